@@ -1,0 +1,165 @@
+//! What a scene calls for, decided once before the first pixel.
+//!
+//! An absent effect casts no ray, takes no branch per pixel and holds no memory: `shade` picks
+//! its kernel by this plan. `tweenray inspect` prints [`EffectPlan::reasons`].
+
+use crate::scene::{Light, Scene, Settings};
+
+/// Which effects run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EffectPlan {
+    /// Perfect mirrors exist and bounces are allowed.
+    pub mirror: bool,
+    /// Glass exists and bounces are allowed.
+    pub glass: bool,
+    /// Diffuse surfaces are lit by area lights with shadow samples.
+    pub area_lights: bool,
+    /// Diffuse surfaces are lit by point or directional lights with hard shadows.
+    pub delta_lights: bool,
+    /// The sky lights diffuse surfaces through sky rays.
+    pub sky_light: bool,
+    /// A ray-free ambient term is added.
+    pub ambient: bool,
+    /// Some material has a texture.
+    pub textures: bool,
+    /// Some mesh has shading normals that differ from its triangles' planes.
+    pub smooth_normals: bool,
+}
+
+/// One line of `inspect`: an effect, whether it runs, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EffectReason {
+    /// The effect's name.
+    pub effect: &'static str,
+    /// Whether it runs.
+    pub runs: bool,
+    /// Why, in a few words with the counts that decided.
+    pub why: String,
+}
+
+impl EffectPlan {
+    /// The plan for `scene` under `settings`.
+    pub fn of(scene: &Scene, settings: &Settings) -> Self {
+        Self::with_reasons(scene, settings).0
+    }
+
+    /// Why each effect runs or not.
+    pub fn reasons(scene: &Scene, settings: &Settings) -> Vec<EffectReason> {
+        Self::with_reasons(scene, settings).1
+    }
+
+    /// The plan that leaves nothing out: for the test that specialised kernels equal it.
+    pub const EVERYTHING: Self = Self {
+        mirror: true,
+        glass: true,
+        area_lights: true,
+        delta_lights: true,
+        sky_light: true,
+        ambient: true,
+        textures: true,
+        smooth_normals: true,
+    };
+
+    fn with_reasons(scene: &Scene, settings: &Settings) -> (Self, Vec<EffectReason>) {
+        let used = UsedMaterials::of(scene);
+        let area = scene
+            .lights
+            .iter()
+            .filter(|l| matches!(l, Light::Quad(_) | Light::Sphere { .. }))
+            .count();
+        let delta = scene.lights.len() - area;
+        let bounces = settings.bounces;
+        let samples = settings.shadow_samples;
+        let sky_bright = scene.sky.radiance.max_element() > 0.0;
+        let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
+        let mut reasons = Vec::new();
+        let mut decide = |effect, runs: bool, why: String| {
+            reasons.push(EffectReason { effect, runs, why });
+            runs
+        };
+        let diffuse = used.diffuse > 0;
+        let no_diffuse = || "no diffuse surface to light".to_string();
+        let plan = Self {
+            mirror: decide(
+                "mirror reflection",
+                used.mirror > 0 && bounces > 0,
+                format!("{} mirror materials in use, {bounces} bounces", used.mirror),
+            ),
+            glass: decide(
+                "glass",
+                used.glass > 0 && bounces > 0,
+                format!("{} glass materials in use, {bounces} bounces", used.glass),
+            ),
+            area_lights: decide(
+                "soft shadows",
+                diffuse && area > 0 && samples > 0,
+                if diffuse {
+                    format!("{area} area lights, {samples} shadow samples")
+                } else {
+                    no_diffuse()
+                },
+            ),
+            delta_lights: decide(
+                "hard shadows",
+                diffuse && delta > 0,
+                if diffuse { format!("{delta} point or directional lights") } else { no_diffuse() },
+            ),
+            sky_light: decide(
+                "sky light",
+                diffuse && sky_bright && scene.sky.lights && settings.sky_samples > 0,
+                if !diffuse {
+                    no_diffuse()
+                } else if !sky_bright {
+                    "the sky is black".into()
+                } else if !scene.sky.lights {
+                    "the sky is only a backdrop".into()
+                } else {
+                    format!("constant sky, {} sky samples", settings.sky_samples)
+                },
+            ),
+            ambient: decide(
+                "ambient term",
+                diffuse && scene.sky.ambient.max_element() > 0.0,
+                if diffuse { format!("ambient {}", scene.sky.ambient) } else { no_diffuse() },
+            ),
+            textures: decide(
+                "textures",
+                used.textured > 0,
+                format!("{} textured materials in use", used.textured),
+            ),
+            smooth_normals: decide(
+                "smooth normals",
+                smooth > 0,
+                format!("{smooth} of {} meshes have shading normals", scene.meshes.len()),
+            ),
+        };
+        (plan, reasons)
+    }
+}
+
+/// How many materials that some surface uses call for what.
+#[derive(Default)]
+struct UsedMaterials {
+    diffuse: usize,
+    mirror: usize,
+    glass: usize,
+    textured: usize,
+}
+
+impl UsedMaterials {
+    fn of(scene: &Scene) -> Self {
+        let mut used = vec![false; scene.materials.len()];
+        let surfaces = scene.meshes.iter().map(|m| m.surface);
+        surfaces
+            .chain(scene.spheres.iter().map(|s| s.surface))
+            .for_each(|s| used[s.material as usize] = true);
+        let mut counts = Self::default();
+        for (material, _) in scene.materials.iter().zip(&used).filter(|(_, used)| **used) {
+            counts.diffuse += usize::from(material.diffuse.max_element() > 0.0);
+            counts.mirror += usize::from(material.mirror.max_element() > 0.0);
+            counts.glass += usize::from(material.glass.is_some());
+            counts.textured += usize::from(material.texture.is_some());
+        }
+        counts
+    }
+}

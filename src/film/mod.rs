@@ -1,0 +1,98 @@
+//! Images and what else a pixel records: plain data, no behaviour beyond indexing.
+
+use crate::math::{Rgb, Vec3};
+
+/// A rendered image with its AOVs. Row 0 is the top; linear radiance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width · height` pixels, row by row.
+    pub rgb: Vec<Rgb>,
+    /// First-hit records, when asked for.
+    pub gbuffer: Option<GBuffer>,
+}
+
+/// Per-pixel first-hit record, of the camera sample nearest the pixel's middle; AOVs are never
+/// averaged over samples, since an average of two surfaces is neither. World space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GBuffer {
+    /// Distance along the view axis, world units; infinity where nothing is hit.
+    pub depth: Vec<f32>,
+    /// Hit point, world units; zero where nothing is hit.
+    pub position: Vec<Vec3>,
+    /// Unit shading normal towards the viewer; zero where nothing is hit.
+    pub normal: Vec<Vec3>,
+    /// Diffuse albedo, textures included.
+    pub albedo: Vec<Rgb>,
+    /// Mesh index + 1 (analytic spheres follow the meshes); 0 where nothing is hit.
+    pub mesh_id: Vec<u32>,
+}
+
+/// One pixel's record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GPixel {
+    /// See [`GBuffer::depth`].
+    pub depth: f32,
+    /// See [`GBuffer::position`].
+    pub position: Vec3,
+    /// See [`GBuffer::normal`].
+    pub normal: Vec3,
+    /// See [`GBuffer::albedo`].
+    pub albedo: Rgb,
+    /// See [`GBuffer::mesh_id`].
+    pub mesh_id: u32,
+}
+
+impl GPixel {
+    /// The record of a pixel where nothing is hit.
+    pub const EMPTY: Self = Self {
+        depth: f32::INFINITY,
+        position: Vec3::ZERO,
+        normal: Vec3::ZERO,
+        albedo: Rgb::ZERO,
+        mesh_id: 0,
+    };
+}
+
+impl Film {
+    /// A black film.
+    pub fn new(width: u32, height: u32, with_gbuffer: bool) -> Self {
+        let n = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            rgb: vec![Rgb::ZERO; n],
+            gbuffer: with_gbuffer.then(|| GBuffer::new(n)),
+        }
+    }
+
+    /// Index of pixel `(x, y)`.
+    pub fn index(&self, x: u32, y: u32) -> usize {
+        y as usize * self.width as usize + x as usize
+    }
+}
+
+impl GBuffer {
+    /// Records of `n` pixels where nothing is hit.
+    pub fn new(n: usize) -> Self {
+        Self {
+            depth: vec![f32::INFINITY; n],
+            position: vec![Vec3::ZERO; n],
+            normal: vec![Vec3::ZERO; n],
+            albedo: vec![Rgb::ZERO; n],
+            mesh_id: vec![0; n],
+        }
+    }
+
+    /// Writes one pixel's record.
+    pub fn set(&mut self, index: usize, p: &GPixel) {
+        self.depth[index] = p.depth;
+        self.position[index] = p.position;
+        self.normal[index] = p.normal;
+        self.albedo[index] = p.albedo;
+        self.mesh_id[index] = p.mesh_id;
+    }
+}

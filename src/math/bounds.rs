@@ -1,0 +1,71 @@
+//! Axis-aligned boxes in f64.
+
+use super::DVec3;
+
+/// An axis-aligned box; empty while `min > max` on an axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds3 {
+    /// Lower corner.
+    pub min: DVec3,
+    /// Upper corner.
+    pub max: DVec3,
+}
+
+impl Bounds3 {
+    /// The box of no point: `include` grows it.
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// True while no point was included.
+    pub fn is_empty(&self) -> bool {
+        self.min.cmpgt(self.max).any()
+    }
+
+    /// Grows the box to hold `p`.
+    pub fn include(&mut self, p: DVec3) {
+        self.min = self.min.min(p);
+        self.max = self.max.max(p);
+    }
+
+    /// The smallest box that holds both.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Middle of the box; zero for the empty box.
+    pub fn centre(&self) -> DVec3 {
+        if self.is_empty() { DVec3::ZERO } else { 0.5 * self.min + 0.5 * self.max }
+    }
+
+    /// Edge lengths; zero for the empty box.
+    pub fn extent(&self) -> DVec3 {
+        if self.is_empty() { DVec3::ZERO } else { self.max - self.min }
+    }
+
+    /// Half the diagonal.
+    pub fn radius(&self) -> f64 {
+        0.5 * self.extent().length()
+    }
+
+    /// Whether `p` lies in the closed box.
+    pub fn contains(&self, p: DVec3) -> bool {
+        p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+
+    /// The part `(t_near, t_far)` of the ray `org + t·dir`, t in `[tnear, tfar]`, inside the box.
+    ///
+    /// `inv_dir` is `1/dir` by component; zero components may be ±infinity. NaN from `0·inf`
+    /// (a ray in a face's plane) counts as inside that slab.
+    pub fn clip(&self, org: DVec3, inv_dir: DVec3, tnear: f64, tfar: f64) -> Option<(f64, f64)> {
+        let (mut near, mut far) = (tnear, tfar);
+        for axis in 0..3 {
+            let a = (self.min[axis] - org[axis]) * inv_dir[axis];
+            let b = (self.max[axis] - org[axis]) * inv_dir[axis];
+            if a.is_nan() || b.is_nan() {
+                continue;
+            }
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
+        }
+        (near <= far).then_some((near, far))
+    }
+}

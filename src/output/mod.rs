@@ -1,0 +1,3 @@
+//! Films to files, each whole or absent: png, exr, ppm, the manifest, the preview video.
+
+mod manifest;

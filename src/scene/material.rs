@@ -1,0 +1,70 @@
+//! Materials and textures: the parameters of a surface's scattering, no behaviour.
+
+use crate::math::Rgb;
+
+/// Index into `Scene::materials`.
+pub type MaterialId = u32;
+/// Index into `Scene::textures`.
+pub type TextureId = u32;
+
+/// A surface's parameters. Components add up: the course's materials are diffuse and
+/// mirror-like at once. Reflectances are linear RGB in `[0, 1]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name as the file spells it.
+    pub name: String,
+    /// Diffuse reflectance (albedo), Lambertian, both sides.
+    pub diffuse: Rgb,
+    /// Image that multiplies `diffuse`.
+    pub texture: Option<TextureId>,
+    /// Reflectance of a perfect mirror, both sides.
+    pub mirror: Rgb,
+    /// Clear glass; then `diffuse` and `mirror` are zero.
+    pub glass: Option<Glass>,
+    /// Emitted radiance.
+    pub emission: Rgb,
+    /// Whether the back emits too.
+    pub emits_back: bool,
+}
+
+impl Material {
+    /// A material that reflects and emits nothing.
+    pub fn black(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            diffuse: Rgb::ZERO,
+            texture: None,
+            mirror: Rgb::ZERO,
+            glass: None,
+            emission: Rgb::ZERO,
+            emits_back: false,
+        }
+    }
+
+    /// A Lambertian material.
+    pub fn diffuse(name: impl Into<String>, albedo: Rgb) -> Self {
+        Self { diffuse: albedo, ..Self::black(name) }
+    }
+}
+
+/// A smooth dielectric boundary; the mesh's outward normals point to the outside medium.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Glass {
+    /// Index of refraction inside, relative to outside; positive.
+    pub ior: f64,
+    /// Share of light that each crossing transmits, linear RGB (white is clear).
+    pub tint: Rgb,
+}
+
+/// A decoded image, linear RGB, row 0 at the top.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    /// The file it came from.
+    pub name: String,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width · height` texels, row by row.
+    pub texels: Vec<Rgb>,
+}

@@ -1,0 +1,121 @@
+//! Meshes and spheres, before (`World…`) and after recentring.
+
+use super::MaterialId;
+use crate::math::{Bounds3, DVec3, Vec2, Vec3};
+
+/// A per-corner attribute: values, and which value each triangle's corners use.
+///
+/// `corners: None` means that the attribute is indexed like the positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Corners<T> {
+    /// The values.
+    pub values: Vec<T>,
+    /// Three indices into `values` a triangle, or `None` for the triangle's own.
+    pub corners: Option<Vec<[u32; 3]>>,
+}
+
+impl<T: Copy> Corners<T> {
+    /// The three values at the corners of triangle `prim`, whose position indices are `triangle`.
+    pub fn get(&self, prim: usize, triangle: [u32; 3]) -> [T; 3] {
+        let at = self.corners.as_ref().map_or(triangle, |c| c[prim]);
+        at.map(|i| self.values[i as usize])
+    }
+}
+
+/// How shading normals come about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NormalPolicy {
+    /// The file's normals where it has them, else smooth with the crease angle.
+    Auto {
+        /// Edges sharper than this stay sharp; degrees.
+        crease_degrees: f64,
+    },
+    /// The triangle's own plane.
+    Flat,
+    /// Area- and angle-weighted vertex normals, split at edges sharper than the crease angle.
+    Smooth {
+        /// Edges sharper than this stay sharp; degrees.
+        crease_degrees: f64,
+    },
+}
+
+/// What the surface of a mesh or sphere is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Surface {
+    /// Its material.
+    pub material: MaterialId,
+    /// The area light whose emitting surface this is: an index into `Scene::lights`.
+    pub light: Option<u32>,
+}
+
+/// A mesh in world space, f64. Invariant: every index is in range and every number finite.
+#[derive(Debug, Clone)]
+pub struct WorldMesh {
+    /// Name for messages and AOVs.
+    pub name: String,
+    /// Vertex positions, world units.
+    pub positions: Vec<DVec3>,
+    /// Vertex indices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Shading normals (unit, or zero where the file's was unusable); `None` shades flat.
+    pub normals: Option<Corners<Vec3>>,
+    /// Texture coordinates, origin at the image's lower left.
+    pub uvs: Option<Corners<Vec2>>,
+    /// The material of all its triangles.
+    pub material: MaterialId,
+}
+
+/// A mesh in scene space, f32: the very numbers that Embree holds.
+#[derive(Debug, Clone)]
+pub struct Mesh {
+    /// Name for messages and AOVs.
+    pub name: String,
+    /// Vertex positions, scene space. One spare element follows the last vertex in memory
+    /// (Embree reads 16 bytes a vertex); `vertex_count` is the true number.
+    pub positions: Vec<Vec3>,
+    /// Vertices without the spare one.
+    pub vertex_count: usize,
+    /// Vertex indices.
+    pub triangles: Vec<[u32; 3]>,
+    /// Shading normals, or `None` to shade flat.
+    pub normals: Option<Corners<Vec3>>,
+    /// Texture coordinates.
+    pub uvs: Option<Corners<Vec2>>,
+    /// What it is made of.
+    pub surface: Surface,
+    /// Bounds of the f32 positions that triangles use.
+    pub bounds: Bounds3,
+}
+
+impl Mesh {
+    /// The f32 corners of triangle `prim`, widened: what every f64 computation starts from.
+    pub fn corners(&self, prim: usize) -> [DVec3; 3] {
+        self.triangles[prim].map(|i| self.positions[i as usize].as_dvec3())
+    }
+}
+
+/// An analytic sphere in world space.
+#[derive(Debug, Clone)]
+pub struct WorldSphere {
+    /// Name for messages and AOVs.
+    pub name: String,
+    /// Centre, world units.
+    pub centre: DVec3,
+    /// Radius, world units, positive.
+    pub radius: f64,
+    /// Its material.
+    pub material: MaterialId,
+}
+
+/// An analytic sphere in scene space, f64.
+#[derive(Debug, Clone)]
+pub struct Sphere {
+    /// Name for messages and AOVs.
+    pub name: String,
+    /// Centre, scene space.
+    pub centre: DVec3,
+    /// Radius, scene space.
+    pub radius: f64,
+    /// What it is made of.
+    pub surface: Surface,
+}

@@ -1,0 +1,80 @@
+//! The scene as plain immutable data with indices, in two forms.
+//!
+//! [`World`] is what import makes: f64, in the user's units. [`World::into_scene`] moves it to
+//! its own centre, scales it by a power of two to about unit size and rounds positions to f32
+//! once: that is the [`Scene`] that Embree, the f64 recheck and the oracle all see. Everything
+//! downstream of here works in *scene space*; [`Recentring`] leads back to the world.
+//!
+//! Not done: instances share no memory; every placed mesh is its own copy
+//! (`docs/decisions`).
+
+mod camera;
+mod light;
+mod material;
+mod mesh;
+mod path;
+mod recentre;
+mod settings;
+
+pub use camera::{Camera, Pose};
+pub use light::{Light, QuadLight, Sky};
+pub use material::{Glass, Material, MaterialId, Texture, TextureId};
+pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
+pub use path::{CameraPath, Easing, KeyPose, Shot};
+pub use recentre::Recentring;
+pub use settings::{
+    Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
+};
+
+use crate::math::Bounds3;
+
+/// A scene as read: f64 positions in world units (y up unless the file says otherwise).
+#[derive(Debug, Clone, Default)]
+pub struct World {
+    /// Placed meshes (transforms already applied).
+    pub meshes: Vec<WorldMesh>,
+    /// Placed analytic spheres.
+    pub spheres: Vec<WorldSphere>,
+    /// Materials, named by [`MaterialId`].
+    pub materials: Vec<Material>,
+    /// Decoded images, named by [`TextureId`].
+    pub textures: Vec<Texture>,
+    /// Lights without a surface in `meshes` or `spheres`: point, directional, quad, sphere.
+    /// Area lights get their emitting surface from [`World::into_scene`].
+    pub lights: Vec<Light>,
+    /// What a ray that hits nothing sees.
+    pub sky: Sky,
+}
+
+/// A scene ready to trace: immutable, in scene space (see [`Recentring`]).
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// How world and scene space belong together.
+    pub recentring: Recentring,
+    /// Triangle meshes; a mesh's index is its `geom_id`.
+    pub meshes: Vec<Mesh>,
+    /// Analytic spheres; together they are the geometry after the last mesh.
+    pub spheres: Vec<Sphere>,
+    /// Materials.
+    pub materials: Vec<Material>,
+    /// Textures.
+    pub textures: Vec<Texture>,
+    /// Lights, area lights included.
+    pub lights: Vec<Light>,
+    /// What a ray that hits nothing sees.
+    pub sky: Sky,
+    /// Bounds of all geometry, f64, scene space.
+    pub bounds: Bounds3,
+}
+
+impl Scene {
+    /// The `geom_id` under which the analytic spheres are traced.
+    pub fn sphere_geom_id(&self) -> u32 {
+        self.meshes.len() as u32
+    }
+
+    /// Triangles in all meshes.
+    pub fn triangle_count(&self) -> usize {
+        self.meshes.iter().map(|m| m.triangles.len()).sum()
+    }
+}

@@ -1,0 +1,267 @@
+//! From world space (f64, the user's units) to scene space (f32, about unit size).
+
+use super::{
+    Corners, Light, Material, Mesh, QuadLight, Scene, Sphere, Surface, World, WorldMesh,
+    WorldSphere,
+};
+use crate::error::{Error, Result};
+use crate::math::{Bounds3, DVec3, Rgb, Vec3};
+
+/// `scene = (world − centre) · 2^log2_scale`. A power of two, so scaling rounds nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recentring {
+    /// World point that becomes the scene's origin.
+    pub centre: DVec3,
+    /// Exponent of the scale.
+    pub log2_scale: i32,
+}
+
+impl Recentring {
+    /// World and scene space are the same.
+    pub const IDENTITY: Self = Self { centre: DVec3::ZERO, log2_scale: 0 };
+
+    /// The recentring that brings `bounds` (world) to the origin and its longest half edge
+    /// into `(0.5, 1]`.
+    pub fn of(bounds: &Bounds3) -> Self {
+        let half = 0.5 * bounds.extent().max_element();
+        let log2_scale = if half > 0.0 { -libm::ceil(libm::log2(half)) as i32 } else { 0 };
+        Self { centre: bounds.centre(), log2_scale }
+    }
+
+    /// Scene units in a world unit: a power of two.
+    pub fn scale(&self) -> f64 {
+        libm::ldexp(1.0, self.log2_scale)
+    }
+
+    /// A world point in scene space.
+    pub fn point_to_scene(&self, p: DVec3) -> DVec3 {
+        (p - self.centre) * self.scale()
+    }
+
+    /// A scene point in world space.
+    pub fn point_to_world(&self, p: DVec3) -> DVec3 {
+        p / self.scale() + self.centre
+    }
+
+    /// A scene length in world units.
+    pub fn length_to_world(&self, length: f64) -> f64 {
+        length / self.scale()
+    }
+}
+
+impl World {
+    /// Bounds of all geometry and area lights, world space.
+    pub fn bounds(&self) -> Bounds3 {
+        let mut bounds = Bounds3::EMPTY;
+        for mesh in &self.meshes {
+            mesh.positions.iter().for_each(|p| bounds.include(*p));
+        }
+        for s in &self.spheres {
+            bounds.include(s.centre - DVec3::splat(s.radius));
+            bounds.include(s.centre + DVec3::splat(s.radius));
+        }
+        for light in &self.lights {
+            match light {
+                Light::Quad(q) => q.corners.iter().for_each(|c| bounds.include(*c)),
+                Light::Sphere { centre, radius, .. } => {
+                    bounds.include(*centre - DVec3::splat(*radius));
+                    bounds.include(*centre + DVec3::splat(*radius));
+                }
+                Light::Point { .. } | Light::Directional { .. } => {}
+            }
+        }
+        bounds
+    }
+
+    /// Moves the world to scene space and rounds positions to f32, once. Area lights get their
+    /// emitting surface. With `recentre` false the world's own coordinates are rounded as they
+    /// are: that shows what the rule is worth.
+    ///
+    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units.
+    pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
+        let bounds = self.bounds();
+        let size = bounds.extent().max_element();
+        if !bounds.is_empty() && !(size == 0.0 || (1e-30..=1e30).contains(&size)) {
+            return Err(Error::Usage(format!(
+                "the scene is {size:e} units wide; from 1e-30 to 1e30 can be rendered. Use `scale`"
+            )));
+        }
+        let recentring = if recentre { Recentring::of(&bounds) } else { Recentring::IDENTITY };
+        let lights: Vec<Light> = std::mem::take(&mut self.lights)
+            .into_iter()
+            .map(|l| to_scene_light(l, &recentring))
+            .collect();
+
+        let mut meshes: Vec<Mesh> = std::mem::take(&mut self.meshes)
+            .into_iter()
+            .map(|m| to_scene_mesh(m, &self.materials, &recentring))
+            .collect();
+        let mut spheres: Vec<Sphere> =
+            self.spheres.into_iter().map(|s| to_scene_sphere(s, &recentring)).collect();
+        for (index, light) in lights.iter().enumerate() {
+            add_emitting_surface(
+                index as u32,
+                light,
+                &mut self.materials,
+                &mut meshes,
+                &mut spheres,
+            );
+        }
+        let mut scene_bounds = meshes.iter().fold(Bounds3::EMPTY, |b, m| b.union(m.bounds));
+        for s in &spheres {
+            scene_bounds.include(s.centre - DVec3::splat(s.radius));
+            scene_bounds.include(s.centre + DVec3::splat(s.radius));
+        }
+        Ok(Scene {
+            recentring,
+            meshes,
+            spheres,
+            materials: self.materials,
+            textures: self.textures,
+            lights,
+            sky: self.sky,
+            bounds: scene_bounds,
+        })
+    }
+}
+
+fn to_scene_light(light: Light, r: &Recentring) -> Light {
+    let scale = r.scale();
+    match light {
+        // Irradiance intensity/d² stays what it was in world units.
+        Light::Point { position, intensity } => Light::Point {
+            position: r.point_to_scene(position),
+            intensity: (intensity.as_dvec3() * scale * scale).as_vec3(),
+        },
+        Light::Directional { .. } => light,
+        Light::Quad(q) => {
+            // The emitting mesh holds f32 corners; the light uses the very same points.
+            let corners = q.corners.map(|c| r.point_to_scene(c).as_vec3().as_dvec3());
+            Light::Quad(QuadLight { corners, ..q })
+        }
+        Light::Sphere { centre, radius, radiance } => {
+            Light::Sphere { centre: r.point_to_scene(centre), radius: radius * scale, radiance }
+        }
+    }
+}
+
+fn to_scene_sphere(s: WorldSphere, r: &Recentring) -> Sphere {
+    Sphere {
+        name: s.name,
+        centre: r.point_to_scene(s.centre),
+        radius: s.radius * r.scale(),
+        surface: Surface { material: s.material, light: None },
+    }
+}
+
+fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> Mesh {
+    let WorldMesh { name, positions, mut triangles, mut normals, mut uvs, material } = mesh;
+    let inside_out = materials[material as usize].glass.is_some()
+        && closed_volume(&positions, &triangles).is_some_and(|volume| volume < 0.0);
+    if inside_out {
+        // Glass tells inside from outside by the winding; a file with reversed faces would
+        // otherwise refract as a hole in glass.
+        reverse(&mut triangles, &mut normals, &mut uvs);
+    }
+    let positions = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
+    scene_mesh(name, positions, triangles, normals, uvs, Surface { material, light: None })
+}
+
+fn scene_mesh(
+    name: String,
+    mut positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    normals: Option<Corners<Vec3>>,
+    uvs: Option<Corners<crate::math::Vec2>>,
+    surface: Surface,
+) -> Mesh {
+    let mut bounds = Bounds3::EMPTY;
+    for t in &triangles {
+        t.iter().for_each(|i| bounds.include(positions[*i as usize].as_dvec3()));
+    }
+    let vertex_count = positions.len();
+    positions.push(Vec3::ZERO);
+    Mesh { name, positions, vertex_count, triangles, normals, uvs, surface, bounds }
+}
+
+fn reverse(
+    triangles: &mut [[u32; 3]],
+    normals: &mut Option<Corners<Vec3>>,
+    uvs: &mut Option<Corners<crate::math::Vec2>>,
+) {
+    triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    if let Some(n) = normals {
+        n.values.iter_mut().for_each(|v| *v = -*v);
+        n.corners.iter_mut().flatten().for_each(|t| t.swap(1, 2));
+    }
+    if let Some(uv) = uvs {
+        uv.corners.iter_mut().flatten().for_each(|t| t.swap(1, 2));
+    }
+}
+
+/// Signed volume of a closed mesh: positive when its faces wind counter-clockwise seen from
+/// outside; `None` when an edge has not exactly one partner that runs the other way.
+fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
+    // Vertices at the same place are one corner, however often the file lists them.
+    let mut welded = std::collections::HashMap::with_capacity(positions.len());
+    let weld: Vec<u32> = positions
+        .iter()
+        .map(|p| {
+            let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+            let next = welded.len() as u32;
+            *welded.entry(key).or_insert(next)
+        })
+        .collect();
+    let mut edges = std::collections::HashMap::with_capacity(triangles.len() * 3);
+    for t in triangles {
+        let t = t.map(|i| weld[i as usize]);
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            if a != b {
+                *edges.entry((a.min(b), a.max(b))).or_insert(0i64) += if a < b { 1 } else { -1 };
+            }
+        }
+    }
+    if triangles.is_empty() || edges.values().any(|balance| *balance != 0) {
+        return None;
+    }
+    let origin = positions[triangles[0][0] as usize];
+    let volume = triangles.iter().map(|t| {
+        let [a, b, c] = t.map(|i| positions[i as usize] - origin);
+        a.dot(b.cross(c))
+    });
+    Some(volume.sum())
+}
+
+fn add_emitting_surface(
+    index: u32,
+    light: &Light,
+    materials: &mut Vec<Material>,
+    meshes: &mut Vec<Mesh>,
+    spheres: &mut Vec<Sphere>,
+) {
+    let mut emitter = |radiance: Rgb, emits_back: bool| {
+        let name = format!("light {}", index + 1);
+        materials.push(Material { emission: radiance, emits_back, ..Material::black(name) });
+        Surface { material: materials.len() as u32 - 1, light: Some(index) }
+    };
+    let name = format!("light {}", index + 1);
+    match light {
+        Light::Quad(q) => {
+            let surface = emitter(q.radiance, q.two_sided);
+            let positions = q.corners.iter().map(|c| c.as_vec3()).collect();
+            meshes.push(scene_mesh(
+                name,
+                positions,
+                vec![[0, 1, 2], [0, 2, 3]],
+                None,
+                None,
+                surface,
+            ));
+        }
+        Light::Sphere { centre, radius, radiance } => {
+            let surface = emitter(*radiance, false);
+            spheres.push(Sphere { name, centre: *centre, radius: *radius, surface });
+        }
+        Light::Point { .. } | Light::Directional { .. } => {}
+    }
+}

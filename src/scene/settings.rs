@@ -1,0 +1,163 @@
+//! Everything a job can set, resolved: scene file first, command line over it.
+
+use serde::{Deserialize, Serialize};
+
+/// The settings of a job. All of them reach the manifest, since a frame is a pure function of
+/// scene, settings and frame number (threads and output places excepted, which are not here).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Image columns.
+    pub width: u32,
+    /// Image rows.
+    pub height: u32,
+    /// Camera samples a pixel.
+    pub spp: u32,
+    /// Pixel filter.
+    pub filter: Filter,
+    /// Shadow samples per area light and camera sample.
+    pub shadow_samples: u32,
+    /// Sky rays per camera sample where the sky lights the scene.
+    pub sky_samples: u32,
+    /// Specular bounces after the camera ray.
+    pub bounces: u32,
+    /// A specular branch whose throughput (largest channel) falls below this is dropped.
+    pub cutoff: f32,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Factor on radiance before the tone curve.
+    pub exposure: f32,
+    /// Tone curve of 8- and 16-bit files.
+    pub tone: ToneCurve,
+    /// Bits a channel of png files: 8 or 16.
+    pub png_bits: u8,
+    /// Which intersector.
+    pub intersector: IntersectorKind,
+    /// Embree's instruction set ("avx2"), or `None` for the machine's best.
+    pub isa: Option<String>,
+    /// The rules that make hits trustworthy.
+    pub rules: HitRules,
+    /// Which part of the image is rendered; `None` for all of it.
+    pub crop: Option<Rect>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            width: 640,
+            height: 360,
+            spp: 4,
+            filter: Filter::Box,
+            shadow_samples: 16,
+            sky_samples: 16,
+            bounces: 4,
+            cutoff: 1e-3,
+            seed: 0,
+            exposure: 1.0,
+            tone: ToneCurve::Srgb,
+            png_bits: 8,
+            intersector: IntersectorKind::Embree,
+            isa: None,
+            rules: HitRules::default(),
+            crop: None,
+        }
+    }
+}
+
+/// Pixel filter. All are non-negative and importance-sampled, so a pixel uses its own samples only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Filter {
+    /// One pixel wide.
+    Box,
+    /// Triangle of radius 1 pixel.
+    Tent,
+    /// Gaussian of standard deviation 0.5 pixel, cut at 1.5.
+    Gaussian,
+    /// Blackman–Harris window of radius 1.5 pixels.
+    BlackmanHarris,
+}
+
+/// How linear radiance becomes a display value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToneCurve {
+    /// Clip to [0, 1], then the sRGB transfer function.
+    Srgb,
+    /// Clip to [0, 1], no transfer function.
+    Linear,
+    /// Reinhard's `x / (1 + x)` on luminance, then sRGB (Reinhard et al., 2002).
+    Reinhard,
+    /// A filmic S-curve fitted to ACES (Narkowicz, 2015), then sRGB.
+    Filmic,
+}
+
+/// Which intersector traces the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntersectorKind {
+    /// Embree 4.
+    Embree,
+    /// The f64 Möller–Trumbore path: brute force, for small scenes and for trust.
+    Oracle,
+}
+
+/// Switches of the rules in `docs/architecture.md`, "Intersection: trust nothing".
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HitRules {
+    /// Embree's ROBUST traversal.
+    pub robust: bool,
+    /// One deterministic second try for a camera or specular ray that misses inside the bounds.
+    pub retry: bool,
+    /// Which hits are recomputed in f64.
+    pub recheck: Recheck,
+    /// Move spawned rays' origins by their rounding-error bound and exclude their primitive.
+    pub spawn_offset: bool,
+    /// Move the scene to its own centre and to unit size.
+    pub recentre: bool,
+}
+
+impl Default for HitRules {
+    fn default() -> Self {
+        Self {
+            robust: true,
+            retry: true,
+            recheck: Recheck::Always,
+            spawn_offset: true,
+            recentre: true,
+        }
+    }
+}
+
+/// Which hits are recomputed in f64.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Recheck {
+    /// Every hit.
+    Always,
+    /// Grazing hits, slivers, hits near an edge.
+    Risky,
+    /// None.
+    Off,
+}
+
+/// Pixels `x0 <= x < x1`, `y0 <= y < y1`; row 0 is the top.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rect {
+    /// First column.
+    pub x0: u32,
+    /// First row.
+    pub y0: u32,
+    /// One past the last column.
+    pub x1: u32,
+    /// One past the last row.
+    pub y1: u32,
+}
+
+/// Frames to render, counted from 1, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FrameRange {
+    /// First frame.
+    pub first: u32,
+    /// Last frame.
+    pub last: u32,
+}
