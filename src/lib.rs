@@ -7,6 +7,7 @@
 // Floor 0: numbers and plain records.
 pub mod error;
 pub mod math;
+pub mod ray;
 pub mod sampling;
 pub mod stats;
 
