@@ -42,14 +42,29 @@ typedef struct Context {
   const TrRay* rays;
 } Context;
 
+/* Words of a packet in Embree's structure-of-arrays layout, lane `i` of `n`; the header has
+   accessors for C++ only. A hit packet follows its ray packet after 12 words a lane. */
+enum { RAY_TFAR = 8, RAY_ID = 10, RAY_WORDS = 12 };
+enum { HIT_NG_X, HIT_NG_Y, HIT_NG_Z, HIT_U, HIT_V, HIT_PRIM, HIT_GEOM, HIT_INST };
+
+static float* float_at(void* packet, unsigned n, unsigned word, unsigned i) {
+  return (float*)packet + (size_t)word * n + i;
+}
+static unsigned* id_at(void* packet, unsigned n, unsigned word, unsigned i) {
+  return (unsigned*)packet + (size_t)word * n + i;
+}
+static const TrRay* original(const Context* context, void* rays, unsigned n, unsigned i) {
+  return &context->rays[*id_at(rays, n, RAY_ID, i)];
+}
+
 /* Drops the primitive that a ray leaves from its candidates. */
 static void exclude_own_primitive(const struct RTCFilterFunctionNArguments* args) {
   const Context* context = (const Context*)args->context;
   for (unsigned i = 0; i < args->N; i++) {
     if (args->valid[i] != -1) continue;
-    const TrRay* ray = &context->rays[RTCRayN_id(args->ray, args->N, i)];
-    if (ray->exclude_prim == RTCHitN_primID(args->hit, args->N, i) &&
-        ray->exclude_geom == RTCHitN_geomID(args->hit, args->N, i))
+    const TrRay* ray = original(context, args->ray, args->N, i);
+    if (ray->exclude_prim == *id_at(args->hit, args->N, HIT_PRIM, i) &&
+        ray->exclude_geom == *id_at(args->hit, args->N, HIT_GEOM, i))
       args->valid[i] = 0;
   }
 }
@@ -145,32 +160,29 @@ static double sphere_root(const TrRay* ray, const TrSphere* s, int leaving, doub
   return NAN;
 }
 
-static double lane_root(struct RTCRayN* rays, unsigned n, unsigned lane, const Context* context,
+static double lane_root(void* rays, unsigned n, unsigned lane, const Context* context,
                         const TrSphere* spheres, unsigned geom, unsigned prim) {
-  const TrRay* ray = &context->rays[RTCRayN_id(rays, n, lane)];
+  const TrRay* ray = original(context, rays, n, lane);
   int leaving = ray->exclude_geom == geom && ray->exclude_prim == prim;
-  double tfar = RTCRayN_tfar(rays, n, lane);
+  double tfar = *float_at(rays, n, RAY_TFAR, lane);
   return sphere_root(ray, &spheres[prim], leaving, ray->tnear, fmin(tfar, ray->tfar));
 }
 
 static void sphere_intersect(const struct RTCIntersectFunctionNArguments* args) {
   const Context* context = (const Context*)args->context;
-  struct RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, args->N);
-  struct RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, args->N);
+  void* rays = args->rayhit;
+  void* hits = float_at(rays, args->N, RAY_WORDS, 0);
   for (unsigned i = 0; i < args->N; i++) {
     if (args->valid[i] != -1) continue;
     double t = lane_root(rays, args->N, i, context, args->geometryUserPtr, args->geomID,
                          args->primID);
     if (isnan(t)) continue;
-    RTCRayN_tfar(rays, args->N, i) = (float)t;
-    RTCHitN_Ng_x(hits, args->N, i) = 0.0f;
-    RTCHitN_Ng_y(hits, args->N, i) = 0.0f;
-    RTCHitN_Ng_z(hits, args->N, i) = 0.0f;
-    RTCHitN_u(hits, args->N, i) = 0.0f;
-    RTCHitN_v(hits, args->N, i) = 0.0f;
-    RTCHitN_primID(hits, args->N, i) = args->primID;
-    RTCHitN_geomID(hits, args->N, i) = args->geomID;
-    RTCHitN_instID(hits, args->N, i, 0) = RTC_INVALID_GEOMETRY_ID;
+    *float_at(rays, args->N, RAY_TFAR, i) = (float)t;
+    for (unsigned word = HIT_NG_X; word <= HIT_V; word++)
+      *float_at(hits, args->N, word, i) = 0.0f;
+    *id_at(hits, args->N, HIT_PRIM, i) = args->primID;
+    *id_at(hits, args->N, HIT_GEOM, i) = args->geomID;
+    *id_at(hits, args->N, HIT_INST, i) = RTC_INVALID_GEOMETRY_ID;
   }
 }
 
@@ -180,7 +192,7 @@ static void sphere_occluded(const struct RTCOccludedFunctionNArguments* args) {
     if (args->valid[i] != -1) continue;
     double t = lane_root(args->ray, args->N, i, context, args->geometryUserPtr, args->geomID,
                          args->primID);
-    if (!isnan(t)) RTCRayN_tfar(args->ray, args->N, i) = -INFINITY;
+    if (!isnan(t)) *float_at(args->ray, args->N, RAY_TFAR, i) = -INFINITY;
   }
 }
 

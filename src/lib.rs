@@ -12,6 +12,7 @@ pub mod sampling;
 pub mod stats;
 
 // Floor 1: the only room with `unsafe`.
+#[allow(unsafe_code)]
 pub mod embree;
 
 // Floor 2: plain data.

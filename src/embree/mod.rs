@@ -78,7 +78,10 @@ impl Device {
         // SAFETY: `config` is a NUL-terminated string that outlives the call.
         let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };
         if raw.is_null() {
-            return Err(Error::Embree(format!("cannot open a device ({})", config.to_string_lossy())));
+            return Err(Error::Embree(format!(
+                "cannot open a device ({})",
+                config.to_string_lossy()
+            )));
         }
         let device = Self { raw, memory: Box::new(AtomicI64::new(0)) };
         let counter: *const AtomicI64 = &*device.memory;
@@ -95,7 +98,7 @@ impl Device {
     fn check(&self, doing: &str) -> Result<()> {
         // SAFETY: `raw` is a live device.
         let code = unsafe { sys::rtcGetDeviceError(self.raw) };
-        if code == sys::RTCError_RTC_ERROR_NONE {
+        if code == sys::RTC_ERROR_NONE {
             return Ok(());
         }
         // SAFETY: `raw` is a live device; the message is a NUL-terminated string of Embree's.
@@ -175,7 +178,7 @@ impl<'g> SceneBuilder<'g> {
         device.check("make a scene")?;
         if options.robust {
             // SAFETY: the scene is live and not committed yet.
-            unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTCSceneFlags_RTC_SCENE_FLAG_ROBUST) };
+            unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
         }
         Ok(Self { scene, device, spheres: Vec::new(), next_id: 0, geometry: PhantomData })
     }
@@ -196,16 +199,16 @@ impl<'g> SceneBuilder<'g> {
         if triangles.iter().flatten().any(|i| *i as usize >= vertex_count) {
             return Err(Error::Embree("a triangle names a vertex that does not exist".into()));
         }
-        self.add(sys::RTCGeometryType_RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
+        self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
             // SAFETY: both slices live for 'g, which the committed scene borrows; sizes, strides
             // and the 16-byte read of the last vertex were checked above ("rtcSetSharedGeometry-
             // Buffer": the buffer must be padded to 16 bytes and stay alive).
             unsafe {
                 sys::rtcSetSharedGeometryBuffer(
                     geometry,
-                    sys::RTCBufferType_RTC_BUFFER_TYPE_VERTEX,
+                    sys::RTC_BUFFER_TYPE_VERTEX,
                     0,
-                    sys::RTCFormat_RTC_FORMAT_FLOAT3,
+                    sys::RTC_FORMAT_FLOAT3,
                     positions.as_ptr().cast(),
                     0,
                     size_of::<Vec3>(),
@@ -213,9 +216,9 @@ impl<'g> SceneBuilder<'g> {
                 );
                 sys::rtcSetSharedGeometryBuffer(
                     geometry,
-                    sys::RTCBufferType_RTC_BUFFER_TYPE_INDEX,
+                    sys::RTC_BUFFER_TYPE_INDEX,
                     0,
-                    sys::RTCFormat_RTC_FORMAT_UINT3,
+                    sys::RTC_FORMAT_UINT3,
                     triangles.as_ptr().cast(),
                     0,
                     size_of::<[u32; 3]>(),
@@ -228,7 +231,7 @@ impl<'g> SceneBuilder<'g> {
     /// Adds analytic spheres as one geometry and returns its `geom_id`.
     pub fn add_spheres(&mut self, spheres: Vec<SphereData>) -> Result<u32> {
         let spheres = spheres.into_boxed_slice();
-        let id = self.add(sys::RTCGeometryType_RTC_GEOMETRY_TYPE_USER, |geometry| {
+        let id = self.add(sys::RTC_GEOMETRY_TYPE_USER, |geometry| {
             // SAFETY: the boxed slice does not move, and the scene that the geometry is attached
             // to is dropped before the box (field order here and in `CommittedScene`).
             unsafe { tr_set_spheres(geometry, spheres.as_ptr(), spheres.len() as u32) };
@@ -266,14 +269,13 @@ impl<'g> SceneBuilder<'g> {
         unsafe { sys::rtcCommitScene(self.scene.0) };
         self.device.check("build the scene")?;
         let native = |property| self.device.property(property) != 0;
-        let width =
-            if native(sys::RTCDeviceProperty_RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) {
-                16
-            } else if native(sys::RTCDeviceProperty_RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) {
-                8
-            } else {
-                4
-            };
+        let width = if native(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) {
+            16
+        } else if native(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) {
+            8
+        } else {
+            4
+        };
         Ok(CommittedScene {
             scene: self.scene,
             device: self.device,
@@ -306,7 +308,7 @@ impl CommittedScene<'_> {
 
     /// Version of the Embree library that is loaded, "4.3.3".
     pub fn library_version(&self) -> String {
-        let v = self.device.property(sys::RTCDeviceProperty_RTC_DEVICE_PROPERTY_VERSION);
+        let v = self.device.property(sys::RTC_DEVICE_PROPERTY_VERSION);
         format!("{}.{}.{}", v / 10000, v / 100 % 100, v % 100)
     }
 

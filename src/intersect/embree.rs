@@ -72,12 +72,8 @@ impl<'s> EmbreeIntersector<'s> {
             return Some((*ray, 0.0));
         }
         let (near, _) = self.bounds.clip(ray.org, 1.0 / ray.dir, ray.tnear, ray.tfar)?;
-        let moved = Ray {
-            org: ray.at(near),
-            tnear: ray.tnear - near,
-            tfar: ray.tfar - near,
-            ..*ray
-        };
+        let moved =
+            Ray { org: ray.at(near), tnear: ray.tnear - near, tfar: ray.tfar - near, ..*ray };
         Some((moved, near))
     }
 
@@ -140,7 +136,7 @@ impl<'s> EmbreeIntersector<'s> {
             if let Some(accepted) = self.recheck(ray, shift, &hit) {
                 return Some(accepted);
             }
-            let beyond = Ray { tnear: f64::from(hit.t.next_up()), ..moved };
+            let beyond = Ray { tnear: just_beyond(hit.t), ..moved };
             if beyond.tnear > beyond.tfar {
                 return None;
             }
@@ -195,16 +191,17 @@ impl<'s> EmbreeIntersector<'s> {
     }
 }
 
+/// The next f32 after a hit's `t`, which is not negative.
+fn just_beyond(t: f32) -> f64 {
+    f64::from(f32::from_bits(t.max(0.0).to_bits() + 1))
+}
+
 /// Each component away from zero by 4 ulp of f32.
 fn nudge(dir: DVec3) -> DVec3 {
     dir * (1.0 + 8.0 * ROUNDING * DVec3::new(1.0, -1.0, 1.0))
 }
 
-fn fill<const W: usize>(
-    packet: &mut Packet<W>,
-    rays: &[Ray],
-    counts: &mut RayCounts,
-) -> [i32; W] {
+fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], counts: &mut RayCounts) -> [i32; W] {
     let mut valid = [0; W];
     for (lane, ray) in rays.iter().enumerate() {
         packet.set(lane, ray);
@@ -236,9 +233,8 @@ fn nearly_on(
     if met.least_weight() >= -1e-4 {
         return Some(met.t);
     }
-    let point = corners[0]
-        + (corners[1] - corners[0]) * beside.u
-        + (corners[2] - corners[0]) * beside.v;
+    let point =
+        corners[0] + (corners[1] - corners[0]) * beside.u + (corners[2] - corners[0]) * beside.v;
     let to_point = point - ray.org;
     let t = to_point.dot(ray.dir) / ray.dir.length_squared();
     let distance = (to_point - ray.dir * t).length();

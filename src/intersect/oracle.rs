@@ -57,8 +57,12 @@ fn meet(ray: &Ray, corners: &[DVec3; 3], prim: PrimRef) -> Option<Hit> {
     }
     let hit = triangle::meet_plane(ray, corners)?;
     let inside = hit.u >= 0.0 && hit.v >= 0.0 && hit.u + hit.v <= 1.0;
-    (inside && hit.t >= ray.tnear && hit.t <= ray.tfar)
-        .then_some(Hit { t: hit.t, u: hit.u, v: hit.v, prim })
+    (inside && hit.t >= ray.tnear && hit.t <= ray.tfar).then_some(Hit {
+        t: hit.t,
+        u: hit.u,
+        v: hit.v,
+        prim,
+    })
 }
 
 impl Intersector for Oracle<'_> {

@@ -60,7 +60,7 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const AREA: bool, con
         counts.camera += scratch.rays.len() as u64;
         trace_paths::<MIRROR, GLASS>(renderer, input, pixels, scratch, &mut counts);
         let Scratch { lit, shadow, .. } = scratch;
-        renderer.light_points::<AREA, SKY>(lit, pixels, shadow, &mut counts);
+        renderer.light_points::<AREA, SKY>(input, lit, pixels, shadow, &mut counts);
         first = last;
     }
     counts
@@ -220,11 +220,7 @@ impl Vertex<'_, '_> {
 
 impl PathState {
     fn place(&self) -> super::lighting::SamplePlace {
-        super::lighting::SamplePlace {
-            pixel: self.pixel,
-            sample: self.sample,
-            branch: self.branch,
-        }
+        super::lighting::SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
     }
 }
 

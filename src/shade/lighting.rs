@@ -4,12 +4,12 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse.
 
-use super::Renderer;
 use super::light::{self, AreaLight, ShadowTarget};
 use super::pixels::BlockPixels;
+use super::{FrameInput, Renderer};
 use crate::intersect::{Ray, SurfaceInteraction};
-use crate::math::{DVec3, Rgb};
-use crate::sampling::warp;
+use crate::math::{DVec3, Rgb, orthonormal_basis};
+use crate::sampling::{cosine_hemisphere, to_world};
 use crate::scene::Light;
 use crate::stats::RayCounts;
 use std::f32::consts::FRAC_1_PI;
@@ -38,12 +38,7 @@ pub(super) struct LitPoint {
 
 impl LitPoint {
     /// A point seen from `wo` whose reflected light reaches the camera times `reflectance`.
-    pub fn new(
-        si: &SurfaceInteraction,
-        wo: DVec3,
-        reflectance: Rgb,
-        place: SamplePlace,
-    ) -> Self {
+    pub fn new(si: &SurfaceInteraction, wo: DVec3, reflectance: Rgb, place: SamplePlace) -> Self {
         let n = if si.is_outside(wo) { si.ns } else { -si.ns };
         Self { si: *si, n, weight: reflectance * FRAC_1_PI, place }
     }
@@ -88,10 +83,18 @@ impl ShadowScratch {
     }
 }
 
+/// An area light with its place in the scene.
+struct AreaSource<'a> {
+    index: u32,
+    light: &'a Light,
+    area: &'a AreaLight,
+}
+
 impl Renderer<'_> {
     /// Adds the direct light of all `lit` points to their pixels.
     pub(super) fn light_points<const AREA: bool, const SKY: bool>(
         &self,
+        input: &FrameInput,
         lit: &[LitPoint],
         pixels: &mut BlockPixels,
         scratch: &mut ShadowScratch,
@@ -104,7 +107,10 @@ impl Renderer<'_> {
         for (index, light) in self.scene.lights.iter().enumerate() {
             match light {
                 Light::Quad(_) | Light::Sphere { .. } if AREA => {
-                    self.area_light(index as u32, light, lit, pixels, scratch, counts);
+                    let area = input.area_lights[index].as_ref();
+                    let Some(area) = area else { continue };
+                    let source = AreaSource { index: index as u32, light, area };
+                    self.area_light(&source, lit, pixels, scratch, counts);
                 }
                 Light::Point { .. } | Light::Directional { .. } if self.plan.delta_lights => {
                     self.delta_light(light, lit, pixels, scratch, counts);
@@ -119,8 +125,7 @@ impl Renderer<'_> {
 
     fn area_light(
         &self,
-        index: u32,
-        light: &Light,
+        source: &AreaSource,
         lit: &[LitPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
@@ -128,12 +133,12 @@ impl Renderer<'_> {
     ) {
         let n = self.settings.shadow_samples as usize;
         let offset = self.settings.rules.spawn_offset;
-        let radiance = light::radiance(light);
+        let radiance = light::radiance(source.light);
         for group in lit.chunks((BATCH / n).max(1)) {
             s.clear();
             for point in group {
-                if let Some((seen, exact)) = AreaLight::seen_from(light, point.si.p, point.n) {
-                    self.fill(&point.place, index, n, pixels, &mut s.u);
+                if let Some((seen, exact)) = source.area.seen_from(point.si.p, point.n) {
+                    self.fill(&point.place, source.index, n, pixels, &mut s.u);
                     for k in 0..n {
                         let sample = seen.sample(point.si.p, point.n, s.u[k].map(f64::from));
                         if sample.weight > 0.0 {
@@ -197,9 +202,10 @@ impl Renderer<'_> {
             for point in group {
                 let dimension = self.scene.lights.len() as u32;
                 self.fill(&point.place, dimension, n, pixels, &mut s.u);
-                let ng = point.ng();
+                let (ng, basis) = (point.ng(), orthonormal_basis(point.n));
                 for k in 0..n {
-                    let dir = warp::cosine_direction(point.n, s.u[k].map(f64::from));
+                    let local = cosine_hemisphere(s.u[k].map(f64::from));
+                    let dir = to_world(local, basis, point.n);
                     // Below the facet but above the smooth surface that it stands for: the
                     // facet's own plane is no occluder.
                     let dir = super::optics::keep_side(dir, ng, true);

@@ -18,10 +18,11 @@ use crate::effects::EffectPlan;
 use crate::film::{Film, GPixel};
 use crate::intersect::Intersector;
 use crate::math::Rgb;
-use crate::sampling::FilterTable;
-use crate::scene::{Camera, Rect, Scene, Settings};
+use crate::sampling::PixelFilter;
+use crate::scene::{Camera, Filter, Rect, Scene, Settings};
 use crate::stats::RayCounts;
 use kernel::Scratch;
+use light::AreaLight;
 use pixels::{BLOCK, BlockPixels};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -54,7 +55,9 @@ struct FrameInput {
     /// Scene space.
     camera: Camera,
     frame: u32,
-    filter: FilterTable,
+    filter: PixelFilter,
+    /// For each light of the scene, its area form.
+    area_lights: Vec<Option<AreaLight>>,
 }
 
 /// One finished tile: each pixel's place, radiance and record.
@@ -78,7 +81,8 @@ impl Renderer<'_> {
         let input = FrameInput {
             camera: camera.to_scene(&self.scene.recentring),
             frame,
-            filter: FilterTable::new(self.settings.filter.into()),
+            filter: pixel_filter(self.settings.filter),
+            area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
         };
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
@@ -120,7 +124,8 @@ impl Renderer<'_> {
             }
             pixels.start(&block, self.settings.seed, input.frame);
             counts += kernel(self, input, pixels, scratch);
-            let inside = |x: u32, y: u32| x >= crop.x0 && x < crop.x1 && y >= crop.y0 && y < crop.y1;
+            let inside =
+                |x: u32, y: u32| x >= crop.x0 && x < crop.x1 && y >= crop.y0 && y < crop.y1;
             out.extend(pixels.finished(self.settings.spp).filter(|(x, y, _, _)| inside(*x, *y)));
         }
         Some((out, counts))
@@ -143,6 +148,15 @@ impl Renderer<'_> {
             [true true false false] [true true false true] [true true true false]
             [true true true true]
         }
+    }
+}
+
+fn pixel_filter(filter: Filter) -> PixelFilter {
+    match filter {
+        Filter::Box => PixelFilter::boxed(),
+        Filter::Tent => PixelFilter::tent(),
+        Filter::Gaussian => PixelFilter::gaussian(),
+        Filter::BlackmanHarris => PixelFilter::blackman_harris(),
     }
 }
 

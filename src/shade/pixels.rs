@@ -104,8 +104,7 @@ impl BlockPixels {
         if renderer.settings.spp == 1 {
             return [0.0; 2];
         }
-        let u = self.film_samplers[pixel].get2(sample, FILM_DIMENSION);
-        u.map(|u| input.filter.offset(f64::from(u)))
+        input.filter.offset2(self.film_samplers[pixel].get2(sample, FILM_DIMENSION))
     }
 
     /// Whether first-hit records are kept.
