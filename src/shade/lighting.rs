@@ -4,7 +4,7 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse.
 
-use super::light::{self, AreaLight, ShadowTarget};
+use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
 use crate::intersect::{Ray, SurfaceInteraction};
@@ -16,6 +16,10 @@ use std::f32::consts::FRAC_1_PI;
 
 /// Shadow rays traced together.
 const BATCH: usize = 256;
+/// Further samples of a light that shows only a sliver above the horizon.
+const MOST_SEARCHED: u32 = 64;
+/// Sets their dimensions apart.
+const SEARCH: u32 = 1 << 31;
 
 /// Which camera sample and which branch of its tree a point belongs to.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +79,19 @@ impl ShadowScratch {
     fn push(&mut self, ray: Ray, weight: f64) {
         self.rays.push(ray);
         self.weights.push(weight);
+    }
+
+    /// A shadow ray to the sample, where it lies above the horizon.
+    fn push_sample(&mut self, point: &LitPoint, sample: &LightSample, offset: bool) {
+        if sample.weight > 0.0 {
+            let ray = point.si.spawn_to(sample.point, sample.normal, offset);
+            self.push(ray, sample.weight);
+        }
+    }
+
+    /// Whether the present point has no ray yet.
+    fn is_open(&self) -> bool {
+        self.rays.len() == self.spans.last().map_or(0, |span| span.end)
     }
 
     /// Ends a point's rays.
@@ -141,10 +158,12 @@ impl Renderer<'_> {
                     self.fill(&point.place, source.index, n, pixels, &mut s.u);
                     for k in 0..n {
                         let sample = seen.sample(point.si.p, point.n, s.u[k].map(f64::from));
-                        if sample.weight > 0.0 {
-                            let ray = point.si.spawn_to(sample.point, sample.normal, offset);
-                            s.push(ray, sample.weight);
-                        }
+                        s.push_sample(point, &sample, offset);
+                    }
+                    if s.is_open() {
+                        // All below the horizon, but some of the light is above: go on until one
+                        // sample is, or the horizon's own shadow would be counted twice.
+                        self.search_above_horizon(&seen, point, source.index, pixels, s);
                     }
                     s.close(radiance * exact as f32);
                 } else {
@@ -153,6 +172,28 @@ impl Renderer<'_> {
             }
             counts.shadow_area += s.rays.len() as u64;
             self.settle(group, pixels, s, counts);
+        }
+    }
+
+    /// Adds the first of further samples that lies above the point's horizon.
+    fn search_above_horizon(
+        &self,
+        seen: &SeenLight,
+        point: &LitPoint,
+        light: u32,
+        pixels: &BlockPixels,
+        s: &mut ShadowScratch,
+    ) {
+        let dimension = self.dimension(&point.place, light) ^ SEARCH;
+        let sampler = pixels.sampler(point.place.pixel);
+        for k in 0..MOST_SEARCHED {
+            let index = point.place.sample.wrapping_mul(MOST_SEARCHED) + k;
+            let u = sampler.get2(index, dimension).map(f64::from);
+            let sample = seen.sample(point.si.p, point.n, u);
+            s.push_sample(point, &sample, self.settings.rules.spawn_offset);
+            if !s.is_open() {
+                return;
+            }
         }
     }
 
@@ -228,10 +269,14 @@ impl Renderer<'_> {
         u: &mut Vec<[f32; 2]>,
     ) {
         u.resize(n, [0.0; 2]);
-        let lights = self.scene.lights.len() as u32 + 1;
-        let dimension = place.branch.wrapping_mul(lights).wrapping_add(light);
+        let dimension = self.dimension(place, light);
         let first = place.sample.wrapping_mul(n as u32);
         pixels.sampler(place.pixel).fill2(first, dimension, &mut u[..n]);
+    }
+
+    fn dimension(&self, place: &SamplePlace, light: u32) -> u32 {
+        let lights = self.scene.lights.len() as u32 + 1;
+        place.branch.wrapping_mul(lights).wrapping_add(light)
     }
 
     /// Traces the batch and adds `weight · unshadowed · ratio` to each point's pixel.
