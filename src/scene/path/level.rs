@@ -54,25 +54,38 @@ pub fn unit(v: DVec3) -> DVec3 {
 /// The constant horizontal of a path whose views and whose one up direction lie in a plane,
 /// pointing right at the start; `None` for other paths, and for views along one line.
 fn plane_normal(path: &CameraPath) -> Option<DVec3> {
-    let fixed = |eyes: &[DVec3], target: DVec3| eyes.iter().map(|e| target - *e).collect();
-    let (views, up): (Vec<DVec3>, DVec3) = match path {
-        CameraPath::Pan { from, to, target, up, .. } => (fixed(&[*from, *to], *target), *up),
-        CameraPath::BSpline { points, target, up, .. } => (fixed(points, *target), *up),
+    let (ends, up) = eyes_and_targets(path)?;
+    let largest = |of: fn(&(DVec3, DVec3)) -> DVec3| {
+        ends.iter().map(|e| of(e).abs().max_element()).fold(0.0, f64::max)
+    };
+    let size = largest(|(eye, target)| *target - *eye);
+    // Far from the origin the coordinates' own rounding is the limit.
+    let far = largest(|(eye, target)| eye.abs().max(target.abs()));
+    let tolerance = POLE.max(8.0 * f64::EPSILON * far / size);
+    let up = unit(up);
+    let views: Vec<DVec3> = ends.iter().map(|(eye, target)| (*target - *eye) / size).collect();
+    let off_axis = views.iter().map(|v| v.cross(up)).find(|r| r.length() > tolerance)?;
+    let normal = off_axis.normalize();
+    // A tilt of the normal counts for little where the first view off the axis is a short one.
+    let planar = views.iter().all(|v| v.dot(normal).abs() <= tolerance / off_axis.length());
+    let turns = views.iter().any(|v| v.cross(views[0]).length() > tolerance);
+    (planar && turns && tolerance < 1e-3).then_some(normal)
+}
+
+/// What a curved or straight path is made of: eyes with their targets, and the one up direction.
+fn eyes_and_targets(path: &CameraPath) -> Option<(Vec<(DVec3, DVec3)>, DVec3)> {
+    match path {
+        CameraPath::Pan { from, to, target, up, .. } => {
+            Some((vec![(*from, *target), (*to, *target)], *up))
+        }
+        CameraPath::BSpline { points, target, up, .. } => {
+            Some((points.iter().map(|p| (*p, *target)).collect(), *up))
+        }
         CameraPath::Keys(keys) => {
             let up = keys.first()?.pose.up;
-            if keys.iter().any(|k| k.pose.up != up) {
-                return None;
-            }
-            (keys.iter().map(|k| k.pose.target - k.pose.eye).collect(), up)
+            let same = keys.iter().all(|k| k.pose.up == up);
+            same.then(|| (keys.iter().map(|k| (k.pose.eye, k.pose.target)).collect(), up))
         }
-        CameraPath::Still(_) | CameraPath::Orbit { .. } => return None,
-    };
-    let size = views.iter().map(|v| v.abs().max_element()).fold(0.0, f64::max);
-    let up = unit(up);
-    let views: Vec<DVec3> = views.into_iter().map(|v| v / size).collect();
-    let first_off_axis = views.iter().map(|v| v.cross(up)).find(|r| r.length() > POLE)?;
-    let normal = first_off_axis.normalize();
-    let planar = views.iter().all(|v| v.dot(normal).abs() <= POLE);
-    let turns = views.iter().any(|v| v.cross(views[0]).length() > POLE);
-    (planar && turns).then_some(normal)
+        CameraPath::Still(_) | CameraPath::Orbit { .. } => None,
+    }
 }

@@ -115,7 +115,7 @@ fn a_closed_orbit_stops_one_step_before_its_start_and_an_open_one_at_its_end() {
 #[test]
 fn a_pan_straight_over_its_target_is_continuous() {
     for frames in [3, 15, 16, 101] {
-        for target in [DVec3::ZERO, DVec3::new(1e6, -3e5, 7e5)] {
+        for target in [DVec3::ZERO, DVec3::new(1e6, -3e5, 7e5), DVec3::splat(1e9)] {
             let over = |x| target + DVec3::new(x, 10.0, 0.3 * x);
             let path = pan(over(5.0), over(-5.0), target);
             let turn = largest_turn(&shot(path, frames));
