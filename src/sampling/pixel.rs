@@ -32,6 +32,13 @@ impl PixelSampler {
     /// Fastest where `first_sample` and the length are multiples of 8.
     pub fn fill2(&self, first_sample: u32, dimension: u32, out: &mut [[f32; 2]]) {
         let seeds = self.seeds(dimension);
+        if out.len() <= 2 {
+            // A block costs as much as two or three single points.
+            for (i, pair) in out.iter_mut().enumerate() {
+                *pair = single(first_sample.wrapping_add(i as u32), seeds);
+            }
+            return;
+        }
         let skip = first_sample as usize % LANES;
         let mut base = first_sample - skip as u32;
         // An unaligned start: the first block's later lanes only.
