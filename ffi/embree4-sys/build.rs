@@ -39,11 +39,8 @@ fn main() {
     let (major, minor, patch) = embree.version;
     println!("cargo::rustc-link-search=native={}", embree.lib.display());
     println!("cargo::rustc-link-lib=dylib=embree4");
-<<<<<<< HEAD
-=======
     // For this package's own tests; the binaries get theirs from the build script of their package.
     println!("cargo::rustc-link-arg=-Wl,-rpath,{}", embree.lib.display());
->>>>>>> setup
     println!("cargo::metadata=include={}", embree.include.display());
     println!("cargo::metadata=lib={}", embree.lib.display());
     println!("cargo::metadata=version={major}.{minor}.{patch}");
@@ -167,11 +164,8 @@ fn bind(include: &Path) {
         .allowlist_var("RTC_.*")
         .prepend_enum_name(false)
         .derive_default(false)
-<<<<<<< HEAD
-=======
         // Embree's C comments would become doc tests.
         .generate_comments(false)
->>>>>>> setup
         .rust_target(bindgen::RustTarget::stable(85, 0).expect("bindgen knows Rust 1.85"))
         .rust_edition(bindgen::RustEdition::Edition2024)
         .generate()
