@@ -153,8 +153,8 @@ pub struct OutputArgs {
     #[arg(long)]
     pub no_video: bool,
     /// Frames per second of the video [default: 24]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub fps: Option<u32>,
+    #[arg(long, value_name = "N", value_parser = values::positive)]
+    pub fps: Option<f64>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,

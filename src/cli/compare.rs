@@ -4,7 +4,7 @@ use super::exit::{Exit, as_input};
 use super::say;
 use crate::error::{Error, Result};
 use crate::measure::{self, Comparison, Space, Summary};
-use crate::output::{self, FramePattern};
+use crate::output::{self, FramePattern, manifest};
 use clap::Args;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -126,15 +126,30 @@ fn images(name: &str) -> Result<Images> {
     if path.exists() || !name.contains('#') {
         return Ok(Images::One(path.to_path_buf()));
     }
-    let pattern = FramePattern::parse(name)?;
-    let found: Named = in_folder(pattern.folder())?
-        .into_iter()
-        .filter_map(|(file, path)| Some((format!("frame {:>4}", pattern.frame_of(&file)?), path)))
-        .collect();
+    let pattern = FramePattern::parse(name, 2)?;
+    let whole = manifest::file_name(&pattern);
+    let numbered = |(file, path): (String, PathBuf)| {
+        Some((format!("frame {:>4}", frame_number(&whole, &file)?), path))
+    };
+    let folder = pattern.folder();
+    let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+    let found: Named = in_folder(folder)?.into_iter().filter_map(numbered).collect();
     if found.is_empty() {
         return Err(Error::Usage(format!("no file is named like {name}")));
     }
     Ok(Images::Many(found))
+}
+
+/// The number that `file` has in the place of the pattern's #s.
+fn frame_number(pattern: &str, file: &str) -> Option<u32> {
+    let (before, rest) = pattern.split_once('#')?;
+    let after = rest.trim_start_matches('#');
+    let digits = file.strip_prefix(before)?.strip_suffix(after)?;
+    let all = digits.bytes().all(|b| b.is_ascii_digit());
+    let number = digits.parse().ok().filter(|_| all)?;
+    // `frame_1.png` is no frame of `frame_####.png`.
+    let width = rest.len() + 1 - after.len();
+    (format!("{number:0width$}") == digits).then_some(number)
 }
 
 fn in_folder(folder: &Path) -> Result<Named> {

@@ -1,10 +1,10 @@
 //! What `inspect` warns of, found by a few hundred rays and never by rendering.
 
 use crate::error::Result;
-use crate::intersect::{Hit, Intersector};
+use crate::intersect::{Hit, Intersector, Ray};
 use crate::math::DVec3;
-use crate::ray::Ray;
 use crate::scene::{Camera, Light, Scene, Settings, Shot};
+use crate::stats::RayCounts;
 
 /// Frames that are looked at, spread over the shot, both ends among them.
 const FRAMES: u32 = 9;
@@ -107,7 +107,7 @@ fn sees_nothing(camera: &Camera, intersector: &dyn Intersector) -> bool {
 
 fn trace(rays: &[Ray], intersector: &dyn Intersector) -> Vec<Option<Hit>> {
     let mut hits = vec![None; rays.len()];
-    intersector.intersect_batch(rays, &mut hits);
+    intersector.intersect_batch(rays, &mut hits, &mut RayCounts::default());
     hits
 }
 

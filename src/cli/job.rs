@@ -45,7 +45,7 @@ fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
     match memory {
         Some(memory) if need > memory => Err(Error::Usage(format!(
             "a frame of {}x{} pixels takes {:.1} GB of memory while it is rendered and written; \
-             this machine has {:.1} GB\n  help: render parts of it with --crop, or a smaller --size",
+             this machine has {:.1} GB\n  help: render a smaller --size",
             settings.width,
             settings.height,
             need as f64 * 1e-9,
@@ -58,10 +58,8 @@ fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
 /// Bytes that a frame takes at most: colour (12 a pixel) and first-hit records (44), twice, since
 /// encoding holds a copy.
 pub fn frame_bytes(settings: &Settings) -> u64 {
-    let pixels = match settings.crop {
-        Some(c) => u64::from(c.x1 - c.x0) * u64::from(c.y1 - c.y0),
-        None => u64::from(settings.width) * u64::from(settings.height),
-    };
+    // A cropped film has the full size, black outside.
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
     pixels * 2 * (12 + 44)
 }
 

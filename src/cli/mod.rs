@@ -13,12 +13,12 @@ mod job;
 mod machine;
 mod progress;
 mod render;
+mod request;
 mod say;
 mod schema;
 mod signals;
 mod stats;
 mod values;
-mod video;
 
 use clap::{Parser, Subcommand};
 use exit::Exit;

@@ -3,21 +3,21 @@
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::Exit;
 use super::progress::{Watch, duration};
+use super::request::Request;
 use super::signals::Interrupt;
 use super::stats::{self, RankStats};
-use super::{job, say, values};
+use super::say;
 use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
-use crate::import::Loaded;
 use crate::intersect::{self, Intersector};
-use crate::output::{Format, FramePattern, Header, MANIFEST_FORMAT, video};
-use crate::scene::{FrameRange, Scene, Settings, Shot};
+use crate::output::Format;
+use crate::output::manifest::beside;
+use crate::output::video::{self, Clip, Video};
 use crate::sequence::{self, Plan, Target, Tracer};
 use crate::shade::Renderer;
 use clap::Args;
-use rayon::ThreadPool;
-use std::path::Path;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -62,33 +62,30 @@ pub fn run(args: &RenderArgs) -> Exit {
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
-    let job = world.agree(Job::load(args))?;
-    if world.is_root() && !args.output.quiet {
-        job.warnings.iter().for_each(say::warning);
-    }
+    // Only one rank talks.
+    let quiet = args.output.quiet || !world.is_root();
+    let request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
+    tell(quiet, &request.warnings, |w| say::warning(w));
     let threads = args.output.threads.map_or_else(cluster::default_threads, |n| n as usize);
     let pool = world.agree(thread_pool(threads))?;
-    let load_seconds = start.elapsed().as_secs_f64();
+    let loaded = Instant::now();
+    let intersector =
+        world.agree(intersect::build(&request.scene, &request.settings, threads))?;
     let built = Instant::now();
-    let intersector = world.agree(intersect::build(&job.scene, &job.settings, threads))?;
-    let mut rank = RankStats {
+    let target = request.target(world.same_everywhere("traces with", intersector.describe())?);
+    let prepare = || pool.install(|| sequence::prepare(&target, request.frames));
+    let plan = world.from_root(prepare)?;
+    tell(quiet, &plan.notes, |n| say::note(n));
+    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
+    let outcome = job.render(world, &*intersector, &interrupt, quiet)?;
+    let rank = RankStats {
         threads,
-        load_seconds,
-        build_seconds: built.elapsed().as_secs_f64(),
-        render_seconds: 0.0,
+        load_seconds: (loaded - start).as_secs_f64(),
+        build_seconds: (built - loaded).as_secs_f64(),
+        render_seconds: built.elapsed().as_secs_f64(),
         intersector_bytes: intersector.memory(),
         peak_memory_bytes: None,
     };
-    let target = job.target(args, &world.same_everywhere("traces with", intersector.describe())?);
-    let plan =
-        world.from_root(|| pool.install(|| sequence::prepare(&target, job.frames)))?;
-    if world.is_root() && !args.output.quiet {
-        plan.notes.iter().for_each(say::note);
-    }
-    let rendering = Instant::now();
-    let outcome =
-        job.render(world, &target, &plan, &*intersector, &pool, &interrupt, args.output.quiet)?;
-    rank.render_seconds = rendering.elapsed().as_secs_f64();
     let ranks = world.gather(&rank.with_peak())?;
     if !world.is_root() {
         let stopped = interrupt.stop.load(Ordering::Relaxed);
@@ -98,128 +95,124 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         let seconds = start.elapsed().as_secs_f64();
         stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
     }
-    finish(args, &job, &target, &plan, &outcome, start)
+    if outcome.unfinished > 0 {
+        say_stopped(args, &job, &outcome);
+        return Ok(Exit::Stopped);
+    }
+    finish(args, &job, start)
 }
 
-/// What is known once the scene is read.
-struct Job {
-    scene: Scene,
-    scene_hash: String,
-    shot: Shot,
-    settings: Settings,
-    frames: FrameRange,
-    pattern: FramePattern,
-    warnings: Vec<crate::error::Diagnostic>,
+fn thread_pool(threads: usize) -> Result<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
 }
 
-impl Job {
-    fn load(args: &RenderArgs) -> Result<Self> {
-        let loaded = job::load(&args.scene, &args.settings)?;
-        let frames = frames_of(&args.output, &loaded)?;
-        let name = args.output.output.clone().or(loaded.output.clone());
-        let name = name.unwrap_or_else(|| default_output(&args.scene.scene));
-        let pattern = FramePattern::parse(&name)?;
-        if frames.first < frames.last && !pattern.is_numbered() {
-            return Err(Error::Usage(format!(
-                "`{name}` names one file for {} frames\n  help: write #### where the frame number \
-                 goes, as in out/frame_####.png",
-                frames.last - frames.first + 1
-            )));
-        }
-        let Loaded { world, shot, settings, warnings, .. } = loaded;
-        let scene_hash = sequence::fingerprint(&world, &shot);
-        let scene = world.into_scene(settings.rules.recentre)?;
-        Ok(Self { scene, scene_hash, shot, settings, frames, pattern, warnings })
+fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {
+    if !quiet {
+        words.iter().for_each(say);
     }
+}
 
-    fn target(&self, args: &RenderArgs, tracer: &str) -> Target {
-        Target {
-            pattern: self.pattern.clone(),
-            header: Header {
-                manifest: MANIFEST_FORMAT,
-                tweenray: env!("CARGO_PKG_VERSION").into(),
-                scene: args.scene.scene.display().to_string(),
-                scene_hash: self.scene_hash.clone(),
-                shot_frames: self.shot.frames,
-                files: self.pattern.file_name(),
-                tracer: tracer.into(),
-                settings: Header::settings(&self.settings),
-            },
-            overwrite: args.output.overwrite,
-        }
-    }
+/// What rendering the planned frames takes.
+struct Frames<'a> {
+    request: &'a Request,
+    target: &'a Target,
+    plan: &'a Plan,
+    pool: &'a ThreadPool,
+}
 
-    #[allow(clippy::too_many_arguments)]
+impl Frames<'_> {
     fn render(
         &self,
         world: &World,
-        target: &Target,
-        plan: &Plan,
         intersector: &dyn Intersector,
-        pool: &ThreadPool,
         interrupt: &Interrupt,
         quiet: bool,
     ) -> Result<Outcome> {
-        let (kept, total) = (plan.kept.len(), plan.kept.len() + plan.render.len());
-        let watch = Watch::new(kept, total, quiet || !world.is_root());
-        let plan_of_effects = EffectPlan::of(&self.scene, &self.settings);
+        let Request { scene, settings, shot, pattern, .. } = self.request;
+        let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
+        let effects = EffectPlan::of(scene, settings);
         let tracer = Tracer {
-            renderer: Renderer {
-                scene: &self.scene,
-                settings: &self.settings,
-                plan: plan_of_effects,
-                intersector,
-            },
-            shot: &self.shot,
-            pool,
-            with_gbuffer: self.pattern.format() == Format::Exr,
+            renderer: Renderer { scene, settings, plan: effects, intersector },
+            shot,
+            pool: self.pool,
+            with_gbuffer: pattern.format() == Format::Exr,
             stop: &interrupt.stop,
             progress: &watch,
         };
+        let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
         let done = |report: &_| watch.frame_done(report);
-        let work = || cluster::render(world, target, plan, &tracer, &interrupt.stop, &done);
-        let outcome = interrupt.watched(work);
+        let outcome =
+            interrupt.watched(|| cluster::render(world, target, plan, &tracer, stop, &done));
         watch.finish();
         if let (Err(error), true) = (&outcome, world.size() > 1) {
+            // The other ranks are in the middle of their frames and would wait for this one.
             say::error(error);
             world.abort(Exit::of(error).code());
         }
         outcome
     }
+
+    fn total(&self) -> usize {
+        self.plan.kept.len() + self.plan.render.len()
+    }
 }
 
-/// Says what there is now, and makes the video of a complete sequence.
-fn finish(
-    args: &RenderArgs,
-    job: &Job,
-    target: &Target,
-    plan: &Plan,
-    outcome: &Outcome,
-    start: Instant,
-) -> Result<Exit> {
-    let rendered = outcome.frames.len();
-    let total = plan.kept.len() + plan.render.len();
-    if outcome.unfinished > 0 {
-        let again = if args.output.overwrite { " without --overwrite" } else { "" };
-        say::aside(format_args!(
-            "stopped: {} of {total} frames are finished in {}; the same command{again} goes on \
-             from here",
-            total - outcome.unfinished,
-            target.pattern
-        ));
-        return Ok(Exit::Stopped);
-    }
-    let said = |line: String| if args.output.quiet { drop(line) } else { say::result(line) };
-    let frames = if total == 1 { "frame" } else { "frames" };
-    said(format!(
-        "{total} {frames} in {} ({rendered} rendered, {} kept) in {}",
-        target.pattern,
-        plan.kept.len(),
+/// Says how to go on.
+fn say_stopped(args: &RenderArgs, job: &Frames, outcome: &Outcome) {
+    let finished = job.total() - outcome.unfinished;
+    let again = if args.output.overwrite { " without --overwrite" } else { "" };
+    say::aside(format_args!(
+        "stopped: {finished} of {} frames are finished in {}; the same command{again} goes on \
+         from here",
+        job.total(),
+        job.target.pattern
+    ));
+}
+
+/// Says what there is now, and makes the video of the frames asked for, all of which are there.
+fn finish(args: &RenderArgs, job: &Frames, start: Instant) -> Result<Exit> {
+    let result = |line: String| {
+        if !args.output.quiet {
+            say::result(line);
+        }
+    };
+    let frames = if job.total() == 1 { "frame" } else { "frames" };
+    result(format!(
+        "{} {frames} in {} ({} rendered, {} kept) in {}",
+        job.total(),
+        job.target.pattern,
+        job.plan.render.len(),
+        job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
     ));
-    if total > 1 && !args.output.no_video {
-        let fps = args.output.fps.unwrap_or(24);
-        said(make_video(job, fps)?);
+    if job.total() > 1 && !args.output.no_video {
+        result(make_video(args, job)?);
     }
     Ok(Exit::Done)
+}
+
+/// Makes the video of the frames asked for; gives the line to print. Only of the whole shot does
+/// it get the plain name, so that rendering a few frames again replaces no video of all.
+fn make_video(args: &RenderArgs, job: &Frames) -> Result<String> {
+    let Request { frames, shot, pattern, .. } = job.request;
+    let whole = frames.last - frames.first + 1 == shot.frames;
+    let ending = match whole {
+        true => ".mp4".to_string(),
+        false => format!("_{}-{}.mp4", frames.first, frames.last),
+    };
+    let clip = Clip {
+        pattern,
+        first: frames.first,
+        count: frames.last - frames.first + 1,
+        fps: args.output.fps.unwrap_or(24.0),
+        display: job.target.write.display,
+    };
+    Ok(match video::make(&clip, &beside(pattern, &ending))? {
+        Video::Made(path) => format!("video {}", path.display()),
+        Video::NoFfmpeg { command } => {
+            format!("no video, since ffmpeg is not installed; where it is, this makes one:\n{command}")
+        }
+        Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
+    })
 }

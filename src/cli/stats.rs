@@ -3,7 +3,8 @@
 use super::machine::{Machine, peak_memory};
 use crate::cluster::Outcome;
 use crate::error::{Error, Result};
-use crate::output::{Header, write_whole};
+use crate::output::atomic;
+use crate::output::manifest::Header;
 use crate::sequence::{FrameReport, Plan};
 use crate::stats::RayCounts;
 use serde::{Deserialize, Serialize};
@@ -93,5 +94,5 @@ pub fn write(
     let mut text =
         serde_json::to_vec_pretty(&stats).map_err(|e| Error::io("write", path, e.into()))?;
     text.push(b'\n');
-    write_whole(path, &text)
+    atomic::write(path, |w| w.write_all(&text)).map(drop)
 }

@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::error::Result;
-use crate::output::{Manifest, part_path};
+use crate::output::manifest::{Manifest, manifest_path, part_path};
 use crate::sequence::{self, FrameMaker, FrameReport, Plan, Target};
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
@@ -40,7 +40,7 @@ pub fn render(
     stop: &AtomicBool,
     done: &dyn Fn(&FrameReport),
 ) -> Result<Outcome> {
-    let manifest = target.pattern.manifest_path();
+    let manifest = manifest_path(&target.pattern);
     let journal = match world.rank() {
         0 => manifest.clone(),
         rank => part_path(&manifest, rank),
@@ -60,8 +60,8 @@ pub fn render(
     };
     sequence::render_frames(target, mine, &journal, maker, &mut after_frame)?;
     if finished.len() < mine.len() && !told.get() {
-        let others = (0..world.size()).filter(|rank| *rank != world.rank());
-        others.map(|rank| world.post(rank, &Note::Stop)).collect::<Result<()>>()?;
+        let mut others = (0..world.size()).filter(|rank| *rank != world.rank());
+        others.try_for_each(|rank| world.post(rank, &Note::Stop))?;
     }
     world.settle(&mut || hear())?;
     join(world, target, plan, &finished)
@@ -88,12 +88,12 @@ fn hear(
 
 /// Joins journals and reports on rank 0.
 fn join(world: &World, target: &Target, plan: &Plan, mine: &[FrameReport]) -> Result<Outcome> {
-    let by_rank = world.gather(&mine)?;
+    let by_rank = world.gather(&mine.to_vec())?;
     if !world.is_root() {
         return Ok(Outcome::default());
     }
     if world.size() > 1 {
-        Manifest::merge_parts(&target.pattern.manifest_path())?;
+        Manifest::merge_parts(&manifest_path(&target.pattern))?;
     }
     let ranks = by_rank.into_iter().enumerate();
     let mut frames: Vec<(u32, FrameReport)> =

@@ -120,6 +120,22 @@ impl World {
         all.iter().map(|bytes| decode(bytes)).collect()
     }
 
+    /// `value` if all ranks have the same, else an error that says what differs. All ranks call it.
+    pub fn same_everywhere(&self, what: &str, value: String) -> Result<String> {
+        if self.size() == 1 {
+            return Ok(value);
+        }
+        let all: Vec<String> = self.exchange(&value)?;
+        match all.iter().enumerate().find(|(_, other)| **other != all[0]) {
+            None => Ok(value),
+            Some((rank, other)) => Err(Error::Usage(format!(
+                "rank 0 {what} {}, but rank {rank} {what} {other}\n  help: frames would differ in \
+                 their last bits; --isa avx2 makes mixed machines agree",
+                all[0]
+            ))),
+        }
+    }
+
     fn exchange<T: Serialize + for<'de> Deserialize<'de>>(&self, value: &T) -> Result<Vec<T>> {
         let gathered = self.gather(value)?;
         decode(&self.broadcast(encode(&gathered)?))
@@ -145,7 +161,8 @@ impl World {
     fn post<T: Serialize>(&self, to: u32, note: &T) -> Result<()> {
         let bytes = encode(note)?;
         match &self.ranks {
-            Ranks::Solo => drop((to, bytes)),
+            // There is nobody to send to.
+            Ranks::Solo => _ = (to, bytes),
             #[cfg(feature = "mpi")]
             Ranks::Mpi(session) => session.post(to, bytes),
         }
@@ -176,7 +193,7 @@ impl World {
     /// the others are busy: what they finished is on disk.
     pub fn abort(&self, code: u8) {
         match &self.ranks {
-            Ranks::Solo => drop(code),
+            Ranks::Solo => _ = code,
             #[cfg(feature = "mpi")]
             Ranks::Mpi(session) => session.abort(code),
         }

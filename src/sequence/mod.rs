@@ -15,9 +15,13 @@ pub use fingerprint::fingerprint;
 pub use resume::{Plan, Target, prepare};
 pub use tracer::Tracer;
 
-use crate::error::{Error, Result};
+#[cfg(test)]
+mod tests;
+
+use crate::error::Result;
 use crate::film::Film;
-use crate::output::{Journal, Row};
+use crate::output::manifest::{Journal, Row};
+use crate::output::{WriteOptions, write_image};
 use crate::stats::RayCounts;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -80,12 +84,13 @@ fn write_frame(
     start: Instant,
 ) -> Result<Row> {
     let path = target.pattern.path(frame);
-    let written = target.write(&path, film)?;
+    let options = WriteOptions { frame: Some(frame), ..target.write.clone() };
+    let written = write_image(&path, film, &options)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(Row {
         frame,
         file,
-        blake3: written.blake3,
+        blake3: written.hash.to_hex().to_string(),
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
         rays,

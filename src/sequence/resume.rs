@@ -1,12 +1,17 @@
 //! What a sequence already holds on disk, and what that leaves to render.
 
 use crate::error::{Error, Result};
-use crate::output::{FramePattern, Header, Manifest, Row};
+use crate::output::manifest::{Header, Manifest, Row, manifest_path};
+use crate::output::{FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::path::Path;
+use std::time::Duration;
+
+/// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
+/// younger one may belong to a process on another machine.
+const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// Where the frames of a job go, and what they all share.
 #[derive(Debug, Clone)]
@@ -15,6 +20,8 @@ pub struct Target {
     pub pattern: FramePattern,
     /// What the frames share.
     pub header: Header,
+    /// How films become files.
+    pub write: WriteOptions,
     /// Whether frames that exist are replaced.
     pub overwrite: bool,
 }
@@ -35,8 +42,9 @@ pub struct Plan {
 /// Errors: `Error::Usage` where frames of other settings, or of unknown origin, are in the way
 /// and `target` does not say to replace them.
 pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
-    let path = target.pattern.manifest_path();
-    make_folder(&path)?;
+    let path = manifest_path(&target.pattern);
+    atomic::create_folder(target.pattern.folder())?;
+    atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE)?;
     let found = match Manifest::read(&path) {
         Err(_) if target.overwrite => None,
         read => read?,
@@ -124,8 +132,7 @@ fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
 /// Refuses frames of other settings, as long as any is left.
 fn refuse_others(target: &Target, manifest: &Manifest, frames: FrameRange) -> Result<()> {
     let Some(d) = manifest.header.first_difference(&target.header) else { return Ok(()) };
-    let folder = target.pattern.manifest_path();
-    let folder = folder.parent().unwrap_or(Path::new("")).to_path_buf();
+    let folder = target.pattern.folder();
     let left = manifest.rows.values().filter(|row| folder.join(&row.file).exists()).count();
     if left == 0 {
         return refuse_strangers(target, frames);
@@ -135,13 +142,4 @@ fn refuse_others(target: &Target, manifest: &Manifest, frames: FrameRange) -> Re
          help: set it back, choose another output with -o, or replace the frames with --overwrite",
         target.pattern, d.name, d.before, d.now
     )))
-}
-
-fn make_folder(manifest: &Path) -> Result<()> {
-    match manifest.parent() {
-        Some(folder) if folder != Path::new("") => {
-            fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))
-        }
-        _ => Ok(()),
-    }
 }
