@@ -7,10 +7,10 @@
 
 use crate::error::{Error, Result};
 use ::mpi::Threading;
-use ::mpi::collective::SystemOperation;
 use ::mpi::environment::Universe;
 use ::mpi::ffi;
 use ::mpi::topology::SimpleCommunicator;
+use ::mpi::point_to_point::MatchedReceiveVec;
 use ::mpi::traits::{
     AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source,
 };
@@ -124,7 +124,7 @@ impl Session {
         self.clear_outbox();
         let any = self.world.any_process();
         std::iter::from_fn(|| any.immediate_matched_probe_with_tag(NOTE))
-            .map(|(message, _)| message.matched_receive_vec().0)
+            .map(|arrived| arrived.matched_receive_vec().0)
             .collect()
     }
 

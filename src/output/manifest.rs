@@ -12,7 +12,7 @@
 //! Not done: no lock keeps two jobs from writing the same sequence at once. With equal settings
 //! they write equal bytes; with others the second is refused when it starts.
 
-use super::write_whole;
+use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
 use crate::stats::RayCounts;
@@ -186,7 +186,7 @@ impl Manifest {
             remove(&part)?;
         }
         let line = line_of(path, header)?;
-        write_whole(path, &line)
+        atomic::write(path, |w| w.write_all(&line)).map(drop)
     }
 
     /// Takes the rows of all part files into the manifest at `path` and removes the parts.
@@ -231,6 +231,27 @@ impl Journal {
         let written = self.file.write_all(lines).and_then(|()| self.file.sync_data());
         written.map_err(|e| Error::io("write", &self.path, e))
     }
+}
+
+/// The pattern's file name, without its folder.
+pub fn file_name(pattern: &FramePattern) -> String {
+    let whole = pattern.to_string();
+    Path::new(&whole).file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Where the manifest of a sequence lies: `out/frame.manifest.jsonl` for `out/frame_####.png`.
+pub fn manifest_path(pattern: &FramePattern) -> PathBuf {
+    beside(pattern, ".manifest.jsonl")
+}
+
+/// A file beside the frames, named by what comes before their number, then `ending`.
+pub fn beside(pattern: &FramePattern, ending: &str) -> PathBuf {
+    let name = file_name(pattern);
+    let stem = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
+    let prefix = stem.split('#').next().unwrap_or_default().trim_end_matches(['_', '-', '.']);
+    // `####.png` has no prefix, and a name that starts with a dot would be hidden.
+    let prefix = if prefix.is_empty() { "frames" } else { prefix };
+    pattern.folder().join(format!("{prefix}{ending}"))
 }
 
 /// Where rank `rank` (not 0) appends its rows of the manifest at `path`.

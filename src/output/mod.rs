@@ -7,6 +7,7 @@
 //! * [`atomic`] is how every file here comes into being: temporary name, sync, rename.
 //! * [`read_image`] reads png, ppm, jpeg, hdr and exr within a memory limit; [`exr`] reads and
 //!   writes any channels.
+//! * [`manifest`] lists the finished frames of a sequence.
 //! * [`video`] has ffmpeg make an mp4 of a sequence.
 //!
 //! png and ppm hold display values: exposure, tone curve, then 8 or 16 bits. exr holds linear
@@ -19,7 +20,7 @@ pub mod atomic;
 mod display;
 pub mod exr;
 mod format;
-mod manifest;
+pub mod manifest;
 mod pattern;
 mod png;
 mod quantise;
