@@ -124,8 +124,9 @@ fn strip_of_blocks(a: &Image, b: &Image, y0: usize, channel: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_images::{constant, pairs, to_8_bit};
+    use super::super::test_images::{constant, from_fn, pairs, to_8_bit};
     use super::*;
+    use crate::math::Rgb;
     use image_compare::Algorithm;
 
     #[test]
@@ -185,6 +186,20 @@ mod tests {
             let (got, expected) = (ssim(&a, &b), by_definition(&a, &b, radius));
             assert!((got - expected).abs() < 2e-5, "{name}: {got} against {expected}");
         }
+    }
+
+    /// The figure is scikit-image 0.26's, called as the module's head says.
+    #[test]
+    fn agrees_with_scikit_image() {
+        let level = |v: u32| v as f32 / 255.0;
+        let a = from_fn(60, 48, |x, y| {
+            Rgb::from_array([0, 1, 2].map(|c| level((x * 7 + y * 13 + c * 29) % 64 + 3 * x)))
+        });
+        let b = from_fn(60, 48, |x, y| {
+            let base = 3 * x + y / 8 * 4;
+            Rgb::from_array([0, 1, 2].map(|c| level((x * 7 + y * 11 + c * 31) % 64 + base)))
+        });
+        assert!((ssim(&a, &b) - 0.136_864_738_850).abs() < 1e-6, "{}", ssim(&a, &b));
     }
 
     #[test]
