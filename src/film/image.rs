@@ -67,8 +67,7 @@ impl Image {
 
 /// Clips to [0, 1]; NaN to 0.
 fn clip(x: f32) -> f32 {
-    // `max` returns the other operand for a NaN.
-    x.max(0.0).min(1.0)
+    if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) }
 }
 
 #[cfg(test)]

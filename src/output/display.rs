@@ -21,8 +21,8 @@ impl Display {
     /// Exposes `radiance` and applies the tone curve; linear display values in [0, 1]. A NaN and
     /// what is below 0 become 0.
     pub fn tone(&self, radiance: Rgb) -> Rgb {
-        let c = (radiance * self.exposure).to_array().map(|v| v.max(0.0).min(BRIGHTEST));
-        let c = Rgb::from_array(c);
+        let clip = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, BRIGHTEST) };
+        let c = Rgb::from_array((radiance * self.exposure).to_array().map(clip));
         match self.tone {
             ToneCurve::Srgb | ToneCurve::Linear => c.min(Rgb::ONE),
             ToneCurve::Reinhard => (c / (1.0 + luminance(c))).min(Rgb::ONE),

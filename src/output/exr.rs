@@ -13,10 +13,14 @@ use super::format::SOFTWARE;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::math::Vec3;
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::image::write::layers::{LayersWriter, WritableLayers};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, LayerAttributes,
-    LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer,
+    LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2,
 };
+use rayon::prelude::*;
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
@@ -122,11 +126,31 @@ pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> R
     };
     let list = AnyChannels::sort(channels.iter().map(to_exr).collect());
     let size = Vec2(width as usize, height as usize);
-    let layer = exr::image::Layer::new(size, attributes, encoding, list);
+    let layer = Layer::new(size, attributes, encoding, list);
+    compress(&Image::from_layer(layer))
+        .map_err(|e| Error::Failed(format!("cannot encode exr: {e}")))
+}
+
+/// Compresses the blocks on this thread's rayon pool and writes them in order. (The crate's own
+/// parallel writer starts a pool of its own for each file, whatever number of threads was asked.)
+fn compress(image: &Image<Layer<AnyChannels<FlatSamples>>>) -> exr::error::Result<Vec<u8>> {
+    let headers = image.layer_data.infer_headers(&image.attributes);
+    let layers = image.layer_data.create_writer(&headers);
     let mut bytes = Cursor::new(Vec::new());
-    let image = exr::image::Image::from_layer(layer);
-    let written = image.write().non_parallel().to_buffered(&mut bytes);
-    written.map_err(|e| Error::Failed(format!("cannot encode exr: {e}")))?;
+    exr::block::write(&mut bytes, headers, true, |meta, writer| {
+        let indices: Vec<_> = meta.enumerate_ordered_header_block_indices().collect();
+        let chunk = |(place, index): (usize, BlockIndex)| {
+            let data = layers.extract_uncompressed_block(&meta.headers, index);
+            let block = UncompressedBlock { index, data };
+            block.compress_to_chunk(&meta.headers).map(|chunk| (place, chunk))
+        };
+        let chunks: Vec<_> = indices.into_par_iter().map(chunk).collect();
+        for chunk in chunks {
+            let (place, chunk) = chunk?;
+            writer.write_chunk(place, chunk)?;
+        }
+        Ok(())
+    })?;
     Ok(bytes.into_inner())
 }
 

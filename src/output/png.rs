@@ -28,7 +28,9 @@ fn encode(
     let mut encoder = png::Encoder::new(w, film.width, film.height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(depth);
-    encoder.set_compression(png::Compression::Balanced);
+    // On 640x360: 3 to 9 ms; `Balanced` takes 50, as long as a whole in-between frame, for files
+    // that are 15 to 45 % smaller.
+    encoder.set_compression(png::Compression::Fast);
     if options.display.tone == ToneCurve::Linear {
         encoder.set_source_gamma(png::ScaledFloat::new(1.0));
     } else {

@@ -44,8 +44,7 @@ impl Quantiser {
 
     /// The level of a linear value; values outside [0, 1] are clipped, a NaN is level 0.
     pub fn level(&self, x: f32) -> u16 {
-        // Below the first threshold, or a NaN: the negated comparison catches both.
-        if !(x >= self.first[1]) {
+        if x.is_nan() || x < self.first[1] {
             return 0;
         }
         let x = x.min(1.0);
