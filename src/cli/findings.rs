@@ -45,7 +45,8 @@ pub fn findings(
         ));
     }
     if blank.len() == frames.len() {
-        warnings.push("nothing is visible: no camera ray of any frame looked at hits anything".into());
+        warnings
+            .push("nothing is visible: no camera ray of any frame looked at hits anything".into());
     } else if !blank.is_empty() {
         warnings.push(format!("nothing is visible in some frames ({})", list(&blank)));
     }
@@ -55,7 +56,8 @@ pub fn findings(
 /// Up to [`FRAMES`] frames of `1..=count`.
 fn sampled_frames(count: u32) -> Vec<u32> {
     let steps = FRAMES.min(count).max(1);
-    let at = |i: u32| 1 + (u64::from(i) * u64::from(count - 1) / u64::from((steps - 1).max(1))) as u32;
+    let at =
+        |i: u32| 1 + (u64::from(i) * u64::from(count - 1) / u64::from((steps - 1).max(1))) as u32;
     (0..steps).map(at).collect()
 }
 

@@ -169,9 +169,8 @@ fn world_bounds(scene: &Scene) -> Option<[[f64; 3]; 2]> {
 fn mesh_bytes(mesh: &Mesh) -> u64 {
     let normals = mesh.normals.as_ref();
     let uvs = mesh.uvs.as_ref();
-    let corner_lists =
-        normals.and_then(|n| n.corners.as_ref()).map_or(0, Vec::len)
-            + uvs.and_then(|uv| uv.corners.as_ref()).map_or(0, Vec::len);
+    let corner_lists = normals.and_then(|n| n.corners.as_ref()).map_or(0, Vec::len)
+        + uvs.and_then(|uv| uv.corners.as_ref()).map_or(0, Vec::len);
     let words = 3 * mesh.positions.len()
         + 3 * mesh.triangles.len()
         + 3 * normals.map_or(0, |n| n.values.len())

@@ -4,9 +4,9 @@ use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::Exit;
 use super::progress::{Watch, duration};
 use super::request::Request;
+use super::say;
 use super::signals::Interrupt;
 use super::stats::{self, RankStats};
-use super::say;
 use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
@@ -69,8 +69,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let threads = args.output.threads.map_or_else(cluster::default_threads, |n| n as usize);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
-    let intersector =
-        world.agree(intersect::build(&request.scene, &request.settings, threads))?;
+    let intersector = world.agree(intersect::build(&request.scene, &request.settings, threads))?;
     let built = Instant::now();
     let target = request.target(world.same_everywhere("traces with", intersector.describe())?);
     let prepare = || pool.install(|| sequence::prepare(&target, request.frames));
@@ -211,7 +210,9 @@ fn make_video(args: &RenderArgs, job: &Frames) -> Result<String> {
     Ok(match video::make(&clip, &beside(pattern, &ending))? {
         Video::Made(path) => format!("video {}", path.display()),
         Video::NoFfmpeg { command } => {
-            format!("no video, since ffmpeg is not installed; where it is, this makes one:\n{command}")
+            format!(
+                "no video, since ffmpeg is not installed; where it is, this makes one:\n{command}"
+            )
         }
         Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
     })

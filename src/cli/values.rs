@@ -14,8 +14,7 @@ pub struct FrameRequest {
 impl FrameRequest {
     /// The frames of a shot of `count` frames, or what is wrong with them.
     pub fn of_shot(self, count: u32) -> Result<FrameRange, String> {
-        let range =
-            FrameRange { first: self.first.unwrap_or(1), last: self.last.unwrap_or(count) };
+        let range = FrameRange { first: self.first.unwrap_or(1), last: self.last.unwrap_or(count) };
         in_shot(range, count).map(|()| range)
     }
 }
@@ -25,7 +24,13 @@ pub fn in_shot(range: FrameRange, count: u32) -> Result<(), String> {
     if range.first >= 1 && range.first <= range.last && range.last <= count {
         return Ok(());
     }
-    Err(format!("frames {}..{} lie outside the shot, which has frames 1..{count}", range.first, range.last))
+    let FrameRange { first, last } = range;
+    Err(match first == last {
+        true => format!("frame {first} lies outside the shot, which has frames 1..{count}"),
+        false => {
+            format!("frames {first}..{last} lie outside the shot, which has frames 1..{count}")
+        }
+    })
 }
 
 /// `640x360`.
@@ -65,7 +70,8 @@ pub fn frames(text: &str) -> Result<FrameRequest, String> {
 /// `x0,y0,x1,y1`; the second corner is excluded.
 pub fn crop(text: &str) -> Result<Rect, String> {
     let wrong = || {
-        "a crop is written x0,y0,x1,y1 in pixels from the upper left, x1 and y1 excluded".to_string()
+        "a crop is written x0,y0,x1,y1 in pixels from the upper left, x1 and y1 excluded"
+            .to_string()
     };
     let numbers: Result<Vec<u32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     match numbers.map_err(|_| wrong())?[..] {

@@ -34,11 +34,7 @@ pub fn default_threads() -> usize {
     share_of_node(allowed, cores_online(), |name| std::env::var(name).ok())
 }
 
-fn share_of_node(
-    allowed: usize,
-    online: usize,
-    env: impl Fn(&str) -> Option<String>,
-) -> usize {
+fn share_of_node(allowed: usize, online: usize, env: impl Fn(&str) -> Option<String>) -> usize {
     let local = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"];
     let neighbours = local.iter().find_map(|name| env(name)?.trim().parse::<usize>().ok());
     match neighbours {

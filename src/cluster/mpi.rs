@@ -9,11 +9,9 @@ use crate::error::{Error, Result};
 use ::mpi::Threading;
 use ::mpi::environment::Universe;
 use ::mpi::ffi;
-use ::mpi::topology::SimpleCommunicator;
 use ::mpi::point_to_point::MatchedReceiveVec;
-use ::mpi::traits::{
-    AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source,
-};
+use ::mpi::topology::SimpleCommunicator;
+use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::RefCell;
 use std::mem::MaybeUninit;
 use std::time::Duration;

@@ -165,8 +165,7 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     let folder = Folder::new();
     let target = folder.target(&settings(), false);
     let plan = prepare(&target, FOUR).expect("prepared");
-    let maker =
-        Plain { settings: settings(), stop_before: 0, made: RefCell::default() };
+    let maker = Plain { settings: settings(), stop_before: 0, made: RefCell::default() };
     let manifest = manifest_path(&target.pattern);
     let part = crate::output::manifest::part_path(&manifest, 1);
     let quiet = &mut |_: &FrameReport| Ok(());

@@ -28,9 +28,8 @@ impl FrameMaker for Tracer<'_> {
     fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>> {
         let settings = self.renderer.settings;
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
-        let render = || {
-            self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress)
-        };
+        let render =
+            || self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress);
         Ok(self.pool.install(render))
     }
 }
