@@ -23,8 +23,15 @@ pub struct ConvertArgs {
 
 /// Runs the command.
 pub fn run(args: &ConvertArgs) -> Result<Exit> {
-    let warnings = Vec::<crate::error::Diagnostic>::new();
-    warnings.iter().for_each(say::warning);
-    say::result(format_args!("{} written", args.to.display()));
+    let report = import::convert(&args.from, &args.to).map_err(as_input)?;
+    report.warnings.iter().for_each(say::warning);
+    let written = &report.written;
+    say::result(format_args!(
+        "{}: {} triangles, {} vertices, {:.1} MB",
+        args.to.display(),
+        written.triangles,
+        written.vertices,
+        written.bytes as f64 * 1e-6
+    ));
     Ok(Exit::Done)
 }

@@ -49,8 +49,12 @@ enum Command {
     Schema(schema::SchemaArgs),
 }
 
-const VERSION: &str =
-    concat!(env!("CARGO_PKG_VERSION"), " (Embree ", env!("TWEENRAY_EMBREE_VERSION"), ")");
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (built with Embree ",
+    env!("TWEENRAY_EMBREE_VERSION"),
+    ")"
+);
 
 /// Runs the program with the process's arguments; the process ends with what this returns.
 pub fn run() -> ExitCode {

@@ -24,10 +24,13 @@ pub fn in_shot(range: FrameRange, count: u32) -> Result<(), String> {
     if range.first >= 1 && range.first <= range.last && range.last <= count {
         return Ok(());
     }
-    Err(format!(
-        "frames {}..{} lie outside the shot, which has frames 1..{count}",
-        range.first, range.last
-    ))
+    let FrameRange { first, last } = range;
+    Err(match first == last {
+        true => format!("frame {first} lies outside the shot, which has frames 1..{count}"),
+        false => {
+            format!("frames {first}..{last} lie outside the shot, which has frames 1..{count}")
+        }
+    })
 }
 
 /// `640x360`.

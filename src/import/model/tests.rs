@@ -1,5 +1,7 @@
 //! The real meshes beside the project, where they exist.
 
+#![allow(clippy::print_stderr)]
+
 use super::*;
 use crate::math::DVec3;
 use crate::scene::{Light, WorldMesh};
@@ -75,4 +77,69 @@ fn the_course_scene_is_read_whole() {
     let [Light::Quad(light)] = &world.lights[..] else { panic!("one light") };
     assert_eq!((light.area(), light.normal(), light.two_sided), (4.0, DVec3::NEG_Y, true));
     assert_eq!(light.radiance, Rgb::splat(2.0));
+}
+
+/// `cargo test --release --lib ten_million -- --ignored --nocapture` says how long import takes.
+#[test]
+#[ignore = "takes a minute and a gigabyte of disk"]
+fn ten_million_triangles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let terrain = crate::import::bench_terrain("terrain", 2237, 10.0, 0).expect("a terrain");
+    let count = terrain.triangles.len();
+    let obj = folder.path().join("terrain.obj");
+    write_obj(&terrain, &obj);
+    let world = World { meshes: vec![terrain], ..World::default() };
+    let ply = folder.path().join("terrain.ply");
+    let mut file = std::fs::File::create(&ply).expect("a file");
+    crate::import::write_ply(&world, &mut file, &ply).expect("written");
+    for (path, policy) in
+        [(&ply, NormalPolicy::Flat), (&ply, SMOOTH), (&obj, NormalPolicy::Flat), (&obj, SMOOTH)]
+    {
+        for _ in 0..3 {
+            let start = Start::now();
+            let model = load_model(path, policy).expect("read");
+            eprintln!("{count} triangles, {policy:?}, {}: {start}", path.display());
+            assert_eq!(model.world.meshes[0].triangles.len(), count);
+        }
+    }
+    let start = Start::now();
+    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let (models, _) = tobj::load_obj(&obj, &options).expect("read");
+    eprintln!("{count} triangles, tobj alone on the same OBJ: {start}");
+    assert_eq!(models[0].mesh.indices.len(), 3 * count);
+}
+
+/// Wall and processor time since a moment; the latter tells more on a busy machine.
+struct Start(std::time::Instant, f64);
+
+impl Start {
+    fn now() -> Self {
+        Self(std::time::Instant::now(), Self::processor_seconds())
+    }
+
+    /// User and system time of this process, of Linux; elsewhere 0.
+    fn processor_seconds() -> f64 {
+        let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+        let after_name = stat.rsplit(") ").next().unwrap_or("");
+        let ticks = after_name.split(' ').skip(11).take(2).filter_map(|t| t.parse::<f64>().ok());
+        ticks.sum::<f64>() / 100.0
+    }
+}
+
+impl std::fmt::Display for Start {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let processor = Self::processor_seconds() - self.1;
+        write!(f, "{:.2} s, {processor:.2} s of processor", self.0.elapsed().as_secs_f64())
+    }
+}
+
+fn write_obj(mesh: &WorldMesh, path: &Path) {
+    use std::io::Write;
+    let mut out = std::io::BufWriter::new(std::fs::File::create(path).expect("a file"));
+    for p in &mesh.positions {
+        writeln!(out, "v {} {} {}", p.x, p.y, p.z).expect("written");
+    }
+    for [a, b, c] in &mesh.triangles {
+        writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1).expect("written");
+    }
 }

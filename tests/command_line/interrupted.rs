@@ -1,0 +1,71 @@
+//! Jobs that are stopped, politely or not, and go on.
+
+use super::job::{Job, Ran};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Frames of a good part of a second each.
+const SLOW: &str = "render cube.obj --size 192x108 --spp 32 --frames 1..4 --no-video";
+
+/// Starts the job and waits for its first finished frame.
+fn after_first_frame(job: &Job, out: &str) -> (Child, BufReader<std::process::ChildStderr>) {
+    let line = format!("{SLOW} -o {out}/f_##.png");
+    let mut child = job.command(&line).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut first = String::new();
+    err.read_line(&mut first).expect("a line");
+    assert!(first.starts_with("frame 1 of 4"), "{first}");
+    (child, err)
+}
+
+fn send(signal: &str, child: &Child) {
+    let line = format!("kill -{signal} {}", child.id());
+    assert!(Command::new("sh").args(["-c", &line]).status().expect("a shell").success());
+}
+
+fn rest(mut err: BufReader<std::process::ChildStderr>) -> String {
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut err, &mut text).expect("text");
+    text
+}
+
+fn assert_same_frames(job: &Job, a: &str, b: &str) {
+    for n in 1..=4 {
+        let name = format!("f_0{n}.png");
+        assert_eq!(job.read(&format!("{a}/{name}")), job.read(&format!("{b}/{name}")), "{name}");
+    }
+}
+
+#[test]
+fn a_signal_stops_within_a_second_and_the_same_command_goes_on() {
+    let job = Job::new();
+    for signal in ["INT", "TERM"] {
+        let (mut child, err) = after_first_frame(&job, signal);
+        let asked = Instant::now();
+        send(signal, &child);
+        let code = child.wait().expect("it ends").code();
+        assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());
+        let words = rest(err);
+        assert_eq!(code, Some(75), "{words}");
+        assert!(words.contains("of 4 frames are finished"), "{words}");
+        assert!(job.names(signal).iter().all(|name| !name.contains(".tmp")), "no torn file");
+        let ran = job.done(&format!("{SLOW} -o {signal}/f_##.png"));
+        assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
+    }
+    job.done(&format!("{SLOW} -o whole/f_##.png"));
+    assert_same_frames(&job, "INT", "whole");
+    assert_same_frames(&job, "TERM", "whole");
+}
+
+#[test]
+fn a_kill_loses_the_frame_in_flight_at_most() {
+    let job = Job::new();
+    let (mut child, _err) = after_first_frame(&job, "k");
+    send("KILL", &child);
+    child.wait().expect("it ends");
+    let ran: Ran = job.done(&format!("{SLOW} -o k/f_##.png"));
+    assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
+    job.done(&format!("{SLOW} -o whole/f_##.png"));
+    assert_same_frames(&job, "k", "whole");
+}

@@ -1,0 +1,8 @@
+//! The program as a user meets it: words, exit codes, files.
+
+mod comparing;
+mod interrupted;
+mod job;
+mod ranks;
+mod rendering;
+mod words;

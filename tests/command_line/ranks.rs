@@ -1,0 +1,89 @@
+//! Several processes: refused without MPI, and the same bytes with it.
+
+use super::job::{Job, Ran};
+
+const LINE: &str = "render cube.obj --size 48x27 --spp 1 --frames 1..5 --no-video";
+
+/// A launcher without MPI would have every rank render everything.
+#[cfg(not(feature = "mpi"))]
+#[test]
+fn a_launcher_without_mpi_is_refused() {
+    let job = Job::new();
+    let mut command = job.command(LINE);
+    let output = command.env("OMPI_COMM_WORLD_SIZE", "4").output().expect("it starts");
+    let ran = Ran::of(&output);
+    assert_eq!(ran.code, Some(2));
+    assert!(ran.err.contains("started 4 processes"), "{}", ran.err);
+    let alone = job.command(LINE).env("OMPI_COMM_WORLD_SIZE", "1").output().expect("it starts");
+    assert!(alone.status.success());
+}
+
+#[cfg(feature = "mpi")]
+mod with_mpi {
+    use super::*;
+    use std::fs;
+    use std::process::Command;
+    use std::time::{Duration, Instant};
+
+    /// The job under mpirun; `None` where there is none, which the test then says.
+    fn under_mpirun(job: &Job, ranks: u32, line: &str) -> Option<Ran> {
+        let alone = job.command(line);
+        let mut command = Command::new("mpirun");
+        command.args(["-n", &ranks.to_string()]).arg(alone.get_program()).args(alone.get_args());
+        command.current_dir(job.path("."));
+        for (name, value) in [
+            ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
+            ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
+            ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+            ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
+        ] {
+            command.env(name, value);
+        }
+        match command.output() {
+            Ok(output) => Some(Ran::of(&output)),
+            Err(_) => {
+                eprintln!("skipped: no mpirun here");
+                None
+            }
+        }
+    }
+
+    #[test]
+    fn ranks_share_the_frames_and_the_bytes_are_the_same() {
+        let job = Job::new();
+        job.done(&format!("{LINE} -o solo/f_##.png"));
+        for ranks in [2, 3] {
+            let line = format!("{LINE} -o r{ranks}/f_##.png --stats s.json");
+            let Some(ran) = under_mpirun(&job, ranks, &line) else { return };
+            assert_eq!(ran.code, Some(0), "{}", ran.err);
+            assert_eq!(ran.out.matches("5 frames in").count(), 1, "{}", ran.out);
+            assert!(ran.err.contains("frame 5 of 5"), "{}", ran.err);
+            let mut names: Vec<String> = (1..=5).map(|n| format!("f_0{n}.png")).collect();
+            for name in &names {
+                let ours = job.read(&format!("r{ranks}/{name}"));
+                assert!(ours == job.read(&format!("solo/{name}")), "{ranks} ranks, {name}");
+            }
+            names.insert(0, "f.manifest.jsonl".into());
+            assert_eq!(job.names(&format!("r{ranks}")), names);
+            let stats: serde_json::Value =
+                serde_json::from_slice(&job.read("s.json")).expect("valid JSON");
+            assert_eq!(stats["ranks"].as_array().map(Vec::len), Some(ranks as usize));
+            assert!(job.done(&line).out.contains("5 kept"));
+        }
+    }
+
+    #[test]
+    fn a_failing_rank_ends_the_job_with_its_words() {
+        let job = Job::new();
+        // Frame 5 belongs to rank 1, and a folder stands in its place.
+        fs::create_dir_all(job.path("o/f_05.png")).expect("made");
+        let start = Instant::now();
+        let line = format!("{LINE} -o o/f_##.png --overwrite");
+        let Some(ran) = under_mpirun(&job, 2, &line) else { return };
+        assert!(ran.code != Some(0) && ran.err.contains("o/f_05.png"), "{}", ran.err);
+        assert!(start.elapsed() < Duration::from_secs(30));
+        let Some(ran) = under_mpirun(&job, 2, "render none.obj") else { return };
+        assert_eq!(ran.err.matches("error: none.obj").count(), 1, "{}", ran.err);
+        assert_eq!(ran.code, Some(2));
+    }
+}

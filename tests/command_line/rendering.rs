@@ -1,0 +1,140 @@
+//! `tweenray render`: files, resuming, refusing, the words around them.
+
+use super::job::Job;
+use std::fs;
+
+const SMALL: &str = "--size 48x27 --spp 1 --sky-samples 2 --no-video";
+
+fn small(rest: &str) -> String {
+    format!("render cube.obj {SMALL} {rest}")
+}
+
+#[test]
+fn frames_are_kept_and_the_rest_rendered() {
+    let job = Job::new();
+    job.done(&small("--frames 1..2 -o o/f_##.png"));
+    let before = job.changed("o/f_01.png");
+    let ran = job.done(&small("--frames 1..4 -o o/f_##.png"));
+    assert!(ran.out.contains("4 frames in o/f_##.png (2 rendered, 2 kept)"), "{}", ran.out);
+    assert_eq!(job.changed("o/f_01.png"), before);
+    let names = ["f.manifest.jsonl", "f_01.png", "f_02.png", "f_03.png", "f_04.png"];
+    assert_eq!(job.names("o"), names);
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    assert_eq!(manifest.lines().count(), 5);
+    for line in manifest.lines() {
+        serde_json::from_str::<serde_json::Value>(line).expect("JSON");
+    }
+    fs::write(job.path("o/f_03.png"), "torn").expect("written");
+    let ran = job.done(&small("--frames 1..4 -o o/f_##.png"));
+    assert!(ran.err.contains("note: o/f_03.png is damaged"), "{}", ran.err);
+    assert!(ran.out.contains("1 rendered, 3 kept"), "{}", ran.out);
+}
+
+#[test]
+fn another_setting_is_refused_by_name_and_overwrite_replaces() {
+    let job = Job::new();
+    job.done(&small("--frames 1 -o o/f_##.png"));
+    let before = job.read("o/f_01.png");
+    for (option, says) in [
+        ("--seed 7", "seed was 0, now it is 7"),
+        ("--shadow-samples 3", "shadow-samples was 16, now it is 3"),
+        ("--recheck risky", "recheck was always, now it is risky"),
+        ("--crop 0,0,9,9", "crop was none, now it is 0,0,9,9"),
+        ("--intersector oracle", "intersector was embree, now it is oracle"),
+    ] {
+        job.refused(&small(&format!("--frames 1 -o o/f_##.png {option}")), says);
+    }
+    assert_eq!(job.read("o/f_01.png"), before);
+    fs::write(job.path("cube.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
+    job.refused(&small("--frames 1 -o o/f_##.png"), "scene content");
+    job.done(&small("--frames 1 -o o/f_##.png --overwrite"));
+    assert_ne!(job.read("o/f_01.png"), before);
+}
+
+#[test]
+fn somebody_elses_frames_are_not_touched() {
+    let job = Job::new();
+    fs::write(job.path("f_01.png"), "mine").expect("written");
+    job.refused(&small("--frames 1..2 -o f_##.png"), "f_01.png exists");
+    assert_eq!(job.read("f_01.png"), b"mine");
+}
+
+#[test]
+fn threads_ranges_and_crops_do_not_change_bytes() {
+    let job = Job::new();
+    job.done(&small("--frames 1..3 --threads 1 -o a/f_##.ppm"));
+    job.done(&small("--frames 3 --threads 2 -o b/f_##.ppm"));
+    assert_eq!(job.read("a/f_03.ppm"), job.read("b/f_03.ppm"));
+    job.done(&small("--frames 3 --crop 10,5,30,20 -o c/f_##.ppm"));
+    let (whole, crop) = (job.read("a/f_03.ppm"), job.read("c/f_03.ppm"));
+    assert_eq!(whole.len(), crop.len());
+    // The pixels end the file; what lies before them is the header.
+    let start = whole.len() - 3 * 48 * 27;
+    for y in 0..27 {
+        for x in 0..48 {
+            let at = start + 3 * (y * 48 + x);
+            let inside = (10..30).contains(&x) && (5..20).contains(&y);
+            let expected = if inside { &whole[at..at + 3] } else { &[0, 0, 0][..] };
+            assert_eq!(&crop[at..at + 3], expected, "pixel {x},{y}");
+        }
+    }
+}
+
+#[test]
+fn quiet_says_nothing_and_otherwise_a_line_a_frame() {
+    let job = Job::new();
+    let ran = job.done(&small("--frames 1..2 --quiet -o q/f_##.png"));
+    assert_eq!((ran.out.as_str(), ran.err.as_str()), ("", ""));
+    let ran = job.done(&small("--frames 1..2 -o p/f_##.png"));
+    let lines: Vec<&str> = ran.err.lines().collect();
+    assert_eq!(lines.len(), 2, "{}", ran.err);
+    assert!(lines[0].starts_with("frame 1 of 2  "), "{}", ran.err);
+    assert!(lines[0].contains(" Mrays/s  left "), "{}", ran.err);
+}
+
+#[test]
+fn stats_are_json_and_count_what_was_cast() {
+    let job = Job::new();
+    job.done(&small("--frames 1..2 -o s/f_##.exr --stats stats.json --threads 2"));
+    let stats: serde_json::Value =
+        serde_json::from_slice(&job.read("stats.json")).expect("valid JSON");
+    assert_eq!(stats["rays"]["camera"], 2 * 48 * 27);
+    assert_eq!(stats["settings"]["sky_samples"], 2);
+    assert_eq!(stats["ranks"][0]["threads"], 2);
+    assert_eq!(stats["complete"], true);
+    assert!(stats["tracer"].as_str().is_some_and(|t| t.contains("Embree 4.")));
+    for key in ["load_seconds", "build_seconds", "render_seconds", "total_seconds"] {
+        assert!(stats[key].as_f64().is_some_and(|s| s >= 0.0), "{key}");
+    }
+    for frame in stats["frames"].as_array().expect("frames") {
+        assert!(frame["trace_seconds"].as_f64() > Some(0.0));
+        assert!(frame["write_seconds"].as_f64() > Some(0.0));
+    }
+    let peak = &stats["peak_memory_bytes"];
+    assert!(peak.is_null() || peak.as_u64() > Some(1 << 20));
+}
+
+#[test]
+fn without_ffmpeg_the_command_is_printed_and_the_job_is_done() {
+    let job = Job::new();
+    let line = "render cube.obj --size 48x27 --spp 1 --frames 1..2 -o v/f_##.png";
+    let output = job.command(line).env("PATH", "").output().expect("the program starts");
+    let out = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{out}");
+    assert!(out.contains("\nffmpeg ") && out.contains("v/f_1-2.mp4"), "{out}");
+}
+
+#[test]
+fn the_default_output_is_named_after_the_scene() {
+    let job = Job::new();
+    job.done("render cube.obj --size 16x9 --spp 1 --frames 1 --quiet");
+    assert_eq!(job.names("out/cube"), ["frame.manifest.jsonl", "frame_0001.png"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_fails() {
+    let job = Job::new();
+    let ran = job.run(&small("--frames 1 -o cube.obj/f_##.png"));
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("error: cannot create the folder cube.obj"), "{}", ran.err);
+}

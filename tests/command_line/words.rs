@@ -1,0 +1,76 @@
+//! Help, versions, mistakes.
+
+use super::job::{Job, Ran};
+use std::process::Stdio;
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let job = Job::new();
+    let help = job.done("--help").out;
+    for command in ["render", "inspect", "compare", "convert", "schema"] {
+        assert!(help.contains(&format!("  {command} ")), "{help}");
+        let own = job.done(&format!("{command} --help")).out;
+        assert!(own.contains("Examples:\n  tweenray"), "{own}");
+        assert!(own.lines().all(|line| line.chars().count() <= 120), "{own}");
+    }
+    assert!(job.done("--version").out.contains("Embree 4."));
+    let bare = job.run("");
+    assert_eq!(bare.code, Some(2));
+    assert!(bare.err.contains("Usage: tweenray"));
+}
+
+#[test]
+fn mistakes_are_answered_with_what_was_meant() {
+    let job = Job::new();
+    job.refused("rendr cube.obj", "'render'");
+    job.refused("render cube.obj --shadow-sample 4", "'--shadow-samples'");
+    job.refused("render cube.obj --filter tant", "'tent'");
+    job.refused("render", "<SCENE>");
+    job.refused("render cube.obj --size 0x0", "at least one pixel");
+    job.refused("render cube.obj --size 640", "as in 640x360");
+    job.refused("render cube.obj --size 65000x65000", "GB of memory");
+    job.refused("render cube.obj --size 70000x1", "at most 65535 pixels");
+    job.refused("render cube.obj --spp 0", "1..=65536");
+    job.refused("render cube.obj --frames 9..3", "frame 9 comes after frame 3");
+    job.refused("render cube.obj --frames 0", "counted from 1");
+    job.refused("render cube.obj --frames 9999999", "lies outside the shot");
+    job.refused("render cube.obj --crop 0,0,9999,9", "does not lie in the image");
+    job.refused("render cube.obj --exposure nan", "finite");
+    job.refused("render cube.obj --threads 0", "1..=4096");
+    job.refused("render cube.obj -o out/frame_####.gif", ".png, .exr or .ppm");
+    job.refused("render cube.obj -o a##/b##.png", "folder");
+    job.refused("render nothing.obj", "nothing.obj");
+    job.refused("render nothing.toml", "nothing.toml");
+    assert_eq!(job.names("."), ["cube.obj"], "a refused job leaves nothing");
+}
+
+#[test]
+fn inspect_tells_without_rendering() {
+    let job = Job::new();
+    let text = job.done("inspect cube.obj").out;
+    for word in ["12 triangles, 8 vertices", "bounds     (-1, -1, -1) to (1, 1, 1)", "effects"] {
+        assert!(text.contains(word), "{text}");
+    }
+    let json = job.done("inspect cube.obj --json").out;
+    let json: serde_json::Value = serde_json::from_str(&json).expect("valid JSON");
+    assert_eq!(json["triangles"], 12);
+    assert_eq!(json["warnings"], serde_json::json!([]));
+    assert!(json["memory"]["geometry"].as_u64() > Some(0));
+    assert_eq!(job.names("."), ["cube.obj"]);
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_fault() {
+    let job = Job::new();
+    for line in ["inspect cube.obj", "--help", "schema"] {
+        let mut child = job
+            .command(line)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        drop(child.stdout.take());
+        let ran = Ran::of(&child.wait_with_output().expect("it ends"));
+        assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""), "{line}");
+    }
+}
