@@ -13,6 +13,7 @@ mod light;
 mod material;
 mod mesh;
 mod path;
+mod place;
 mod recentre;
 mod settings;
 

@@ -1,0 +1,83 @@
+//! Any mesh file to the fast format: binary little-endian PLY.
+//!
+//! The file is written under a temporary name, synced and renamed: where one existed, it is
+//! whole, the old one or the new.
+
+mod flatten;
+mod write_ply;
+
+pub use write_ply::{PlyReport, write_ply};
+
+use super::model::read_model;
+use crate::error::{Diagnostic, Error, Result};
+use crate::scene::Light;
+use std::io::Write;
+use std::path::Path;
+
+/// What [`convert`] did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvertReport {
+    /// What the written file holds.
+    pub written: PlyReport,
+    /// What was lost or dropped on the way.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Reads the mesh file `input` and writes `output`, whose ending must be `.ply`.
+///
+/// Normals are the input's, or none: none are computed. Materials, textures and lights have no
+/// place in a PLY file and are left out with a warning.
+///
+/// Errors: those of [`super::load_model`], `Error::Usage` for another ending, `Error::Io`.
+pub fn convert(input: &Path, output: &Path) -> Result<ConvertReport> {
+    if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")) {
+        let name = output.display();
+        return Err(Error::Usage(format!("cannot write {name}: meshes are written as .ply only")));
+    }
+    let model = read_model(input)?;
+    let mut warnings = model.warnings;
+    let world = model.world;
+    let mut lost = Vec::new();
+    if world.materials.iter().any(|m| m.name != super::DEFAULT_MATERIAL) {
+        lost.push("materials");
+    }
+    if !world.textures.is_empty() {
+        lost.push("textures");
+    }
+    if !world.lights.is_empty() {
+        lost.push("lights");
+    }
+    if !lost.is_empty() {
+        let message = format!("a PLY file holds no {}: left out", lost.join(", "));
+        warnings.push(Diagnostic::new(input, message));
+    }
+    if world.lights.iter().any(|light| matches!(light, Light::Quad(_) | Light::Sphere { .. })) {
+        warnings.push(Diagnostic::new(input, "the surfaces of area lights were left out too"));
+    }
+    if !world.spheres.is_empty() {
+        let message = "exact spheres became 80,000 triangles each";
+        warnings.push(Diagnostic::new(input, message));
+    }
+    let written = write_atomically(output, |file| write_ply(&world, file, output))?;
+    Ok(ConvertReport { written, warnings })
+}
+
+/// Runs `write` on a temporary file beside `path`, then gives it that name.
+fn write_atomically<T>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<T>) -> Result<T> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tweenray-").suffix(".part");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(|e| Error::io("write", path, e))?;
+    let result = write(file.as_file_mut())?;
+    file.as_file().sync_all().map_err(|e| Error::io("write", path, e))?;
+    file.persist(path).map_err(|e| Error::io("rename", path, e.error))?;
+    Ok(result)
+}
+
+#[cfg(test)]
+mod tests;

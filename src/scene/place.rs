@@ -1,0 +1,235 @@
+//! Putting worlds together: affine transforms, and one world after another.
+
+use super::{Corners, Light, QuadLight, World, WorldMesh};
+use crate::error::{Error, Result};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+
+/// Two scale factors that differ by no more than this share count as one.
+const SAME_SCALE: f64 = 1e-9;
+
+impl WorldMesh {
+    /// Moves the mesh by `transform`, in f64. Normals follow by the inverse transpose; where
+    /// `transform` mirrors, triangles are reversed, so that outside stays outside.
+    ///
+    /// Errors: a transform that flattens or is not finite; a vertex that it moves out of f64.
+    pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
+        let (normal_matrix, mirrors) = normal_matrix(transform)?;
+        let moved: Vec<DVec3> =
+            self.positions.iter().map(|p| transform.transform_point3(*p)).collect();
+        if moved.iter().any(|p| !p.is_finite()) {
+            let name = &self.name;
+            return Err(Error::Usage(format!("`{name}` is moved beyond the largest number")));
+        }
+        self.positions = moved;
+        if let Some(normals) = &mut self.normals {
+            let turn = |n: &Vec3| (normal_matrix * n.as_dvec3()).normalize_or_zero().as_vec3();
+            normals.values.iter_mut().for_each(|n| *n = turn(n));
+        }
+        if mirrors {
+            reverse(&mut self.triangles);
+            self.normals.iter_mut().for_each(reverse_corners);
+            self.uvs.iter_mut().for_each(reverse_corners);
+        }
+        Ok(())
+    }
+}
+
+impl World {
+    /// Moves everything but the sky by `transform`: meshes, spheres and lights. The intensity
+    /// of point lights and the irradiance of directional ones stay.
+    ///
+    /// Errors: as [`WorldMesh::apply_transform`]; spheres under a transform that is no
+    /// similarity, since they would not stay spheres. The world is then half moved: drop it.
+    pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
+        let (_, mirrors) = normal_matrix(transform)?;
+        self.meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;
+        for sphere in &mut self.spheres {
+            move_sphere(&sphere.name, &mut sphere.centre, &mut sphere.radius, transform)?;
+        }
+        self.lights.iter_mut().try_for_each(|light| move_light(light, transform, mirrors))
+    }
+
+    /// Adds all that `other` holds, with its indices shifted. The sky stays this world's.
+    pub fn append(&mut self, mut other: World) {
+        let materials = self.materials.len() as u32;
+        let textures = self.textures.len() as u32;
+        other.meshes.iter_mut().for_each(|mesh| mesh.material += materials);
+        other.spheres.iter_mut().for_each(|sphere| sphere.material += materials);
+        for texture in other.materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
+            *texture += textures;
+        }
+        self.meshes.append(&mut other.meshes);
+        self.spheres.append(&mut other.spheres);
+        self.materials.append(&mut other.materials);
+        self.textures.append(&mut other.textures);
+        self.lights.append(&mut other.lights);
+    }
+}
+
+/// The inverse transpose of the linear part, up to a positive factor, and whether it mirrors.
+fn normal_matrix(transform: &DAffine3) -> Result<(DMat3, bool)> {
+    let m = transform.matrix3;
+    // Scaled to about 1 first: products of tiny columns would underflow.
+    let size = m.to_cols_array().iter().fold(0f64, |size, x| size.max(x.abs()));
+    let unit = m * (1.0 / size);
+    let det = unit.determinant();
+    if !transform.is_finite() || !unit.is_finite() || det == 0.0 {
+        let message = "a transform that flattens or is not finite: check scale and rotation";
+        return Err(Error::Usage(message.into()));
+    }
+    let (x, y, z) = (unit.x_axis, unit.y_axis, unit.z_axis);
+    let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    Ok((cofactors * det.signum(), det < 0.0))
+}
+
+fn reverse(triangles: &mut [[u32; 3]]) {
+    triangles.iter_mut().for_each(|t| t.swap(1, 2));
+}
+
+fn reverse_corners<T>(corners: &mut Corners<T>) {
+    corners.corners.iter_mut().for_each(|c| reverse(c));
+}
+
+fn move_sphere(
+    name: &str,
+    centre: &mut DVec3,
+    radius: &mut f64,
+    transform: &DAffine3,
+) -> Result<()> {
+    let m = transform.matrix3;
+    let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+    let scale = x.length();
+    let near = |value: f64, target: f64| (value - target).abs() <= SAME_SCALE * scale;
+    let skew = [x.dot(y), y.dot(z), z.dot(x)].map(|d| d / scale);
+    if !(near(y.length(), scale) && near(z.length(), scale) && skew.iter().all(|d| near(*d, 0.0))) {
+        return Err(Error::Usage(format!(
+            "`{name}` is an exact sphere, which a scale that differs by direction would deform; \
+             use the same scale in x, y and z, or a sphere made of triangles"
+        )));
+    }
+    *centre = transform.transform_point3(*centre);
+    *radius *= scale;
+    Ok(())
+}
+
+fn move_light(light: &mut Light, transform: &DAffine3, mirrors: bool) -> Result<()> {
+    match light {
+        Light::Point { position, .. } => *position = transform.transform_point3(*position),
+        Light::Directional { to_light, .. } => {
+            *to_light = transform.transform_vector3(*to_light).normalize_or_zero();
+        }
+        Light::Quad(QuadLight { corners, .. }) => {
+            *corners = corners.map(|c| transform.transform_point3(c));
+            if mirrors {
+                corners.swap(1, 3);
+            }
+        }
+        Light::Sphere { centre, radius, .. } => {
+            move_sphere("a sphere light", centre, radius, transform)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DQuat, Rgb};
+    use crate::scene::{Material, WorldSphere};
+
+    fn triangle() -> WorldMesh {
+        WorldMesh {
+            name: "t".into(),
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 1.0)],
+            triangles: vec![[0, 1, 2]],
+            normals: Some(Corners {
+                values: vec![Vec3::new(0.0, -1.0, 1.0).normalize()],
+                corners: Some(vec![[0, 0, 0]]),
+            }),
+            uvs: Some(Corners { values: vec![], corners: Some(vec![[5, 6, 7]]) }),
+            material: 0,
+        }
+    }
+
+    fn plane(mesh: &WorldMesh) -> DVec3 {
+        let [a, b, c] = mesh.triangles[0].map(|i| mesh.positions[i as usize]);
+        (b - a).cross(c - a).normalize()
+    }
+
+    #[test]
+    fn normals_stay_those_of_the_surface_and_outside_stays_outside() {
+        let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -2.0);
+        for scale in [DVec3::ONE, DVec3::new(2.0, 1.0, 1e-3), DVec3::new(-1.0, 3.0, 1.0)] {
+            for size in [1e-200, 1.0, 1e200] {
+                let transform =
+                    DAffine3::from_scale_rotation_translation(scale * size, turn, DVec3::ONE);
+                let mut mesh = triangle();
+                mesh.apply_transform(&transform).expect("a good transform");
+                let normal = mesh.normals.as_ref().expect("normals").values[0].as_dvec3();
+                if size == 1.0 {
+                    // The plane follows by the winding, the normal by the matrix.
+                    assert!(normal.angle_between(plane(&mesh)) < 1e-6, "{scale} {size:e}");
+                }
+                assert!((normal.length() - 1.0).abs() < 1e-6);
+                let mirrored = scale.x < 0.0;
+                let uvs = mesh.uvs.and_then(|uv| uv.corners).expect("uv corners");
+                assert_eq!(uvs[0], if mirrored { [5, 7, 6] } else { [5, 6, 7] });
+            }
+        }
+    }
+
+    #[test]
+    fn senseless_transforms_are_errors() {
+        for scale in [DVec3::new(1.0, 0.0, 1.0), DVec3::ZERO, DVec3::splat(f64::NAN)] {
+            assert!(triangle().apply_transform(&DAffine3::from_scale(scale)).is_err());
+        }
+        assert!(triangle().apply_transform(&DAffine3::from_translation(DVec3::INFINITY)).is_err());
+    }
+
+    fn with_sphere() -> World {
+        let (name, centre, radius) = ("ball".into(), DVec3::X, 2.0);
+        let light = QuadLight {
+            corners: [DVec3::ZERO, DVec3::X, DVec3::ONE, DVec3::new(0.0, 1.0, 1.0)],
+            radiance: Rgb::ONE,
+            two_sided: false,
+        };
+        World {
+            spheres: vec![WorldSphere { name, centre, radius, material: 0 }],
+            materials: vec![Material { texture: Some(0), ..Material::black("m") }],
+            lights: vec![Light::Quad(light)],
+            ..World::default()
+        }
+    }
+
+    #[test]
+    fn spheres_take_similarities_only() {
+        let turn = DQuat::from_rotation_z(0.7);
+        let similar = DAffine3::from_scale_rotation_translation(DVec3::splat(-3.0), turn, DVec3::Y);
+        let mut world = with_sphere();
+        world.apply_transform(&similar).expect("a similarity");
+        assert!((world.spheres[0].radius - 6.0).abs() < 1e-12);
+        let [Light::Quad(light)] = &world.lights[..] else { panic!("one quad") };
+        // A mirror image of a lamp still shines away from its back.
+        let before = DVec3::new(0.0, -1.0, 1.0).normalize();
+        assert!(light.normal().dot(turn * -before) > 0.999);
+        let error = with_sphere().apply_transform(&DAffine3::from_scale(DVec3::new(1.0, 1.0, 1.1)));
+        assert!(error.is_err_and(|e| e.to_string().contains("`ball` is an exact sphere")));
+    }
+
+    #[test]
+    fn appended_indices_are_shifted() {
+        let mut world = with_sphere();
+        world.textures = vec![];
+        let mut other = with_sphere();
+        other.meshes.push(triangle());
+        world.textures.push(crate::scene::Texture {
+            name: "image".into(),
+            width: 1,
+            height: 1,
+            texels: vec![Rgb::ONE],
+        });
+        world.append(other);
+        assert_eq!((world.meshes[0].material, world.spheres[1].material), (1, 1));
+        assert_eq!((world.materials[0].texture, world.materials[1].texture), (Some(0), Some(1)));
+    }
+}
