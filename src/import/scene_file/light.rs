@@ -1,0 +1,150 @@
+//! `[[light]]` and `[sky]`.
+
+use super::at::At;
+use super::number::Positive;
+use super::quad::{self, QuadShape};
+use super::report::Source;
+use super::vector::{Direction, Light as Amount, List, Point, Size2};
+use crate::error::Result;
+use crate::scene::{self, QuadLight};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A light: exactly one of `point`, `directional`, `quad` and `sphere`.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "snake_case", expecting = "a table")]
+pub(super) enum Light {
+    /// A point that emits alike in all directions; its shadows are hard.
+    Point(PointLight),
+    /// Parallel light from infinitely far, such as the sun's; its shadows are hard.
+    Directional(DirectionalLight),
+    /// A flat rectangle or parallelogram that glows; its shadows are soft.
+    Quad(QuadLightTable),
+    /// A glowing sphere; its shadows are soft.
+    Sphere(SphereLight),
+}
+
+/// A point that emits alike in all directions.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct PointLight {
+    /// Where it is, world units.
+    position: Point,
+    /// Radiant intensity, W/sr: at distance d it gives the irradiance intensity / d².
+    intensity: Amount,
+}
+
+/// Parallel light from infinitely far.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct DirectionalLight {
+    /// Vector from the scene towards the light; its length does not matter.
+    to_light: Direction,
+    /// Irradiance on a surface that faces the light, W/m².
+    irradiance: Amount,
+}
+
+/// A glowing parallelogram: either `corner` and `edges`, or `centre`, `normal` and `size`.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct QuadLightTable {
+    /// One corner, world units.
+    corner: Option<Point>,
+    /// The two edges that leave the corner, as vectors, world units. The light shines towards
+    /// their cross product, first times second.
+    edges: Option<List<Point, 2>>,
+    /// Middle of the rectangle, world units.
+    centre: Option<Point>,
+    /// Direction in which the rectangle shines.
+    normal: Option<Direction>,
+    /// Width and height, world units. The width is level; where the normal is vertical it runs
+    /// along x and the height along z.
+    size: Option<Size2>,
+    /// Emitted radiance, W/(m² sr).
+    radiance: Amount,
+    /// Whether the back shines too.
+    #[serde(default)]
+    two_sided: bool,
+}
+
+/// A glowing sphere.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct SphereLight {
+    /// Centre, world units.
+    centre: Point,
+    /// Radius, world units.
+    radius: Positive,
+    /// Emitted radiance, W/(m² sr).
+    radiance: Amount,
+}
+
+/// What a ray that hits nothing sees: a constant sky.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct Sky {
+    /// Radiance of the sky, W/(m² sr).
+    #[serde(default)]
+    radiance: Amount,
+    /// Whether the sky lights diffuse surfaces, by rays that geometry can block; if not it is
+    /// only a backdrop.
+    #[serde(default = "yes")]
+    lights: bool,
+    /// Light that reaches every diffuse surface, corners included, without any ray: it adds
+    /// `diffuse` times `ambient` to what is seen.
+    #[serde(default)]
+    ambient: Amount,
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl At<Light> {
+    /// As scene data.
+    pub fn build(&self, source: &Source) -> Result<scene::Light> {
+        Ok(match &self.value {
+            Light::Point(p) => scene::Light::Point {
+                position: p.position.vec(),
+                intensity: p.intensity.rgb(),
+            },
+            Light::Directional(d) => scene::Light::Directional {
+                to_light: d.to_light.unit(),
+                irradiance: d.irradiance.rgb(),
+            },
+            Light::Quad(q) => scene::Light::Quad(QuadLight {
+                corners: quad::corners(&q.shape(), source, &self.span)?,
+                radiance: q.radiance.rgb(),
+                two_sided: q.two_sided,
+            }),
+            Light::Sphere(s) => scene::Light::Sphere {
+                centre: s.centre.vec(),
+                radius: s.radius.0,
+                radiance: s.radiance.rgb(),
+            },
+        })
+    }
+}
+
+impl QuadLightTable {
+    fn shape(&self) -> QuadShape<'_> {
+        QuadShape {
+            corner: self.corner.as_ref(),
+            edges: self.edges.as_ref(),
+            centre: self.centre.as_ref(),
+            normal: self.normal.as_ref(),
+            size: self.size.as_ref(),
+        }
+    }
+}
+
+impl Sky {
+    /// As scene data.
+    pub fn build(&self) -> scene::Sky {
+        scene::Sky {
+            radiance: self.radiance.rgb(),
+            lights: self.lights,
+            ambient: self.ambient.rgb(),
+        }
+    }
+}

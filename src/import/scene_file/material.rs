@@ -1,0 +1,98 @@
+//! `[material.NAME]`.
+
+use super::at::At;
+use super::number::Ior;
+use super::report::Source;
+use super::vector::{Light as Amount, Reflectance};
+use crate::error::Result;
+use crate::scene::{self, TextureId};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// What a surface is made of. `diffuse` and `mirror` add up, to at most 1 in each channel;
+/// `glass` stands alone.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct Material {
+    /// Diffuse reflectance (albedo), linear RGB or one number for grey. Absent: 0, or 1 where
+    /// there is a `texture`.
+    pub diffuse: Option<Reflectance>,
+    /// Image file, relative to the scene file, that multiplies `diffuse`.
+    pub texture: Option<At<String>>,
+    /// Reflectance of a perfect mirror, linear RGB or one number for grey. Absent: 0.
+    pub mirror: Option<At<Reflectance>>,
+    /// Clear glass.
+    pub glass: Option<At<Glass>>,
+    /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
+    /// meshes of up to 64 flat quads, then light the scene; other meshes only glow.
+    pub emission: Option<Amount>,
+    /// Whether the back of a face emits too.
+    #[serde(default)]
+    pub emits_back: bool,
+}
+
+/// A smooth boundary between glass and air.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct Glass {
+    /// Index of refraction of the inside relative to the outside.
+    #[serde(default = "window_glass")]
+    ior: Ior,
+    /// Share of light that each crossing of the surface lets through.
+    #[serde(default = "Reflectance::white")]
+    tint: Reflectance,
+}
+
+fn window_glass() -> Ior {
+    Ior(1.5)
+}
+
+impl Material {
+    /// As scene data; `texture` is the decoded image's index.
+    pub fn build(
+        &self,
+        name: &str,
+        source: &Source,
+        texture: Option<TextureId>,
+    ) -> Result<scene::Material> {
+        self.check(source)?;
+        let glass = self.glass.as_ref().map(|g| scene::Glass { ior: g.ior.0, tint: g.tint.rgb() });
+        Ok(scene::Material {
+            name: name.to_owned(),
+            diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
+            texture,
+            mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
+            glass,
+            emission: self.emission.unwrap_or_default().rgb(),
+            emits_back: self.emits_back,
+        })
+    }
+
+    fn albedo(&self) -> Option<Reflectance> {
+        self.diffuse.or_else(|| self.texture.as_ref().map(|_| Reflectance::white()))
+    }
+
+    fn check(&self, source: &Source) -> Result<()> {
+        if let Some(glass) = &self.glass {
+            let others = self.diffuse.is_some() || self.texture.is_some() || self.mirror.is_some();
+            if others || self.emission.is_some() {
+                let message = "glass stands alone: a material that has it has neither `diffuse`, \
+                               `texture`, `mirror` nor `emission`";
+                return Err(source.fault(&glass.span, message).into());
+            }
+        }
+        if let (Some(diffuse), Some(mirror)) = (self.albedo(), &self.mirror) {
+            let sums = [0, 1, 2].map(|c| diffuse.0[c].0 + mirror.0[c].0);
+            // Sums such as 0.1 + 0.9 may round to a little over 1.
+            if let Some(channel) = sums.iter().position(|s| *s > 1.0 + 1e-9) {
+                let message = format!(
+                    "`diffuse` and `mirror` together reflect {} of {} light; at most 1 is possible",
+                    sums[channel],
+                    ["red", "green", "blue"][channel]
+                );
+                return Err(source.fault(&mirror.span, message).into());
+            }
+        }
+        Ok(())
+    }
+}

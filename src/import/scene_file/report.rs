@@ -1,0 +1,135 @@
+//! From a fault in the scene file's text to a [`Diagnostic`] with line, column and advice.
+
+use super::at::Span;
+use crate::error::{Diagnostic, Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Larger scene files are refused: geometry belongs into mesh files.
+const MAX_BYTES: u64 = 16 << 20;
+
+/// A scene file's text and name.
+pub(super) struct Source {
+    pub path: PathBuf,
+    pub text: String,
+}
+
+impl Source {
+    /// Reads the file.
+    ///
+    /// Errors: `Error::Io`; `Error::Input` for a file over 16 MB or one that is not UTF-8.
+    pub fn read(path: &Path) -> Result<Self> {
+        let about = std::fs::metadata(path).map_err(|e| Error::io("read", path, e))?;
+        if !about.is_file() {
+            return Err(Error::input(path, "this is not a regular file"));
+        }
+        if about.len() > MAX_BYTES {
+            let message = format!("a scene file has at most {} MB", MAX_BYTES >> 20);
+            let help = "put geometry into a mesh file and name it: file = \"mesh.ply\"";
+            return Err(Diagnostic::new(path, message).help(help).into());
+        }
+        let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
+        Self::from_bytes(path, bytes)
+    }
+
+    fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self> {
+        let path = path.to_path_buf();
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(Self { path, text }),
+            Err(e) => {
+                let good = e.utf8_error().valid_up_to();
+                let text = String::from_utf8_lossy(&e.as_bytes()[..good]).into_owned();
+                let source = Self { path, text };
+                Err(source.fault(&(good..good), "the file is not UTF-8 text from here on").into())
+            }
+        }
+    }
+
+    /// A diagnostic at the start of `span`.
+    pub fn fault(&self, span: &Span, message: impl Into<String>) -> Diagnostic {
+        let before = self.text.get(..span.start).unwrap_or(&self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        Diagnostic::new(&self.path, message).at(line, column)
+    }
+
+    /// A diagnostic about `name`, which is none of `known`.
+    pub fn unknown(&self, span: &Span, what: &str, name: &str, known: &[&str]) -> Diagnostic {
+        let fault = self.fault(span, format!("unknown {what} `{name}`"));
+        match help_on_names(name, known) {
+            Some(help) => fault.help(help),
+            None => fault,
+        }
+    }
+
+    /// What the TOML reader says, in our words.
+    pub fn from_toml(&self, error: &toml::de::Error) -> Diagnostic {
+        let span = error.span().unwrap_or(0..0);
+        let message = error.message();
+        let unknown = message
+            .strip_prefix("unknown field ")
+            .map(|rest| ("key", rest))
+            .or_else(|| message.strip_prefix("unknown variant ").map(|r| (self.kind_at(&span), r)));
+        if let Some((what, rest)) = unknown {
+            let names = quoted(rest);
+            let (name, known) = names.split_first().unwrap_or((&"", &[]));
+            return self.unknown(&span, what, name, known);
+        }
+        if let Some(name) = message.strip_prefix("missing field ") {
+            return self.fault(&span, format!("the key {name} is missing"));
+        }
+        if message.starts_with("wanted exactly 1 element") {
+            let text = "exactly one key that says the kind must stand here";
+            return self.fault(&span, text).help("see docs/scene-format.md for the kinds");
+        }
+        self.fault(&span, in_plain_words(message))
+    }
+
+    /// An unknown name in quotes is a value, any other a key.
+    fn kind_at(&self, span: &Span) -> &'static str {
+        let at = self.text.as_bytes().get(span.start);
+        if matches!(at, Some(b'"' | b'\'')) { "value" } else { "key" }
+    }
+}
+
+/// "invalid type: X, expected Y" reads better the other way round.
+fn in_plain_words(message: &str) -> String {
+    let swapped = ["invalid type: ", "invalid value: ", "invalid length "]
+        .iter()
+        .find_map(|prefix| message.strip_prefix(prefix)?.rsplit_once(", expected "));
+    match swapped {
+        Some((found, expected)) => {
+            let found = match found {
+                "map" => "a table or a date",
+                "sequence" => "an array",
+                other => other,
+            };
+            format!("expected {expected}, found {found}")
+        }
+        None => message.to_owned(),
+    }
+}
+
+/// The parts of `text` between backquotes.
+fn quoted(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
+}
+
+fn help_on_names(name: &str, known: &[&str]) -> Option<String> {
+    let list = || known.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
+    match nearest(name, known) {
+        Some(near) => Some(format!("did you mean `{near}`?")),
+        None if known.is_empty() => None,
+        None => Some(format!("valid here: {}", list())),
+    }
+}
+
+/// The name of `known` that `name` most likely stands for; `None` where none is near.
+pub(super) fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
+    let lower = name.to_lowercase();
+    known
+        .iter()
+        .map(|k| (strsim::normalized_damerau_levenshtein(&lower, &k.to_lowercase()), *k))
+        .filter(|(likeness, _)| *likeness >= 0.5)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, k)| k)
+}

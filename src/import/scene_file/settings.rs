@@ -1,0 +1,265 @@
+//! `[settings]`: everything that `tweenray render` can set, under the same names.
+
+use super::at::At;
+use super::number::{Int, Positive, Share};
+use super::report::Source;
+use super::vector::List;
+use crate::error::Result;
+use crate::import::Job;
+use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, ToneCurve};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::borrow::Cow;
+use std::path::PathBuf;
+
+/// Image columns or rows.
+pub(super) type Pixels = Int<1, 32_768>;
+/// Samples of any kind that may be none.
+type Samples = Int<0, 65_536>;
+
+/// How to render. The command line's options of the same names stand over these.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, expecting = "a table")]
+pub(super) struct Settings {
+    /// Image width and height, pixels.
+    pub size: List<Pixels, 2>,
+    /// Camera samples a pixel.
+    spp: Int<1, 65_536>,
+    /// Pixel filter: "box", "tent", "gaussian" or "blackman-harris".
+    filter: Filter,
+    /// Shadow samples per area light and camera sample; 0 leaves area lights unlit.
+    shadow_samples: Samples,
+    /// Sky rays per camera sample where the sky lights the scene.
+    sky_samples: Samples,
+    /// Specular bounces after the camera ray.
+    bounces: Int<0, 64>,
+    /// Mirror and glass branches that contribute less than this share are dropped.
+    cutoff: Share,
+    /// Seed of every random number.
+    seed: Int<0, { i64::MAX }>,
+    /// Factor on radiance before the tone curve.
+    exposure: Positive,
+    /// Tone curve of png and ppm files: "srgb" and "linear" clip, "reinhard" and "filmic" compress
+    /// highlights. exr files stay linear.
+    tone: ToneCurve,
+    /// Bits a channel of png files: 8 or 16.
+    png_bits: PngBits,
+    /// What traces: "embree", or "oracle", the brute-force f64 path for small scenes.
+    intersector: IntersectorKind,
+    /// Embree's instruction set; frames differ in the last bits by it. Absent: the machine's best.
+    isa: Option<Isa>,
+    /// The rules that make hits trustworthy.
+    rules: Rules,
+    /// Render only the pixels x0 <= x < x1, y0 <= y < y1, as `[x0, y0, x1, y1]`; row 0 is the top.
+    /// Absent: all of them.
+    crop: Option<At<List<Int<0, 32_768>, 4>>>,
+    /// First and last frame to render, as `[first, last]`, counted from 1. Absent: all.
+    frames: Option<At<List<Int<1, 1_000_000>, 2>>>,
+    /// Where frames go, relative to the current folder: `####` is the frame's number, the ending
+    /// (png, exr, ppm) the format. Absent: the command line decides.
+    output: Option<At<String>>,
+    /// Frames per second of the preview video.
+    fps: Int<1, 1000>,
+    /// Whether a preview video is made of the sequence.
+    video: bool,
+    /// Whether existing frames are replaced.
+    overwrite: bool,
+    /// Rendering threads. Absent: the cores this process may use.
+    threads: Option<Int<1, 4096>>,
+    /// File for what the job took, as JSON, relative to the current folder. Absent: none.
+    stats: Option<PathBuf>,
+}
+
+/// The rules that make hits trustworthy: each can be switched off to see what it is worth.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, expecting = "a table")]
+pub(super) struct Rules {
+    /// Watertight traversal of Embree.
+    robust: bool,
+    /// One second try for a camera or specular ray that misses inside the scene's bounds.
+    retry: bool,
+    /// Which hits are recomputed in f64: "always", "risky" (grazing, slivers, near an edge), "off".
+    recheck: Recheck,
+    /// Start secondary rays outside the rounding error of their hit.
+    spawn_offset: bool,
+    /// Trace the scene about its own centre at unit size.
+    recentre: bool,
+}
+
+/// Bits a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub(super) struct PngBits(u8);
+
+/// Instruction sets that Embree can be held to.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
+pub(super) enum Isa {
+    /// SSE2.
+    #[serde(rename = "sse2")]
+    Sse2,
+    /// SSE4.2.
+    #[serde(rename = "sse4.2")]
+    Sse42,
+    /// AVX.
+    #[serde(rename = "avx")]
+    Avx,
+    /// AVX2.
+    #[serde(rename = "avx2")]
+    Avx2,
+    /// AVX-512.
+    #[serde(rename = "avx512")]
+    Avx512,
+}
+
+impl Isa {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Sse2 => "sse2",
+            Self::Sse42 => "sse4.2",
+            Self::Avx => "avx",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for PngBits {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        match Int::<0, 64>::deserialize(deserializer)?.u32() {
+            8 => Ok(Self(8)),
+            16 => Ok(Self(16)),
+            bits => Err(D::Error::custom(format_args!("expected 8 or 16, found {bits}"))),
+        }
+    }
+}
+
+impl JsonSchema for PngBits {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "PngBits".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "enum": [8, 16] })
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let s = scene::Settings::default();
+        Self {
+            size: List([s.width, s.height].map(|x| Int::clamped(x.into()))),
+            spp: Int::clamped(s.spp.into()),
+            filter: s.filter,
+            shadow_samples: Int::clamped(s.shadow_samples.into()),
+            sky_samples: Int::clamped(s.sky_samples.into()),
+            bounces: Int::clamped(s.bounces.into()),
+            cutoff: Share(shortest(s.cutoff)),
+            seed: Int::clamped(s.seed as i64),
+            exposure: Positive(shortest(s.exposure)),
+            tone: s.tone,
+            png_bits: PngBits(s.png_bits),
+            intersector: s.intersector,
+            isa: None,
+            rules: Rules::default(),
+            crop: None,
+            frames: None,
+            output: None,
+            fps: Int::clamped(24),
+            video: true,
+            overwrite: false,
+            threads: None,
+            stats: None,
+        }
+    }
+}
+
+/// The f64 with the fewest digits that rounds to `x`: 0.001 for the f32 next to it.
+fn shortest(x: f32) -> f64 {
+    x.to_string().parse().unwrap_or(f64::from(x))
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        let HitRules { robust, retry, recheck, spawn_offset, recentre } = HitRules::default();
+        Self { robust, retry, recheck, spawn_offset, recentre }
+    }
+}
+
+impl Settings {
+    /// As scene data.
+    ///
+    /// Errors: a crop that leaves the image or is empty.
+    pub fn build(&self, source: &Source) -> Result<scene::Settings> {
+        let Rules { robust, retry, recheck, spawn_offset, recentre } = self.rules;
+        Ok(scene::Settings {
+            width: self.size.0[0].u32(),
+            height: self.size.0[1].u32(),
+            spp: self.spp.u32(),
+            filter: self.filter,
+            shadow_samples: self.shadow_samples.u32(),
+            sky_samples: self.sky_samples.u32(),
+            bounces: self.bounces.u32(),
+            cutoff: self.cutoff.0 as f32,
+            seed: self.seed.u64(),
+            exposure: self.exposure.0 as f32,
+            tone: self.tone,
+            png_bits: self.png_bits.0,
+            intersector: self.intersector,
+            isa: self.isa.map(|isa| isa.name().to_owned()),
+            rules: HitRules { robust, retry, recheck, spawn_offset, recentre },
+            crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
+        })
+    }
+
+    fn crop(&self, crop: &At<List<Int<0, 32_768>, 4>>, source: &Source) -> Result<Rect> {
+        let [x0, y0, x1, y1] = crop.0.map(Int::u32);
+        let [width, height] = self.size.0.map(Int::u32);
+        if x0 < x1 && y0 < y1 && x1 <= width && y1 <= height {
+            return Ok(Rect { x0, y0, x1, y1 });
+        }
+        let message = format!("the crop is empty or leaves the image of {width} x {height} pixels");
+        let help = "crop = [x0, y0, x1, y1] with x0 < x1 and y0 < y1, row 0 at the top";
+        Err(source.fault(&crop.span, message).help(help).into())
+    }
+
+    /// Everything about the job that does not decide a frame's bytes; `shot_frames` is the length
+    /// of the camera's move.
+    ///
+    /// Errors: frames that the move has not, an empty output pattern.
+    pub fn job(&self, source: &Source, shot_frames: u32) -> Result<Job> {
+        let frames = self.frames.as_ref().map(|f| frame_range(f, source, shot_frames)).transpose()?;
+        if let Some(output) = self.output.as_ref().filter(|o| o.is_empty()) {
+            return Err(source.fault(&output.span, "the output pattern is empty").into());
+        }
+        Ok(Job {
+            frames,
+            output: self.output.as_ref().map(|o| o.value.clone()),
+            fps: self.fps.u32(),
+            video: self.video,
+            overwrite: self.overwrite,
+            threads: self.threads.map(Int::u32),
+            stats: self.stats.clone(),
+        })
+    }
+}
+
+fn frame_range(
+    frames: &At<List<Int<1, 1_000_000>, 2>>,
+    source: &Source,
+    shot_frames: u32,
+) -> Result<FrameRange> {
+    let [first, last] = frames.0.map(Int::u32);
+    let message = if first > last {
+        format!("the first frame, {first}, comes after the last, {last}")
+    } else if last > shot_frames {
+        format!("there is no frame {last}: the camera's move has {shot_frames}")
+    } else {
+        return Ok(FrameRange { first, last });
+    };
+    Err(source.fault(&frames.span, message).into())
+}
