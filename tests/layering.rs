@@ -27,8 +27,8 @@ fn the_source_keeps_the_rules() {
 
 /// All `.rs` files below `dir`.
 fn rust_files(dir: &Path, into: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
+    for entry in std::fs::read_dir(dir).expect("a folder of sources") {
+        let path = entry.expect("a readable folder").path();
         if path.is_dir() {
             rust_files(&path, into);
         } else if path.extension().is_some_and(|e| e == "rs") {
@@ -65,7 +65,7 @@ fn check(path: &str, text: &str) -> Vec<String> {
 
 fn check_all(files: &[(&str, &str)]) -> Vec<String> {
     let sources: Vec<Source> = files.iter().map(|(p, t)| Source::new(p, t)).collect();
-    violations(&Floors::read(LIB).unwrap(), &sources)
+    violations(&Floors::read(LIB).expect("floors"), &sources)
 }
 
 #[track_caller]

@@ -53,8 +53,8 @@ impl Source {
 
     /// Reads a file.
     pub fn read(path: &Path) -> Self {
-        let text = std::fs::read_to_string(path).unwrap();
-        Self::new(&path.to_str().unwrap().replace('\\', "/"), &text)
+        let text = std::fs::read_to_string(path).expect("a readable source file");
+        Self::new(&path.to_string_lossy(), &text)
     }
 
     /// Module path of the file inside the crate: `["shade", "light"]`; `None` outside a room.
@@ -183,11 +183,7 @@ fn walk(tokens: &[Token], mut visit: impl FnMut(usize, &[&str])) {
                 }
                 braces.push(module);
             }
-            "}" => {
-                if braces.pop() == Some(true) {
-                    modules.pop();
-                }
-            }
+            "}" if braces.pop() == Some(true) => _ = modules.pop(),
             _ => {}
         }
     }
