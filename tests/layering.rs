@@ -176,6 +176,7 @@ fn only_the_command_line_prints() {
         one(&check("src/shade/mod.rs", &text), &["src/shade/mod.rs:1", name]);
         assert_eq!(check("src/cli/render.rs", &text), [""; 0]);
         assert_eq!(check("src/main.rs", &text), [""; 0]);
+        assert_eq!(check("src/shade/tests.rs", &text), [""; 0]);
         let test = format!("#[cfg(test)]\nmod tests {{\n{text}\n}}");
         assert_eq!(check("src/shade/mod.rs", &test), [""; 0]);
     }
