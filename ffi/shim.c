@@ -1,5 +1,12 @@
 #include "shim.h"
 
+#include <math.h>
+#include <stddef.h>
+
+#if defined(__SSE__)
+#include <immintrin.h>
+#endif
+
 /* Embree 4.3 and newer read and write structs of these sizes; those of 4.2 are smaller. */
 _Static_assert(RTC_VERSION >= 40300, "Embree 4.3 or newer is needed");
 _Static_assert(sizeof(struct RTCRay) == 48, "size of RTCRay");
@@ -9,5 +16,190 @@ _Static_assert(sizeof(struct RTCRayHit4) == 336, "size of RTCRayHit4");
 _Static_assert(sizeof(struct RTCRayHit8) == 672, "size of RTCRayHit8");
 _Static_assert(sizeof(struct RTCRayHit16) == 1344, "size of RTCRayHit16");
 _Static_assert(sizeof(struct RTCRayQueryContext) == 8, "size of RTCRayQueryContext");
+_Static_assert(sizeof(TrRay) == 72, "size of TrRay");
+_Static_assert(sizeof(TrSphere) == 32, "size of TrSphere");
 
 unsigned tr_version_header(void) { return RTC_VERSION; }
+
+/* Embree asks for flush-to-zero (0x8000) and denormals-are-zero (0x0040) on tracing threads. */
+#if defined(__SSE__)
+unsigned tr_mxcsr(void) { return _mm_getcsr(); }
+static unsigned begin_tracing(void) {
+  unsigned saved = _mm_getcsr();
+  _mm_setcsr(saved | 0x8040u);
+  return saved;
+}
+static void end_tracing(unsigned saved) { _mm_setcsr(saved); }
+#else
+unsigned tr_mxcsr(void) { return 0; }
+static unsigned begin_tracing(void) { return 0; }
+static void end_tracing(unsigned saved) { (void)saved; }
+#endif
+
+/* What callbacks need beside Embree's own context; the first member makes the cast valid. */
+typedef struct Context {
+  struct RTCRayQueryContext base;
+  const TrRay* rays;
+} Context;
+
+/* Words of a packet in Embree's structure-of-arrays layout, lane `i` of `n`; the header has
+   accessors for C++ only. A hit packet follows its ray packet after 12 words a lane. */
+enum { RAY_TFAR = 8, RAY_ID = 10, RAY_WORDS = 12 };
+enum { HIT_NG_X, HIT_NG_Y, HIT_NG_Z, HIT_U, HIT_V, HIT_PRIM, HIT_GEOM, HIT_INST };
+
+static float* float_at(void* packet, unsigned n, unsigned word, unsigned i) {
+  return (float*)packet + (size_t)word * n + i;
+}
+static unsigned* id_at(void* packet, unsigned n, unsigned word, unsigned i) {
+  return (unsigned*)packet + (size_t)word * n + i;
+}
+static const TrRay* original(const Context* context, void* rays, unsigned n, unsigned i) {
+  return &context->rays[*id_at(rays, n, RAY_ID, i)];
+}
+
+/* Drops the primitive that a ray leaves from its candidates. */
+static void exclude_own_primitive(const struct RTCFilterFunctionNArguments* args) {
+  const Context* context = (const Context*)args->context;
+  for (unsigned i = 0; i < args->N; i++) {
+    if (args->valid[i] != -1) continue;
+    const TrRay* ray = original(context, args->ray, args->N, i);
+    if (ray->exclude_prim == *id_at(args->hit, args->N, HIT_PRIM, i) &&
+        ray->exclude_geom == *id_at(args->hit, args->N, HIT_GEOM, i))
+      args->valid[i] = 0;
+  }
+}
+
+static enum RTCRayQueryFlags query_flags(unsigned flags) {
+  int query = (flags & TR_COHERENT) ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  if (flags & TR_EXCLUDE) query |= RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+  return (enum RTCRayQueryFlags)query;
+}
+
+void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhits,
+                  const TrRay* rays, unsigned flags) {
+  Context context;
+  rtcInitRayQueryContext(&context.base);
+  context.rays = rays;
+  struct RTCIntersectArguments args;
+  rtcInitIntersectArguments(&args);
+  args.context = &context.base;
+  args.flags = query_flags(flags);
+  args.filter = (flags & TR_EXCLUDE) ? exclude_own_primitive : NULL;
+  unsigned saved = begin_tracing();
+  switch (width) {
+    case 1: rtcIntersect1(scene, rayhits, &args); break;
+    case 4: rtcIntersect4(valid, scene, rayhits, &args); break;
+    case 8: rtcIntersect8(valid, scene, rayhits, &args); break;
+    case 16: rtcIntersect16(valid, scene, rayhits, &args); break;
+  }
+  end_tracing(saved);
+}
+
+void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
+                 const TrRay* rays, unsigned flags) {
+  Context context;
+  rtcInitRayQueryContext(&context.base);
+  context.rays = rays;
+  struct RTCOccludedArguments args;
+  rtcInitOccludedArguments(&args);
+  args.context = &context.base;
+  args.flags = query_flags(flags);
+  args.filter = (flags & TR_EXCLUDE) ? exclude_own_primitive : NULL;
+  unsigned saved = begin_tracing();
+  switch (width) {
+    case 1: rtcOccluded1(scene, packet, &args); break;
+    case 4: rtcOccluded4(valid, scene, packet, &args); break;
+    case 8: rtcOccluded8(valid, scene, packet, &args); break;
+    case 16: rtcOccluded16(valid, scene, packet, &args); break;
+  }
+  end_tracing(saved);
+}
+
+/* Spheres: the f64 test of src/intersect/sphere.rs on the f64 ray, so that Embree's spheres are
+   as exact as the oracle's. */
+
+static void sphere_bounds(const struct RTCBoundsFunctionArguments* args) {
+  const TrSphere* s = (const TrSphere*)args->geometryUserPtr + args->primID;
+  float lower[3], upper[3];
+  for (int axis = 0; axis < 3; axis++) {
+    /* Embree walks the f32 ray: the box must also hold what rounding the ray moves out of it. */
+    double margin = 0x1p-20 * (fabs(s->centre[axis]) + s->radius);
+    lower[axis] = nextafterf((float)(s->centre[axis] - s->radius - margin), -INFINITY);
+    upper[axis] = nextafterf((float)(s->centre[axis] + s->radius + margin), INFINITY);
+  }
+  args->bounds_o->lower_x = lower[0];
+  args->bounds_o->lower_y = lower[1];
+  args->bounds_o->lower_z = lower[2];
+  args->bounds_o->upper_x = upper[0];
+  args->bounds_o->upper_y = upper[1];
+  args->bounds_o->upper_z = upper[2];
+}
+
+static double dot(const double a[3], const double b[3]) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* The hit parameter in [tnear, tfar], or NaN. */
+static double sphere_root(const TrRay* ray, const TrSphere* s, int leaving, double tnear,
+                          double tfar) {
+  double a = dot(ray->dir, ray->dir);
+  double to_centre[3], offset[3];
+  for (int i = 0; i < 3; i++) to_centre[i] = s->centre[i] - ray->org[i];
+  double middle = dot(to_centre, ray->dir) / a;
+  for (int i = 0; i < 3; i++) offset[i] = to_centre[i] - ray->dir[i] * middle;
+  double inside = s->radius * s->radius - dot(offset, offset);
+  if (!(inside >= 0.0) || !isfinite(middle)) return NAN;
+  double half_chord = sqrt(inside / a);
+  double near_root = middle - half_chord, far_root = middle + half_chord;
+  if (leaving) {
+    double other = fabs(near_root) > fabs(far_root) ? near_root : far_root;
+    return other > 0.0 && other >= tnear && other <= tfar ? other : NAN;
+  }
+  if (near_root >= tnear && near_root <= tfar) return near_root;
+  if (far_root >= tnear && far_root <= tfar) return far_root;
+  return NAN;
+}
+
+static double lane_root(void* rays, unsigned n, unsigned lane, const Context* context,
+                        const TrSphere* spheres, unsigned geom, unsigned prim) {
+  const TrRay* ray = original(context, rays, n, lane);
+  int leaving = ray->exclude_geom == geom && ray->exclude_prim == prim;
+  double tfar = *float_at(rays, n, RAY_TFAR, lane);
+  return sphere_root(ray, &spheres[prim], leaving, ray->tnear, fmin(tfar, ray->tfar));
+}
+
+static void sphere_intersect(const struct RTCIntersectFunctionNArguments* args) {
+  const Context* context = (const Context*)args->context;
+  void* rays = args->rayhit;
+  void* hits = float_at(rays, args->N, RAY_WORDS, 0);
+  for (unsigned i = 0; i < args->N; i++) {
+    if (args->valid[i] != -1) continue;
+    double t = lane_root(rays, args->N, i, context, args->geometryUserPtr, args->geomID,
+                         args->primID);
+    if (isnan(t)) continue;
+    *float_at(rays, args->N, RAY_TFAR, i) = (float)t;
+    for (unsigned word = HIT_NG_X; word <= HIT_V; word++)
+      *float_at(hits, args->N, word, i) = 0.0f;
+    *id_at(hits, args->N, HIT_PRIM, i) = args->primID;
+    *id_at(hits, args->N, HIT_GEOM, i) = args->geomID;
+    *id_at(hits, args->N, HIT_INST, i) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+static void sphere_occluded(const struct RTCOccludedFunctionNArguments* args) {
+  const Context* context = (const Context*)args->context;
+  for (unsigned i = 0; i < args->N; i++) {
+    if (args->valid[i] != -1) continue;
+    double t = lane_root(args->ray, args->N, i, context, args->geometryUserPtr, args->geomID,
+                         args->primID);
+    if (!isnan(t)) *float_at(args->ray, args->N, RAY_TFAR, i) = -INFINITY;
+  }
+}
+
+void tr_set_spheres(RTCGeometry geometry, const TrSphere* spheres, unsigned count) {
+  rtcSetGeometryUserPrimitiveCount(geometry, count);
+  rtcSetGeometryUserData(geometry, (void*)spheres);
+  rtcSetGeometryBoundsFunction(geometry, (RTCBoundsFunction)sphere_bounds, NULL);
+  rtcSetGeometryIntersectFunction(geometry, sphere_intersect);
+  rtcSetGeometryOccludedFunction(geometry, sphere_occluded);
+}

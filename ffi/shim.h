@@ -1,10 +1,44 @@
-/* The C edge of tweenray: what Embree's header offers only as inline C. */
+/* The C edge of tweenray: what Embree's header offers only as inline C, and tracing with
+   flush-to-zero set and restored (changing MXCSR from Rust is undefined behaviour). */
 #ifndef TWEENRAY_SHIM_H
 #define TWEENRAY_SHIM_H
 
 #include <embree4/rtcore.h>
 
+/* A ray as `tweenray::ray::Ray` lays it out: f64, scene space. */
+typedef struct TrRay {
+  double org[3];
+  double dir[3];
+  double tnear;
+  double tfar;
+  unsigned exclude_geom;
+  unsigned exclude_prim;
+} TrRay;
+
+/* An analytic sphere as `tweenray::embree::SphereData` lays it out. */
+typedef struct TrSphere {
+  double centre[3];
+  double radius;
+} TrSphere;
+
+enum { TR_COHERENT = 1, TR_EXCLUDE = 2 };
+
 /* The version of the Embree header this was compiled with: major * 10000 + minor * 100 + patch. */
 unsigned tr_version_header(void);
+
+/* Turns `geometry` (a user geometry) into `count` analytic spheres, which must outlive it. */
+void tr_set_spheres(RTCGeometry geometry, const TrSphere* spheres, unsigned count);
+
+/* Closest hits of a packet. `width` is 1 (RTCRayHit), 4, 8 or 16; `valid` has `width` lanes of
+   0 or -1 and is not read for 1. Lane i's `id` must be i, and `rays[i]` its f64 original. */
+void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhits,
+                  const TrRay* rays, unsigned flags);
+
+/* Occlusion of a packet (RTCRay, RTCRay4, ...): tfar is -inf afterwards where something is hit. */
+void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
+                 const TrRay* rays, unsigned flags);
+
+/* MXCSR of the calling thread; 0 where there is none. */
+unsigned tr_mxcsr(void);
 
 #endif

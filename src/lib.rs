@@ -7,10 +7,12 @@
 // Floor 0: numbers and plain records.
 pub mod error;
 pub mod math;
+pub mod ray;
 pub mod sampling;
 pub mod stats;
 
 // Floor 1: the only room with `unsafe`.
+#[allow(unsafe_code)]
 pub mod embree;
 
 // Floor 2: plain data.

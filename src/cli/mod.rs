@@ -1,1 +1,95 @@
-//! Under way: the room `cli`.
+//! The command line: arguments in, words and an exit code out. One file per subcommand.
+//!
+//! Only this room talks to people; nothing below it knows of arguments or prints. Results go to
+//! stdout; progress, warnings and errors to stderr.
+
+mod args;
+mod compare;
+mod convert;
+mod exit;
+mod findings;
+mod inspect;
+mod job;
+mod machine;
+mod progress;
+mod render;
+mod request;
+mod say;
+mod schema;
+mod signals;
+mod stats;
+mod values;
+
+use clap::{Parser, Subcommand};
+use exit::Exit;
+use std::process::ExitCode;
+
+/// Render camera moves through static, high-geometry scenes
+#[derive(Debug, Parser)]
+#[command(name = "tweenray", version = VERSION, arg_required_else_help = true)]
+#[command(after_help = "\
+Examples:
+  tweenray render bunny.obj
+  tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16
+  tweenray inspect scene.toml
+  tweenray compare out/frame_0001.png other.png
+
+`tweenray COMMAND --help` says more.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(Box<render::RenderArgs>),
+    Inspect(Box<inspect::InspectArgs>),
+    Compare(compare::CompareArgs),
+    Convert(convert::ConvertArgs),
+    Schema(schema::SchemaArgs),
+}
+
+const VERSION: &str =
+    concat!(env!("CARGO_PKG_VERSION"), " (Embree ", env!("TWEENRAY_EMBREE_VERSION"), ")");
+
+/// Runs the program with the process's arguments; the process ends with what this returns.
+pub fn run() -> ExitCode {
+    std::panic::set_hook(Box::new(|panic| {
+        say::aside(format_args!("error: this is a fault in tweenray, please report it: {panic}"));
+    }));
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(wrong) => {
+            // Help and version are "errors" to clap; a closed pipe is no fault of ours.
+            let _ = wrong.print();
+            return if wrong.use_stderr() { Exit::Usage } else { Exit::Done }.into();
+        }
+    };
+    // The panic was told by the hook above.
+    std::panic::catch_unwind(|| dispatch(&arguments.command)).unwrap_or(Exit::Failed).into()
+}
+
+fn dispatch(command: &Command) -> Exit {
+    let result = match command {
+        Command::Render(args) => return render::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Convert(args) => convert::run(args),
+        Command::Schema(args) => schema::run(args),
+    };
+    result.unwrap_or_else(|error| {
+        say::error(&error);
+        Exit::of(&error)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Arguments;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_declarations_agree_with_themselves() {
+        Arguments::command().debug_assert();
+    }
+}

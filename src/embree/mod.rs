@@ -1,1 +1,356 @@
-//! Under way: the room `embree`.
+//! Embree behind a safe face: `Device` → [`SceneBuilder`] → `commit()` → [`CommittedScene`].
+//!
+//! The only room with `unsafe` (with `ffi/`). Takes f32 triangles and f64 spheres, gives packet
+//! queries; knows nothing of materials, rules or retries. Only a committed scene can be traced,
+//! and it borrows the buffers that Embree shares.
+
+mod packet;
+
+pub use packet::{Packet, PacketHit, QueryFlags};
+
+use crate::error::{Error, Result};
+use crate::math::Vec3;
+use crate::ray::Ray;
+use embree4_sys as sys;
+use std::ffi::{CStr, CString, c_void};
+use std::marker::PhantomData;
+use std::sync::atomic::{AtomicI64, Ordering};
+
+/// Version of the Embree that this program was compiled with.
+pub const VERSION: &str = env!("TWEENRAY_EMBREE_VERSION");
+
+/// An analytic sphere as `ffi/shim.h` lays it out: scene space, f64.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SphereData {
+    /// Centre.
+    pub centre: [f64; 3],
+    /// Radius, positive.
+    pub radius: f64,
+}
+
+unsafe extern "C" {
+    fn tr_set_spheres(geometry: sys::RTCGeometry, spheres: *const SphereData, count: u32);
+    fn tr_intersect(
+        scene: sys::RTCScene,
+        width: u32,
+        valid: *const i32,
+        rayhits: *mut c_void,
+        rays: *const Ray,
+        flags: u32,
+    );
+    fn tr_occluded(
+        scene: sys::RTCScene,
+        width: u32,
+        valid: *const i32,
+        rays: *mut c_void,
+        originals: *const Ray,
+        flags: u32,
+    );
+    fn tr_mxcsr() -> u32;
+}
+
+/// The floating-point control word of the calling thread (x86; 0 elsewhere): tests assert that
+/// tracing leaves it as it was.
+pub fn floating_point_mode() -> u32 {
+    // SAFETY: reads a register of the calling thread; no precondition.
+    unsafe { tr_mxcsr() }
+}
+
+/// An Embree device: its threads and its count of the memory it holds.
+struct Device {
+    raw: sys::RTCDevice,
+    /// Bytes that Embree holds; its address is given to Embree, hence the box.
+    memory: Box<AtomicI64>,
+}
+
+// SAFETY: Embree 4 API manual, "Device Object": devices and their functions may be used from any
+// thread; the counter is atomic.
+unsafe impl Send for Device {}
+// SAFETY: as above.
+unsafe impl Sync for Device {}
+
+impl Device {
+    fn new(threads: usize, isa: Option<&str>) -> Result<Self> {
+        let isa = isa.map(|isa| format!(",isa={isa}")).unwrap_or_default();
+        let config = CString::new(format!("threads={threads},set_affinity=0{isa}"))
+            .map_err(|_| Error::Usage("the instruction set's name holds a NUL".into()))?;
+        // SAFETY: `config` is a NUL-terminated string that outlives the call.
+        let raw = unsafe { sys::rtcNewDevice(config.as_ptr()) };
+        if raw.is_null() {
+            return Err(Error::Embree(format!(
+                "cannot open a device ({})",
+                config.to_string_lossy()
+            )));
+        }
+        let device = Self { raw, memory: Box::new(AtomicI64::new(0)) };
+        let counter: *const AtomicI64 = &*device.memory;
+        // SAFETY: the counter lives as long as the device (dropped after rtcReleaseDevice), and
+        // `count_memory` takes it as the shared reference it is.
+        unsafe {
+            sys::rtcSetDeviceMemoryMonitorFunction(raw, Some(count_memory), counter as *mut c_void);
+        }
+        device.check("open a device")?;
+        Ok(device)
+    }
+
+    /// The device's pending error, with what was being done.
+    fn check(&self, doing: &str) -> Result<()> {
+        // SAFETY: `raw` is a live device.
+        let code = unsafe { sys::rtcGetDeviceError(self.raw) };
+        if code == sys::RTC_ERROR_NONE {
+            return Ok(());
+        }
+        // SAFETY: `raw` is a live device; the message is a NUL-terminated string of Embree's.
+        let message = unsafe {
+            let text = sys::rtcGetDeviceLastErrorMessage(self.raw);
+            if text.is_null() { "".into() } else { CStr::from_ptr(text).to_string_lossy() }
+        };
+        Err(Error::Embree(format!("cannot {doing}: {message} (code {code})")))
+    }
+
+    fn property(&self, property: sys::RTCDeviceProperty) -> isize {
+        // SAFETY: `raw` is a live device.
+        unsafe { sys::rtcGetDeviceProperty(self.raw, property) }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: `raw` came from rtcNewDevice and is released once. Scenes hold their own
+        // reference, and every scene of ours is dropped before its device.
+        unsafe { sys::rtcReleaseDevice(self.raw) }
+    }
+}
+
+unsafe extern "C" fn count_memory(counter: *mut c_void, bytes: isize, _post: bool) -> bool {
+    // SAFETY: `Device::new` registered a pointer to an AtomicI64 that outlives the device.
+    let counter = unsafe { &*(counter as *const AtomicI64) };
+    counter.fetch_add(bytes as i64, Ordering::Relaxed);
+    true
+}
+
+/// How Embree builds its scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BuildOptions<'a> {
+    /// Threads for the build.
+    pub threads: usize,
+    /// Instruction set ("avx2"), or `None` for the machine's best.
+    pub isa: Option<&'a str>,
+    /// ROBUST traversal.
+    pub robust: bool,
+}
+
+/// A scene that takes geometry; `commit` makes it traceable. Borrows the geometry for `'g`.
+pub struct SceneBuilder<'g> {
+    // Declared before the device, so dropped before it.
+    scene: SceneHandle,
+    device: Device,
+    spheres: Vec<Box<[SphereData]>>,
+    next_id: u32,
+    geometry: PhantomData<&'g ()>,
+}
+
+/// Owns one reference to an Embree scene.
+struct SceneHandle(sys::RTCScene);
+
+// SAFETY: Embree 4 API manual, "Scene Object": a committed scene may be traced from any thread;
+// before that only `SceneBuilder`, which is not shared, touches it.
+unsafe impl Send for SceneHandle {}
+// SAFETY: as above.
+unsafe impl Sync for SceneHandle {}
+
+impl Drop for SceneHandle {
+    fn drop(&mut self) {
+        // SAFETY: the handle came from rtcNewScene and is released once.
+        unsafe { sys::rtcReleaseScene(self.0) }
+    }
+}
+
+impl<'g> SceneBuilder<'g> {
+    /// An empty scene on a device of its own.
+    ///
+    /// Errors: `Error::Embree` for an unknown instruction set or a failing device.
+    pub fn new(options: &BuildOptions) -> Result<Self> {
+        let device = Device::new(options.threads, options.isa)?;
+        // SAFETY: the device is live; the scene is owned by the handle.
+        let scene = SceneHandle(unsafe { sys::rtcNewScene(device.raw) });
+        device.check("make a scene")?;
+        if options.robust {
+            // SAFETY: the scene is live and not committed yet.
+            unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
+        }
+        Ok(Self { scene, device, spheres: Vec::new(), next_id: 0, geometry: PhantomData })
+    }
+
+    /// Adds a triangle mesh and returns its `geom_id` (0, 1, 2, … in order).
+    ///
+    /// `positions` has one spare element after `vertex_count`, since Embree reads 16 bytes a
+    /// vertex. Errors: an index out of range, a missing spare element, Embree's own.
+    pub fn add_triangles(
+        &mut self,
+        positions: &'g [Vec3],
+        vertex_count: usize,
+        triangles: &'g [[u32; 3]],
+    ) -> Result<u32> {
+        if positions.len() <= vertex_count {
+            return Err(Error::Embree("a vertex buffer lacks its spare element".into()));
+        }
+        if triangles.iter().flatten().any(|i| *i as usize >= vertex_count) {
+            return Err(Error::Embree("a triangle names a vertex that does not exist".into()));
+        }
+        self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
+            // SAFETY: both slices live for 'g, which the committed scene borrows; sizes, strides
+            // and the 16-byte read of the last vertex were checked above ("rtcSetSharedGeometry-
+            // Buffer": the buffer must be padded to 16 bytes and stay alive).
+            unsafe {
+                sys::rtcSetSharedGeometryBuffer(
+                    geometry,
+                    sys::RTC_BUFFER_TYPE_VERTEX,
+                    0,
+                    sys::RTC_FORMAT_FLOAT3,
+                    positions.as_ptr().cast(),
+                    0,
+                    size_of::<Vec3>(),
+                    vertex_count,
+                );
+                sys::rtcSetSharedGeometryBuffer(
+                    geometry,
+                    sys::RTC_BUFFER_TYPE_INDEX,
+                    0,
+                    sys::RTC_FORMAT_UINT3,
+                    triangles.as_ptr().cast(),
+                    0,
+                    size_of::<[u32; 3]>(),
+                    triangles.len(),
+                );
+            }
+        })
+    }
+
+    /// Adds analytic spheres as one geometry and returns its `geom_id`.
+    pub fn add_spheres(&mut self, spheres: Vec<SphereData>) -> Result<u32> {
+        let spheres = spheres.into_boxed_slice();
+        let id = self.add(sys::RTC_GEOMETRY_TYPE_USER, |geometry| {
+            // SAFETY: the boxed slice does not move, and the scene that the geometry is attached
+            // to is dropped before the box (field order here and in `CommittedScene`).
+            unsafe { tr_set_spheres(geometry, spheres.as_ptr(), spheres.len() as u32) };
+        });
+        self.spheres.push(spheres);
+        id
+    }
+
+    fn add(
+        &mut self,
+        kind: sys::RTCGeometryType,
+        fill: impl FnOnce(sys::RTCGeometry),
+    ) -> Result<u32> {
+        let id = self.next_id;
+        // SAFETY: the device is live; the geometry is committed, attached (the scene takes its
+        // own reference) and then released once, in the order the manual asks for.
+        unsafe {
+            let geometry = sys::rtcNewGeometry(self.device.raw, kind);
+            self.device.check("make a geometry")?;
+            fill(geometry);
+            sys::rtcCommitGeometry(geometry);
+            sys::rtcAttachGeometryByID(self.scene.0, geometry, id);
+            sys::rtcReleaseGeometry(geometry);
+        }
+        self.device.check("add a geometry")?;
+        self.next_id += 1;
+        Ok(id)
+    }
+
+    /// Builds the BVH.
+    ///
+    /// Errors: `Error::Embree`, out of memory for instance.
+    pub fn commit(self) -> Result<CommittedScene<'g>> {
+        // SAFETY: the scene is live and has all its geometry.
+        unsafe { sys::rtcCommitScene(self.scene.0) };
+        self.device.check("build the scene")?;
+        let native = |property| self.device.property(property) != 0;
+        let width = if native(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) {
+            16
+        } else if native(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) {
+            8
+        } else {
+            4
+        };
+        Ok(CommittedScene {
+            scene: self.scene,
+            device: self.device,
+            _spheres: self.spheres,
+            width,
+            geometry: PhantomData,
+        })
+    }
+}
+
+/// A built scene: immutable, traceable from any thread.
+pub struct CommittedScene<'g> {
+    scene: SceneHandle,
+    device: Device,
+    _spheres: Vec<Box<[SphereData]>>,
+    width: usize,
+    geometry: PhantomData<&'g ()>,
+}
+
+impl CommittedScene<'_> {
+    /// The packet width that the instruction set handles natively: 16, 8 or 4.
+    pub fn native_width(&self) -> usize {
+        self.width
+    }
+
+    /// Bytes that Embree holds for this scene.
+    pub fn memory(&self) -> u64 {
+        self.device.memory.load(Ordering::Relaxed).max(0) as u64
+    }
+
+    /// Version of the Embree library that is loaded, "4.3.3".
+    pub fn library_version(&self) -> String {
+        let v = self.device.property(sys::RTC_DEVICE_PROPERTY_VERSION);
+        format!("{}.{}.{}", v / 10000, v / 100 % 100, v % 100)
+    }
+
+    /// Closest hits of the lanes of `packet` that `valid` marks with -1; lane i stands for
+    /// `rays[i]`, whose excluded primitive is honoured with `flags.exclude`.
+    pub fn intersect<const W: usize>(
+        &self,
+        valid: &[i32; W],
+        packet: &mut Packet<W>,
+        rays: &[Ray],
+        flags: QueryFlags,
+    ) {
+        packet.check_lanes(valid, rays);
+        let lanes = Aligned(*valid);
+        // SAFETY: `Packet<W>` has the layout and alignment of RTCRayHitW (asserted in packet.rs),
+        // `lanes` is aligned, and every valid lane has its ray (checked above).
+        unsafe {
+            let at = std::ptr::from_mut(packet).cast();
+            let (valid, rays) = (lanes.0.as_ptr(), rays.as_ptr());
+            tr_intersect(self.scene.0, W as u32, valid, at, rays, flags.bits());
+        }
+    }
+
+    /// Marks the lanes that anything blocks: their `tfar` becomes minus infinity.
+    pub fn occluded<const W: usize>(
+        &self,
+        valid: &[i32; W],
+        packet: &mut Packet<W>,
+        rays: &[Ray],
+        flags: QueryFlags,
+    ) {
+        packet.check_lanes(valid, rays);
+        let lanes = Aligned(*valid);
+        // SAFETY: as for `intersect`; RTCRayW is the front part of RTCRayHitW.
+        unsafe {
+            let at = std::ptr::from_mut(packet).cast();
+            let (valid, rays) = (lanes.0.as_ptr(), rays.as_ptr());
+            tr_occluded(self.scene.0, W as u32, valid, at, rays, flags.bits());
+        }
+    }
+}
+
+/// Embree wants lane masks aligned to the packet's width.
+#[repr(align(64))]
+struct Aligned<const W: usize>([i32; W]);

@@ -2,6 +2,10 @@
 
 use crate::math::{Rgb, Vec3};
 
+mod image;
+
+pub use image::{Encoding, Image};
+
 /// A rendered image with its AOVs. Row 0 is the top; linear radiance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {

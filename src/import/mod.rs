@@ -3,9 +3,23 @@
 //! [`load`] takes a scene file (TOML) or a bare mesh. Input is hostile until it was validated
 //! here: what leaves this room has indices in range and finite numbers only.
 
+mod course;
+mod generators;
+mod lines;
 mod model;
+mod mtl;
+mod normals;
+mod obj;
+mod ply;
+mod polygon;
+mod source;
+mod texture;
+mod tidy;
 
-pub use model::{Model, load_model};
+pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
+pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model, load_model};
+pub use normals::apply as apply_normals;
+pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Result};
 use crate::scene::{FrameRange, Settings, Shot, World};

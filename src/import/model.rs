@@ -1,8 +1,15 @@
 //! Mesh files to world-space data: OBJ with MTL, the course's OBJ dialect, PLY.
 
-use crate::error::{Diagnostic, Result};
+use super::{normals, obj, ply, source};
+use crate::error::{Diagnostic, Error, Result};
+use crate::math::{Rgb, Vec3};
 use crate::scene::{NormalPolicy, World};
 use std::path::{Path, PathBuf};
+
+/// Name of the material of faces that have none.
+pub const DEFAULT_MATERIAL: &str = "default";
+/// Diffuse reflectance of that material: a light, slightly warm grey, linear RGB.
+pub const DEFAULT_ALBEDO: Rgb = Vec3::new(0.72, 0.70, 0.66);
 
 /// What one mesh file holds, in the file's own coordinates.
 #[derive(Debug, Clone, Default)]
@@ -17,7 +24,32 @@ pub struct Model {
 }
 
 /// Reads a mesh file; the ending and, for `.obj`, the content choose the reader.
+///
+/// Triangles without area are dropped with one warning; so are vertices that no triangle uses.
+///
+/// Errors: `Error::Input` with the line (text) or byte offset (binary), for anything that is
+/// not a finite number, an index out of range, or a file without faces; `Error::Io`.
 pub fn load_model(path: &Path, normals: NormalPolicy) -> Result<Model> {
-    let _ = (path, normals);
-    todo!()
+    let mut model = read_model(path)?;
+    for mesh in &mut model.world.meshes {
+        normals::apply(mesh, normals);
+    }
+    Ok(model)
 }
+
+/// As [`load_model`]; normals are the file's, or none.
+pub(super) fn read_model(path: &Path) -> Result<Model> {
+    let bytes = source::read(path)?;
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    match ending.as_str() {
+        "obj" => obj::read(path, &bytes),
+        "ply" => ply::read(path, bytes),
+        _ => Err(Error::from(
+            Diagnostic::new(path, format!("`.{ending}` is no mesh format that can be read"))
+                .help("the formats are .obj and .ply"),
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

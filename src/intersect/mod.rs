@@ -3,25 +3,36 @@
 //! Backends return a [`Hit`] and nothing more; `SurfaceInteraction` expands it, one function for
 //! both, so that they can differ in the hit alone. All in scene space.
 
-mod ray;
+mod embree;
+mod interaction;
+mod oracle;
+mod sphere;
+mod triangle;
 
-pub use ray::{Hit, PrimRef, Ray};
+pub use crate::ray::{Hit, PrimRef, Ray};
+pub use embree::EmbreeIntersector;
+pub use interaction::SurfaceInteraction;
+pub use oracle::Oracle;
 
 use crate::error::Result;
-use crate::scene::{Scene, Settings};
+use crate::scene::{IntersectorKind, Scene, Settings};
+use crate::stats::RayCounts;
 
 /// Closest-hit and any-hit queries, single and in batches. Batches of camera or shadow rays
-/// should be coherent: neighbours first.
+/// should be coherent: neighbours first. Second tries and refused rays are added to `counts`;
+/// the caller counts the rays themselves, since it knows their kind.
+///
+/// A ray that is not [`Ray::is_valid`] hits nothing and is never occluded.
 pub trait Intersector: Sync {
     /// Closest hit, or `None`.
-    fn intersect(&self, ray: &Ray) -> Option<Hit>;
+    fn intersect(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit>;
     /// Whether anything lies between `tnear` and `tfar`.
-    fn occluded(&self, ray: &Ray) -> bool;
+    fn occluded(&self, ray: &Ray, counts: &mut RayCounts) -> bool;
     /// [`Self::intersect`] of every ray, into `hits` (same length).
-    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]);
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts);
     /// [`Self::occluded`] of every ray, into `occluded` (same length).
-    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]);
-    /// What traces, for reports: "Embree 4.3.3, avx512" or "f64 oracle".
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], counts: &mut RayCounts);
+    /// What traces, for reports: "Embree 4.3.3, packets of 16" or "f64 oracle".
     fn describe(&self) -> String;
     /// Memory that the acceleration structure holds, bytes.
     fn memory(&self) -> u64;
@@ -35,6 +46,13 @@ pub fn build<'s>(
     settings: &Settings,
     threads: usize,
 ) -> Result<Box<dyn Intersector + Send + 's>> {
-    let _ = (scene, settings, threads);
-    todo!()
+    Ok(match settings.intersector {
+        IntersectorKind::Embree => Box::new(EmbreeIntersector::new(
+            scene,
+            settings.rules,
+            settings.isa.as_deref(),
+            threads,
+        )?),
+        IntersectorKind::Oracle => Box::new(Oracle::new(scene)),
+    })
 }

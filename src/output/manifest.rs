@@ -1,1 +1,304 @@
-//! Under way: the manifest of a sequence.
+//! The manifest of a sequence: which frames are whole, under which settings, at what cost.
+//!
+//! JSON Lines beside the frames: a [`Header`], then one [`Row`] a frame. Rows are only appended,
+//! each in one write that is synced, after its frame was renamed into place: a row means a whole
+//! frame. A crash can tear the last line alone, and reading drops it. A later row of a frame
+//! overrides an earlier one.
+//!
+//! With several ranks, rank 0 alone writes the manifest itself and every other rank appends to a
+//! part file of its own, which rank 0 takes in at the end or at the next start: `O_APPEND` rows of
+//! many writers in one file would be enough on a local disk, but NFS does not keep them apart.
+//!
+//! Not done: no lock keeps two jobs from writing the same sequence at once. With equal settings
+//! they write equal bytes; with others the second is refused when it starts.
+
+use super::{FramePattern, atomic};
+use crate::error::{Error, Result};
+use crate::scene::Settings;
+use crate::stats::RayCounts;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Version of the file format.
+pub const FORMAT: u32 = 1;
+
+/// What every frame of a sequence shares: together with its number, all that its bytes depend on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// [`FORMAT`].
+    pub manifest: u32,
+    /// Version of the program.
+    pub tweenray: String,
+    /// The scene as the user named it; told, never compared.
+    pub scene: String,
+    /// Hash of the resolved world and shot, hexadecimal.
+    pub scene_hash: String,
+    /// Frames of the whole shot; told, never compared (the shot is in the hash).
+    pub shot_frames: u32,
+    /// File name pattern of the frames, without a folder.
+    pub files: String,
+    /// What traces: intersector, its version and instruction set.
+    pub tracer: String,
+    /// Every setting, by name. Kept as JSON, so that a manifest of another version can be read
+    /// far enough to say what differs.
+    pub settings: Value,
+}
+
+/// A finished frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Frame number, from 1.
+    pub frame: u32,
+    /// Its file, without a folder.
+    pub file: String,
+    /// BLAKE3 of the file, hexadecimal.
+    pub blake3: String,
+    /// Size of the file.
+    pub bytes: u64,
+    /// Wall seconds from the camera to the renamed file.
+    pub seconds: f64,
+    /// Rays cast for it.
+    pub rays: RayCounts,
+}
+
+/// A setting that keeps two headers apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Difference {
+    /// Its name as the command line spells it, or what else differs.
+    pub name: String,
+    /// Its value in the manifest.
+    pub before: String,
+    /// Its value now.
+    pub now: String,
+}
+
+/// A manifest as read: the header, and the last row of every frame.
+#[derive(Debug, Clone)]
+pub struct Manifest {
+    /// What the frames share.
+    pub header: Header,
+    /// Rows by frame.
+    pub rows: BTreeMap<u32, Row>,
+}
+
+/// Appends rows to a manifest or to a rank's part of it.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Header {
+    /// The settings as the header keeps them.
+    pub fn settings(settings: &Settings) -> Value {
+        // By way of text: `to_value` widens an f32 of 0.1 to 0.10000000149011612.
+        let text = serde_json::to_string(settings).unwrap_or_default();
+        serde_json::from_str(&text).unwrap_or(Value::Null)
+    }
+
+    /// The first entry in which a job with the header `now` would differ from this one.
+    pub fn first_difference(&self, now: &Self) -> Option<Difference> {
+        let (before, now) = (self.entries(), now.entries());
+        let names = now.iter().chain(&before).map(|(name, _)| name);
+        let value = |entries: &[(String, String)], name: &str| {
+            let found = entries.iter().find(|(n, _)| n == name);
+            found.map_or_else(|| "unknown to that version".to_string(), |(_, v)| v.clone())
+        };
+        names
+            .map(|name| Difference {
+                name: name.clone(),
+                before: value(&before, name),
+                now: value(&now, name),
+            })
+            .find(|d| d.before != d.now)
+    }
+
+    /// Everything that is compared, as text, the user's own settings first.
+    fn entries(&self) -> Vec<(String, String)> {
+        let mut entries = Vec::new();
+        let s = &self.settings;
+        entries.push(("size".into(), format!("{}x{}", plain(&s["width"]), plain(&s["height"]))));
+        entries.push(("crop".into(), crop(&s["crop"])));
+        for group in [s, &s["rules"]] {
+            for (key, value) in group.as_object().into_iter().flatten() {
+                if !["width", "height", "crop", "rules"].contains(&key.as_str()) {
+                    entries.push((key.replace('_', "-"), plain(value)));
+                }
+            }
+        }
+        for (name, value) in [
+            ("output file", &self.files),
+            ("scene content", &self.scene_hash),
+            ("tweenray version", &self.tweenray),
+            ("tracer", &self.tracer),
+        ] {
+            entries.push((name.into(), value.clone()));
+        }
+        entries
+    }
+}
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Null => "default".into(),
+        // Fractional settings are f32; in that precision text and number agree both ways.
+        Value::Number(n) if n.is_f64() => format!("{}", n.as_f64().unwrap_or(f64::NAN) as f32),
+        other => other.to_string(),
+    }
+}
+
+fn crop(value: &Value) -> String {
+    if value.is_null() {
+        return "none".into();
+    }
+    ["x0", "y0", "x1", "y1"].map(|key| plain(&value[key])).join(",")
+}
+
+impl Manifest {
+    /// Reads the manifest at `path`; `None` where there is none.
+    ///
+    /// Errors: `Error::Failed` when the header cannot be understood; rows that cannot are dropped,
+    /// so that their frames are rendered again.
+    pub fn read(path: &Path) -> Result<Option<Self>> {
+        let Some(bytes) = read_if_there(path)? else { return Ok(None) };
+        let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
+        let header = serde_json::from_slice::<Header>(first).map_err(|why| {
+            Error::Failed(format!(
+                "{} is not a manifest that this version of tweenray can read: {why}\n  \
+                 help: choose another output, or replace the sequence with --overwrite",
+                path.display()
+            ))
+        })?;
+        let rows = rows_in(&bytes).map(|row| (row.frame, row)).collect();
+        Ok(Some(Self { header, rows }))
+    }
+
+    /// Starts the manifest at `path` anew with `header`, in place of any older one and its parts.
+    pub fn create(path: &Path, header: &Header) -> Result<()> {
+        // Parts go first: after a crash in between, frames without a row are rendered again,
+        // while rows of the old settings under the new header would be wrong.
+        for part in parts(path)? {
+            remove(&part)?;
+        }
+        let line = line_of(path, header)?;
+        atomic::write(path, |w| w.write_all(&line)).map(drop)
+    }
+
+    /// Takes the rows of all part files into the manifest at `path` and removes the parts.
+    pub fn merge_parts(path: &Path) -> Result<()> {
+        let parts = parts(path)?;
+        let mut lines = Vec::new();
+        for part in &parts {
+            for row in rows_in(&read_if_there(part)?.unwrap_or_default()) {
+                lines.extend(line_of(path, &row)?);
+            }
+        }
+        if !lines.is_empty() {
+            Journal::open(path)?.append_bytes(&lines)?;
+        }
+        parts.iter().try_for_each(|part| remove(part))
+    }
+}
+
+impl Journal {
+    /// Opens the manifest or part at `path` for appending; a torn last line is cut off.
+    pub fn open(path: &Path) -> Result<Self> {
+        let bytes = read_if_there(path)?.unwrap_or_default();
+        let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1);
+        let file = OpenOptions::new()
+            .append(true)
+            .create(true)
+            .open(path)
+            .map_err(|e| Error::io("open", path, e))?;
+        if whole < bytes.len() {
+            file.set_len(whole as u64).map_err(|e| Error::io("mend", path, e))?;
+        }
+        Ok(Self { path: path.to_path_buf(), file })
+    }
+
+    /// Appends a row: one write, then a sync.
+    pub fn append(&mut self, row: &Row) -> Result<()> {
+        let line = line_of(&self.path, row)?;
+        self.append_bytes(&line)
+    }
+
+    fn append_bytes(&mut self, lines: &[u8]) -> Result<()> {
+        let written = self.file.write_all(lines).and_then(|()| self.file.sync_data());
+        written.map_err(|e| Error::io("write", &self.path, e))
+    }
+}
+
+/// The pattern's file name, without its folder.
+pub fn file_name(pattern: &FramePattern) -> String {
+    let whole = pattern.to_string();
+    Path::new(&whole).file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Where the manifest of a sequence lies: `out/frame.manifest.jsonl` for `out/frame_####.png`.
+pub fn manifest_path(pattern: &FramePattern) -> PathBuf {
+    beside(pattern, ".manifest.jsonl")
+}
+
+/// A file beside the frames, named by what comes before their number, then `ending`.
+pub fn beside(pattern: &FramePattern, ending: &str) -> PathBuf {
+    let name = file_name(pattern);
+    let stem = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
+    let prefix = stem.split('#').next().unwrap_or_default().trim_end_matches(['_', '-', '.']);
+    // `####.png` has no prefix, and a name that starts with a dot would be hidden.
+    let prefix = if prefix.is_empty() { "frames" } else { prefix };
+    pattern.folder().join(format!("{prefix}{ending}"))
+}
+
+/// Where rank `rank` (not 0) appends its rows of the manifest at `path`.
+pub fn part_path(path: &Path, rank: u32) -> PathBuf {
+    path.with_extension(format!("rank{rank:04}.jsonl"))
+}
+
+fn parts(path: &Path) -> Result<Vec<PathBuf>> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned() + ".rank";
+    let is_part = |name: &str| {
+        let number = name.strip_prefix(&stem).and_then(|n| n.strip_suffix(".jsonl"));
+        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let entries = fs::read_dir(folder).map_err(|e| Error::io("read", folder, e))?;
+    let mut parts: Vec<_> = entries
+        .filter_map(io::Result::ok)
+        .filter(|entry| entry.file_name().to_str().is_some_and(is_part))
+        .map(|entry| entry.path())
+        .collect();
+    parts.sort();
+    Ok(parts)
+}
+
+fn rows_in(bytes: &[u8]) -> impl Iterator<Item = Row> + '_ {
+    // Without its line feed the last line is torn, even if it happens to parse.
+    let lines = bytes.split_inclusive(|b| *b == b'\n').filter(|l| l.ends_with(b"\n"));
+    lines.filter_map(|line| serde_json::from_slice(line).ok())
+}
+
+fn line_of(path: &Path, value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(value).map_err(|e| Error::io("write", path, e.into()))?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::io("read", path, e)),
+    }
+}
+
+fn remove(path: &Path) -> Result<()> {
+    fs::remove_file(path).map_err(|e| Error::io("remove", path, e))
+}

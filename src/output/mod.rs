@@ -1,3 +1,34 @@
-//! Films to files, each whole or absent: png, exr, ppm, the manifest, the preview video.
+//! Films to files, each whole or absent: png, exr, ppm, the manifest, the preview video; and
+//! pictures back from files, for comparison.
+//!
+//! * [`write_image`] writes a film in the [`Format`] that the file's ending names and returns the
+//!   bytes' hash; [`WriteOptions`] holds exposure, tone curve and what the file says about itself.
+//! * [`FramePattern`] turns `out/frame_####.png` and a frame number into a path.
+//! * [`atomic`] is how every file here comes into being: temporary name, sync, rename.
+//! * [`read_image`] reads png, ppm, jpeg, hdr and exr within a memory limit; [`exr`] reads and
+//!   writes any channels.
+//! * [`manifest`] lists the finished frames of a sequence.
+//! * [`video`] has ffmpeg make an mp4 of a sequence.
+//!
+//! png and ppm hold display values: exposure, tone curve, then 8 or 16 bits. exr holds linear
+//! radiance as rendered, without exposure, in f32 throughout: half floats have 11 bits, and
+//! comparisons here go down to 1e-5.
+//!
+//! Not done: cropped files' data windows; exr compressions other than ZIP when writing.
 
-mod manifest;
+pub mod atomic;
+mod display;
+pub mod exr;
+mod format;
+pub mod manifest;
+mod pattern;
+mod png;
+mod quantise;
+mod read;
+pub mod video;
+
+pub use atomic::Written;
+pub use display::Display;
+pub use format::{Format, WriteOptions, write_image};
+pub use pattern::FramePattern;
+pub use read::{DEFAULT_MEMORY_LIMIT, read_image, read_image_within};

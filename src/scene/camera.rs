@@ -1,5 +1,8 @@
 //! The pinhole camera: its pose in the world, and rays through its pixels.
 
+#[cfg(test)]
+mod tests;
+
 use super::Recentring;
 use crate::error::{Error, Result};
 use crate::math::DVec3;
@@ -34,37 +37,31 @@ pub struct Camera {
     pub height: u32,
 }
 
+/// Narrowest field of view, degrees, and distance of the widest from 180: below it the directions
+/// of neighbouring pixels would be the same numbers.
+const LEAST_VFOV: f64 = 1e-6;
+
+/// Sines of the angle between view and up below this are mostly rounding error.
+const POLE: f64 = 1e-9;
+
 impl Camera {
-    /// A camera at `pose` with the vertical field of view `vfov_degrees` (0 to 180, exclusive).
+    /// A camera at `pose` with the vertical field of view `vfov_degrees` (1e-6 to 180 − 1e-6).
     ///
-    /// Looking along `up` is allowed: the image's up direction is then the world axis least
-    /// aligned with the view, taken in the order z, y, x. Eye equal to target is an error.
+    /// Looking along `up`, or an `up` of zero, is allowed: the image's up direction is then the
+    /// world axis least aligned with the view, of equal ones the first in the order z, y, x.
+    ///
+    /// Errors ([`Error::Usage`]): eye equal to target or so near that rounding decides the view,
+    /// numbers that are not finite, a field of view out of range, an image without pixels.
     pub fn new(pose: &Pose, vfov_degrees: f64, width: u32, height: u32) -> Result<Self> {
-        if !(vfov_degrees > 0.0 && vfov_degrees < 180.0) {
-            return Err(Error::Usage(format!(
-                "the vertical field of view is {vfov_degrees} degrees; it must lie between 0 and 180"
-            )));
-        }
+        Self::check_vfov(vfov_degrees)?;
         if width == 0 || height == 0 {
             return Err(Error::Usage(format!("the image size {width}x{height} has no pixels")));
         }
-        let view = pose.target - pose.eye;
-        if !(pose.eye.is_finite() && pose.target.is_finite() && pose.up.is_finite()) {
-            return Err(Error::Usage("a camera position is not a finite number".into()));
-        }
-        let scale = pose.eye.abs().max(pose.target.abs()).max_element();
-        if view.length() <= 4.0 * f64::EPSILON * scale || view == DVec3::ZERO {
-            return Err(Error::Usage(format!(
-                "the camera stands on its own target {}; it looks nowhere",
-                pose.target
-            )));
-        }
-        // Scaling by the largest component first keeps the length from under- and overflow.
-        let forward = unit(view);
+        let forward = view_direction(pose)?;
         let right = right_of(forward, pose.up);
         let up = right.cross(forward);
-        let (sin, cos) =
-            (libm::sin(pose.roll_degrees.to_radians()), libm::cos(pose.roll_degrees.to_radians()));
+        let roll = (pose.roll_degrees % 360.0).to_radians();
+        let (sin, cos) = (libm::sin(roll), libm::cos(roll));
         let (right, up) = (right * cos - up * sin, up * cos + right * sin);
         let half_height = libm::tan(0.5 * vfov_degrees.to_radians());
         let half_width = half_height * f64::from(width) / f64::from(height);
@@ -78,6 +75,17 @@ impl Camera {
         })
     }
 
+    /// Whether a vertical field of view, degrees, is one that [`Camera::new`] takes.
+    pub(super) fn check_vfov(vfov_degrees: f64) -> Result<()> {
+        if (LEAST_VFOV..=180.0 - LEAST_VFOV).contains(&vfov_degrees) {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "the vertical field of view is {vfov_degrees} degrees; it must lie between 0 and 180, \
+             and at least {LEAST_VFOV} from either"
+        )))
+    }
+
     /// Direction (unit) through image point `(x, y)` in pixels; `(0, 0)` is the upper left corner
     /// of the image and `(0.5, 0.5)` the middle of its first pixel.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
@@ -86,18 +94,16 @@ impl Camera {
         (self.forward + self.half_right * sx + self.half_up * sy).normalize()
     }
 
-    /// Image point in pixels and depth along `forward` of `p`; `None` behind the eye.
+    /// Image point in pixels and depth along `forward` of `p`; `None` behind the eye, and where
+    /// the image point is not a finite number.
     pub fn project(&self, p: DVec3) -> Option<(f64, f64, f64)> {
         let to = p - self.eye;
         let depth = to.dot(self.forward);
-        if depth <= 0.0 {
-            return None;
-        }
         let sx = to.dot(self.half_right) / (depth * self.half_right.length_squared());
         let sy = to.dot(self.half_up) / (depth * self.half_up.length_squared());
         let x = 0.5 * (sx + 1.0) * f64::from(self.width);
         let y = 0.5 * (1.0 - sy) * f64::from(self.height);
-        Some((x, y, depth))
+        (depth > 0.0 && x.is_finite() && y.is_finite()).then_some((x, y, depth))
     }
 
     /// The same camera in scene space.
@@ -106,15 +112,40 @@ impl Camera {
     }
 }
 
+/// Unit vector from eye to target.
+fn view_direction(pose: &Pose) -> Result<DVec3> {
+    let Pose { eye, target, up, roll_degrees } = *pose;
+    if !(eye.is_finite() && target.is_finite() && up.is_finite() && roll_degrees.is_finite()) {
+        return Err(Error::Usage(format!(
+            "the camera at {eye} looking at {target}, up {up}, roll {roll_degrees} degrees: \
+             not all of these are finite numbers"
+        )));
+    }
+    let view = target - eye;
+    if !view.is_finite() {
+        return Err(Error::Usage("the camera is too far from its target for f64".into()));
+    }
+    let scale = eye.abs().max(target.abs()).max_element();
+    if view.abs().max_element() <= 4.0 * f64::EPSILON * scale {
+        return Err(Error::Usage(format!(
+            "the camera stands on its own target {target}; it looks nowhere"
+        )));
+    }
+    Ok(unit(view))
+}
+
+/// Scaling by the largest component first keeps the length from under- and overflow.
 fn unit(v: DVec3) -> DVec3 {
     (v / v.abs().max_element()).normalize()
 }
 
+/// The image's right: perpendicular to `forward` to rounding, however close `up` is to it.
 fn right_of(forward: DVec3, up: DVec3) -> DVec3 {
     let candidate = if up == DVec3::ZERO { DVec3::ZERO } else { forward.cross(unit(up)) };
-    // Below 1e-9 the direction of the cross product is mostly rounding error.
-    if candidate.length() > 1e-9 {
-        return candidate.normalize();
+    if candidate.length() > POLE {
+        // A short product has a large share of rounding error along `forward`: take it out.
+        let right = candidate.normalize();
+        return (right - forward * right.dot(forward)).normalize();
     }
     let least = [DVec3::Z, DVec3::Y, DVec3::X]
         .into_iter()

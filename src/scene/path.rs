@@ -1,6 +1,17 @@
 //! Camera paths: from a frame number to a pose.
+//!
+//! Takes a [`Shot`] and a frame number (from 1); gives the [`Pose`] or [`Camera`] of that frame,
+//! which depends on nothing else, or an error that names the frame. The curves and their ends are
+//! described in `docs/camera-paths.md`.
 
-use super::Pose;
+mod check;
+mod level;
+mod spline;
+#[cfg(test)]
+mod tests;
+
+use super::{Camera, Pose};
+use crate::error::{Error, Result};
 use crate::math::DVec3;
 
 /// A camera move: path, timing and lens.
@@ -36,22 +47,25 @@ pub enum CameraPath {
     },
     /// A circle about an axis through `target`.
     Orbit {
-        /// Centre of interest and of the circle.
+        /// Point of interest, on the axis.
         target: DVec3,
-        /// Eye at the start.
+        /// Eye at the start, off the axis.
         eye: DVec3,
         /// Axis of rotation, also the up direction.
         axis: DVec3,
-        /// Total turn, degrees; 360 closes the circle, and the last frame then stops one step
-        /// before the first so that the video loops.
+        /// Total turn, degrees, counter-clockwise seen from the axis's tip. A multiple of 360
+        /// closes the circle, and the last frame then stops one step before the first so that
+        /// the video loops.
         degrees: f64,
         /// Roll, degrees.
         roll_degrees: f64,
     },
-    /// Key poses joined by Catmull–Rom splines (Catmull and Rom, 1974); passes through each.
+    /// Key poses joined by Catmull–Rom splines (Catmull and Rom, 1974) whose knots are the keys'
+    /// times; passes through each, and rests before the first key and after the last.
     Keys(Vec<KeyPose>),
     /// A uniform cubic B-spline through four or more control points (de Boor, 1972), with a
-    /// fixed point of interest; approximates, and stays in their convex hull.
+    /// fixed point of interest; starts and ends at the first and last of them, approximates the
+    /// others, and stays in their convex hull.
     BSpline {
         /// Control points of the eye.
         points: Vec<DVec3>,
@@ -81,10 +95,113 @@ pub struct KeyPose {
 pub enum Easing {
     /// Constant speed of progress.
     Linear,
-    /// Slow start.
+    /// From rest with constant acceleration: `t²`.
     In,
-    /// Slow end.
+    /// To rest with constant deceleration: `1 − (1 − t)²`.
     Out,
-    /// Slow start and end.
+    /// `In` for the first half, `Out` for the second: `2t²`, then `1 − 2(1 − t)²`.
     InOut,
+}
+
+impl Easing {
+    /// Progress in `[0, 1]` at time `t` in `[0, 1]`; non-decreasing, exactly 0 at 0 and 1 at 1.
+    pub fn apply(self, t: f64) -> f64 {
+        let rest = 1.0 - t;
+        match self {
+            Self::Linear => t,
+            Self::In => t * t,
+            Self::Out => 1.0 - rest * rest,
+            Self::InOut if t < 0.5 => 2.0 * t * t,
+            Self::InOut => 1.0 - 2.0 * rest * rest,
+        }
+    }
+}
+
+impl Shot {
+    /// Checks the whole shot: path, lens, and a camera for every frame.
+    ///
+    /// Errors: [`Error::Usage`] with what is wrong and, where one frame is at fault, its number.
+    pub fn validate(&self) -> Result<()> {
+        // The lens first: a wrong one is no single frame's fault.
+        check::shot(self)?;
+        (1..=self.frames).try_for_each(|frame| self.camera(frame, 1, 1).map(drop))
+    }
+
+    /// The pose at `frame`, from 1 to `frames`.
+    ///
+    /// `up` is the path's own unless the view runs along it in this frame or has passed over it
+    /// before: then it is chosen so that the image moves without a jump.
+    pub fn pose(&self, frame: u32) -> Result<Pose> {
+        check::shot(self)?;
+        if !(1..=self.frames).contains(&frame) {
+            let last = self.frames;
+            return Err(Error::Usage(format!(
+                "frame {frame} is not one of the shot's 1 to {last}"
+            )));
+        }
+        let progress = self.progress(frame);
+        let mut pose = self.path.pose(progress);
+        if pose.up.abs().max_element() < 1e-6 && matches!(self.path, CameraPath::Keys(_)) {
+            return Err(Error::Usage(format!(
+                "frame {frame} of {}: the up directions of the keys around it are opposite and \
+                 cancel; add a key between them",
+                self.frames
+            )));
+        }
+        pose.up = level::steady_up(&self.path, progress, &pose);
+        Ok(pose)
+    }
+
+    /// The camera at `frame`, world space, for an image of `width` by `height` pixels.
+    pub fn camera(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
+        let pose = self.pose(frame)?;
+        Camera::new(&pose, self.vfov_degrees, width, height).map_err(|error| match error {
+            Error::Usage(what) => Error::Usage(format!("frame {frame} of {}: {what}", self.frames)),
+            other => other,
+        })
+    }
+
+    /// Eased progress along the path at `frame`.
+    fn progress(&self, frame: u32) -> f64 {
+        let closed = matches!(self.path, CameraPath::Orbit { degrees, .. }
+            if degrees != 0.0 && degrees % 360.0 == 0.0);
+        let steps = if closed { self.frames } else { (self.frames - 1).max(1) };
+        self.easing.apply(f64::from(frame - 1) / f64::from(steps))
+    }
+}
+
+impl CameraPath {
+    /// The pose at `progress` in `[0, 1]` of a path that was checked.
+    fn pose(&self, progress: f64) -> Pose {
+        match self {
+            Self::Still(pose) => *pose,
+            Self::Pan { from, to, target, up, roll_degrees } => {
+                // The ends exactly, and no rounding where they are the same point.
+                let eye = if progress == 1.0 { *to } else { *from + (*to - *from) * progress };
+                Pose { eye, target: *target, up: *up, roll_degrees: *roll_degrees }
+            }
+            Self::Orbit { target, eye, axis, degrees, roll_degrees } => {
+                let eye = turn(*eye, *target, *axis, degrees * progress);
+                Pose { eye, target: *target, up: *axis, roll_degrees: *roll_degrees }
+            }
+            Self::Keys(keys) => spline::key_pose(keys, progress),
+            Self::BSpline { points, target, up, roll_degrees } => {
+                let eye = spline::b_spline(points, progress);
+                Pose { eye, target: *target, up: *up, roll_degrees: *roll_degrees }
+            }
+        }
+    }
+}
+
+/// `point` turned about the axis through `centre` (Rodrigues, 1840).
+fn turn(point: DVec3, centre: DVec3, axis: DVec3, degrees: f64) -> DVec3 {
+    let angle = (degrees % 360.0).to_radians();
+    if angle == 0.0 {
+        return point;
+    }
+    let axis = level::unit(axis);
+    let arm = point - centre;
+    let along = axis * arm.dot(axis);
+    let across = arm - along;
+    centre + along + across * libm::cos(angle) + axis.cross(across) * libm::sin(angle)
 }

@@ -81,7 +81,8 @@ impl World {
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
         let bounds = self.bounds();
         let size = bounds.extent().max_element();
-        if !bounds.is_empty() && !(size == 0.0 || (1e-30..=1e30).contains(&size)) {
+        let renders = size == 0.0 || (1e-30..=1e30).contains(&size);
+        if !renders {
             return Err(Error::Usage(format!(
                 "the scene is {size:e} units wide; from 1e-30 to 1e30 can be rendered. Use `scale`"
             )));

@@ -1,1 +1,98 @@
-//! Under way: the room `sequence`.
+//! One frame after another: camera, film, whole file, manifest row.
+//!
+//! [`prepare`] looks at what is on disk and decides which frames are kept and which rendered;
+//! [`render_frames`] renders some of these, in order. What makes a film is a parameter
+//! ([`FrameMaker`]); [`Tracer`] is the maker that traces every frame. A row follows the rename of
+//! its frame, so whatever moment the job ends at, rows name whole frames only.
+//!
+//! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
+
+mod fingerprint;
+mod resume;
+mod tracer;
+
+pub use fingerprint::fingerprint;
+pub use resume::{Plan, Target, prepare};
+pub use tracer::Tracer;
+
+#[cfg(test)]
+mod tests;
+
+use crate::error::Result;
+use crate::film::Film;
+use crate::output::manifest::{Journal, Row};
+use crate::output::{WriteOptions, write_image};
+use crate::stats::RayCounts;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Instant;
+
+/// Makes the film of a frame.
+pub trait FrameMaker {
+    /// The film of frame `frame` (from 1), or `None` when the job was asked to stop first.
+    fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>>;
+}
+
+/// What a finished frame took.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameReport {
+    /// Frame number, from 1.
+    pub frame: u32,
+    /// Wall seconds from the camera to the film.
+    pub trace_seconds: f64,
+    /// Wall seconds to encode, write and sync the file and its row.
+    pub write_seconds: f64,
+    /// Size of the file.
+    pub bytes: u64,
+    /// Rays cast.
+    pub rays: RayCounts,
+}
+
+/// Renders `frames` in order into `target`; rows go to the journal at `journal`. `done` hears of
+/// each finished frame. Ends early, without an error, when `maker` gives no film.
+///
+/// Errors: whatever making or writing a frame met; the frames before it are finished.
+pub fn render_frames(
+    target: &Target,
+    frames: &[u32],
+    journal: &Path,
+    maker: &dyn FrameMaker,
+    done: &mut dyn FnMut(&FrameReport) -> Result<()>,
+) -> Result<()> {
+    if frames.is_empty() {
+        return Ok(());
+    }
+    let mut journal = Journal::open(journal)?;
+    for &frame in frames {
+        let start = Instant::now();
+        let Some((film, rays)) = maker.make(frame)? else { break };
+        let trace_seconds = start.elapsed().as_secs_f64();
+        let row = write_frame(target, frame, &film, rays, start)?;
+        journal.append(&row)?;
+        let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
+        done(&FrameReport { frame, trace_seconds, write_seconds, bytes: row.bytes, rays })?;
+    }
+    Ok(())
+}
+
+/// Writes the frame's file whole; gives its row.
+fn write_frame(
+    target: &Target,
+    frame: u32,
+    film: &Film,
+    rays: RayCounts,
+    start: Instant,
+) -> Result<Row> {
+    let path = target.pattern.path(frame);
+    let options = WriteOptions { frame: Some(frame), ..target.write.clone() };
+    let written = write_image(&path, film, &options)?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Row {
+        frame,
+        file,
+        blake3: written.hash.to_hex().to_string(),
+        bytes: written.bytes,
+        seconds: start.elapsed().as_secs_f64(),
+        rays,
+    })
+}

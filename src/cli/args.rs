@@ -1,0 +1,181 @@
+//! Options that stand over the scene file: what to render and how.
+
+use super::values::{self, FrameRequest};
+use crate::import::{LoadOptions, UpAxis};
+use crate::scene::{Filter, IntersectorKind, Recheck, Rect, Settings, ToneCurve};
+use clap::Args;
+use std::path::PathBuf;
+
+/// The scene and how to read it.
+#[derive(Debug, Args)]
+pub struct SceneArgs {
+    /// Scene file (.toml), or a bare mesh (.obj, .ply), which the camera then orbits once
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Which axis of a bare mesh points up [default: y]
+    #[arg(long, value_name = "AXIS", value_parser = values::choice::<UpAxis>(&["x", "y", "z"]))]
+    pub up: Option<UpAxis>,
+    /// Factor on the coordinates of a bare mesh [default: 1]
+    #[arg(long, value_name = "FACTOR", value_parser = values::positive)]
+    pub scale: Option<f64>,
+}
+
+impl SceneArgs {
+    /// As import wants it.
+    pub fn load_options(&self) -> LoadOptions {
+        let default = LoadOptions::default();
+        LoadOptions {
+            up: self.up.unwrap_or(default.up),
+            scale: self.scale.unwrap_or(default.scale),
+        }
+    }
+}
+
+/// Everything that decides a frame's bytes; the scene file's value holds where an option is absent.
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Image")]
+pub struct SettingArgs {
+    /// Image size in pixels [default: 640x360]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    pub size: Option<(u32, u32)>,
+    /// Render only these pixels of the image (upper left corner is 0,0; x1 and y1 are excluded)
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop)]
+    pub crop: Option<Rect>,
+    /// Camera samples a pixel [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub spp: Option<u32>,
+    /// Pixel filter [default: box]
+    #[arg(long, value_name = "FILTER",
+        value_parser = values::choice::<Filter>(&["box", "tent", "gaussian", "blackman-harris"]))]
+    pub filter: Option<Filter>,
+    /// Factor on radiance before the tone curve [default: 1]
+    #[arg(long, value_name = "FACTOR", value_parser = values::positive_f32)]
+    pub exposure: Option<f32>,
+    /// Tone curve of png and ppm files; exr stays linear [default: srgb]
+    #[arg(long, value_name = "CURVE",
+        value_parser = values::choice::<ToneCurve>(&["srgb", "linear", "reinhard", "filmic"]))]
+    pub tone: Option<ToneCurve>,
+    /// Bits a channel of png files: 8 or 16 [default: 8]
+    #[arg(long, value_name = "BITS", value_parser = png_bits)]
+    pub png_bits: Option<u8>,
+
+    /// Shadow samples per area light and camera sample; 0 leaves area lights unlit [default: 16]
+    #[arg(long, value_name = "N", help_heading = "Light",
+        value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    pub shadow_samples: Option<u32>,
+    /// Sky rays per camera sample where the sky lights the scene [default: 16]
+    #[arg(long, value_name = "N", help_heading = "Light",
+        value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    pub sky_samples: Option<u32>,
+    /// Specular bounces after the camera ray [default: 4]
+    #[arg(long, value_name = "N", help_heading = "Light",
+        value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub bounces: Option<u32>,
+    /// Drop mirror and glass branches that contribute less than this share [default: 0.001]
+    #[arg(long, value_name = "SHARE", help_heading = "Light", value_parser = values::share)]
+    pub cutoff: Option<f32>,
+    /// Seed of every random number [default: 0]
+    #[arg(long, value_name = "N", help_heading = "Light")]
+    pub seed: Option<u64>,
+
+    /// What traces: Embree, or the brute-force f64 oracle for small scenes [default: embree]
+    #[arg(long, value_name = "KIND", help_heading = "Tracing",
+        value_parser = values::choice::<IntersectorKind>(&["embree", "oracle"]))]
+    pub intersector: Option<IntersectorKind>,
+    /// Embree's instruction set; frames differ in the last bits by it [default: this machine's best]
+    #[arg(long, value_name = "ISA", help_heading = "Tracing",
+        value_parser = ["sse2", "sse4.2", "avx", "avx2", "avx512"])]
+    pub isa: Option<String>,
+    /// Which hits are recomputed in f64 [default: always]
+    #[arg(long, value_name = "WHICH", help_heading = "Tracing",
+        value_parser = values::choice::<Recheck>(&["always", "risky", "off"]))]
+    pub recheck: Option<Recheck>,
+    /// Watertight traversal of Embree [default: on]
+    #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
+    pub robust: Option<bool>,
+    /// A second try for rays that miss inside the bounds [default: on]
+    #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
+    pub retry: Option<bool>,
+    /// Start secondary rays outside the rounding error of their hit [default: on]
+    #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
+    pub spawn_offset: Option<bool>,
+    /// Trace the scene about its own centre at unit size [default: on]
+    #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
+    pub recentre: Option<bool>,
+}
+
+impl SettingArgs {
+    /// Puts every option that was given over `settings`.
+    pub fn apply(&self, settings: &mut Settings) {
+        let s = settings;
+        if let Some((width, height)) = self.size {
+            (s.width, s.height) = (width, height);
+        }
+        if self.crop.is_some() {
+            s.crop = self.crop;
+        }
+        if self.isa.is_some() {
+            s.isa.clone_from(&self.isa);
+        }
+        put(&mut s.spp, self.spp);
+        put(&mut s.filter, self.filter);
+        put(&mut s.exposure, self.exposure);
+        put(&mut s.tone, self.tone);
+        put(&mut s.png_bits, self.png_bits);
+        put(&mut s.shadow_samples, self.shadow_samples);
+        put(&mut s.sky_samples, self.sky_samples);
+        put(&mut s.bounces, self.bounces);
+        put(&mut s.cutoff, self.cutoff);
+        put(&mut s.seed, self.seed);
+        put(&mut s.intersector, self.intersector);
+        put(&mut s.rules.recheck, self.recheck);
+        put(&mut s.rules.robust, self.robust);
+        put(&mut s.rules.retry, self.retry);
+        put(&mut s.rules.spawn_offset, self.spawn_offset);
+        put(&mut s.rules.recentre, self.recentre);
+    }
+}
+
+/// Frames and output, for `render`.
+#[derive(Debug, Args)]
+pub struct OutputArgs {
+    /// Where frames go; #### is the frame number, the ending chooses png, exr (linear, with AOVs)
+    /// or ppm [default: out/<scene>/frame_####.png]
+    #[arg(short, long, value_name = "PATTERN")]
+    pub output: Option<String>,
+    /// Frames to render, counted from 1, both ends included: 7, 1..16, 5.. [default: all]
+    #[arg(long, value_name = "RANGE", value_parser = values::frames)]
+    pub frames: Option<FrameRequest>,
+    /// Replace frames that exist
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Make no video of the sequence
+    #[arg(long)]
+    pub no_video: bool,
+    /// Frames per second of the video [default: 24]
+    #[arg(long, value_name = "N", value_parser = values::positive)]
+    pub fps: Option<f64>,
+    /// Write what the job took to this file, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+    /// Rendering threads [default: the cores this process may use]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+fn png_bits(text: &str) -> Result<u8, String> {
+    match text {
+        "8" => Ok(8),
+        "16" => Ok(16),
+        _ => Err("png files have 8 or 16 bits a channel".into()),
+    }
+}
+
+fn put<T: Copy>(slot: &mut T, option: Option<T>) {
+    if let Some(value) = option {
+        *slot = value;
+    }
+}

@@ -1,0 +1,54 @@
+//! What the exit code says.
+
+use crate::error::Error;
+use std::process::ExitCode;
+
+/// How the program ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Everything asked for is done.
+    Done,
+    /// The job failed.
+    Failed,
+    /// The request or its input is wrong.
+    Usage,
+    /// Stopped cleanly; the same command goes on. (`EX_TEMPFAIL` of sysexits.h.)
+    Stopped,
+}
+
+impl Exit {
+    /// How an error ends the program.
+    pub fn of(error: &Error) -> Self {
+        match error {
+            Error::Usage(_) | Error::Input(_) => Self::Usage,
+            Error::Stopped => Self::Stopped,
+            Error::Io { .. } | Error::Embree(_) | Error::Failed(_) => Self::Failed,
+        }
+    }
+
+    /// The number.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Failed => 1,
+            Self::Usage => 2,
+            Self::Stopped => 75,
+        }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit.code())
+    }
+}
+
+/// An input file that cannot be read is bad input, not a failed job.
+pub fn as_input(error: Error) -> Error {
+    match error {
+        Error::Io { action, path, source } => {
+            Error::input(path, format!("cannot {action} it: {source}"))
+        }
+        other => other,
+    }
+}

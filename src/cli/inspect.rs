@@ -1,0 +1,249 @@
+//! `tweenray inspect`: what a scene holds and calls for, without rendering it.
+
+use super::args::{SceneArgs, SettingArgs};
+use super::exit::Exit;
+use super::findings::findings;
+use super::{job, say};
+use crate::cluster;
+use crate::effects::EffectPlan;
+use crate::error::{Error, Result};
+use crate::import::Loaded;
+use crate::intersect;
+use crate::math::DVec3;
+use crate::scene::{Light, Mesh, Scene, Settings, Shot};
+use clap::Args;
+use serde::Serialize;
+
+/// Say what a scene holds and what rendering it would do, without rendering
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  tweenray inspect scene.toml
+  tweenray inspect bunny.obj --json")]
+pub struct InspectArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    settings: SettingArgs,
+}
+
+/// Everything that `inspect` tells.
+#[derive(Serialize)]
+struct Inspection {
+    scene: String,
+    tracer: String,
+    triangles: usize,
+    vertices: usize,
+    meshes: usize,
+    spheres: usize,
+    materials: usize,
+    textures: usize,
+    lights: Lights,
+    bounds: Option<[[f64; 3]; 2]>,
+    frames: u32,
+    size: [u32; 2],
+    camera_start: CameraView,
+    camera_end: CameraView,
+    memory: Memory,
+    effects: Vec<Effect>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize, Default)]
+struct Lights {
+    point: usize,
+    directional: usize,
+    quad: usize,
+    sphere: usize,
+    sky: bool,
+    ambient: bool,
+}
+
+/// World space.
+#[derive(Serialize)]
+struct CameraView {
+    eye: [f64; 3],
+    looks_along: [f64; 3],
+}
+
+/// Bytes.
+#[derive(Serialize)]
+struct Memory {
+    geometry: u64,
+    textures: u64,
+    intersector: u64,
+    frame: u64,
+}
+
+#[derive(Serialize)]
+struct Effect {
+    effect: &'static str,
+    runs: bool,
+    why: String,
+}
+
+/// Runs the command.
+pub fn run(args: &InspectArgs) -> Result<Exit> {
+    let inspection = inspect(args)?;
+    if args.json {
+        let text = serde_json::to_string_pretty(&inspection)
+            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
+        say::result(text);
+    } else {
+        say::text(&inspection.to_text());
+    }
+    Ok(Exit::Done)
+}
+
+fn inspect(args: &InspectArgs) -> Result<Inspection> {
+    let loaded = job::load(&args.scene, &args.settings)?;
+    let Loaded { world, shot, settings, warnings, .. } = loaded;
+    let scene = world.into_scene(settings.rules.recentre)?;
+    let intersector = intersect::build(&scene, &settings, cluster::default_threads())?;
+    let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
+    let reasons = EffectPlan::reasons(&scene, &settings);
+    Ok(Inspection {
+        scene: args.scene.scene.display().to_string(),
+        tracer: intersector.describe(),
+        triangles: scene.triangle_count(),
+        vertices: scene.meshes.iter().map(|m| m.vertex_count).sum(),
+        meshes: scene.meshes.len(),
+        spheres: scene.spheres.len(),
+        materials: scene.materials.len(),
+        textures: scene.textures.len(),
+        lights: Lights::of(&scene),
+        bounds: world_bounds(&scene),
+        frames: shot.frames,
+        size: [settings.width, settings.height],
+        camera_start: CameraView::at(&shot, 1, &settings)?,
+        camera_end: CameraView::at(&shot, shot.frames, &settings)?,
+        memory: Memory {
+            geometry: scene.meshes.iter().map(mesh_bytes).sum(),
+            textures: scene.textures.iter().map(|t| 12 * t.texels.len() as u64).sum(),
+            intersector: intersector.memory(),
+            frame: job::frame_bytes(&settings),
+        },
+        effects: reasons
+            .into_iter()
+            .map(|r| Effect { effect: r.effect, runs: r.runs, why: r.why })
+            .collect(),
+        warnings,
+    })
+}
+
+impl Lights {
+    fn of(scene: &Scene) -> Self {
+        let mut lights = Self {
+            sky: scene.sky.lights && scene.sky.radiance.max_element() > 0.0,
+            ambient: scene.sky.ambient.max_element() > 0.0,
+            ..Self::default()
+        };
+        for light in &scene.lights {
+            match light {
+                Light::Point { .. } => lights.point += 1,
+                Light::Directional { .. } => lights.directional += 1,
+                Light::Quad(_) => lights.quad += 1,
+                Light::Sphere { .. } => lights.sphere += 1,
+            }
+        }
+        lights
+    }
+}
+
+impl CameraView {
+    fn at(shot: &Shot, frame: u32, settings: &Settings) -> Result<Self> {
+        let camera = shot.camera(frame, settings.width, settings.height)?;
+        Ok(Self { eye: camera.eye.to_array(), looks_along: camera.forward.to_array() })
+    }
+}
+
+fn world_bounds(scene: &Scene) -> Option<[[f64; 3]; 2]> {
+    let corner = |p: DVec3| scene.recentring.point_to_world(p).to_array();
+    (!scene.bounds.is_empty()).then(|| [corner(scene.bounds.min), corner(scene.bounds.max)])
+}
+
+fn mesh_bytes(mesh: &Mesh) -> u64 {
+    let normals = mesh.normals.as_ref();
+    let uvs = mesh.uvs.as_ref();
+    let corner_lists = normals.and_then(|n| n.corners.as_ref()).map_or(0, Vec::len)
+        + uvs.and_then(|uv| uv.corners.as_ref()).map_or(0, Vec::len);
+    let words = 3 * mesh.positions.len()
+        + 3 * mesh.triangles.len()
+        + 3 * normals.map_or(0, |n| n.values.len())
+        + 2 * uvs.map_or(0, |uv| uv.values.len())
+        + 3 * corner_lists;
+    4 * words as u64
+}
+
+impl Inspection {
+    fn to_text(&self) -> String {
+        let mut lines = vec![
+            format!("scene      {}", self.scene),
+            format!(
+                "geometry   {} triangles, {} vertices, {} meshes, {} spheres",
+                self.triangles, self.vertices, self.meshes, self.spheres
+            ),
+            format!("materials  {}, {} textures", self.materials, self.textures),
+            format!("lights     {}", self.lights.to_text()),
+        ];
+        if let Some([min, max]) = self.bounds {
+            lines.push(format!("bounds     {} to {}", point(min), point(max)));
+        }
+        let [width, height] = self.size;
+        lines.push(format!("frames     {} of {width}x{height} pixels", self.frames));
+        for (name, view) in [("start", &self.camera_start), ("end", &self.camera_end)] {
+            let (eye, along) = (point(view.eye), point(view.looks_along));
+            lines.push(format!("camera     {name}: at {eye}, looks along {along}"));
+        }
+        lines.push(format!("tracer     {}", self.tracer));
+        let m = &self.memory;
+        lines.push(format!(
+            "memory     geometry {}, textures {}, intersector {}, a frame {}",
+            bytes(m.geometry),
+            bytes(m.textures),
+            bytes(m.intersector),
+            bytes(m.frame)
+        ));
+        lines.push("effects".into());
+        for e in &self.effects {
+            let runs = if e.runs { "runs" } else { "off" };
+            lines.push(format!("  {:<18} {runs:<5} {}", e.effect, e.why));
+        }
+        lines.extend(self.warnings.iter().map(|w| format!("warning: {w}")));
+        lines.join("\n") + "\n"
+    }
+}
+
+impl Lights {
+    fn to_text(&self) -> String {
+        let counts = [
+            (self.point, "point"),
+            (self.directional, "directional"),
+            (self.quad, "quad"),
+            (self.sphere, "sphere"),
+        ];
+        let mut parts: Vec<String> =
+            counts.iter().filter(|(n, _)| *n > 0).map(|(n, kind)| format!("{n} {kind}")).collect();
+        parts.extend(self.sky.then(|| "sky".into()));
+        parts.extend(self.ambient.then(|| "ambient".into()));
+        if parts.is_empty() { "none".into() } else { parts.join(", ") }
+    }
+}
+
+fn point(p: [f64; 3]) -> String {
+    // Adding zero turns -0 into 0.
+    let [x, y, z] = p.map(|c| (c * 1e4).round() / 1e4 + 0.0);
+    format!("({x}, {y}, {z})")
+}
+
+fn bytes(count: u64) -> String {
+    match count {
+        0..1_000_000 => format!("{:.1} kB", count as f64 * 1e-3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", count as f64 * 1e-6),
+        _ => format!("{:.2} GB", count as f64 * 1e-9),
+    }
+}

@@ -1,0 +1,85 @@
+//! A job, resolved: the scene as read, with the command line's options over it.
+
+use super::args::{SceneArgs, SettingArgs};
+use super::exit::as_input;
+use super::machine;
+use crate::error::{Error, Result};
+use crate::import::{self, Loaded};
+use crate::scene::Settings;
+
+/// Longest image edge, pixels: what every format and ffmpeg can still take.
+const MAX_EDGE: u32 = 65_535;
+
+/// Reads the scene and puts the options over its settings.
+///
+/// Errors: `Error::Input` and `Error::Usage`; a scene that cannot be read is bad input too.
+pub fn load(scene: &SceneArgs, options: &SettingArgs) -> Result<Loaded> {
+    let mut loaded = import::load(&scene.scene, &scene.load_options()).map_err(as_input)?;
+    options.apply(&mut loaded.settings);
+    check(&loaded.settings)?;
+    Ok(loaded)
+}
+
+/// What scene file and command line can only get wrong together.
+fn check(settings: &Settings) -> Result<()> {
+    let Settings { width, height, .. } = *settings;
+    if width > MAX_EDGE || height > MAX_EDGE {
+        return Err(Error::Usage(format!(
+            "the image size {width}x{height} is too large: an edge has at most {MAX_EDGE} pixels"
+        )));
+    }
+    if let Some(crop) = settings.crop {
+        if crop.x0 >= crop.x1 || crop.y0 >= crop.y1 || crop.x1 > width || crop.y1 > height {
+            return Err(Error::Usage(format!(
+                "the crop {},{},{},{} does not lie in the image of {width}x{height} pixels",
+                crop.x0, crop.y0, crop.x1, crop.y1
+            )));
+        }
+    }
+    check_memory(settings, machine::memory())
+}
+
+/// Whether a frame fits into the machine's memory.
+fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
+    let need = frame_bytes(settings);
+    match memory {
+        Some(memory) if need > memory => Err(Error::Usage(format!(
+            "a frame of {}x{} pixels takes {:.1} GB of memory while it is rendered and written; \
+             this machine has {:.1} GB\n  help: render a smaller --size",
+            settings.width,
+            settings.height,
+            need as f64 * 1e-9,
+            memory as f64 * 1e-9
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Bytes that a frame takes at most: colour (12 a pixel) and first-hit records (44), twice, since
+/// encoding holds a copy.
+pub fn frame_bytes(settings: &Settings) -> u64 {
+    // A cropped film has the full size, black outside.
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    pixels * 2 * (12 + 44)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Rect;
+
+    #[test]
+    fn sizes_and_crops_beyond_reason_are_refused_with_the_figure() {
+        let large = Settings { width: 60_000, height: 60_000, ..Settings::default() };
+        let error = check_memory(&large, Some(8 << 30)).unwrap_err().to_string();
+        assert!(error.contains("403.2 GB") && error.contains("8.6 GB"), "{error}");
+        assert!(check(&Settings { width: 70_000, ..Settings::default() }).is_err());
+        let crop = |x1, y1| Settings {
+            crop: Some(Rect { x0: 600, y0: 0, x1, y1 }),
+            ..Settings::default()
+        };
+        assert!(check(&crop(640, 360)).is_ok());
+        assert!(check(&crop(641, 360)).is_err());
+        assert!(check(&crop(600, 360)).is_err());
+    }
+}

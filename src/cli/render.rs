@@ -1,0 +1,219 @@
+//! `tweenray render`: every frame of a shot, and a video of them.
+
+use super::args::{OutputArgs, SceneArgs, SettingArgs};
+use super::exit::Exit;
+use super::progress::{Watch, duration};
+use super::request::Request;
+use super::say;
+use super::signals::Interrupt;
+use super::stats::{self, RankStats};
+use crate::cluster::{self, Outcome, World};
+use crate::effects::EffectPlan;
+use crate::error::{Error, Result};
+use crate::intersect::{self, Intersector};
+use crate::output::Format;
+use crate::output::manifest::beside;
+use crate::output::video::{self, Clip, Video};
+use crate::sequence::{self, Plan, Target, Tracer};
+use crate::shade::Renderer;
+use clap::Args;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Render the frames of a camera move
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Every option can also stand in the scene file; the command line wins.
+Frames that exist with the same settings are kept, so the same command goes on where it stopped.
+
+Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed.
+
+Examples:
+  tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16 --size 640x360 --spp 4
+  tweenray render bunny.obj --up z
+  mpirun -n 4 tweenray render scene.toml")]
+pub struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+    #[command(flatten)]
+    settings: SettingArgs,
+}
+
+/// Runs the command.
+pub fn run(args: &RenderArgs) -> Exit {
+    let world = match World::join() {
+        Ok(world) => world,
+        Err(error) => {
+            say::error(&error);
+            return Exit::of(&error);
+        }
+    };
+    render(&world, args).unwrap_or_else(|error| {
+        if world.is_root() {
+            say::error(&error);
+        }
+        Exit::of(&error)
+    })
+}
+
+fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
+    let start = Instant::now();
+    let interrupt = Interrupt::listen()?;
+    // Only one rank talks.
+    let quiet = args.output.quiet || !world.is_root();
+    let request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
+    tell(quiet, &request.warnings, |w| say::warning(w));
+    let threads = args.output.threads.map_or_else(cluster::default_threads, |n| n as usize);
+    let pool = world.agree(thread_pool(threads))?;
+    let loaded = Instant::now();
+    let intersector = world.agree(intersect::build(&request.scene, &request.settings, threads))?;
+    let built = Instant::now();
+    let target = request.target(world.same_everywhere("traces with", intersector.describe())?);
+    let prepare = || pool.install(|| sequence::prepare(&target, request.frames));
+    let plan = world.from_root(prepare)?;
+    tell(quiet, &plan.notes, |n| say::note(n));
+    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
+    let outcome = job.render(world, &*intersector, &interrupt, quiet)?;
+    let rank = RankStats {
+        threads,
+        load_seconds: (loaded - start).as_secs_f64(),
+        build_seconds: (built - loaded).as_secs_f64(),
+        render_seconds: built.elapsed().as_secs_f64(),
+        intersector_bytes: intersector.memory(),
+        peak_memory_bytes: None,
+    };
+    let ranks = world.gather(&rank.with_peak())?;
+    if !world.is_root() {
+        let stopped = interrupt.stop.load(Ordering::Relaxed);
+        return Ok(if stopped { Exit::Stopped } else { Exit::Done });
+    }
+    if let Some(path) = &args.output.stats {
+        let seconds = start.elapsed().as_secs_f64();
+        stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
+    }
+    if outcome.unfinished > 0 {
+        say_stopped(args, &job, &outcome);
+        return Ok(Exit::Stopped);
+    }
+    finish(args, &job, start)
+}
+
+fn thread_pool(threads: usize) -> Result<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
+}
+
+fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {
+    if !quiet {
+        words.iter().for_each(say);
+    }
+}
+
+/// What rendering the planned frames takes.
+struct Frames<'a> {
+    request: &'a Request,
+    target: &'a Target,
+    plan: &'a Plan,
+    pool: &'a ThreadPool,
+}
+
+impl Frames<'_> {
+    fn render(
+        &self,
+        world: &World,
+        intersector: &dyn Intersector,
+        interrupt: &Interrupt,
+        quiet: bool,
+    ) -> Result<Outcome> {
+        let Request { scene, settings, shot, pattern, .. } = self.request;
+        let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
+        let effects = EffectPlan::of(scene, settings);
+        let tracer = Tracer {
+            renderer: Renderer { scene, settings, plan: effects, intersector },
+            shot,
+            pool: self.pool,
+            with_gbuffer: pattern.format() == Format::Exr,
+            stop: &interrupt.stop,
+            progress: &watch,
+        };
+        let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
+        let done = |report: &_| watch.frame_done(report);
+        let outcome =
+            interrupt.watched(|| cluster::render(world, target, plan, &tracer, stop, &done));
+        watch.finish();
+        if let (Err(error), true) = (&outcome, world.size() > 1) {
+            // The other ranks are in the middle of their frames and would wait for this one.
+            say::error(error);
+            world.abort(Exit::of(error).code());
+        }
+        outcome
+    }
+
+    fn total(&self) -> usize {
+        self.plan.kept.len() + self.plan.render.len()
+    }
+}
+
+/// Says how to go on.
+fn say_stopped(args: &RenderArgs, job: &Frames, outcome: &Outcome) {
+    let finished = job.total() - outcome.unfinished;
+    let again = if args.output.overwrite { " without --overwrite" } else { "" };
+    say::aside(format_args!(
+        "stopped: {finished} of {} frames are finished in {}; the same command{again} goes on \
+         from here",
+        job.total(),
+        job.target.pattern
+    ));
+}
+
+/// Says what there is now, and makes the video of the frames asked for, all of which are there.
+fn finish(args: &RenderArgs, job: &Frames, start: Instant) -> Result<Exit> {
+    let result = |line: String| {
+        if !args.output.quiet {
+            say::result(line);
+        }
+    };
+    let frames = if job.total() == 1 { "frame" } else { "frames" };
+    result(format!(
+        "{} {frames} in {} ({} rendered, {} kept) in {}",
+        job.total(),
+        job.target.pattern,
+        job.plan.render.len(),
+        job.plan.kept.len(),
+        duration(start.elapsed().as_secs_f64())
+    ));
+    if job.total() > 1 && !args.output.no_video {
+        result(make_video(args, job)?);
+    }
+    Ok(Exit::Done)
+}
+
+/// Makes the video of the frames asked for; gives the line to print. Only of the whole shot does
+/// it get the plain name, so that rendering a few frames again replaces no video of all.
+fn make_video(args: &RenderArgs, job: &Frames) -> Result<String> {
+    let Request { frames, shot, pattern, .. } = job.request;
+    let whole = frames.last - frames.first + 1 == shot.frames;
+    let ending = match whole {
+        true => ".mp4".to_string(),
+        false => format!("_{}-{}.mp4", frames.first, frames.last),
+    };
+    let clip = Clip {
+        pattern,
+        first: frames.first,
+        count: frames.last - frames.first + 1,
+        fps: args.output.fps.unwrap_or(24.0),
+        display: job.target.write.display,
+    };
+    Ok(match video::make(&clip, &beside(pattern, &ending))? {
+        Video::Made(path) => format!("video {}", path.display()),
+        Video::NoFfmpeg { command } => {
+            format!(
+                "no video, since ffmpeg is not installed; where it is, this makes one:\n{command}"
+            )
+        }
+        Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
+    })
+}

@@ -1,0 +1,95 @@
+//! What `render` was asked to do, resolved: scene, shot, settings, frames and where they go.
+
+use super::args::{OutputArgs, SceneArgs, SettingArgs};
+use super::{job, values};
+use crate::error::{Diagnostic, Error, Result};
+use crate::import::Loaded;
+use crate::output::manifest::{self, Header};
+use crate::output::{FramePattern, WriteOptions};
+use crate::scene::{FrameRange, Scene, Settings, Shot};
+use crate::sequence::{Target, fingerprint};
+use std::path::Path;
+
+/// Everything that rendering takes.
+pub struct Request {
+    /// The scene, ready to trace.
+    pub scene: Scene,
+    /// The camera move.
+    pub shot: Shot,
+    /// How to render.
+    pub settings: Settings,
+    /// Which frames.
+    pub frames: FrameRange,
+    /// Where they go.
+    pub pattern: FramePattern,
+    /// What import warns of.
+    pub warnings: Vec<Diagnostic>,
+    scene_name: String,
+    scene_hash: String,
+    overwrite: bool,
+}
+
+impl Request {
+    /// Reads the scene and puts the options over it.
+    pub fn load(scene: &SceneArgs, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
+        let loaded = job::load(scene, settings)?;
+        let frames = frames(output, &loaded)?;
+        let name = output.output.clone().or_else(|| loaded.output.clone());
+        let name = name.unwrap_or_else(|| default_output(&scene.scene));
+        let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
+        let Loaded { world, shot, settings, warnings, .. } = loaded;
+        let scene_hash = fingerprint(&world, &shot);
+        Ok(Self {
+            scene: world.into_scene(settings.rules.recentre)?,
+            shot,
+            settings,
+            frames,
+            pattern,
+            warnings,
+            scene_name: scene.scene.display().to_string(),
+            scene_hash,
+            overwrite: output.overwrite,
+        })
+    }
+
+    /// Where frames traced by `tracer` go, and what they share.
+    pub fn target(&self, tracer: String) -> Target {
+        let header = Header {
+            manifest: manifest::FORMAT,
+            tweenray: env!("CARGO_PKG_VERSION").into(),
+            scene: self.scene_name.clone(),
+            scene_hash: self.scene_hash.clone(),
+            shot_frames: self.shot.frames,
+            files: manifest::file_name(&self.pattern),
+            tracer,
+            settings: Header::settings(&self.settings),
+        };
+        Target {
+            pattern: self.pattern.clone(),
+            header,
+            write: WriteOptions::of(&self.settings, None),
+            overwrite: self.overwrite,
+        }
+    }
+}
+
+/// The frames asked for: by option, else by scene file, else all.
+fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
+    let count = loaded.shot.frames;
+    let all = FrameRange { first: 1, last: count };
+    let range = match output.frames {
+        Some(request) => request.of_shot(count),
+        None => {
+            let range = loaded.frames.unwrap_or(all);
+            values::in_shot(range, count).map(|()| range)
+        }
+    };
+    range.map_err(Error::Usage)
+}
+
+/// `out/<scene name>/frame_####.png`.
+fn default_output(scene: &Path) -> String {
+    let name = scene.file_stem().unwrap_or_default().to_string_lossy();
+    // A # of the scene's own name would count as a digit of the frame number.
+    format!("out/{}/frame_####.png", name.replace('#', "_"))
+}

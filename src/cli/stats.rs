@@ -1,0 +1,98 @@
+//! The file of `--stats`: what a job took, as JSON.
+
+use super::machine::{Machine, peak_memory};
+use crate::cluster::Outcome;
+use crate::error::{Error, Result};
+use crate::output::atomic;
+use crate::output::manifest::Header;
+use crate::sequence::{FrameReport, Plan};
+use crate::stats::RayCounts;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What one rank tells of itself.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct RankStats {
+    /// Rendering threads.
+    pub threads: usize,
+    /// Seconds to read the scene.
+    pub load_seconds: f64,
+    /// Seconds to build the acceleration structure.
+    pub build_seconds: f64,
+    /// Seconds from the first frame to the last, waiting for other ranks included.
+    pub render_seconds: f64,
+    /// Memory of the acceleration structure.
+    pub intersector_bytes: u64,
+    /// Most memory held at once, where the system tells.
+    pub peak_memory_bytes: Option<u64>,
+}
+
+impl RankStats {
+    /// This rank's, with its memory as of now.
+    pub fn with_peak(self) -> Self {
+        Self { peak_memory_bytes: peak_memory(), ..self }
+    }
+}
+
+#[derive(Serialize)]
+struct Stats<'a> {
+    tweenray: &'a str,
+    scene: &'a str,
+    scene_hash: &'a str,
+    tracer: &'a str,
+    machine: Machine,
+    settings: &'a serde_json::Value,
+    complete: bool,
+    total_seconds: f64,
+    load_seconds: f64,
+    build_seconds: f64,
+    render_seconds: f64,
+    peak_memory_bytes: Option<u64>,
+    rays: RayCounts,
+    kept: &'a [u32],
+    frames: Vec<Frame<'a>>,
+    ranks: &'a [RankStats],
+}
+
+#[derive(Serialize)]
+struct Frame<'a> {
+    rank: u32,
+    #[serde(flatten)]
+    report: &'a FrameReport,
+}
+
+/// Writes the file at `path`, whole. `ranks` starts with rank 0, whose times the top level shows.
+pub fn write(
+    path: &Path,
+    header: &Header,
+    plan: &Plan,
+    outcome: &Outcome,
+    ranks: &[RankStats],
+    total_seconds: f64,
+) -> Result<()> {
+    let mut rays = RayCounts::default();
+    outcome.frames.iter().for_each(|(_, report)| rays += report.rays);
+    let slowest = |of: fn(&RankStats) -> f64| ranks.iter().map(of).fold(0.0, f64::max);
+    let stats = Stats {
+        tweenray: &header.tweenray,
+        scene: &header.scene,
+        scene_hash: &header.scene_hash,
+        tracer: &header.tracer,
+        machine: Machine::here(),
+        settings: &header.settings,
+        complete: outcome.unfinished == 0,
+        total_seconds,
+        load_seconds: slowest(|r| r.load_seconds),
+        build_seconds: slowest(|r| r.build_seconds),
+        render_seconds: slowest(|r| r.render_seconds),
+        peak_memory_bytes: ranks.iter().filter_map(|r| r.peak_memory_bytes).max(),
+        rays,
+        kept: &plan.kept,
+        frames: outcome.frames.iter().map(|(rank, report)| Frame { rank: *rank, report }).collect(),
+        ranks,
+    };
+    let mut text =
+        serde_json::to_vec_pretty(&stats).map_err(|e| Error::io("write", path, e.into()))?;
+    text.push(b'\n');
+    atomic::write(path, |w| w.write_all(&text)).map(drop)
+}

@@ -1,0 +1,158 @@
+//! Values of options as people type them: sizes, frame ranges, crops, choices, numbers in bounds.
+
+use crate::scene::{FrameRange, Rect};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::de::DeserializeOwned;
+
+/// Frames as asked for; an open end is filled in by the shot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameRequest {
+    first: Option<u32>,
+    last: Option<u32>,
+}
+
+impl FrameRequest {
+    /// The frames of a shot of `count` frames, or what is wrong with them.
+    pub fn of_shot(self, count: u32) -> Result<FrameRange, String> {
+        let range = FrameRange { first: self.first.unwrap_or(1), last: self.last.unwrap_or(count) };
+        in_shot(range, count).map(|()| range)
+    }
+}
+
+/// Whether `range` lies in a shot of `count` frames; else what is wrong.
+pub fn in_shot(range: FrameRange, count: u32) -> Result<(), String> {
+    if range.first >= 1 && range.first <= range.last && range.last <= count {
+        return Ok(());
+    }
+    Err(format!(
+        "frames {}..{} lie outside the shot, which has frames 1..{count}",
+        range.first, range.last
+    ))
+}
+
+/// `640x360`.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || "a size is written WIDTHxHEIGHT in pixels, as in 640x360".to_string();
+    let (w, h) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let edge = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
+    match (edge(w)?, edge(h)?) {
+        (0, _) | (_, 0) => Err("an image needs at least one pixel each way".into()),
+        size => Ok(size),
+    }
+}
+
+/// `7`, `1..16` (both included), `5..`, `..8`.
+pub fn frames(text: &str) -> Result<FrameRequest, String> {
+    let number = |text: &str| match text.trim().parse::<u32>() {
+        Ok(0) => Err("frames are counted from 1".to_string()),
+        Ok(n) => Ok(n),
+        Err(_) => Err("frames are written 7, 1..16 (both included) or 5..".to_string()),
+    };
+    let end = |text: &str| if text.is_empty() { Ok(None) } else { number(text).map(Some) };
+    let request = match text.split_once("..") {
+        None => {
+            let only = Some(number(text)?);
+            FrameRequest { first: only, last: only }
+        }
+        Some((first, last)) => FrameRequest { first: end(first)?, last: end(last)? },
+    };
+    match request {
+        FrameRequest { first: Some(a), last: Some(b) } if a > b => {
+            Err(format!("frame {a} comes after frame {b}"))
+        }
+        request => Ok(request),
+    }
+}
+
+/// `x0,y0,x1,y1`; the second corner is excluded.
+pub fn crop(text: &str) -> Result<Rect, String> {
+    let wrong = || {
+        "a crop is written x0,y0,x1,y1 in pixels from the upper left, x1 and y1 excluded"
+            .to_string()
+    };
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.map_err(|_| wrong())?[..] {
+        [x0, y0, x1, y1] if x0 < x1 && y0 < y1 => Ok(Rect { x0, y0, x1, y1 }),
+        [_, _, _, _] => Err("this crop holds no pixel: x0 < x1 and y0 < y1 must hold".into()),
+        _ => Err(wrong()),
+    }
+}
+
+/// A finite number of at least `least`.
+fn at_least(text: &str, least: f64, strictly: bool) -> Result<f64, String> {
+    let value: f64 = text.trim().parse().map_err(|_| "this is not a number".to_string())?;
+    let fits = value.is_finite() && if strictly { value > least } else { value >= least };
+    let bound = if strictly { "above" } else { "at least" };
+    if fits { Ok(value) } else { Err(format!("the value must be finite and {bound} {least}")) }
+}
+
+/// A finite positive f64.
+pub fn positive(text: &str) -> Result<f64, String> {
+    at_least(text, 0.0, true)
+}
+
+/// A finite positive f32.
+pub fn positive_f32(text: &str) -> Result<f32, String> {
+    match positive(text)? as f32 {
+        value if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("the value is too large or too small".into()),
+    }
+}
+
+/// A share in `[0, 1]`.
+pub fn share(text: &str) -> Result<f32, String> {
+    let value = at_least(text, 0.0, false)?;
+    if value <= 1.0 { Ok(value as f32) } else { Err("the value must be at most 1".into()) }
+}
+
+/// `on` or `off`.
+pub fn switch() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|text| text == "on")
+}
+
+/// One of `names`, each the name that serde knows the value of `T` by.
+pub fn choice<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: DeserializeOwned + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names)
+        .try_map(|name| serde_json::from_value::<T>(serde_json::Value::String(name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frame_ranges_include_both_ends_and_stay_in_the_shot() {
+        let range = |text: &str, count| frames(text)?.of_shot(count).map(|r| (r.first, r.last));
+        assert_eq!(range("7", 16), Ok((7, 7)));
+        assert_eq!(range("1..16", 16), Ok((1, 16)));
+        assert_eq!(range("5..", 16), Ok((5, 16)));
+        assert_eq!(range("..8", 16), Ok((1, 8)));
+        for (text, count) in [("0", 16), ("9..3", 16), ("1..17", 16), ("20..", 16), ("a", 16)] {
+            assert!(range(text, count).is_err(), "{text}");
+        }
+        assert!(frames("1-16").is_err() && frames("1...3").is_err() && frames("-1").is_err());
+    }
+
+    #[test]
+    fn sizes_and_crops_need_a_pixel() {
+        assert_eq!(size("640x360"), Ok((640, 360)));
+        for text in ["0x0", "640", "640x", "x", "-1x5", "99999999999x1", "640*360"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        assert_eq!(crop("1,2,3,4"), Ok(Rect { x0: 1, y0: 2, x1: 3, y1: 4 }));
+        for text in ["3,2,1,4", "1,2,3", "1,2,3,4,5", "a,b,c,d", "1,1,1,1"] {
+            assert!(crop(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_finite() {
+        for text in ["nan", "inf", "-1", "0", "1e99"] {
+            assert!(positive_f32(text).is_err(), "{text}");
+        }
+        assert!(share("1.5").is_err() && share("0").is_ok());
+    }
+}

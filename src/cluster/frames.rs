@@ -1,0 +1,129 @@
+//! The frames of a sequence, divided among the ranks.
+
+use super::World;
+use crate::error::Result;
+use crate::output::manifest::{Manifest, manifest_path, part_path};
+use crate::sequence::{self, FrameMaker, FrameReport, Plan, Target};
+use serde::{Deserialize, Serialize};
+use std::cell::Cell;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What became of a plan, known on rank 0.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    /// Every finished frame, by number, with the rank that rendered it.
+    pub frames: Vec<(u32, FrameReport)>,
+    /// Frames that the job did not get to.
+    pub unfinished: usize,
+}
+
+/// What ranks tell each other while they render.
+#[derive(Serialize, Deserialize)]
+enum Note {
+    /// A frame is finished.
+    Done(FrameReport),
+    /// Somebody was asked to stop.
+    Stop,
+}
+
+/// Renders `plan.render`: each rank a contiguous run of it, its rows in its own journal; rank 0
+/// joins the journals. `done` hears on rank 0 of every finished frame of any rank. A rank on which
+/// `stop` was set tells the others, which stop after the frame in flight. All ranks call it.
+///
+/// Errors are this rank's own; other ranks may still be at work, and [`World::abort`] ends them.
+pub fn render(
+    world: &World,
+    target: &Target,
+    plan: &Plan,
+    maker: &dyn FrameMaker,
+    stop: &AtomicBool,
+    done: &dyn Fn(&FrameReport),
+) -> Result<Outcome> {
+    let manifest = manifest_path(&target.pattern);
+    let journal = match world.rank() {
+        0 => manifest.clone(),
+        rank => part_path(&manifest, rank),
+    };
+    let mine = &plan.render[run_of(plan.render.len(), world.size(), world.rank())];
+    let mut finished = Vec::new();
+    let told = Cell::new(false);
+    let hear = || hear(world, stop, &told, done);
+    let mut after_frame = |report: &FrameReport| {
+        finished.push(report.clone());
+        if world.is_root() {
+            done(report);
+        } else {
+            world.post(0, &Note::Done(report.clone()))?;
+        }
+        hear()
+    };
+    sequence::render_frames(target, mine, &journal, maker, &mut after_frame)?;
+    if finished.len() < mine.len() && !told.get() {
+        let mut others = (0..world.size()).filter(|rank| *rank != world.rank());
+        others.try_for_each(|rank| world.post(rank, &Note::Stop))?;
+    }
+    world.settle(&mut || hear())?;
+    join(world, target, plan, &finished)
+}
+
+/// Takes in what other ranks said.
+fn hear(
+    world: &World,
+    stop: &AtomicBool,
+    told: &Cell<bool>,
+    done: &dyn Fn(&FrameReport),
+) -> Result<()> {
+    for note in world.notes()? {
+        match note {
+            Note::Done(report) => done(&report),
+            Note::Stop => {
+                told.set(true);
+                stop.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Joins journals and reports on rank 0.
+fn join(world: &World, target: &Target, plan: &Plan, mine: &[FrameReport]) -> Result<Outcome> {
+    let by_rank = world.gather(&mine.to_vec())?;
+    if !world.is_root() {
+        return Ok(Outcome::default());
+    }
+    if world.size() > 1 {
+        Manifest::merge_parts(&manifest_path(&target.pattern))?;
+    }
+    let ranks = by_rank.into_iter().enumerate();
+    let mut frames: Vec<(u32, FrameReport)> =
+        ranks.flat_map(|(rank, list)| list.into_iter().map(move |r| (rank as u32, r))).collect();
+    frames.sort_by_key(|(_, report)| report.frame);
+    Ok(Outcome { unfinished: plan.render.len() - frames.len(), frames })
+}
+
+/// The run of `count` frames that rank `rank` of `size` renders: contiguous, as even as can be.
+fn run_of(count: usize, size: u32, rank: u32) -> Range<usize> {
+    let cut = |rank: u32| (count as u64 * u64::from(rank) / u64::from(size)) as usize;
+    cut(rank)..cut(rank + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::run_of;
+
+    #[test]
+    fn runs_cover_every_frame_once_and_differ_by_one_at_most() {
+        for (count, size) in [(16, 1), (16, 3), (2, 8), (0, 4), (262_144, 4_096)] {
+            let runs: Vec<_> = (0..size).map(|rank| run_of(count, size, rank)).collect();
+            let mut next = 0;
+            for run in &runs {
+                assert_eq!(run.start, next);
+                next = run.end;
+            }
+            assert_eq!(next, count);
+            let lengths = || runs.iter().map(|r| r.len());
+            assert!(lengths().max() <= lengths().min().map(|least| least + 1));
+        }
+    }
+}

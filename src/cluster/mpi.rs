@@ -1,0 +1,164 @@
+//! Ranks over MPI: the only place of this room that is unsafe, and the only one that knows rsmpi.
+//!
+//! MPI is initialised as `Funneled`: every call comes from the main thread, except `MPI_Abort`
+//! from the hook of a thread that panics, since a panic must not leave the other ranks waiting
+//! (a rank that unwinds hangs the job in `MPI_Finalize`).
+#![allow(unsafe_code)]
+
+use crate::error::{Error, Result};
+use ::mpi::Threading;
+use ::mpi::environment::Universe;
+use ::mpi::ffi;
+use ::mpi::point_to_point::MatchedReceiveVec;
+use ::mpi::topology::SimpleCommunicator;
+use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source};
+use std::cell::RefCell;
+use std::mem::MaybeUninit;
+use std::time::Duration;
+
+/// How long a waiting rank sleeps between looks; Open MPI would spin on a core instead.
+const NAP: Duration = Duration::from_millis(5);
+/// Tag of notes.
+const NOTE: i32 = 1;
+/// Largest broadcast or gather in one call; MPI counts in `int`.
+const PIECE: usize = 1 << 30;
+
+/// MPI, initialised; finalised when dropped, on the main thread.
+pub struct Session {
+    outbox: RefCell<Vec<Posted>>,
+    world: SimpleCommunicator,
+    // Dropped last: it finalises MPI.
+    _universe: Universe,
+}
+
+/// A note on its way, with the memory that MPI still reads.
+struct Posted {
+    request: ffi::MPI_Request,
+    _bytes: Box<[u8]>,
+}
+
+impl Session {
+    /// Initialises MPI and makes every later panic of this process end the job.
+    pub fn start() -> Result<Self> {
+        let (universe, _) = ::mpi::initialize_with_threading(Threading::Funneled)
+            .ok_or_else(|| Error::Failed("MPI was already initialised".into()))?;
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            before(panic);
+            // SAFETY: MPI is initialised; `MPI_Abort` on the world communicator does not return,
+            // and MPI is not used by this process again.
+            unsafe { ffi::MPI_Abort(ffi::RSMPI_COMM_WORLD, 1) };
+        }));
+        let world = universe.world();
+        Ok(Self { outbox: RefCell::default(), world, _universe: universe })
+    }
+
+    pub fn rank(&self) -> u32 {
+        self.world.rank() as u32
+    }
+
+    pub fn size(&self) -> u32 {
+        self.world.size() as u32
+    }
+
+    /// Rank 0's `bytes`, on every rank.
+    pub fn broadcast(&self, mut bytes: Vec<u8>) -> Vec<u8> {
+        let root = self.world.process_at_rank(0);
+        let mut length = bytes.len() as u64;
+        root.broadcast_into(&mut length);
+        bytes.resize(length as usize, 0);
+        for piece in bytes.chunks_mut(PIECE) {
+            root.broadcast_into(piece);
+        }
+        bytes
+    }
+
+    /// Every rank's `bytes` on rank 0, nothing elsewhere.
+    pub fn gather(&self, bytes: &[u8]) -> Vec<Vec<u8>> {
+        if self.rank() != 0 {
+            let root = self.world.process_at_rank(0);
+            root.send_with_tag(&(bytes.len() as u64), NOTE + 1);
+            bytes.chunks(PIECE).for_each(|piece| root.send_with_tag(piece, NOTE + 1));
+            return Vec::new();
+        }
+        let mut all = vec![bytes.to_vec()];
+        for rank in 1..self.world.size() {
+            let from = self.world.process_at_rank(rank);
+            let (length, _) = from.receive_with_tag::<u64>(NOTE + 1);
+            let mut theirs = vec![0; length as usize];
+            for piece in theirs.chunks_mut(PIECE) {
+                from.receive_into_with_tag(piece, NOTE + 1);
+            }
+            all.push(theirs);
+        }
+        all
+    }
+
+    /// Starts sending a note and returns at once.
+    pub fn post(&self, to: u32, bytes: Vec<u8>) {
+        self.clear_outbox();
+        let bytes = bytes.into_boxed_slice();
+        let mut request = MaybeUninit::uninit();
+        // SAFETY: `MPI_Isend` reads `bytes` until the request completes; the heap memory is kept
+        // beside the request, is not moved or written, and is freed only in `clear_outbox`, after
+        // `MPI_Test` said that the request is complete. A note is far shorter than `int` can say.
+        let request = unsafe {
+            ffi::MPI_Isend(
+                bytes.as_ptr().cast(),
+                bytes.len() as i32,
+                ffi::RSMPI_UINT8_T,
+                to as i32,
+                NOTE,
+                self.world.as_raw(),
+                request.as_mut_ptr(),
+            );
+            request.assume_init()
+        };
+        self.outbox.borrow_mut().push(Posted { request, _bytes: bytes });
+    }
+
+    /// Notes that have arrived.
+    pub fn notes(&self) -> Vec<Vec<u8>> {
+        self.clear_outbox();
+        let any = self.world.any_process();
+        std::iter::from_fn(|| any.immediate_matched_probe_with_tag(NOTE))
+            .map(|arrived| arrived.matched_receive_vec().0)
+            .collect()
+    }
+
+    /// Waits, asleep, until every rank called this and every note of this rank is on its way.
+    pub fn settle(&self, meanwhile: &mut dyn FnMut() -> Result<()>) -> Result<()> {
+        while !self.clear_outbox() {
+            meanwhile()?;
+            std::thread::sleep(NAP);
+        }
+        let mut barrier = self.world.immediate_barrier();
+        while let Err(pending) = barrier.test() {
+            barrier = pending;
+            if let Err(error) = meanwhile() {
+                barrier.wait();
+                return Err(error);
+            }
+            std::thread::sleep(NAP);
+        }
+        Ok(())
+    }
+
+    /// Ends all ranks.
+    pub fn abort(&self, code: u8) {
+        self.world.abort(i32::from(code));
+    }
+
+    /// Frees the notes that were sent; true when none is left.
+    fn clear_outbox(&self) -> bool {
+        let mut outbox = self.outbox.borrow_mut();
+        outbox.retain_mut(|posted| {
+            let mut done = 0;
+            // SAFETY: the request comes from `MPI_Isend` and is active: completed ones are
+            // removed here, before anything could test them again.
+            unsafe { ffi::MPI_Test(&mut posted.request, &mut done, ffi::RSMPI_STATUS_IGNORE) };
+            done == 0
+        });
+        outbox.is_empty()
+    }
+}

@@ -1,0 +1,144 @@
+//! Packets of rays in Embree's own layout.
+
+use crate::math::Vec3;
+use crate::ray::{PrimRef, Ray};
+
+/// `RTCRayHitW`: W rays and their hits, structure of arrays. W is 1, 4, 8 or 16.
+#[repr(C, align(64))]
+#[derive(Debug, Clone)]
+pub struct Packet<const W: usize> {
+    org_x: [f32; W],
+    org_y: [f32; W],
+    org_z: [f32; W],
+    tnear: [f32; W],
+    dir_x: [f32; W],
+    dir_y: [f32; W],
+    dir_z: [f32; W],
+    time: [f32; W],
+    tfar: [f32; W],
+    mask: [u32; W],
+    id: [u32; W],
+    flags: [u32; W],
+    ng_x: [f32; W],
+    ng_y: [f32; W],
+    ng_z: [f32; W],
+    u: [f32; W],
+    v: [f32; W],
+    prim_id: [u32; W],
+    geom_id: [u32; W],
+    inst_id: [u32; W],
+    inst_prim_id: [u32; W],
+}
+
+const NO_GEOMETRY: u32 = u32::MAX;
+
+// RTCRayHit is 96 bytes for one ray: 21 words and padding to 16 bytes; RTCRay itself is 48.
+const _: () = {
+    assert!(size_of::<Packet<16>>() == size_of::<embree4_sys::RTCRayHit16>());
+    assert!(size_of::<Packet<8>>() >= size_of::<embree4_sys::RTCRayHit8>());
+    assert!(size_of::<Packet<4>>() >= size_of::<embree4_sys::RTCRayHit4>());
+    assert!(size_of::<Packet<1>>() >= size_of::<embree4_sys::RTCRayHit>());
+    assert!(size_of::<Ray>() == 72);
+};
+
+/// What Embree says of a hit, f32.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PacketHit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Weight of vertex 1.
+    pub u: f32,
+    /// Weight of vertex 2.
+    pub v: f32,
+    /// Unnormalised geometric normal; zero on spheres.
+    pub ng: Vec3,
+    /// What was hit.
+    pub prim: PrimRef,
+}
+
+/// What a query may assume and must do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueryFlags {
+    /// Neighbouring rays go similar ways.
+    pub coherent: bool,
+    /// Some ray excludes a primitive.
+    pub exclude: bool,
+}
+
+impl QueryFlags {
+    pub(super) fn bits(self) -> u32 {
+        u32::from(self.coherent) | u32::from(self.exclude) << 1
+    }
+}
+
+impl<const W: usize> Packet<W> {
+    /// A packet without rays.
+    pub fn new() -> Self {
+        Self {
+            org_x: [0.0; W],
+            org_y: [0.0; W],
+            org_z: [0.0; W],
+            tnear: [0.0; W],
+            dir_x: [0.0; W],
+            dir_y: [0.0; W],
+            dir_z: [0.0; W],
+            time: [0.0; W],
+            tfar: [0.0; W],
+            mask: [u32::MAX; W],
+            id: std::array::from_fn(|i| i as u32),
+            flags: [0; W],
+            ng_x: [0.0; W],
+            ng_y: [0.0; W],
+            ng_z: [0.0; W],
+            u: [0.0; W],
+            v: [0.0; W],
+            prim_id: [NO_GEOMETRY; W],
+            geom_id: [NO_GEOMETRY; W],
+            inst_id: [NO_GEOMETRY; W],
+            inst_prim_id: [NO_GEOMETRY; W],
+        }
+    }
+
+    /// Puts `ray`, rounded to f32, into `lane` and forgets the lane's hit.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, ray: &Ray) {
+        self.org_x[lane] = ray.org.x as f32;
+        self.org_y[lane] = ray.org.y as f32;
+        self.org_z[lane] = ray.org.z as f32;
+        self.dir_x[lane] = ray.dir.x as f32;
+        self.dir_y[lane] = ray.dir.y as f32;
+        self.dir_z[lane] = ray.dir.z as f32;
+        self.tnear[lane] = ray.tnear as f32;
+        self.tfar[lane] = ray.tfar as f32;
+        self.geom_id[lane] = NO_GEOMETRY;
+    }
+
+    /// The hit of `lane`, or `None`.
+    #[inline(always)]
+    pub fn hit(&self, lane: usize) -> Option<PacketHit> {
+        (self.geom_id[lane] != NO_GEOMETRY).then(|| PacketHit {
+            t: self.tfar[lane],
+            u: self.u[lane],
+            v: self.v[lane],
+            ng: Vec3::new(self.ng_x[lane], self.ng_y[lane], self.ng_z[lane]),
+            prim: PrimRef { geom_id: self.geom_id[lane], prim_id: self.prim_id[lane] },
+        })
+    }
+
+    /// Whether an occlusion query found something in `lane`.
+    #[inline(always)]
+    pub fn is_occluded(&self, lane: usize) -> bool {
+        self.tfar[lane] == f32::NEG_INFINITY
+    }
+
+    /// Panics where a valid lane has no f64 ray: callbacks would read past the slice.
+    pub(super) fn check_lanes(&self, valid: &[i32; W], rays: &[Ray]) {
+        assert!(rays.len() >= W || valid[rays.len()..].iter().all(|v| *v == 0));
+    }
+}
+
+impl<const W: usize> Default for Packet<W> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

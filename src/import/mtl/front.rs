@@ -1,0 +1,231 @@
+//! Checks an MTL file line by line and hands tobj a clean copy of it.
+
+use crate::error::{Diagnostic, Result};
+use crate::import::lines::{Line, Lines, Words, check_text, number, show};
+use crate::import::source::Fault;
+use crate::import::source::Notes;
+use std::fmt::Write;
+use std::path::Path;
+
+/// What tobj does not tell about a material.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Source {
+    /// Name, trimmed.
+    pub name: String,
+    /// Line of its `newmtl`.
+    pub line: usize,
+    /// `Tf`: share of light that passes, linear RGB.
+    pub filter: Option<[f64; 3]>,
+}
+
+/// The materials of a library, as its lines and as tobj read them.
+pub(super) fn read(
+    file: &Path,
+    bytes: &[u8],
+    warnings: &mut Vec<Diagnostic>,
+) -> Result<Vec<(Source, tobj::Material)>> {
+    let mut front = Front::default();
+    let mut lines = Lines::new(check_text(file, bytes)?, 1);
+    while let Some(line) = lines.next_line() {
+        front.line(line).map_err(|message| Fault::new(line.number, message).at(file))?;
+    }
+    warnings.extend(std::mem::take(&mut front.notes).into_warnings(file));
+    let (materials, _) = tobj::load_mtl_buf(&mut front.clean.as_bytes())
+        .map_err(|e| crate::error::Error::input(file, format!("tobj: {e}")))?;
+    Ok(front.sources.into_iter().zip(materials).collect())
+}
+
+#[derive(Default)]
+struct Front {
+    sources: Vec<Source>,
+    /// The text for tobj: one statement a line, names replaced by numbers (tobj trims them
+    /// otherwise than we do), only what [`super::meaning`] looks at.
+    clean: String,
+    notes: Notes,
+}
+
+impl Front {
+    fn line(&mut self, line: Line<'_>) -> std::result::Result<(), String> {
+        let mut words = line.words();
+        let Some(keyword) = words.next() else { return Ok(()) };
+        if keyword[0] == b'#' {
+            return Ok(());
+        }
+        if keyword == b"newmtl" {
+            return self.open(words, line.number);
+        }
+        let text = String::from_utf8_lossy(keyword).into_owned();
+        if self.sources.is_empty() {
+            return Err(format!("`{}` before the first `newmtl`", show(keyword)));
+        }
+        match text.as_str() {
+            "Kd" | "Ks" | "Ke" => self.colour(&text, words, f64::MAX),
+            "Ka" => colour(&text, words, f64::MAX).map(|_| ()),
+            "Tf" => self.filter(words),
+            "Ni" => self.number("Ni", words, 1e-3, 1e3),
+            "Ns" => number_in("Ns", words, f64::MIN, f64::MAX).map(|_| ()),
+            "d" => self.dissolve(words),
+            "Tr" => self.transparency(words),
+            "illum" => self.illum(words),
+            "map_Kd" => self.image(words, line.number),
+            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "map_d" | "map_bump" | "map_Bump"
+            | "bump" | "disp" | "decal" | "refl" | "norm" | "map_Tr" | "map_refl" | "map_Kn" => {
+                self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
+                Ok(())
+            }
+            _ => self.other(keyword, line.number),
+        }
+    }
+
+    fn open(&mut self, words: Words<'_>, line: usize) -> std::result::Result<(), String> {
+        let name = String::from_utf8_lossy(words.rest()).into_owned();
+        if name.is_empty() {
+            return Err("`newmtl` without a name".into());
+        }
+        self.put(format_args!("newmtl {}", self.sources.len()));
+        self.sources.push(Source { name, line, filter: None });
+        Ok(())
+    }
+
+    fn put(&mut self, statement: std::fmt::Arguments<'_>) {
+        // Writing to a String cannot fail.
+        let _ = writeln!(self.clean, "{statement}");
+    }
+
+    fn colour(
+        &mut self,
+        keyword: &str,
+        words: Words<'_>,
+        max: f64,
+    ) -> std::result::Result<(), String> {
+        let [r, g, b] = colour(keyword, words, max)?;
+        self.put(format_args!("{keyword} {r:e} {g:e} {b:e}"));
+        Ok(())
+    }
+
+    fn filter(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+        let filter = colour("Tf", words, 1.0)?;
+        if let Some(source) = self.sources.last_mut() {
+            source.filter = Some(filter);
+        }
+        Ok(())
+    }
+
+    fn number(
+        &mut self,
+        keyword: &str,
+        words: Words<'_>,
+        min: f64,
+        max: f64,
+    ) -> std::result::Result<(), String> {
+        let value = number_in(keyword, words, min, max)?;
+        self.put(format_args!("{keyword} {value:e}"));
+        Ok(())
+    }
+
+    fn dissolve(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+        let mut after = words;
+        let halo = after.next() == Some(b"-halo");
+        self.number("d", if halo { after } else { words }, 0.0, 1.0)
+    }
+
+    /// `Tr` is 1 − d; a `d` of the same material, whichever comes first, is the later word for
+    /// tobj only if it comes later, as in the file.
+    fn transparency(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+        let value = number_in("Tr", words, 0.0, 1.0)?;
+        self.put(format_args!("d {:e}", 1.0 - value));
+        Ok(())
+    }
+
+    fn illum(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+        let value = number_in("illum", words, 0.0, 10.0)?;
+        if value.fract() != 0.0 {
+            return Err(format!("`illum {value}`: a whole number from 0 to 10 is needed"));
+        }
+        self.put(format_args!("illum {value}"));
+        Ok(())
+    }
+
+    /// `map_Kd [options] file`. The file's name may hold blanks.
+    fn image(&mut self, mut words: Words<'_>, line: usize) -> std::result::Result<(), String> {
+        loop {
+            let mut ahead = words;
+            let arguments = match ahead.next() {
+                Some(b"-s" | b"-o" | b"-t") => 3,
+                Some(b"-mm") => 2,
+                Some(
+                    b"-blendu" | b"-blendv" | b"-cc" | b"-clamp" | b"-bm" | b"-boost" | b"-texres"
+                    | b"-imfchan" | b"-type" | b"-colorspace",
+                ) => 1,
+                _ => break,
+            };
+            let option = words.next().unwrap_or_default();
+            self.notes.add(&format!("texture option `{}` is ignored", show(option)), line);
+            for used in 0..arguments {
+                let mut ahead = words;
+                // The second and third number of -s, -o and -t may be left out.
+                let is_value = ahead.next().is_some_and(|w| arguments == 1 || number(w).is_ok());
+                if !is_value && used == 0 {
+                    return Err(format!("`map_Kd`: the option `{}` lacks a value", show(option)));
+                }
+                if is_value {
+                    words = ahead;
+                }
+            }
+        }
+        let name = String::from_utf8_lossy(words.rest()).into_owned();
+        if name.is_empty() {
+            return Err("`map_Kd` without a file name".into());
+        }
+        self.put(format_args!("map_Kd {name}"));
+        Ok(())
+    }
+
+    fn other(&mut self, keyword: &[u8], line: usize) -> std::result::Result<(), String> {
+        let word = |b: &u8| b.is_ascii_alphanumeric() || b"_-.".contains(b);
+        if keyword.len() > 32 || !keyword.iter().all(word) || !keyword[0].is_ascii_alphabetic() {
+            return Err(format!("`{}` is not a statement of an MTL file", show(keyword)));
+        }
+        self.notes.add(&format!("`{}` is ignored", show(keyword)), line);
+        Ok(())
+    }
+}
+
+/// One number (a grey) or three, not negative, at most `max`.
+fn colour(keyword: &str, mut words: Words<'_>, max: f64) -> std::result::Result<[f64; 3], String> {
+    let all = words;
+    let mut values = Vec::with_capacity(3);
+    while let Some(word) = words.value() {
+        if matches!(word, b"spectral" | b"xyz") {
+            return Err(format!("`{keyword} {}`: only RGB can be read", show(word)));
+        }
+        let value = number(word)?;
+        if !(0.0..=max.min(f64::from(f32::MAX))).contains(&value) {
+            return Err(format!("`{keyword}` holds {value}, which is no share of light"));
+        }
+        values.push(value);
+    }
+    match values[..] {
+        [grey] => Ok([grey; 3]),
+        [r, g, b] => Ok([r, g, b]),
+        _ => Err(format!("`{keyword}` takes three numbers, not `{}`", show(all.rest()))),
+    }
+}
+
+fn number_in(
+    keyword: &str,
+    mut words: Words<'_>,
+    min: f64,
+    max: f64,
+) -> std::result::Result<f64, String> {
+    let all = words;
+    let word = words.value().ok_or_else(|| format!("`{keyword}` without a number"))?;
+    if words.value().is_some() {
+        return Err(format!("`{keyword}` takes one number, not `{}`", show(all.rest())));
+    }
+    let value = number(word)?;
+    if !(min..=max).contains(&value) {
+        return Err(format!("`{keyword} {value}`: from {min} to {max} is possible"));
+    }
+    Ok(value)
+}

@@ -1,0 +1,79 @@
+//! What a material of an MTL file means to a Whitted renderer.
+//!
+//! | MTL | ours |
+//! |---|---|
+//! | `Kd`, `map_Kd` | diffuse reflectance, texture |
+//! | `Ke` | emission, both sides |
+//! | `illum` 3 or 5 with `Ks` | perfect mirror of reflectance `Ks` beside the diffuse part |
+//! | `illum` 6 or 7; 4 or 9 unless `d` is 1; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
+//! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
+
+use super::front::Source;
+use crate::import::model::DEFAULT_ALBEDO;
+use crate::math::{DVec3, Rgb};
+use crate::scene::{Glass, Material};
+
+/// Index of refraction of glass whose file has no `Ni`.
+const DEFAULT_IOR: f64 = 1.5;
+
+/// The material without its texture, and what the user should know about it.
+pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String>) {
+    let mut notes = Vec::new();
+    let mut out = Material::black(&source.name);
+    out.emission = mtl.emissive.map_or(Rgb::ZERO, rgb);
+    out.emits_back = true;
+    if is_glass(mtl, &mut notes) {
+        let tint = source.filter.map_or(Rgb::ONE, rgb);
+        let ior = mtl.optical_density.unwrap_or_else(|| {
+            notes.push(format!("glass without `Ni`: the index of refraction is {DEFAULT_IOR}"));
+            DEFAULT_IOR
+        });
+        out.glass = Some(Glass { ior, tint });
+        return (out, notes);
+    }
+    if matches!(mtl.illumination_model, Some(3 | 5)) {
+        out.mirror = mtl.specular.map_or(Rgb::ZERO, rgb);
+    }
+    let dark = out.mirror != Rgb::ZERO || out.emission != Rgb::ZERO;
+    out.diffuse = match mtl.diffuse {
+        Some(diffuse) => rgb(diffuse),
+        None if dark => Rgb::ZERO,
+        None => DEFAULT_ALBEDO,
+    };
+    let most = (out.diffuse + out.mirror).max_element();
+    if most > 1.0 {
+        out.diffuse /= most;
+        out.mirror /= most;
+        notes.push(format!("`Kd` and `Ks` reflect {most} of the light: scaled down to 1"));
+    }
+    (out, notes)
+}
+
+/// The factor on the texture: `Kd` where it is a colour. Writers that leave it out or black
+/// beside a texture mean the plain texture.
+pub(super) fn textured(mtl: &tobj::Material) -> Rgb {
+    match mtl.diffuse.map(rgb) {
+        Some(diffuse) if diffuse != Rgb::ZERO => diffuse.min(Rgb::ONE),
+        _ => Rgb::ONE,
+    }
+}
+
+fn is_glass(mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {
+    let clear = mtl.dissolve.is_some_and(|d| d < 1.0);
+    match mtl.illumination_model {
+        Some(6 | 7) => true,
+        // 3ds Max writes `illum 4` with `d 1` for what is plainly opaque.
+        Some(4 | 9) => clear || mtl.dissolve.is_none(),
+        _ if clear && mtl.optical_density.is_some() => true,
+        _ => {
+            if clear {
+                notes.push("transparent (`d`, `Tr`) without `Ni`: rendered opaque".into());
+            }
+            false
+        }
+    }
+}
+
+fn rgb(c: [f64; 3]) -> Rgb {
+    DVec3::from_array(c).as_vec3()
+}

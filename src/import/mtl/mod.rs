@@ -1,0 +1,114 @@
+//! Material libraries (MTL): `tobj` reads them behind [`front`], which checks every field first
+//! (tobj 4.0.5 panics on `Kd 0.1 0.2`, accepts NaN and names no line); [`meaning`] turns them
+//! into our materials.
+
+mod front;
+mod meaning;
+
+use super::model::Model;
+use super::obj::default_material;
+use super::source;
+use super::texture::{self, TextureCache};
+use crate::error::{Diagnostic, Result};
+use crate::scene::MaterialId;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// The materials that an OBJ file can name, read but not yet used.
+#[derive(Default)]
+pub(super) struct Libraries {
+    entries: HashMap<String, Entry>,
+    textures: TextureCache,
+    loaded: Vec<PathBuf>,
+}
+
+struct Entry {
+    library: PathBuf,
+    source: front::Source,
+    parsed: tobj::Material,
+}
+
+impl Libraries {
+    /// Reads what `mtllib NAMES` on `line` of `obj` asks for: one file, whose name may hold
+    /// blanks, or else several. A file that is missing is a warning.
+    ///
+    /// Errors: a library that can be read but holds nonsense, with its line.
+    pub fn load(&mut self, obj: &Path, line: usize, names: &str, model: &mut Model) -> Result<()> {
+        let whole = source::beside(obj, names);
+        let several = !whole.is_file() && names.split_whitespace().count() > 1;
+        let files: Vec<PathBuf> = if several {
+            names.split_whitespace().map(|name| source::beside(obj, name)).collect()
+        } else {
+            vec![whole]
+        };
+        for file in files {
+            if self.loaded.contains(&file) {
+                continue;
+            }
+            self.loaded.push(file.clone());
+            match source::read(&file) {
+                Ok(bytes) => self.parse(&file, &bytes, model)?,
+                Err(error) => model.warnings.push(
+                    Diagnostic::new(obj, format!("material library left out: {error}")).line(line),
+                ),
+            }
+        }
+        Ok(())
+    }
+
+    fn parse(&mut self, file: &Path, bytes: &[u8], model: &mut Model) -> Result<()> {
+        model.files.push(file.to_path_buf());
+        for (source, parsed) in front::read(file, bytes, &mut model.warnings)? {
+            let name = source.name.clone();
+            let entry = Entry { library: file.to_path_buf(), source, parsed };
+            if let Some(other) = self.entries.get(&name) {
+                let message = format!(
+                    "material `{name}` is defined again; {}:{} holds",
+                    other.library.display(),
+                    other.source.line
+                );
+                let place = Diagnostic::new(file, message).line(entry.source.line);
+                model.warnings.push(place);
+            } else {
+                self.entries.insert(name, entry);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the material that `usemtl NAME` on `line` of `obj` asks for to the model's world,
+    /// and its texture. An unknown name is a warning, and the default material.
+    pub fn material(
+        &mut self,
+        obj: &Path,
+        line: usize,
+        name: &str,
+        model: &mut Model,
+    ) -> Result<MaterialId> {
+        let Some(entry) = self.entries.get(name) else {
+            let message = format!("no material `{name}`: plain grey in its place");
+            model.warnings.push(Diagnostic::new(obj, message).line(line));
+            return Ok(default_material(model));
+        };
+        let place = |message: String| {
+            Diagnostic::new(&entry.library, format!("material `{name}`: {message}"))
+                .line(entry.source.line)
+        };
+        let (mut material, notes) = meaning::of(&entry.source, &entry.parsed);
+        model.warnings.extend(notes.into_iter().map(place));
+        if let Some(image) = &entry.parsed.diffuse_texture {
+            let file = source::beside(&entry.library, image);
+            match texture::load_cached(&file, &mut self.textures, model) {
+                Ok(id) => {
+                    material.texture = Some(id);
+                    material.diffuse = meaning::textured(&entry.parsed);
+                }
+                Err(error) => {
+                    model.warnings.push(place(format!("texture left out: {error}")));
+                }
+            }
+        }
+        model.world.materials.push(material);
+        Ok(model.world.materials.len() as MaterialId - 1)
+    }
+}

@@ -1,0 +1,254 @@
+//! From checked chunks to one mesh per material.
+
+use super::default_material;
+use super::face::{Faces, MISSING};
+use super::parse::Part;
+use crate::error::{Diagnostic, Error, Result};
+use crate::import::model::Model;
+use crate::import::{mtl, polygon, tidy};
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::scene::{Corners, WorldMesh};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::ops::Range;
+use std::path::Path;
+
+/// The file's values, whole.
+#[derive(Default)]
+struct Values {
+    positions: Vec<DVec3>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+}
+
+/// Triangles as indices into [`Values`]; `vt` and `vn` are as long as `v`, or empty.
+#[derive(Default)]
+struct Triangles {
+    v: Vec<[u32; 3]>,
+    vt: Vec<[u32; 3]>,
+    vn: Vec<[u32; 3]>,
+}
+
+/// Faces `faces` of a part have the group's material.
+struct Segment {
+    faces: Range<usize>,
+    group: usize,
+}
+
+/// Materials in order of use; `None` is the default.
+#[derive(Default)]
+struct Groups {
+    names: Vec<Option<(usize, String)>>,
+    by_name: HashMap<Option<String>, usize>,
+}
+
+/// Adds the meshes and their materials to `model`.
+pub(super) fn assemble(
+    path: &Path,
+    mut parts: Vec<Part>,
+    libraries: &mut mtl::Libraries,
+    model: &mut Model,
+) -> Result<()> {
+    let mut groups = Groups::default();
+    let segments = groups.segments(&parts);
+    let values = take_values(&mut parts);
+    let pieces: Vec<Vec<(usize, Triangles)>> = parts
+        .into_par_iter()
+        .zip(segments)
+        .map(|(part, segments)| triangulate(part, segments, &values))
+        .collect::<std::result::Result<_, _>>()
+        .map_err(|message| Error::input(path, message))?;
+    let triangles = collect(groups.names.len(), pieces, &values);
+
+    let mut dropped = 0;
+    let mut meshes = Builder::new(values, triangles.len());
+    for (triangles, name) in triangles.into_iter().zip(groups.names) {
+        let Some(mut mesh) = meshes.build(triangles, &mut dropped) else { continue };
+        mesh.material = match &name {
+            Some((line, name)) => libraries.material(path, *line, name, model)?,
+            None => default_material(model),
+        };
+        mesh.name = match name {
+            Some((_, name)) => name,
+            None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        };
+        model.world.meshes.push(mesh);
+    }
+    model.warnings.extend(tidy::warning(path, dropped));
+    if model.world.meshes.is_empty() {
+        model.warnings.push(Diagnostic::new(path, "no triangle is left: nothing will be seen"));
+    }
+    Ok(())
+}
+
+impl Groups {
+    fn id(&mut self, name: Option<(usize, String)>) -> usize {
+        let key = name.as_ref().map(|(_, name)| name.clone());
+        *self.by_name.entry(key).or_insert_with(|| {
+            self.names.push(name);
+            self.names.len() - 1
+        })
+    }
+
+    /// What each part's faces are made of; a material holds on across parts.
+    fn segments(&mut self, parts: &[Part]) -> Vec<Vec<Segment>> {
+        let mut current = None;
+        let mut all = Vec::with_capacity(parts.len());
+        for part in parts {
+            let mut segments = Vec::new();
+            let mut from = 0;
+            let faces = part.faces.ends.len();
+            let last = std::iter::once((faces, None));
+            let changes = part.materials.iter().map(|(at, line, name)| (*at, Some((*line, name))));
+            for (at, next) in changes.chain(last) {
+                if at > from {
+                    segments.push(Segment { faces: from..at, group: self.id(current.clone()) });
+                    from = at;
+                }
+                if let Some((line, name)) = next {
+                    current = (!name.is_empty()).then(|| (line, name.clone()));
+                }
+            }
+            all.push(segments);
+        }
+        all
+    }
+}
+
+/// Joins the parts' values; where corners lack an attribute that others have, a last value
+/// stands for it: a zero normal means flat there.
+fn take_values(parts: &mut [Part]) -> Values {
+    let mut values = Values::default();
+    for part in &mut *parts {
+        append(&mut values.positions, &mut part.positions);
+        append(&mut values.uvs, &mut part.uvs);
+        append(&mut values.normals, &mut part.normals);
+    }
+    values.uvs.push(Vec2::ZERO);
+    values.normals.push(Vec3::ZERO);
+    values
+}
+
+/// Moves `from` to the end of `to`, without a copy where `to` is empty.
+fn append<T>(to: &mut Vec<T>, from: &mut Vec<T>) {
+    if to.is_empty() {
+        std::mem::swap(to, from);
+    } else {
+        to.append(from);
+    }
+    from.shrink_to_fit();
+}
+
+fn triangulate(
+    part: Part,
+    segments: Vec<Segment>,
+    values: &Values,
+) -> std::result::Result<Vec<(usize, Triangles)>, String> {
+    let (mut local, mut corners) = (Vec::new(), Vec::new());
+    let mut pieces: Vec<(usize, Triangles)> = Vec::with_capacity(segments.len());
+    for segment in segments {
+        let mut out = Triangles::default();
+        for face in segment.faces {
+            let start = if face == 0 { 0 } else { part.faces.ends[face - 1] as usize };
+            let end = part.faces.ends[face] as usize;
+            local.clear();
+            if end - start == 3 {
+                local.push([0, 1, 2]);
+            } else {
+                corners.clear();
+                corners
+                    .extend(part.faces.v[start..end].iter().map(|v| values.positions[*v as usize]));
+                polygon::triangulate(&corners, &mut local)?;
+            }
+            out.extend(&part.faces, start, &local, values);
+        }
+        pieces.push((segment.group, out));
+    }
+    Ok(pieces)
+}
+
+impl Triangles {
+    fn extend(&mut self, faces: &Faces, start: usize, local: &[[u32; 3]], values: &Values) {
+        let pick = |list: &[u32], missing: u32, t: &[u32; 3]| {
+            t.map(|i| match list[start + i as usize] {
+                MISSING => missing,
+                index => index,
+            })
+        };
+        self.v.extend(local.iter().map(|t| pick(&faces.v, 0, t)));
+        if !faces.vt.is_empty() {
+            let missing = values.uvs.len() as u32 - 1;
+            self.vt.extend(local.iter().map(|t| pick(&faces.vt, missing, t)));
+        }
+        if !faces.vn.is_empty() {
+            let missing = values.normals.len() as u32 - 1;
+            self.vn.extend(local.iter().map(|t| pick(&faces.vn, missing, t)));
+        }
+    }
+
+    fn append(&mut self, mut more: Self, values: &Values) {
+        let lists = [
+            (&mut self.vt, &mut more.vt, values.uvs.len() as u32 - 1),
+            (&mut self.vn, &mut more.vn, values.normals.len() as u32 - 1),
+        ];
+        for (list, more_list, missing) in lists {
+            if !list.is_empty() || !more_list.is_empty() {
+                list.resize(self.v.len(), [missing; 3]);
+                more_list.resize(more.v.len(), [missing; 3]);
+                append(list, more_list);
+            }
+        }
+        append(&mut self.v, &mut more.v);
+    }
+}
+
+fn collect(groups: usize, pieces: Vec<Vec<(usize, Triangles)>>, values: &Values) -> Vec<Triangles> {
+    let mut all: Vec<Triangles> = (0..groups).map(|_| Triangles::default()).collect();
+    for (group, piece) in pieces.into_iter().flatten() {
+        all[group].append(piece, values);
+    }
+    all
+}
+
+/// Makes meshes that hold only the values that they use.
+struct Builder {
+    values: Values,
+    /// With one group only, the values are its own: no copy.
+    only_one: bool,
+    scratch: Vec<u32>,
+}
+
+impl Builder {
+    fn new(values: Values, groups: usize) -> Self {
+        Self { values, only_one: groups == 1, scratch: Vec::new() }
+    }
+
+    fn build(&mut self, triangles: Triangles, dropped: &mut usize) -> Option<WorldMesh> {
+        let Triangles { mut v, vt, vn } = triangles;
+        let mut vt = (!vt.is_empty()).then_some(vt);
+        let mut vn = (!vn.is_empty()).then_some(vn);
+        *dropped += tidy::drop_degenerate(&self.values.positions, &mut v, &mut [&mut vt, &mut vn]);
+        if v.is_empty() {
+            return None;
+        }
+        let Self { values, only_one, scratch } = self;
+        let positions = tidy::compact(&mut values.positions, &mut v, *only_one, scratch);
+        let attribute = |corners: Vec<[u32; 3]>| (corners != v).then_some(corners);
+        let uvs = vt.and_then(|mut vt| {
+            let missing = values.uvs.len() as u32 - 1;
+            vt.iter().flatten().any(|i| *i != missing).then(|| {
+                let values = tidy::compact(&mut values.uvs, &mut vt, *only_one, scratch);
+                Corners { values, corners: attribute(vt) }
+            })
+        });
+        let normals = vn.and_then(|mut vn| {
+            let missing = values.normals.len() as u32 - 1;
+            vn.iter().flatten().any(|i| *i != missing).then(|| {
+                let values = tidy::compact(&mut values.normals, &mut vn, *only_one, scratch);
+                Corners { values, corners: attribute(vn) }
+            })
+        });
+        let name = String::new();
+        Some(WorldMesh { name, positions, triangles: v, normals, uvs, material: 0 })
+    }
+}

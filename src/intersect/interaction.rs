@@ -1,0 +1,127 @@
+//! From a [`Hit`] to a surface point, and from there to new rays.
+
+use super::{Hit, PrimRef, Ray};
+use crate::math::{DVec3, Vec2};
+use crate::scene::{Mesh, Scene, Surface};
+
+/// A hit expanded, scene space, f64.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceInteraction {
+    /// The point, from the triangle's corners and weights (not from `org + t·dir`, which is worse).
+    pub p: DVec3,
+    /// Unit geometric normal on the outside (counter-clockwise side).
+    pub ng: DVec3,
+    /// Unit shading normal, on the same side as `ng`.
+    pub ns: DVec3,
+    /// Texture coordinates; zero without.
+    pub uv: Vec2,
+    /// What it is made of.
+    pub surface: Surface,
+    /// What was hit.
+    pub prim: PrimRef,
+    /// How far along `ng` a ray must start so that rounding cannot put it on the wrong side.
+    pub offset: f64,
+}
+
+/// Half an ulp at 1 in f32: the relative error of rounding a coordinate for Embree.
+const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
+
+impl SurfaceInteraction {
+    /// Expands `hit`; one function for all intersectors.
+    pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
+        match scene.meshes.get(hit.prim.geom_id as usize) {
+            Some(mesh) => on_triangle(mesh, hit),
+            None => on_sphere(scene, ray, hit),
+        }
+    }
+
+    /// Whether `dir` points to the outside of the surface.
+    pub fn is_outside(&self, dir: DVec3) -> bool {
+        dir.dot(self.ng) > 0.0
+    }
+
+    /// A ray from here along `dir`, on the side of the surface that `dir` points to.
+    pub fn spawn(&self, dir: DVec3, offset: bool) -> Ray {
+        let org = if offset { self.start(dir) } else { self.p };
+        let exclude = if offset { self.prim } else { PrimRef::NONE };
+        Ray { exclude, ..Ray::new(org, dir) }
+    }
+
+    /// A ray from here that ends at `target`, a point of a surface with unit normal `normal`:
+    /// it stops short of that surface by its rounding-error bound. `t` runs from 0 to 1.
+    pub fn spawn_to(&self, target: DVec3, normal: DVec3, offset: bool) -> Ray {
+        if !offset {
+            return Ray { tfar: 1.0, ..Ray::new(self.p, target - self.p) };
+        }
+        let org = self.start(target - self.p);
+        // Embree sees origin and direction rounded, so the end moves by the error of both.
+        let bound = 4.0 * ROUNDING * (org.abs().max(target.abs())).dot(DVec3::ONE);
+        let facing = if normal.dot(org - target) >= 0.0 { normal } else { -normal };
+        let end = target + facing * bound;
+        Ray { exclude: self.prim, tfar: 1.0, ..Ray::new(org, end - org) }
+    }
+
+    fn start(&self, dir: DVec3) -> DVec3 {
+        self.p + self.ng * if self.is_outside(dir) { self.offset } else { -self.offset }
+    }
+}
+
+fn on_triangle(mesh: &Mesh, hit: &Hit) -> SurfaceInteraction {
+    let prim = hit.prim.prim_id as usize;
+    let [a, b, c] = mesh.corners(prim);
+    let (e1, e2) = (b - a, c - a);
+    let p = a + e1 * hit.u + e2 * hit.v;
+    let ng = unit_normal(e1, e2);
+    let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+    let triangle = mesh.triangles[prim];
+    let ns = match &mesh.normals {
+        Some(normals) => {
+            let [na, nb, nc] = normals.get(prim, triangle).map(|n| n.as_dvec3());
+            let sum = na * weights[0] + nb * weights[1] + nc * weights[2];
+            on_side_of(sum.try_normalize().unwrap_or(ng), ng)
+        }
+        None => ng,
+    };
+    let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
+        let [ta, tb, tc] = uvs.get(prim, triangle);
+        ta * weights[0] as f32 + tb * weights[1] as f32 + tc * weights[2] as f32
+    });
+    // Embree rounds the origin (its error scales with the coordinates) and then works with
+    // differences to the corners of this triangle and its neighbours (scales with the edges).
+    let size = e1.abs().max(e2.abs()).max_element();
+    let offset = ROUNDING * (2.0 * p.abs().dot(ng.abs()) + 2.0 * size);
+    SurfaceInteraction { p, ng, ns, uv, surface: mesh.surface, prim: hit.prim, offset }
+}
+
+fn on_sphere(scene: &Scene, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
+    let sphere = &scene.spheres[hit.prim.prim_id as usize];
+    let from_centre = ray.at(hit.t) - sphere.centre;
+    let ng = from_centre.normalize();
+    let p = sphere.centre + ng * sphere.radius;
+    let offset = 2.0 * ROUNDING * p.abs().dot(ng.abs());
+    SurfaceInteraction {
+        p,
+        ng,
+        ns: ng,
+        uv: Vec2::ZERO,
+        surface: sphere.surface,
+        prim: hit.prim,
+        offset,
+    }
+}
+
+/// Unit normal of a triangle with edges `e1`, `e2` of any size.
+fn unit_normal(e1: DVec3, e2: DVec3) -> DVec3 {
+    let n = e1.cross(e2);
+    let largest = n.abs().max_element();
+    if largest > 1e-290 {
+        return (n / largest).normalize();
+    }
+    // Edges so short that their product underflows: scale them first.
+    let scale = 1.0 / e1.abs().max(e2.abs()).max_element();
+    (e1 * scale).cross(e2 * scale).try_normalize().unwrap_or(DVec3::Z)
+}
+
+fn on_side_of(n: DVec3, reference: DVec3) -> DVec3 {
+    if n.dot(reference) < 0.0 { -n } else { n }
+}

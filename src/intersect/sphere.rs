@@ -1,0 +1,60 @@
+//! The f64 ray–sphere test, the same in both intersectors (`ffi/shim.c` mirrors it for Embree).
+
+use super::Ray;
+use crate::math::DVec3;
+
+/// The first root in `[tnear, tfar]`, or `None`.
+///
+/// The distance from the centre to the line is taken from the point of the line nearest the
+/// centre, not from `b² − ac`, which cancels for far spheres (Haines et al., 2019). A ray that
+/// leaves this sphere (`leaving`) starts on it: its near root is that start and does not count.
+pub(super) fn first_root(ray: &Ray, centre: DVec3, radius: f64, leaving: bool) -> Option<f64> {
+    let a = ray.dir.length_squared();
+    let to_centre = centre - ray.org;
+    let middle = to_centre.dot(ray.dir) / a;
+    let offset = to_centre - ray.dir * middle;
+    let inside = radius * radius - offset.length_squared();
+    if inside < 0.0 || !middle.is_finite() {
+        return None;
+    }
+    let half_chord = (inside / a).sqrt();
+    let in_range = |t: f64| (ray.tnear..=ray.tfar).contains(&t);
+    let (near, far) = (middle - half_chord, middle + half_chord);
+    if leaving {
+        // The start is whichever root is nearer to zero; only the other one is a hit.
+        let other = if near.abs() > far.abs() { near } else { far };
+        return (other > 0.0 && in_range(other)).then_some(other);
+    }
+    [near, far].into_iter().find(|t| in_range(*t))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_entry_from_outside_and_exit_from_inside() {
+        let at = |x: f64| Ray::new(DVec3::new(x, 0.0, 0.0), DVec3::X);
+        assert_eq!(first_root(&at(-3.0), DVec3::ZERO, 1.0, false), Some(2.0));
+        assert_eq!(first_root(&at(0.0), DVec3::ZERO, 1.0, false), Some(1.0));
+        assert_eq!(first_root(&at(3.0), DVec3::ZERO, 1.0, false), None);
+    }
+
+    #[test]
+    fn a_ray_that_leaves_sees_only_the_far_side() {
+        let inward = Ray::new(DVec3::NEG_X, DVec3::X);
+        assert_eq!(first_root(&inward, DVec3::ZERO, 1.0, true), Some(2.0));
+        let outward = Ray::new(DVec3::X, DVec3::X);
+        assert_eq!(first_root(&outward, DVec3::ZERO, 1.0, true), None);
+    }
+
+    #[test]
+    fn a_far_sphere_keeps_its_silhouette() {
+        // Distance 1e7 radii: b² − ac would lose the radius altogether.
+        let far = DVec3::new(0.0, 0.0, 1e7);
+        for (x, hit) in [(0.999_999, true), (1.000_001, false)] {
+            let ray = Ray::new(DVec3::new(x, 0.0, 0.0), DVec3::Z);
+            assert_eq!(first_root(&ray, far, 1.0, false).is_some(), hit);
+        }
+    }
+}

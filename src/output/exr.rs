@@ -1,0 +1,246 @@
+//! OpenEXR: any number of named channels of one size, in one part of scanlines, ZIP-compressed in
+//! blocks of 16 rows. (Multi-part and tiled files break viewers.)
+//!
+//! A film's channels are `R G B`; with AOVs also `Z` (distance along the view axis, infinity
+//! where nothing is hit), `P.X P.Y P.Z` (position), `N.X N.Y N.Z` (normal), `albedo.R albedo.G
+//! albedo.B`, all f32, and `mesh_id` (u32, 0 where nothing is hit). World units throughout. A
+//! later AOV is another [`Channel`] in the list.
+//!
+//! The files hold no attribute that the crate `exr` keeps in a hash map, whose order differs from
+//! run to run: the same film is the same bytes.
+
+use super::format::SOFTWARE;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::math::Vec3;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, LayerAttributes,
+    LineOrder, ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+};
+use std::io::{BufRead, Cursor, Seek};
+use std::path::Path;
+
+/// One channel of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// `R`, or with a layer's name before a dot, `albedo.R`.
+    pub name: String,
+    /// The pixels, row by row from the top.
+    pub samples: Samples,
+}
+
+/// A channel's pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Samples {
+    /// Numbers. Half floats of other programs' files are read as these.
+    F32(Vec<f32>),
+    /// Identifiers.
+    U32(Vec<u32>),
+}
+
+impl Samples {
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::U32(v) => v.len(),
+        }
+    }
+
+    /// True without a pixel.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channels {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The channels, sorted by name.
+    pub list: Vec<Channel>,
+}
+
+impl Channels {
+    /// The samples of the f32 channel `name`.
+    pub fn f32(&self, name: &str) -> Option<&[f32]> {
+        self.list.iter().find(|c| c.name == name).and_then(|c| match &c.samples {
+            Samples::F32(v) => Some(v.as_slice()),
+            Samples::U32(_) => None,
+        })
+    }
+}
+
+/// The film's channels, its AOVs among them if it has them.
+pub fn channels_of(film: &Film) -> Vec<Channel> {
+    let mut channels = Vec::new();
+    push_vectors(&mut channels, ["R", "G", "B"], &film.rgb);
+    if let Some(g) = &film.gbuffer {
+        channels.push(Channel { name: "Z".into(), samples: Samples::F32(g.depth.clone()) });
+        push_vectors(&mut channels, ["P.X", "P.Y", "P.Z"], &g.position);
+        push_vectors(&mut channels, ["N.X", "N.Y", "N.Z"], &g.normal);
+        push_vectors(&mut channels, ["albedo.R", "albedo.G", "albedo.B"], &g.albedo);
+        let ids = Samples::U32(g.mesh_id.clone());
+        channels.push(Channel { name: "mesh_id".into(), samples: ids });
+    }
+    channels
+}
+
+/// Appends the three components of `vectors` as channels.
+pub fn push_vectors(channels: &mut Vec<Channel>, names: [&str; 3], vectors: &[Vec3]) {
+    for (i, name) in names.into_iter().enumerate() {
+        let samples = Samples::F32(vectors.iter().map(|v| v[i]).collect());
+        channels.push(Channel { name: name.into(), samples });
+    }
+}
+
+/// The bytes of a file of these channels. `comment` is told in the metadata.
+///
+/// # Errors
+/// [`Error::Usage`] when a channel has not `width · height` samples; [`Error::Failed`] when the
+/// format cannot hold them (no channel, two of one name).
+pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> Result<Vec<u8>> {
+    let pixels = width as usize * height as usize;
+    if let Some(c) = channels.iter().find(|c| c.samples.len() != pixels) {
+        let (name, n) = (&c.name, c.samples.len());
+        return Err(Error::Usage(format!(
+            "channel {name} has {n} samples, an image of {width}x{height} needs {pixels}"
+        )));
+    }
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let attributes = LayerAttributes {
+        software_name: Some(Text::from(SOFTWARE)),
+        comments: (!comment.is_empty()).then(|| Text::new_or_none(comment)).flatten(),
+        ..LayerAttributes::default()
+    };
+    let list = AnyChannels::sort(channels.iter().map(to_exr).collect());
+    let size = Vec2(width as usize, height as usize);
+    let layer = exr::image::Layer::new(size, attributes, encoding, list);
+    let mut bytes = Cursor::new(Vec::new());
+    let image = exr::image::Image::from_layer(layer);
+    let written = image.write().non_parallel().to_buffered(&mut bytes);
+    written.map_err(|e| Error::Failed(format!("cannot encode exr: {e}")))?;
+    Ok(bytes.into_inner())
+}
+
+fn to_exr(channel: &Channel) -> AnyChannel<FlatSamples> {
+    let samples = match &channel.samples {
+        Samples::F32(v) => FlatSamples::F32(v.clone()),
+        Samples::U32(v) => FlatSamples::U32(v.clone()),
+    };
+    AnyChannel::new(channel.name.as_str(), samples)
+}
+
+/// Reads the first part of a file, from `source`; `path` is for messages. Tiled files, half floats
+/// and every compression that the crate `exr` knows are read; of several resolutions the full one.
+///
+/// # Errors
+/// [`Error::Input`] when the bytes are no exr file, hold deep or subsampled data, or would take
+/// more than `limit` bytes of memory.
+pub fn decode(path: &Path, source: impl BufRead + Seek, limit: u64) -> Result<Channels> {
+    let refuse = |e: exr::error::Error| Error::input(path, format!("not a readable exr file: {e}"));
+    let chunks = exr::block::read(source, false).map_err(refuse)?;
+    for header in chunks.headers() {
+        let pixels = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
+        let needed = pixels.saturating_mul(header.channels.list.len() as u64 * 4);
+        super::read::check_memory(path, needed, limit)?;
+        if header.channels.list.iter().any(|c| c.sampling != Vec2(1, 1)) {
+            return Err(Error::input(path, "subsampled exr channels are not supported"));
+        }
+    }
+    let read = exr::image::read::read().no_deep_data().largest_resolution_level();
+    let read = read.all_channels().first_valid_layer().all_attributes().non_parallel();
+    let layer = read.from_chunks(chunks).map_err(refuse)?.layer_data;
+    let from_exr = |channel: AnyChannel<FlatSamples>| Channel {
+        name: channel.name.to_string(),
+        samples: match channel.sample_data {
+            FlatSamples::F16(v) => Samples::F32(v.into_iter().map(|h| h.to_f32()).collect()),
+            FlatSamples::F32(v) => Samples::F32(v),
+            FlatSamples::U32(v) => Samples::U32(v),
+        },
+    };
+    let list = layer.channel_data.list.into_iter().map(from_exr).collect();
+    Ok(Channels { width: layer.size.0 as u32, height: layer.size.1 as u32, list })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{GBuffer, GPixel};
+    use crate::math::Rgb;
+
+    const LIMIT: u64 = 1 << 28;
+
+    fn film() -> Film {
+        let mut film = Film::new(35, 19, true);
+        let mut gbuffer = GBuffer::new(film.rgb.len());
+        for i in 0..film.rgb.len() {
+            let x = i as f32;
+            film.rgb[i] = Rgb::new(x / 7.0, 1e-20 * x, 3e30);
+            if i % 3 > 0 {
+                let normal = Vec3::new(0.0, 0.6, -0.8);
+                let position = Vec3::new(x, -x / 3.0, 1e6 + x);
+                let albedo = Rgb::splat(x / 1000.0);
+                let mesh_id = 16_777_217 + i as u32;
+                gbuffer.set(i, &GPixel { depth: x / 3.0, position, normal, albedo, mesh_id });
+            }
+        }
+        film.gbuffer = Some(gbuffer);
+        film
+    }
+
+    fn sorted(mut channels: Vec<Channel>) -> Vec<Channel> {
+        channels.sort_by(|a, b| a.name.cmp(&b.name));
+        channels
+    }
+
+    #[test]
+    fn every_channel_comes_back_bit_for_bit() {
+        let channels = channels_of(&film());
+        assert_eq!(channels.len(), 3 + 1 + 3 + 3 + 3 + 1);
+        let bytes = encode(35, 19, &channels, "spp 4").expect("encoded");
+        let back = decode(Path::new("x.exr"), Cursor::new(&bytes), LIMIT).expect("decoded");
+        assert_eq!((back.width, back.height), (35, 19));
+        assert_eq!(back.list, sorted(channels));
+        assert_eq!(back.f32("Z").map(|z| z[0]), Some(f32::INFINITY));
+        assert_eq!(back.f32("mesh_id"), None);
+    }
+
+    #[test]
+    fn one_part_of_scanlines() {
+        let bytes = encode(35, 19, &channels_of(&film()), "a comment").expect("encoded");
+        let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(&bytes), true);
+        let meta = meta.expect("pedantically valid");
+        assert_eq!(meta.headers.len(), 1);
+        assert!(!meta.requirements.has_multiple_layers && !meta.requirements.has_deep_data);
+        let header = &meta.headers[0];
+        assert_eq!(header.compression, Compression::ZIP16);
+        assert!(!header.blocks.has_tiles());
+        assert_eq!(header.own_attributes.comments, Some(Text::from("a comment")));
+        assert_eq!(header.own_attributes.software_name, Some(Text::from(SOFTWARE)));
+    }
+
+    #[test]
+    fn wrong_channels_are_errors() {
+        let channel =
+            |name: &str, n| Channel { name: name.into(), samples: Samples::F32(vec![0.0; n]) };
+        assert!(matches!(encode(2, 2, &[channel("R", 3)], ""), Err(Error::Usage(_))));
+        let twice = [channel("R", 4), channel("R", 4)];
+        assert!(matches!(encode(2, 2, &twice, ""), Err(Error::Failed(_))));
+        assert!(matches!(encode(2, 2, &[], ""), Err(Error::Failed(_))));
+    }
+
+    #[test]
+    fn too_large_for_the_limit() {
+        let bytes = encode(35, 19, &channels_of(&film()), "").expect("encoded");
+        let error = decode(Path::new("x.exr"), Cursor::new(&bytes), 35 * 19 * 14 * 4 - 1);
+        assert!(matches!(error, Err(Error::Input(_))));
+    }
+}

@@ -1,0 +1,114 @@
+//! What a sequence shows, as one hash: the resolved world and shot, not the files they came from.
+//!
+//! So a comment, a renamed file or a setting that moves between scene file and command line keeps
+//! the frames, while a vertex, a light or a key pose that changes does not.
+
+use crate::scene::{Corners, Shot, Texture, World, WorldMesh};
+use std::fmt::Debug;
+
+/// BLAKE3 of everything in `world` and `shot` that reaches a pixel, hexadecimal.
+pub fn fingerprint(world: &World, shot: &Shot) -> String {
+    let mut hash = Hash(blake3::Hasher::new());
+    hash.text(&world.meshes.len());
+    world.meshes.iter().for_each(|mesh| hash.mesh(mesh));
+    world.textures.iter().for_each(|texture| hash.texture(texture));
+    for sphere in &world.spheres {
+        hash.text(&(sphere.centre, sphere.radius, sphere.material));
+    }
+    for material in &world.materials {
+        // Names are for people.
+        hash.text(&crate::scene::Material { name: String::new(), ..material.clone() });
+    }
+    hash.text(&(&world.lights, &world.sky, shot));
+    hash.0.finalize().to_hex().to_string()
+}
+
+struct Hash(blake3::Hasher);
+
+impl Hash {
+    fn mesh(&mut self, mesh: &WorldMesh) {
+        self.array(&mesh.positions);
+        self.array(&mesh.triangles);
+        self.attribute(mesh.normals.as_ref());
+        self.attribute(mesh.uvs.as_ref());
+        self.text(&mesh.material);
+    }
+
+    fn attribute<T: bytemuck::NoUninit>(&mut self, attribute: Option<&Corners<T>>) {
+        let Some(attribute) = attribute else { return self.text(&"none") };
+        self.array(&attribute.values);
+        match &attribute.corners {
+            Some(corners) => self.array(corners),
+            None => self.text(&"as positions"),
+        }
+    }
+
+    fn texture(&mut self, texture: &Texture) {
+        self.text(&(texture.width, texture.height));
+        self.array(&texture.texels);
+    }
+
+    /// The length goes first, so that no two lists of arrays run together into the same bytes.
+    fn array<T: bytemuck::NoUninit>(&mut self, values: &[T]) {
+        self.0.update(&(values.len() as u64).to_le_bytes());
+        self.0.update(bytemuck::cast_slice(values));
+    }
+
+    /// Small data by its `Debug` text, which spells every float so that it reads back the same.
+    fn text(&mut self, value: &impl Debug) {
+        let text = format!("{value:?}");
+        self.0.update(&(text.len() as u64).to_le_bytes());
+        self.0.update(text.as_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Rgb, Vec3};
+    use crate::scene::{CameraPath, Easing, Material, Pose};
+
+    fn world() -> World {
+        World {
+            meshes: vec![WorldMesh {
+                name: "a".into(),
+                positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+                triangles: vec![[0, 1, 2]],
+                normals: Some(Corners { values: vec![Vec3::Z], corners: Some(vec![[0; 3]]) }),
+                uvs: None,
+                material: 0,
+            }],
+            materials: vec![Material::diffuse("m", Rgb::ONE)],
+            ..World::default()
+        }
+    }
+
+    fn shot() -> Shot {
+        let pose = Pose { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
+        let path = CameraPath::Still(pose);
+        Shot { path, easing: Easing::Linear, frames: 1, vfov_degrees: 40.0 }
+    }
+
+    #[test]
+    fn every_change_that_shows_changes_the_hash_and_a_name_does_not() {
+        let base = fingerprint(&world(), &shot());
+        let mut renamed = world();
+        renamed.meshes[0].name = "b".into();
+        renamed.materials[0].name = "n".into();
+        assert_eq!(base, fingerprint(&renamed, &shot()));
+
+        let changes: [fn(&mut World); 5] = [
+            |w| w.meshes[0].positions[1].x += 1e-15,
+            |w| w.meshes[0].triangles[0] = [0, 2, 1],
+            |w| w.meshes[0].normals = None,
+            |w| w.materials[0].diffuse.x = 0.5,
+            |w| w.sky.lights = false,
+        ];
+        for change in changes {
+            let mut changed = world();
+            change(&mut changed);
+            assert_ne!(base, fingerprint(&changed, &shot()));
+        }
+        assert_ne!(base, fingerprint(&world(), &Shot { vfov_degrees: 41.0, ..shot() }));
+    }
+}

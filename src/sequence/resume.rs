@@ -1,0 +1,145 @@
+//! What a sequence already holds on disk, and what that leaves to render.
+
+use crate::error::{Error, Result};
+use crate::output::manifest::{Header, Manifest, Row, manifest_path};
+use crate::output::{FramePattern, WriteOptions, atomic};
+use crate::scene::FrameRange;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::time::Duration;
+
+/// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
+/// younger one may belong to a process on another machine.
+const LEFTOVER_AGE: Duration = Duration::from_secs(60);
+
+/// Where the frames of a job go, and what they all share.
+#[derive(Debug, Clone)]
+pub struct Target {
+    /// Where frame n lies.
+    pub pattern: FramePattern,
+    /// What the frames share.
+    pub header: Header,
+    /// How films become files.
+    pub write: WriteOptions,
+    /// Whether frames that exist are replaced.
+    pub overwrite: bool,
+}
+
+/// What there is to do.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Frames that exist whole, with the same settings.
+    pub kept: Vec<u32>,
+    /// Frames to render.
+    pub render: Vec<u32>,
+    /// What the user should know: damaged frames.
+    pub notes: Vec<String>,
+}
+
+/// Decides which of `frames` are rendered, and makes the manifest ready for their rows.
+///
+/// Errors: `Error::Usage` where frames of other settings, or of unknown origin, are in the way
+/// and `target` does not say to replace them.
+pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
+    let path = manifest_path(&target.pattern);
+    atomic::create_folder(target.pattern.folder())?;
+    atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE)?;
+    let found = match Manifest::read(&path) {
+        Err(_) if target.overwrite => None,
+        read => read?,
+    };
+    let Some(manifest) = found else {
+        refuse_strangers(target, frames)?;
+        Manifest::create(&path, &target.header)?;
+        return Ok(Plan::all(frames));
+    };
+    if !target.overwrite {
+        refuse_others(target, &manifest, frames)?;
+    }
+    if manifest.header.first_difference(&target.header).is_some() {
+        Manifest::create(&path, &target.header)?;
+        return Ok(Plan::all(frames));
+    }
+    Manifest::merge_parts(&path)?;
+    if target.overwrite {
+        return Ok(Plan::all(frames));
+    }
+    let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
+    let states = (frames.first..=frames.last)
+        .into_par_iter()
+        .map(|frame| Ok((frame, state(target, frame, rows.get(&frame))?)))
+        .collect::<Result<Vec<_>>>()?;
+    Ok(Plan::of(states))
+}
+
+/// How a frame stands on disk.
+enum State {
+    Whole,
+    Missing,
+    Damaged(String),
+}
+
+fn state(target: &Target, frame: u32, row: Option<&Row>) -> Result<State> {
+    let path = target.pattern.path(frame);
+    let name = path.display();
+    let bytes = match fs::read(&path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(State::Missing),
+        read => read.map_err(|e| Error::io("read", &path, e))?,
+    };
+    let Some(row) = row else {
+        return Ok(State::Damaged(format!("{name} is not in the manifest; rendered again")));
+    };
+    let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
+    let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
+    Ok(if whole { State::Whole } else { State::Damaged(note()) })
+}
+
+impl Plan {
+    fn all(frames: FrameRange) -> Self {
+        Self { render: (frames.first..=frames.last).collect(), ..Self::default() }
+    }
+
+    fn of(states: Vec<(u32, State)>) -> Self {
+        let mut plan = Self::default();
+        for (frame, state) in states {
+            match state {
+                State::Whole => plan.kept.push(frame),
+                State::Missing => plan.render.push(frame),
+                State::Damaged(note) => {
+                    plan.render.push(frame);
+                    plan.notes.push(note);
+                }
+            }
+        }
+        plan
+    }
+}
+
+/// Refuses frames that no manifest vouches for: they may be somebody's work.
+fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
+    let in_the_way = (frames.first..=frames.last).map(|f| target.pattern.path(f));
+    match in_the_way.into_iter().find(|path| path.exists()) {
+        Some(path) if !target.overwrite => Err(Error::Usage(format!(
+            "{} exists, and no manifest beside it says how it was made\n  \
+             help: choose another output with -o, or replace it with --overwrite",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses frames of other settings, as long as any is left.
+fn refuse_others(target: &Target, manifest: &Manifest, frames: FrameRange) -> Result<()> {
+    let Some(d) = manifest.header.first_difference(&target.header) else { return Ok(()) };
+    let folder = target.pattern.folder();
+    let left = manifest.rows.values().filter(|row| folder.join(&row.file).exists()).count();
+    if left == 0 {
+        return refuse_strangers(target, frames);
+    }
+    Err(Error::Usage(format!(
+        "{} holds {left} frames of other settings: {} was {}, now it is {}\n  \
+         help: set it back, choose another output with -o, or replace the frames with --overwrite",
+        target.pattern, d.name, d.before, d.now
+    )))
+}

@@ -1,0 +1,177 @@
+//! Sequences on disk, with a maker that needs no scene.
+
+use super::*;
+use crate::output::manifest::{Header, Manifest, manifest_path};
+use crate::output::{FramePattern, WriteOptions};
+use crate::scene::{FrameRange, Settings};
+use std::cell::RefCell;
+use std::fs;
+use std::path::PathBuf;
+
+const FOUR: FrameRange = FrameRange { first: 1, last: 4 };
+
+/// Films that tell frames apart; `stop_before` is the frame it gives up at.
+struct Plain {
+    settings: Settings,
+    stop_before: u32,
+    made: RefCell<Vec<u32>>,
+}
+
+impl FrameMaker for Plain {
+    fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>> {
+        if frame == self.stop_before {
+            return Ok(None);
+        }
+        self.made.borrow_mut().push(frame);
+        let mut film = Film::new(4, 2, false);
+        film.rgb[0].x = frame as f32 / 255.0 * self.settings.exposure;
+        Ok(Some((film, RayCounts { camera: 8, ..RayCounts::default() })))
+    }
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn target(&self, settings: &Settings, overwrite: bool) -> Target {
+        let name = self.path("frame_##.png").display().to_string();
+        let header = Header {
+            manifest: 1,
+            tweenray: "0".into(),
+            scene: "s".into(),
+            scene_hash: "h".into(),
+            shot_frames: 4,
+            files: "frame_##.png".into(),
+            tracer: "none".into(),
+            settings: Header::settings(settings),
+        };
+        Target {
+            pattern: FramePattern::parse(&name, 4).expect("a pattern"),
+            header,
+            write: WriteOptions::of(settings, None),
+            overwrite,
+        }
+    }
+
+    /// Renders frames 1 to 4; gives the numbers of those made, and the plan.
+    fn run(
+        &self,
+        settings: &Settings,
+        overwrite: bool,
+        stop_before: u32,
+    ) -> Result<(Vec<u32>, Plan)> {
+        let target = self.target(settings, overwrite);
+        let plan = prepare(&target, FOUR)?;
+        let made = RefCell::default();
+        let maker = Plain { settings: settings.clone(), stop_before, made };
+        let journal = manifest_path(&target.pattern);
+        render_frames(&target, &plan.render, &journal, &maker, &mut |_| Ok(()))?;
+        Ok((maker.made.into_inner(), plan))
+    }
+
+    fn frames(&self) -> Vec<Vec<u8>> {
+        (1..=4).map(|n| fs::read(self.path(&format!("frame_0{n}.png"))).expect("whole")).collect()
+    }
+}
+
+fn settings() -> Settings {
+    Settings { width: 4, height: 2, ..Settings::default() }
+}
+
+#[test]
+fn finished_frames_are_kept_and_a_stopped_job_goes_on() {
+    let folder = Folder::new();
+    assert_eq!(folder.run(&settings(), false, 3).expect("runs").0, [1, 2]);
+    assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, [3, 4]);
+    let (made, plan) = folder.run(&settings(), false, 0).expect("runs");
+    assert_eq!((made, plan.kept, plan.notes), (vec![], vec![1, 2, 3, 4], vec![]));
+    let undisturbed = Folder::new();
+    undisturbed.run(&settings(), false, 0).expect("runs");
+    assert_eq!(folder.frames(), undisturbed.frames());
+}
+
+#[test]
+fn damaged_missing_and_unlisted_frames_are_rendered_again() {
+    let folder = Folder::new();
+    folder.run(&settings(), false, 0).expect("runs");
+    let whole = folder.frames();
+    fs::write(folder.path("frame_01.png"), b"torn").expect("written");
+    fs::remove_file(folder.path("frame_02.png")).expect("removed");
+    // A crash between rename and row, and in the middle of the next row.
+    let manifest = folder.path("frame.manifest.jsonl");
+    let text = fs::read_to_string(&manifest).expect("there");
+    let lines: Vec<&str> = text.lines().collect();
+    let torn = &lines[4][..lines[4].len() / 2];
+    fs::write(&manifest, [&lines[..4].join("\n"), "\n", torn].concat()).expect("written");
+    let (made, plan) = folder.run(&settings(), false, 0).expect("runs");
+    assert_eq!((made, plan.notes.len()), (vec![1, 2, 4], 2));
+    assert_eq!(folder.frames(), whole);
+    let read = Manifest::read(&manifest).expect("readable").expect("there");
+    assert_eq!(read.rows.len(), 4);
+    assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, Vec::<u32>::new());
+}
+
+#[test]
+fn other_settings_are_refused_by_name_and_overwrite_replaces() {
+    let folder = Folder::new();
+    folder.run(&settings(), false, 0).expect("runs");
+    let brighter = Settings { exposure: 2.1, ..settings() };
+    let error = folder.run(&brighter, false, 0).expect_err("refused").to_string();
+    assert!(error.contains("exposure was 1, now it is 2.1"), "{error}");
+    let mut crop = settings();
+    crop.crop = Some(crate::scene::Rect { x0: 0, y0: 0, x1: 2, y1: 1 });
+    let error = folder.run(&crop, false, 0).expect_err("refused").to_string();
+    assert!(error.contains("crop was none, now it is 0,0,2,1"), "{error}");
+    assert_eq!(folder.run(&brighter, true, 3).expect("runs").0, [1, 2]);
+    // Frames 3 and 4 of the old settings are still there; no row of the new manifest has them.
+    let (made, plan) = folder.run(&brighter, false, 0).expect("runs");
+    assert_eq!((made, plan.kept, plan.notes.len()), (vec![3, 4], vec![1, 2], 2));
+    // Exposure 0.1 is no f64: it must still equal itself after a round through the file.
+    let dark = Settings { exposure: 0.1, ..settings() };
+    folder.run(&dark, true, 0).expect("runs");
+    assert_eq!(folder.run(&dark, false, 0).expect("kept").0, Vec::<u32>::new());
+}
+
+#[test]
+fn frames_that_nothing_vouches_for_are_not_touched() {
+    let folder = Folder::new();
+    fs::write(folder.path("frame_03.png"), b"somebody's").expect("written");
+    let error = folder.run(&settings(), false, 0).expect_err("refused").to_string();
+    assert!(error.contains("frame_03.png exists"), "{error}");
+    assert!(!folder.path("frame.manifest.jsonl").exists());
+    assert_eq!(folder.run(&settings(), true, 0).expect("runs").0, [1, 2, 3, 4]);
+}
+
+#[test]
+fn settings_may_change_once_all_frames_are_gone() {
+    let folder = Folder::new();
+    folder.run(&settings(), false, 0).expect("runs");
+    (1..=4).for_each(|n| {
+        fs::remove_file(folder.path(&format!("frame_0{n}.png"))).expect("removed");
+    });
+    let other = Settings { spp: 9, ..settings() };
+    assert_eq!(folder.run(&other, false, 0).expect("runs").0, [1, 2, 3, 4]);
+}
+
+#[test]
+fn parts_of_ranks_are_taken_in_at_the_next_start() {
+    let folder = Folder::new();
+    let target = folder.target(&settings(), false);
+    let plan = prepare(&target, FOUR).expect("prepared");
+    let maker = Plain { settings: settings(), stop_before: 0, made: RefCell::default() };
+    let manifest = manifest_path(&target.pattern);
+    let part = crate::output::manifest::part_path(&manifest, 1);
+    let quiet = &mut |_: &FrameReport| Ok(());
+    render_frames(&target, &plan.render[..2], &manifest, &maker, quiet).expect("runs");
+    render_frames(&target, &plan.render[2..3], &part, &maker, quiet).expect("runs");
+    // Both ranks were killed here.
+    assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, [4]);
+    assert!(!part.exists());
+}

@@ -1,0 +1,35 @@
+//! The maker that traces every frame on its own.
+
+use super::FrameMaker;
+use crate::error::Result;
+use crate::film::Film;
+use crate::scene::Shot;
+use crate::shade::{Progress, Renderer};
+use crate::stats::RayCounts;
+use std::sync::atomic::AtomicBool;
+
+/// Traces each frame through the shot's camera.
+pub struct Tracer<'a> {
+    /// What renders a film.
+    pub renderer: Renderer<'a>,
+    /// Where the camera is when.
+    pub shot: &'a Shot,
+    /// The threads that render.
+    pub pool: &'a rayon::ThreadPool,
+    /// Whether films get their first-hit records.
+    pub with_gbuffer: bool,
+    /// Set when the job shall stop.
+    pub stop: &'a AtomicBool,
+    /// Hears of finished tiles.
+    pub progress: &'a dyn Progress,
+}
+
+impl FrameMaker for Tracer<'_> {
+    fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>> {
+        let settings = self.renderer.settings;
+        let camera = self.shot.camera(frame, settings.width, settings.height)?;
+        let render =
+            || self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress);
+        Ok(self.pool.install(render))
+    }
+}

@@ -1,0 +1,144 @@
+//! The pixels of one block while it is rendered: sums, records, samplers.
+
+use super::{FrameInput, Renderer};
+use crate::film::GPixel;
+use crate::math::Rgb;
+use crate::sampling::PixelSampler;
+use crate::scene::Rect;
+
+/// Edge of a block in pixels.
+pub(super) const BLOCK: u32 = 8;
+/// Dimension of the camera samples' pixel positions.
+const FILM_DIMENSION: u32 = 0;
+
+/// One block's pixels, in 4 x 4 sub-blocks so that 16 neighbours make a packet.
+pub(super) struct BlockPixels {
+    places: Vec<(u32, u32)>,
+    film_samplers: Vec<PixelSampler>,
+    samplers: Vec<PixelSampler>,
+    sums: Vec<Rgb>,
+    records: Vec<Record>,
+    with_records: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Record {
+    nearest: f64,
+    pixel: GPixel,
+}
+
+impl BlockPixels {
+    /// No block yet; with or without G-buffer records.
+    pub fn new(with_records: bool) -> Self {
+        Self {
+            places: Vec::new(),
+            film_samplers: Vec::new(),
+            samplers: Vec::new(),
+            sums: Vec::new(),
+            records: Vec::new(),
+            with_records,
+        }
+    }
+
+    /// Starts the block `rect` (within the image).
+    pub fn start(&mut self, rect: &Rect, seed: u64, frame: u32) {
+        self.places.clear();
+        for sub_y in (rect.y0..rect.y1).step_by(4) {
+            for sub_x in (rect.x0..rect.x1).step_by(4) {
+                for y in sub_y..(sub_y + 4).min(rect.y1) {
+                    self.places.extend((sub_x..(sub_x + 4).min(rect.x1)).map(|x| (x, y)));
+                }
+            }
+        }
+        self.film_samplers.clear();
+        self.samplers.clear();
+        for (x, y) in &self.places {
+            // Camera samples do not depend on the frame: frame 0 is no frame's number.
+            self.film_samplers.push(PixelSampler::new(seed, 0, *x, *y));
+            self.samplers.push(PixelSampler::new(seed, frame, *x, *y));
+        }
+        self.sums.clear();
+        self.sums.resize(self.places.len(), Rgb::ZERO);
+        self.records.clear();
+        if self.with_records {
+            let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
+            self.records.resize(self.places.len(), empty);
+        }
+    }
+
+    /// Pixels in the block.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Adds radiance to a pixel's sum.
+    pub fn add(&mut self, pixel: u32, radiance: Rgb) {
+        self.sums[pixel as usize] += radiance;
+    }
+
+    /// The sampler of a pixel's shading.
+    pub fn sampler(&self, pixel: u32) -> &PixelSampler {
+        &self.samplers[pixel as usize]
+    }
+
+    /// Image point of a camera sample: the pixel's middle where there is but one.
+    pub fn sample_position(
+        &self,
+        renderer: &Renderer,
+        input: &FrameInput,
+        pixel: usize,
+        sample: u32,
+    ) -> (f64, f64) {
+        let (x, y) = self.places[pixel];
+        let [dx, dy] = self.offset(renderer, input, pixel, sample);
+        (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
+    }
+
+    fn offset(
+        &self,
+        renderer: &Renderer,
+        input: &FrameInput,
+        pixel: usize,
+        sample: u32,
+    ) -> [f64; 2] {
+        if renderer.settings.spp == 1 {
+            return [0.0; 2];
+        }
+        input.filter.offset2(self.film_samplers[pixel].get2(sample, FILM_DIMENSION))
+    }
+
+    /// Whether first-hit records are kept.
+    pub fn wants_records(&self) -> bool {
+        self.with_records
+    }
+
+    /// Whether this camera sample is the nearest so far to its pixel's middle; remembers it.
+    pub fn is_nearest(
+        &mut self,
+        renderer: &Renderer,
+        input: &FrameInput,
+        pixel: usize,
+        sample: u32,
+    ) -> bool {
+        let [dx, dy] = self.offset(renderer, input, pixel, sample);
+        let distance = dx * dx + dy * dy;
+        let nearer = distance < self.records[pixel].nearest;
+        if nearer {
+            self.records[pixel].nearest = distance;
+        }
+        nearer
+    }
+
+    /// Keeps a pixel's record.
+    pub fn set_record(&mut self, pixel: usize, record: GPixel) {
+        self.records[pixel].pixel = record;
+    }
+
+    /// Each pixel's place, mean radiance and record.
+    pub fn finished(&self, spp: u32) -> impl Iterator<Item = (u32, u32, Rgb, Option<GPixel>)> {
+        let share = 1.0 / spp as f32;
+        self.places.iter().enumerate().map(move |(i, (x, y))| {
+            (*x, *y, self.sums[i] * share, self.records.get(i).map(|r| r.pixel))
+        })
+    }
+}

@@ -1,0 +1,175 @@
+//! Pictures whose every pixel physics tells in closed form.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{job, pose, quad, render, sphere_world};
+use tweenray::math::{DVec3, Rgb};
+use tweenray::scene::{IntersectorKind, Light, Material, QuadLight, Sky, World};
+
+const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
+
+fn floor(albedo: f32) -> World {
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("floor", Rgb::splat(albedo)));
+    let corners = [(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)];
+    world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
+    world
+}
+
+/// A floor lit by a point light: radiance is albedo/π · I·cosθ/d² at each pixel's point.
+#[test]
+fn lambert_floor_under_a_point_light() {
+    let light = DVec3::new(0.3, 1.5, -0.2);
+    for kind in BOTH {
+        let mut world = floor(0.6);
+        world.lights.push(Light::Point { position: light, intensity: Rgb::splat(7.0) });
+        let camera = pose((0.1, 2.0, 0.7), (0.0, 0.0, 0.0));
+        let mut job = job(world, camera, 24, 18);
+        job.settings.intersector = kind;
+        let (film, counts) = render(&job);
+        for (x, y, rgb) in common::pixels(&film) {
+            let p = common::on_plane_y(&job, x, y, 0.0);
+            let to_light = light - p;
+            let cos = to_light.normalize().y;
+            let expected = 0.6 / std::f64::consts::PI * 7.0 * cos / to_light.length_squared();
+            assert!((f64::from(rgb.x) - expected).abs() < 2e-6 * expected, "{kind:?} {x},{y}");
+        }
+        assert_eq!(counts.shadow_delta, 24 * 18);
+    }
+}
+
+/// The same under a rectangle light that nothing hides: Lambert's formula, with no noise.
+#[test]
+fn lambert_floor_under_a_rectangle_light() {
+    for kind in BOTH {
+        let mut world = floor(0.5);
+        let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+        let corners = corners.map(|(x, z)| DVec3::new(x, 1.0, z));
+        let light = QuadLight { corners, radiance: Rgb::splat(3.0), two_sided: false };
+        assert!(light.normal().y < -0.99, "the test's light faces the floor");
+        world.lights.push(Light::Quad(light));
+        let mut job = job(world, pose((0.0, 0.9, 2.0), (0.0, 0.0, 0.6)), 16, 12);
+        job.settings.intersector = kind;
+        job.settings.shadow_samples = 4;
+        let (film, _) = render(&job);
+        for (x, y, rgb) in common::pixels(&film) {
+            let irradiance = 3.0 * unit_square_irradiance(common::on_plane_y(&job, x, y, 0.0));
+            let expected = 0.5 / std::f64::consts::PI * irradiance;
+            let error = (f64::from(rgb.x) - expected).abs();
+            assert!(error < 1e-5 * expected, "{kind:?} {x},{y}: {} for {expected}", rgb.x);
+        }
+    }
+}
+
+/// Irradiance per unit radiance at `p` on the plane y = 0 from the unit square over the origin at
+/// y = 1: the midpoint rule over the square.
+fn unit_square_irradiance(p: DVec3) -> f64 {
+    let n = 400;
+    let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n) - 0.5;
+    let mut sum = 0.0;
+    for i in 0..n {
+        for j in 0..n {
+            let d2 = (DVec3::new(at(i), 1.0, at(j)) - p).length_squared();
+            sum += 1.0 / (d2 * d2);
+        }
+    }
+    sum / f64::from(n * n)
+}
+
+/// A mirror that faces an emitter shows its radiance times the reflectance.
+#[test]
+fn a_mirror_shows_a_known_emitter() {
+    for kind in BOTH {
+        let mut world = World::default();
+        world.materials.push(Material { mirror: Rgb::new(0.9, 0.5, 0.25), ..Material::black("m") });
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        world.meshes.push(quad(corners.map(|(x, y)| DVec3::new(x, y, 0.0)), 0));
+        // The emitter fills everything behind the camera, and faces the mirror.
+        let far = [(-50.0, -50.0), (-50.0, 50.0), (50.0, 50.0), (50.0, -50.0)];
+        let corners = far.map(|(x, y)| DVec3::new(x, y, 10.0));
+        let radiance = Rgb::new(2.0, 4.0, 8.0);
+        world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: false }));
+        let mut job = job(world, pose((0.0, 0.0, 2.0), (0.0, 0.0, 0.0)), 16, 12);
+        job.settings.intersector = kind;
+        let (film, counts) = render(&job);
+        for (x, y, rgb) in common::pixels(&film) {
+            assert!(rgb.abs_diff_eq(Rgb::new(1.8, 2.0, 2.0), 1e-6), "{kind:?} {x},{y}: {rgb}");
+        }
+        assert_eq!((counts.mirror, counts.shadow_area), (16 * 12, 0));
+    }
+}
+
+/// A convex white body under a uniform unit sky has radiance 1 everywhere.
+#[test]
+fn a_white_sphere_in_a_furnace_is_one() {
+    for kind in BOTH {
+        for tessellated in [false, true] {
+            if tessellated && kind == IntersectorKind::Oracle {
+                continue;
+            }
+            let mut world = sphere_world(Material::diffuse("white", Rgb::ONE), tessellated);
+            world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+            let mut job = job(world, pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), 48, 36);
+            job.settings.intersector = kind;
+            job.settings.spp = 4;
+            let (film, counts) = render(&job);
+            for (x, y, rgb) in common::pixels(&film) {
+                assert!(rgb.abs_diff_eq(Rgb::ONE, 0.002), "{kind:?} {x},{y}: {rgb}");
+            }
+            assert!(counts.shadow_sky > 0);
+        }
+    }
+}
+
+/// Clear glass in a furnace hides itself: reflected and refracted shares add up.
+#[test]
+fn a_glass_sphere_in_a_furnace_vanishes() {
+    use tweenray::scene::Glass;
+    let glass = Glass { ior: 1.5, tint: Rgb::ONE };
+    let mut world = sphere_world(Material { glass: Some(glass), ..Material::black("g") }, false);
+    world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+    let mut job = job(world, pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), 48, 36);
+    job.settings.bounces = 30;
+    job.settings.cutoff = 1e-6;
+    let (film, _) = render(&job);
+    for (x, y, rgb) in common::pixels(&film) {
+        assert!(rgb.abs_diff_eq(Rgb::ONE, 1e-4), "{x},{y}: {rgb}");
+    }
+}
+
+#[test]
+fn an_empty_scene_is_sky() {
+    for kind in BOTH {
+        let sky = Sky { radiance: Rgb::new(0.1, 0.2, 0.3), ..Sky::default() };
+        let world = World { sky, ..World::default() };
+        let mut job = job(world, pose((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)), 16, 12);
+        job.settings.intersector = kind;
+        let (film, counts) = render(&job);
+        assert!(film.rgb.iter().all(|c| *c == sky.radiance));
+        assert_eq!(counts.total(), 16 * 12);
+    }
+}
+
+/// A camera inside a closed box with a light inside too: no ray gets out, whatever it aims at.
+#[test]
+fn from_inside_a_box_no_sky_is_seen() {
+    for kind in BOTH {
+        let mut world = World::default();
+        world.materials.push(Material::diffuse("wall", Rgb::splat(0.5)));
+        world.meshes.push(common::cube(DVec3::ZERO, 1.0, 0));
+        world.sky = Sky { radiance: Rgb::splat(1000.0), ..Sky::default() };
+        let position = DVec3::new(0.0, 0.5, 0.0);
+        world.lights.push(Light::Point { position, intensity: Rgb::ONE });
+        for target in [(1.0, 1.0, 1.0), (-1.0, 0.0, 0.2), (0.0, -1.0, 0.0), (1.0, 0.0, 1.0)] {
+            let mut job = job(world.clone(), pose((0.1, 0.0, -0.1), target), 32, 24);
+            job.settings.intersector = kind;
+            let (film, _) = render(&job);
+            for (x, y, rgb) in common::pixels(&film) {
+                let lit = rgb.min_element() > 0.0 && rgb.max_element() < 10.0;
+                assert!(lit, "{kind:?} towards {target:?}: {x},{y} is {rgb}");
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Small scenes built in memory, and the shortest way from a world to a film.
+
+#![allow(dead_code, clippy::unwrap_used, missing_docs)]
+
+use std::sync::atomic::AtomicBool;
+use tweenray::effects::EffectPlan;
+use tweenray::film::Film;
+use tweenray::intersect;
+use tweenray::math::{DVec3, Rgb};
+use tweenray::scene::{Camera, Material, Pose, Scene, Settings, World, WorldMesh, WorldSphere};
+use tweenray::shade::{Progress, Renderer};
+use tweenray::stats::RayCounts;
+
+pub struct Job {
+    pub world: World,
+    pub camera: Camera,
+    pub settings: Settings,
+}
+
+pub struct Silent;
+impl Progress for Silent {
+    fn tile_done(&self, _: f64, _: &RayCounts) {}
+}
+
+pub fn job(world: World, pose: Pose, width: u32, height: u32) -> Job {
+    let camera = Camera::new(&pose, 40.0, width, height).unwrap();
+    Job { world, camera, settings: Settings { width, height, spp: 1, ..Settings::default() } }
+}
+
+pub fn pose(eye: (f64, f64, f64), target: (f64, f64, f64)) -> Pose {
+    Pose { eye: eye.into(), target: target.into(), up: DVec3::Y, roll_degrees: 0.0 }
+}
+
+pub fn render(job: &Job) -> (Film, RayCounts) {
+    let scene = job.world.clone().into_scene(job.settings.rules.recentre).unwrap();
+    render_scene(&scene, job, EffectPlan::of(&scene, &job.settings))
+}
+
+pub fn render_scene(scene: &Scene, job: &Job, plan: EffectPlan) -> (Film, RayCounts) {
+    let intersector = intersect::build(scene, &job.settings, 1).unwrap();
+    let renderer = Renderer { scene, settings: &job.settings, plan, intersector: &*intersector };
+    renderer.render(&job.camera, 1, true, &AtomicBool::new(false), &Silent).unwrap()
+}
+
+pub fn pixels(film: &Film) -> impl Iterator<Item = (u32, u32, Rgb)> + '_ {
+    let width = film.width;
+    film.rgb.iter().enumerate().map(move |(i, c)| (i as u32 % width, i as u32 / width, *c))
+}
+
+/// Where the middle of a pixel meets the plane y = `height`.
+pub fn on_plane_y(job: &Job, x: u32, y: u32, height: f64) -> DVec3 {
+    let dir = job.camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+    job.camera.eye + dir * ((height - job.camera.eye.y) / dir.y)
+}
+
+/// The pixel that a world point falls on.
+pub fn pixel_of(job: &Job, p: DVec3) -> (u32, u32) {
+    let (x, y, _) = job.camera.project(p).unwrap();
+    (x as u32, y as u32)
+}
+
+pub fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, material: u32) -> WorldMesh {
+    WorldMesh { name: "test".into(), positions, triangles, normals: None, uvs: None, material }
+}
+
+pub fn quad(corners: [DVec3; 4], material: u32) -> WorldMesh {
+    mesh(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], material)
+}
+
+/// A cube of half edge `half`, faces outwards.
+pub fn cube(centre: DVec3, half: f64, material: u32) -> WorldMesh {
+    let corner = |i: u32| {
+        let sign = |bit: u32| if i >> bit & 1 == 1 { half } else { -half };
+        centre + DVec3::new(sign(0), sign(1), sign(2))
+    };
+    let faces =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
+    mesh((0..8).map(corner).collect(), triangles, material)
+}
+
+/// A unit sphere, analytic or as a fine mesh with smooth normals.
+pub fn sphere_world(material: Material, tessellated: bool) -> World {
+    let mut world = World::default();
+    world.materials.push(material);
+    if tessellated {
+        let mut m = uv_sphere(64, 32);
+        let values = m.positions.iter().map(|p| p.as_vec3().normalize()).collect();
+        m.normals = Some(tweenray::scene::Corners { values, corners: None });
+        world.meshes.push(m);
+    } else {
+        let sphere =
+            WorldSphere { name: "sphere".into(), centre: DVec3::ZERO, radius: 1.0, material: 0 };
+        world.spheres.push(sphere);
+    }
+    world
+}
+
+fn uv_sphere(nu: u32, nv: u32) -> WorldMesh {
+    use std::f64::consts::{PI, TAU};
+    let mut positions = Vec::new();
+    for j in 0..=nv {
+        for i in 0..nu {
+            let (theta, phi) =
+                (PI * f64::from(j) / f64::from(nv), TAU * f64::from(i) / f64::from(nu));
+            let r = theta.sin();
+            positions.push(DVec3::new(r * phi.cos(), theta.cos(), r * phi.sin()));
+        }
+    }
+    let at = |j: u32, i: u32| j * nu + i % nu;
+    let mut triangles = Vec::new();
+    for j in 0..nv {
+        for i in 0..nu {
+            let (a, b, c, d) = (at(j, i), at(j, i + 1), at(j + 1, i), at(j + 1, i + 1));
+            if j > 0 {
+                triangles.push([a, b, c]);
+            }
+            if j + 1 < nv {
+                triangles.push([b, d, c]);
+            }
+        }
+    }
+    mesh(positions, triangles, 0)
+}

@@ -1,0 +1,206 @@
+//! The same bytes whatever the threads, the crop and the kernel.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Job, Silent, job, pose, render, render_scene};
+use std::sync::atomic::AtomicBool;
+use tweenray::effects::EffectPlan;
+use tweenray::embree::floating_point_mode;
+use tweenray::film::Film;
+use tweenray::intersect;
+use tweenray::math::{DVec3, Rgb};
+use tweenray::scene::{
+    Filter, Glass, Light, Material, QuadLight, Rect, Sky, World, WorldMesh, WorldSphere,
+};
+use tweenray::shade::Renderer;
+
+/// A bumpy floor of 3,200 triangles with spheres on it; `extras` adds lights and materials.
+fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("floor", Rgb::new(0.6, 0.5, 0.4)));
+    world.meshes.push(bumpy_floor(40));
+    let mut ball = |material: Material, x: f64| {
+        world.materials.push(material);
+        world.spheres.push(WorldSphere {
+            name: "ball".into(),
+            centre: DVec3::new(x, 0.7, 0.0),
+            radius: 0.6,
+            material: world.materials.len() as u32 - 1,
+        });
+    };
+    if mirror {
+        ball(Material { mirror: Rgb::splat(0.9), ..Material::black("mirror") }, -1.2);
+    }
+    if glass {
+        let glass = Glass { ior: 1.5, tint: Rgb::splat(0.98) };
+        ball(Material { glass: Some(glass), ..Material::black("glass") }, 0.1);
+    }
+    ball(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)), 1.3);
+    if area {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let corners = corners.map(|(x, z)| DVec3::new(x, 4.0, z));
+        let radiance = Rgb::splat(8.0);
+        world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: false }));
+        let centre = DVec3::new(-3.0, 3.0, 2.0);
+        world.lights.push(Light::Sphere { centre, radius: 0.4, radiance: Rgb::splat(9.0) });
+    }
+    world.lights.push(Light::Directional {
+        to_light: DVec3::new(0.3, 1.0, 0.5).normalize(),
+        irradiance: Rgb::splat(0.4),
+    });
+    world.sky = Sky { radiance: Rgb::new(0.1, 0.15, 0.3), lights: sky, ambient: Rgb::ZERO };
+    world
+}
+
+fn bumpy_floor(n: u32) -> WorldMesh {
+    let mut positions = Vec::new();
+    for z in 0..=n {
+        for x in 0..=n {
+            let (x, z) = (f64::from(x) / f64::from(n) - 0.5, f64::from(z) / f64::from(n) - 0.5);
+            let y = 0.1 * (17.0 * x).sin() * (13.0 * z).cos();
+            positions.push(DVec3::new(8.0 * x, y, 8.0 * z));
+        }
+    }
+    let mut triangles = Vec::new();
+    for z in 0..n {
+        for x in 0..n {
+            let k = z * (n + 1) + x;
+            triangles.extend([[k, k + n + 1, k + 1], [k + 1, k + n + 1, k + n + 2]]);
+        }
+    }
+    common::mesh(positions, triangles, 0)
+}
+
+fn busy_job(width: u32, height: u32) -> Job {
+    let world = busy_world(true, true, true, true);
+    let mut job = job(world, pose((0.5, 2.0, 5.0), (0.0, 0.5, 0.0)), width, height);
+    job.settings.spp = 3;
+    job.settings.filter = Filter::Gaussian;
+    job.settings.shadow_samples = 5;
+    job.settings.sky_samples = 3;
+    job
+}
+
+fn on_threads(job: &Job, threads: usize) -> Film {
+    let scene = job.world.clone().into_scene(true).unwrap();
+    let intersector = intersect::build(&scene, &job.settings, threads).unwrap();
+    let plan = EffectPlan::of(&scene, &job.settings);
+    let renderer =
+        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let before = floating_point_mode();
+    let stop = AtomicBool::new(false);
+    let film = pool.install(|| renderer.render(&job.camera, 7, true, &stop, &Silent)).unwrap().0;
+    assert!(pool.broadcast(|_| floating_point_mode()).iter().all(|mode| *mode == before));
+    film
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    // Not a multiple of the block or the tile.
+    let job = busy_job(101, 77);
+    let one = on_threads(&job, 1);
+    for threads in [2, 3, 8] {
+        assert!(one == on_threads(&job, threads), "{threads} threads differ");
+    }
+}
+
+#[test]
+fn a_crop_has_the_bytes_of_the_whole() {
+    let whole = on_threads(&busy_job(101, 77), 2);
+    for (x0, y0, x1, y1) in [(3, 5, 60, 41), (8, 8, 16, 16), (95, 70, 101, 77), (50, 40, 51, 41)] {
+        let mut job = busy_job(101, 77);
+        job.settings.crop = Some(Rect { x0, y0, x1, y1 });
+        let part = on_threads(&job, 2);
+        let (records, all) = (part.gbuffer.as_ref().unwrap(), whole.gbuffer.as_ref().unwrap());
+        for (x, y, rgb) in common::pixels(&part) {
+            let inside = x >= x0 && x < x1 && y >= y0 && y < y1;
+            let i = part.index(x, y);
+            assert_eq!(rgb, if inside { whole.rgb[i] } else { Rgb::ZERO }, "{x},{y}");
+            assert!(!inside || records.depth[i] == all.depth[i]);
+        }
+    }
+}
+
+#[test]
+fn each_specialised_kernel_equals_the_one_with_everything_on() {
+    for bits in 0..16 {
+        let on = |bit: u32| bits >> bit & 1 == 1;
+        let world = busy_world(on(0), on(1), on(2), on(3));
+        let mut job = job(world, pose((0.5, 2.0, 5.0), (0.0, 0.5, 0.0)), 40, 30);
+        job.settings.spp = 2;
+        let scene = job.world.clone().into_scene(true).unwrap();
+        let plan = EffectPlan::of(&scene, &job.settings);
+        assert_eq!(
+            [plan.mirror, plan.glass, plan.area_lights, plan.sky_light],
+            [on(0), on(1), on(2), on(3)]
+        );
+        let (film, counts) = render_scene(&scene, &job, plan);
+        // Everything but the sky rays: the scene says whether a visible sky also lights.
+        let everything = EffectPlan { sky_light: plan.sky_light, ..EffectPlan::EVERYTHING };
+        let (full, full_counts) = render_scene(&scene, &job, everything);
+        assert!(film == full, "kernel {bits:04b} differs");
+        assert_eq!(counts, full_counts, "kernel {bits:04b} casts other rays");
+        let absent = [(on(0), counts.mirror), (on(1), counts.glass), (on(2), counts.shadow_area)];
+        for (present, rays) in absent.into_iter().chain([(on(3), counts.shadow_sky)]) {
+            assert_eq!(present, rays > 0, "kernel {bits:04b}: {counts:?}");
+        }
+    }
+}
+
+#[test]
+fn camera_samples_do_not_depend_on_the_frame_but_shading_does() {
+    let job = busy_job(64, 48);
+    let scene = job.world.clone().into_scene(true).unwrap();
+    let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
+    let plan = EffectPlan::of(&scene, &job.settings);
+    let renderer =
+        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
+    let stop = AtomicBool::new(false);
+    let frame = |n| renderer.render(&job.camera, n, true, &stop, &Silent).unwrap().0;
+    let (one, two) = (frame(1), frame(2));
+    assert!(one.gbuffer == two.gbuffer && one.rgb != two.rgb);
+}
+
+#[test]
+fn a_stopped_frame_is_no_frame() {
+    let job = busy_job(64, 48);
+    let scene = job.world.clone().into_scene(true).unwrap();
+    let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
+    let plan = EffectPlan::of(&scene, &job.settings);
+    let renderer =
+        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
+    assert!(renderer.render(&job.camera, 1, true, &AtomicBool::new(true), &Silent).is_none());
+}
+
+#[test]
+fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
+    let at = |k: i32| {
+        let mut job = busy_job(40, 30);
+        let s = 2f64.powi(k);
+        let w = &mut job.world;
+        w.meshes.iter_mut().flat_map(|m| &mut m.positions).for_each(|p| *p *= s);
+        for sphere in &mut w.spheres {
+            sphere.centre *= s;
+            sphere.radius *= s;
+        }
+        for light in &mut w.lights {
+            match light {
+                Light::Quad(q) => q.corners.iter_mut().for_each(|c| *c *= s),
+                Light::Sphere { centre, radius, .. } => {
+                    *centre *= s;
+                    *radius *= s;
+                }
+                Light::Point { .. } | Light::Directional { .. } => {}
+            }
+        }
+        job.camera.eye *= s;
+        render(&job).0.rgb
+    };
+    let plain = at(0);
+    for k in [-40, -7, 1, 40] {
+        assert!(plain == at(k), "2^{k} differs");
+    }
+}
