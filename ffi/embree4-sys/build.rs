@@ -33,6 +33,7 @@ fn main() {
         eprintln!("{message}");
         exit(1);
     });
+    // Only the place in use: a path that does not exist would make every build start afresh.
     println!("cargo::rerun-if-changed={}", embree.include.join("embree4").display());
     bind(&embree.include);
 
@@ -78,7 +79,7 @@ const FROM_ENV: &str = "EMBREE_DIR";
 fn places() -> Vec<Place> {
     let mut places = Vec::new();
     let mut add = |prefix: PathBuf, reason| {
-        if !places.iter().any(|p: &Place| p.prefix == prefix) {
+        if !prefix.as_os_str().is_empty() && !places.iter().any(|p: &Place| p.prefix == prefix) {
             places.push(Place { prefix, reason });
         }
     };
@@ -114,7 +115,6 @@ fn pkg_config_prefix() -> Option<PathBuf> {
 /// The Embree in `prefix`, or what it lacks.
 fn probe(prefix: &Path) -> Result<Embree, String> {
     let include = prefix.join("include");
-    println!("cargo::rerun-if-changed={}", include.join("embree4").display());
     let header = ["rtcore_config.h", "rtcore.h"]
         .iter()
         .find_map(|name| fs::read_to_string(include.join("embree4").join(name)).ok())
