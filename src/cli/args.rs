@@ -21,12 +21,13 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// As import wants it.
-    pub fn load_options(&self) -> LoadOptions {
+    /// As import wants it; `size` is the image size that the command line asks for.
+    pub fn load_options(&self, size: Option<(u32, u32)>) -> LoadOptions {
         let default = LoadOptions::default();
         LoadOptions {
             up: self.up.unwrap_or(default.up),
             scale: self.scale.unwrap_or(default.scale),
+            size,
         }
     }
 }
@@ -150,8 +151,11 @@ pub struct OutputArgs {
     #[arg(long)]
     pub overwrite: bool,
     /// Make no video of the sequence
-    #[arg(long)]
+    #[arg(long, overrides_with = "video")]
     pub no_video: bool,
+    /// Make a video even where the scene file says not to
+    #[arg(long)]
+    pub video: bool,
     /// Frames per second of the video [default: 24]
     #[arg(long, value_name = "N", value_parser = values::positive)]
     pub fps: Option<f64>,

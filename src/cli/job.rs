@@ -7,14 +7,15 @@ use crate::error::{Error, Result};
 use crate::import::{self, Loaded};
 use crate::scene::Settings;
 
-/// Longest image edge, pixels: what every format and ffmpeg can still take.
-const MAX_EDGE: u32 = 65_535;
+/// Longest image edge, pixels, in scene files too.
+const MAX_EDGE: u32 = 32_768;
 
 /// Reads the scene and puts the options over its settings.
 ///
 /// Errors: `Error::Input` and `Error::Usage`; a scene that cannot be read is bad input too.
 pub fn load(scene: &SceneArgs, options: &SettingArgs) -> Result<Loaded> {
-    let mut loaded = import::load(&scene.scene, &scene.load_options()).map_err(as_input)?;
+    let mut loaded =
+        import::load(&scene.scene, &scene.load_options(options.size)).map_err(as_input)?;
     options.apply(&mut loaded.settings);
     check(&loaded.settings)?;
     Ok(loaded)
@@ -70,9 +71,9 @@ mod tests {
 
     #[test]
     fn sizes_and_crops_beyond_reason_are_refused_with_the_figure() {
-        let large = Settings { width: 60_000, height: 60_000, ..Settings::default() };
-        let error = check_memory(&large, Some(8 << 30)).unwrap_err().to_string();
-        assert!(error.contains("403.2 GB") && error.contains("8.6 GB"), "{error}");
+        let large = Settings { width: 30_000, height: 30_000, ..Settings::default() };
+        let error = check_memory(&large, Some(8 << 30)).expect_err("too large").to_string();
+        assert!(error.contains("100.8 GB") && error.contains("8.6 GB"), "{error}");
         assert!(check(&Settings { width: 70_000, ..Settings::default() }).is_err());
         let crop = |x1, y1| Settings {
             crop: Some(Rect { x0: 600, y0: 0, x1, y1 }),

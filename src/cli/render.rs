@@ -66,7 +66,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let quiet = args.output.quiet || !world.is_root();
     let request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
-    let threads = args.output.threads.map_or_else(cluster::default_threads, |n| n as usize);
+    let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
     let intersector = world.agree(intersect::build(&request.scene, &request.settings, threads))?;
@@ -90,15 +90,15 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         let stopped = interrupt.stop.load(Ordering::Relaxed);
         return Ok(if stopped { Exit::Stopped } else { Exit::Done });
     }
-    if let Some(path) = &args.output.stats {
+    if let Some(path) = &request.stats {
         let seconds = start.elapsed().as_secs_f64();
         stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
     }
     if outcome.unfinished > 0 {
-        say_stopped(args, &job, &outcome);
+        say_stopped(&job, &outcome);
         return Ok(Exit::Stopped);
     }
-    finish(args, &job, start)
+    finish(&job, start, quiet)
 }
 
 fn thread_pool(threads: usize) -> Result<ThreadPool> {
@@ -158,9 +158,9 @@ impl Frames<'_> {
 }
 
 /// Says how to go on.
-fn say_stopped(args: &RenderArgs, job: &Frames, outcome: &Outcome) {
+fn say_stopped(job: &Frames, outcome: &Outcome) {
     let finished = job.total() - outcome.unfinished;
-    let again = if args.output.overwrite { " without --overwrite" } else { "" };
+    let again = if job.request.overwrite { " without --overwrite" } else { "" };
     say::aside(format_args!(
         "stopped: {finished} of {} frames are finished in {}; the same command{again} goes on \
          from here",
@@ -170,9 +170,9 @@ fn say_stopped(args: &RenderArgs, job: &Frames, outcome: &Outcome) {
 }
 
 /// Says what there is now, and makes the video of the frames asked for, all of which are there.
-fn finish(args: &RenderArgs, job: &Frames, start: Instant) -> Result<Exit> {
+fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
     let result = |line: String| {
-        if !args.output.quiet {
+        if !quiet {
             say::result(line);
         }
     };
@@ -185,15 +185,16 @@ fn finish(args: &RenderArgs, job: &Frames, start: Instant) -> Result<Exit> {
         job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
     ));
-    if job.total() > 1 && !args.output.no_video {
-        result(make_video(args, job)?);
+    match job.request.fps {
+        Some(fps) if job.total() > 1 => result(make_video(job, fps)?),
+        _ => {}
     }
     Ok(Exit::Done)
 }
 
 /// Makes the video of the frames asked for; gives the line to print. Only of the whole shot does
 /// it get the plain name, so that rendering a few frames again replaces no video of all.
-fn make_video(args: &RenderArgs, job: &Frames) -> Result<String> {
+fn make_video(job: &Frames, fps: f64) -> Result<String> {
     let Request { frames, shot, pattern, .. } = job.request;
     let whole = frames.last - frames.first + 1 == shot.frames;
     let ending = match whole {
@@ -204,7 +205,7 @@ fn make_video(args: &RenderArgs, job: &Frames) -> Result<String> {
         pattern,
         first: frames.first,
         count: frames.last - frames.first + 1,
-        fps: args.output.fps.unwrap_or(24.0),
+        fps,
         display: job.target.write.display,
     };
     Ok(match video::make(&clip, &beside(pattern, &ending))? {

@@ -8,7 +8,7 @@ use crate::output::manifest::{self, Header};
 use crate::output::{FramePattern, WriteOptions};
 use crate::scene::{FrameRange, Scene, Settings, Shot};
 use crate::sequence::{Target, fingerprint};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Everything that rendering takes.
 pub struct Request {
@@ -22,11 +22,18 @@ pub struct Request {
     pub frames: FrameRange,
     /// Where they go.
     pub pattern: FramePattern,
+    /// Whether frames that exist are replaced.
+    pub overwrite: bool,
+    /// Frames per second of the video; `None` for no video.
+    pub fps: Option<f64>,
+    /// Rendering threads, where somebody said how many.
+    pub threads: Option<usize>,
+    /// Where the statistics go, if anywhere.
+    pub stats: Option<PathBuf>,
     /// What import warns of.
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     scene_hash: String,
-    overwrite: bool,
 }
 
 impl Request {
@@ -37,6 +44,7 @@ impl Request {
         let name = output.output.clone().or_else(|| loaded.output.clone());
         let name = name.unwrap_or_else(|| default_output(&scene.scene));
         let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
+        let video = output.video || (loaded.video && !output.no_video);
         let Loaded { world, shot, settings, warnings, .. } = loaded;
         let scene_hash = fingerprint(&world, &shot);
         Ok(Self {
@@ -45,10 +53,13 @@ impl Request {
             settings,
             frames,
             pattern,
+            overwrite: output.overwrite || loaded.overwrite,
+            fps: video.then(|| output.fps.unwrap_or(loaded.fps.into())),
+            threads: output.threads.or(loaded.threads).map(|n| n as usize),
+            stats: output.stats.clone().or(loaded.stats),
             warnings,
             scene_name: scene.scene.display().to_string(),
             scene_hash,
-            overwrite: output.overwrite,
         })
     }
 

@@ -18,7 +18,7 @@ pub struct SchemaArgs {}
 
 /// Runs the command.
 pub fn run(_: &SchemaArgs) -> Result<Exit> {
-    let schema = serde_json::to_string_pretty(&1)
+    let schema = serde_json::to_string_pretty(&import::schema())
         .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
     say::result(schema);
     Ok(Exit::Done)

@@ -41,10 +41,8 @@ mod with_mpi {
         }
         match command.output() {
             Ok(output) => Some(Ran::of(&output)),
-            Err(_) => {
-                eprintln!("skipped: no mpirun here");
-                None
-            }
+            // Without mpirun there is nothing to test here.
+            Err(_) => None,
         }
     }
 
