@@ -3,7 +3,7 @@
 use super::at::{At, Span};
 use super::number::{Degrees, FieldOfView, Int, Share};
 use super::report::Source;
-use super::vector::{Direction, List, Point};
+use super::vector::{Direction, Point};
 use crate::error::{Error, Result};
 use crate::import::framing::{self, Lens};
 use crate::math::DVec3;
@@ -252,7 +252,7 @@ impl Orbit {
     fn path(&self, common: &Common, world: &World, lens: &Lens) -> CameraPath {
         let target = self.target.map(|t| t.vec());
         let (target, eye) = match self.eye {
-            Some(eye) => (target.unwrap_or_else(|| world.bounds().centre()), eye.vec()),
+            Some(eye) => (target.unwrap_or_else(|| framing::bounds(world).centre()), eye.vec()),
             None => framing::orbit(world, target, common.up, framing::ELEVATION_DEGREES, lens),
         };
         CameraPath::Orbit {

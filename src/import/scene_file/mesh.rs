@@ -44,9 +44,9 @@ pub(super) struct Mesh {
     /// Edges sharper than this angle stay sharp where normals are averaged, degrees.
     #[serde(default = "default_crease")]
     pub crease_angle: Crease,
-    /// The axis that points up in the file; it is turned to y before `transform`.
-    #[serde(default = "y_up")]
-    pub up: UpAxis,
+    /// The axis that points up in the mesh file, "x", "y" or "z"; it is turned to y before
+    /// `transform`. Absent: "y".
+    pub up: Option<At<UpAxis>>,
     /// Steps that place the mesh, applied one after the other.
     #[serde(default)]
     pub transform: Vec<At<Step>>,
@@ -142,10 +142,6 @@ fn auto() -> Normals {
 
 fn default_crease() -> Crease {
     Crease(crate::import::DEFAULT_CREASE_DEGREES)
-}
-
-fn y_up() -> UpAxis {
-    UpAxis::Y
 }
 
 fn origin() -> Point {

@@ -5,7 +5,7 @@ use super::number::{Int, Positive, Share};
 use super::report::Source;
 use super::vector::List;
 use crate::error::Result;
-use crate::import::Job;
+use crate::import::Loaded;
 use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, ToneCurve};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
@@ -227,24 +227,25 @@ impl Settings {
         Err(source.fault(&crop.span, message).help(help).into())
     }
 
-    /// Everything about the job that does not decide a frame's bytes; `shot_frames` is the length
-    /// of the camera's move.
+    /// Writes to `loaded` what does not decide a frame's bytes.
     ///
-    /// Errors: frames that the move has not, an empty output pattern.
-    pub fn job(&self, source: &Source, shot_frames: u32) -> Result<Job> {
-        let frames = self.frames.as_ref().map(|f| frame_range(f, source, shot_frames)).transpose()?;
-        if let Some(output) = self.output.as_ref().filter(|o| o.is_empty()) {
-            return Err(source.fault(&output.span, "the output pattern is empty").into());
+    /// Errors: frames that the camera's move has not, an empty output pattern.
+    pub fn job(&self, source: &Source, loaded: &mut Loaded) -> Result<()> {
+        if let Some(frames) = &self.frames {
+            loaded.frames = Some(frame_range(frames, source, loaded.shot.frames)?);
         }
-        Ok(Job {
-            frames,
-            output: self.output.as_ref().map(|o| o.value.clone()),
-            fps: self.fps.u32(),
-            video: self.video,
-            overwrite: self.overwrite,
-            threads: self.threads.map(Int::u32),
-            stats: self.stats.clone(),
-        })
+        if let Some(output) = &self.output {
+            if output.is_empty() {
+                return Err(source.fault(&output.span, "the output pattern is empty").into());
+            }
+            loaded.output = Some(output.value.clone());
+        }
+        loaded.fps = self.fps.u32();
+        loaded.video = self.video;
+        loaded.overwrite = self.overwrite;
+        loaded.threads = self.threads.map(Int::u32);
+        loaded.stats.clone_from(&self.stats);
+        Ok(())
     }
 }
 
