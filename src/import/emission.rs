@@ -67,7 +67,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
     for sphere in world.spheres.split_off(first_sphere) {
         let material = &materials[sphere.material as usize];
         if emits(material) {
-            notes.extend(reflects(material).then(|| Note::ReflectsNothing(sphere.name)));
+            notes.extend(reflects(material).then_some(Note::ReflectsNothing(sphere.name)));
             let (centre, radius, radiance) = (sphere.centre, sphere.radius, material.emission);
             world.lights.push(Light::Sphere { centre, radius, radiance });
         } else {

@@ -31,7 +31,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let crease_degrees = super::DEFAULT_CREASE_DEGREES;
     let Model { mut world, mut warnings, files } =
         super::load_model(path, NormalPolicy::Auto { crease_degrees })?;
-    world.apply_transform(&(DAffine3::from_scale(DVec3::splat(options.scale)) * to_y_up(options.up)))?;
+    world.apply_transform(
+        &(DAffine3::from_scale(DVec3::splat(options.scale)) * to_y_up(options.up)),
+    )?;
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
     }
@@ -128,7 +130,8 @@ impl Studio {
         let up = to_light.cross(right.normalize()) * (0.5 * side);
         let centre = self.middle + to_light * distance;
         // Counter-clockwise seen from the middle.
-        let corners = [centre - right - up, centre - right + up, centre + right + up, centre + right - up];
+        let corners =
+            [centre - right - up, centre - right + up, centre + right + up, centre + right - up];
         // Irradiance at the middle, whatever the size, on a surface that faces the light.
         let irradiance = 2.4;
         let radiance = irradiance * (distance / side).powi(2);

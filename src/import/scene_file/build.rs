@@ -3,8 +3,9 @@
 use super::at::{At, Span};
 use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
-use super::report::{Source, nearest};
-use super::{SceneFile, shapes, transform};
+use super::piece::{name_meshes, nearest_file, place, uv_sphere};
+use super::report::Source;
+use super::{SceneFile, shapes};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::{self, Model, emission};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
@@ -14,9 +15,6 @@ use std::path::{Path, PathBuf};
 /// Triangles that all generators of a scene file may make together: some 5 GB of memory, and as
 /// much again for Embree.
 pub(super) const MAX_GENERATED: u64 = 100_000_000;
-
-/// The generator rounds to six decimals; smaller spheres are made large and shrunk.
-const LEAST_ROUNDED_RADIUS: f64 = 0.01;
 
 /// A world in the making.
 pub(super) struct Builder<'a> {
@@ -139,8 +137,8 @@ impl<'a> Builder<'a> {
 
     fn read_model(&mut self, file: &At<String>, mesh: &Mesh, bare: bool) -> Result<World> {
         let path = self.beside(file);
-        let Model { mut world, warnings, files } =
-            import::load_model(&path, mesh.policy()).map_err(|e| match e {
+        let Model { mut world, warnings, files } = import::load_model(&path, mesh.policy())
+            .map_err(|e| match e {
                 Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
                 other => self.at_key(file, other),
             })?;
@@ -257,62 +255,4 @@ impl<'a> Builder<'a> {
             self.warnings.push(warning);
         }
     }
-}
-
-fn uv_sphere(
-    radius: f64,
-    centre: crate::math::DVec3,
-    meridians: u32,
-    bands: u32,
-) -> Result<WorldMesh> {
-    if radius >= LEAST_ROUNDED_RADIUS {
-        return import::uv_sphere("uv_sphere", centre, radius, meridians, bands, 0);
-    }
-    let origin = crate::math::DVec3::ZERO;
-    let mut mesh = import::uv_sphere("uv_sphere", origin, 1.0, meridians, bands, 0)?;
-    mesh.positions.iter_mut().for_each(|p| *p = *p * radius + centre);
-    Ok(mesh)
-}
-
-/// A lone mesh takes the name, several prefix it.
-fn name_meshes(piece: &mut World, name: Option<&str>) {
-    let Some(name) = name else { return };
-    let names = piece.meshes.iter_mut().map(|m| &mut m.name);
-    let mut names: Vec<&mut String> =
-        names.chain(piece.spheres.iter_mut().map(|s| &mut s.name)).collect();
-    if let [only] = names.as_mut_slice() {
-        name.clone_into(only);
-    } else {
-        names.into_iter().for_each(|n| *n = format!("{name}/{n}"));
-    }
-}
-
-fn place(piece: &mut World, mesh: &Mesh, source: &Source) -> Result<()> {
-    let up = match &mesh.up {
-        Some(up) if mesh.file.is_none() => {
-            let message = "`up` is for mesh files; turn a generated mesh by `transform`";
-            return Err(source.fault(&up.span, message).into());
-        }
-        Some(up) => transform::to_y_up(up.value),
-        None => Default::default(),
-    };
-    let whole = transform::combine(&mesh.transform, source)? * up;
-    if whole == Default::default() {
-        return Ok(());
-    }
-    piece.apply_transform(&whole).map_err(|error| match (error, mesh.transform.first()) {
-        (Error::Usage(what), Some(step)) => source.fault(&step.span, what).into(),
-        (other, _) => other,
-    })
-}
-
-fn nearest_file(path: &Path) -> Option<String> {
-    let wanted = path.file_name()?.to_string_lossy().into_owned();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let entries = std::fs::read_dir(folder).ok()?;
-    let mut names: Vec<String> =
-        entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    let known: Vec<&str> = names.iter().map(String::as_str).collect();
-    nearest(&wanted, &known).map(str::to_owned)
 }

@@ -8,10 +8,12 @@
 mod at;
 mod build;
 mod camera;
+mod generated;
 mod light;
 mod material;
 mod mesh;
 mod number;
+mod piece;
 mod quad;
 mod report;
 mod settings;
@@ -65,7 +67,7 @@ impl SceneFile {
     ///
     /// Errors: `Error::Input` with line and column.
     fn parse(source: &Source) -> Result<Self> {
-        toml::from_str(&source.text).map_err(|e| source.from_toml(&e).into())
+        toml::from_str(&source.text).map_err(|e| source.toml_fault(&e).into())
     }
 }
 
