@@ -131,3 +131,6 @@ impl Needs {
             .unwrap_or(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -83,7 +83,7 @@ struct Studio {
     floor_height: f64,
     floor_half: f64,
     middle: DVec3,
-    radius: f64,
+    lamp_distance: f64,
 }
 
 impl Studio {
@@ -96,7 +96,9 @@ impl Studio {
         // A hair lower, so that a flat bottom does not fight with the floor.
         let floor_height = lowest - 1e-3 * radius;
         let reach = floor_reach(target, eye, floor_height, lens);
-        Self { floor_height, floor_half: 1.5 * reach, middle, radius }
+        // As high as the camera or higher: views that only look down never see it.
+        let lamp_distance = (5.0 * radius).max((eye - target).length());
+        Self { floor_height, floor_half: 1.5 * reach, middle, lamp_distance }
     }
 
     fn build(&self, world: &mut World) {
@@ -125,7 +127,7 @@ impl Studio {
     /// stands towards +z.
     fn key_light(&self) -> Light {
         let to_light = DVec3::new(-0.45, 0.75, 0.5).normalize();
-        let (distance, side) = (5.0 * self.radius, 2.4 * self.radius);
+        let (distance, side) = (self.lamp_distance, 0.48 * self.lamp_distance);
         let right = DVec3::Y.cross(to_light).normalize() * (0.5 * side);
         let up = to_light.cross(right.normalize()) * (0.5 * side);
         let centre = self.middle + to_light * distance;
@@ -153,3 +155,6 @@ fn floor_reach(target: DVec3, eye: DVec3, floor_height: f64, lens: &Lens) -> f64
     let seen = eye + corner * t - target;
     libm::hypot(seen.x, seen.z)
 }
+
+#[cfg(test)]
+mod tests;
