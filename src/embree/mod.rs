@@ -268,14 +268,9 @@ impl<'g> SceneBuilder<'g> {
         // SAFETY: the scene is live and has all its geometry.
         unsafe { sys::rtcCommitScene(self.scene.0) };
         self.device.check("build the scene")?;
-        let native = |property| self.device.property(property) != 0;
-        let width = if native(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) {
-            16
-        } else if native(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) {
-            8
-        } else {
-            4
-        };
+        let eight = sys::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED;
+        // Also with AVX-512: packets of 16 are slower (docs/decisions/003-packets-of-8.md).
+        let width = if self.device.property(eight) != 0 { 8 } else { 4 };
         Ok(CommittedScene {
             scene: self.scene,
             device: self.device,
@@ -296,8 +291,8 @@ pub struct CommittedScene<'g> {
 }
 
 impl CommittedScene<'_> {
-    /// The packet width that the instruction set handles natively: 16, 8 or 4.
-    pub fn native_width(&self) -> usize {
+    /// The packet width to use: 8 where the instruction set handles that natively, else 4.
+    pub fn packet_width(&self) -> usize {
         self.width
     }
 

@@ -118,8 +118,11 @@ impl Needs {
 
     /// The height at which the distance is least: where two of the three lines cross.
     fn best_height(&self) -> f64 {
-        let lines =
-            [(self.sides, self.slopes[0]), (self.top, self.slopes[1]), (self.bottom, self.slopes[2])];
+        let lines = [
+            (self.sides, self.slopes[0]),
+            (self.top, self.slopes[1]),
+            (self.bottom, self.slopes[2]),
+        ];
         [(0, 1), (0, 2), (1, 2)]
             .map(|(i, j)| (lines[i].0 - lines[j].0) / (lines[i].1 - lines[j].1))
             .into_iter()
@@ -128,3 +131,6 @@ impl Needs {
             .unwrap_or(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests;

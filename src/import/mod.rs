@@ -5,6 +5,8 @@
 
 mod convert;
 mod course;
+mod emission;
+mod framing;
 mod generators;
 mod lines;
 mod model;
@@ -13,19 +15,25 @@ mod normals;
 mod obj;
 mod ply;
 mod polygon;
+mod scene_file;
 mod source;
 mod texture;
 mod tidy;
+mod turntable;
 
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
 pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model, load_model};
 pub use normals::apply as apply_normals;
+pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
-use crate::error::{Diagnostic, Result};
+use crate::error::{Diagnostic, Error, Result};
 use crate::scene::{FrameRange, Settings, Shot, World};
 use std::path::{Path, PathBuf};
+
+/// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
+pub const DEFAULT_CREASE_DEGREES: f64 = 30.0;
 
 /// What the command line says about reading, beside the scene file itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,11 +42,14 @@ pub struct LoadOptions {
     pub up: UpAxis,
     /// Factor on a bare mesh's coordinates.
     pub scale: f64,
+    /// Image width and height where the command line overrides them: an orbit that frames the
+    /// scene by itself depends on their ratio.
+    pub size: Option<(u32, u32)>,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { up: UpAxis::Y, scale: 1.0 }
+        Self { up: UpAxis::Y, scale: 1.0, size: None }
     }
 }
 
@@ -68,16 +79,59 @@ pub struct Loaded {
     pub frames: Option<FrameRange>,
     /// Output pattern, where the file says, relative to the current folder.
     pub output: Option<String>,
+    /// Frames per second of the preview video.
+    pub fps: u32,
+    /// Whether a preview video is made.
+    pub video: bool,
+    /// Whether existing frames are replaced.
+    pub overwrite: bool,
+    /// Rendering threads, where the file says.
+    pub threads: Option<u32>,
+    /// File for statistics, where the file says, relative to the current folder.
+    pub stats: Option<PathBuf>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
     /// Every file read, in order: the scene's content hash is taken over them.
     pub files: Vec<PathBuf>,
 }
 
-/// Reads a scene file, or a bare mesh under a default camera orbit, sky and key light.
+impl Loaded {
+    /// A job that says nothing beyond what to render.
+    fn new(world: World, shot: Shot, settings: Settings) -> Self {
+        Self {
+            world,
+            shot,
+            settings,
+            frames: None,
+            output: None,
+            fps: 24,
+            video: true,
+            overwrite: false,
+            threads: None,
+            stats: None,
+            warnings: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+}
+
+/// Reads a scene file (`.toml`), or a bare mesh under a default camera orbit, sky and key light.
 ///
-/// Errors: `Error::Input` with file, line and column; `Error::Io` for files that cannot be read.
+/// Errors: `Error::Input` with file, line and column; `Error::Io` for files that cannot be read;
+/// `Error::Usage` for options that are for bare meshes only, or out of range.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
-    let _ = (path, options);
-    todo!()
+    let scale = options.scale;
+    if !(1e-30..=1e30).contains(&scale) {
+        return Err(Error::Usage(format!("the scale is {scale}; it lies between 1e-30 and 1e30")));
+    }
+    let is_scene_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    if !is_scene_file {
+        return turntable::load(path, options);
+    }
+    if options.up != UpAxis::Y || scale != 1.0 {
+        let message = "`--up` and `--scale` are for bare meshes; in a scene file say `up` and \
+                       `transform` in its [[mesh]]";
+        return Err(Error::Usage(message.into()));
+    }
+    scene_file::load(path, options)
 }

@@ -50,7 +50,7 @@ fn project(corners: &[DVec3]) -> Vec<Coord<f64>> {
         m if m == size.y => DVec2::new(p.z, p.x * normal.y.signum()),
         _ => DVec2::new(p.x, p.y * normal.z.signum()),
     };
-    corners.iter().map(|p| flat(p)).map(|p| Coord { x: p.x, y: p.y }).collect()
+    corners.iter().map(flat).map(|p| Coord { x: p.x, y: p.y }).collect()
 }
 
 /// No corner turns right, and the turns add up to one round.

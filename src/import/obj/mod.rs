@@ -111,3 +111,6 @@ fn name_of(words: &Words<'_>) -> String {
 fn expected(statement: &str, fields: &str, words: &Words<'_>) -> String {
     format!("`{statement}` takes {fields}, not `{}`", show(words.rest()))
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,13 +11,15 @@ pub(super) struct Fields<'a> {
     /// Next byte, and line.
     at: usize,
     line: usize,
+    /// Where the current record starts.
+    record: usize,
     /// What is left of the current record's line (ASCII).
     words: Words<'a>,
 }
 
 impl<'a> Fields<'a> {
     pub fn new(bytes: &'a [u8], format: Format, (at, line): (usize, usize)) -> Self {
-        Self { bytes, format, at, line, words: Words::new(b"") }
+        Self { bytes, format, at, line, record: at, words: Words::new(b"") }
     }
 
     /// Byte and line of what comes next.
@@ -25,16 +27,17 @@ impl<'a> Fields<'a> {
         (self.at, self.line)
     }
 
-    /// A fault at the current place.
+    /// A fault in the current record.
     pub fn fault(&self, message: impl std::fmt::Display) -> Fault {
         match self.format {
             Format::Ascii => Fault::new(self.line - 1, message.to_string()),
-            _ => Fault::at_byte(self.at, message.to_string()),
+            _ => Fault::at_byte(self.record, message.to_string()),
         }
     }
 
     /// Starts the next record: in text, the next line that is not blank.
     pub fn start(&mut self) -> Result<(), Fault> {
+        self.record = self.at;
         while self.format == Format::Ascii {
             let rest = &self.bytes[self.at..];
             self.line += 1;

@@ -104,10 +104,9 @@ impl At<Light> {
     /// As scene data.
     pub fn build(&self, source: &Source) -> Result<scene::Light> {
         Ok(match &self.value {
-            Light::Point(p) => scene::Light::Point {
-                position: p.position.vec(),
-                intensity: p.intensity.rgb(),
-            },
+            Light::Point(p) => {
+                scene::Light::Point { position: p.position.vec(), intensity: p.intensity.rgb() }
+            }
             Light::Directional(d) => scene::Light::Directional {
                 to_light: d.to_light.unit(),
                 irradiance: d.irradiance.rgb(),

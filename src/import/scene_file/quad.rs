@@ -34,7 +34,10 @@ pub(super) fn corners(shape: &QuadShape<'_>, source: &Source, span: &Span) -> Re
             Ok(parallelogram(centre.vec() - 0.5 * a - 0.5 * b, a, b))
         }
         _ => Err(source
-            .fault(span, "a quad is given by `corner` and `edges`, or by `centre`, `normal` and `size`")
+            .fault(
+                span,
+                "a quad is given by `corner` and `edges`, or by `centre`, `normal` and `size`",
+            )
             .help("give all keys of one form and none of the other")
             .into()),
     }

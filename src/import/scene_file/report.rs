@@ -7,6 +7,10 @@ use std::path::{Path, PathBuf};
 /// Larger scene files are refused: geometry belongs into mesh files.
 const MAX_BYTES: u64 = 16 << 20;
 
+/// The kinds of what comes in kinds.
+const KINDS: &str = "a light has one of `point`, `directional`, `quad` and `sphere`; a step of \
+                     `transform` one of `translate`, `rotate`, `scale` and `matrix`";
+
 /// A scene file's text and name.
 pub(super) struct Source {
     pub path: PathBuf,
@@ -62,7 +66,7 @@ impl Source {
     }
 
     /// What the TOML reader says, in our words.
-    pub fn from_toml(&self, error: &toml::de::Error) -> Diagnostic {
+    pub fn toml_fault(&self, error: &toml::de::Error) -> Diagnostic {
         let span = error.span().unwrap_or(0..0);
         let message = error.message();
         let unknown = message
@@ -79,7 +83,7 @@ impl Source {
         }
         if message.starts_with("wanted exactly 1 element") {
             let text = "exactly one key that says the kind must stand here";
-            return self.fault(&span, text).help("see docs/scene-format.md for the kinds");
+            return self.fault(&span, text).help(KINDS);
         }
         self.fault(&span, in_plain_words(message))
     }
@@ -93,6 +97,9 @@ impl Source {
 
 /// "invalid type: X, expected Y" reads better the other way round.
 fn in_plain_words(message: &str) -> String {
+    if message == "wanted string or table" {
+        return "expected a table".to_owned();
+    }
     let swapped = ["invalid type: ", "invalid value: ", "invalid length "]
         .iter()
         .find_map(|prefix| message.strip_prefix(prefix)?.rsplit_once(", expected "));
@@ -101,8 +108,9 @@ fn in_plain_words(message: &str) -> String {
             let found = match found {
                 "map" => "a table or a date",
                 "sequence" => "an array",
-                other => other,
+                other => other.trim_end_matches(" as i128").trim_end_matches(" as u128"),
             };
+            let expected = if expected == "a sequence" { "an array" } else { expected };
             format!("expected {expected}, found {found}")
         }
         None => message.to_owned(),

@@ -1,17 +1,18 @@
 //! `[settings]`: everything that `tweenray render` can set, under the same names.
 
+mod switches;
+
 use super::at::At;
 use super::number::{Int, Positive, Share};
 use super::report::Source;
 use super::vector::List;
 use crate::error::Result;
-use crate::import::Job;
-use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, ToneCurve};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
-use std::borrow::Cow;
+use crate::import::Loaded;
+use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ToneCurve};
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::PathBuf;
+use switches::{Isa, PngBits, Rules};
 
 /// Image columns or rows.
 pub(super) type Pixels = Int<1, 32_768>;
@@ -71,83 +72,6 @@ pub(super) struct Settings {
     stats: Option<PathBuf>,
 }
 
-/// The rules that make hits trustworthy: each can be switched off to see what it is worth.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, expecting = "a table")]
-pub(super) struct Rules {
-    /// Watertight traversal of Embree.
-    robust: bool,
-    /// One second try for a camera or specular ray that misses inside the scene's bounds.
-    retry: bool,
-    /// Which hits are recomputed in f64: "always", "risky" (grazing, slivers, near an edge), "off".
-    recheck: Recheck,
-    /// Start secondary rays outside the rounding error of their hit.
-    spawn_offset: bool,
-    /// Trace the scene about its own centre at unit size.
-    recentre: bool,
-}
-
-/// Bits a channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(transparent)]
-pub(super) struct PngBits(u8);
-
-/// Instruction sets that Embree can be held to.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
-pub(super) enum Isa {
-    /// SSE2.
-    #[serde(rename = "sse2")]
-    Sse2,
-    /// SSE4.2.
-    #[serde(rename = "sse4.2")]
-    Sse42,
-    /// AVX.
-    #[serde(rename = "avx")]
-    Avx,
-    /// AVX2.
-    #[serde(rename = "avx2")]
-    Avx2,
-    /// AVX-512.
-    #[serde(rename = "avx512")]
-    Avx512,
-}
-
-impl Isa {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Sse2 => "sse2",
-            Self::Sse42 => "sse4.2",
-            Self::Avx => "avx",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for PngBits {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        match Int::<0, 64>::deserialize(deserializer)?.u32() {
-            8 => Ok(Self(8)),
-            16 => Ok(Self(16)),
-            bits => Err(D::Error::custom(format_args!("expected 8 or 16, found {bits}"))),
-        }
-    }
-}
-
-impl JsonSchema for PngBits {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "PngBits".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": [8, 16] })
-    }
-}
-
 impl Default for Settings {
     fn default() -> Self {
         let s = scene::Settings::default();
@@ -181,13 +105,6 @@ impl Default for Settings {
 /// The f64 with the fewest digits that rounds to `x`: 0.001 for the f32 next to it.
 fn shortest(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::from(x))
-}
-
-impl Default for Rules {
-    fn default() -> Self {
-        let HitRules { robust, retry, recheck, spawn_offset, recentre } = HitRules::default();
-        Self { robust, retry, recheck, spawn_offset, recentre }
-    }
 }
 
 impl Settings {
@@ -227,24 +144,25 @@ impl Settings {
         Err(source.fault(&crop.span, message).help(help).into())
     }
 
-    /// Everything about the job that does not decide a frame's bytes; `shot_frames` is the length
-    /// of the camera's move.
+    /// Writes to `loaded` what does not decide a frame's bytes.
     ///
-    /// Errors: frames that the move has not, an empty output pattern.
-    pub fn job(&self, source: &Source, shot_frames: u32) -> Result<Job> {
-        let frames = self.frames.as_ref().map(|f| frame_range(f, source, shot_frames)).transpose()?;
-        if let Some(output) = self.output.as_ref().filter(|o| o.is_empty()) {
-            return Err(source.fault(&output.span, "the output pattern is empty").into());
+    /// Errors: frames that the camera's move has not, an empty output pattern.
+    pub fn job(&self, source: &Source, loaded: &mut Loaded) -> Result<()> {
+        if let Some(frames) = &self.frames {
+            loaded.frames = Some(frame_range(frames, source, loaded.shot.frames)?);
         }
-        Ok(Job {
-            frames,
-            output: self.output.as_ref().map(|o| o.value.clone()),
-            fps: self.fps.u32(),
-            video: self.video,
-            overwrite: self.overwrite,
-            threads: self.threads.map(Int::u32),
-            stats: self.stats.clone(),
-        })
+        if let Some(output) = &self.output {
+            if output.is_empty() {
+                return Err(source.fault(&output.span, "the output pattern is empty").into());
+            }
+            loaded.output = Some(output.value.clone());
+        }
+        loaded.fps = self.fps.u32();
+        loaded.video = self.video;
+        loaded.overwrite = self.overwrite;
+        loaded.threads = self.threads.map(Int::u32);
+        loaded.stats.clone_from(&self.stats);
+        Ok(())
     }
 }
 

@@ -9,13 +9,10 @@ pub(super) fn quad(name: String, corners: [DVec3; 4], material: MaterialId) -> W
 }
 
 /// Twelve triangles that face outwards.
-pub(super) fn cuboid(
-    name: String,
-    (min, max): (DVec3, DVec3),
-    material: MaterialId,
-) -> WorldMesh {
+pub(super) fn cuboid(name: String, (min, max): (DVec3, DVec3), material: MaterialId) -> WorldMesh {
     // Bit 0 of a vertex's index says x, bit 1 y, bit 2 z.
-    let pick = |index: usize, axis: usize| if index >> axis & 1 == 0 { min[axis] } else { max[axis] };
+    let pick =
+        |index: usize, axis: usize| if index >> axis & 1 == 0 { min[axis] } else { max[axis] };
     let positions = (0..8).map(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
     const FACES: [[u32; 4]; 6] =
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];

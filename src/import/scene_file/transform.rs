@@ -46,9 +46,7 @@ impl At<Step> {
         Ok(match &self.value {
             Step::Translate(by) => DAffine3::from_translation(by.vec()),
             Step::Rotate(r) => DAffine3::from_mat3(rotation(r.axis.unit(), r.degrees.0)),
-            Step::Scale(factors) => {
-                DAffine3::from_scale(DVec3::from_array(factors.0.map(|f| f.0)))
-            }
+            Step::Scale(factors) => DAffine3::from_scale(DVec3::from_array(factors.0.map(|f| f.0))),
             Step::Matrix(rows) => {
                 let column = |c: usize| DVec3::from_array([0, 1, 2].map(|r| rows.0[r].0[c].0));
                 let matrix = DMat3::from_cols(column(0), column(1), column(2));
@@ -112,9 +110,7 @@ mod tests {
 
     #[test]
     fn each_axis_comes_up() {
-        for (axis, up) in
-            [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)]
-        {
+        for (axis, up) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
             let turn = to_y_up(axis);
             assert_eq!(turn.transform_vector3(up), DVec3::Y);
             assert_eq!(turn.matrix3.determinant(), 1.0);

@@ -1,0 +1,180 @@
+//! Surfaces that emit become lights, where a light of that shape exists.
+//!
+//! An analytic sphere becomes a sphere light; a mesh that consists of flat convex quads (pairs of
+//! triangles, at most [`MAX_QUADS`]) becomes quad lights. [`World::into_scene`] gives lights their
+//! surface, so the sphere or mesh itself leaves the world. Any other mesh keeps its emission: it
+//! is seen, and casts no light.
+
+use crate::math::DVec3;
+use crate::scene::{Light, Material, QuadLight, World, WorldMesh};
+
+/// More quads than this would each cost shadow rays at every point.
+const MAX_QUADS: usize = 64;
+
+/// Something about an emitting surface that its user may not expect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Note {
+    /// The mesh of this name glows without lighting anything.
+    CastsNoLight(String),
+    /// The light made of the surface of this name no longer reflects.
+    ReflectsNothing(String),
+}
+
+impl Note {
+    /// What to know.
+    pub fn message(&self) -> String {
+        match self {
+            Self::CastsNoLight(name) => format!("`{name}` emits: it is seen, but casts no light"),
+            Self::ReflectsNothing(name) => {
+                format!("`{name}` became a light: its reflectance is ignored")
+            }
+        }
+    }
+
+    /// What to do about it.
+    pub fn help(&self) -> String {
+        match self {
+            Self::CastsNoLight(_) => format!(
+                "a sphere, or a mesh of at most {MAX_QUADS} flat quads, lights the scene when it emits"
+            ),
+            Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
+        }
+    }
+}
+
+/// Turns what emits among the meshes and spheres from `first_mesh` and `first_sphere` on into
+/// lights, and says what that leaves out.
+pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let materials = &world.materials;
+    for mesh in world.meshes.split_off(first_mesh) {
+        let material = &materials[mesh.material as usize];
+        match quads(&mesh).filter(|_| emits(material)) {
+            Some(quads) => {
+                notes.extend(reflects(material).then(|| Note::ReflectsNothing(mesh.name.clone())));
+                let light = |corners| {
+                    let (radiance, two_sided) = (material.emission, material.emits_back);
+                    Light::Quad(QuadLight { corners, radiance, two_sided })
+                };
+                world.lights.extend(quads.into_iter().map(light));
+            }
+            None => {
+                notes.extend(emits(material).then(|| Note::CastsNoLight(mesh.name.clone())));
+                world.meshes.push(mesh);
+            }
+        }
+    }
+    for sphere in world.spheres.split_off(first_sphere) {
+        let material = &materials[sphere.material as usize];
+        if emits(material) {
+            notes.extend(reflects(material).then_some(Note::ReflectsNothing(sphere.name)));
+            let (centre, radius, radiance) = (sphere.centre, sphere.radius, material.emission);
+            world.lights.push(Light::Sphere { centre, radius, radiance });
+        } else {
+            world.spheres.push(sphere);
+        }
+    }
+    notes
+}
+
+fn emits(material: &Material) -> bool {
+    material.emission.max_element() > 0.0
+}
+
+fn reflects(material: &Material) -> bool {
+    material.diffuse.max_element() > 0.0 || material.mirror.max_element() > 0.0
+}
+
+/// The mesh as quads, if each two of its triangles in turn make one.
+fn quads(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
+    let count = mesh.triangles.len();
+    if count == 0 || count % 2 != 0 || count > 2 * MAX_QUADS {
+        return None;
+    }
+    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
+    mesh.triangles.chunks_exact(2).map(|t| quad(corners(&t[0]), corners(&t[1]))).collect()
+}
+
+/// Two triangles that share an edge and make a flat convex quad.
+fn quad(first: [DVec3; 3], second: [DVec3; 3]) -> Option<[DVec3; 4]> {
+    let (i, j) = (0..9).map(|k| (k / 3, k % 3)).find(|(i, j)| {
+        // Edge i of the first runs against edge j of the second.
+        first[*i] == second[(j + 1) % 3] && first[(i + 1) % 3] == second[*j]
+    })?;
+    let corners = [first[(i + 2) % 3], first[i], second[(j + 2) % 3], first[(i + 1) % 3]];
+    is_flat_and_convex(&corners).then_some(corners)
+}
+
+fn is_flat_and_convex(corners: &[DVec3; 4]) -> bool {
+    let edges = [0, 1, 2, 3].map(|k| corners[(k + 1) % 4] - corners[k]);
+    let size = edges.iter().fold(0f64, |s, e| s.max(e.abs().max_element()));
+    if !(size > 0.0 && size.is_finite()) {
+        return false;
+    }
+    let edges = edges.map(|e| e / size);
+    let normal = (edges[0] + edges[1]).cross(edges[1] + edges[2]).normalize_or_zero();
+    let turns = [0, 1, 2, 3].map(|k| edges[k].cross(edges[(k + 1) % 4]));
+    // File coordinates have six digits or so.
+    edges.iter().all(|e| e.dot(normal).abs() < 1e-5) && turns.iter().all(|t| t.dot(normal) > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rgb;
+    use crate::scene::WorldSphere;
+
+    fn lamp(triangles: Vec<[u32; 3]>, raise: f64) -> WorldMesh {
+        let positions =
+            vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, raise), DVec3::Y, DVec3::Z];
+        let (name, normals, uvs, material) = ("lamp".into(), None, None, 0);
+        WorldMesh { name, positions, triangles, normals, uvs, material }
+    }
+
+    fn world(mesh: WorldMesh) -> World {
+        let emission = Rgb::splat(3.0);
+        let glow = Material { emission, emits_back: true, ..Material::black("glow") };
+        World { meshes: vec![mesh], materials: vec![glow], ..World::default() }
+    }
+
+    #[test]
+    fn a_flat_pair_of_triangles_is_a_quad_light_whatever_its_diagonal() {
+        for second in [[0, 2, 3], [2, 3, 0], [3, 0, 2]] {
+            for first in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
+                let mut world = world(lamp(vec![first, second], 0.0));
+                assert_eq!(adopt(&mut world, 0, 0), []);
+                let [Light::Quad(light)] = &world.lights[..] else { panic!("a quad light") };
+                assert_eq!((light.area(), light.normal()), (1.0, DVec3::Z));
+                assert!(light.two_sided && world.meshes.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn other_emitting_meshes_stay_with_a_note() {
+        let apart = lamp(vec![[0, 1, 2], [0, 3, 2]], 0.0);
+        let bent = lamp(vec![[0, 1, 2], [0, 2, 3]], 0.1);
+        let odd = lamp(vec![[0, 1, 2]], 0.0);
+        for mesh in [apart, bent, odd] {
+            let mut world = world(mesh);
+            assert_eq!(adopt(&mut world, 0, 0), [Note::CastsNoLight("lamp".into())]);
+            assert_eq!((world.meshes.len(), world.lights.len()), (1, 0));
+        }
+    }
+
+    #[test]
+    fn an_emitting_sphere_is_a_light_and_no_surface_twice() {
+        let mut world = world(lamp(vec![[0, 1, 2]], 0.0));
+        world.materials.push(Material::diffuse("grey", Rgb::splat(0.5)));
+        world.meshes[0].material = 1;
+        let (centre, radius) = (DVec3::X, 0.5);
+        for material in [0, 1] {
+            let name = format!("{material}");
+            world.spheres.push(WorldSphere { name, centre, radius, material });
+        }
+        assert_eq!(adopt(&mut world, 0, 0), []);
+        assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 1, 1));
+        let scene = world.into_scene(true).expect("a scene");
+        assert_eq!(scene.spheres.len(), 2);
+    }
+}

@@ -1,0 +1,258 @@
+//! From the checked tables to a [`World`]: reads meshes and textures, places and merges them.
+
+use super::at::{At, Span};
+use super::material::Material;
+use super::mesh::{Mesh, Normals, Shape, Sphere};
+use super::piece::{name_meshes, nearest_file, place, uv_sphere};
+use super::report::Source;
+use super::{SceneFile, shapes};
+use crate::error::{Diagnostic, Error, Result};
+use crate::import::{self, Model, emission};
+use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Triangles that all generators of a scene file may make together: some 5 GB of memory, and as
+/// much again for Embree.
+pub(super) const MAX_GENERATED: u64 = 100_000_000;
+
+/// A world in the making.
+pub(super) struct Builder<'a> {
+    source: &'a Source,
+    pub world: World,
+    pub warnings: Vec<Diagnostic>,
+    /// Every file read, the scene file first, each once.
+    pub files: Vec<PathBuf>,
+    materials: BTreeMap<&'a str, Named>,
+    default_material: Option<MaterialId>,
+    generated: u64,
+}
+
+struct Named {
+    id: MaterialId,
+    span: Span,
+    used: bool,
+}
+
+impl<'a> Builder<'a> {
+    /// A world with everything that `file` says is in it.
+    ///
+    /// Errors: `Error::Input` at the key that is wrong, or inside the mesh file that is.
+    pub fn build(source: &'a Source, file: &'a SceneFile) -> Result<Self> {
+        let mut this = Self {
+            source,
+            world: World::default(),
+            warnings: Vec::new(),
+            files: vec![source.path.clone()],
+            materials: BTreeMap::new(),
+            default_material: None,
+            generated: 0,
+        };
+        for (name, material) in &file.material {
+            this.add_material(name, material)?;
+        }
+        for mesh in &file.mesh {
+            this.add_mesh(mesh)?;
+        }
+        for sphere in &file.sphere {
+            this.add_sphere(sphere)?;
+        }
+        for light in &file.light {
+            this.world.lights.push(light.build(source)?);
+        }
+        this.world.sky = file.sky.as_ref().map_or_else(Default::default, |sky| sky.build());
+        this.warn_of_unused_materials();
+        this.warn_of_darkness();
+        Ok(this)
+    }
+
+    fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
+        let texture = match &material.texture {
+            Some(file) => Some(self.add_texture(file)?),
+            None => None,
+        };
+        let built = material.build(name, self.source, texture)?;
+        let id = self.world.materials.len() as MaterialId;
+        self.world.materials.push(built);
+        self.materials.insert(name, Named { id, span: material.span.clone(), used: false });
+        Ok(())
+    }
+
+    fn add_texture(&mut self, file: &At<String>) -> Result<scene::TextureId> {
+        let path = self.beside(file);
+        let same = |t: &scene::Texture| Path::new(&t.name) == path;
+        if let Some(known) = self.world.textures.iter().position(same) {
+            return Ok(known as scene::TextureId);
+        }
+        let texture = import::load_texture(&path).map_err(|e| self.at_key(file, e))?;
+        self.note_file(&path);
+        self.world.textures.push(texture);
+        Ok(self.world.textures.len() as scene::TextureId - 1)
+    }
+
+    fn add_mesh(&mut self, mesh: &At<Mesh>) -> Result<()> {
+        let shape = mesh.shape(self.source, &mesh.span)?;
+        let over = mesh.material.as_ref().map(|name| self.material(name)).transpose()?;
+        let mut piece = match shape {
+            Shape::File(file) => self.read_model(file, mesh, over.is_some())?,
+            generated => {
+                let mesh = self.generate(&generated, mesh)?;
+                World { meshes: vec![mesh], ..World::default() }
+            }
+        };
+        name_meshes(&mut piece, mesh.name.as_deref());
+        place(&mut piece, mesh, self.source)?;
+        let (meshes, spheres) = (self.world.meshes.len(), self.world.spheres.len());
+        let grey = piece.materials.is_empty() && over.is_none();
+        self.world.append(piece);
+        let over = if grey { Some(self.default_material()) } else { over };
+        if let Some(id) = over {
+            self.world.meshes[meshes..].iter_mut().for_each(|m| m.material = id);
+            self.world.spheres[spheres..].iter_mut().for_each(|s| s.material = id);
+        }
+        self.light_up(meshes, spheres, &mesh.span);
+        Ok(())
+    }
+
+    fn add_sphere(&mut self, sphere: &At<Sphere>) -> Result<()> {
+        let material = match &sphere.material {
+            Some(name) => self.material(name)?,
+            None => self.default_material(),
+        };
+        let (meshes, spheres) = (self.world.meshes.len(), self.world.spheres.len());
+        let name = sphere.name.clone().unwrap_or_else(|| format!("sphere {}", spheres + 1));
+        let (centre, radius) = (sphere.centre.vec(), sphere.radius.0);
+        self.world.spheres.push(WorldSphere { name, centre, radius, material });
+        self.light_up(meshes, spheres, &sphere.span);
+        Ok(())
+    }
+
+    /// Turns what emits among the newest meshes and spheres into lights, as far as that goes.
+    fn light_up(&mut self, meshes: usize, spheres: usize, span: &Span) {
+        for note in emission::adopt(&mut self.world, meshes, spheres) {
+            let warning = self.source.fault(span, note.message()).help(note.help());
+            self.warnings.push(warning);
+        }
+    }
+
+    fn read_model(&mut self, file: &At<String>, mesh: &Mesh, bare: bool) -> Result<World> {
+        let path = self.beside(file);
+        let Model { mut world, warnings, files } = import::load_model(&path, mesh.policy())
+            .map_err(|e| match e {
+                Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
+                other => self.at_key(file, other),
+            })?;
+        files.iter().for_each(|f| self.note_file(f));
+        self.warnings.extend(warnings);
+        if bare {
+            world.materials.clear();
+            world.textures.clear();
+        }
+        Ok(world)
+    }
+
+    fn generate(&mut self, shape: &Shape<'_>, mesh: &Mesh) -> Result<WorldMesh> {
+        let mut made = match shape {
+            Shape::Cuboid(c) => shapes::cuboid("box".into(), c.corners(self.source)?, 0),
+            Shape::Quad(q) => shapes::quad("quad".into(), q.corners(self.source)?, 0),
+            Shape::UvSphere(s) => {
+                self.allow(s.triangles(), &s.span)?;
+                let (r, centre) = (s.radius.0, s.centre.vec());
+                uv_sphere(r, centre, s.meridians.u32(), s.bands.u32())
+                    .map_err(|e| self.at_span(&s.span, &e))?
+            }
+            Shape::Terrain(t) => {
+                self.allow(t.triangles(), &t.span)?;
+                import::bench_terrain("terrain", t.vertices.u32(), 0.5 * t.size.0, 0)
+                    .map_err(|e| self.at_span(&t.span, &e))?
+            }
+            Shape::File(file) => return Err(self.at_span(&file.span, "a file is not generated")),
+        };
+        if mesh.normals != Normals::Auto {
+            import::apply_normals(&mut made, mesh.policy());
+        }
+        Ok(made)
+    }
+
+    /// Refuses what would fill the memory.
+    fn allow(&mut self, triangles: u64, span: &Span) -> Result<()> {
+        self.generated += triangles;
+        if self.generated <= MAX_GENERATED {
+            return Ok(());
+        }
+        let total = self.generated;
+        let message = format!("the generated meshes would have {total} triangles by here");
+        let help = format!("at most {MAX_GENERATED} can be generated in one scene");
+        Err(self.source.fault(span, message).help(help).into())
+    }
+
+    fn material(&mut self, name: &At<String>) -> Result<MaterialId> {
+        if let Some(named) = self.materials.get_mut(name.value.as_str()) {
+            named.used = true;
+            return Ok(named.id);
+        }
+        let known: Vec<&str> = self.materials.keys().copied().collect();
+        let fault = self.source.unknown(&name.span, "material", &name.value, &known);
+        let define = || format!("define it: [material.{}]", name.value);
+        Err(if fault.help.is_none() { fault.help(define()) } else { fault }.into())
+    }
+
+    /// The material of surfaces that name none.
+    fn default_material(&mut self) -> MaterialId {
+        let materials = &mut self.world.materials;
+        *self.default_material.get_or_insert_with(|| {
+            let grey = scene::Material::diffuse(import::DEFAULT_MATERIAL, import::DEFAULT_ALBEDO);
+            materials.push(grey);
+            materials.len() as MaterialId - 1
+        })
+    }
+
+    fn beside(&self, file: &At<String>) -> PathBuf {
+        import::source::beside(&self.source.path, &file.value)
+    }
+
+    fn note_file(&mut self, path: &Path) {
+        if !self.files.iter().any(|f| f == path) {
+            self.files.push(path.to_path_buf());
+        }
+    }
+
+    fn at_span(&self, span: &Span, message: impl ToString) -> Error {
+        self.source.fault(span, message.to_string()).into()
+    }
+
+    /// `error` about the file that a key names, at the key; with the nearest file's name where
+    /// there is none of that name.
+    fn at_key(&self, file: &At<String>, error: Error) -> Error {
+        let missing = matches!(&error, Error::Io { source, .. }
+            if source.kind() == std::io::ErrorKind::NotFound);
+        let (message, help) = match error {
+            Error::Input(d) => (format!("{}: {}", d.file.display(), d.message), d.help),
+            other => (other.to_string(), None),
+        };
+        let fault = self.source.fault(&file.span, message);
+        let near = if missing { nearest_file(&self.beside(file)) } else { None };
+        match near.map(|n| format!("did you mean `{n}`?")).or(help) {
+            Some(help) => fault.help(help).into(),
+            None => fault.into(),
+        }
+    }
+
+    fn warn_of_unused_materials(&mut self) {
+        for (name, named) in self.materials.iter().filter(|(_, named)| !named.used) {
+            let message = format!("no mesh or sphere uses the material `{name}`");
+            self.warnings.push(self.source.fault(&named.span, message));
+        }
+    }
+
+    fn warn_of_darkness(&mut self) {
+        let World { lights, sky, materials, .. } = &self.world;
+        let glows = materials.iter().any(|m| m.emission.max_element() > 0.0);
+        let bright = sky.radiance.max_element() > 0.0 || sky.ambient.max_element() > 0.0;
+        if lights.is_empty() && !glows && !bright {
+            let warning = Diagnostic::new(&self.source.path, "nothing lights the scene")
+                .help("add a [[light]] or give the [sky] a radiance");
+            self.warnings.push(warning);
+        }
+    }
+}

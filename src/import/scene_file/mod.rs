@@ -1,0 +1,115 @@
+//! The scene file: TOML to a [`Loaded`] job.
+//!
+//! The tables are plain serde types whose numbers are in range by construction (`number`,
+//! `vector`), so a wrong one is refused where it stands; what takes more than one value to judge
+//! keeps its place ([`at::At`]) and is judged when the tables become scene data. The JSON schema
+//! comes from the same types. `docs/scene-format.md` is the user's page.
+
+mod at;
+mod build;
+mod camera;
+mod generated;
+mod light;
+mod material;
+mod mesh;
+mod number;
+mod piece;
+mod quad;
+mod report;
+mod settings;
+mod shapes;
+#[cfg(test)]
+mod tests;
+mod transform;
+mod vector;
+
+pub(super) use transform::to_y_up;
+
+use super::{LoadOptions, Loaded};
+use crate::error::Result;
+use at::At;
+use build::Builder;
+use camera::Camera;
+use light::{Light, Sky};
+use material::Material;
+use mesh::{Mesh, Sphere};
+use report::Source;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use settings::Settings;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A scene for tweenray: what is in it, how the camera moves, how it is rendered. Lengths are in
+/// world units of your choice, y is up, angles are in degrees, colours are linear RGB (Rec. 709).
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, expecting = "a scene")]
+#[schemars(title = "tweenray scene file")]
+struct SceneFile {
+    /// The camera and its move. Absent: the camera orbits the scene once.
+    camera: Option<At<Camera>>,
+    /// Lights.
+    light: Vec<At<Light>>,
+    /// What a ray that hits nothing sees. Absent: black.
+    sky: Option<Sky>,
+    /// Materials by name.
+    material: BTreeMap<String, At<Material>>,
+    /// Meshes, from files or generated.
+    mesh: Vec<At<Mesh>>,
+    /// Exact spheres.
+    sphere: Vec<At<Sphere>>,
+    /// How to render. Absent: all defaults.
+    settings: Settings,
+}
+
+impl SceneFile {
+    /// Reads the tables alone; no other file is opened.
+    ///
+    /// Errors: `Error::Input` with line and column.
+    fn parse(source: &Source) -> Result<Self> {
+        toml::from_str(&source.text).map_err(|e| source.toml_fault(&e).into())
+    }
+}
+
+/// Reads a scene file and every file that it names.
+///
+/// Errors: `Error::Input` with file, line and column; `Error::Io` where the scene file itself
+/// cannot be read.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
+    let source = Source::read(path)?;
+    let file = SceneFile::parse(&source)?;
+    let mut settings = file.settings.build(&source)?;
+    if let Some((width, height)) = options.size {
+        (settings.width, settings.height) = (width, height);
+    }
+    let Builder { world, warnings, files, .. } = Builder::build(&source, &file)?;
+    let aspect = f64::from(settings.width.max(1)) / f64::from(settings.height.max(1));
+    let shot = match &file.camera {
+        Some(camera) => camera.build(&source, &world, aspect)?,
+        None => Camera::default().build(&source, &world, aspect)?,
+    };
+    let mut loaded = Loaded { warnings, files, ..Loaded::new(world, shot, settings) };
+    file.settings.job(&source, &mut loaded)?;
+    Ok(loaded)
+}
+
+/// The scene file's JSON schema (draft 2020-12), for editors.
+pub fn schema() -> serde_json::Value {
+    let mut schema = schemars::schema_for!(SceneFile).to_value();
+    drop_null_defaults(&mut schema);
+    schema
+}
+
+/// "default: null" would say that null is a value; TOML has none.
+fn drop_null_defaults(schema: &mut serde_json::Value) {
+    match schema {
+        serde_json::Value::Object(map) => {
+            if map.get("default").is_some_and(serde_json::Value::is_null) {
+                map.remove("default");
+            }
+            map.values_mut().for_each(drop_null_defaults);
+        }
+        serde_json::Value::Array(items) => items.iter_mut().for_each(drop_null_defaults),
+        _ => {}
+    }
+}

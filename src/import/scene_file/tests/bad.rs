@@ -1,0 +1,302 @@
+//! Bad files: each with its place, marked by `¦`, and a part of message or help.
+
+use super::*;
+
+/// Text with `¦` before the place, part of the message, part of the help ("" for any).
+type Case = (&'static str, &'static str, &'static str);
+
+const NAMES: &[Case] = &[
+    ("[¦lights]\n", "unknown key `lights`", "did you mean `light`?"),
+    ("¦camra = 1\n", "unknown key `camra`", "`camera`"),
+    ("¦xyzzy = 1\n", "unknown key `xyzzy`", "valid here: `camera`, `light`"),
+    ("[camera]\nfov = 40\n¦frams = 3\n", "unknown key `frams`", "`frames`"),
+    ("[camera.pan]\nfrom = [1, 0, 0]\n¦form = [1, 0, 0]\n", "unknown key `form`", "`from`"),
+    ("[[mesh]]\nbox = { min = [0, 0, 0], ¦maxi = [1, 1, 1] }\n", "`maxi`", "`max`"),
+    ("[[light]]\n[light.point]\n¦possition = [0, 0, 0]\n", "`possition`", "`position`"),
+    ("[[light]]\n¦pont = { position = [0, 0, 0] }\n", "unknown key `pont`", "`point`"),
+    ("[material.red]\n¦difuse = 1\n", "unknown key `difuse`", "`diffuse`"),
+    ("[material.a]\nglass = { ¦iro = 1.5 }\n", "unknown key `iro`", "`ior`"),
+    ("[settings]\n¦sspp = 4\n", "unknown key `sspp`", "`spp`"),
+    ("[settings.rules]\n¦retri = true\n", "unknown key `retri`", "`retry`"),
+    ("[settings]\nfilter = ¦\"bocks\"\n", "unknown value `bocks`", "valid here: `box`"),
+    ("[settings]\nisa = ¦'avx3'\n", "unknown value `avx3`", "`avx"),
+    ("[camera]\neasing = ¦'inout'\n", "unknown value `inout`", "`in-out`"),
+    ("[camera]\nup = ¦'w'\n", "unknown value `w`", "`x`"),
+    (
+        "[[mesh]]\ntransform = [{ scale = 2 }, { ¦rotat = { axis = 'y', degrees = 3 } }]\n",
+        "`rotat`",
+        "`rotate`",
+    ),
+    (
+        "[material.red]\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = ¦'rde'\n",
+        "unknown material `rde`",
+        "`red`",
+    ),
+    (
+        "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = ¦'red'\n",
+        "unknown material `red`",
+        "[material.red]",
+    ),
+    ("¦[[sphere]]\nradius = 1\n", "the key `centre` is missing", ""),
+    ("[camera]\npan = ¦{ from = [0, 0, 1], to = [0, 0, 2] }\n", "the key `target` is missing", ""),
+];
+
+const TYPES: &[Case] = &[
+    ("camera = ¦3\n", "expected a table, found integer `3`", ""),
+    (
+        "[camera]\nfov = ¦'wide'\n",
+        "expected an angle in degrees above 0 and below 180, found string \"wide\"",
+        "",
+    ),
+    (
+        "[camera.still]\neye = ¦[1, 2]\ntarget = [0, 0, 0]\n",
+        "expected an array of 3 values, found 2",
+        "",
+    ),
+    (
+        "[camera.still]\neye = ¦[1, 2, 3, 4]\ntarget = [0, 0, 0]\n",
+        "expected an array of 3 values, found 4",
+        "",
+    ),
+    ("[camera.still]\neye = [1, ¦'2', 3]\ntarget = [0, 0, 0]\n", "found string \"2\"", ""),
+    ("[sky]\nlights = ¦1\n", "expected a boolean, found integer `1`", ""),
+    (
+        "[settings]\nspp = ¦4.0\n",
+        "expected a whole number from 1 to 65536, found floating point `4.0`",
+        "",
+    ),
+    ("[settings]\nfps = ¦2000-01-01\n", "found a table or a date", ""),
+    ("[settings]\nsize = ¦640\n", "expected an array of 2 values, found integer `640`", ""),
+    ("[settings]\nseed = ¦99999999999999999999\n", "expected a whole number from 0", ""),
+    (
+        "[sky]\nradiance = ¦true\n",
+        "expected a number or an array of 3 numbers, found boolean `true`",
+        "",
+    ),
+    ("light = [¦3]\n", "expected a table", ""),
+    ("¦[[light]]\n", "exactly one key that says the kind", "`point`, `directional`"),
+    (
+        "¦[[light]]\npoint = { position = [0, 0, 0], intensity = 1 }\nsphere = { centre = [0, 0, 0], radius = 1, radiance = 1 }\n",
+        "exactly one key that says the kind",
+        "`point`, `directional`",
+    ),
+    (
+        "[[mesh]]\nbox = { min = [0, 0, 0], max = [1, 1, 1] }\ntransform = ¦{ scale = 2 }\n",
+        "expected an array, found a table",
+        "",
+    ),
+];
+
+const RANGES: &[Case] = &[
+    ("[camera]\nfov = ¦180\n", "expected an angle in degrees above 0 and below 180, found 180", ""),
+    ("[camera]\nfov = ¦0.0\n", "found 0.0", ""),
+    ("[camera]\nfov = ¦nan\n", "found NaN", ""),
+    ("[camera]\nframes = ¦0\n", "expected a whole number from 1 to 1000000, found 0", ""),
+    ("[camera]\nup = ¦[0, 0, 0]\n", "a direction cannot be [0, 0, 0]", ""),
+    (
+        "[camera.still]\neye = [1, ¦inf, 3]\ntarget = [0, 0, 0]\n",
+        "expected a number from -1e30 to 1e30, found inf",
+        "",
+    ),
+    (
+        "[[sphere]]\ncentre = [0, 0, 0]\nradius = ¦-1\n",
+        "expected a number from 1e-30 to 1e30, found -1",
+        "",
+    ),
+    (
+        "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n[[sphere]]\ncentre = [0, 0, 0]\nradius = ¦0\n",
+        "found 0",
+        "",
+    ),
+    (
+        "[[light]]\nsphere = { centre = [0, 0, 0], radius = ¦-2.5, radiance = 1 }\n",
+        "found -2.5",
+        "",
+    ),
+    (
+        "[[light]]\npoint = { position = [0, 0, 0], intensity = [1, ¦-1, 1] }\n",
+        "expected a number from 0 to 1e30, found -1",
+        "",
+    ),
+    (
+        "[[light]]\nquad = { centre = [0, 0, 0], normal = ¦[0, 0, 0], size = [1, 1], radiance = 1 }\n",
+        "a direction cannot be",
+        "",
+    ),
+    ("[material.red]\ndiffuse = [0.5, ¦1.5, 0]\n", "expected a number from 0 to 1, found 1.5", ""),
+    ("[material.red]\ndiffuse = ¦-0.1\n", "expected a number from 0 to 1, found -0.1", ""),
+    (
+        "[material.a]\nglass = { ior = ¦0 }\n",
+        "expected an index of refraction from 0.1 to 10, found 0",
+        "",
+    ),
+    ("[settings]\nspp = ¦0\n", "expected a whole number from 1 to 65536, found 0", ""),
+    ("[settings]\nsize = [640, ¦0]\n", "expected a whole number from 1 to 32768, found 0", ""),
+    ("[settings]\npng_bits = ¦12\n", "expected 8 or 16, found 12", ""),
+    ("[settings]\ncutoff = ¦2\n", "expected a number from 0 to 1, found 2", ""),
+    (
+        "[[mesh]]\nterrain = { vertices = ¦1 }\n",
+        "expected a whole number from 2 to 65535, found 1",
+        "",
+    ),
+    (
+        "[[mesh]]\nterrain = ¦{ vertices = 65535 }\n",
+        "would have 8589410312 triangles",
+        "at most 100000000",
+    ),
+    ("[[mesh]]\nterrain = { vertices = ¦1000000 }\n", "expected a whole number from 2", ""),
+    ("[[mesh]]\nterrain = {}\ntransform = [{ scale = ¦0 }]\n", "found 0", ""),
+];
+
+const TOGETHER: &[Case] = &[
+    (
+        "[material.a]\ndiffuse = 0.5\nmirror = ¦[0.5, 0.6, 0.2]\n",
+        "together reflect 1.1 of green light",
+        "",
+    ),
+    ("[material.a]\ndiffuse = 0.5\nglass = ¦{ ior = 1.5 }\n", "glass stands alone", ""),
+    (
+        "[camera]\npan = { from = [0, 0, 1], to = [0, 0, 2], target = [0, 0, 0] }\norbit = ¦{}\n",
+        "has a path already: `pan`",
+        "`orbit`",
+    ),
+    ("[camera]\nstill = ¦{ eye = [1, 2, 3], target = [1, 2, 3] }\n", "own target", ""),
+    ("[camera]\norbit = ¦{ eye = [0, 5, 0], target = [0, 0, 0] }\n", "axis", ""),
+    (
+        "[camera]\nbspline = ¦{ points = [[0, 0, 1], [0, 0, 2], [0, 0, 3]], target = [0, 0, 0] }\n",
+        "at least 4",
+        "",
+    ),
+    (
+        "[camera]\n[[camera.keys]]\nat = 0.5\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n[[camera.keys]]\nat = ¦0.5\neye = [0, 0, 2]\ntarget = [0, 0, 0]\n",
+        "not later than",
+        "",
+    ),
+    (
+        "[camera]\nkeys = [{ at = 0, eye = [0, 0, 1], target = [0, 0, 0] }, ¦{ eye = [0, 0, 2], target = [0, 0, 0] }]\n",
+        "no `at`",
+        "for every key",
+    ),
+    (
+        "[[camera.keys]]\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n¦[[camera.keys]]\neye = [0, 0, 2]\ntarget = [0, 0, 2]\n",
+        "own target",
+        "",
+    ),
+    (
+        "¦[[light]]\nquad = { centre = [0, 0, 0], radiance = 1 }\n",
+        "by `corner` and `edges`, or",
+        "one form",
+    ),
+    ("[[mesh]]\nquad = ¦{ corner = [0, 0, 0], edges = [[1, 0, 0], [2, 0, 0]] }\n", "parallel", ""),
+    ("[[mesh]]\nbox = ¦{ min = [0, 0, 0], max = [1, 0, 1] }\n", "`min` must be smaller", ""),
+    ("¦[[mesh]]\nname = 'nothing'\n", "no triangles", "exactly one of"),
+    ("[[mesh]]\nterrain = {}\nquad = ¦{}\n", "elsewhere already", "exactly one of"),
+    ("[[mesh]]\nterrain = {}\nup = ¦'z'\n", "`up` is for mesh files", ""),
+    ("[[mesh]]\nfile = ¦'meshes/bunny.obj'\n", "cannot read", ""),
+    ("[[mesh]]\nfile = ¦'scene.tml'\n", "cannot read", "did you mean `scene.toml`?"),
+    ("[[mesh]]\nfile = ¦'scene.toml'\n", "no mesh format", ".ply"),
+    ("[material.a]\ntexture = ¦'wood.png'\n", "cannot read", ""),
+    (
+        "[[mesh]]\nterrain = {}\ntransform = [¦{ matrix = [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0]] }]\n",
+        "flattens",
+        "",
+    ),
+    ("[settings]\nsize = [10, 10]\ncrop = ¦[0, 0, 11, 5]\n", "leaves the image", "x0 < x1"),
+    ("[settings]\nframes = ¦[3, 2]\n", "comes after", ""),
+    ("[settings]\nframes = ¦[1, 17]\n[camera]\nframes = 16\n", "no frame 17", ""),
+    ("[settings]\noutput = ¦''\n", "empty", ""),
+];
+
+const SYNTAX: &[Case] = &[
+    ("[camera]\nfov = 40\n¦fov = 41\n", "duplicate key", ""),
+    ("[camera\nfov = 40\n", "", ""),
+    ("# ä ö ü\n[camera] # ß\nfov = ¦40 x\n", "", ""),
+    ("[sky]\r\nradiance = 1\r\nambient = ¦-1\r\n", "found -1", ""),
+    ("sky = { radiance = [1, 1, 1], /* ä */ }\n", "", ""),
+];
+
+/// Line and column of the mark, and the text without it.
+fn place(marked: &str) -> (Option<(usize, usize)>, String) {
+    let text = marked.replace('¦', "");
+    let mark = marked.find('¦').map(|at| {
+        let before = &marked[..at];
+        let start = before.rfind('\n').map_or(0, |i| i + 1);
+        (before.matches('\n').count() + 1, before[start..].chars().count() + 1)
+    });
+    (mark, text)
+}
+
+fn check(cases: &[Case]) {
+    let mut wrong = String::new();
+    for (marked, message, help) in cases {
+        let (mark, text) = place(marked);
+        let found = bad(&text);
+        let at = found.line.zip(found.column);
+        let placed = at.is_some() && (mark.is_none() || at == mark);
+        let helped = found.help.as_deref().unwrap_or("").contains(help);
+        if !(placed && helped && found.message.contains(message)) {
+            wrong += &format!("{marked}=> {found}\n\n");
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[test]
+fn unknown_names_are_shown_with_the_nearest() {
+    check(NAMES);
+}
+
+#[test]
+fn wrong_types_are_shown_where_they_stand() {
+    check(TYPES);
+}
+
+#[test]
+fn values_out_of_range_are_shown_where_they_stand() {
+    check(RANGES);
+}
+
+#[test]
+fn values_that_do_not_go_together_are_shown() {
+    check(TOGETHER);
+}
+
+#[test]
+fn syntax_errors_have_their_place() {
+    check(SYNTAX);
+}
+
+#[test]
+fn columns_count_characters() {
+    let named = bad("[material.\"ä ö\"]\ndiffuse = 2\n");
+    assert_eq!((named.line, named.column), (Some(2), Some(11)));
+    let inline = bad("material = { \"äöü\" = { diffuse = 2 } }\n");
+    assert_eq!((inline.line, inline.column), (Some(1), Some(34)));
+}
+
+#[test]
+fn a_file_that_is_no_text_says_where() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, b"[sky]\n# \xff\n").expect("written");
+    let Err(Error::Input(d)) = load(&path, &LoadOptions::default()) else { panic!("an error") };
+    assert_eq!((d.line, d.column), (Some(2), Some(3)));
+    let none = load(&folder.path().join("none.toml"), &LoadOptions::default());
+    assert!(matches!(none, Err(Error::Io { .. })));
+}
+
+#[test]
+fn deep_nesting_is_refused_not_fatal() {
+    let deep = format!("camera = {}1{}", "[".repeat(100_000), "]".repeat(100_000));
+    assert!(bad(&deep).line.is_some());
+}
+
+#[test]
+fn a_fault_inside_a_mesh_file_is_shown_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, "[[mesh]]\nfile = 'bad.obj'\n").expect("written");
+    std::fs::write(folder.path().join("bad.obj"), "v 0 0 0\nv 0 nan 0\n").expect("written");
+    let Err(Error::Input(d)) = load(&path, &LoadOptions::default()) else { panic!("an error") };
+    assert_eq!((d.file, d.line), (folder.path().join("bad.obj"), Some(2)));
+}

@@ -1,0 +1,200 @@
+//! Good files: defaults, every kind of thing, warnings.
+
+use super::*;
+use crate::import::terrain_height;
+use crate::math::{DVec3, Rgb};
+use crate::scene::{CameraPath, Light as SceneLight, Settings as SceneSettings};
+
+#[test]
+fn an_empty_file_is_an_empty_scene_with_all_defaults() {
+    let loaded = good("");
+    assert_eq!(loaded.settings, SceneSettings::default());
+    assert_eq!((loaded.shot.frames, loaded.shot.vfov_degrees), (48, 40.0));
+    assert_eq!((loaded.fps, loaded.frames, loaded.output), (24, None, None));
+    assert_eq!(loaded.files.len(), 1);
+    assert!(loaded.warnings[0].message.contains("nothing lights the scene"));
+    let scene = loaded.world.into_scene(true).expect("an empty scene");
+    assert_eq!(scene.triangle_count(), 0);
+}
+
+#[test]
+fn every_setting_reaches_its_place() {
+    let loaded = good(
+        "[settings]\nsize = [320, 200]\nspp = 7\nfilter = 'tent'\nshadow_samples = 5\n\
+         sky_samples = 6\nbounces = 2\ncutoff = 0.25\nseed = 11\nexposure = 1.5\n\
+         tone = 'filmic'\npng_bits = 16\nintersector = 'oracle'\nisa = 'sse4.2'\n\
+         rules = { robust = false, retry = false, recheck = 'risky', spawn_offset = false, \
+         recentre = false }\ncrop = [1, 2, 30, 40]\nframes = [2, 3]\n\
+         output = 'out/f_####.exr'\nfps = 30\nvideo = false\noverwrite = true\nthreads = 2\n\
+         stats = 's.json'\n[camera]\nframes = 5\n",
+    );
+    let s = &loaded.settings;
+    assert_eq!((s.width, s.height, s.spp, s.seed), (320, 200, 7, 11));
+    assert_eq!((s.shadow_samples, s.sky_samples, s.bounces, s.png_bits), (5, 6, 2, 16));
+    assert_eq!((s.cutoff, s.exposure, s.isa.as_deref()), (0.25, 1.5, Some("sse4.2")));
+    // What is left at its default would show here.
+    let d = SceneSettings::default();
+    assert!(s.filter != d.filter && s.tone != d.tone && s.intersector != d.intersector);
+    let (r, rd) = (s.rules, d.rules);
+    assert!(r.robust != rd.robust && r.retry != rd.retry && r.recheck != rd.recheck);
+    assert!(r.spawn_offset != rd.spawn_offset && r.recentre != rd.recentre);
+    let crop = s.crop.expect("a crop");
+    assert_eq!((crop.x0, crop.y0, crop.x1, crop.y1), (1, 2, 30, 40));
+    let frames = loaded.frames.expect("frames");
+    assert_eq!((frames.first, frames.last, loaded.fps), (2, 3, 30));
+    assert_eq!(loaded.output.as_deref(), Some("out/f_####.exr"));
+    assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
+    assert!(loaded.overwrite && !loaded.video);
+}
+
+#[test]
+fn lights_come_in_four_kinds_and_quads_in_two_forms() {
+    let loaded = good(
+        "[[light]]\npoint = { position = [1, 2, 3], intensity = 5 }\n\
+         [[light]]\ndirectional = { to_light = [0, 10, 0], irradiance = [1, 2, 3] }\n\
+         [[light]]\nquad = { centre = [1, 10, 2], normal = '-y', size = [4, 2], radiance = 20 }\n\
+         [[light]]\n[light.quad]\ncorner = [0, 0, 0]\nedges = [[1, 0, 0], [0, 1, 0]]\n\
+         radiance = 1\ntwo_sided = true\n\
+         [[light]]\nsphere = { centre = [0, 9, 0], radius = 0.5, radiance = 3 }\n",
+    );
+    let [point, sun, lamp, window, bulb] = &loaded.world.lights[..] else { panic!("5 lights") };
+    assert_eq!(
+        *point,
+        SceneLight::Point { position: DVec3::new(1., 2., 3.), intensity: Rgb::splat(5.) }
+    );
+    let irradiance = Rgb::new(1.0, 2.0, 3.0);
+    assert_eq!(*sun, SceneLight::Directional { to_light: DVec3::Y, irradiance });
+    let SceneLight::Quad(lamp) = lamp else { panic!("a quad") };
+    assert_eq!((lamp.normal(), lamp.area(), lamp.two_sided), (DVec3::NEG_Y, 8.0, false));
+    assert!(lamp.corners.contains(&DVec3::new(-1.0, 10.0, 1.0)));
+    let SceneLight::Quad(window) = window else { panic!("a quad") };
+    assert_eq!((window.normal(), window.area(), window.two_sided), (DVec3::Z, 1.0, true));
+    assert!(matches!(bulb, SceneLight::Sphere { radius: 0.5, .. }));
+}
+
+#[test]
+fn paths_come_in_five_kinds() {
+    let path = |text: &str| good(&format!("[camera]\nroll = 5\nup = 'z'\n{text}\n")).shot;
+    let still = path("still = { eye = [9, 0, 0], target = [0, 0, 0] }");
+    assert_eq!(still.frames, 1);
+    let CameraPath::Still(pose) = still.path else { panic!("still") };
+    assert_eq!((pose.up, pose.roll_degrees), (DVec3::Z, 5.0));
+    let pan = path("pan = { from = [9, 0, 0], to = [0, 9, 0], target = [0, 0, 0] }").path;
+    assert!(matches!(pan, CameraPath::Pan { from: DVec3 { x: 9.0, .. }, up: DVec3::Z, .. }));
+    let orbit = path("orbit = { eye = [9, 0, 1], degrees = 90, target = [0, 0, 0] }").path;
+    assert!(matches!(orbit, CameraPath::Orbit { degrees: 90.0, axis: DVec3::Z, .. }));
+    let CameraPath::Keys(keys) = path(
+        "keys = [{ eye = [9, 0, 0], target = [0, 0, 0] }, \
+         { eye = [8, 0, 0], target = [0, 0, 0], roll = 9, up = [0, 2, 0] }, \
+         { eye = [7, 0, 0], target = [0, 0, 0] }]",
+    )
+    .path
+    else {
+        panic!("keys")
+    };
+    assert_eq!(keys.iter().map(|k| k.at).collect::<Vec<_>>(), [0.0, 0.5, 1.0]);
+    assert_eq!((keys[1].pose.up, keys[1].pose.roll_degrees), (DVec3::Y, 9.0));
+    assert_eq!((keys[2].pose.up, keys[2].pose.roll_degrees), (DVec3::Z, 5.0));
+    let points = "points = [[1, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 1]], target = [0, 0, 9]";
+    let spline = path(&format!("bspline = {{ {points} }}")).path;
+    assert!(matches!(spline, CameraPath::BSpline { points, .. } if points.len() == 4));
+}
+
+#[test]
+fn materials_add_up_and_glass_stands_alone() {
+    let loaded = good(
+        "[material.m]\ndiffuse = [0.1, 0.2, 0.9]\nmirror = [0.9, 0.8, 0.1]\nemission = 2\n\
+         emits_back = true\n[material.g]\nglass = { tint = [1, 0.9, 0.8] }\n",
+    );
+    let [glass, m] = &loaded.world.materials[..] else { panic!("two") };
+    assert_eq!((m.diffuse, m.mirror), (Rgb::new(0.1, 0.2, 0.9), Rgb::new(0.9, 0.8, 0.1)));
+    assert!(m.emits_back && m.emission == Rgb::splat(2.0));
+    assert_eq!(glass.glass.map(|g| (g.ior, g.tint)), Some((1.5, Rgb::new(1.0, 0.9, 0.8))));
+    let unused: Vec<_> = loaded.warnings.iter().filter(|w| w.message.contains("uses")).collect();
+    assert_eq!((unused[0].line, unused[1].line), (Some(6), Some(1)));
+}
+
+#[test]
+fn transforms_apply_in_order() {
+    let loaded = good(
+        "[[mesh]]\nbox = { min = [0, 0, 0], max = [1, 1, 1] }\n\
+         transform = [{ scale = [2, 1, 1] }, { rotate = { axis = 'z', degrees = 90 } }, \
+         { translate = [5, 0, 0] }, { matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 7]] }]\n",
+    );
+    let bounds = loaded.world.bounds();
+    assert_eq!((bounds.min, bounds.max), (DVec3::new(4., 0., 7.), DVec3::new(5., 2., 8.)));
+}
+
+#[test]
+fn generators_make_what_they_say() {
+    let loaded = good(
+        "[[mesh]]\nterrain = { vertices = 11, size = 4 }\n\
+         [[mesh]]\nname = 'ball'\nuv_sphere = { centre = [0, 5, 0], radius = 2, meridians = 8, \
+         bands = 5 }\n[[mesh]]\nuv_sphere = { radius = 1e-7 }\nnormals = 'flat'\n\
+         [[mesh]]\nquad = { centre = [0, 0, 0], normal = 'y', size = [1, 2] }\nnormals = 'smooth'\n",
+    );
+    let [terrain, ball, tiny, quad] = &loaded.world.meshes[..] else { panic!("4 meshes") };
+    assert_eq!((terrain.triangles.len(), terrain.normals.is_some()), (200, false));
+    let corner = terrain.positions[0];
+    assert!((corner.y - terrain_height(-2.0, -2.0)).abs() < 1e-6 && corner.x == -2.0);
+    assert_eq!((ball.name.as_str(), ball.triangles.len()), ("ball", 64));
+    assert!(ball.normals.is_some() && tiny.normals.is_none() && quad.normals.is_some());
+    assert!(tiny.positions.iter().all(|p| (p.length() / 1e-7 - 1.0).abs() < 1e-5));
+    let names: Vec<_> = loaded.world.materials.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(names, ["default"]);
+}
+
+#[test]
+fn files_are_read_beside_the_scene_file_once_named_and_listed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("m")).expect("a folder");
+    std::fs::write(at("m/t.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").expect("written");
+    std::fs::write(at("white.ppm"), b"P6 1 1 255\n\xff\xff\xff").expect("written");
+    let text = "[material.w]\ntexture = 'white.ppm'\n[material.w2]\ntexture = 'white.ppm'\n\
+                [[mesh]]\nfile = 'm/t.obj'\nmaterial = 'w'\nname = 'tri'\n\
+                [[mesh]]\nfile = 'm/t.obj'\nup = 'z'\n";
+    std::fs::write(at("scene.toml"), text).expect("written");
+    let loaded = load(&at("scene.toml"), &LoadOptions::default()).expect("a scene");
+    assert_eq!(loaded.files, [at("scene.toml"), at("white.ppm"), at("m/t.obj")]);
+    let world = &loaded.world;
+    assert_eq!(world.textures.len(), 1);
+    assert_eq!(world.materials[world.meshes[0].material as usize].name, "w");
+    assert_eq!(world.materials[0].diffuse, Rgb::ONE);
+    assert_eq!(world.meshes[0].name, "tri");
+    assert_eq!(world.meshes[1].positions[2], DVec3::Y);
+}
+
+#[test]
+fn what_emits_becomes_a_light_or_a_warning() {
+    let loaded = good(
+        "[material.glow]\nemission = 4\n\
+         [[mesh]]\nquad = { centre = [0, 3, 0], normal = '-y', size = [1, 1] }\nmaterial = 'glow'\n\
+         [[mesh]]\nbox = { min = [0, 0, 0], max = [1, 1, 1] }\nmaterial = 'glow'\n\
+         [[sphere]]\ncentre = [0, 9, 0]\nradius = 1\nmaterial = 'glow'\n\
+         [[mesh]]\nuv_sphere = {}\nmaterial = 'glow'\n",
+    );
+    let lights = &loaded.world.lights;
+    assert_eq!(lights.len(), 1 + 6 + 1);
+    assert!(matches!(&lights[0], SceneLight::Quad(q) if q.normal() == DVec3::NEG_Y));
+    assert!(matches!(&lights[7], SceneLight::Sphere { .. }));
+    assert_eq!((loaded.world.meshes.len(), loaded.world.spheres.len()), (1, 0));
+    let [warning] = &loaded.warnings[..] else { panic!("one warning") };
+    assert_eq!(warning.line, Some(13));
+    assert!(warning.message.contains("casts no light"));
+}
+
+#[test]
+fn the_command_line_size_reaches_framing_and_settings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n").expect("written");
+    let at = |size| {
+        let loaded = load(&path, &LoadOptions { size, ..LoadOptions::default() }).expect("a scene");
+        let CameraPath::Orbit { eye, .. } = loaded.shot.path else { panic!("an orbit") };
+        (eye.length(), (loaded.settings.width, loaded.settings.height))
+    };
+    let (wide, size) = at(Some((200, 100)));
+    assert_eq!(size, (200, 100));
+    assert!(at(Some((100, 200))).0 > 1.5 * wide);
+}

@@ -1,0 +1,131 @@
+//! Material libraries. tobj 4.0.5 panics on some of these when it meets them bare.
+
+use super::{Expect, Expect::*, check, load_bytes};
+
+const OBJ: &[u8] = b"mtllib bad.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+const CASES: &[(&str, Expect)] = &[
+    ("newmtl a\nKd 1 1 1\n", Fine),
+    ("newmtl a\nKd 0.5\n", Fine),
+    ("newmtl a\nKa 1 1 1\nKs 1 1 1\nNs 100\nillum 2\nd 1\nNi 1.45\n", Fine),
+    ("newmtl a\nd -halo 0.5\nNi 1.5\n", Fine),
+    ("newmtl a\nillum 6\nNi 1.5\nTf 0.9 1 1\n", Fine),
+    ("# only this\n", Warns(2, "no material `a`")),
+    ("newmtl\n", Line(1, "`newmtl` without a name")),
+    ("Kd 1 1 1\n", Line(1, "`Kd` before the first `newmtl`")),
+    ("newmtl a\nKd 0.1 0.2\n", Line(2, "`Kd` takes three numbers, not `0.1 0.2`")),
+    ("newmtl a\nKd\n", Line(2, "`Kd` takes three numbers")),
+    ("newmtl a\nKd 1 1 1 1\n", Line(2, "`Kd` takes three numbers")),
+    ("newmtl a\nKd red\n", Line(2, "`red` is not a number")),
+    ("newmtl a\nKd nan 0 0\n", Line(2, "not a finite number")),
+    ("newmtl a\nKd inf 0 0\n", Line(2, "not a finite number")),
+    ("newmtl a\nKd 1e300 0 0\n", Line(2, "no share of light")),
+    ("newmtl a\nKd -0.1 0 0\n", Line(2, "holds -0.1")),
+    ("newmtl a\nKd spectral file.rfl\n", Line(2, "only RGB can be read")),
+    ("newmtl a\nKd xyz 1 1 1\n", Line(2, "only RGB can be read")),
+    ("newmtl a\nKs 0.1 0.2\n", Line(2, "`Ks` takes three numbers")),
+    ("newmtl a\nKe 1 2\n", Line(2, "`Ke` takes three numbers")),
+    ("newmtl a\nKa x\n", Line(2, "`x` is not a number")),
+    ("newmtl a\nTf 1 1 2\n", Line(2, "holds 2")),
+    ("newmtl a\nNi\n", Line(2, "`Ni` without a number")),
+    ("newmtl a\nNi 0\n", Line(2, "`Ni 0`: from 0.001 to 1000")),
+    ("newmtl a\nNi -1.5\n", Line(2, "`Ni -1.5`")),
+    ("newmtl a\nNi 1.5 1.5\n", Line(2, "`Ni` takes one number")),
+    ("newmtl a\nNs abc\n", Line(2, "`abc` is not a number")),
+    ("newmtl a\nd 1.5\n", Line(2, "`d 1.5`: from 0 to 1")),
+    ("newmtl a\nd -halo\n", Line(2, "`d` without a number")),
+    ("newmtl a\nTr 2\n", Line(2, "`Tr 2`")),
+    ("newmtl a\nillum x\n", Line(2, "`x` is not a number")),
+    ("newmtl a\nillum 11\n", Line(2, "`illum 11`")),
+    ("newmtl a\nillum 2.5\n", Line(2, "a whole number from 0 to 10")),
+    ("newmtl a\nmap_Kd\n", Line(2, "`map_Kd` without a file name")),
+    ("newmtl a\nmap_Kd -s\n", Line(2, "the option `-s` lacks a value")),
+    ("newmtl a\nmap_Kd -bm 1\n", Line(2, "`map_Kd` without a file name")),
+    ("newmtl a\n\u{1b}[31m\n", Line(2, "is not a statement of an MTL file")),
+    ("newmtl a\nKd 1 1 \0\n", Line(2, "a zero byte")),
+    ("newmtl a\nmap_Kd gone.png\n", Warns(1, "texture left out: cannot read")),
+    ("newmtl a\nmap_Kd -o 1 1 -clamp on no image.png\n", Warns(2, "texture option `-clamp`")),
+    ("newmtl a\nmap_Kd bad.mtl\n", Warns(1, "not a readable image")),
+    ("newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\n", Warns(3, "defined again")),
+    ("newmtl a\nd 0.5\n", Warns(1, "rendered opaque")),
+    ("newmtl a\nillum 7\n", Warns(1, "glass without `Ni`")),
+    ("newmtl a\nKd 0.8 0.8 0.8\nKs 0.8 0.8 0.8\nillum 3\n", Warns(1, "scaled down to 1")),
+    ("newmtl a\nbump bumps.png\n", Warns(2, "textures by `bump` are ignored")),
+    ("newmtl a\nPr 0.5\n", Warns(2, "`Pr` is ignored")),
+];
+
+#[test]
+fn malformed_material_libraries_are_errors_with_lines() {
+    for (text, expect) in CASES {
+        check(text, load_bytes("obj", OBJ, &[("bad.mtl", text.as_bytes())]), expect);
+    }
+}
+
+#[test]
+fn materials_mean_what_they_say() {
+    let mtl = "newmtl mirror\nillum 3\nKs 1 1 1\nnewmtl glass\nillum 7\nNi 1.33\nTf .9 1 .8\n\
+               newmtl red #25 \nKd .6 .08 .06\nKs 1 1 1\nillum 2\nnewmtl lamp\nKe 3 2 1\n\
+               newmtl window\nd 0.2\nNi 1.5\nnewmtl max\nillum 4\nd 1\nTr 0\nKd .5 .5 .5\nNi 1.5\n\
+               newmtl bare\n";
+    let names = ["mirror", "glass", "red #25", "lamp", "window", "max", "bare"];
+    let mut obj = "mtllib all of them.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
+    for name in names {
+        obj += &format!("usemtl {name}\nf 1 2 3\n");
+    }
+    obj += "usemtl mirror\nf 1 3 2\n";
+    let model =
+        load_bytes("obj", obj.as_bytes(), &[("all of them.mtl", mtl.as_bytes())]).expect("read");
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
+    assert_eq!(model.files.len(), 2);
+    let world = &model.world;
+    let found: Vec<_> = world.meshes.iter().map(|m| (&m.name[..], m.triangles.len())).collect();
+    let expected: Vec<_> = names.iter().map(|n| (*n, if *n == "mirror" { 2 } else { 1 })).collect();
+    assert_eq!(found, expected);
+    let material = |i: usize| &world.materials[world.meshes[i].material as usize];
+    let grey = |x: f32| tweenray::math::Rgb::splat(x);
+    assert_eq!((material(0).mirror, material(0).diffuse), (grey(1.0), grey(0.0)));
+    let glass = material(1).glass.expect("glass");
+    assert_eq!((glass.ior, glass.tint), (1.33, tweenray::math::Rgb::new(0.9, 1.0, 0.8)));
+    assert_eq!(material(2).diffuse, tweenray::math::Rgb::new(0.6, 0.08, 0.06));
+    assert_eq!(material(2).mirror, grey(0.0));
+    assert_eq!(material(3).emission, tweenray::math::Rgb::new(3.0, 2.0, 1.0));
+    assert!(material(4).glass.is_some() && material(5).glass.is_none());
+    assert_eq!(material(5).diffuse, grey(0.5));
+    assert_eq!(material(6).diffuse, tweenray::import::DEFAULT_ALBEDO);
+}
+
+#[test]
+fn textures_are_linear_and_shared() {
+    let ppm = b"P6 2 1 255\n\x00\x80\xff\xff\x00\x00";
+    let mtl = b"newmtl a\nmap_Kd my image.ppm\nnewmtl b\nKd .5 .5 .5\nmap_Kd my image.ppm\n";
+    let obj = "mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
+               usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\n";
+    let others: &[(&str, &[u8])] = &[("x.mtl", mtl), ("my image.ppm", ppm)];
+    let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
+    let [texture] = &model.world.textures[..] else { panic!("one texture") };
+    let first = texture.texels[0];
+    // sRGB 128 of 255 is 0.21586 (IEC 61966-2-1).
+    assert_eq!((first.x, first.z), (0.0, 1.0));
+    assert!((first.y - 0.215_861).abs() < 1e-6);
+    let factors: Vec<f32> = model.world.materials.iter().map(|m| m.diffuse.x).collect();
+    assert_eq!(factors, [1.0, 0.5]);
+    assert_eq!(model.files.len(), 3);
+}
+
+#[test]
+fn image_bombs_are_refused() {
+    let bombs: [&[u8]; 3] = [
+        b"P6 65000 65000 255\n\0",
+        b"P6 4294967295 4294967295 255\n\0",
+        // A png header of 2^31 − 1 squared, checksum and all.
+        b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x02\0\0\0\xb8\x13\xc5\x96",
+    ];
+    for bomb in bombs {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("bomb.png");
+        std::fs::write(&path, bomb).expect("written");
+        let error = tweenray::import::load_texture(&path).expect_err("refused");
+        assert!(matches!(error, tweenray::error::Error::Input(_)), "{error}");
+    }
+}
