@@ -24,16 +24,16 @@ unsigned tr_version_header(void) { return RTC_VERSION; }
 /* Embree asks for flush-to-zero (0x8000) and denormals-are-zero (0x0040) on tracing threads. */
 #if defined(__SSE__)
 unsigned tr_mxcsr(void) { return _mm_getcsr(); }
-static unsigned begin_tracing(void) {
+unsigned tr_begin_tracing(void) {
   unsigned saved = _mm_getcsr();
   _mm_setcsr(saved | 0x8040u);
   return saved;
 }
-static void end_tracing(unsigned saved) { _mm_setcsr(saved); }
+void tr_end_tracing(unsigned saved) { _mm_setcsr(saved); }
 #else
 unsigned tr_mxcsr(void) { return 0; }
-static unsigned begin_tracing(void) { return 0; }
-static void end_tracing(unsigned saved) { (void)saved; }
+unsigned tr_begin_tracing(void) { return 0; }
+void tr_end_tracing(unsigned saved) { (void)saved; }
 #endif
 
 /* What callbacks need beside Embree's own context; the first member makes the cast valid. */
@@ -85,14 +85,14 @@ void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhit
   args.context = &context.base;
   args.flags = query_flags(flags);
   args.filter = (flags & TR_EXCLUDE) ? exclude_own_primitive : NULL;
-  unsigned saved = begin_tracing();
+  unsigned saved = tr_begin_tracing();
   switch (width) {
     case 1: rtcIntersect1(scene, rayhits, &args); break;
     case 4: rtcIntersect4(valid, scene, rayhits, &args); break;
     case 8: rtcIntersect8(valid, scene, rayhits, &args); break;
     case 16: rtcIntersect16(valid, scene, rayhits, &args); break;
   }
-  end_tracing(saved);
+  tr_end_tracing(saved);
 }
 
 void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
@@ -105,14 +105,14 @@ void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
   args.context = &context.base;
   args.flags = query_flags(flags);
   args.filter = (flags & TR_EXCLUDE) ? exclude_own_primitive : NULL;
-  unsigned saved = begin_tracing();
+  unsigned saved = tr_begin_tracing();
   switch (width) {
     case 1: rtcOccluded1(scene, packet, &args); break;
     case 4: rtcOccluded4(valid, scene, packet, &args); break;
     case 8: rtcOccluded8(valid, scene, packet, &args); break;
     case 16: rtcOccluded16(valid, scene, packet, &args); break;
   }
-  end_tracing(saved);
+  tr_end_tracing(saved);
 }
 
 /* Spheres: the f64 test of src/intersect/sphere.rs on the f64 ray, so that Embree's spheres are

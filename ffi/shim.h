@@ -41,4 +41,27 @@ void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
 /* MXCSR of the calling thread; 0 where there is none. */
 unsigned tr_mxcsr(void);
 
+/* Sets flush-to-zero for tracing and returns what MXCSR was, which the other one restores. */
+unsigned tr_begin_tracing(void);
+void tr_end_tracing(unsigned saved);
+
+/* A camera as `tweenray::embree::BareCamera` lays it out: f32, scene space. */
+typedef struct TrCamera {
+  float eye[3];
+  float forward[3];
+  float half_right[3];
+  float half_up[3];
+  unsigned width;
+  unsigned height;
+} TrCamera;
+
+typedef struct TrTally {
+  unsigned long long hits;
+  double sum_of_t;
+} TrTally;
+
+/* The benches' yardstick (bare_loop.c): one ray through the middle of every pixel, in packets of
+   8, and nothing else. Width and height are multiples of 8; the scene has triangles only. */
+TrTally tr_bare_camera_loop(RTCScene scene, const TrCamera* camera);
+
 #endif

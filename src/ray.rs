@@ -63,6 +63,7 @@ impl Ray {
     /// can hold, a direction that is not zero, `tnear <= tfar`, a finite `tnear`.
     ///
     /// (A NaN origin costs Embree a thousand times a normal ray, and returns nothing useful.)
+    #[inline]
     pub fn is_valid(&self) -> bool {
         const LARGEST: f64 = 1e18;
         let org = self.org.abs().max_element();

@@ -5,8 +5,10 @@
 //! and it borrows the buffers that Embree shares.
 
 mod packet;
+mod yardstick;
 
 pub use packet::{Packet, PacketHit, QueryFlags};
+pub use yardstick::{BareCamera, BareTally};
 
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -274,7 +276,7 @@ impl<'g> SceneBuilder<'g> {
         Ok(CommittedScene {
             scene: self.scene,
             device: self.device,
-            _spheres: self.spheres,
+            spheres: self.spheres,
             width,
             geometry: PhantomData,
         })
@@ -285,7 +287,7 @@ impl<'g> SceneBuilder<'g> {
 pub struct CommittedScene<'g> {
     scene: SceneHandle,
     device: Device,
-    _spheres: Vec<Box<[SphereData]>>,
+    spheres: Vec<Box<[SphereData]>>,
     width: usize,
     geometry: PhantomData<&'g ()>,
 }

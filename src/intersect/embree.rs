@@ -61,10 +61,6 @@ impl<'s> EmbreeIntersector<'s> {
         Ok(Self { committed: builder.commit()?, scene, rules, near, boxes, bounds })
     }
 
-    fn flags(&self, rays: &[Ray], coherent: bool) -> QueryFlags {
-        QueryFlags { coherent, exclude: rays.iter().any(|r| r.exclude != PrimRef::NONE) }
-    }
-
     /// The ray that Embree should see, and by how much its origin was moved along it; `None` for
     /// a ray that passes the scene by.
     fn approach(&self, ray: &Ray) -> Option<(Ray, f64)> {
@@ -85,18 +81,20 @@ impl<'s> EmbreeIntersector<'s> {
     ) {
         let mut packet = Packet::<W>::new();
         for (rays, hits) in rays.chunks(W).zip(hits.chunks_mut(W)) {
-            if rays.iter().any(|r| r.org.abs().max_element() > self.near) {
+            let lanes = fill(&mut packet, rays, self.near);
+            if lanes.far {
                 for (ray, hit) in rays.iter().zip(hits) {
                     *hit = self.intersect(ray, counts);
                 }
                 continue;
             }
-            let valid = fill(&mut packet, rays, counts);
-            self.committed.intersect(&valid, &mut packet, rays, self.flags(rays, true));
+            counts.invalid += lanes.invalid;
+            let flags = QueryFlags { coherent: true, exclude: lanes.exclude };
+            self.committed.intersect(&lanes.valid, &mut packet, rays, flags);
             for (lane, (ray, out)) in rays.iter().zip(hits).enumerate() {
                 *out = match packet.hit(lane) {
                     Some(hit) => self.accept(ray, ray, 0.0, &hit),
-                    None if valid[lane] != 0 => self.retry(ray, counts),
+                    None if lanes.valid[lane] != 0 => self.retry(ray, counts),
                     None => None,
                 };
             }
@@ -111,10 +109,12 @@ impl<'s> EmbreeIntersector<'s> {
     ) {
         let mut packet = Packet::<W>::new();
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
-            let valid = fill(&mut packet, rays, counts);
-            self.committed.occluded(&valid, &mut packet, rays, self.flags(rays, false));
+            let lanes = fill(&mut packet, rays, f64::INFINITY);
+            counts.invalid += lanes.invalid;
+            let flags = QueryFlags { coherent: false, exclude: lanes.exclude };
+            self.committed.occluded(&lanes.valid, &mut packet, rays, flags);
             for (lane, out) in occluded.iter_mut().enumerate() {
-                *out = valid[lane] != 0 && packet.is_occluded(lane);
+                *out = lanes.valid[lane] != 0 && packet.is_occluded(lane);
             }
         }
     }
@@ -124,28 +124,37 @@ impl<'s> EmbreeIntersector<'s> {
         let (moved, shift) = self.approach(ray)?;
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
-        let rays = std::slice::from_ref(&moved);
-        self.committed.intersect(&[-1], &mut packet, rays, self.flags(rays, false));
+        let flags = QueryFlags { coherent: false, exclude: moved.exclude != PrimRef::NONE };
+        self.committed.intersect(&[-1], &mut packet, std::slice::from_ref(&moved), flags);
         packet.hit(0).map(|hit| (hit, moved, shift))
     }
 
     /// The hit in f64, or the next one behind it where it is a phantom.
+    #[inline]
     fn accept(&self, ray: &Ray, moved: &Ray, shift: f64, hit: &PacketHit) -> Option<Hit> {
+        let accepted = self.recheck(ray, shift, hit);
+        if accepted.is_some() { accepted } else { self.pass_phantom(ray, moved, shift, hit) }
+    }
+
+    /// The first hit behind `hit` that is none.
+    #[cold]
+    fn pass_phantom(&self, ray: &Ray, moved: &Ray, shift: f64, hit: &PacketHit) -> Option<Hit> {
         let (mut hit, mut moved, mut shift) = (*hit, *moved, shift);
         for _ in 0..MOST_PHANTOMS {
-            if let Some(accepted) = self.recheck(ray, shift, &hit) {
-                return Some(accepted);
-            }
             let beyond = Ray { tnear: just_beyond(hit.t), ..moved };
             if beyond.tnear > beyond.tfar {
                 return None;
             }
             let (next, again, further) = self.query(&beyond)?;
             (hit, moved, shift) = (next, again, shift + further);
+            if let Some(accepted) = self.recheck(ray, shift, &hit) {
+                return Some(accepted);
+            }
         }
         None
     }
 
+    #[inline]
     fn recheck(&self, ray: &Ray, shift: f64, hit: &PacketHit) -> Option<Hit> {
         let Some(mesh) = self.scene.meshes.get(hit.prim.geom_id as usize) else {
             let s = &self.scene.spheres[hit.prim.prim_id as usize];
@@ -201,17 +210,30 @@ fn nudge(dir: DVec3) -> DVec3 {
     dir * (1.0 + 8.0 * ROUNDING * DVec3::new(1.0, -1.0, 1.0))
 }
 
-fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], counts: &mut RayCounts) -> [i32; W] {
-    let mut valid = [0; W];
+/// What one look at a packet's rays found out.
+struct Lanes<const W: usize> {
+    /// Embree's mask: -1 where the ray is valid.
+    valid: [i32; W],
+    /// Rays refused.
+    invalid: u64,
+    /// Some origin is further out than `near`.
+    far: bool,
+    /// Some ray excludes a primitive.
+    exclude: bool,
+}
+
+#[inline]
+fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], near: f64) -> Lanes<W> {
+    let mut lanes = Lanes { valid: [0; W], invalid: 0, far: false, exclude: false };
     for (lane, ray) in rays.iter().enumerate() {
         packet.set(lane, ray);
-        if ray.is_valid() {
-            valid[lane] = -1;
-        } else {
-            counts.invalid += 1;
-        }
+        let valid = ray.is_valid();
+        lanes.valid[lane] = -i32::from(valid);
+        lanes.invalid += u64::from(!valid);
+        lanes.far |= ray.org.abs().max_element() > near;
+        lanes.exclude |= ray.exclude != PrimRef::NONE;
     }
-    valid
+    lanes
 }
 
 /// Whether Embree's f32 answer may be far off: near an edge, or grazing.
