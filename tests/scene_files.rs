@@ -137,9 +137,9 @@ fn cornell_is_a_closed_room_and_the_camera_stays_inside() {
     for frame in 1..=loaded.shot.frames {
         let eye = loaded.shot.pose(frame).expect("a pose").eye;
         let turns = |meshes: &[tweenray::scene::WorldMesh]| -> f64 {
-            let corners = meshes.iter().flat_map(|m| {
-                m.triangles.iter().map(|t| t.map(|i| m.positions[i as usize]))
-            });
+            let corners = meshes
+                .iter()
+                .flat_map(|m| m.triangles.iter().map(|t| t.map(|i| m.positions[i as usize])));
             corners.map(|c| winding(eye, c)).sum()
         };
         // All round and facing inwards, then outside both boxes.
