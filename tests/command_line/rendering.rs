@@ -3,7 +3,7 @@
 use super::job::Job;
 use std::fs;
 
-const SMALL: &str = "--size 48x27 --spp 1 --sky-samples 2 --no-video";
+const SMALL: &str = "--size 48x27 --spp 1 --bounces 1 --sky-samples 2 --no-video";
 
 fn small(rest: &str) -> String {
     format!("render cube.obj {SMALL} {rest}")
