@@ -6,6 +6,7 @@
 mod convert;
 mod course;
 mod generators;
+mod lamps;
 mod lines;
 mod model;
 mod mtl;
