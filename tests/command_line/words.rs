@@ -82,7 +82,14 @@ fn inspect_warns_of_cameras_inside_of_darkness_and_of_emptiness() {
     for (eye, target, light, warning) in [
         ("[0, 0, 0.2]", "[0, 0, 0]", LAMP, "inside geometry"),
         ("[0, 2, 9]", "[0, 2, 20]", LAMP, "nothing is visible"),
-        ("[0, 2, 9]", "[0, 0, 0]", "", "no light"),
+        ("[0, 2, 9]", "[0, 0, 0]", "", "nothing lights the scene"),
+        (
+            "[0, 2, 9]",
+            "[0, 0, 0]",
+            "[settings]\nshadow_samples = 0\n[[light]]\nquad = \
+          { centre = [0, 9, 0], normal = \"-y\", size = [1, 1], radiance = 9 }",
+            "shadow-samples is 0",
+        ),
     ] {
         boxed(&job, eye, target, light);
         let warnings = inspected(&job)["warnings"].clone();
