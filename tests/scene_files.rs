@@ -93,7 +93,8 @@ fn reflective_spheres_says_what_the_course_file_says() {
     assert_eq!((from, to), (DVec3::new(5.0, 3.0, 10.0), DVec3::new(-5.0, 3.0, 10.0)));
     assert_eq!((target, ours.shot.frames), (DVec3::new(0.5, 0.0, -0.5), 16));
 
-    let path = Path::new("/work/shared/course/reflective_spheres.obj");
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/course/reflective_spheres.obj"));
     if !path.exists() {
         #[allow(clippy::print_stderr)]
         {
