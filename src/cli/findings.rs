@@ -67,22 +67,32 @@ fn list(frames: &[u32]) -> String {
     format!("{word} {}", numbers.join(", "))
 }
 
-/// Why every surface would be black, if so.
+/// Why every surface would be black though the scene has something bright. (Import warns itself
+/// where nothing at all is bright.)
 fn no_light(scene: &Scene, settings: &Settings) -> Option<String> {
     let sky = &scene.sky;
-    let sky_lights = sky.lights && settings.sky_samples > 0 && sky.radiance.max_element() > 0.0;
-    if sky_lights || sky.ambient.max_element() > 0.0 {
+    let sky_bright = sky.radiance.max_element() > 0.0;
+    let sky_lights = sky_bright && sky.lights && settings.sky_samples > 0;
+    let is_delta = |l: &Light| matches!(l, Light::Point { .. } | Light::Directional { .. });
+    let has_area_lights = !scene.lights.is_empty();
+    if sky_lights
+        || sky.ambient.max_element() > 0.0
+        || scene.lights.iter().any(is_delta)
+        || (has_area_lights && settings.shadow_samples > 0)
+    {
         return None;
     }
-    let is_area = |l: &Light| matches!(l, Light::Quad(_) | Light::Sphere { .. });
-    let areas = scene.lights.iter().filter(|l| is_area(l)).count();
-    if scene.lights.is_empty() {
-        let glows = scene.materials.iter().any(|m| m.emission.max_element() > 0.0);
-        let but = if glows { "; only emitters themselves are bright" } else { "" };
-        return Some(format!("no light reaches any surface{but}"));
+    let mut why = Vec::new();
+    if has_area_lights {
+        why.push("shadow-samples is 0, which leaves area lights out");
     }
-    (settings.shadow_samples == 0 && areas == scene.lights.len())
-        .then(|| "all lights are area lights and shadow-samples is 0: surfaces stay unlit".into())
+    if sky_bright && !sky.lights {
+        why.push("the sky is only a backdrop");
+    }
+    if sky_bright && sky.lights {
+        why.push("sky-samples is 0, which leaves the sky out");
+    }
+    (!why.is_empty()).then(|| format!("no light reaches any surface: {}", why.join("; ")))
 }
 
 /// Share of rays in all directions from the eye whose first hit is a surface seen from behind.

@@ -31,6 +31,29 @@ impl Machine {
     }
 }
 
+/// The widest instruction set of this machine that Embree has kernels for: what it uses unless
+/// told, and by which the last bits of a hit differ.
+pub fn best_isa() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    {
+        // Embree's AVX-512 kernels need all of these.
+        let avx512 = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512cd")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512vl");
+        match () {
+            () if avx512 => "avx512",
+            () if is_x86_feature_detected!("avx2") => "avx2",
+            () if is_x86_feature_detected!("avx") => "avx",
+            () if is_x86_feature_detected!("sse4.2") => "sse4.2",
+            () => "sse2",
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    std::env::consts::ARCH
+}
+
 /// Main memory of the machine, bytes.
 pub fn memory() -> Option<u64> {
     kilobytes("/proc/meminfo", "MemTotal:")

@@ -71,7 +71,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let loaded = Instant::now();
     let intersector = world.agree(intersect::build(&request.scene, &request.settings, threads))?;
     let built = Instant::now();
-    let target = request.target(world.same_everywhere("traces with", intersector.describe())?);
+    let tracer = request.tracer(&intersector.describe());
+    let target = request.target(world.same_everywhere("traces with", tracer)?);
     let prepare = || pool.install(|| sequence::prepare(&target, request.frames));
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));

@@ -1,12 +1,12 @@
 //! What `render` was asked to do, resolved: scene, shot, settings, frames and where they go.
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
-use super::{job, values};
+use super::{job, machine, values};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::Loaded;
 use crate::output::manifest::{self, Header};
 use crate::output::{FramePattern, WriteOptions};
-use crate::scene::{FrameRange, Scene, Settings, Shot};
+use crate::scene::{FrameRange, IntersectorKind, Scene, Settings, Shot};
 use crate::sequence::{Target, fingerprint};
 use std::path::{Path, PathBuf};
 
@@ -61,6 +61,16 @@ impl Request {
             scene_name: scene.scene.display().to_string(),
             scene_hash,
         })
+    }
+
+    /// What traces, as far as frames differ by it: `intersector` by its own description, and the
+    /// instruction set.
+    pub fn tracer(&self, intersector: &str) -> String {
+        match (self.settings.intersector, &self.settings.isa) {
+            (IntersectorKind::Oracle, _) => intersector.into(),
+            (IntersectorKind::Embree, Some(isa)) => format!("{intersector}, {isa}"),
+            (IntersectorKind::Embree, None) => format!("{intersector}, {}", machine::best_isa()),
+        }
     }
 
     /// Where frames traced by `tracer` go, and what they share.

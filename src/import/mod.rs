@@ -8,6 +8,7 @@ mod course;
 mod emission;
 mod framing;
 mod generators;
+mod lamps;
 mod lines;
 mod model;
 mod mtl;

@@ -14,8 +14,8 @@ pub const DEFAULT_ALBEDO: Rgb = Vec3::new(0.72, 0.70, 0.66);
 /// What one mesh file holds, in the file's own coordinates.
 #[derive(Debug, Clone, Default)]
 pub struct Model {
-    /// Meshes, spheres, materials (at least one where there is a mesh), textures and lights
-    /// (emitting quads of the course's dialect). `sky` stays at its default.
+    /// Meshes, spheres, materials (at least one where there is a mesh), textures and lights:
+    /// emitting faces, which are then not among the meshes. `sky` stays at its default.
     pub world: World,
     /// What the user should know: dropped faces, ignored material keys.
     pub warnings: Vec<Diagnostic>,

@@ -264,7 +264,6 @@ mod tests {
     }
 
     #[test]
-    #[expect(clippy::print_stderr, reason = "a test that skips must say so")]
     fn a_full_disk_is_an_error() {
         let Ok(full) = OpenOptions::new().write(true).open("/dev/full") else {
             eprintln!("skipped: no /dev/full here");

@@ -134,7 +134,7 @@ impl Header {
             ("output file", &self.files),
             ("scene content", &self.scene_hash),
             ("tweenray version", &self.tweenray),
-            ("tracer", &self.tracer),
+            ("tracer (see --isa)", &self.tracer),
         ] {
             entries.push((name.into(), value.clone()));
         }

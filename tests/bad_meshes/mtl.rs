@@ -65,7 +65,7 @@ fn malformed_material_libraries_are_errors_with_lines() {
 fn materials_mean_what_they_say() {
     let mtl = "newmtl mirror\nillum 3\nKs 1 1 1\nnewmtl glass\nillum 7\nNi 1.33\nTf .9 1 .8\n\
                newmtl red #25 \nKd .6 .08 .06\nKs 1 1 1\nillum 2\nnewmtl lamp\nKe 3 2 1\n\
-               newmtl window\nd 0.2\nNi 1.5\nnewmtl max\nillum 4\nd 1\nTr 0\nKd .5 .5 .5\nNi 1.5\n\
+               newmtl window\nd 0.2\nNi 1.5\nnewmtl max\nillum 4\nd 1\nTr 1\nKd .5 .5 .5\nNi 1.5\n\
                newmtl bare\n";
     let names = ["mirror", "glass", "red #25", "lamp", "window", "max", "bare"];
     let mut obj = "mtllib all of them.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
@@ -79,6 +79,9 @@ fn materials_mean_what_they_say() {
     assert_eq!(model.files.len(), 2);
     let world = &model.world;
     let found: Vec<_> = world.meshes.iter().map(|m| (&m.name[..], m.triangles.len())).collect();
+    // The lamp's triangle became lights.
+    assert_eq!(world.lights.len(), 3);
+    let names = ["mirror", "glass", "red #25", "window", "max", "bare"];
     let expected: Vec<_> = names.iter().map(|n| (*n, if *n == "mirror" { 2 } else { 1 })).collect();
     assert_eq!(found, expected);
     let material = |i: usize| &world.materials[world.meshes[i].material as usize];
@@ -88,10 +91,11 @@ fn materials_mean_what_they_say() {
     assert_eq!((glass.ior, glass.tint), (1.33, tweenray::math::Rgb::new(0.9, 1.0, 0.8)));
     assert_eq!(material(2).diffuse, tweenray::math::Rgb::new(0.6, 0.08, 0.06));
     assert_eq!(material(2).mirror, grey(0.0));
-    assert_eq!(material(3).emission, tweenray::math::Rgb::new(3.0, 2.0, 1.0));
-    assert!(material(4).glass.is_some() && material(5).glass.is_none());
-    assert_eq!(material(5).diffuse, grey(0.5));
-    assert_eq!(material(6).diffuse, tweenray::import::DEFAULT_ALBEDO);
+    let lamp = world.materials.iter().find(|m| m.name == "lamp").expect("the lamp");
+    assert_eq!(lamp.emission, tweenray::math::Rgb::new(3.0, 2.0, 1.0));
+    assert!(material(3).glass.is_some() && material(4).glass.is_none());
+    assert_eq!(material(4).diffuse, grey(0.5));
+    assert_eq!(material(5).diffuse, tweenray::import::DEFAULT_ALBEDO);
 }
 
 #[test]

@@ -91,8 +91,14 @@ fn the_undamaged_files_are_good() {
     }
 }
 
+/// 2000 cases, or more where the variable PROPTEST_CASES asks for it.
+fn config() -> ProptestConfig {
+    let asked = ProptestConfig::default();
+    ProptestConfig { cases: asked.cases.max(2000), failure_persistence: None, ..asked }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config())]
 
     #[test]
     fn damaged_files_never_panic(

@@ -142,3 +142,13 @@ fn a_file_of_degenerate_faces_is_an_empty_world_with_warnings() {
     assert!(model.world.meshes.is_empty());
     assert_eq!(model.warnings.len(), 2);
 }
+
+#[test]
+fn a_face_that_would_take_minutes_to_cut_is_an_error() {
+    let corners = 20_001;
+    let mut text: String = (0..corners).map(|i| format!("v {i} {} 0\n", i % 2)).collect();
+    text += "f";
+    (1..=corners).for_each(|i| text += &format!(" {i}"));
+    let expect = Line(corners + 1, "a concave face with 20001 corners; 20000 is the most");
+    check("comb", load_bytes("obj", text.as_bytes(), &[]), &expect);
+}

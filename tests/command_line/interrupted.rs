@@ -5,8 +5,9 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Frames of a good part of a second each.
-const SLOW: &str = "render cube.obj --size 192x108 --spp 32 --frames 1..4 --no-video";
+/// Frames of some tenths of a second each.
+const SLOW: &str = "render cube.obj --size 192x108 --spp 32 --shadow-samples 1 \
+    --sky-samples 1 --frames 1..4 --no-video";
 
 /// Starts the job and waits for its first finished frame.
 fn after_first_frame(job: &Job, out: &str) -> (Child, BufReader<std::process::ChildStderr>) {

@@ -3,7 +3,7 @@
 use super::job::Job;
 use std::fs;
 
-const SMALL: &str = "--size 48x27 --spp 1 --sky-samples 2 --no-video";
+const SMALL: &str = "--size 48x27 --spp 1 --bounces 1 --sky-samples 2 --no-video";
 
 fn small(rest: &str) -> String {
     format!("render cube.obj {SMALL} {rest}")
@@ -137,4 +137,28 @@ fn a_folder_that_cannot_be_made_fails() {
     let ran = job.run(&small("--frames 1 -o cube.obj/f_##.png"));
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.err.contains("error: cannot create the folder cube.obj"), "{}", ran.err);
+}
+
+#[test]
+fn options_may_stand_in_the_scene_file_and_the_command_line_wins() {
+    let job = Job::new();
+    let scene = "\
+        [camera]\nframes = 8\nstill = { eye = [0, 2, 9], target = [0, 0, 0] }\n\
+        [settings]\nsize = [48, 27]\nspp = 1\nframes = [2, 3]\noutput = \"o/f_##.png\"\n\
+        stats = \"stats.json\"\nthreads = 1\nvideo = false\nseed = 5\n\
+        [[mesh]]\nfile = \"cube.obj\"\n";
+    fs::write(job.path("scene.toml"), scene).expect("written");
+    let ran = job.done("render scene.toml");
+    assert!(!ran.out.contains("video"), "{}", ran.out);
+    assert_eq!(job.names("o"), ["f.manifest.jsonl", "f_02.png", "f_03.png"]);
+    let stats: serde_json::Value =
+        serde_json::from_slice(&job.read("stats.json")).expect("valid JSON");
+    assert_eq!(stats["ranks"][0]["threads"], 1);
+    // The same setting by the other way is the same job.
+    fs::write(job.path("scene.toml"), scene.replace("seed = 5\n", "")).expect("written");
+    assert!(job.done("render scene.toml --seed 5").out.contains("2 kept"));
+    job.refused("render scene.toml", "seed was 5, now it is 0");
+    job.done("render scene.toml --seed 5 --frames 1 --size 16x9 -o p.png --stats other.json");
+    assert_eq!(job.names("o").len(), 3);
+    assert!(job.path("p.png").exists() && job.path("other.json").exists());
 }

@@ -43,19 +43,59 @@ fn mistakes_are_answered_with_what_was_meant() {
     assert_eq!(job.names("."), ["cube.obj"], "a refused job leaves nothing");
 }
 
+/// A closed box and a lamp, and a camera somewhere.
+fn boxed(job: &Job, eye: &str, target: &str, light: &str) {
+    let text = format!(
+        "[camera]\nframes = 3\nstill = {{ eye = {eye}, target = {target} }}\n\
+         [sky]\nradiance = 0\n{light}\n\
+         [[mesh]]\nname = \"box\"\nbox = {{ min = [-1, -1, -1], max = [1, 1, 3] }}\n"
+    );
+    std::fs::write(job.path("box.toml"), text).expect("written");
+}
+
+const LAMP: &str = "[[light]]\npoint = { position = [0, 4, 0], intensity = 9 }";
+
+fn inspected(job: &Job) -> serde_json::Value {
+    let json = job.done("inspect box.toml --json").out;
+    serde_json::from_str(&json).expect("valid JSON")
+}
+
 #[test]
 fn inspect_tells_without_rendering() {
     let job = Job::new();
-    let text = job.done("inspect cube.obj").out;
-    for word in ["12 triangles, 8 vertices", "bounds     (-1, -1, -1) to (1, 1, 1)", "effects"] {
+    boxed(&job, "[0, 2, 9]", "[0, 0, 0]", LAMP);
+    let text = job.done("inspect box.toml").out;
+    for word in ["12 triangles", "bounds     (-1, -1, -1) to (1, 1, 3)", "effects", "1 point"] {
         assert!(text.contains(word), "{text}");
     }
-    let json = job.done("inspect cube.obj --json").out;
-    let json: serde_json::Value = serde_json::from_str(&json).expect("valid JSON");
-    assert_eq!(json["triangles"], 12);
+    let json = inspected(&job);
+    assert_eq!((&json["triangles"], &json["frames"]), (&12.into(), &3.into()));
+    assert_eq!(json["camera_end"]["eye"], serde_json::json!([0.0, 2.0, 9.0]));
     assert_eq!(json["warnings"], serde_json::json!([]));
     assert!(json["memory"]["geometry"].as_u64() > Some(0));
-    assert_eq!(job.names("."), ["cube.obj"]);
+    assert_eq!(job.names("."), ["box.toml", "cube.obj"]);
+}
+
+#[test]
+fn inspect_warns_of_cameras_inside_of_darkness_and_of_emptiness() {
+    let job = Job::new();
+    for (eye, target, light, warning) in [
+        ("[0, 0, 0.2]", "[0, 0, 0]", LAMP, "inside geometry"),
+        ("[0, 2, 9]", "[0, 2, 20]", LAMP, "nothing is visible"),
+        ("[0, 2, 9]", "[0, 0, 0]", "", "nothing lights the scene"),
+        (
+            "[0, 2, 9]",
+            "[0, 0, 0]",
+            "[settings]\nshadow_samples = 0\n[[light]]\nquad = \
+          { centre = [0, 9, 0], normal = \"-y\", size = [1, 1], radiance = 9 }",
+            "shadow-samples is 0",
+        ),
+    ] {
+        boxed(&job, eye, target, light);
+        let warnings = inspected(&job)["warnings"].clone();
+        assert_eq!(warnings.as_array().map(Vec::len), Some(1), "{warnings}");
+        assert!(warnings[0].as_str().is_some_and(|w| w.contains(warning)), "{warnings}");
+    }
 }
 
 #[test]

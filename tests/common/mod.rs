@@ -122,3 +122,22 @@ fn uv_sphere(nu: u32, nv: u32) -> WorldMesh {
     }
     mesh(positions, triangles, 0)
 }
+
+/// A frame of a scene in `scenes/`, at its own size or another.
+pub fn load_job(scene: &str, frame: u32, size: Option<(u32, u32)>) -> Job {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenes")
+        .join(scene)
+        .join("scene.toml");
+    let options = tweenray::import::LoadOptions { size, ..Default::default() };
+    let loaded = tweenray::import::load(&path, &options).unwrap();
+    let mut settings = loaded.settings;
+    (settings.width, settings.height) = size.unwrap_or((settings.width, settings.height));
+    let camera = loaded.shot.camera(frame, settings.width, settings.height).unwrap();
+    Job { world: loaded.world, camera, settings }
+}
+
+/// The machine's cores.
+pub fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
+}

@@ -4,7 +4,7 @@
 //! `emitted r g b`, `roughness x`); `m N` selects material N, from 0; `v x y z` with an optional
 //! `vt u v` after it; `f a b c d` (or three corners); `s x y z r` a sphere. Colours are linear.
 //!
-//! Faces that emit become area lights: quads as they are, triangles as three quads. The course's
+//! Faces that emit become area lights: flat convex quads as they are, others as several. The course's
 //! lights have no side, so neither have ours (`two_sided`); the quad of `reflective_spheres.obj`
 //! winds counter-clockwise seen from below and would light the scene under it in any case.
 //! Spheres that emit become sphere lights.
@@ -15,10 +15,10 @@ use super::model::Model;
 use super::obj::default_material;
 use super::source::{self, Notes};
 use super::texture::{self, TextureCache};
-use super::{polygon, tidy};
+use super::{lamps, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DVec3, Rgb, Vec2};
-use crate::scene::{Corners, Light, Material, MaterialId, QuadLight, WorldMesh, WorldSphere};
+use crate::scene::{Corners, Light, Material, MaterialId, WorldMesh, WorldSphere};
 use statements::{CourseMaterial, Face, File};
 use std::path::Path;
 
@@ -37,7 +37,8 @@ pub(super) fn read(path: &Path, text: &[u8]) -> Result<Model> {
     model.warnings.extend(std::mem::take(&mut file.notes).into_warnings(path));
     add_spheres(&file, &materials, &mut model);
     add_faces(path, &file, &materials, &mut model)?;
-    if model.world.meshes.is_empty() && model.world.spheres.is_empty() {
+    let world = &model.world;
+    if world.meshes.is_empty() && world.spheres.is_empty() && world.lights.is_empty() {
         let message = "no faces and no spheres: there is no surface to render";
         return Err(Error::input(path, message));
     }
@@ -101,7 +102,10 @@ fn add_faces(
         match materials.get(slot) {
             Some(material) if material.emitted != Rgb::ZERO => {
                 for face in faces {
-                    add_light(file, face, material.emitted, &mut dropped, model);
+                    let lights = lamps::of_face(&corners_of(file, face), material.emitted)
+                        .map_err(|message| Error::input(path, message))?;
+                    dropped += usize::from(lights.is_empty());
+                    model.world.lights.extend(lights);
                 }
             }
             known => {
@@ -117,6 +121,10 @@ fn add_faces(
     Ok(())
 }
 
+fn corners_of(file: &File, face: &Face) -> Vec<DVec3> {
+    face.corners.iter().map(|i| file.positions[*i as usize]).collect()
+}
+
 fn mesh_of(
     file: &File,
     faces: &[&Face],
@@ -126,10 +134,8 @@ fn mesh_of(
     let mut triangles = Vec::new();
     let mut local = Vec::new();
     for face in faces {
-        let corners: Vec<DVec3> =
-            face.corners.iter().map(|i| file.positions[*i as usize]).collect();
         local.clear();
-        polygon::triangulate(&corners, &mut local)?;
+        polygon::triangulate(&corners_of(file, face), &mut local)?;
         triangles.extend(local.iter().map(|t| t.map(|i| face.corners[i as usize])));
     }
     *dropped += tidy::drop_degenerate(&file.positions, &mut triangles, &mut []);
@@ -141,26 +147,4 @@ fn mesh_of(
         Corners { values: tidy::compact_owned(values, &mut uv_triangles), corners: None }
     });
     Ok(WorldMesh { name: String::new(), positions, triangles, normals: None, uvs, material })
-}
-
-/// Lights that cover a face exactly.
-fn add_light(file: &File, face: &Face, radiance: Rgb, dropped: &mut usize, model: &mut Model) {
-    let p: Vec<DVec3> = face.corners.iter().map(|i| file.positions[*i as usize]).collect();
-    let quad = |corners: [DVec3; 4]| QuadLight { corners, radiance, two_sided: true };
-    let lights = match p[..] {
-        [a, b, c] => {
-            let centre = (a + b + c) / 3.0;
-            let (ab, bc, ca) = (a.midpoint(b), b.midpoint(c), c.midpoint(a));
-            vec![[a, ab, centre, ca], [b, bc, centre, ab], [c, ca, centre, bc]]
-        }
-        [a, b, c, d] => vec![[a, b, c, d]],
-        _ => Vec::new(),
-    };
-    for light in lights.into_iter().map(quad) {
-        if light.area() > 0.0 {
-            model.world.lights.push(Light::Quad(light));
-        } else {
-            *dropped += 1;
-        }
-    }
 }

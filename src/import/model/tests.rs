@@ -10,7 +10,7 @@ use std::collections::HashMap;
 const SMOOTH: NormalPolicy = NormalPolicy::Auto { crease_degrees: 30.0 };
 
 fn shared(name: &str) -> Option<Model> {
-    let path = Path::new("/work/shared").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name);
     if !path.exists() {
         eprintln!("skipped: {} is not on this machine", path.display());
         return None;

@@ -41,6 +41,8 @@ struct Front {
     /// The text for tobj: one statement a line, names replaced by numbers (tobj trims them
     /// otherwise than we do), only what [`super::meaning`] looks at.
     clean: String,
+    /// Whether the current material has a `d`.
+    has_dissolve: bool,
     notes: Notes,
 }
 
@@ -83,6 +85,7 @@ impl Front {
             return Err("`newmtl` without a name".into());
         }
         self.put(format_args!("newmtl {}", self.sources.len()));
+        self.has_dissolve = false;
         self.sources.push(Source { name, line, filter: None });
         Ok(())
     }
@@ -126,14 +129,16 @@ impl Front {
     fn dissolve(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
         let mut after = words;
         let halo = after.next() == Some(b"-halo");
+        self.has_dissolve = true;
         self.number("d", if halo { after } else { words }, 0.0, 1.0)
     }
 
-    /// `Tr` is 1 − d; a `d` of the same material, whichever comes first, is the later word for
-    /// tobj only if it comes later, as in the file.
+    /// `Tr` is 1 − d. Where a material has both, `d` holds: some writers mean opaque by `Tr 1`.
     fn transparency(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
         let value = number_in("Tr", words, 0.0, 1.0)?;
-        self.put(format_args!("d {:e}", 1.0 - value));
+        if !self.has_dissolve {
+            self.put(format_args!("d {:e}", 1.0 - value));
+        }
         Ok(())
     }
 

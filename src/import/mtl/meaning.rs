@@ -3,7 +3,7 @@
 //! | MTL | ours |
 //! |---|---|
 //! | `Kd`, `map_Kd` | diffuse reflectance, texture |
-//! | `Ke` | emission, both sides |
+//! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
 //! | `illum` 3 or 5 with `Ks` | perfect mirror of reflectance `Ks` beside the diffuse part |
 //! | `illum` 6 or 7; 4 or 9 unless `d` is 1; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |

@@ -3,10 +3,11 @@
 use super::default_material;
 use super::face::{Faces, MISSING};
 use super::parse::Part;
-use crate::error::{Diagnostic, Error, Result};
+use crate::error::{Diagnostic, Result};
 use crate::import::model::Model;
-use crate::import::{mtl, polygon, tidy};
-use crate::math::{DVec3, Vec2, Vec3};
+use crate::import::source::Fault;
+use crate::import::{lamps, mtl, polygon, tidy};
+use crate::math::{DVec3, Rgb, Vec2, Vec3};
 use crate::scene::{Corners, WorldMesh};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -57,7 +58,7 @@ pub(super) fn assemble(
         .zip(segments)
         .map(|(part, segments)| triangulate(part, segments, &values))
         .collect::<std::result::Result<_, _>>()
-        .map_err(|message| Error::input(path, message))?;
+        .map_err(|fault| fault.at(path))?;
     let triangles = collect(groups.names.len(), pieces, &values);
 
     let mut dropped = 0;
@@ -72,13 +73,33 @@ pub(super) fn assemble(
             Some((_, name)) => name,
             None => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         };
-        model.world.meshes.push(mesh);
+        add(path, mesh, model);
     }
     model.warnings.extend(tidy::warning(path, dropped));
-    if model.world.meshes.is_empty() {
+    if model.world.meshes.is_empty() && model.world.lights.is_empty() {
         model.warnings.push(Diagnostic::new(path, "no triangle is left: nothing will be seen"));
     }
     Ok(())
+}
+
+/// Adds a mesh, or lights in its place where it emits and is simple enough.
+fn add(path: &Path, mesh: WorldMesh, model: &mut Model) {
+    let emission = model.world.materials[mesh.material as usize].emission;
+    if emission == Rgb::ZERO {
+        model.world.meshes.push(mesh);
+    } else if let Some(lights) = lamps::of_mesh(&mesh, emission) {
+        model.world.lights.extend(lights);
+    } else {
+        let message = format!(
+            "`{}` emits from {} triangles: they glow but light nothing, since that would take \
+             more than {} area lights",
+            mesh.name,
+            mesh.triangles.len(),
+            lamps::MAX_LIGHTS
+        );
+        model.warnings.push(Diagnostic::new(path, message));
+        model.world.meshes.push(mesh);
+    }
 }
 
 impl Groups {
@@ -143,7 +164,7 @@ fn triangulate(
     part: Part,
     segments: Vec<Segment>,
     values: &Values,
-) -> std::result::Result<Vec<(usize, Triangles)>, String> {
+) -> std::result::Result<Vec<(usize, Triangles)>, Fault> {
     let (mut local, mut corners) = (Vec::new(), Vec::new());
     let mut pieces: Vec<(usize, Triangles)> = Vec::with_capacity(segments.len());
     for segment in segments {
@@ -158,7 +179,10 @@ fn triangulate(
                 corners.clear();
                 corners
                     .extend(part.faces.v[start..end].iter().map(|v| values.positions[*v as usize]));
-                polygon::triangulate(&corners, &mut local)?;
+                polygon::triangulate(&corners, &mut local).map_err(|message| {
+                    let large = part.faces.large.iter().find(|(number, _)| *number == face);
+                    Fault::new(large.map_or(0, |(_, line)| *line), message)
+                })?;
             }
             out.extend(&part.faces, start, &local, values);
         }

@@ -3,6 +3,7 @@
 use super::count::Counts;
 use super::{Fault, Words};
 use crate::import::lines::show;
+use crate::import::polygon::MAX_CONCAVE_CORNERS;
 
 /// Index of an attribute that a corner does not have.
 pub(super) const MISSING: u32 = u32::MAX;
@@ -18,6 +19,8 @@ pub(super) struct Faces {
     pub vn: Vec<u32>,
     /// One past the last corner of each face.
     pub ends: Vec<u32>,
+    /// Number and line of the faces so large that triangulation may refuse them.
+    pub large: Vec<(usize, usize)>,
 }
 
 impl Faces {
@@ -46,6 +49,9 @@ impl Faces {
             if !list.is_empty() {
                 list.resize(self.v.len(), MISSING);
             }
+        }
+        if corners > MAX_CONCAVE_CORNERS {
+            self.large.push((self.ends.len(), line));
         }
         self.ends.push(self.v.len() as u32);
         Ok(())

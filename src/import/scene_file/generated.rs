@@ -23,6 +23,9 @@ pub(super) struct Cuboid {
 /// A parallelogram: either `corner` and `edges`, or `centre`, `normal` and `size`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(extend("oneOf" = [
+    {"required": ["corner", "edges"]}, {"required": ["centre", "normal", "size"]}
+]))]
 pub(super) struct Quad {
     /// One corner, world units.
     corner: Option<Point>,

@@ -16,6 +16,7 @@ mod number;
 mod piece;
 mod quad;
 mod report;
+mod schema;
 mod settings;
 mod shapes;
 #[cfg(test)]
@@ -23,6 +24,7 @@ mod tests;
 mod transform;
 mod vector;
 
+pub use schema::schema;
 pub(super) use transform::to_y_up;
 
 use super::{LoadOptions, Loaded};
@@ -91,25 +93,4 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let mut loaded = Loaded { warnings, files, ..Loaded::new(world, shot, settings) };
     file.settings.job(&source, &mut loaded)?;
     Ok(loaded)
-}
-
-/// The scene file's JSON schema (draft 2020-12), for editors.
-pub fn schema() -> serde_json::Value {
-    let mut schema = schemars::schema_for!(SceneFile).to_value();
-    drop_null_defaults(&mut schema);
-    schema
-}
-
-/// "default: null" would say that null is a value; TOML has none.
-fn drop_null_defaults(schema: &mut serde_json::Value) {
-    match schema {
-        serde_json::Value::Object(map) => {
-            if map.get("default").is_some_and(serde_json::Value::is_null) {
-                map.remove("default");
-            }
-            map.values_mut().for_each(drop_null_defaults);
-        }
-        serde_json::Value::Array(items) => items.iter_mut().for_each(drop_null_defaults),
-        _ => {}
-    }
 }

@@ -12,7 +12,6 @@ fn clip(pattern: &FramePattern) -> Clip<'_> {
     Clip { pattern, first: 3, count: 5, fps: 24.0, display: DISPLAY }
 }
 
-#[expect(clippy::print_stderr, reason = "a test that skips must say so")]
 fn has_ffmpeg() -> bool {
     let there = Command::new("ffmpeg").arg("-version").output().is_ok();
     if !there {

@@ -27,6 +27,11 @@ fn all_keys() -> BTreeSet<String> {
 }
 
 #[test]
+fn toml_has_no_null() {
+    assert!(!schema().to_string().contains("null"));
+}
+
+#[test]
 fn the_schema_is_strict_and_described() {
     fn check(schema: &Value) {
         match schema {
@@ -41,7 +46,6 @@ fn the_schema_is_strict_and_described() {
                         assert!(described, "no description: {key}");
                     }
                 }
-                assert!(map.get("default") != Some(&Value::Null));
                 map.values().for_each(check);
             }
             Value::Array(items) => items.iter().for_each(check),
@@ -68,8 +72,11 @@ fn ranges_and_defaults_are_in_the_schema() {
 
 #[test]
 fn the_page_names_every_key() {
-    let missing: Vec<String> =
-        all_keys().into_iter().filter(|key| !PAGE.contains(&format!("`{key}`"))).collect();
+    let named = |key: &String| {
+        let forms = [format!("`{key}`"), format!("## `[{key}]`"), format!("## `[[{key}]]`")];
+        forms.iter().any(|form| PAGE.contains(form))
+    };
+    let missing: Vec<String> = all_keys().into_iter().filter(|key| !named(key)).collect();
     assert!(missing.is_empty(), "docs/scene-format.md does not name {missing:?}");
 }
 
@@ -92,5 +99,29 @@ fn every_example_in_the_page_is_a_scene() {
         if let Err(e) = SceneFile::parse(&source) {
             panic!("{e}\n{block}");
         }
+    }
+}
+
+/// Defaults that the schema states are those of the page's tables.
+#[test]
+fn the_page_states_the_true_defaults() {
+    let schema = schema();
+    let tables = schema["$defs"].as_object().expect("tables").values();
+    let rows: Vec<Vec<&str>> = PAGE
+        .lines()
+        .filter(|l| l.starts_with("| `"))
+        .map(|l| l.split('|').map(str::trim).collect())
+        .collect();
+    let properties = tables.filter_map(|t| t.get("properties")?.as_object()).flatten();
+    for (key, property) in properties.filter(|(key, _)| *key != "rules") {
+        let Some(default) = property.get("default") else { continue };
+        let number = default.as_f64().map(|x| x.to_string());
+        let shown = number.unwrap_or_else(|| default.to_string().replace(',', ", "));
+        let stated = rows
+            .iter()
+            .filter(|row| row[1] == format!("`{key}`"))
+            .any(|row| row[3].trim_matches('`').replace(".0", "") == shown.replace(".0", ""));
+        // An empty list is a key that may as well be absent.
+        assert!(stated || shown == "[]", "docs/scene-format.md: `{key}` defaults to {shown}");
     }
 }

@@ -1,0 +1,143 @@
+//! Emitting faces as area lights: flat convex quads that cover them exactly.
+
+use super::polygon;
+use crate::math::{DVec3, Rgb};
+use crate::scene::{Light, QuadLight, WorldMesh};
+
+/// A mesh that would need more lights than this stays a mesh that glows but lights nothing:
+/// every light costs shadow rays at every pixel.
+pub(super) const MAX_LIGHTS: usize = 64;
+/// A quad's corners may leave its plane by this share of its size.
+const FLAT: f64 = 1e-6;
+
+/// Lights in place of a mesh whose faces emit `radiance` on both sides, or `None` where that
+/// takes more than [`MAX_LIGHTS`]. Neighbouring triangles make one quad where they can.
+pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
+    if mesh.triangles.len() > 2 * MAX_LIGHTS {
+        return None;
+    }
+    let mut quads = Vec::new();
+    let mut rest = &mesh.triangles[..];
+    while let [first, after @ ..] = rest {
+        let joined = after.first().and_then(|second| joined(*first, *second));
+        let joined = joined.map(|quad| quad.map(|i| mesh.positions[i as usize]));
+        if let Some(quad) = joined.filter(is_flat_and_convex) {
+            quads.push(quad);
+            rest = &after[1..];
+        } else {
+            quads.extend(of_triangle(first.map(|i| mesh.positions[i as usize])));
+            rest = after;
+        }
+    }
+    (quads.len() <= MAX_LIGHTS).then(|| quads.into_iter().map(|q| light(q, radiance)).collect())
+}
+
+/// Lights in place of a face of three or more corners; none where it has no area.
+///
+/// Errors: as [`polygon::triangulate`].
+pub(super) fn of_face(corners: &[DVec3], radiance: Rgb) -> Result<Vec<Light>, String> {
+    if let [a, b, c, d] = *corners {
+        if is_flat_and_convex(&[a, b, c, d]) {
+            return Ok(vec![light([a, b, c, d], radiance)]);
+        }
+    }
+    let mut triangles = Vec::new();
+    polygon::triangulate(corners, &mut triangles)?;
+    let corners = triangles.iter().map(|t| t.map(|i| corners[i as usize]));
+    Ok(corners
+        .filter(|[a, b, c]| (*b - *a).cross(*c - *a) != DVec3::ZERO)
+        .flat_map(of_triangle)
+        .map(|quad| light(quad, radiance))
+        .collect())
+}
+
+fn light(corners: [DVec3; 4], radiance: Rgb) -> Light {
+    Light::Quad(QuadLight { corners, radiance, two_sided: true })
+}
+
+/// Three quads that meet at the triangle's centre and at the middles of its sides.
+fn of_triangle([a, b, c]: [DVec3; 3]) -> [[DVec3; 4]; 3] {
+    let centre = (a + b + c) / 3.0;
+    let (ab, bc, ca) = (a.midpoint(b), b.midpoint(c), c.midpoint(a));
+    [[a, ab, centre, ca], [b, bc, centre, ab], [c, ca, centre, bc]]
+}
+
+/// The quad of two triangles of one orientation that share a side.
+fn joined(p: [u32; 3], q: [u32; 3]) -> Option<[u32; 4]> {
+    for i in 0..3 {
+        for j in 0..3 {
+            let (a, b, c) = (p[i], p[(i + 1) % 3], p[(i + 2) % 3]);
+            if q[j] == b && q[(j + 1) % 3] == a {
+                return Some([a, q[(j + 2) % 3], b, c]);
+            }
+        }
+    }
+    None
+}
+
+fn is_flat_and_convex(corners: &[DVec3; 4]) -> bool {
+    let [a, b, c, d] = *corners;
+    let normal = (c - a).cross(d - b).normalize_or_zero();
+    let size = (c - a).length().max((d - b).length());
+    let turns_left = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - q).dot(normal) > 0.0;
+    (b - a).dot(normal).abs() <= FLAT * size
+        && [(a, b, c), (b, c, d), (c, d, a), (d, a, b)]
+            .into_iter()
+            .all(|(p, q, r)| turns_left(p, q, r))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn areas(lights: &[Light]) -> DVec3 {
+        let area = |light: &Light| match light {
+            Light::Quad(quad) => {
+                assert!(is_flat_and_convex(&quad.corners));
+                0.5 * quad.area_vector()
+            }
+            other => panic!("{other:?}"),
+        };
+        lights.iter().map(area).sum()
+    }
+
+    const SQUARE: [DVec3; 4] =
+        [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, 1.0, 0.0)];
+
+    #[test]
+    fn lights_cover_their_face_exactly() {
+        let arrow =
+            [DVec3::ZERO, DVec3::new(2.0, -1.0, 0.0), DVec3::X * 0.5, DVec3::new(2.0, 1.0, 0.0)];
+        let folded = [SQUARE[0], SQUARE[1], SQUARE[2] + DVec3::Z, SQUARE[3]];
+        for (face, count, area) in [
+            (&SQUARE[..], 1, DVec3::Z),
+            (&SQUARE[..3], 3, 0.5 * DVec3::Z),
+            (&arrow[..], 6, 0.5 * DVec3::Z),
+            (&folded[..], 6, DVec3::new(-0.5, -0.5, 1.0)),
+            (&[DVec3::X; 4][..], 0, DVec3::ZERO),
+        ] {
+            let lights = of_face(face, Rgb::ONE).expect("a small face");
+            assert_eq!(lights.len(), count, "{face:?}");
+            assert!((areas(&lights) - area).length() < 1e-12, "{face:?}");
+        }
+    }
+
+    #[test]
+    fn split_quads_are_joined_and_large_meshes_refused() {
+        let mesh = |triangles: Vec<[u32; 3]>| WorldMesh {
+            name: "lamp".into(),
+            positions: SQUARE.to_vec(),
+            triangles,
+            normals: None,
+            uvs: None,
+            material: 0,
+        };
+        for [p, q] in [[[0, 1, 2], [0, 2, 3]], [[1, 2, 0], [3, 0, 2]], [[2, 0, 1], [2, 3, 0]]] {
+            let lights = of_mesh(&mesh(vec![p, q]), Rgb::ONE).expect("few");
+            assert_eq!((lights.len(), areas(&lights)), (1, DVec3::Z));
+        }
+        let lights = of_mesh(&mesh(vec![[0, 1, 2], [0, 2, 1]]), Rgb::ONE).expect("few");
+        assert_eq!(lights.len(), 6, "front and back are no quad");
+        assert!(of_mesh(&mesh(vec![[0, 1, 2]; 22]), Rgb::ONE).is_none());
+    }
+}
