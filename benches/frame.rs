@@ -30,8 +30,8 @@ struct Case {
 
 #[rustfmt::skip]
 const CASES: [Case; 5] = [
-    Case { name: "64x36, no effects", size: (64, 36), effects: false, turns: 41, frames: 25 },
-    Case { name: "128x72, no effects", size: (128, 72), effects: false, turns: 41, frames: 10 },
+    Case { name: "64x36, no effects", size: (64, 36), effects: false, turns: 101, frames: 25 },
+    Case { name: "128x72, no effects", size: (128, 72), effects: false, turns: 101, frames: 10 },
     Case { name: "640x360, no effects", size: (640, 360), effects: false, turns: 11, frames: 1 },
     Case { name: "160x90, as the scene file", size: (160, 90), effects: true, turns: 5, frames: 1 },
     Case { name: "640x360, as the scene file", size: (640, 360), effects: true, turns: 1, frames: 1 },

@@ -15,7 +15,7 @@ use tweenray::stats::RayCounts;
 
 /// The frame whose camera the rays are.
 const FRAME: u32 = 8;
-const TURNS: usize = 15;
+const TURNS: usize = 45;
 /// Rays handed over at once: the kernel's, one sample of an 8 x 8 block.
 const BLOCK: usize = 64;
 /// The hit rules, one added after another.

@@ -9,7 +9,7 @@ use tweenray::sampling::{PixelSampler, QuadWarp, cosine_hemisphere, to_world};
 use tweenray::scene::{Light, Recheck, Scene};
 use tweenray::stats::RayCounts;
 
-const TURNS: usize = 5;
+const TURNS: usize = 9;
 const WIDTHS: [&str; 4] = ["16", "8", "4", "1"];
 /// Shadow rays a point, as the scene file has it.
 const SAMPLES: usize = 16;
