@@ -14,7 +14,7 @@ use crate::embree::{
     BuildOptions, CommittedScene, Packet, PacketHit, QueryFlags, SceneBuilder, SphereData,
 };
 use crate::error::Result;
-use crate::math::{Bounds3, DVec3};
+use crate::math::{Bounds3, DVec3, orthonormal_basis};
 use crate::scene::{HitRules, Recheck, Scene};
 use crate::stats::RayCounts;
 
@@ -205,9 +205,12 @@ fn just_beyond(t: f32) -> f64 {
     f64::from(f32::from_bits(t.max(0.0).to_bits() + 1))
 }
 
-/// Each component away from zero by 4 ulp of f32.
+/// The direction turned by 4 ulp of f32, across: a factor on each component would leave an
+/// axis-parallel ray, the likeliest to pass through a vertex, as it is.
 fn nudge(dir: DVec3) -> DVec3 {
-    dir * (1.0 + 8.0 * ROUNDING * DVec3::new(1.0, -1.0, 1.0))
+    let length = dir.length();
+    let (across, _) = orthonormal_basis(dir / length);
+    dir + across * (8.0 * ROUNDING * length)
 }
 
 /// What one look at a packet's rays found out.

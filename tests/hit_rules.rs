@@ -1,0 +1,124 @@
+//! The rules between Embree and a trusted hit, each on a case that fails without it.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{job, pose, render};
+use tweenray::intersect::{EmbreeIntersector, Hit, Intersector};
+use tweenray::math::{DVec3, Rgb};
+use tweenray::ray::Ray;
+use tweenray::scene::{HitRules, Light, Material, Scene, World};
+use tweenray::stats::RayCounts;
+
+fn tessellated_sphere() -> Scene {
+    let world = common::sphere_world(Material::diffuse("white", Rgb::ONE), true);
+    world.into_scene(true).unwrap()
+}
+
+/// Rays from inside the closed sphere at each of its vertices that miss it, over many eyes.
+fn leaks(scene: &Scene, rules: HitRules) -> usize {
+    let intersector = EmbreeIntersector::new(scene, rules, None, 1).unwrap();
+    let mesh = &scene.meshes[0];
+    let mut counts = RayCounts::default();
+    let mut missed = 0;
+    for i in 0..60 {
+        let a = f64::from(i);
+        let eye = DVec3::new(a.sin(), (1.3 * a).cos(), (0.7 * a).sin()) * 0.3;
+        let targets = mesh.positions[..mesh.vertex_count].iter();
+        let rays: Vec<Ray> = targets.map(|v| Ray::new(eye, v.as_dvec3() - eye)).collect();
+        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
+        intersector.intersect_batch(&rays, &mut hits, &mut counts);
+        missed += hits.iter().filter(|h| h.is_none()).count();
+        missed += rays.iter().filter(|r| intersector.intersect(r, &mut counts).is_none()).count();
+    }
+    missed
+}
+
+#[test]
+fn no_ray_leaks_through_a_vertex() {
+    let scene = tessellated_sphere();
+    let without = leaks(&scene, HitRules { retry: false, ..HitRules::default() });
+    assert!(without > 0, "the case is not hard: nothing leaks without a second try");
+    assert_eq!(leaks(&scene, HitRules::default()), 0, "{without} leak without a second try");
+}
+
+#[test]
+fn a_far_eye_sees_what_a_near_one_does() {
+    let scene = tessellated_sphere();
+    let intersector = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let mesh = &scene.meshes[0];
+    let mut counts = RayCounts::default();
+    for prim in (0..mesh.triangles.len()).step_by(7) {
+        let [a, b, c] = mesh.corners(prim);
+        let middle = (a + b + c) / 3.0;
+        let away = (b - a).cross(c - a).normalize();
+        for distance in [2.0, 1e3, 1e6] {
+            let ray = Ray::new(middle + away * distance, -away);
+            let hit = intersector.intersect(&ray, &mut counts).unwrap();
+            assert_eq!(hit.prim.prim_id as usize, prim, "from {distance}");
+            assert!((hit.t - distance).abs() < 1e-9 * distance);
+        }
+    }
+}
+
+#[test]
+fn a_translated_scene_looks_the_same() {
+    let at = |offset: DVec3| {
+        let mut world = common::sphere_world(Material::diffuse("white", Rgb::splat(0.8)), true);
+        world.meshes[0].positions.iter_mut().for_each(|p| *p += offset);
+        let position = offset + DVec3::new(2.0, 3.0, 2.0);
+        world.lights.push(Light::Point { position, intensity: Rgb::splat(12.0) });
+        let mut job = job(world, pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), 64, 64);
+        job.camera.eye += offset;
+        render(&job).0.rgb
+    };
+    let here = at(DVec3::ZERO);
+    for offset in [1e3, 1e5, 1e6] {
+        let there = at(DVec3::new(offset, -offset, 0.5 * offset));
+        let most = here.iter().zip(&there).map(|(a, b)| (*a - *b).abs().max_element());
+        let most = most.fold(0.0, f32::max);
+        assert!(most < 1.0 / 255.0, "at {offset}: {most}");
+    }
+}
+
+#[test]
+fn senseless_rays_hit_nothing_and_are_counted() {
+    let scene = tessellated_sphere();
+    let intersector = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let good = Ray::new(DVec3::ZERO, DVec3::X);
+    let bad = [
+        Ray { org: DVec3::NAN, ..good },
+        Ray { dir: DVec3::ZERO, ..good },
+        Ray { dir: DVec3::INFINITY, ..good },
+        Ray { tnear: 2.0, tfar: 1.0, ..good },
+    ];
+    // Among good neighbours in one packet.
+    let rays: Vec<Ray> = bad.iter().flat_map(|b| [good, *b, good]).collect();
+    let mut hits = vec![None; rays.len()];
+    let mut counts = RayCounts::default();
+    intersector.intersect_batch(&rays, &mut hits, &mut counts);
+    let mut occluded = vec![false; rays.len()];
+    intersector.occluded_batch(&rays, &mut occluded, &mut counts);
+    for (i, (hit, occluded)) in hits.iter().zip(&occluded).enumerate() {
+        assert_eq!((hit.is_some(), *occluded), (i % 3 != 1, i % 3 != 1), "ray {i}");
+    }
+    assert_eq!(counts.invalid, 2 * bad.len() as u64);
+}
+
+/// A light outside of a closed room lights nothing inside, not even along the corners.
+#[test]
+fn a_closed_room_is_dark() {
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("wall", Rgb::splat(0.8)));
+    world.meshes.push(common::cube(DVec3::ZERO, 1.0, 0));
+    let position = DVec3::new(1.7, 2.9, 2.3);
+    world.lights.push(Light::Point { position, intensity: Rgb::splat(1e6) });
+    for target in [(1.0, 1.0, 1.0), (1.0, 0.999, 0.0), (-1.0, -1.0, 0.3)] {
+        let (film, counts) = render(&job(world.clone(), pose((0.0, 0.0, 0.0), target), 160, 120));
+        assert!(counts.shadow_delta > 0 || target.0 > 0.0);
+        for (x, y, rgb) in common::pixels(&film) {
+            assert_eq!(rgb, Rgb::ZERO, "{x},{y} towards {target:?}");
+        }
+    }
+}
