@@ -32,6 +32,6 @@ pub fn run(args: &ConvertArgs) -> Result<Exit> {
         written.triangles,
         written.vertices,
         written.bytes as f64 * 1e-6
-    ));
+    ))?;
     Ok(Exit::Done)
 }

@@ -91,9 +91,9 @@ pub fn run(args: &InspectArgs) -> Result<Exit> {
     if args.json {
         let text = serde_json::to_string_pretty(&inspection)
             .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text);
+        say::result(text)?;
     } else {
-        say::text(&inspection.to_text());
+        say::text(&inspection.to_text())?;
     }
     Ok(Exit::Done)
 }

@@ -98,6 +98,18 @@ fn inspect_warns_of_cameras_inside_of_darkness_and_of_emptiness() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_result_that_cannot_be_written_is_a_failure() {
+    let job = Job::new();
+    for line in ["inspect cube.obj", "--help", "schema"] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("a device");
+        let ran = Ran::of(&job.command(line).stdout(full).output().expect("the program starts"));
+        assert_eq!(ran.code, Some(1), "{line}");
+        assert!(ran.err.contains("cannot write to stdout"), "{}", ran.err);
+    }
+}
+
 #[test]
 fn a_reader_that_goes_away_is_no_fault() {
     let job = Job::new();
