@@ -6,9 +6,7 @@ use super::machine;
 use crate::error::{Error, Result};
 use crate::import::{self, Loaded};
 use crate::scene::Settings;
-
-/// Longest image edge, pixels, in scene files too.
-const MAX_EDGE: u32 = 32_768;
+use crate::scene::limits::MAX_EDGE;
 
 /// Reads the scene and puts the options over its settings.
 ///

@@ -54,7 +54,7 @@ impl Request {
             frames,
             pattern,
             overwrite: output.overwrite || loaded.overwrite,
-            fps: video.then(|| output.fps.unwrap_or(loaded.fps.into())),
+            fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats: output.stats.clone().or(loaded.stats),
             warnings,

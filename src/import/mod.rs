@@ -30,7 +30,7 @@ pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::{FrameRange, Settings, Shot, World};
+use crate::scene::{FrameRange, Settings, Shot, World, limits};
 use std::path::{Path, PathBuf};
 
 /// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
@@ -81,7 +81,7 @@ pub struct Loaded {
     /// Output pattern, where the file says, relative to the current folder.
     pub output: Option<String>,
     /// Frames per second of the preview video.
-    pub fps: u32,
+    pub fps: f64,
     /// Whether a preview video is made.
     pub video: bool,
     /// Whether existing frames are replaced.
@@ -105,7 +105,7 @@ impl Loaded {
             settings,
             frames: None,
             output: None,
-            fps: 24,
+            fps: 24.0,
             video: true,
             overwrite: false,
             threads: None,
@@ -122,7 +122,7 @@ impl Loaded {
 /// `Error::Usage` for options that are for bare meshes only, or out of range.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let scale = options.scale;
-    if !(1e-30..=1e30).contains(&scale) {
+    if !limits::FACTOR.contains(&scale) {
         return Err(Error::Usage(format!("the scale is {scale}; it lies between 1e-30 and 1e30")));
     }
     let is_scene_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));

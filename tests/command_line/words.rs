@@ -34,7 +34,13 @@ fn mistakes_are_answered_with_what_was_meant() {
     job.refused("render cube.obj --frames 0", "counted from 1");
     job.refused("render cube.obj --frames 9999999", "lies outside the shot");
     job.refused("render cube.obj --crop 0,0,9999,9", "does not lie in the image");
-    job.refused("render cube.obj --exposure nan", "finite");
+    job.refused("render cube.obj --exposure nan", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --exposure -1", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --scale -1", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --cutoff -0.5", "from 0 to 1");
+    job.refused("render cube.obj --fps 0", "from 1 to 1000");
+    job.refused("render cube.obj --spp -1", "1..=65536");
+    job.refused("render cube.obj --seed 9223372036854775808", "0..=9223372036854775807");
     job.refused("render cube.obj --threads 0", "1..=4096");
     job.refused("render cube.obj -o out/frame_####.gif", ".png, .exr or .ppm");
     job.refused("render cube.obj -o a##/b##.png", "folder");
