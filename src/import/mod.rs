@@ -78,8 +78,8 @@ pub struct Loaded {
     pub settings: Settings,
     /// Frames to render, where the file says.
     pub frames: Option<FrameRange>,
-    /// Output pattern, where the file says, relative to the current folder.
-    pub output: Option<String>,
+    /// Where frames go, where the file says.
+    pub output: Option<OutputName>,
     /// Frames per second of the preview video.
     pub fps: f64,
     /// Whether a preview video is made.
@@ -92,8 +92,28 @@ pub struct Loaded {
     pub stats: Option<PathBuf>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
-    /// Every file read, in order: the scene's content hash is taken over them.
+    /// Every file read, in order.
     pub files: Vec<PathBuf>,
+    /// What was added around a bare mesh.
+    pub stage: Option<Stage>,
+}
+
+/// Floor and lamp that a bare mesh gets: they are in the world, but not in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stage {
+    /// Which of the world's meshes is the floor.
+    pub floor: usize,
+    /// Which of the world's lights is the lamp.
+    pub lamp: usize,
+}
+
+/// Where frames go, as a scene file says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputName {
+    /// The pattern, relative to the current folder.
+    pub pattern: String,
+    /// Where it stands, for what is wrong with it; the message is still to be said.
+    pub place: Diagnostic,
 }
 
 impl Loaded {
@@ -112,6 +132,7 @@ impl Loaded {
             stats: None,
             warnings: Vec::new(),
             files: Vec::new(),
+            stage: None,
         }
     }
 }

@@ -7,7 +7,7 @@ use super::number::{FrameRate, Int, Positive, Share};
 use super::report::Source;
 use super::vector::List;
 use crate::error::Result;
-use crate::import::Loaded;
+use crate::import::{Loaded, OutputName};
 use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ToneCurve, limits};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -159,7 +159,8 @@ impl Settings {
             if output.is_empty() {
                 return Err(source.fault(&output.span, "the output pattern is empty").into());
             }
-            loaded.output = Some(output.value.clone());
+            let place = source.fault(&output.span, "");
+            loaded.output = Some(OutputName { pattern: output.value.clone(), place });
         }
         loaded.fps = self.fps.0;
         loaded.video = self.video;

@@ -42,7 +42,7 @@ fn every_setting_reaches_its_place() {
     assert_eq!((crop.x0, crop.y0, crop.x1, crop.y1), (1, 2, 30, 40));
     let frames = loaded.frames.expect("frames");
     assert_eq!((frames.first, frames.last, loaded.fps), (2, 3, 30.0));
-    assert_eq!(loaded.output.as_deref(), Some("out/f_####.exr"));
+    assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
     assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
     assert!(loaded.overwrite && !loaded.video);
 }
