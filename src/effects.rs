@@ -3,6 +3,7 @@
 //! An absent effect casts no ray, takes no branch per pixel and holds no memory: `shade` picks
 //! its kernel by this plan. `tweenray inspect` prints [`EffectPlan::reasons`].
 
+use crate::error::counted;
 use crate::scene::{Light, Scene, Settings};
 
 /// Which effects run.
@@ -69,6 +70,7 @@ impl EffectPlan {
             .count();
         let delta = scene.lights.len() - area;
         let bounces = settings.bounces;
+        let bounced = counted(bounces as usize, "bounce");
         let samples = settings.shadow_samples;
         let sky_bright = scene.sky.radiance.max_element() > 0.0;
         let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
@@ -83,18 +85,19 @@ impl EffectPlan {
             mirror: decide(
                 "mirror reflection",
                 used.mirror > 0 && bounces > 0,
-                format!("{} mirror materials in use, {bounces} bounces", used.mirror),
+                format!("{} in use, {}", counted(used.mirror, "mirror material"), bounced),
             ),
             glass: decide(
                 "glass",
                 used.glass > 0 && bounces > 0,
-                format!("{} glass materials in use, {bounces} bounces", used.glass),
+                format!("{} in use, {}", counted(used.glass, "glass material"), bounced),
             ),
             area_lights: decide(
                 "soft shadows",
                 diffuse && area > 0 && samples > 0,
                 if diffuse {
-                    format!("{area} area lights, {samples} shadow samples")
+                    let samples = counted(samples as usize, "shadow sample");
+                    format!("{}, {samples}", counted(area, "area light"))
                 } else {
                     no_diffuse()
                 },
@@ -102,7 +105,7 @@ impl EffectPlan {
             delta_lights: decide(
                 "hard shadows",
                 diffuse && delta > 0,
-                if diffuse { format!("{delta} point or directional lights") } else { no_diffuse() },
+                if diffuse { counted(delta, "point or directional light") } else { no_diffuse() },
             ),
             sky_light: decide(
                 "sky light",
@@ -114,7 +117,10 @@ impl EffectPlan {
                 } else if !scene.sky.lights {
                     "the sky is only a backdrop".into()
                 } else {
-                    format!("constant sky, {} sky samples", settings.sky_samples)
+                    format!(
+                        "constant sky, {}",
+                        counted(settings.sky_samples as usize, "sky sample")
+                    )
                 },
             ),
             ambient: decide(
@@ -125,7 +131,7 @@ impl EffectPlan {
             textures: decide(
                 "textures",
                 used.textured > 0,
-                format!("{} textured materials in use", used.textured),
+                format!("{} in use", counted(used.textured, "textured material")),
             ),
             smooth_normals: decide(
                 "smooth normals",

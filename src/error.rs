@@ -121,3 +121,8 @@ impl fmt::Display for Diagnostic {
         Ok(())
     }
 }
+
+/// `1 frame`, `2 frames`: a count in a message.
+pub fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
+}

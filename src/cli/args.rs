@@ -2,7 +2,7 @@
 
 use super::values::{self, FrameRequest};
 use crate::import::{LoadOptions, UpAxis};
-use crate::scene::{Filter, IntersectorKind, Recheck, Rect, Settings, ToneCurve};
+use crate::scene::{Filter, IntersectorKind, Recheck, Rect, Settings, ToneCurve, limits};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "AXIS", value_parser = values::choice::<UpAxis>(&["x", "y", "z"]))]
     pub up: Option<UpAxis>,
     /// Factor on the coordinates of a bare mesh [default: 1]
-    #[arg(long, value_name = "FACTOR", value_parser = values::positive)]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = values::within(limits::FACTOR))]
     pub scale: Option<f64>,
 }
 
@@ -43,14 +43,14 @@ pub struct SettingArgs {
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop)]
     pub crop: Option<Rect>,
     /// Camera samples a pixel [default: 4]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SAMPLES))]
     pub spp: Option<u32>,
     /// Pixel filter [default: box]
     #[arg(long, value_name = "FILTER",
         value_parser = values::choice::<Filter>(&["box", "tent", "gaussian", "blackman-harris"]))]
     pub filter: Option<Filter>,
     /// Factor on radiance before the tone curve [default: 1]
-    #[arg(long, value_name = "FACTOR", value_parser = values::positive_f32)]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = values::within_f32(limits::FACTOR))]
     pub exposure: Option<f32>,
     /// Tone curve of png and ppm files; exr stays linear [default: srgb]
     #[arg(long, value_name = "CURVE",
@@ -62,21 +62,22 @@ pub struct SettingArgs {
 
     /// Shadow samples per area light and camera sample; 0 leaves area lights unlit [default: 16]
     #[arg(long, value_name = "N", help_heading = "Light",
-        value_parser = clap::value_parser!(u32).range(0..=65_536))]
+        allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
     pub shadow_samples: Option<u32>,
     /// Sky rays per camera sample where the sky lights the scene [default: 16]
     #[arg(long, value_name = "N", help_heading = "Light",
-        value_parser = clap::value_parser!(u32).range(0..=65_536))]
+        allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
     pub sky_samples: Option<u32>,
     /// Specular bounces after the camera ray [default: 4]
     #[arg(long, value_name = "N", help_heading = "Light",
-        value_parser = clap::value_parser!(u32).range(0..=64))]
+        allow_negative_numbers = true, value_parser = whole(0, limits::MAX_BOUNCES))]
     pub bounces: Option<u32>,
     /// Drop mirror and glass branches that contribute less than this share [default: 0.001]
-    #[arg(long, value_name = "SHARE", help_heading = "Light", value_parser = values::share)]
+    #[arg(long, value_name = "SHARE", help_heading = "Light", allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
     pub cutoff: Option<f32>,
     /// Seed of every random number [default: 0]
-    #[arg(long, value_name = "N", help_heading = "Light")]
+    #[arg(long, value_name = "N", help_heading = "Light", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(0..=limits::MAX_SEED))]
     pub seed: Option<u64>,
 
     /// What traces: Embree, or the brute-force f64 oracle for small scenes [default: embree]
@@ -157,17 +158,21 @@ pub struct OutputArgs {
     #[arg(long)]
     pub video: bool,
     /// Frames per second of the video [default: 24]
-    #[arg(long, value_name = "N", value_parser = values::positive)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
     pub fps: Option<f64>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
     /// Rendering threads [default: the cores this process may use]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_THREADS))]
     pub threads: Option<u32>,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+fn whole(least: u32, most: u32) -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(i64::from(least)..=i64::from(most))
 }
 
 fn png_bits(text: &str) -> Result<u8, String> {

@@ -57,9 +57,9 @@ pub fn run(args: &CompareArgs) -> Result<Exit> {
     if args.json {
         let text = serde_json::to_string_pretty(&report)
             .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text);
+        say::result(text)?;
     } else {
-        report.print();
+        report.print()?;
     }
     Ok(Exit::Done)
 }
@@ -164,18 +164,18 @@ fn in_folder(folder: &Path) -> Result<Named> {
 }
 
 impl Report {
-    fn print(&self) {
+    fn print(&self) -> Result<()> {
         let width = self.pairs.iter().map(|p| p.name.len()).max().unwrap_or(0).max(6);
         say::result(format_args!(
             "{:width$}  {:>10} {:>10} {:>8} {:>7} {:>7}  largest error",
             "", "MSE", "RMSE", "PSNR dB", "SSIM", "FLIP"
-        ));
+        ))?;
         for Pair { name, comparison: c } in &self.pairs {
             let l = &c.largest;
             say::result(format_args!(
                 "{name:width$}  {:>10.3e} {:>10.3e} {:>8.2} {:>7.4} {:>7.4}  {:.4} at {},{}",
                 c.mse, c.rmse, c.psnr, c.ssim, c.flip, l.value, l.x, l.y
-            ));
+            ))?;
             if c.not_finite > 0 {
                 say::warning(format_args!("{name}: {} pixels are not finite", c.not_finite));
             }
@@ -185,7 +185,7 @@ impl Report {
             say::result(format_args!(
                 "{:width$}  {:>10.3e} {:>10.3e} {:>8.2} {:>7.4} {:>7.4}  {:.4} at {},{} in {frame}",
                 "all", s.mse, s.rmse, s.psnr, s.ssim, s.flip, l.value, l.x, l.y
-            ));
+            ))?;
         }
         let linear = self.pairs.iter().any(|p| p.comparison.space == Space::Linear);
         say::result(if linear {
@@ -193,11 +193,12 @@ impl Report {
              in sRGB"
         } else {
             "in sRGB code values from 0 to 1"
-        });
+        })?;
         for (side, names) in [("A", &self.only_in_a), ("B", &self.only_in_b)] {
             if !names.is_empty() {
                 say::warning(format_args!("only {side} has {}", names.join(", ")));
             }
         }
+        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use super::exit::{Exit, as_input};
 use super::say;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::import;
 use clap::Args;
 use std::path::PathBuf;
@@ -23,7 +23,10 @@ pub struct ConvertArgs {
 
 /// Runs the command.
 pub fn run(args: &ConvertArgs) -> Result<Exit> {
-    let report = import::convert(&args.from, &args.to).map_err(as_input)?;
+    let report = import::convert(&args.from, &args.to).map_err(|e| match e {
+        Error::Io { ref path, .. } if *path == args.to => e,
+        other => as_input(other),
+    })?;
     report.warnings.iter().for_each(say::warning);
     let written = &report.written;
     say::result(format_args!(
@@ -32,6 +35,6 @@ pub fn run(args: &ConvertArgs) -> Result<Exit> {
         written.triangles,
         written.vertices,
         written.bytes as f64 * 1e-6
-    ));
+    ))?;
     Ok(Exit::Done)
 }

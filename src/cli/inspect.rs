@@ -6,10 +6,10 @@ use super::findings::findings;
 use super::{job, say};
 use crate::cluster;
 use crate::effects::EffectPlan;
-use crate::error::{Error, Result};
-use crate::import::Loaded;
+use crate::error::{Error, Result, counted};
+use crate::import::{Loaded, Stage};
 use crate::intersect;
-use crate::math::DVec3;
+use crate::math::{Bounds3, DVec3};
 use crate::scene::{Light, Mesh, Scene, Settings, Shot};
 use clap::Args;
 use serde::Serialize;
@@ -41,6 +41,8 @@ struct Inspection {
     spheres: usize,
     materials: usize,
     textures: usize,
+    /// A floor and a lamp are added; the figures above and `bounds` are without them.
+    adds_floor_and_lamp: bool,
     lights: Lights,
     bounds: Option<[[f64; 3]; 2]>,
     frames: u32,
@@ -91,32 +93,35 @@ pub fn run(args: &InspectArgs) -> Result<Exit> {
     if args.json {
         let text = serde_json::to_string_pretty(&inspection)
             .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text);
+        say::result(text)?;
     } else {
-        say::text(&inspection.to_text());
+        say::text(&inspection.to_text())?;
     }
     Ok(Exit::Done)
 }
 
 fn inspect(args: &InspectArgs) -> Result<Inspection> {
     let loaded = job::load(&args.scene, &args.settings)?;
-    let Loaded { world, shot, settings, warnings, .. } = loaded;
+    let Loaded { world, shot, settings, warnings, stage, .. } = loaded;
     let scene = world.into_scene(settings.rules.recentre)?;
     let intersector = intersect::build(&scene, &settings, cluster::default_threads())?;
     let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
+    let meshes = own_meshes(&scene, stage);
     let reasons = EffectPlan::reasons(&scene, &settings);
     Ok(Inspection {
         scene: args.scene.scene.display().to_string(),
         tracer: intersector.describe(),
-        triangles: scene.triangle_count(),
-        vertices: scene.meshes.iter().map(|m| m.vertex_count).sum(),
-        meshes: scene.meshes.len(),
+        triangles: meshes.iter().map(|m| m.triangles.len()).sum(),
+        vertices: meshes.iter().map(|m| m.vertex_count).sum(),
+        meshes: meshes.len(),
         spheres: scene.spheres.len(),
-        materials: scene.materials.len(),
+        // Floor and lamp have one each.
+        materials: scene.materials.len() - if stage.is_some() { 2 } else { 0 },
         textures: scene.textures.len(),
+        adds_floor_and_lamp: stage.is_some(),
         lights: Lights::of(&scene),
-        bounds: world_bounds(&scene),
+        bounds: world_bounds(&scene, &meshes),
         frames: shot.frames,
         size: [settings.width, settings.height],
         camera_start: CameraView::at(&shot, 1, &settings)?,
@@ -161,9 +166,25 @@ impl CameraView {
     }
 }
 
-fn world_bounds(scene: &Scene) -> Option<[[f64; 3]; 2]> {
+/// The meshes that come from the user's files.
+fn own_meshes(scene: &Scene, stage: Option<Stage>) -> Vec<&Mesh> {
+    let lamp = stage.map(|s| s.lamp as u32);
+    let added = |index: usize, mesh: &Mesh| {
+        stage.is_some_and(|s| s.floor == index || mesh.surface.light == lamp)
+    };
+    let meshes = scene.meshes.iter().enumerate();
+    meshes.filter(|(index, mesh)| !added(*index, mesh)).map(|(_, mesh)| mesh).collect()
+}
+
+/// Bounds of `meshes` and of all spheres.
+fn world_bounds(scene: &Scene, meshes: &[&Mesh]) -> Option<[[f64; 3]; 2]> {
+    let mut bounds = meshes.iter().fold(Bounds3::EMPTY, |b, m| b.union(m.bounds));
+    for s in &scene.spheres {
+        bounds.include(s.centre - DVec3::splat(s.radius));
+        bounds.include(s.centre + DVec3::splat(s.radius));
+    }
     let corner = |p: DVec3| scene.recentring.point_to_world(p).to_array();
-    (!scene.bounds.is_empty()).then(|| [corner(scene.bounds.min), corner(scene.bounds.max)])
+    (!bounds.is_empty()).then(|| [corner(bounds.min), corner(bounds.max)])
 }
 
 fn mesh_bytes(mesh: &Mesh) -> u64 {
@@ -184,14 +205,21 @@ impl Inspection {
         let mut lines = vec![
             format!("scene      {}", self.scene),
             format!(
-                "geometry   {} triangles, {} vertices, {} meshes, {} spheres",
-                self.triangles, self.vertices, self.meshes, self.spheres
+                "geometry   {}, {} vertices, {} {}, {}",
+                counted(self.triangles, "triangle"),
+                self.vertices,
+                self.meshes,
+                if self.meshes == 1 { "mesh" } else { "meshes" },
+                counted(self.spheres, "sphere")
             ),
-            format!("materials  {}, {} textures", self.materials, self.textures),
+            format!("materials  {}, {}", self.materials, counted(self.textures, "texture")),
             format!("lights     {}", self.lights.to_text()),
         ];
         if let Some([min, max]) = self.bounds {
             lines.push(format!("bounds     {} to {}", point(min), point(max)));
+        }
+        if self.adds_floor_and_lamp {
+            lines.push("stage      a floor and a lamp are added, not counted above".into());
         }
         let [width, height] = self.size;
         lines.push(format!("frames     {} of {width}x{height} pixels", self.frames));

@@ -3,12 +3,11 @@
 use super::args::{SceneArgs, SettingArgs};
 use super::exit::as_input;
 use super::machine;
-use crate::error::{Error, Result};
-use crate::import::{self, Loaded};
+use crate::error::{Diagnostic, Error, Result};
+use crate::import::{self, Loaded, OutputName};
+use crate::output::FramePattern;
 use crate::scene::Settings;
-
-/// Longest image edge, pixels, in scene files too.
-const MAX_EDGE: u32 = 32_768;
+use crate::scene::limits::MAX_EDGE;
 
 /// Reads the scene and puts the options over its settings.
 ///
@@ -18,7 +17,17 @@ pub fn load(scene: &SceneArgs, options: &SettingArgs) -> Result<Loaded> {
         import::load(&scene.scene, &scene.load_options(options.size)).map_err(as_input)?;
     options.apply(&mut loaded.settings);
     check(&loaded.settings)?;
+    check_output(&loaded)?;
     Ok(loaded)
+}
+
+/// Whether the scene file's output can be a pattern; a fault is shown where it stands.
+fn check_output(loaded: &Loaded) -> Result<()> {
+    let Some(OutputName { pattern, place }) = &loaded.output else { return Ok(()) };
+    match FramePattern::parse(pattern, loaded.shot.frames) {
+        Err(Error::Usage(message)) => Err(Diagnostic { message, ..place.clone() }.into()),
+        other => other.map(drop),
+    }
 }
 
 /// What scene file and command line can only get wrong together.

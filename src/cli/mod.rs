@@ -20,6 +20,7 @@ mod signals;
 mod stats;
 mod values;
 
+use crate::error::Result;
 use clap::{Parser, Subcommand};
 use exit::Exit;
 use std::process::ExitCode;
@@ -64,9 +65,13 @@ pub fn run() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(wrong) => {
-            // Help and version are "errors" to clap; a closed pipe is no fault of ours.
-            let _ = wrong.print();
-            return if wrong.use_stderr() { Exit::Usage } else { Exit::Done }.into();
+            // Help and version are "errors" to clap.
+            let printed = say::told(wrong.print());
+            return match wrong.use_stderr() {
+                true => Exit::Usage,
+                false => ended(printed.map(|()| Exit::Done)),
+            }
+            .into();
         }
     };
     // The panic was told by the hook above.
@@ -81,6 +86,11 @@ fn dispatch(command: &Command) -> Exit {
         Command::Convert(args) => convert::run(args),
         Command::Schema(args) => schema::run(args),
     };
+    ended(result)
+}
+
+/// Says what went wrong, if anything did.
+fn ended(result: Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
         say::error(&error);
         Exit::of(&error)

@@ -11,9 +11,9 @@ use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::{self, Intersector};
-use crate::output::Format;
 use crate::output::manifest::beside;
 use crate::output::video::{self, Clip, Video};
+use crate::output::{Format, atomic};
 use crate::sequence::{self, Plan, Target, Tracer};
 use crate::shade::Renderer;
 use clap::Args;
@@ -73,7 +73,10 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let built = Instant::now();
     let tracer = request.tracer(&intersector.describe());
     let target = request.target(world.same_everywhere("traces with", tracer)?);
-    let prepare = || pool.install(|| sequence::prepare(&target, request.frames));
+    let prepare = || {
+        request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
+        pool.install(|| sequence::prepare(&target, request.frames))
+    };
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
     let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
@@ -172,11 +175,7 @@ fn say_stopped(job: &Frames, outcome: &Outcome) {
 
 /// Says what there is now, and makes the video of the frames asked for, all of which are there.
 fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
-    let result = |line: String| {
-        if !quiet {
-            say::result(line);
-        }
-    };
+    let result = |line: String| if quiet { Ok(()) } else { say::result(line) };
     let frames = if job.total() == 1 { "frame" } else { "frames" };
     result(format!(
         "{} {frames} in {} ({} rendered, {} kept) in {}",
@@ -185,9 +184,9 @@ fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
         job.plan.render.len(),
         job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
-    ));
+    ))?;
     match job.request.fps {
-        Some(fps) if job.total() > 1 => result(make_video(job, fps)?),
+        Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
         _ => {}
     }
     Ok(Exit::Done)

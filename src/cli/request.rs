@@ -41,7 +41,8 @@ impl Request {
     pub fn load(scene: &SceneArgs, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
         let loaded = job::load(scene, settings)?;
         let frames = frames(output, &loaded)?;
-        let name = output.output.clone().or_else(|| loaded.output.clone());
+        let name =
+            output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
         let name = name.unwrap_or_else(|| default_output(&scene.scene));
         let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
         let video = output.video || (loaded.video && !output.no_video);
@@ -54,7 +55,7 @@ impl Request {
             frames,
             pattern,
             overwrite: output.overwrite || loaded.overwrite,
-            fps: video.then(|| output.fps.unwrap_or(loaded.fps.into())),
+            fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats: output.stats.clone().or(loaded.stats),
             warnings,

@@ -1,18 +1,28 @@
-//! Words to people: results on stdout, the rest on stderr. A reader that went away is no fault.
+//! Words to people: results on stdout, the rest on stderr. A reader that went away is no fault; a
+//! result that is lost otherwise (a full disk) is.
 
-use crate::error::Error;
+use crate::error::{Error, Result};
 use std::fmt::Display;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 
 /// A line on stdout.
-pub fn result(line: impl Display) {
-    // A broken pipe means that nobody reads on (`tweenray inspect scene.toml | head -1`).
-    let _ = writeln!(std::io::stdout(), "{line}");
+pub fn result(line: impl Display) -> Result<()> {
+    text(&format!("{line}\n"))
 }
 
 /// Text on stdout as it is.
-pub fn text(text: &str) {
-    let _ = std::io::stdout().write_all(text.as_bytes());
+pub fn text(text: &str) -> Result<()> {
+    let mut out = std::io::stdout();
+    told(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// What came of writing to stdout.
+pub fn told(written: std::io::Result<()>) -> Result<()> {
+    match written {
+        // Nobody reads on (`tweenray inspect scene.toml | head -1`).
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.map_err(|e| Error::io("write to", "stdout", e)),
+    }
 }
 
 /// A line on stderr as it is.

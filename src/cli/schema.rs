@@ -20,6 +20,6 @@ pub struct SchemaArgs {}
 pub fn run(_: &SchemaArgs) -> Result<Exit> {
     let schema = serde_json::to_string_pretty(&import::schema())
         .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-    say::result(schema);
+    say::result(schema)?;
     Ok(Exit::Done)
 }

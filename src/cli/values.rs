@@ -3,6 +3,7 @@
 use crate::scene::{FrameRange, Rect};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
+use std::ops::RangeInclusive;
 
 /// Frames as asked for; an open end is filled in by the shot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,31 +82,29 @@ pub fn crop(text: &str) -> Result<Rect, String> {
     }
 }
 
-/// A finite number of at least `least`.
-fn at_least(text: &str, least: f64, strictly: bool) -> Result<f64, String> {
-    let value: f64 = text.trim().parse().map_err(|_| "this is not a number".to_string())?;
-    let fits = value.is_finite() && if strictly { value > least } else { value >= least };
-    let bound = if strictly { "above" } else { "at least" };
-    if fits { Ok(value) } else { Err(format!("the value must be finite and {bound} {least}")) }
-}
-
-/// A finite positive f64.
-pub fn positive(text: &str) -> Result<f64, String> {
-    at_least(text, 0.0, true)
-}
-
-/// A finite positive f32.
-pub fn positive_f32(text: &str) -> Result<f32, String> {
-    match positive(text)? as f32 {
-        value if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("the value is too large or too small".into()),
+/// A parser of numbers in `range`.
+pub fn within(
+    range: RangeInclusive<f64>,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
+    move |text| {
+        let value: f64 = text.trim().parse().map_err(|_| "this is not a number".to_string())?;
+        let (least, most) = (range.start(), range.end());
+        let wrong = || format!("expected a number from {} to {}", plain(*least), plain(*most));
+        if range.contains(&value) { Ok(value) } else { Err(wrong()) }
     }
 }
 
-/// A share in `[0, 1]`.
-pub fn share(text: &str) -> Result<f32, String> {
-    let value = at_least(text, 0.0, false)?;
-    if value <= 1.0 { Ok(value as f32) } else { Err("the value must be at most 1".into()) }
+/// As [`within`], for settings that are f32.
+pub fn within_f32(
+    range: RangeInclusive<f64>,
+) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync {
+    let parse = within(range);
+    move |text| parse(text).map(|value| value as f32)
+}
+
+/// `1000`, but `1e30`.
+fn plain(x: f64) -> String {
+    if x == 0.0 || (1e-3..1e6).contains(&x) { x.to_string() } else { format!("{x:e}") }
 }
 
 /// `on` or `off`.
@@ -125,6 +124,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::limits;
 
     #[test]
     fn frame_ranges_include_both_ends_and_stay_in_the_shot() {
@@ -152,10 +152,12 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_finite() {
+    fn numbers_keep_their_range() {
         for text in ["nan", "inf", "-1", "0", "1e99"] {
-            assert!(positive_f32(text).is_err(), "{text}");
+            assert!(within_f32(limits::FACTOR)(text).is_err(), "{text}");
         }
+        let share = within(limits::SHARE);
         assert!(share("1.5").is_err() && share("0").is_ok());
+        assert_eq!(within(limits::FPS)("0"), Err("expected a number from 1 to 1000".into()));
     }
 }

@@ -30,7 +30,7 @@ pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::{FrameRange, Settings, Shot, World};
+use crate::scene::{FrameRange, Settings, Shot, World, limits};
 use std::path::{Path, PathBuf};
 
 /// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
@@ -78,10 +78,10 @@ pub struct Loaded {
     pub settings: Settings,
     /// Frames to render, where the file says.
     pub frames: Option<FrameRange>,
-    /// Output pattern, where the file says, relative to the current folder.
-    pub output: Option<String>,
+    /// Where frames go, where the file says.
+    pub output: Option<OutputName>,
     /// Frames per second of the preview video.
-    pub fps: u32,
+    pub fps: f64,
     /// Whether a preview video is made.
     pub video: bool,
     /// Whether existing frames are replaced.
@@ -92,8 +92,28 @@ pub struct Loaded {
     pub stats: Option<PathBuf>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
-    /// Every file read, in order: the scene's content hash is taken over them.
+    /// Every file read, in order.
     pub files: Vec<PathBuf>,
+    /// What was added around a bare mesh.
+    pub stage: Option<Stage>,
+}
+
+/// Floor and lamp that a bare mesh gets: they are in the world, but not in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stage {
+    /// Which of the world's meshes is the floor.
+    pub floor: usize,
+    /// Which of the world's lights is the lamp.
+    pub lamp: usize,
+}
+
+/// Where frames go, as a scene file says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputName {
+    /// The pattern, relative to the current folder.
+    pub pattern: String,
+    /// Where it stands, for what is wrong with it; the message is still to be said.
+    pub place: Diagnostic,
 }
 
 impl Loaded {
@@ -105,13 +125,14 @@ impl Loaded {
             settings,
             frames: None,
             output: None,
-            fps: 24,
+            fps: 24.0,
             video: true,
             overwrite: false,
             threads: None,
             stats: None,
             warnings: Vec::new(),
             files: Vec::new(),
+            stage: None,
         }
     }
 }
@@ -122,7 +143,7 @@ impl Loaded {
 /// `Error::Usage` for options that are for bare meshes only, or out of range.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let scale = options.scale;
-    if !(1e-30..=1e30).contains(&scale) {
+    if !limits::FACTOR.contains(&scale) {
         return Err(Error::Usage(format!("the scale is {scale}; it lies between 1e-30 and 1e30")));
     }
     let is_scene_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));

@@ -46,7 +46,7 @@ pub(super) fn read_model(path: &Path) -> Result<Model> {
         "ply" => ply::read(path, bytes),
         _ => Err(Error::from(
             Diagnostic::new(path, format!("`.{ending}` is no mesh format that can be read"))
-                .help("the formats are .obj and .ply"),
+                .help("meshes are .obj and .ply; scene files end in .toml"),
         )),
     }
 }

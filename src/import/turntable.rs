@@ -6,7 +6,7 @@
 
 use super::framing::{self, Lens};
 use super::scene_file::to_y_up;
-use super::{LoadOptions, Loaded, Model, emission};
+use super::{LoadOptions, Loaded, Model, Stage, emission};
 use crate::error::{Diagnostic, Result};
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::{
@@ -42,12 +42,12 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
         (settings.width, settings.height) = (width, height);
     }
     let aspect = f64::from(settings.width.max(1)) / f64::from(settings.height.max(1));
-    let shot = stage(&mut world, aspect);
-    Ok(Loaded { warnings, files, ..Loaded::new(world, shot, settings) })
+    let (shot, stage) = put_on_stage(&mut world, aspect);
+    Ok(Loaded { warnings, files, stage, ..Loaded::new(world, shot, settings) })
 }
 
-/// Adds floor and lights to `world` and gives the camera's orbit.
-fn stage(world: &mut World, aspect: f64) -> Shot {
+/// Adds floor and lights to `world`, where it has no lights, and gives the camera's orbit.
+fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<Stage>) {
     let own_lights = !world.lights.is_empty();
     let lens = Lens { vfov_degrees: VFOV_DEGREES, aspect };
     let (target, eye) = if own_lights && !world.spheres.is_empty() {
@@ -55,19 +55,20 @@ fn stage(world: &mut World, aspect: f64) -> Shot {
     } else {
         framing::orbit(world, None, DVec3::Y, ELEVATION_DEGREES, &lens)
     };
-    if own_lights {
+    let stage = if own_lights {
         let ambient = Rgb::splat(0.1);
         world.sky = Sky { radiance: BACKDROP, lights: false, ambient };
+        None
     } else {
-        let studio = Studio::around(world, target, eye, &lens);
-        studio.build(world);
-    }
-    Shot {
+        Some(Studio::around(world, target, eye, &lens).build(world))
+    };
+    let shot = Shot {
         path: CameraPath::Orbit { target, eye, axis: DVec3::Y, degrees: 360.0, roll_degrees: 0.0 },
         easing: Easing::Linear,
         frames: FRAMES,
         vfov_degrees: VFOV_DEGREES,
-    }
+    };
+    (shot, stage)
 }
 
 /// In the course's scenes spheres stand on a plane that is far wider than what is to be seen.
@@ -101,12 +102,14 @@ impl Studio {
         Self { floor_height, floor_half: 1.5 * reach, middle, lamp_distance }
     }
 
-    fn build(&self, world: &mut World) {
+    fn build(&self, world: &mut World) -> Stage {
+        let stage = Stage { floor: world.meshes.len(), lamp: world.lights.len() };
         let floor = self.floor(world.materials.len() as u32);
         world.materials.push(Material::diffuse("floor", Rgb::splat(0.6)));
         world.meshes.push(floor);
         world.lights.push(self.key_light());
         world.sky = Sky { radiance: Rgb::new(0.42, 0.45, 0.50), lights: true, ambient: Rgb::ZERO };
+        stage
     }
 
     fn floor(&self, material: u32) -> WorldMesh {

@@ -45,6 +45,22 @@ pub fn create_folder(folder: impl AsRef<Path>) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::io("create the folder", folder, e))
 }
 
+/// Makes sure, before long work, that [`write`] can put a file at `path`: makes its folder and
+/// tries a temporary file there.
+///
+/// # Errors
+/// [`Error::Io`] with the path, also where a folder has that name.
+pub fn make_room(path: impl AsRef<Path>) -> Result<()> {
+    let path = path.as_ref();
+    if path.is_dir() {
+        return Err(Error::io("write", path, io::ErrorKind::IsADirectory.into()));
+    }
+    if let Some(folder) = path.parent() {
+        create_folder(folder)?;
+    }
+    Temporary::create(path).map(drop)
+}
+
 /// Removes temporary files of dead runs from `folder` (not below it) and returns their paths.
 ///
 /// A file is left alone when the process in its name lives on this machine, or when it changed

@@ -1,6 +1,6 @@
 //! What a sequence already holds on disk, and what that leaves to render.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Header, Manifest, Row, manifest_path};
 use crate::output::{FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
@@ -138,8 +138,12 @@ fn refuse_others(target: &Target, manifest: &Manifest, frames: FrameRange) -> Re
         return refuse_strangers(target, frames);
     }
     Err(Error::Usage(format!(
-        "{} holds {left} frames of other settings: {} was {}, now it is {}\n  \
+        "{} holds {} of other settings: {} was {}, now it is {}\n  \
          help: set it back, choose another output with -o, or replace the frames with --overwrite",
-        target.pattern, d.name, d.before, d.now
+        target.pattern,
+        counted(left, "frame"),
+        d.name,
+        d.before,
+        d.now
     )))
 }

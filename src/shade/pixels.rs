@@ -11,7 +11,8 @@ pub(super) const BLOCK: u32 = 8;
 /// Dimension of the camera samples' pixel positions.
 const FILM_DIMENSION: u32 = 0;
 
-/// One block's pixels, in 4 x 4 sub-blocks so that 16 neighbours make a packet.
+/// One block's pixels, in 4 x 4 sub-blocks so that the rays of a packet, which follow this order, are
+/// neighbours.
 pub(super) struct BlockPixels {
     places: Vec<(u32, u32)>,
     film_samplers: Vec<PixelSampler>,

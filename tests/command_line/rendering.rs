@@ -140,6 +140,19 @@ fn a_folder_that_cannot_be_made_fails() {
 }
 
 #[test]
+fn the_statistics_folder_is_made_before_the_first_frame() {
+    let job = Job::new();
+    job.done(&small("--frames 1 -o a/f.png --stats deep/er/s.json"));
+    assert_eq!(job.names("deep/er"), ["s.json"]);
+    let ran = job.run(&small("--frames 1 -o b/f.png --stats cube.obj/s.json"));
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("cube.obj") && !ran.err.contains("frame 1"), "{}", ran.err);
+    let folder = job.run(&small("--frames 1 -o b/f.png --stats deep"));
+    assert_eq!(folder.code, Some(1), "{}", folder.err);
+    assert!(!job.path("b/f.png").exists(), "nothing is rendered");
+}
+
+#[test]
 fn options_may_stand_in_the_scene_file_and_the_command_line_wins() {
     let job = Job::new();
     let scene = "\

@@ -34,13 +34,52 @@ fn mistakes_are_answered_with_what_was_meant() {
     job.refused("render cube.obj --frames 0", "counted from 1");
     job.refused("render cube.obj --frames 9999999", "lies outside the shot");
     job.refused("render cube.obj --crop 0,0,9999,9", "does not lie in the image");
-    job.refused("render cube.obj --exposure nan", "finite");
+    job.refused("render cube.obj --exposure nan", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --exposure -1", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --scale -1", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --cutoff -0.5", "from 0 to 1");
+    job.refused("render cube.obj --fps 0", "from 1 to 1000");
+    job.refused("render cube.obj --spp -1", "1..=65536");
+    job.refused("render cube.obj --seed 9223372036854775808", "0..=9223372036854775807");
     job.refused("render cube.obj --threads 0", "1..=4096");
     job.refused("render cube.obj -o out/frame_####.gif", ".png, .exr or .ppm");
     job.refused("render cube.obj -o a##/b##.png", "folder");
     job.refused("render nothing.obj", "nothing.obj");
     job.refused("render nothing.toml", "nothing.toml");
     assert_eq!(job.names("."), ["cube.obj"], "a refused job leaves nothing");
+}
+
+#[test]
+fn a_scene_of_another_ending_or_with_a_wrong_output_is_told_so() {
+    let job = Job::new();
+    std::fs::write(job.path("scene.txt"), "[camera]\n").expect("written");
+    job.refused("render scene.txt", "scene files end in .toml");
+    let text = "[settings]\noutput = 'f_####.gif'\n[[mesh]]\nfile = 'cube.obj'\n";
+    std::fs::write(job.path("scene.toml"), text).expect("written");
+    for command in ["inspect", "render"] {
+        job.refused(&format!("{command} scene.toml"), "scene.toml:2:10: cannot tell the format");
+    }
+}
+
+#[test]
+fn inspect_of_a_bare_mesh_gives_its_own_figures() {
+    let job = Job::new();
+    let text = job.done("inspect cube.obj").out;
+    let bounds = "bounds     (-1, -1, -1) to (1, 1, 1)";
+    for words in ["12 triangles, 8 vertices, 1 mesh, 0 spheres", "materials  1,", bounds, "stage "]
+    {
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn convert_makes_the_folder_and_names_the_target() {
+    let job = Job::new();
+    job.done("convert cube.obj new/folder/b.ply");
+    assert_eq!(job.names("new/folder"), ["b.ply"]);
+    let ran = job.run("convert cube.obj cube.obj/b.ply");
+    assert_eq!(ran.code, Some(1), "{}", ran.err);
+    assert!(ran.err.contains("cube.obj/b.ply: ") && !ran.err.contains(".part"), "{}", ran.err);
 }
 
 /// A closed box and a lamp, and a camera somewhere.
@@ -95,6 +134,24 @@ fn inspect_warns_of_cameras_inside_of_darkness_and_of_emptiness() {
         let warnings = inspected(&job)["warnings"].clone();
         assert_eq!(warnings.as_array().map(Vec::len), Some(1), "{warnings}");
         assert!(warnings[0].as_str().is_some_and(|w| w.contains(warning)), "{warnings}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_result_that_cannot_be_written_is_a_failure() {
+    use std::os::unix::fs::FileTypeExt;
+    let about = std::fs::metadata("/dev/full");
+    if !about.is_ok_and(|about| about.file_type().is_char_device()) {
+        eprintln!("skipped: no /dev/full here");
+        return;
+    }
+    let job = Job::new();
+    for line in ["inspect cube.obj", "--help", "schema"] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("a device");
+        let ran = Ran::of(&job.command(line).stdout(full).output().expect("the program starts"));
+        assert_eq!(ran.code, Some(1), "{line}");
+        assert!(ran.err.contains("cannot write to stdout"), "{}", ran.err);
     }
 }
 

@@ -11,7 +11,8 @@ pub use write_ply::{PlyReport, write_ply};
 use super::model::read_model;
 use crate::error::{Diagnostic, Error, Result};
 use crate::scene::Light;
-use std::io::Write;
+use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// What [`convert`] did.
@@ -68,11 +69,14 @@ fn write_atomically<T>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
+    // The system's own word, without the temporary file's name; `path` is what the user knows.
+    let failed = |action, e: io::Error| Error::io(action, path, e.kind().into());
+    fs::create_dir_all(folder).map_err(|e| failed("make the folder of", e))?;
     let mut builder = tempfile::Builder::new();
     builder.prefix(".tweenray-").suffix(".part");
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(|e| Error::io("write", path, e))?;
+    let mut file = builder.tempfile_in(folder).map_err(|e| failed("write", e))?;
     let result = write(file.as_file_mut())?;
     file.as_file().sync_all().map_err(|e| Error::io("write", path, e))?;
     file.persist(path).map_err(|e| Error::io("rename", path, e.error))?;

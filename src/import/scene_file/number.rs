@@ -5,6 +5,7 @@
 //! All floats are finite. Lengths and coordinates stay within 1e30, so that squares of them do
 //! not overflow and colours fit an f32.
 
+use crate::scene::limits;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -77,8 +78,8 @@ number!(
 );
 number!(
     /// A length or factor.
-    Positive: "a number from 1e-30 to 1e30", |x| (1e-30..=1e30).contains(&x),
-    { "type": "number", "minimum": 1e-30, "maximum": 1e30 }
+    Positive: "a number from 1e-30 to 1e30", |x| limits::FACTOR.contains(&x),
+    { "type": "number", "minimum": limits::FACTOR.start(), "maximum": limits::FACTOR.end() }
 );
 number!(
     /// An amount of light in one channel.
@@ -87,8 +88,13 @@ number!(
 );
 number!(
     /// A share.
-    Share: "a number from 0 to 1", |x| (0.0..=1.0).contains(&x),
+    Share: "a number from 0 to 1", |x| limits::SHARE.contains(&x),
     { "type": "number", "minimum": 0, "maximum": 1 }
+);
+number!(
+    /// Frames per second.
+    FrameRate: "a number from 1 to 1000", |x| limits::FPS.contains(&x),
+    { "type": "number", "minimum": limits::FPS.start(), "maximum": limits::FPS.end() }
 );
 number!(
     /// Any angle, degrees.

@@ -3,21 +3,25 @@
 mod switches;
 
 use super::at::At;
-use super::number::{Int, Positive, Share};
+use super::number::{FrameRate, Int, Positive, Share};
 use super::report::Source;
 use super::vector::List;
 use crate::error::Result;
-use crate::import::Loaded;
-use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ToneCurve};
+use crate::import::{Loaded, OutputName};
+use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ToneCurve, limits};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
 use switches::{Isa, PngBits, Rules};
 
 /// Image columns or rows.
-pub(super) type Pixels = Int<1, 32_768>;
+pub(super) type Pixels = Int<1, { limits::MAX_EDGE as i64 }>;
 /// Samples of any kind that may be none.
-type Samples = Int<0, 65_536>;
+type Samples = Int<0, MAX_SAMPLES>;
+/// A corner of a crop.
+type Corner = Int<0, { limits::MAX_EDGE as i64 }>;
+
+const MAX_SAMPLES: i64 = limits::MAX_SAMPLES as i64;
 
 /// How to render. The command line's options of the same names stand over these.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -26,7 +30,7 @@ pub(super) struct Settings {
     /// Image width and height, pixels.
     pub size: List<Pixels, 2>,
     /// Camera samples a pixel.
-    spp: Int<1, 65_536>,
+    spp: Int<1, MAX_SAMPLES>,
     /// Pixel filter: "box", "tent", "gaussian" or "blackman-harris".
     filter: Filter,
     /// Shadow samples per area light and camera sample; 0 leaves area lights unlit.
@@ -34,11 +38,11 @@ pub(super) struct Settings {
     /// Sky rays per camera sample where the sky lights the scene.
     sky_samples: Samples,
     /// Specular bounces after the camera ray.
-    bounces: Int<0, 64>,
+    bounces: Int<0, { limits::MAX_BOUNCES as i64 }>,
     /// Mirror and glass branches that contribute less than this share are dropped.
     cutoff: Share,
     /// Seed of every random number.
-    seed: Int<0, { i64::MAX }>,
+    seed: Int<0, { limits::MAX_SEED as i64 }>,
     /// Factor on radiance before the tone curve.
     exposure: Positive,
     /// Tone curve of png and ppm files: "srgb" and "linear" clip, "reinhard" and "filmic" compress
@@ -54,20 +58,20 @@ pub(super) struct Settings {
     rules: Rules,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, as `[x0, y0, x1, y1]`; row 0 is the top.
     /// Absent: all of them.
-    crop: Option<At<List<Int<0, 32_768>, 4>>>,
+    crop: Option<At<List<Corner, 4>>>,
     /// First and last frame to render, as `[first, last]`, counted from 1. Absent: all.
     frames: Option<At<List<Int<1, 1_000_000>, 2>>>,
     /// Where frames go, relative to the current folder: `####` is the frame's number, the ending
     /// (png, exr, ppm) the format. Absent: the command line decides.
     output: Option<At<String>>,
     /// Frames per second of the preview video.
-    fps: Int<1, 1000>,
+    fps: FrameRate,
     /// Whether a preview video is made of the sequence.
     video: bool,
     /// Whether existing frames are replaced.
     overwrite: bool,
     /// Rendering threads. Absent: the cores this process may use.
-    threads: Option<Int<1, 4096>>,
+    threads: Option<Int<1, { limits::MAX_THREADS as i64 }>>,
     /// File for what the job took, as JSON, relative to the current folder. Absent: none.
     stats: Option<PathBuf>,
 }
@@ -93,7 +97,7 @@ impl Default for Settings {
             crop: None,
             frames: None,
             output: None,
-            fps: Int::clamped(24),
+            fps: FrameRate(24.0),
             video: true,
             overwrite: false,
             threads: None,
@@ -133,7 +137,7 @@ impl Settings {
         })
     }
 
-    fn crop(&self, crop: &At<List<Int<0, 32_768>, 4>>, source: &Source) -> Result<Rect> {
+    fn crop(&self, crop: &At<List<Corner, 4>>, source: &Source) -> Result<Rect> {
         let [x0, y0, x1, y1] = crop.0.map(Int::u32);
         let [width, height] = self.size.0.map(Int::u32);
         if x0 < x1 && y0 < y1 && x1 <= width && y1 <= height {
@@ -155,9 +159,10 @@ impl Settings {
             if output.is_empty() {
                 return Err(source.fault(&output.span, "the output pattern is empty").into());
             }
-            loaded.output = Some(output.value.clone());
+            let place = source.fault(&output.span, "");
+            loaded.output = Some(OutputName { pattern: output.value.clone(), place });
         }
-        loaded.fps = self.fps.u32();
+        loaded.fps = self.fps.0;
         loaded.video = self.video;
         loaded.overwrite = self.overwrite;
         loaded.threads = self.threads.map(Int::u32);

@@ -10,7 +10,7 @@ fn an_empty_file_is_an_empty_scene_with_all_defaults() {
     let loaded = good("");
     assert_eq!(loaded.settings, SceneSettings::default());
     assert_eq!((loaded.shot.frames, loaded.shot.vfov_degrees), (48, 40.0));
-    assert_eq!((loaded.fps, loaded.frames, loaded.output), (24, None, None));
+    assert_eq!((loaded.fps, loaded.frames, loaded.output), (24.0, None, None));
     assert_eq!(loaded.files.len(), 1);
     assert!(loaded.warnings[0].message.contains("nothing lights the scene"));
     let scene = loaded.world.into_scene(true).expect("an empty scene");
@@ -41,8 +41,8 @@ fn every_setting_reaches_its_place() {
     let crop = s.crop.expect("a crop");
     assert_eq!((crop.x0, crop.y0, crop.x1, crop.y1), (1, 2, 30, 40));
     let frames = loaded.frames.expect("frames");
-    assert_eq!((frames.first, frames.last, loaded.fps), (2, 3, 30));
-    assert_eq!(loaded.output.as_deref(), Some("out/f_####.exr"));
+    assert_eq!((frames.first, frames.last, loaded.fps), (2, 3, 30.0));
+    assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
     assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
     assert!(loaded.overwrite && !loaded.video);
 }

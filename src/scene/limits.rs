@@ -1,0 +1,20 @@
+//! What settings may be: the same in scene files and on the command line.
+
+use std::ops::RangeInclusive;
+
+/// Most image columns or rows.
+pub const MAX_EDGE: u32 = 32_768;
+/// Most samples of one kind.
+pub const MAX_SAMPLES: u32 = 65_536;
+/// Most specular bounces.
+pub const MAX_BOUNCES: u32 = 64;
+/// Most rendering threads.
+pub const MAX_THREADS: u32 = 4096;
+/// The largest seed: the largest whole number that TOML has.
+pub const MAX_SEED: u64 = i64::MAX as u64;
+/// Lengths and factors, exposure among them.
+pub const FACTOR: RangeInclusive<f64> = 1e-30..=1e30;
+/// Shares of a whole.
+pub const SHARE: RangeInclusive<f64> = 0.0..=1.0;
+/// Frames per second of a video.
+pub const FPS: RangeInclusive<f64> = 1.0..=1000.0;
