@@ -46,6 +46,8 @@ impl Request {
         let name = name.unwrap_or_else(|| default_output(&scene.scene));
         let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
         let video = output.video || (loaded.video && !output.no_video);
+        let stats = output.stats.clone().or(loaded.stats);
+        refuse_input(stats.as_deref(), &loaded.files)?;
         let Loaded { world, shot, settings, warnings, .. } = loaded;
         let scene_hash = fingerprint(&world, &shot);
         Ok(Self {
@@ -57,7 +59,7 @@ impl Request {
             overwrite: output.overwrite || loaded.overwrite,
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
-            stats: output.stats.clone().or(loaded.stats),
+            stats,
             warnings,
             scene_name: scene.scene.display().to_string(),
             scene_hash,
@@ -114,4 +116,17 @@ fn default_output(scene: &Path) -> String {
     let name = scene.file_stem().unwrap_or_default().to_string_lossy();
     // A # of the scene's own name would count as a digit of the frame number.
     format!("out/{}/frame_####.png", name.replace('#', "_"))
+}
+
+/// Refuses to write statistics over a file that the scene was read from.
+fn refuse_input(stats: Option<&Path>, inputs: &[PathBuf]) -> Result<()> {
+    let Some(stats) = stats else { return Ok(()) };
+    let real = |path: &Path| std::fs::canonicalize(path).ok();
+    match real(stats).filter(|s| inputs.iter().any(|input| real(input).as_ref() == Some(s))) {
+        Some(_) => Err(Error::Usage(format!(
+            "--stats {} would replace a file that the scene is read from",
+            stats.display()
+        ))),
+        None => Ok(()),
+    }
 }

@@ -108,6 +108,21 @@ fn is_alive(pid: u32) -> bool {
     pid == std::process::id() || Path::new("/proc").join(pid.to_string()).exists()
 }
 
+/// The file that `target` stands for: where a link leads. A rename would replace a link by a file,
+/// and a device too, which is an error.
+fn resolve(target: &Path) -> Result<PathBuf> {
+    let Ok(found) = fs::symlink_metadata(target) else { return Ok(target.to_path_buf()) };
+    let real = match found.is_symlink() {
+        true => fs::canonicalize(target).map_err(|e| Error::io("follow the link", target, e))?,
+        false => target.to_path_buf(),
+    };
+    let special = fs::metadata(&real).is_ok_and(|m| !m.is_file() && !m.is_dir());
+    if special {
+        return Err(Error::Usage(format!("{} is not a regular file", target.display())));
+    }
+    Ok(real)
+}
+
 /// A temporary file's name, removed when dropped before [`Temporary::rename`].
 pub(super) struct Temporary {
     path: PathBuf,
@@ -119,6 +134,7 @@ impl Temporary {
     /// Creates the temporary file that is to become `target`.
     pub(super) fn create(target: &Path) -> Result<(Self, File)> {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
+        let target = &resolve(target)?;
         let Some(name) = target.file_name() else {
             return Err(Error::Usage(format!("{} does not name a file", target.display())));
         };

@@ -63,6 +63,10 @@ pub struct Row {
     pub seconds: f64,
     /// Rays cast for it.
     pub rays: RayCounts,
+    /// Whether the frame is left from a sequence of other settings, of which only a part was
+    /// replaced.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub other_settings: bool,
 }
 
 /// A setting that keeps two headers apart.
@@ -179,14 +183,18 @@ impl Manifest {
     }
 
     /// Starts the manifest at `path` anew with `header`, in place of any older one and its parts.
-    pub fn create(path: &Path, header: &Header) -> Result<()> {
+    /// `left` are frames of other settings that stay: nobody may take them for this sequence's.
+    pub fn create(path: &Path, header: &Header, left: &[Row]) -> Result<()> {
         // Parts go first: after a crash in between, frames without a row are rendered again,
         // while rows of the old settings under the new header would be wrong.
         for part in parts(path)? {
             remove(&part)?;
         }
-        let line = line_of(path, header)?;
-        atomic::write(path, |w| w.write_all(&line)).map(drop)
+        let mut lines = line_of(path, header)?;
+        for row in left {
+            lines.extend(line_of(path, &Row { other_settings: true, ..row.clone() })?);
+        }
+        atomic::write(path, |w| w.write_all(&lines)).map(drop)
     }
 
     /// Takes the rows of all part files into the manifest at `path` and removes the parts.

@@ -94,5 +94,6 @@ fn write_frame(
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
         rays,
+        other_settings: false,
     })
 }

@@ -6,7 +6,9 @@ use crate::output::{FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 use std::time::Duration;
 
 /// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
@@ -51,14 +53,14 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     };
     let Some(manifest) = found else {
         refuse_strangers(target, frames)?;
-        Manifest::create(&path, &target.header)?;
+        Manifest::create(&path, &target.header, &[])?;
         return Ok(Plan::all(frames));
     };
     if !target.overwrite {
         refuse_others(target, &manifest, frames)?;
     }
     if manifest.header.first_difference(&target.header).is_some() {
-        Manifest::create(&path, &target.header)?;
+        Manifest::create(&path, &target.header, &left_over(target, &manifest, frames))?;
         return Ok(Plan::all(frames));
     }
     Manifest::merge_parts(&path)?;
@@ -68,7 +70,7 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
     let states = (frames.first..=frames.last)
         .into_par_iter()
-        .map(|frame| Ok((frame, state(target, frame, rows.get(&frame))?)))
+        .map(|frame| Ok((frame, state(target, frame, &rows)?)))
         .collect::<Result<Vec<_>>>()?;
     Ok(Plan::of(states))
 }
@@ -80,19 +82,50 @@ enum State {
     Damaged(String),
 }
 
-fn state(target: &Target, frame: u32, row: Option<&Row>) -> Result<State> {
+fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State> {
     let path = target.pattern.path(frame);
     let name = path.display();
+    let row = rows.get(&frame);
     let bytes = match fs::read(&path) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(State::Missing),
         read => read.map_err(|e| Error::io("read", &path, e))?,
     };
+    refuse_taken(&path, frame, rows)?;
     let Some(row) = row else {
         return Ok(State::Damaged(format!("{name} is not in the manifest; rendered again")));
     };
     let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
     let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
     Ok(if whole { State::Whole } else { State::Damaged(note()) })
+}
+
+/// Frames of another sequence that a job over `frames` does not replace.
+fn left_over(target: &Target, manifest: &Manifest, frames: FrameRange) -> Vec<Row> {
+    let folder = target.pattern.folder();
+    let stays = |row: &&Row| {
+        let replaced = (frames.first..=frames.last).contains(&row.frame)
+            && target.pattern.path(row.frame) == folder.join(&row.file);
+        !replaced && folder.join(&row.file).exists()
+    };
+    manifest.rows.values().filter(stays).cloned().collect()
+}
+
+/// Refuses to replace a file that holds a frame of other settings, or another frame.
+fn refuse_taken(path: &Path, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<()> {
+    let here = |row: &&Row| path.file_name().is_some_and(|name| name == row.file.as_str());
+    let holds = match rows.values().find(|row| here(row) && row.other_settings) {
+        Some(_) => "a frame of other settings".to_string(),
+        None if rows.contains_key(&frame) => return Ok(()),
+        None => match rows.values().find(here) {
+            Some(row) => format!("frame {}", row.frame),
+            None => return Ok(()),
+        },
+    };
+    Err(Error::Usage(format!(
+        "{} holds {holds}\n  \
+         help: choose another output with -o, or replace it with --overwrite",
+        path.display()
+    )))
 }
 
 impl Plan {

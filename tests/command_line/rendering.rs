@@ -52,6 +52,40 @@ fn another_setting_is_refused_by_name_and_overwrite_replaces() {
 }
 
 #[test]
+fn frames_left_from_other_settings_are_never_taken_for_this_sequence() {
+    let job = Job::new();
+    job.done(&small("--frames 1..3 -o o/f_#.png"));
+    job.done(&small("--frames 2 -o o/f_#.png --seed 7 --overwrite"));
+    let left = job.read("o/f_1.png");
+    job.refused(&small("--frames 1..3 -o o/f_#.png --seed 7"), "o/f_1.png holds a frame of other");
+    assert_eq!(job.read("o/f_1.png"), left);
+    let ran = job.done(&small("--frames 1..3 -o o/f_#.png --seed 7 --overwrite"));
+    assert!(ran.out.contains("3 rendered"), "{}", ran.out);
+    assert_ne!(job.read("o/f_1.png"), left);
+}
+
+#[test]
+fn another_frame_under_the_same_name_is_refused() {
+    let job = Job::new();
+    job.done(&small("--frames 1 -o o/look.png"));
+    job.refused(&small("--frames 2 -o o/look.png"), "o/look.png holds frame 1");
+    job.done(&small("--frames 2 -o o/look.png --overwrite"));
+}
+
+#[test]
+fn statistics_replace_neither_the_scene_nor_a_link() {
+    let job = Job::new();
+    let before = job.read("cube.obj");
+    job.refused(&small("--frames 1 -o o/f.png --stats cube.obj"), "would replace a file");
+    assert_eq!(job.read("cube.obj"), before);
+    fs::write(job.path("real.json"), "").expect("written");
+    std::os::unix::fs::symlink(job.path("real.json"), job.path("link.json")).expect("a link");
+    job.done(&small("--frames 1 -o o/f.png --stats link.json"));
+    assert!(job.path("link.json").is_symlink());
+    assert!(job.read("real.json").starts_with(b"{"));
+}
+
+#[test]
 fn somebody_elses_frames_are_not_touched() {
     let job = Job::new();
     fs::write(job.path("f_01.png"), "mine").expect("written");

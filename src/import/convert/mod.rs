@@ -71,6 +71,13 @@ fn write_atomically<T>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result
     };
     // The system's own word, without the temporary file's name; `path` is what the user knows.
     let failed = |action, e: io::Error| Error::io(action, path, e.kind().into());
+    if fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+        // A rename would put a file in a device's place.
+        return Err(failed(
+            "write, since it is no regular file,",
+            io::ErrorKind::InvalidInput.into(),
+        ));
+    }
     fs::create_dir_all(folder).map_err(|e| failed("make the folder of", e))?;
     let mut builder = tempfile::Builder::new();
     builder.prefix(".tweenray-").suffix(".part");
