@@ -29,8 +29,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's.
 const TILE: u32 = 32;
-/// Frames with fewer camera samples than this stay on one thread: handing out work costs more.
-const PARALLEL_FROM: u64 = 8192;
+/// Frames with fewer camera samples than this are cut into single blocks: a few tiles would not
+/// keep the threads equally busy.
+const SMALL: u64 = 8192;
+/// Frames with fewer still stay on one thread: handing out work costs more.
+const PARALLEL_FROM: u64 = 512;
 
 /// What it takes to shade any frame of a job.
 pub struct Renderer<'a> {
@@ -86,7 +89,10 @@ impl Renderer<'_> {
         };
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
-        let tiles = split(&aligned(&crop, &full), TILE);
+        let samples = u64::from(crop.x1 - crop.x0)
+            * u64::from(crop.y1 - crop.y0)
+            * u64::from(self.settings.spp);
+        let tiles = split(&aligned(&crop, &full), if samples < SMALL { BLOCK } else { TILE });
         let share = 1.0 / tiles.len().max(1) as f64;
         let kernel = self.kernel();
         let start = || (BlockPixels::new(with_gbuffer), Scratch::default());
@@ -95,9 +101,6 @@ impl Renderer<'_> {
             progress.tile_done(share, &done.1);
             Some(done)
         };
-        let samples = u64::from(crop.x1 - crop.x0)
-            * u64::from(crop.y1 - crop.y0)
-            * u64::from(self.settings.spp);
         let done: Option<Vec<(TilePixels, RayCounts)>> = if samples < PARALLEL_FROM {
             let mut state = start();
             tiles.iter().map(|tile| one(&mut state, tile)).collect()
