@@ -45,7 +45,7 @@ pub fn create_folder(folder: impl AsRef<Path>) -> Result<()> {
     fs::create_dir_all(folder).map_err(|e| Error::io("create the folder", folder, e))
 }
 
-/// Makes sure, before long work, that [`write`] can put a file at `path`: makes its folder and
+/// Makes sure, before long work, that [`write()`] can put a file at `path`: makes its folder and
 /// tries a temporary file there.
 ///
 /// # Errors
