@@ -83,8 +83,12 @@ impl World {
         let size = bounds.extent().max_element();
         let renders = size == 0.0 || (1e-30..=1e30).contains(&size);
         if !renders {
+            let size = match size.is_finite() {
+                true => format!("{size:e} units"),
+                false => "more units than a number can hold".into(),
+            };
             return Err(Error::Usage(format!(
-                "the scene is {size:e} units wide; from 1e-30 to 1e30 can be rendered. Use `scale`"
+                "the scene is {size} wide; from 1e-30 to 1e30 can be rendered. Use `scale`"
             )));
         }
         let recentring = if recentre { Recentring::of(&bounds) } else { Recentring::IDENTITY };
