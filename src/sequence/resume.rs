@@ -68,10 +68,12 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
         return Ok(Plan::all(frames));
     }
     let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
-    let states = (frames.first..=frames.last)
+    let states: Vec<Result<(u32, State)>> = (frames.first..=frames.last)
         .into_par_iter()
         .map(|frame| Ok((frame, state(target, frame, &rows)?)))
-        .collect::<Result<Vec<_>>>()?;
+        .collect();
+    // Of several refusals the first frame's is told, whichever thread was quicker.
+    let states = states.into_iter().collect::<Result<Vec<_>>>()?;
     Ok(Plan::of(states))
 }
 
