@@ -1,0 +1,10 @@
+//! Cases that break ray tracers, one file per letter: each in its small size, as a test.
+//! `./x stress` runs them in full.
+
+#![allow(clippy::unwrap_used)]
+
+mod a_intersection;
+#[path = "../common/mod.rs"]
+mod common;
+mod shapes;
+mod suite;
