@@ -43,22 +43,20 @@ pub struct Case {
 
 /// Lists a letter's cases and makes each a test: `number name "anchor" => function;`.
 macro_rules! cases {
-    ($($number:literal $name:ident $anchor:literal => $run:path;)*) => {
+    ($($number:literal $name:ident $anchor:literal => $($run:ident)::+;)*) => {
         /// All cases of this letter.
         pub const CASES: &[$crate::suite::Case] = &[$($crate::suite::Case {
             number: $number,
             name: stringify!($name),
             anchor: $anchor,
-            run: $run,
+            run: $($run)::+,
         }),*];
 
         #[cfg(test)]
         mod tests {
-            #[allow(unused_imports)]
-            use super::*;
             $(#[test]
             fn $name() {
-                let outcome = $run($crate::suite::Size::Small);
+                let outcome = super::$($run)::+($crate::suite::Size::Small);
                 println!("{}", outcome.shown.join("\n"));
                 outcome.assert();
             })*
