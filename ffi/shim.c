@@ -18,6 +18,7 @@ _Static_assert(sizeof(struct RTCRayHit16) == 1344, "size of RTCRayHit16");
 _Static_assert(sizeof(struct RTCRayQueryContext) == 8, "size of RTCRayQueryContext");
 _Static_assert(sizeof(TrRay) == 72, "size of TrRay");
 _Static_assert(sizeof(TrSphere) == 32, "size of TrSphere");
+_Static_assert(sizeof(TrQuery) == 24, "size of TrQuery");
 
 unsigned tr_version_header(void) { return RTC_VERSION; }
 
@@ -39,8 +40,15 @@ void tr_end_tracing(unsigned saved) { (void)saved; }
 /* What callbacks need beside Embree's own context; the first member makes the cast valid. */
 typedef struct Context {
   struct RTCRayQueryContext base;
-  const TrRay* rays;
+  const TrQuery* query;
 } Context;
+
+static Context context_of(const TrQuery* query) {
+  Context context;
+  rtcInitRayQueryContext(&context.base);
+  context.query = query;
+  return context;
+}
 
 /* Words of a packet in Embree's structure-of-arrays layout, lane `i` of `n`; the header has
    accessors for C++ only. A hit packet follows its ray packet after 12 words a lane. */
@@ -54,18 +62,25 @@ static unsigned* id_at(void* packet, unsigned n, unsigned word, unsigned i) {
   return (unsigned*)packet + (size_t)word * n + i;
 }
 static const TrRay* original(const Context* context, void* rays, unsigned n, unsigned i) {
-  return &context->rays[*id_at(rays, n, RAY_ID, i)];
+  return &context->query->rays[*id_at(rays, n, RAY_ID, i)];
 }
 
-/* Drops the primitive that a ray leaves from its candidates. */
-static void exclude_own_primitive(const struct RTCFilterFunctionNArguments* args) {
+static int has_passed(const TrQuery* query, unsigned geom, unsigned prim) {
+  for (unsigned k = 0; k < query->passed_count; k++)
+    if (query->passed[k].prim == prim && query->passed[k].geom == geom) return 1;
+  return 0;
+}
+
+/* Drops the primitive that a ray leaves, and those that it passed, from its candidates. */
+static void drop_excluded(const struct RTCFilterFunctionNArguments* args) {
   const Context* context = (const Context*)args->context;
   for (unsigned i = 0; i < args->N; i++) {
     if (args->valid[i] != -1) continue;
     const TrRay* ray = original(context, args->ray, args->N, i);
-    if (ray->exclude_prim == *id_at(args->hit, args->N, HIT_PRIM, i) &&
-        ray->exclude_geom == *id_at(args->hit, args->N, HIT_GEOM, i))
-      args->valid[i] = 0;
+    unsigned prim = *id_at(args->hit, args->N, HIT_PRIM, i);
+    unsigned geom = *id_at(args->hit, args->N, HIT_GEOM, i);
+    int leaves = ray->exclude_prim == prim && ray->exclude_geom == geom;
+    if (leaves || has_passed(context->query, geom, prim)) args->valid[i] = 0;
   }
 }
 
@@ -76,15 +91,13 @@ static enum RTCRayQueryFlags query_flags(unsigned flags) {
 }
 
 void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhits,
-                  const TrRay* rays, unsigned flags) {
-  Context context;
-  rtcInitRayQueryContext(&context.base);
-  context.rays = rays;
+                  const TrQuery* query) {
+  Context context = context_of(query);
   struct RTCIntersectArguments args;
   rtcInitIntersectArguments(&args);
   args.context = &context.base;
-  args.flags = query_flags(flags);
-  args.filter = (flags & TR_EXCLUDE) ? exclude_own_primitive : NULL;
+  args.flags = query_flags(query->flags);
+  args.filter = (query->flags & TR_EXCLUDE) ? drop_excluded : NULL;
   unsigned saved = tr_begin_tracing();
   switch (width) {
     case 1: rtcIntersect1(scene, rayhits, &args); break;
@@ -96,15 +109,13 @@ void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhit
 }
 
 void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
-                 const TrRay* rays, unsigned flags) {
-  Context context;
-  rtcInitRayQueryContext(&context.base);
-  context.rays = rays;
+                 const TrQuery* query) {
+  Context context = context_of(query);
   struct RTCOccludedArguments args;
   rtcInitOccludedArguments(&args);
   args.context = &context.base;
-  args.flags = query_flags(flags);
-  args.filter = (flags & TR_EXCLUDE) ? exclude_own_primitive : NULL;
+  args.flags = query_flags(query->flags);
+  args.filter = (query->flags & TR_EXCLUDE) ? drop_excluded : NULL;
   unsigned saved = tr_begin_tracing();
   switch (width) {
     case 1: rtcOccluded1(scene, packet, &args); break;
@@ -121,6 +132,12 @@ void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
 static void sphere_bounds(const struct RTCBoundsFunctionArguments* args) {
   const TrSphere* s = (const TrSphere*)args->geometryUserPtr + args->primID;
   float lower[3], upper[3];
+  if (s->radius < 0.0) {
+    /* Embree leaves out what has no valid bounds. */
+    args->bounds_o->lower_x = args->bounds_o->lower_y = args->bounds_o->lower_z = INFINITY;
+    args->bounds_o->upper_x = args->bounds_o->upper_y = args->bounds_o->upper_z = -INFINITY;
+    return;
+  }
   for (int axis = 0; axis < 3; axis++) {
     /* Embree walks the f32 ray: the box must also hold what rounding the ray moves out of it. */
     double margin = 0x1p-20 * (fabs(s->centre[axis]) + s->radius);
@@ -163,6 +180,7 @@ static double sphere_root(const TrRay* ray, const TrSphere* s, int leaving, doub
 static double lane_root(void* rays, unsigned n, unsigned lane, const Context* context,
                         const TrSphere* spheres, unsigned geom, unsigned prim) {
   const TrRay* ray = original(context, rays, n, lane);
+  if (has_passed(context->query, geom, prim)) return NAN;
   int leaving = ray->exclude_geom == geom && ray->exclude_prim == prim;
   double tfar = *float_at(rays, n, RAY_TFAR, lane);
   return sphere_root(ray, &spheres[prim], leaving, ray->tnear, fmin(tfar, ray->tfar));

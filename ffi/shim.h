@@ -15,13 +15,29 @@ typedef struct TrRay {
   unsigned exclude_prim;
 } TrRay;
 
-/* An analytic sphere as `tweenray::embree::SphereData` lays it out. */
+/* An analytic sphere as `tweenray::embree::SphereData` lays it out; negative radius: left out. */
 typedef struct TrSphere {
   double centre[3];
   double radius;
 } TrSphere;
 
+/* A primitive as `tweenray::ray::PrimRef` lays it out. */
+typedef struct TrPrim {
+  unsigned geom;
+  unsigned prim;
+} TrPrim;
+
 enum { TR_COHERENT = 1, TR_EXCLUDE = 2 };
+
+/* What a query needs beside its packet, as `tweenray::embree::Query` lays it out. */
+typedef struct TrQuery {
+  /* The f64 originals; lane i of a packet stands for rays[id of lane i]. */
+  const TrRay* rays;
+  /* Primitives that no ray of the packet may hit; read with TR_EXCLUDE only. */
+  const TrPrim* passed;
+  unsigned passed_count;
+  unsigned flags;
+} TrQuery;
 
 /* The version of the Embree header this was compiled with: major * 10000 + minor * 100 + patch. */
 unsigned tr_version_header(void);
@@ -30,13 +46,13 @@ unsigned tr_version_header(void);
 void tr_set_spheres(RTCGeometry geometry, const TrSphere* spheres, unsigned count);
 
 /* Closest hits of a packet. `width` is 1 (RTCRayHit), 4, 8 or 16; `valid` has `width` lanes of
-   0 or -1 and is not read for 1. Lane i's `id` must be i, and `rays[i]` its f64 original. */
+   0 or -1 and is not read for 1. */
 void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhits,
-                  const TrRay* rays, unsigned flags);
+                  const TrQuery* query);
 
 /* Occlusion of a packet (RTCRay, RTCRay4, ...): tfar is -inf afterwards where something is hit. */
 void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
-                 const TrRay* rays, unsigned flags);
+                 const TrQuery* query);
 
 /* MXCSR of the calling thread; 0 where there is none. */
 unsigned tr_mxcsr(void);

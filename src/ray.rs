@@ -46,6 +46,9 @@ pub struct Hit {
     pub v: f64,
     /// What was hit.
     pub prim: PrimRef,
+    /// Whether `t`, `u` and `v` are f32 numbers, to be computed again in f64 from the triangle
+    /// once its corners are at hand. That the ray meets the triangle is certain all the same.
+    pub rough: bool,
 }
 
 impl Ray {

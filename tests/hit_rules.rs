@@ -8,7 +8,7 @@ use common::{job, pose, render};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::ray::Ray;
-use tweenray::scene::{HitRules, Light, Material, Scene, World};
+use tweenray::scene::{HitRules, Light, Material, Recheck, Scene, World};
 use tweenray::stats::RayCounts;
 
 fn tessellated_sphere() -> Scene {
@@ -121,5 +121,57 @@ fn a_closed_room_is_dark() {
         for (x, y, rgb) in common::pixels(&film) {
             assert_eq!(rgb, Rgb::ZERO, "{x},{y} towards {target:?}");
         }
+    }
+}
+
+/// Rechecking only what may be wrong gives the bits of rechecking everything.
+#[test]
+fn risky_hits_are_the_only_ones_that_need_the_recheck_at_once() {
+    for (scene, frame) in [("reflective_spheres", 7), ("cornell", 1), ("demo", 3)] {
+        let films = [Recheck::Risky, Recheck::Always].map(|recheck| {
+            let mut job = common::load_job(scene, frame, Some((160, 90)));
+            job.settings.rules.recheck = recheck;
+            (job.settings.spp, job.settings.shadow_samples) = (1, 1);
+            render(&job).0
+        });
+        assert!(films[0].rgb == films[1].rgb, "{scene}");
+    }
+}
+
+/// A thousand copies with two materials: the first one's picture, whatever the threads.
+#[test]
+fn of_coincident_faces_the_lowest_number_is_seen() {
+    let world_of = |copies: u32| {
+        let mut world = World::default();
+        world.materials.push(Material::diffuse("red", Rgb::new(0.8, 0.1, 0.1)));
+        world.materials.push(Material::diffuse("blue", Rgb::new(0.1, 0.1, 0.8)));
+        for copy in 0..copies {
+            world.meshes.push(common::cube(DVec3::ZERO, 1.0, copy % 2));
+        }
+        world.lights.push(Light::Point {
+            position: DVec3::new(3.0, 5.0, 4.0),
+            intensity: Rgb::splat(80.0),
+        });
+        world
+    };
+    let picture = |copies: u32, threads: usize| {
+        let job = job(world_of(copies), pose((2.0, 3.0, 4.0), (0.0, 0.0, 0.0)), 64, 64);
+        let scene = job.world.clone().into_scene(true).unwrap();
+        let embree = EmbreeIntersector::new(&scene, job.settings.rules, None, threads).unwrap();
+        let plan = tweenray::effects::EffectPlan::of(&scene, &job.settings);
+        let renderer = tweenray::shade::Renderer {
+            scene: &scene,
+            settings: &job.settings,
+            plan,
+            intersector: &embree,
+        };
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        let (film, _) = renderer.render(&job.camera, 1, false, &stop, &common::Silent).unwrap();
+        film.rgb
+    };
+    let one = picture(1, 1);
+    assert!(one.iter().any(|c| c.x > c.z && c.x > 0.1), "the cube is red");
+    for threads in [1, 2, 8] {
+        assert!(picture(1000, threads) == one, "{threads} threads");
     }
 }

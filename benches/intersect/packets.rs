@@ -28,7 +28,7 @@ pub fn report(scene: &Scene, committed: &CommittedScene, camera_rays: &[Ray]) {
         let mut candidates: Vec<Candidate> = Vec::new();
         for coherent in [true, false] {
             // Shadow rays leave a surface, whose primitive they exclude.
-            let flags = QueryFlags { coherent, exclude: !closest };
+            let flags = QueryFlags { coherent, exclude: !closest, passed: &[] };
             let width = |run: fn(&CommittedScene, &[Ray], QueryFlags, bool)| -> Candidate {
                 (String::new(), Box::new(move || run(committed, rays, flags, closest)))
             };
@@ -78,7 +78,7 @@ fn trace<const W: usize>(scene: &CommittedScene, rays: &[Ray], flags: QueryFlags
 /// The shadow rays that the renderer would send from the terrain that `camera` sees: to the area
 /// light and to the sky.
 fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
-    let layer = intersector(scene, true, Recheck::Always);
+    let layer = intersector(scene, true, true, Recheck::Always);
     let mut hits = vec![None; camera.len()];
     layer.intersect_batch(camera, &mut hits, &mut RayCounts::default());
     let Some(Light::Quad(quad)) = scene.lights.first() else {

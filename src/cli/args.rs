@@ -88,9 +88,9 @@ pub struct SettingArgs {
     #[arg(long, value_name = "ISA", help_heading = "Tracing",
         value_parser = ["sse2", "sse4.2", "avx", "avx2", "avx512"])]
     pub isa: Option<String>,
-    /// Which hits are recomputed in f64 [default: always]
+    /// Which hits are recomputed in f64 at once; "always" gives the same picture [default: risky]
     #[arg(long, value_name = "WHICH", help_heading = "Tracing",
-        value_parser = values::choice::<Recheck>(&["always", "risky", "off"]))]
+        value_parser = values::choice::<Recheck>(&["risky", "always", "off"]))]
     pub recheck: Option<Recheck>,
     /// Watertight traversal of Embree [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]

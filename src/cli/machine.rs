@@ -31,9 +31,29 @@ impl Machine {
     }
 }
 
-/// The widest instruction set of this machine that Embree has kernels for: what it uses unless
-/// told, and by which the last bits of a hit differ.
+/// Instruction sets that Embree has kernels for, narrow to wide.
+pub const ISAS: [&str; 5] = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
+
+/// The instruction set to use unless told otherwise, by which the last bits of a hit differ:
+/// this machine's widest, or the narrower one that `TWEENRAY_MAX_ISA` names.
 pub fn best_isa() -> &'static str {
+    let place = |name: &str| ISAS.iter().position(|isa| *isa == name);
+    let most = std::env::var("TWEENRAY_MAX_ISA").ok().and_then(|name| place(&name));
+    match (place(detected_isa()), most) {
+        (Some(own), Some(most)) => ISAS[own.min(most)],
+        _ => detected_isa(),
+    }
+}
+
+/// The widest instruction set that every machine of `best` has; `None` where they are of
+/// different kinds of processor.
+pub fn shared_isa(best: &[String]) -> Option<&'static str> {
+    let places = best.iter().map(|name| ISAS.iter().position(|isa| isa == name));
+    places.collect::<Option<Vec<_>>>()?.into_iter().min().map(|place| ISAS[place])
+}
+
+/// The widest instruction set of this machine that Embree has kernels for.
+pub fn detected_isa() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {
         // Embree's AVX-512 kernels need all of these.
@@ -70,4 +90,19 @@ fn kilobytes(file: &str, key: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let number: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     number.checked_mul(1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn machines_share_the_narrowest_of_their_best() {
+        let shared =
+            |names: &[&str]| shared_isa(&names.iter().map(ToString::to_string).collect::<Vec<_>>());
+        assert_eq!(shared(&["avx512", "avx2", "avx512"]), Some("avx2"));
+        assert_eq!(shared(&["sse4.2"]), Some("sse4.2"));
+        assert_eq!(shared(&["avx2", "aarch64"]), None);
+        assert!(ISAS.contains(&best_isa()) || cfg!(not(target_arch = "x86_64")));
+    }
 }

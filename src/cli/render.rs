@@ -2,6 +2,7 @@
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::Exit;
+use super::machine;
 use super::progress::{Watch, duration};
 use super::request::Request;
 use super::say;
@@ -14,6 +15,7 @@ use crate::intersect::{self, Intersector};
 use crate::output::manifest::beside;
 use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
+use crate::scene::Settings;
 use crate::sequence::{self, Plan, Target, Tracer};
 use crate::shade::Renderer;
 use clap::Args;
@@ -64,8 +66,9 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let interrupt = Interrupt::listen()?;
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
-    let request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
+    let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
+    share_isa(world, &mut request.settings, quiet)?;
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
@@ -103,6 +106,24 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         return Ok(Exit::Stopped);
     }
     finish(&job, start, quiet)
+}
+
+/// Holds every rank to the best instruction set that all their machines have, unless one was
+/// asked for: frames differ in their last bits by it.
+fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> {
+    let best: Vec<String> = world.all(machine::best_isa().to_string())?;
+    let Some(isa) = machine::shared_isa(&best) else { return Ok(()) };
+    // Where Embree would choose the same on every machine it may.
+    let needed = world.all(isa != machine::detected_isa())?.contains(&true);
+    if settings.isa.is_none() && needed {
+        settings.isa = Some(isa.into());
+        if best.iter().any(|other| other != isa) {
+            tell(quiet, &["the machines have different instruction sets"], |why| {
+                say::note(format_args!("{why}; all use {isa}"));
+            });
+        }
+    }
+    Ok(())
 }
 
 fn thread_pool(threads: usize) -> Result<ThreadPool> {

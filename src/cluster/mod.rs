@@ -120,6 +120,11 @@ impl World {
         all.iter().map(|bytes| decode(bytes)).collect()
     }
 
+    /// Every rank's `value`, in rank order, on every rank. All ranks call it.
+    pub fn all<T: Serialize + for<'de> Deserialize<'de>>(&self, value: T) -> Result<Vec<T>> {
+        if self.size() == 1 { Ok(vec![value]) } else { self.exchange(&value) }
+    }
+
     /// `value` if all ranks have the same, else an error that says what differs. All ranks call it.
     pub fn same_everywhere(&self, what: &str, value: String) -> Result<String> {
         if self.size() == 1 {

@@ -7,6 +7,7 @@
 mod packet;
 mod yardstick;
 
+use packet::Query;
 pub use packet::{Packet, PacketHit, QueryFlags};
 pub use yardstick::{BareCamera, BareTally};
 
@@ -27,7 +28,7 @@ pub const VERSION: &str = env!("TWEENRAY_EMBREE_VERSION");
 pub struct SphereData {
     /// Centre.
     pub centre: [f64; 3],
-    /// Radius, positive.
+    /// Radius; a sphere of negative radius is never hit.
     pub radius: f64,
 }
 
@@ -38,25 +39,23 @@ unsafe extern "C" {
         width: u32,
         valid: *const i32,
         rayhits: *mut c_void,
-        rays: *const Ray,
-        flags: u32,
+        query: *const Query,
     );
     fn tr_occluded(
         scene: sys::RTCScene,
         width: u32,
         valid: *const i32,
         rays: *mut c_void,
-        originals: *const Ray,
-        flags: u32,
+        query: *const Query,
     );
     fn tr_mxcsr() -> u32;
 }
 
-/// The floating-point control word of the calling thread (x86; 0 elsewhere): tests assert that
-/// tracing leaves it as it was.
+/// The floating-point control bits of the calling thread (x86; 0 elsewhere): tests assert that
+/// tracing leaves them as they were. The lowest six, which only remember exceptions, are left out.
 pub fn floating_point_mode() -> u32 {
     // SAFETY: reads a register of the calling thread; no precondition.
-    unsafe { tr_mxcsr() }
+    unsafe { tr_mxcsr() & !0x3f }
 }
 
 /// An Embree device: its threads and its count of the memory it holds.
@@ -149,6 +148,7 @@ pub struct SceneBuilder<'g> {
     scene: SceneHandle,
     device: Device,
     spheres: Vec<Box<[SphereData]>>,
+    indices: Vec<Box<[[u32; 3]]>>,
     next_id: u32,
     geometry: PhantomData<&'g ()>,
 }
@@ -182,10 +182,19 @@ impl<'g> SceneBuilder<'g> {
             // SAFETY: the scene is live and not committed yet.
             unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
         }
-        Ok(Self { scene, device, spheres: Vec::new(), next_id: 0, geometry: PhantomData })
+        Ok(Self {
+            scene,
+            device,
+            spheres: Vec::new(),
+            indices: Vec::new(),
+            next_id: 0,
+            geometry: PhantomData,
+        })
     }
 
     /// Adds a triangle mesh and returns its `geom_id` (0, 1, 2, … in order).
+    ///
+    /// The triangles numbered in `omit` keep their numbers but are never hit.
     ///
     /// `positions` has one spare element after `vertex_count`, since Embree reads 16 bytes a
     /// vertex. Errors: an index out of range, a missing spare element, Embree's own.
@@ -194,6 +203,7 @@ impl<'g> SceneBuilder<'g> {
         positions: &'g [Vec3],
         vertex_count: usize,
         triangles: &'g [[u32; 3]],
+        omit: impl ExactSizeIterator<Item = u32>,
     ) -> Result<u32> {
         if positions.len() <= vertex_count {
             return Err(Error::Embree("a vertex buffer lacks its spare element".into()));
@@ -201,8 +211,17 @@ impl<'g> SceneBuilder<'g> {
         if triangles.iter().flatten().any(|i| *i as usize >= vertex_count) {
             return Err(Error::Embree("a triangle names a vertex that does not exist".into()));
         }
-        self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
-            // SAFETY: both slices live for 'g, which the committed scene borrows; sizes, strides
+        let mut triangles = triangles;
+        let mut own: Box<[[u32; 3]]> = Box::default();
+        if omit.len() > 0 {
+            own = Box::from(triangles);
+            // A triangle of one point has no inside.
+            omit.for_each(|prim| own[prim as usize] = [own[prim as usize][0]; 3]);
+            triangles = &own;
+        }
+        let id = self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
+            // SAFETY: both slices live for 'g, which the committed scene borrows, or are boxes that
+            // do not move and are dropped after the scene (as with spheres); sizes, strides
             // and the 16-byte read of the last vertex were checked above ("rtcSetSharedGeometry-
             // Buffer": the buffer must be padded to 16 bytes and stay alive).
             unsafe {
@@ -227,12 +246,21 @@ impl<'g> SceneBuilder<'g> {
                     triangles.len(),
                 );
             }
-        })
+        });
+        self.indices.push(own);
+        id
     }
 
-    /// Adds analytic spheres as one geometry and returns its `geom_id`.
-    pub fn add_spheres(&mut self, spheres: Vec<SphereData>) -> Result<u32> {
-        let spheres = spheres.into_boxed_slice();
+    /// Adds analytic spheres as one geometry and returns its `geom_id`. Those numbered in `omit`
+    /// keep their numbers but are never hit.
+    pub fn add_spheres(
+        &mut self,
+        spheres: Vec<SphereData>,
+        omit: impl Iterator<Item = u32>,
+    ) -> Result<u32> {
+        let mut spheres = spheres.into_boxed_slice();
+        // The shim gives a negative radius no bounds, and Embree leaves it out.
+        omit.for_each(|prim| spheres[prim as usize].radius = -1.0);
         let id = self.add(sys::RTC_GEOMETRY_TYPE_USER, |geometry| {
             // SAFETY: the boxed slice does not move, and the scene that the geometry is attached
             // to is dropped before the box (field order here and in `CommittedScene`).
@@ -277,6 +305,7 @@ impl<'g> SceneBuilder<'g> {
             scene: self.scene,
             device: self.device,
             spheres: self.spheres,
+            _indices: self.indices,
             width,
             geometry: PhantomData,
         })
@@ -288,6 +317,7 @@ pub struct CommittedScene<'g> {
     scene: SceneHandle,
     device: Device,
     spheres: Vec<Box<[SphereData]>>,
+    _indices: Vec<Box<[[u32; 3]]>>,
     width: usize,
     geometry: PhantomData<&'g ()>,
 }
@@ -319,14 +349,12 @@ impl CommittedScene<'_> {
         flags: QueryFlags,
     ) {
         packet.check_lanes(valid, rays);
-        let lanes = Aligned(*valid);
+        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags));
+        let at = std::ptr::from_mut(packet).cast();
         // SAFETY: `Packet<W>` has the layout and alignment of RTCRayHitW (asserted in packet.rs),
-        // `lanes` is aligned, and every valid lane has its ray (checked above).
-        unsafe {
-            let at = std::ptr::from_mut(packet).cast();
-            let (valid, rays) = (lanes.0.as_ptr(), rays.as_ptr());
-            tr_intersect(self.scene.0, W as u32, valid, at, rays, flags.bits());
-        }
+        // `lanes` is aligned, every valid lane has its ray (checked above), and the slices behind
+        // `query` outlive the call.
+        unsafe { tr_intersect(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }
     }
 
     /// Marks the lanes that anything blocks: their `tfar` becomes minus infinity.
@@ -338,13 +366,10 @@ impl CommittedScene<'_> {
         flags: QueryFlags,
     ) {
         packet.check_lanes(valid, rays);
-        let lanes = Aligned(*valid);
+        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags));
+        let at = std::ptr::from_mut(packet).cast();
         // SAFETY: as for `intersect`; RTCRayW is the front part of RTCRayHitW.
-        unsafe {
-            let at = std::ptr::from_mut(packet).cast();
-            let (valid, rays) = (lanes.0.as_ptr(), rays.as_ptr());
-            tr_occluded(self.scene.0, W as u32, valid, at, rays, flags.bits());
-        }
+        unsafe { tr_occluded(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }
     }
 }
 

@@ -39,6 +39,7 @@ const _: () = {
     assert!(size_of::<Packet<4>>() >= size_of::<embree4_sys::RTCRayHit4>());
     assert!(size_of::<Packet<1>>() >= size_of::<embree4_sys::RTCRayHit>());
     assert!(size_of::<Ray>() == 72);
+    assert!(size_of::<Query>() == 24);
 };
 
 /// What Embree says of a hit, f32.
@@ -57,17 +58,34 @@ pub struct PacketHit {
 }
 
 /// What a query may assume and must do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct QueryFlags {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct QueryFlags<'p> {
     /// Neighbouring rays go similar ways.
     pub coherent: bool,
     /// Some ray excludes a primitive.
     pub exclude: bool,
+    /// Primitives that no ray of the packet may hit.
+    pub passed: &'p [PrimRef],
 }
 
-impl QueryFlags {
-    pub(super) fn bits(self) -> u32 {
-        u32::from(self.coherent) | u32::from(self.exclude) << 1
+/// A query as `ffi/shim.h` lays it out. Its pointers are those of the slices it was made of.
+#[repr(C)]
+pub(super) struct Query {
+    rays: *const Ray,
+    passed: *const PrimRef,
+    passed_count: u32,
+    flags: u32,
+}
+
+impl Query {
+    pub(super) fn new(rays: &[Ray], flags: QueryFlags) -> Self {
+        let filter = flags.exclude || !flags.passed.is_empty();
+        Self {
+            rays: rays.as_ptr(),
+            passed: flags.passed.as_ptr(),
+            passed_count: flags.passed.len() as u32,
+            flags: u32::from(flags.coherent) | u32::from(filter) << 1,
+        }
     }
 }
 

@@ -5,27 +5,35 @@
 //!   f32 origin would be too coarse.
 //! * A hit's `t, u, v` are recomputed in f64; one that lies beside its triangle is a phantom, and
 //!   the ray goes on past it.
-//! * A ray that misses inside the bounds of some geometry gets one second try, moved by 4 ulp.
+//! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
+//! * A ray that misses although it comes near some triangle gets one second try, moved by 4 ulp.
 //!
-//! Shadow rays report no primitive, so only the first two rules reach them.
+//! Shadow rays report no primitive, so only the first rule reaches them.
+//!
+//! A batch goes through Embree, the second tries and the recheck a block at a time, so that each
+//! step works on arrays; what they leave open is settled ray by ray.
 
-use super::{Hit, Intersector, PrimRef, Ray, sphere, triangle};
+use super::coarse::{Bundle, CoarseTree};
+use super::coincident;
+use super::triangle::{self, Pairs};
+use super::{Hit, Intersector, PrimRef, Ray, sphere};
 use crate::embree::{
     BuildOptions, CommittedScene, Packet, PacketHit, QueryFlags, SceneBuilder, SphereData,
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
-use crate::scene::{HitRules, Recheck, Scene};
+use crate::scene::{HitRules, Mesh, Recheck, Scene};
 use crate::stats::RayCounts;
+use rayon::prelude::*;
 
 /// Half an ulp at 1 in f32.
 const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 /// Largest coordinate of an origin that is not moved: the recentred scene lies within ±1.
 const NEAR: f64 = 4.0;
-/// Phantoms that one ray may pass; each lies behind the one before.
-const MOST_PHANTOMS: usize = 64;
-/// Scenes of more geometries than this share one box for the retry rule.
-const MOST_BOXES: usize = 16;
+/// Phantoms that one ray may pass.
+const MOST_PHANTOMS: usize = 4096;
+/// Rays that go through the steps together: a block of the renderer's.
+const BLOCK: usize = triangle::MOST;
 
 /// A scene traced by Embree.
 pub struct EmbreeIntersector<'s> {
@@ -34,8 +42,30 @@ pub struct EmbreeIntersector<'s> {
     rules: HitRules,
     /// Largest coordinate of an origin that is not moved.
     near: f64,
-    boxes: Vec<Bounds3>,
+    /// Where a miss deserves a second try; spheres need none, since their test is exact.
+    coarse: CoarseTree,
+    /// Longest edge of each mesh.
+    longest_edges: Vec<f64>,
     bounds: Bounds3,
+}
+
+/// What Embree says of a ray.
+#[derive(Clone, Copy)]
+struct Candidate {
+    hit: PacketHit,
+    /// How far the ray's origin was moved along it before Embree saw it.
+    shift: f64,
+}
+
+/// Lanes of a block, a bit each.
+type Lanes = u64;
+
+fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes.wrapping_sub(1);
+        (lane < BLOCK).then_some(lane)
+    })
 }
 
 impl<'s> EmbreeIntersector<'s> {
@@ -50,15 +80,26 @@ impl<'s> EmbreeIntersector<'s> {
     ) -> Result<Self> {
         let near = if rules.recentre { NEAR } else { f64::INFINITY };
         let mut builder = SceneBuilder::new(&BuildOptions { threads, isa, robust: rules.robust })?;
-        for mesh in &scene.meshes {
-            builder.add_triangles(&mesh.positions, mesh.vertex_count, &mesh.triangles)?;
+        let copies = coincident::copies(scene);
+        let copies_in = |geom_id: u32| {
+            let first = copies.partition_point(|copy| copy.geom_id < geom_id);
+            let end = copies.partition_point(|copy| copy.geom_id <= geom_id);
+            copies[first..end].iter().map(|copy| copy.prim_id)
+        };
+        for (mesh, geom_id) in scene.meshes.iter().zip(0..) {
+            let omit = copies_in(geom_id);
+            builder.add_triangles(&mesh.positions, mesh.vertex_count, &mesh.triangles, omit)?;
         }
         let spheres = scene.spheres.iter();
         let spheres =
             spheres.map(|s| SphereData { centre: s.centre.to_array(), radius: s.radius }).collect();
-        builder.add_spheres(spheres)?;
-        let (boxes, bounds) = (retry_boxes(scene), padded(&scene.bounds));
-        Ok(Self { committed: builder.commit()?, scene, rules, near, boxes, bounds })
+        builder.add_spheres(spheres, copies_in(scene.sphere_geom_id()))?;
+        let largest = largest_coordinate(&scene.bounds);
+        let coarse = CoarseTree::new(scene, margin(largest));
+        let longest_edges = scene.meshes.iter().map(longest_edge).collect();
+        let bounds = padded(&scene.bounds);
+        let committed = builder.commit()?;
+        Ok(Self { committed, scene, rules, near, coarse, longest_edges, bounds })
     }
 
     /// The ray that Embree should see, and by how much its origin was moved along it; `None` for
@@ -73,32 +114,145 @@ impl<'s> EmbreeIntersector<'s> {
         Some((moved, near))
     }
 
-    fn intersect_packets<const W: usize>(
+    // ---- one ray -----------------------------------------------------------------------------
+
+    /// One Embree query that cannot hit the `passed` primitives.
+    fn query(&self, ray: &Ray, passed: &[PrimRef]) -> Option<Candidate> {
+        let (moved, shift) = self.approach(ray)?;
+        let mut packet = Packet::<1>::new();
+        packet.set(0, &moved);
+        let exclude = moved.exclude != PrimRef::NONE;
+        let flags = QueryFlags { coherent: false, exclude, passed };
+        self.committed.intersect(&[-1], &mut packet, std::slice::from_ref(&moved), flags);
+        packet.hit(0).map(|hit| Candidate { hit, shift })
+    }
+
+    /// The first true hit of a valid ray.
+    fn first_hit(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit> {
+        match self.query(ray, &[]) {
+            Some(candidate) => self
+                .recheck(ray, &candidate)
+                .or_else(|| self.settle(ray, Some(candidate.hit.prim), counts)),
+            None => self.settle(ray, None, counts),
+        }
+    }
+
+    /// The first true hit of `ray`, sought along `cast`: itself, or what a second try makes of it.
+    fn pursue(&self, ray: &Ray, cast: &Ray, passed: &mut Vec<PrimRef>) -> Option<Hit> {
+        while passed.len() < MOST_PHANTOMS {
+            let candidate = self.query(cast, passed)?;
+            if let Some(hit) = self.recheck(ray, &candidate) {
+                return Some(hit);
+            }
+            passed.push(candidate.hit.prim);
+        }
+        None
+    }
+
+    /// The hit of a ray whose first query gave the phantom `phantom`, or nothing.
+    #[cold]
+    fn settle(&self, ray: &Ray, phantom: Option<PrimRef>, counts: &mut RayCounts) -> Option<Hit> {
+        let mut passed = Vec::new();
+        if let Some(phantom) = phantom {
+            passed.push(phantom);
+            let hit = self.pursue(ray, ray, &mut passed);
+            if hit.is_some() {
+                return hit;
+            }
+        }
+        let bundle = Bundle::of([ray])?;
+        if !self.rules.retry || !self.coarse.may_meet(&bundle) {
+            return None;
+        }
+        counts.retry += 1;
+        // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
+        self.pursue(ray, &nudged(ray), &mut passed)
+    }
+
+    // ---- a block -----------------------------------------------------------------------------
+
+    fn intersect_block<const W: usize>(
         &self,
         rays: &[Ray],
         hits: &mut [Option<Hit>],
         counts: &mut RayCounts,
     ) {
-        let mut packet = Packet::<W>::new();
-        for (rays, hits) in rays.chunks(W).zip(hits.chunks_mut(W)) {
-            let lanes = fill(&mut packet, rays, self.near);
-            if lanes.far {
-                for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = self.intersect(ray, counts);
-                }
-                continue;
+        hits.fill(None);
+        let valid = valid_lanes(rays);
+        counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
+        if rays.iter().any(|ray| ray.org.abs().max_element() > self.near) {
+            // Rays of a camera outside the scene: rare enough to go one by one.
+            for lane in each(valid) {
+                hits[lane] = self.first_hit(&rays[lane], counts);
             }
-            counts.invalid += lanes.invalid;
-            let flags = QueryFlags { coherent: true, exclude: lanes.exclude };
-            self.committed.intersect(&lanes.valid, &mut packet, rays, flags);
-            for (lane, (ray, out)) in rays.iter().zip(hits).enumerate() {
-                *out = match packet.hit(lane) {
-                    Some(hit) => self.accept(ray, ray, 0.0, &hit),
-                    None if lanes.valid[lane] != 0 => self.retry(ray, counts),
-                    None => None,
-                };
+            return;
+        }
+        let mut found = [NOTHING; BLOCK];
+        let mut hit = self.trace::<W>(rays, valid, &mut found);
+        hit |= self.second_tries::<W>(rays, valid & !hit, &mut found, counts);
+        for lane in each(self.recheck_block(rays, hit, &found, hits)) {
+            hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
+        }
+    }
+
+    /// Sends the `valid` lanes through Embree in packets; returns those that hit.
+    fn trace<const W: usize>(
+        &self,
+        rays: &[Ray],
+        valid: Lanes,
+        found: &mut [PacketHit; BLOCK],
+    ) -> Lanes {
+        let mut packet = Packet::<W>::new();
+        let mut hit = 0;
+        for (k, rays) in rays.chunks(W).enumerate() {
+            let mut mask = [0; W];
+            let mut exclude = false;
+            for (lane, ray) in rays.iter().enumerate() {
+                packet.set(lane, ray);
+                mask[lane] = -((valid >> (k * W + lane) & 1) as i32);
+                exclude |= ray.exclude != PrimRef::NONE;
+            }
+            let flags = QueryFlags { coherent: true, exclude, passed: &[] };
+            self.committed.intersect(&mask, &mut packet, rays, flags);
+            for lane in 0..rays.len() {
+                if let Some(candidate) = packet.hit(lane) {
+                    found[k * W + lane] = candidate;
+                    hit |= 1 << (k * W + lane);
+                }
             }
         }
+        hit
+    }
+
+    /// Gives the `missed` lanes that come near some triangle a second try; returns those that hit.
+    fn second_tries<const W: usize>(
+        &self,
+        rays: &[Ray],
+        missed: Lanes,
+        found: &mut [PacketHit; BLOCK],
+        counts: &mut RayCounts,
+    ) -> Lanes {
+        let Some(bundle) = Bundle::of(each(missed).map(|lane| &rays[lane])) else { return 0 };
+        if !self.rules.retry || !self.coarse.may_meet(&bundle) {
+            return 0;
+        }
+        let tried = missed.count_ones();
+        counts.retry += u64::from(tried);
+        let mut again = [rays[0]; BLOCK];
+        for (k, lane) in each(missed).enumerate() {
+            again[k] = nudged(&rays[lane]);
+        }
+        let mut found_again = [NOTHING; BLOCK];
+        let all = Lanes::MAX >> (BLOCK as u32 - tried);
+        let hit_again = self.trace::<W>(&again[..tried as usize], all, &mut found_again);
+        let mut hit = 0;
+        for (k, lane) in each(missed).enumerate() {
+            if hit_again >> k & 1 == 1 {
+                found[lane] = found_again[k];
+                hit |= 1 << lane;
+            }
+        }
+        hit
     }
 
     fn occluded_packets<const W: usize>(
@@ -109,67 +263,94 @@ impl<'s> EmbreeIntersector<'s> {
     ) {
         let mut packet = Packet::<W>::new();
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
-            let lanes = fill(&mut packet, rays, f64::INFINITY);
-            counts.invalid += lanes.invalid;
-            let flags = QueryFlags { coherent: false, exclude: lanes.exclude };
-            self.committed.occluded(&lanes.valid, &mut packet, rays, flags);
+            let mut mask = [0; W];
+            let mut exclude = false;
+            for (lane, ray) in rays.iter().enumerate() {
+                packet.set(lane, ray);
+                let valid = ray.is_valid();
+                mask[lane] = -i32::from(valid);
+                counts.invalid += u64::from(!valid);
+                exclude |= ray.exclude != PrimRef::NONE;
+            }
+            let flags = QueryFlags { coherent: false, exclude, passed: &[] };
+            self.committed.occluded(&mask, &mut packet, rays, flags);
             for (lane, out) in occluded.iter_mut().enumerate() {
-                *out = lanes.valid[lane] != 0 && packet.is_occluded(lane);
+                *out = mask[lane] != 0 && packet.is_occluded(lane);
             }
         }
     }
 
-    /// One Embree query, no second try; `shift` leads from the moved ray back to the given one.
-    fn query(&self, ray: &Ray) -> Option<(PacketHit, Ray, f64)> {
-        let (moved, shift) = self.approach(ray)?;
-        let mut packet = Packet::<1>::new();
-        packet.set(0, &moved);
-        let flags = QueryFlags { coherent: false, exclude: moved.exclude != PrimRef::NONE };
-        self.committed.intersect(&[-1], &mut packet, std::slice::from_ref(&moved), flags);
-        packet.hit(0).map(|hit| (hit, moved, shift))
-    }
+    // ---- the recheck -------------------------------------------------------------------------
 
-    /// The hit in f64, or the next one behind it where it is a phantom.
-    #[inline]
-    fn accept(&self, ray: &Ray, moved: &Ray, shift: f64, hit: &PacketHit) -> Option<Hit> {
-        let accepted = self.recheck(ray, shift, hit);
-        if accepted.is_some() { accepted } else { self.pass_phantom(ray, moved, shift, hit) }
-    }
-
-    /// The first hit behind `hit` that is none.
-    #[cold]
-    fn pass_phantom(&self, ray: &Ray, moved: &Ray, shift: f64, hit: &PacketHit) -> Option<Hit> {
-        let (mut hit, mut moved, mut shift) = (*hit, *moved, shift);
-        for _ in 0..MOST_PHANTOMS {
-            let beyond = Ray { tnear: just_beyond(hit.t), ..moved };
-            if beyond.tnear > beyond.tfar {
-                return None;
-            }
-            let (next, again, further) = self.query(&beyond)?;
-            (hit, moved, shift) = (next, again, shift + further);
-            if let Some(accepted) = self.recheck(ray, shift, &hit) {
-                return Some(accepted);
-            }
-        }
-        None
-    }
-
-    #[inline]
-    fn recheck(&self, ray: &Ray, shift: f64, hit: &PacketHit) -> Option<Hit> {
-        let Some(mesh) = self.scene.meshes.get(hit.prim.geom_id as usize) else {
-            let s = &self.scene.spheres[hit.prim.prim_id as usize];
-            let leaving = hit.prim == ray.exclude;
-            let t = sphere::first_root(ray, s.centre, s.radius, leaving)?;
-            return Some(Hit { t, u: 0.0, v: 0.0, prim: hit.prim });
-        };
-        let wanted = match self.rules.recheck {
+    /// Whether the rules want `hit`, one of a block, recomputed before anybody looks at its triangle.
+    #[inline(always)]
+    fn is_wanted(&self, ray: &Ray, hit: &PacketHit) -> bool {
+        match self.rules.recheck {
             Recheck::Always => true,
-            Recheck::Risky => is_risky(ray, hit),
+            Recheck::Risky => is_risky(ray, hit, self.longest_edges[hit.prim.geom_id as usize]),
             Recheck::Off => false,
+        }
+    }
+
+    /// Rechecks the hits `found` in the lanes `hit`, many at once; returns the lanes whose hit may
+    /// be a phantom.
+    fn recheck_block(
+        &self,
+        rays: &[Ray],
+        hit: Lanes,
+        found: &[PacketHit; BLOCK],
+        hits: &mut [Option<Hit>],
+    ) -> Lanes {
+        let mut pairs = Pairs::new();
+        let mut lanes = [0u8; BLOCK];
+        let mut corners = [[0u32; 3]; BLOCK];
+        let mut wanted = 0;
+        let mut open = 0;
+        // Indices first, then vertices: so the processor waits for many cache misses at a time.
+        for lane in each(hit) {
+            let (ray, candidate) = (&rays[lane], &found[lane]);
+            match self.scene.meshes.get(candidate.prim.geom_id as usize) {
+                Some(mesh) if self.is_wanted(ray, candidate) => {
+                    lanes[wanted] = lane as u8;
+                    corners[wanted] = mesh.triangles[candidate.prim.prim_id as usize];
+                    wanted += 1;
+                }
+                Some(_) => hits[lane] = Some(self.as_it_is(candidate, 0.0)),
+                None => {
+                    hits[lane] = self.recheck_sphere(ray, candidate.prim);
+                    open |= Lanes::from(hits[lane].is_none()) << lane;
+                }
+            }
+        }
+        for (lane, corners) in lanes[..wanted].iter().zip(&corners) {
+            let lane = *lane as usize;
+            let mesh = &self.scene.meshes[found[lane].prim.geom_id as usize];
+            pairs.push(&rays[lane], &corners.map(|i| mesh.positions[i as usize].as_dvec3()));
+        }
+        pairs.compute();
+        for (k, lane) in lanes[..wanted].iter().map(|lane| *lane as usize).enumerate() {
+            let met = pairs.get(k);
+            let (ray, prim) = (&rays[lane], found[lane].prim);
+            // Not finite: neither is the least weight, or it is below zero.
+            if met.least_weight() >= 0.0 && (ray.tnear..=ray.tfar).contains(&met.t) {
+                hits[lane] = Some(Hit { t: met.t, u: met.u, v: met.v, prim, rough: false });
+            } else {
+                hits[lane] = self.recheck(ray, &Candidate { hit: found[lane], shift: 0.0 });
+                open |= Lanes::from(hits[lane].is_none()) << lane;
+            }
+        }
+        open
+    }
+
+    /// The hit in f64, or `None` for a phantom.
+    #[inline]
+    fn recheck(&self, ray: &Ray, candidate: &Candidate) -> Option<Hit> {
+        let hit = &candidate.hit;
+        let Some(mesh) = self.scene.meshes.get(hit.prim.geom_id as usize) else {
+            return self.recheck_sphere(ray, hit.prim);
         };
-        if !wanted {
-            let (t, u, v) = (f64::from(hit.t) + shift, f64::from(hit.u), f64::from(hit.v));
-            return Some(Hit { t, u, v, prim: hit.prim });
+        if self.rules.recheck == Recheck::Off {
+            return Some(self.as_it_is(hit, candidate.shift));
         }
         let corners = mesh.corners(hit.prim.prim_id as usize);
         let met = triangle::meet_plane(ray, &corners)?;
@@ -180,71 +361,66 @@ impl<'s> EmbreeIntersector<'s> {
             let t = nearly_on(ray, &corners, &met, &beside)?;
             (beside.u, beside.v, t)
         };
-        (t >= ray.tnear && t <= ray.tfar).then_some(Hit { t, u, v, prim: hit.prim })
+        (t >= ray.tnear && t <= ray.tfar).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
     }
 
-    /// One second try for a ray that should perhaps have hit: moved by 4 ulp.
-    fn retry(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit> {
-        if !self.rules.retry {
-            return None;
-        }
-        let inv = 1.0 / ray.dir;
-        if !self.boxes.iter().any(|b| b.clip(ray.org, inv, ray.tnear, ray.tfar).is_some()) {
-            return None;
-        }
-        counts.retry += 1;
-        let nudged = Ray { dir: nudge(ray.dir), ..*ray };
-        let (hit, moved, shift) = self.query(&nudged)?;
-        // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
-        self.accept(ray, &moved, shift, &hit)
+    /// Embree's own numbers. Unless the recheck is off they are computed again when the surface is
+    /// looked at.
+    #[inline(always)]
+    fn as_it_is(&self, hit: &PacketHit, shift: f64) -> Hit {
+        let (t, u, v) = (f64::from(hit.t) + shift, f64::from(hit.u), f64::from(hit.v));
+        Hit { t, u, v, prim: hit.prim, rough: self.rules.recheck != Recheck::Off }
+    }
+
+    fn recheck_sphere(&self, ray: &Ray, prim: PrimRef) -> Option<Hit> {
+        let s = &self.scene.spheres[prim.prim_id as usize];
+        let t = sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude)?;
+        Some(Hit { t, u: 0.0, v: 0.0, prim, rough: false })
     }
 }
 
-/// The next f32 after a hit's `t`, which is not negative.
-fn just_beyond(t: f32) -> f64 {
-    f64::from(f32::from_bits(t.max(0.0).to_bits() + 1))
+/// What a lane holds before Embree found anything.
+const NOTHING: PacketHit =
+    PacketHit { t: 0.0, u: 0.0, v: 0.0, ng: crate::math::Vec3::ZERO, prim: PrimRef::NONE };
+
+/// The lanes whose rays are valid.
+fn valid_lanes(rays: &[Ray]) -> Lanes {
+    rays.iter().enumerate().fold(0, |lanes, (k, ray)| lanes | Lanes::from(ray.is_valid()) << k)
 }
 
-/// The direction turned by 4 ulp of f32, across: a factor on each component would leave an
-/// axis-parallel ray, the likeliest to pass through a vertex, as it is.
-fn nudge(dir: DVec3) -> DVec3 {
-    let length = dir.length();
-    let (across, _) = orthonormal_basis(dir / length);
-    dir + across * (8.0 * ROUNDING * length)
+/// The ray turned by 4 ulp of f32, across: a factor on each component would leave an
+/// axis-parallel direction, the likeliest to pass through a vertex, as it is.
+fn nudged(ray: &Ray) -> Ray {
+    let length = ray.dir.length();
+    let (across, _) = orthonormal_basis(ray.dir / length);
+    Ray { dir: ray.dir + across * (8.0 * ROUNDING * length), ..*ray }
 }
 
-/// What one look at a packet's rays found out.
-struct Lanes<const W: usize> {
-    /// Embree's mask: -1 where the ray is valid.
-    valid: [i32; W],
-    /// Rays refused.
-    invalid: u64,
-    /// Some origin is further out than `near`.
-    far: bool,
-    /// Some ray excludes a primitive.
-    exclude: bool,
+/// Whether the ray may in truth pass beside the triangle that Embree named.
+///
+/// Embree's edge functions are off by some ulp of (edge x distance x direction), and the weights
+/// are those over the triangle's area as the ray sees it: grazing hits, slivers and hits near an
+/// edge fail the test. `edge` is the longest of the mesh, so that no corner need be fetched.
+#[inline(always)]
+fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
+    let least = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
+    let ones = DVec3::ONE;
+    let length = ray.dir.abs().dot(ones);
+    let reach = ray.org.abs().dot(ones) + f64::from(hit.t) * length;
+    let area = hit.ng.as_dvec3().dot(ray.dir).abs();
+    // Written so that NaN is risky.
+    let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
+    !is_safe
 }
 
-#[inline]
-fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], near: f64) -> Lanes<W> {
-    let mut lanes = Lanes { valid: [0; W], invalid: 0, far: false, exclude: false };
-    for (lane, ray) in rays.iter().enumerate() {
-        packet.set(lane, ray);
-        let valid = ray.is_valid();
-        lanes.valid[lane] = -i32::from(valid);
-        lanes.invalid += u64::from(!valid);
-        lanes.far |= ray.org.abs().max_element() > near;
-        lanes.exclude |= ray.exclude != PrimRef::NONE;
-    }
-    lanes
-}
-
-/// Whether Embree's f32 answer may be far off: near an edge, or grazing.
-fn is_risky(ray: &Ray, hit: &PacketHit) -> bool {
-    let edge = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
-    let ng = hit.ng.as_dvec3();
-    let cos2 = ng.dot(ray.dir).powi(2);
-    edge < 1e-5 || cos2 < 0.05 * 0.05 * ng.length_squared() * ray.dir.length_squared()
+/// Longest edge of a mesh's triangles, or a little more.
+fn longest_edge(mesh: &Mesh) -> f64 {
+    let longest = mesh.triangles.par_iter().map(|triangle| {
+        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
+        let [x, y, z] = [b - a, c - b, a - c].map(|edge| edge.length_squared());
+        x.max(y).max(z)
+    });
+    f64::from(longest.reduce(|| 0.0, f32::max)).sqrt() * (1.0 + 8.0 * ROUNDING)
 }
 
 /// A plane point just beside its triangle: where the ray passes the nearest point of the triangle,
@@ -267,19 +443,19 @@ fn nearly_on(
     (distance <= 8.0 * ROUNDING * reach).then_some(t)
 }
 
-/// Boxes whose rays deserve a second try: one a geometry while there are few.
-fn retry_boxes(scene: &Scene) -> Vec<Bounds3> {
-    if scene.meshes.len() > MOST_BOXES {
-        return vec![padded(&scene.bounds)];
-    }
-    // Spheres need none: their test is exact.
-    scene.meshes.iter().filter(|m| !m.bounds.is_empty()).map(|m| padded(&m.bounds)).collect()
-}
-
 /// A box with a margin for the rounding of rays.
 fn padded(bounds: &Bounds3) -> Bounds3 {
-    let margin = 4.0 * ROUNDING * (bounds.min.abs().max(bounds.max.abs()));
+    let margin = margin(largest_coordinate(bounds));
     Bounds3 { min: bounds.min - margin, max: bounds.max + margin }
+}
+
+fn largest_coordinate(bounds: &Bounds3) -> f64 {
+    bounds.min.abs().max(bounds.max.abs()).max_element()
+}
+
+/// How far rounding a ray to f32 may move it near points of this largest coordinate.
+fn margin(largest: f64) -> DVec3 {
+    DVec3::splat(16.0 * ROUNDING * largest)
 }
 
 impl Intersector for EmbreeIntersector<'_> {
@@ -288,10 +464,7 @@ impl Intersector for EmbreeIntersector<'_> {
             counts.invalid += 1;
             return None;
         }
-        match self.query(ray) {
-            Some((hit, moved, shift)) => self.accept(ray, &moved, shift, &hit),
-            None => self.retry(ray, counts),
-        }
+        self.first_hit(ray, counts)
     }
 
     fn occluded(&self, ray: &Ray, counts: &mut RayCounts) -> bool {
@@ -301,9 +474,11 @@ impl Intersector for EmbreeIntersector<'_> {
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts) {
-        match self.committed.packet_width() {
-            8 => self.intersect_packets::<8>(rays, hits, counts),
-            _ => self.intersect_packets::<4>(rays, hits, counts),
+        for (rays, hits) in rays.chunks(BLOCK).zip(hits.chunks_mut(BLOCK)) {
+            match self.committed.packet_width() {
+                8 => self.intersect_block::<8>(rays, hits, counts),
+                _ => self.intersect_block::<4>(rays, hits, counts),
+            }
         }
     }
 
@@ -320,6 +495,6 @@ impl Intersector for EmbreeIntersector<'_> {
     }
 
     fn memory(&self) -> u64 {
-        self.committed.memory()
+        self.committed.memory() + self.coarse.memory()
     }
 }

@@ -1,6 +1,6 @@
 //! From a [`Hit`] to a surface point, and from there to new rays.
 
-use super::{Hit, PrimRef, Ray};
+use super::{Hit, PrimRef, Ray, triangle};
 use crate::math::{DVec3, Vec2};
 use crate::scene::{Mesh, Scene, Surface};
 
@@ -30,7 +30,7 @@ impl SurfaceInteraction {
     /// Expands `hit`; one function for all intersectors.
     pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Self {
         match scene.meshes.get(hit.prim.geom_id as usize) {
-            Some(mesh) => on_triangle(mesh, hit),
+            Some(mesh) => on_triangle(mesh, ray, hit),
             None => on_sphere(scene, ray, hit),
         }
     }
@@ -67,9 +67,11 @@ impl SurfaceInteraction {
     }
 }
 
-fn on_triangle(mesh: &Mesh, hit: &Hit) -> SurfaceInteraction {
+fn on_triangle(mesh: &Mesh, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
     let prim = hit.prim.prim_id as usize;
-    let [a, b, c] = mesh.corners(prim);
+    let corners = mesh.corners(prim);
+    let hit = refined(ray, &corners, hit);
+    let [a, b, c] = corners;
     let (e1, e2) = (b - a, c - a);
     let p = a + e1 * hit.u + e2 * hit.v;
     let ng = unit_normal(e1, e2);
@@ -92,6 +94,17 @@ fn on_triangle(mesh: &Mesh, hit: &Hit) -> SurfaceInteraction {
     let size = e1.abs().max(e2.abs()).max_element();
     let offset = ROUNDING * (2.0 * p.abs().dot(ng.abs()) + 2.0 * size);
     SurfaceInteraction { p, ng, ns, uv, surface: mesh.surface, prim: hit.prim, offset }
+}
+
+/// The hit in f64. A rough one gets here what the recheck gives the others: the corners are at
+/// hand, while the intersector would have to fetch them just for that.
+fn refined(ray: &Ray, corners: &[DVec3; 3], hit: &Hit) -> Hit {
+    if !hit.rough {
+        return *hit;
+    }
+    let Some(met) = triangle::meet_plane(ray, corners) else { return *hit };
+    let met = if met.least_weight() >= 0.0 { met } else { met.clamped() };
+    Hit { t: met.t, u: met.u, v: met.v, rough: false, ..*hit }
 }
 
 fn on_sphere(scene: &Scene, ray: &Ray, hit: &Hit) -> SurfaceInteraction {

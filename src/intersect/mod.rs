@@ -3,6 +3,8 @@
 //! Backends return a [`Hit`] and nothing more; `SurfaceInteraction` expands it, one function for
 //! both, so that they can differ in the hit alone. All in scene space.
 
+mod coarse;
+mod coincident;
 mod embree;
 mod interaction;
 mod oracle;
@@ -28,7 +30,8 @@ pub trait Intersector: Sync {
     fn intersect(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit>;
     /// Whether anything lies between `tnear` and `tfar`.
     fn occluded(&self, ray: &Ray, counts: &mut RayCounts) -> bool;
-    /// [`Self::intersect`] of every ray, into `hits` (same length).
+    /// [`Self::intersect`] of every ray, into `hits` (same length); their numbers may be left
+    /// rough ([`Hit::rough`]), what is hit is the same.
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts);
     /// [`Self::occluded`] of every ray, into `occluded` (same length).
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], counts: &mut RayCounts);

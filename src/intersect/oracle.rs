@@ -44,7 +44,7 @@ impl<'s> Oracle<'s> {
         for (index, s) in self.scene.spheres.iter().enumerate() {
             let prim = PrimRef { geom_id, prim_id: index as u32 };
             if let Some(t) = sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude) {
-                offer(Hit { t, u: 0.0, v: 0.0, prim });
+                offer(Hit { t, u: 0.0, v: 0.0, prim, rough: false });
             }
         }
         best
@@ -62,6 +62,7 @@ fn meet(ray: &Ray, corners: &[DVec3; 3], prim: PrimRef) -> Option<Hit> {
         u: hit.u,
         v: hit.v,
         prim,
+        rough: false,
     })
 }
 

@@ -1,4 +1,4 @@
-//! The f64 ray–triangle test (Möller and Trumbore, 1997): the oracle's, and the recheck's.
+//! The recheck's f64 ray–triangle test (Möller and Trumbore, 1997), one at a time or many.
 
 use super::Ray;
 use crate::math::DVec3;
@@ -15,7 +15,8 @@ pub(super) struct PlaneHit {
 }
 
 impl PlaneHit {
-    /// The smallest of the three weights: negative outside the triangle.
+    /// The smallest of the three weights: negative outside the triangle, NaN where there is no
+    /// plane point.
     pub fn least_weight(&self) -> f64 {
         self.u.min(self.v).min(1.0 - self.u - self.v)
     }
@@ -33,18 +34,89 @@ impl PlaneHit {
 /// `None` for a ray in the plane (convention: it hits nothing) and for a degenerate triangle.
 /// Neither `tnear`, `tfar` nor the triangle's edges are looked at.
 pub(super) fn meet_plane(ray: &Ray, corners: &[DVec3; 3]) -> Option<PlaneHit> {
-    let e1 = corners[1] - corners[0];
-    let e2 = corners[2] - corners[0];
-    let p = ray.dir.cross(e2);
-    let det = e1.dot(p);
-    if det == 0.0 {
-        return None;
+    let [a, b, c] = corners.map(|c| c.to_array());
+    let [t, u, v] = meet(ray.org.to_array(), ray.dir.to_array(), a, b, c);
+    (t.is_finite() && u.is_finite() && v.is_finite()).then_some(PlaneHit { t, u, v })
+}
+
+/// `[t, u, v]`, not finite where the determinant is zero. The one formula of this file, so that
+/// one ray and many give the same bits.
+#[inline(always)]
+fn meet(org: [f64; 3], dir: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
+    let sub = |x: [f64; 3], y: [f64; 3]| [x[0] - y[0], x[1] - y[1], x[2] - y[2]];
+    let dot = |x: [f64; 3], y: [f64; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+    let cross = |x: [f64; 3], y: [f64; 3]| {
+        [x[1] * y[2] - y[1] * x[2], x[2] * y[0] - y[2] * x[0], x[0] * y[1] - y[0] * x[1]]
+    };
+    let (e1, e2) = (sub(b, a), sub(c, a));
+    let p = cross(dir, e2);
+    let inv = 1.0 / dot(e1, p);
+    let s = sub(org, a);
+    let q = cross(s, e1);
+    [dot(e2, q) * inv, dot(s, p) * inv, dot(dir, q) * inv]
+}
+
+/// Most pairs of a [`Pairs`].
+pub(super) const MOST: usize = 64;
+/// Pairs that are computed together: two SSE2 registers, one of AVX.
+const STEP: usize = 4;
+
+/// Rays, each with one triangle, in groups of [`STEP`]: filled once and computed together.
+pub(super) struct Pairs {
+    count: usize,
+    groups: [Group; MOST / STEP],
+}
+
+/// One component of the pairs of a group.
+type Lane = [f64; STEP];
+
+/// Structure of arrays.
+#[derive(Clone, Copy)]
+struct Group {
+    /// Origin, direction, corners.
+    inputs: [[Lane; 3]; 5],
+    /// `t`, `u`, `v`.
+    outputs: [Lane; 3],
+}
+
+impl Pairs {
+    pub fn new() -> Self {
+        let group = Group { inputs: [[[0.0; STEP]; 3]; 5], outputs: [[0.0; STEP]; 3] };
+        Self { count: 0, groups: [group; MOST / STEP] }
     }
-    let inv = 1.0 / det;
-    let s = ray.org - corners[0];
-    let q = s.cross(e1);
-    let hit = PlaneHit { t: e2.dot(q) * inv, u: s.dot(p) * inv, v: ray.dir.dot(q) * inv };
-    (hit.t.is_finite() && hit.u.is_finite() && hit.v.is_finite()).then_some(hit)
+
+    /// Adds a pair; there is room for [`MOST`].
+    #[inline(always)]
+    pub fn push(&mut self, ray: &Ray, corners: &[DVec3; 3]) {
+        let (group, k) = (&mut self.groups[self.count / STEP], self.count % STEP);
+        let [a, b, c] = corners;
+        for (slot, value) in group.inputs.iter_mut().zip([&ray.org, &ray.dir, a, b, c]) {
+            slot[0][k] = value.x;
+            slot[1][k] = value.y;
+            slot[2][k] = value.z;
+        }
+        self.count += 1;
+    }
+
+    /// Computes all pairs.
+    pub fn compute(&mut self) {
+        for group in &mut self.groups[..self.count.div_ceil(STEP)] {
+            let mut out = [[0.0; STEP]; 3];
+            for k in 0..STEP {
+                let [org, dir, a, b, c] = group.inputs.map(|value| value.map(|axis| axis[k]));
+                let [t, u, v] = meet(org, dir, a, b, c);
+                (out[0][k], out[1][k], out[2][k]) = (t, u, v);
+            }
+            group.outputs = out;
+        }
+    }
+
+    /// Pair `k`'s plane point; weights that are not finite where there is none.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> PlaneHit {
+        let [t, u, v] = self.groups[k / STEP].outputs.map(|lane| lane[k % STEP]);
+        PlaneHit { t, u, v }
+    }
 }
 
 #[cfg(test)]
@@ -70,6 +142,22 @@ mod tests {
         for (u, v) in [(-1e-9, 0.5), (0.5, -1e-9), (0.6, 0.4 + 1e-9), (-1.0, -1.0), (3.0, 3.0)] {
             let c = PlaneHit { t: 1.0, u, v }.clamped();
             assert!(c.least_weight() >= -f64::EPSILON, "{c:?}");
+        }
+    }
+
+    #[test]
+    fn many_give_the_bits_of_one() {
+        let mut pairs = Pairs::new();
+        let rays: Vec<Ray> = (0..MOST)
+            .map(|k| {
+                let k = k as f64;
+                Ray::new(DVec3::new(0.01 * k, 0.3, 2.0), DVec3::new(0.003 * k, 0.1, -1.0))
+            })
+            .collect();
+        rays.iter().for_each(|ray| pairs.push(ray, &UNIT));
+        pairs.compute();
+        for (k, ray) in rays.iter().enumerate() {
+            assert_eq!(meet_plane(ray, &UNIT), Some(pairs.get(k)), "{k}");
         }
     }
 }

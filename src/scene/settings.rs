@@ -121,22 +121,23 @@ impl Default for HitRules {
         Self {
             robust: true,
             retry: true,
-            recheck: Recheck::Always,
+            recheck: Recheck::Risky,
             spawn_offset: true,
             recentre: true,
         }
     }
 }
 
-/// Which hits are recomputed in f64.
+/// Which hits are recomputed in f64. `Always` and `Risky` give the same picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Recheck {
-    /// Every hit.
+    /// Every hit, at once.
     Always,
-    /// Grazing hits, slivers, hits near an edge.
+    /// At once those that may be phantoms by Embree's error bound: grazing, on slivers, near an
+    /// edge. The others when their triangle is looked at for shading.
     Risky,
-    /// None.
+    /// None: f32 numbers, phantoms included.
     Off,
 }
 

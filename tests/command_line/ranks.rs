@@ -28,8 +28,18 @@ mod with_mpi {
     /// The job under mpirun; `None` where there is none, which the test then says.
     fn under_mpirun(job: &Job, ranks: u32, line: &str) -> Option<Ran> {
         let alone = job.command(line);
-        let mut command = Command::new("mpirun");
+        let mut command = mpirun(job);
         command.args(["-n", &ranks.to_string()]).arg(alone.get_program()).args(alone.get_args());
+        match command.output() {
+            Ok(output) => Some(Ran::of(&output)),
+            // Without mpirun there is nothing to test here.
+            Err(_) => None,
+        }
+    }
+
+    /// mpirun, allowed to share cores and to run as root.
+    fn mpirun(job: &Job) -> Command {
+        let mut command = Command::new("mpirun");
         command.current_dir(job.path("."));
         for (name, value) in [
             ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
@@ -39,11 +49,7 @@ mod with_mpi {
         ] {
             command.env(name, value);
         }
-        match command.output() {
-            Ok(output) => Some(Ran::of(&output)),
-            // Without mpirun there is nothing to test here.
-            Err(_) => None,
-        }
+        command
     }
 
     #[test]
@@ -67,6 +73,30 @@ mod with_mpi {
                 serde_json::from_slice(&job.read("s.json")).expect("valid JSON");
             assert_eq!(stats["ranks"].as_array().map(Vec::len), Some(ranks as usize));
             assert!(job.done(&line).out.contains("5 kept"));
+        }
+    }
+
+    /// Ranks on unlike machines use what all have, and say so.
+    #[test]
+    fn unlike_machines_share_an_instruction_set() {
+        let job = Job::new();
+        job.done(&format!("{LINE} --isa sse4.2 -o solo/f_##.png"));
+        let alone = job.command(&format!("{LINE} -o mixed/f_##.png"));
+        let mut command = mpirun(&job);
+        for isa in ["avx2", "sse4.2"] {
+            command.args(["-n", "1", "env", &format!("TWEENRAY_MAX_ISA={isa}")]);
+            command.arg(alone.get_program()).args(alone.get_args());
+            if isa == "avx2" {
+                command.arg(":");
+            }
+        }
+        let Ok(output) = command.output() else { return };
+        let ran = Ran::of(&output);
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert!(ran.err.contains("all use sse4.2"), "{}", ran.err);
+        for frame in 1..=5 {
+            let name = format!("f_0{frame}.png");
+            assert!(job.read(&format!("mixed/{name}")) == job.read(&format!("solo/{name}")));
         }
     }
 

@@ -38,7 +38,7 @@ fn another_setting_is_refused_by_name_and_overwrite_replaces() {
     for (option, says) in [
         ("--seed 7", "seed was 0, now it is 7"),
         ("--shadow-samples 3", "shadow-samples was 16, now it is 3"),
-        ("--recheck risky", "recheck was always, now it is risky"),
+        ("--recheck always", "recheck was risky, now it is always"),
         ("--crop 0,0,9,9", "crop was none, now it is 0,0,9,9"),
         ("--intersector oracle", "intersector was embree, now it is oracle"),
     ] {

@@ -15,7 +15,8 @@ pub(super) struct Rules {
     pub robust: bool,
     /// One second try for a camera or specular ray that misses inside the scene's bounds.
     pub retry: bool,
-    /// Which hits are recomputed in f64: "always", "risky" (grazing, slivers, near an edge), "off".
+    /// Which hits are recomputed in f64 at once: "risky" (grazing, slivers, near an edge; the others
+    /// when shaded), "always", "off".
     pub recheck: Recheck,
     /// Start secondary rays outside the rounding error of their hit.
     pub spawn_offset: bool,

@@ -1,0 +1,179 @@
+//! A coarse tree of boxes around the triangles: which misses deserve a second try.
+//!
+//! A ray that meets none of the boxes cannot have been lost between two triangles. Whole blocks
+//! of rays are asked about at once, by interval arithmetic on their origins and directions
+//! (Boulos et al., 2006), so that open sky costs next to nothing.
+
+use super::Ray;
+use crate::math::{Bounds3, DVec3, Vec3};
+use crate::scene::Scene;
+use rayon::prelude::*;
+
+/// Cells along each axis of the grid that groups the triangles.
+const CELLS: usize = 32;
+/// Triangles that one task groups.
+const TASK: usize = 1 << 18;
+
+/// Boxes in depth-first order; `skip` leads past a node's children.
+pub(super) struct CoarseTree {
+    nodes: Vec<Node>,
+}
+
+struct Node {
+    bounds: Bounds3,
+    /// Index of the next node that is no child of this one.
+    skip: u32,
+    is_leaf: bool,
+}
+
+impl CoarseTree {
+    /// The tree of `scene`'s triangles. Boxes are padded by `margin`, for the rounding of
+    /// rays.
+    pub fn new(scene: &Scene, margin: DVec3) -> Self {
+        let all = scene.meshes.iter().fold(Bounds3::EMPTY, |b, m| b.union(m.bounds));
+        let mut cells = vec![Cell::EMPTY; if all.is_empty() { 0 } else { CELLS.pow(3) }];
+        let longest = all.extent().max_element();
+        let per_unit = if longest > 0.0 { CELLS as f64 / longest } else { 0.0 };
+        for mesh in &scene.meshes {
+            let grouped = mesh.triangles.par_chunks(TASK).map(|triangles| {
+                let mut cells = vec![Cell::EMPTY; CELLS.pow(3)];
+                for triangle in triangles {
+                    let corners = triangle.map(|i| mesh.positions[i as usize]);
+                    let at = (corners[0].as_dvec3() - all.min) * per_unit;
+                    let [x, y, z] = at.to_array().map(|c| (c as usize).min(CELLS - 1));
+                    corners.iter().for_each(|c| cells[(z * CELLS + y) * CELLS + x].include(*c));
+                }
+                cells
+            });
+            // The union of boxes does not depend on the order.
+            for part in grouped.collect::<Vec<_>>() {
+                cells.iter_mut().zip(part).for_each(|(cell, other)| cell.union(&other));
+            }
+        }
+        let mut boxes: Vec<Bounds3> = cells.iter().filter_map(Cell::bounds).collect();
+        for b in &mut boxes {
+            *b = Bounds3 { min: b.min - margin, max: b.max + margin };
+        }
+        let mut tree = Self { nodes: Vec::with_capacity(2 * boxes.len()) };
+        if !boxes.is_empty() {
+            tree.add(&mut boxes);
+        }
+        tree
+    }
+
+    /// Adds the subtree of `boxes`, halved at the median of its longest axis.
+    fn add(&mut self, boxes: &mut [Bounds3]) {
+        let bounds = boxes.iter().fold(Bounds3::EMPTY, |b, o| b.union(*o));
+        let node = self.nodes.len();
+        self.nodes.push(Node { bounds, skip: 0, is_leaf: boxes.len() == 1 });
+        if boxes.len() > 1 {
+            let axis = bounds.extent().max_position();
+            let middle = boxes.len() / 2;
+            let by_centre =
+                |a: &Bounds3, b: &Bounds3| f64::total_cmp(&a.centre()[axis], &b.centre()[axis]);
+            boxes.select_nth_unstable_by(middle, by_centre);
+            let (left, right) = boxes.split_at_mut(middle);
+            self.add(left);
+            self.add(right);
+        }
+        self.nodes[node].skip = self.nodes.len() as u32;
+    }
+
+    /// Whether any ray of `bundle` may meet a triangle: never wrongly no.
+    pub fn may_meet(&self, bundle: &Bundle) -> bool {
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at) {
+            if !bundle.may_meet(&node.bounds) {
+                at = node.skip as usize;
+            } else if node.is_leaf {
+                return true;
+            } else {
+                at += 1;
+            }
+        }
+        false
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> u64 {
+        (self.nodes.capacity() * size_of::<Node>()) as u64
+    }
+}
+
+/// A box of f32 corners, cheap to grow.
+#[derive(Clone, Copy)]
+struct Cell {
+    min: Vec3,
+    max: Vec3,
+}
+
+impl Cell {
+    const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    fn include(&mut self, p: Vec3) {
+        self.min = self.min.min(p);
+        self.max = self.max.max(p);
+    }
+
+    fn union(&mut self, other: &Self) {
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+
+    fn bounds(&self) -> Option<Bounds3> {
+        let bounds = Bounds3 { min: self.min.as_dvec3(), max: self.max.as_dvec3() };
+        self.min.cmple(self.max).all().then_some(bounds)
+    }
+}
+
+/// Rays between bounds of their origins and directions.
+pub(super) struct Bundle {
+    org: [DVec3; 2],
+    dir: [DVec3; 2],
+    /// `1 / dir`.
+    inv: [DVec3; 2],
+    tnear: f64,
+    tfar: f64,
+}
+
+impl Bundle {
+    /// The bundle that holds `rays`; `None` of none.
+    pub fn of<'r>(rays: impl IntoIterator<Item = &'r Ray>) -> Option<Self> {
+        let mut rays = rays.into_iter();
+        let first = rays.next()?;
+        let (mut org, mut dir) = ([first.org; 2], [first.dir; 2]);
+        let (mut tnear, mut tfar) = (first.tnear, first.tfar);
+        for ray in rays {
+            org = [org[0].min(ray.org), org[1].max(ray.org)];
+            dir = [dir[0].min(ray.dir), dir[1].max(ray.dir)];
+            (tnear, tfar) = (tnear.min(ray.tnear), tfar.max(ray.tfar));
+        }
+        Some(Self { org, dir, inv: dir.map(|d| 1.0 / d), tnear, tfar })
+    }
+
+    /// Whether some `t` lies in all three slabs for some ray of the bundle.
+    fn may_meet(&self, bounds: &Bounds3) -> bool {
+        let (mut near, mut far) = (self.tnear, self.tfar);
+        for axis in 0..3 {
+            // t·d must lie in [low, high].
+            let low = bounds.min[axis] - self.org[1][axis];
+            let high = bounds.max[axis] - self.org[0][axis];
+            let (least, most) = (self.dir[0][axis], self.dir[1][axis]);
+            let (inv_least, inv_most) = (self.inv[0][axis], self.inv[1][axis]);
+            if least > 0.0 {
+                near = near.max(low * if low >= 0.0 { inv_most } else { inv_least });
+                far = far.min(high * if high >= 0.0 { inv_least } else { inv_most });
+            } else if most < 0.0 {
+                near = near.max(high * if high <= 0.0 { inv_least } else { inv_most });
+                far = far.min(low * if low <= 0.0 { inv_most } else { inv_least });
+            } else if self.tnear < 0.0 {
+                // Directions of both signs and a segment on both sides of the origin.
+            } else if low > 0.0 {
+                near = near.max(if most > 0.0 { low * inv_most } else { f64::INFINITY });
+            } else if high < 0.0 {
+                near = near.max(if least < 0.0 { high * inv_least } else { f64::INFINITY });
+            }
+        }
+        near <= far
+    }
+}
