@@ -3,16 +3,18 @@
 //! Backends return a [`Hit`] and nothing more; `SurfaceInteraction` expands it, one function for
 //! both, so that they can differ in the hit alone. All in scene space.
 
+pub mod court;
 mod embree;
 mod interaction;
 mod oracle;
+mod sieve;
 mod sphere;
 mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
 pub use embree::EmbreeIntersector;
 pub use interaction::SurfaceInteraction;
-pub use oracle::Oracle;
+pub use oracle::{CourtHit, Oracle};
 
 use crate::error::Result;
 use crate::scene::{IntersectorKind, Scene, Settings};
