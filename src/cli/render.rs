@@ -118,9 +118,8 @@ fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> 
     if settings.isa.is_none() && needed {
         settings.isa = Some(isa.into());
         if best.iter().any(|other| other != isa) {
-            tell(quiet, &["the machines have different instruction sets"], |why| {
-                say::note(format_args!("{why}; all use {isa}"));
-            });
+            let what = "the machines have different instruction sets; all use what they share:";
+            tell(quiet, &[format!("{what} {isa}")], |note| say::note(note));
         }
     }
     Ok(())

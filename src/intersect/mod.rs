@@ -5,16 +5,18 @@
 
 mod coarse;
 mod coincident;
+pub mod court;
 mod embree;
 mod interaction;
 mod oracle;
+mod sieve;
 mod sphere;
 mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
 pub use embree::EmbreeIntersector;
 pub use interaction::SurfaceInteraction;
-pub use oracle::Oracle;
+pub use oracle::{CourtHit, Oracle};
 
 use crate::error::Result;
 use crate::scene::{IntersectorKind, Scene, Settings};

@@ -6,9 +6,11 @@
 pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, UVec2, Vec2, Vec3};
 
 mod bounds;
+mod double_double;
 mod srgb;
 
 pub use bounds::Bounds3;
+pub use double_double::{DoubleDouble, DoubleDouble3};
 pub use srgb::{srgb_decode, srgb_encode};
 
 /// Linear RGB: radiance, irradiance, reflectance; Rec. 709 primaries.
