@@ -1,0 +1,348 @@
+//! Slivers met at grazing angles (Embree's issue 387): phantoms, distances, and who is hit at all.
+
+use super::ways::{OneByOne, stock, to_scene};
+use super::wide;
+use crate::shapes;
+use crate::suite::{self, Outcome, Size};
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
+use tweenray::math::{DVec3, orthonormal_basis};
+use tweenray::scene::{HitRules, Scene, World, WorldMesh};
+
+/// Slivers in a scene.
+const SLIVERS: u32 = 100;
+/// Half edge of the cube that holds them; rays start up to twice as far from their sliver.
+const HALF: f64 = 300.0;
+/// Steepest angle between a ray and its sliver's plane, radians.
+const GRAZING: f64 = 0.02;
+/// Distance from its triangle, in longest edges, from which a hit is a phantom.
+const PHANTOM: f64 = 1e-4;
+
+/// Slivers strewn about, and rays that graze them.
+struct Field {
+    world: World,
+    seed: u64,
+}
+
+impl Field {
+    fn new(seed: u64) -> Self {
+        let mut rng = suite::rng(7, seed);
+        let mut positions = Vec::new();
+        for _ in 0..SLIVERS {
+            let middle = DVec3::from_array(std::array::from_fn(|_| rng.random_range(-HALF..HALF)));
+            // 11.2 and 9.7 long, and a third edge that just lets them close.
+            let (long, short, third) = (11.2f64, 9.7f64, rng.random_range(1.5005..1.7f64));
+            let along = (long * long + short * short - third * third) / (2.0 * long);
+            let height = (short * short - along * along).max(0.0).sqrt();
+            let normal = shapes::direction(&mut rng);
+            let (x, y) = orthonormal_basis(normal);
+            let start = middle - x * (0.5 * long);
+            positions.extend([start, start + x * long, start + x * along + y * height]);
+        }
+        let triangles = (0..SLIVERS).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let name = "slivers".into();
+        let mesh = WorldMesh { name, positions, triangles, normals: None, uvs: None, material: 0 };
+        Self { world: shapes::world_of(mesh), seed }
+    }
+
+    /// A world ray that passes through one sliver or just beside it.
+    fn ray(&self, i: u64) -> Ray {
+        let mut rng: Pcg64Mcg = suite::rng(70_000 + self.seed, i);
+        let mesh = &self.world.meshes[0];
+        let [a, b, c] = mesh.triangles[rng.random_range(0..mesh.triangles.len())]
+            .map(|k| mesh.positions[k as usize]);
+        let (u, v) = (rng.random_range(-0.2..1.2), rng.random_range(-0.2..1.2f64));
+        let target = a + (b - a) * u + (c - a) * v * (1.0 - u);
+        let normal = (b - a).cross(c - a).normalize();
+        let (x, y) = orthonormal_basis(normal);
+        let (sin, cos) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();
+        let dir = x * cos + y * sin + normal * rng.random_range(-GRAZING..GRAZING);
+        let dir = dir.normalize();
+        Ray::new(target - dir * rng.random_range(10.0..2.0 * HALF), dir)
+    }
+}
+
+/// How a field's rays are traced.
+#[derive(Clone, Copy)]
+struct Way {
+    rules: HitRules,
+    /// One by one instead of in packets.
+    one_by_one: bool,
+}
+
+/// Traces `rays` rays over `fields` fields and sums what `judge` says of each ray and its hit.
+fn trace<T: Send + Default>(
+    fields: u64,
+    rays: u64,
+    way: Way,
+    judge: impl Fn(&Scene, &Ray, Option<&Hit>, &mut T) + Sync,
+    sum: impl Fn(T, T) -> T + Sync + Send + Copy,
+) -> T {
+    let mut total = T::default();
+    for seed in 0..fields {
+        let field = Field::new(seed);
+        let scene = field.world.clone().into_scene(way.rules.recentre).unwrap();
+        let embree = EmbreeIntersector::new(&scene, way.rules, None, 1).unwrap();
+        let single = OneByOne(&embree);
+        let tracer: &dyn Intersector = if way.one_by_one { &single } else { &embree };
+        let batch = |rays: &[Ray], hits: &[Option<Hit>]| {
+            let mut found = T::default();
+            for (ray, hit) in rays.iter().zip(hits) {
+                judge(&scene, ray, hit.as_ref(), &mut found);
+            }
+            found
+        };
+        let make = |i| to_scene(&field.ray(i), &scene.recentring);
+        total = sum(total, suite::trace(tracer, rays / fields, make, batch, sum, T::default));
+    }
+    total
+}
+
+/// Ours in packets and one by one.
+const OURS: [bool; 2] = [false, true];
+
+fn ours(one_by_one: bool) -> Way {
+    Way { rules: HitRules::default(), one_by_one }
+}
+
+fn stock_way() -> Way {
+    Way { rules: stock(true), one_by_one: false }
+}
+
+fn corners(scene: &Scene, hit: &Hit) -> [DVec3; 3] {
+    scene.meshes[hit.prim.geom_id as usize].corners(hit.prim.prim_id as usize)
+}
+
+/// A ray and its hit, bit by bit, for whoever has to look into it.
+fn told(scene: &Scene, ray: &Ray, hit: Option<&Hit>) -> String {
+    let bits = |p: DVec3| p.to_array().map(f64::to_bits).map(|b| format!("{b:016x}")).join(" ");
+    let mut line = format!("org {} dir {} hit {hit:?}", bits(ray.org), bits(ray.dir));
+    if let Some(hit) = hit {
+        let corners = corners(scene, hit).map(|c| format!("{:?}", c.as_vec3().to_array()));
+        line += &format!(" corners {}", corners.join(" "));
+    }
+    line
+}
+
+#[derive(Default)]
+struct Phantoms {
+    hits: u64,
+    /// The ray passes its triangle by.
+    beside: u64,
+    /// The point at `t` lies beside its triangle.
+    off: u64,
+    /// Furthest such ray and point, world units.
+    worst: [f64; 2],
+    example: Option<String>,
+}
+
+fn judge_phantom(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Phantoms) {
+    let Some(hit) = hit else { return };
+    found.hits += 1;
+    let corners = corners(scene, hit);
+    let limit = PHANTOM * wide::longest_edge(&corners);
+    let line = wide::line_to_triangle(ray, &corners);
+    let point = wide::point_to_triangle(ray.at(hit.t), &corners);
+    found.beside += u64::from(line > limit);
+    found.off += u64::from(point > limit);
+    let world = [line, point].map(|d| scene.recentring.length_to_world(d));
+    found.worst = std::array::from_fn(|k| found.worst[k].max(world[k]));
+    if line > limit || point > limit {
+        found.example.get_or_insert_with(|| told(scene, ray, Some(hit)));
+    }
+}
+
+fn sum_phantoms(a: Phantoms, b: Phantoms) -> Phantoms {
+    Phantoms {
+        hits: a.hits + b.hits,
+        beside: a.beside + b.beside,
+        off: a.off + b.off,
+        worst: std::array::from_fn(|k| a.worst[k].max(b.worst[k])),
+        example: a.example.or(b.example),
+    }
+}
+
+/// Fields and rays of a size.
+fn amount(size: Size) -> (u64, u64) {
+    (size.of(4, 60), size.of(100_000, 15_000_000))
+}
+
+/// No accepted hit lies beside its triangle.
+pub fn phantom_hit(size: Size) -> Outcome {
+    let mut outcome = Outcome::default();
+    let (fields, rays) = amount(size);
+    for one_by_one in OURS {
+        let found = trace(fields, rays, ours(one_by_one), judge_phantom, sum_phantoms);
+        // A hit may be both; each of its faults is enough.
+        outcome.count(rays, found.beside.max(found.off));
+        outcome.show(format!("hits {}, worst point {:.1e} off", found.hits, found.worst[1]));
+        found.example.into_iter().for_each(|e| outcome.example(e));
+    }
+    let found = trace(fields, rays, stock_way(), judge_phantom, sum_phantoms);
+    outcome.show(format!(
+        "stock ROBUST, {rays} rays, {} hits: {} of triangles that the ray passes by, by up to {:.1} \
+         units; {} points off, by up to {:.1}",
+        found.hits, found.beside, found.worst[0], found.off, found.worst[1]
+    ));
+    if size == Size::Full {
+        outcome.at_least("phantoms of stock Embree", found.beside as f64, 1.0);
+    }
+    outcome
+}
+
+#[derive(Default)]
+struct Distances {
+    hits: u64,
+    wrong: u64,
+    /// Worst relative error of `t`, and absolute one in world units.
+    worst: [f64; 2],
+    example: Option<String>,
+}
+
+/// `t` against the plane's; where the ray passes just beside the triangle, where it is nearest.
+fn judge_distance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Distances) {
+    let Some(hit) = hit else { return };
+    let corners = corners(scene, hit);
+    let Some(met) = wide::meet(ray, &corners) else { return };
+    let limit = PHANTOM * wide::longest_edge(&corners);
+    if met.least < 0.0 && wide::line_to_triangle(ray, &corners) > limit {
+        // A phantom: what its `t` should be nobody can say.
+        return;
+    }
+    let off = wide::point_to_triangle(ray.at(hit.t), &corners);
+    let error = if met.least < 0.0 && off <= limit { 0.0 } else { (hit.t - met.t).abs() };
+    let relative = error / met.t.abs();
+    found.hits += 1;
+    found.wrong += u64::from(relative > 1e-6);
+    // `t` is in world units in either space.
+    found.worst = [found.worst[0].max(relative), found.worst[1].max(error)];
+    if relative > 1e-6 {
+        let t = met.t;
+        found.example.get_or_insert_with(|| format!("t {t:e}: {}", told(scene, ray, Some(hit))));
+    }
+}
+
+fn sum_distances(a: Distances, b: Distances) -> Distances {
+    Distances {
+        hits: a.hits + b.hits,
+        wrong: a.wrong + b.wrong,
+        worst: std::array::from_fn(|k| a.worst[k].max(b.worst[k])),
+        example: a.example.or(b.example),
+    }
+}
+
+/// Distances of grazing hits.
+pub fn grazing_t(size: Size) -> Outcome {
+    let mut outcome = Outcome::default();
+    let (fields, rays) = amount(size);
+    for one_by_one in OURS {
+        let found = trace(fields, rays, ours(one_by_one), judge_distance, sum_distances);
+        outcome.count(found.hits, found.wrong);
+        let [relative, absolute] = found.worst;
+        outcome.show(format!("worst error of t: {relative:.1e} of it, {absolute:.1e} units"));
+        found.example.into_iter().for_each(|e| outcome.example(e));
+    }
+    let found = trace(fields, rays, stock_way(), judge_distance, sum_distances);
+    let [relative, absolute] = found.worst;
+    outcome.at_least("stock ROBUST: worst relative error of t", relative, 1e-6);
+    outcome.show(format!(
+        "stock ROBUST: worst error {absolute:.2} units; beyond 1e-6 in {} of {} hits",
+        found.wrong, found.hits
+    ));
+    outcome
+}
+
+#[derive(Default)]
+struct Balance {
+    /// Rays that hit what the court says they miss.
+    wrongly_hit: u64,
+    /// Rays that miss what the court says they hit.
+    missed: u64,
+    /// Rays that pass some edge within the band.
+    in_band: u64,
+    example: Option<String>,
+}
+
+/// ulps of the ray's largest coordinate that an edge's band is wide, to either side.
+const BAND: f64 = 4.0;
+
+fn judge_balance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Balance) {
+    let mesh = &scene.meshes[0];
+    let hit_prim = hit.map(|h| h.prim.prim_id as usize);
+    let (mut nearest, mut in_band, mut legal) = (None::<(f64, usize)>, false, hit.is_none());
+    let dir = ray.dir.normalize();
+    for prim in 0..mesh.triangles.len() {
+        let corners = mesh.corners(prim);
+        // Most slivers are far from the ray.
+        let reach = wide::longest_edge(&corners);
+        if (corners[0] - ray.org).cross(dir).length_squared() > 4.0 * reach * reach {
+            continue;
+        }
+        let largest = ray.org.abs().max_element().max(corners[0].abs().max_element());
+        let ulp = f64::from(f32::EPSILON) * largest;
+        if wide::line_to_edges(ray, &corners) <= BAND * ulp {
+            in_band = true;
+            legal |= hit_prim == Some(prim);
+            continue;
+        }
+        let Some(met) = wide::meet(ray, &corners).filter(|m| m.least > 0.0 && m.t >= 0.0) else {
+            continue;
+        };
+        legal |= hit_prim == Some(prim);
+        if nearest.is_none_or(|n| met.t < n.0) {
+            nearest = Some((met.t, prim));
+        }
+    }
+    found.in_band += u64::from(in_band);
+    // Missed: nothing was hit, or something behind what should have been.
+    let missed = nearest.is_some_and(|(t, prim)| {
+        hit_prim != Some(prim) && hit.is_none_or(|h| h.t > t * (1.0 + 1e-6))
+    });
+    found.missed += u64::from(missed);
+    found.wrongly_hit += u64::from(!legal);
+    if missed || !legal {
+        found.example.get_or_insert_with(|| {
+            let should = nearest.map(|(t, prim)| {
+                let corners = mesh.corners(prim).map(|c| format!("{:?}", c.as_vec3().to_array()));
+                format!("{t:e} on {prim}: {}", corners.join(" "))
+            });
+            format!("should be {should:?}: {}", told(scene, ray, hit))
+        });
+    }
+}
+
+fn sum_balance(a: Balance, b: Balance) -> Balance {
+    Balance {
+        wrongly_hit: a.wrongly_hit + b.wrongly_hit,
+        missed: a.missed + b.missed,
+        in_band: a.in_band + b.in_band,
+        example: a.example.or(b.example),
+    }
+}
+
+/// False and missed hits, away from the edges' bands.
+pub fn sliver_balance(size: Size) -> Outcome {
+    let mut outcome = Outcome { allowed: 1e-7, ..Outcome::default() };
+    let (fields, rays) = amount(size);
+    for one_by_one in OURS {
+        let found = trace(fields, rays, ours(one_by_one), judge_balance, sum_balance);
+        outcome.count(rays, found.wrongly_hit + found.missed);
+        outcome.show(format!(
+            "false {}, missed {}; {} rays within {BAND} ulp of an edge",
+            found.wrongly_hit, found.missed, found.in_band
+        ));
+        found.example.into_iter().for_each(|e| outcome.example(e));
+    }
+    let found = trace(fields, rays, stock_way(), judge_balance, sum_balance);
+    outcome.show(format!(
+        "stock ROBUST, {rays} rays: false {}, missed {}",
+        found.wrongly_hit, found.missed
+    ));
+    outcome.at_least(
+        "stock ROBUST: false and missed",
+        (found.wrongly_hit + found.missed) as f64,
+        1.0,
+    );
+    outcome
+}
