@@ -38,7 +38,8 @@ pub fn vertex_perspective(size: Size) -> Outcome {
     const CELLS: u32 = 256;
     let rough = |x: u32, y: u32| {
         let (x, y) = (f64::from(x), f64::from(y));
-        3.0 * (0.37 * x).sin() * (0.23 * y).cos() + 1.5 * (1.9 * x + 0.7 * y).sin()
+        // Gentler than any ray: at a silhouette near the border a miss would be right.
+        (0.37 * x).sin() * (0.23 * y).cos() + 0.2 * (1.9 * x + 0.7 * y).sin()
     };
     let world = shapes::world_of(field(CELLS, rough));
     let first = DVec3::new(128.3, 127.9, 300.0);
@@ -49,7 +50,11 @@ pub fn vertex_perspective(size: Size) -> Outcome {
         let (x, y) = inner(CELLS, (i % u64::from(vertices)) as u32);
         let eye = match i / u64::from(vertices) {
             0 => first,
-            k => first + shapes::in_ball(&mut suite::rng(4, k), 250.0),
+            k => {
+                let mut rng = suite::rng(4, k);
+                let mut within = |most: f64| rng.random_range(-most..most);
+                first + DVec3::new(within(100.0), within(100.0), 200.0 + within(200.0))
+            }
         };
         (eye, y * (CELLS + 1) + x)
     };
