@@ -1,5 +1,6 @@
 //! A. Intersection.
 
+mod accuracy;
 mod fields;
 mod invariance;
 mod slivers;
@@ -22,6 +23,8 @@ cases! {
     7 phantom_hit "stock ROBUST: 13 per 3e6, up to 140 units off" => slivers::phantom_hit;
     8 grazing_t "stock ROBUST: t up to 2.57 units off" => slivers::grazing_t;
     9 sliver_balance "stock ROBUST: 1,350 false and 1,042 missed per 3e6" => slivers::sliver_balance;
+    10 hit_accuracy "Embree allows 16 ulp, 256 rays on one triangle" => accuracy::hit_accuracy;
+    11 small_triangle_far "Embree's own test of this is commented out" => accuracy::small_triangle_far;
     12 translation_invariance "raw f32 Embree at 1e6: 43 % of hits on the wrong triangle" => invariance::translation;
     13 scale_invariance "LuxCore #79 fails at 10 cm" => invariance::scale;
 }

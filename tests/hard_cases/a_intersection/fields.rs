@@ -9,7 +9,7 @@ use tweenray::math::DVec3;
 use tweenray::scene::{HitRules, Scene, World, WorldMesh};
 
 /// Corners `(x, y, height(x, y))` for whole x and y from 0 to `cells`, two triangles a cell.
-fn field(cells: u32, height: impl Fn(u32, u32) -> f64) -> WorldMesh {
+pub fn field(cells: u32, height: impl Fn(u32, u32) -> f64) -> WorldMesh {
     let side = cells + 1;
     let at = |x: u32, y: u32| DVec3::new(f64::from(x), f64::from(y), height(x, y));
     let positions = (0..side * side).map(|i| at(i % side, i / side)).collect();
