@@ -24,7 +24,13 @@ impl Recentring {
     /// into `(0.5, 1]`.
     pub fn of(bounds: &Bounds3) -> Self {
         let half = 0.5 * bounds.extent().max_element();
-        let log2_scale = if half > 0.0 { -libm::ceil(libm::log2(half)) as i32 } else { 0 };
+        // Exact, unlike a logarithm: a scene twice as large gets a scale half as large, always.
+        let (mantissa, exponent) = libm::frexp(half);
+        let log2_scale = match half {
+            half if half <= 0.0 => 0,
+            _ if mantissa == 0.5 => 1 - exponent,
+            _ => -exponent,
+        };
         Self { centre: bounds.centre(), log2_scale }
     }
 
@@ -77,7 +83,8 @@ impl World {
     /// emitting surface. With `recentre` false the world's own coordinates are rounded as they
     /// are: that shows what the rule is worth.
     ///
-    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units.
+    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a mesh,
+    /// sphere or area light so small beside the scene that f32 would crush it (`recentre` only).
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
         let bounds = self.bounds();
         let size = bounds.extent().max_element();
@@ -92,6 +99,9 @@ impl World {
             )));
         }
         let recentring = if recentre { Recentring::of(&bounds) } else { Recentring::IDENTITY };
+        if recentre {
+            refuse_crushed(&self, &recentring)?;
+        }
         let lights: Vec<Light> = std::mem::take(&mut self.lights)
             .into_iter()
             .map(|l| to_scene_light(l, &recentring))
@@ -128,6 +138,61 @@ impl World {
             bounds: scene_bounds,
         })
     }
+}
+
+/// Errors for what is lost beside the rest of the scene, by its name: rather no picture than one
+/// with a hole in it.
+fn refuse_crushed(world: &World, r: &Recentring) -> Result<()> {
+    for mesh in &world.meshes {
+        let mut bounds = Bounds3::EMPTY;
+        mesh.positions.iter().for_each(|p| bounds.include(*p));
+        refuse_crushed_box(&mesh.name, &bounds, r)?;
+    }
+    // Spheres stay f64, so their place does not matter.
+    for s in &world.spheres {
+        refuse_narrower(&s.name, 2.0 * s.radius, r, NARROWEST)?;
+    }
+    for (index, light) in world.lights.iter().enumerate() {
+        let name = format!("light {}", index + 1);
+        match light {
+            Light::Quad(q) => {
+                let mut bounds = Bounds3::EMPTY;
+                q.corners.iter().for_each(|c| bounds.include(*c));
+                refuse_crushed_box(&name, &bounds, r)?;
+            }
+            Light::Sphere { radius, .. } => refuse_narrower(&name, 2.0 * radius, r, NARROWEST)?,
+            Light::Point { .. } | Light::Directional { .. } => {}
+        }
+    }
+    Ok(())
+}
+
+/// Widths of scene space: what is narrower has triangles whose determinants underflow in f32.
+const NARROWEST: f64 = 1.0 / (1u64 << 32) as f64;
+/// Numbers of f32 that must fit across a mesh; with fewer, rounding moves its surface by more than
+/// a quarter of its radius.
+const FEWEST_STEPS: f64 = 8.0;
+
+/// Errors for triangles within `bounds` (world) whose corners would fall together in f32. What is
+/// a point in f64 already is nothing that could be lost.
+fn refuse_crushed_box(name: &str, bounds: &Bounds3, r: &Recentring) -> Result<()> {
+    let largest = r.point_to_scene(bounds.min).abs().max(r.point_to_scene(bounds.max).abs());
+    let step = f64::from(f32::EPSILON) * largest.max_element();
+    let width = bounds.extent().max_element();
+    refuse_narrower(name, width, r, NARROWEST.max(FEWEST_STEPS * step))
+}
+
+/// Errors for what is wider than nothing (world units) but narrower than `least` (scene units).
+fn refuse_narrower(name: &str, width: f64, r: &Recentring, least: f64) -> Result<()> {
+    if width == 0.0 || width * r.scale() >= least {
+        return Ok(());
+    }
+    let least = r.length_to_world(least);
+    Err(Error::Usage(format!(
+        "`{name}` is {width:.1e} units wide, too small to be told from a point beside the rest of \
+         the scene, which holds things from {least:.1e} units there. Leave it out, or render it \
+         apart"
+    )))
 }
 
 fn to_scene_light(light: Light, r: &Recentring) -> Light {
@@ -268,5 +333,58 @@ fn add_emitting_surface(
             spheres.push(Sphere { name, centre: *centre, radius: *radius, surface });
         }
         Light::Point { .. } | Light::Directional { .. } => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scale_of(half: f64) -> f64 {
+        let bounds = Bounds3 { min: DVec3::splat(-half), max: DVec3::splat(half) };
+        Recentring::of(&bounds).scale()
+    }
+
+    #[test]
+    fn the_scale_follows_the_size_exactly() {
+        // Just above a power of two: a logarithm rounds to the power itself, but not near 1.
+        for half in [1.0, 1.0 + f64::EPSILON, 1.5, 2.0 - f64::EPSILON] {
+            assert!((0.5..=1.0).contains(&(half * scale_of(half))) && half * scale_of(half) > 0.5);
+            for k in -90..=90 {
+                let power = libm::ldexp(1.0, k);
+                assert_eq!(scale_of(half * power) * power, scale_of(half), "{half} times 2^{k}");
+            }
+        }
+        assert_eq!(scale_of(0.0), 1.0);
+    }
+
+    #[test]
+    fn what_would_be_crushed_is_refused_by_name() {
+        const DIRECTIONS: [DVec3; 6] =
+            [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+        let with = |radius: f64, at: f64| {
+            let mut world = World::default();
+            world.materials.push(Material::black("m"));
+            for (name, centre, radius) in [("large", 0.0, 1.0), ("tiny", at, radius)] {
+                let centre = DVec3::X * centre;
+                let corner = |dir: DVec3| centre + dir * radius;
+                world.meshes.push(WorldMesh {
+                    name: name.into(),
+                    positions: DIRECTIONS.map(corner).into(),
+                    triangles: vec![[0, 2, 4], [1, 5, 3]],
+                    normals: None,
+                    uvs: None,
+                    material: 0,
+                });
+            }
+            world.into_scene(true)
+        };
+        assert!(with(1e-5, 1.0).is_ok());
+        assert!(with(0.0, 1.0).is_ok(), "a point is no loss");
+        let error = with(1e-7, 1.0).expect_err("crushed").to_string();
+        assert!(error.contains("`tiny` is 2.0e-7 units wide"), "{error}");
+        // Near the middle numbers are finer.
+        assert!(with(1e-7, 0.0).is_ok());
+        assert!(with(1e-12, 0.0).is_err());
     }
 }

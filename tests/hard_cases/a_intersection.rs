@@ -2,7 +2,9 @@
 
 mod accuracy;
 mod fields;
+mod holes;
 mod invariance;
+mod ranges;
 mod slivers;
 mod ways;
 mod wide;
@@ -20,6 +22,7 @@ cases! {
     3 watertight_edge "stock ROBUST, compact, misses 2.5e-7" => watertight_edge;
     4 vertex_perspective "stock: 21,524 of 65,025 miss, with ROBUST 951" => fields::vertex_perspective;
     5 structured_grid "mitsuba #1149, tinybvh #168: axis-parallel rays fall through" => fields::structured_grid;
+    6 bunny_holes "naive f32: 8.5 % holes at an epsilon of 1e-6, all at 1e-5" => holes::bunny_holes;
     7 phantom_hit "stock ROBUST: 13 per 3e6, up to 140 units off" => slivers::phantom_hit;
     8 grazing_t "stock ROBUST: t up to 2.57 units off" => slivers::grazing_t;
     9 sliver_balance "stock ROBUST: 1,350 false and 1,042 missed per 3e6" => slivers::sliver_balance;
@@ -27,6 +30,7 @@ cases! {
     11 small_triangle_far "Embree's own test of this is commented out" => accuracy::small_triangle_far;
     12 translation_invariance "raw f32 Embree at 1e6: 43 % of hits on the wrong triangle" => invariance::translation;
     13 scale_invariance "LuxCore #79 fails at 10 cm" => invariance::scale;
+    14 range_guard "Embree: 49 % holes at a radius of 1e-18, 21 % at 2e18" => ranges::range_guard;
 }
 
 /// Leaks of closed spheres at the origin and far away. `aim` gives the target of ray `i`.

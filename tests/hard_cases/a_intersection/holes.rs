@@ -1,0 +1,182 @@
+//! The hole of Möller and Trumbore's determinant epsilon, which no choice of it cures.
+
+use super::ways::{OneByOne, to_scene};
+use crate::shapes;
+use crate::suite::{self, Outcome, Size};
+use rand::Rng;
+use rayon::prelude::*;
+use std::path::Path;
+use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
+use tweenray::math::{DVec3, Vec3};
+use tweenray::scene::{HitRules, NormalPolicy, WorldMesh};
+
+/// Determinants below these are "parallel" to whoever copies the formula with them.
+const EPSILONS: [f64; 9] = [0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
+
+/// The largest |determinant| among the triangles that the ray hits up to `most`, by the formula in
+/// one precision; `None` where it hits none. A determinant epsilon above it makes a hole.
+macro_rules! largest_determinant {
+    ($name:ident, $vector:ty, $number:ty) => {
+        fn $name(org: $vector, dir: $vector, most: $number, mesh: &[[$vector; 3]]) -> Option<f64> {
+            let mut largest: Option<f64> = None;
+            for [a, b, c] in mesh {
+                let (e1, e2) = (*b - *a, *c - *a);
+                let p = dir.cross(e2);
+                let det = e1.dot(p);
+                if det == 0.0 {
+                    continue;
+                }
+                let inv = 1.0 / det;
+                let s = org - *a;
+                let u = s.dot(p) * inv;
+                let q = s.cross(e1);
+                let (v, t) = (dir.dot(q) * inv, e2.dot(q) * inv);
+                if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t <= most {
+                    let det = f64::from(det.abs());
+                    largest = Some(largest.map_or(det, |l| l.max(det)));
+                }
+            }
+            largest
+        }
+    };
+}
+largest_determinant!(in_f32, Vec3, f32);
+largest_determinant!(in_f64, DVec3, f64);
+
+/// The running sum of the triangles' areas.
+fn areas(mesh: &WorldMesh) -> Vec<f64> {
+    let area = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|k| mesh.positions[k as usize]);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    let add = |sum: &mut f64, t: &[u32; 3]| {
+        *sum += area(t);
+        Some(*sum)
+    };
+    mesh.triangles.iter().scan(0.0, add).collect()
+}
+
+/// A mesh, and rays that each aim at a point of its surface.
+struct Subject {
+    name: &'static str,
+    mesh: WorldMesh,
+    areas: Vec<f64>,
+    /// Where the eye of a ray is.
+    eye: fn(&mut rand_pcg::Pcg64Mcg) -> DVec3,
+}
+
+impl Subject {
+    fn new(name: &'static str, mesh: WorldMesh, eye: fn(&mut rand_pcg::Pcg64Mcg) -> DVec3) -> Self {
+        Self { name, areas: areas(&mesh), mesh, eye }
+    }
+
+    /// Ray `i`, direction of unit length, and the distance at which it meets its point.
+    fn ray(&self, i: u64) -> (Ray, f64) {
+        let mut rng = suite::rng(6, i);
+        let eye = (self.eye)(&mut rng);
+        // Every part of the surface alike.
+        let at = rng.random::<f64>() * self.areas.last().unwrap();
+        let prim = self.areas.partition_point(|sum| *sum <= at).min(self.areas.len() - 1);
+        let [a, b, c] = self.mesh.triangles[prim].map(|k| self.mesh.positions[k as usize]);
+        let (u, v): (f64, f64) = (rng.random(), rng.random());
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        let to = a + (b - a) * u + (c - a) * v - eye;
+        (Ray::new(eye, to.normalize()), to.length())
+    }
+
+    fn scaled(&self, scale: f64) -> Vec<[DVec3; 3]> {
+        let corner = |k: u32| self.mesh.positions[k as usize] * scale;
+        self.mesh.triangles.iter().map(|t| t.map(corner)).collect()
+    }
+
+    /// Shares of `rays` rays that find a hole, one for each epsilon, in f32 and f64.
+    fn naive(&self, scale: f64, rays: u64) -> [[f64; EPSILONS.len()]; 2] {
+        let wide = self.scaled(scale);
+        let narrow: Vec<[Vec3; 3]> = wide.iter().map(|t| t.map(|p| p.as_vec3())).collect();
+        let holes = (0..rays).into_par_iter().map(|i| {
+            let (ray, distance) = self.ray(i);
+            let (org, most) = (ray.org * scale, distance * scale * 1.001);
+            let found = [
+                in_f32(org.as_vec3(), ray.dir.as_vec3(), most as f32, &narrow),
+                in_f64(org, ray.dir, most, &wide),
+            ];
+            found.map(|det| EPSILONS.map(|e| u64::from(det.is_none_or(|det| det < e))))
+        });
+        let sum = |a: [[u64; 9]; 2], b: [[u64; 9]; 2]| {
+            std::array::from_fn(|p| std::array::from_fn(|e| a[p][e] + b[p][e]))
+        };
+        let holes = holes.reduce(|| [[0; 9]; 2], sum);
+        holes.map(|shares| shares.map(|count| count as f64 / rays as f64))
+    }
+
+    /// Rays that find a hole in the product's picture of the mesh at `scale`.
+    fn holes(&self, scale: f64, rays: u64, one_by_one: bool) -> u64 {
+        let mut world = shapes::world_of(self.mesh.clone());
+        world.meshes[0].positions.iter_mut().for_each(|p| *p *= scale);
+        let scene = world.into_scene(true).unwrap();
+        let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 4).unwrap();
+        let single = OneByOne(&embree);
+        let tracer: &dyn Intersector = if one_by_one { &single } else { &embree };
+        let make = |i: u64| {
+            let (ray, distance) = self.ray(i);
+            // The point that the ray aims at lies at t = 1.
+            let ray = Ray::new(ray.org * scale, ray.dir * (distance * scale));
+            to_scene(&ray, &scene.recentring)
+        };
+        let judge = |_: &[Ray], hits: &[Option<Hit>]| {
+            hits.iter().filter(|h| h.is_none_or(|h| h.t > 1.001)).count() as u64
+        };
+        suite::trace(tracer, rays, make, judge, |a, b| a + b, || 0)
+    }
+}
+
+/// The meshes: a sphere of radius 0.05 from inside; the bunny from around it, where it is at hand.
+fn subjects(outcome: &mut Outcome) -> Vec<Subject> {
+    let sphere = shapes::sphere(DVec3::ZERO, 0.05, 200, 100);
+    let mut subjects = vec![Subject::new("sphere", sphere, |rng| shapes::in_ball(rng, 0.01))];
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/meshes"))
+        .join("stanford-bunny.obj");
+    if file.exists() {
+        let model = tweenray::import::load_model(&file, NormalPolicy::Flat).unwrap();
+        let mesh = model.world.meshes.into_iter().next().unwrap();
+        // 0.16 wide, its middle at about (-0.02, 0.11, 0).
+        let eye = |rng: &mut rand_pcg::Pcg64Mcg| {
+            DVec3::new(-0.02, 0.11, 0.0) + shapes::direction(rng) * 0.4
+        };
+        subjects.push(Subject::new("bunny", mesh, eye));
+    } else {
+        outcome.show("bunny: SKIPPED, there is no mesh of it beside the project");
+    }
+    subjects
+}
+
+fn percent(shares: &[f64]) -> String {
+    let shares: Vec<String> = shares.iter().map(|s| format!("{:.1}", 100.0 * s)).collect();
+    shares.join(" ")
+}
+
+/// Meshes at scales from 1e-6 to 1e6.
+pub fn bunny_holes(size: Size) -> Outcome {
+    let mut outcome = Outcome::default();
+    let epsilons: Vec<String> = EPSILONS.iter().map(|e| format!("{e:.0e}")).collect();
+    outcome.show(format!("naive formula: % holes at epsilons {}", epsilons.join(" ")));
+    for subject in subjects(&mut outcome) {
+        for power in (-6..=6).step_by(size.of(6, 1)) {
+            let scale = 10f64.powi(power);
+            for one_by_one in [false, true] {
+                let rays = size.of(20_000, 1_000_000);
+                outcome.count(rays, subject.holes(scale, rays, one_by_one));
+            }
+            let [narrow, wide] = subject.naive(scale, size.of(60, 2000));
+            let name = subject.name;
+            outcome.show(format!("{name} x 1e{power}, f32: {}", percent(&narrow)));
+            outcome.show(format!("{name} x 1e{power}, f64: {}", percent(&wide)));
+            if power == 0 && name == "sphere" {
+                outcome.at_least("f32, epsilon 1e-6: share of holes", narrow[7], 0.04);
+                outcome.at_least("f32, epsilon 1e-5: share of holes", narrow[8], 1.0);
+                outcome.at_least("f64, epsilon 1e-5: share of holes", wide[8], 1.0);
+            }
+        }
+    }
+    outcome
+}
