@@ -6,6 +6,7 @@ use crate::shapes;
 use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
+use tweenray::intersect::court::Line;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
 use tweenray::math::DVec3;
 use tweenray::scene::{HitRules, Mesh, WorldMesh};
@@ -69,13 +70,6 @@ fn ray_at([a, b, c]: &[DVec3; 3], rng: &mut impl Rng) -> Ray {
     Ray::new(target + away, -away * 10f64.powf(rng.random_range(-2.0..2.0)))
 }
 
-/// Whether `ray` passes an edge so near that a hit is anybody's guess.
-fn in_band(ray: &Ray, corners: &[DVec3; 3]) -> bool {
-    let largest = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max);
-    let ulp = f64::from(f32::EPSILON) * largest.max(ray.org.abs().max_element());
-    wide::line_to_edges(ray, corners) <= BAND * ulp
-}
-
 fn measure(i: u64, rules: HitRules) -> Accuracy {
     let scene = shapes::world_of(triangles(i)).into_scene(rules.recentre).unwrap();
     let mesh = &scene.meshes[0];
@@ -95,17 +89,19 @@ fn measure(i: u64, rules: HitRules) -> Accuracy {
 
 fn judge(mesh: &Mesh, aimed: &[DVec3; 3], ray: &Ray, hit: Option<Hit>, found: &mut Accuracy) {
     // What is hit may lie before the triangle that was aimed at, never behind it.
-    let wanted = wide::meet(ray, aimed).filter(|m| m.least >= 0.0 && !in_band(ray, aimed));
+    let line = Line::new(ray, mesh.bounds.min.abs().max(mesh.bounds.max.abs()).max_element());
+    let in_band = |corners: &[DVec3; 3]| line.edge_ulps(corners) <= BAND;
+    let wanted = line.meet(aimed).filter(|_| !in_band(aimed));
     let mut wrong = wanted.is_some_and(|m| hit.is_none_or(|h| h.t > m.t * (1.0 + 1e-6)));
     let mut errors = [0.0; 3];
     if let Some(hit) = hit {
         let corners = mesh.corners(hit.prim.prim_id as usize);
-        match wide::meet(ray, &corners).filter(|m| m.least >= 0.0) {
+        match wide::meet(ray, &corners).filter(|_| line.meet(&corners).is_some()) {
             Some(met) => {
                 errors = [(hit.t - met.t) / met.t, hit.u - met.u, hit.v - met.v]
                     .map(|e| e.abs() / f64::from(f32::EPSILON));
             }
-            None => wrong |= !in_band(ray, &corners),
+            None => wrong |= !in_band(&corners),
         }
     }
     let inexact = errors.iter().any(|e| e.is_nan() || *e > ULPS);

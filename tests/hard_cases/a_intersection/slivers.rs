@@ -6,6 +6,7 @@ use crate::shapes;
 use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
+use tweenray::intersect::court::Line;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
 use tweenray::math::{DVec3, orthonormal_basis};
 use tweenray::scene::{HitRules, Scene, World, WorldMesh};
@@ -272,6 +273,7 @@ fn judge_balance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Balanc
     let hit_prim = hit.map(|h| h.prim.prim_id as usize);
     let (mut nearest, mut in_band, mut legal) = (None::<(f64, usize)>, false, hit.is_none());
     let dir = ray.dir.normalize();
+    let line = Line::new(ray, scene.bounds.min.abs().max(scene.bounds.max.abs()).max_element());
     // No sliver has an edge longer than 11.2, and no band is wider than the rest.
     let reach = 12.0 * scene.recentring.scale();
     for prim in 0..mesh.triangles.len() {
@@ -280,16 +282,12 @@ fn judge_balance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Balanc
         if (corners[0] - ray.org).cross(dir).length_squared() > reach * reach {
             continue;
         }
-        let largest = ray.org.abs().max_element().max(corners[0].abs().max_element());
-        let ulp = f64::from(f32::EPSILON) * largest;
-        if wide::line_to_edges(ray, &corners) <= BAND * ulp {
+        if line.edge_ulps(&corners) <= BAND {
             in_band = true;
             legal |= hit_prim == Some(prim);
             continue;
         }
-        let Some(met) = wide::meet(ray, &corners).filter(|m| m.least > 0.0 && m.t >= 0.0) else {
-            continue;
-        };
+        let Some(met) = line.meet(&corners).filter(|m| m.t >= 0.0) else { continue };
         legal |= hit_prim == Some(prim);
         if nearest.is_none_or(|n| met.t < n.0) {
             nearest = Some((met.t, prim));

@@ -1,67 +1,8 @@
-//! A court for the cases: ray and triangle in double-double arithmetic (Dekker, 1971; about 31
-//! digits), shared with nothing in the product; and distances in f64.
+//! Ray and triangle in double-double arithmetic, by a formula that shares nothing with the product;
+//! distances in f64.
 
 use tweenray::intersect::Ray;
-use tweenray::math::DVec3;
-
-/// An unevaluated sum of two f64.
-#[derive(Clone, Copy)]
-struct Wide {
-    hi: f64,
-    lo: f64,
-}
-
-impl Wide {
-    /// Knuth's exact sum.
-    fn sum(a: f64, b: f64) -> Self {
-        let hi = a + b;
-        let part = hi - a;
-        Self { hi, lo: (a - (hi - part)) + (b - part) }
-    }
-
-    fn add(self, other: Self) -> Self {
-        let high = Self::sum(self.hi, other.hi);
-        let low = Self::sum(self.lo, other.lo);
-        let high = Self::sum(high.hi, high.lo + low.hi);
-        Self::sum(high.hi, high.lo + low.lo)
-    }
-
-    fn neg(self) -> Self {
-        Self { hi: -self.hi, lo: -self.lo }
-    }
-
-    fn mul(self, other: Self) -> Self {
-        let hi = self.hi * other.hi;
-        let lo = self.hi.mul_add(other.hi, -hi);
-        Self::sum(hi, lo + (self.hi * other.lo + self.lo * other.hi))
-    }
-
-    fn div(self, other: Self) -> Self {
-        let first = self.hi / other.hi;
-        let rest = self.add(other.mul(Self::sum(first, 0.0)).neg());
-        let second = rest.hi / other.hi;
-        let rest = rest.add(other.mul(Self::sum(second, 0.0)).neg());
-        Self::sum(first, second).add(Self::sum(rest.hi / other.hi, 0.0))
-    }
-}
-
-type WideVec = [Wide; 3];
-
-/// `a - b`, exact.
-fn difference(a: DVec3, b: DVec3) -> WideVec {
-    std::array::from_fn(|i| Wide::sum(a[i], -b[i]))
-}
-
-fn cross(a: &WideVec, b: &WideVec) -> WideVec {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j].mul(b[k]).add(a[k].mul(b[j]).neg())
-    })
-}
-
-fn dot(a: &WideVec, b: &WideVec) -> Wide {
-    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
-}
+use tweenray::math::{DVec3, DoubleDouble, DoubleDouble3};
 
 /// Where a ray's line meets a triangle's plane.
 #[derive(Debug, Clone, Copy)]
@@ -75,18 +16,20 @@ pub struct Met {
 
 /// The plane point, to all digits of f64; `None` for a ray in the plane.
 pub fn meet(ray: &Ray, [a, b, c]: &[DVec3; 3]) -> Option<Met> {
-    let (e1, e2) = (difference(*b, *a), difference(*c, *a));
-    let dir = difference(ray.dir, DVec3::ZERO);
-    let p = cross(&dir, &e2);
-    let det = dot(&e1, &p);
-    if det.hi == 0.0 {
+    let apart = DoubleDouble3::difference;
+    let (e1, e2, dir) = (apart(*b, *a), apart(*c, *a), apart(ray.dir, DVec3::ZERO));
+    let p = dir.cross(e2);
+    let det = e1.dot(p);
+    if det.round() == 0.0 {
         return None;
     }
-    let s = difference(ray.org, *a);
-    let q = cross(&s, &e1);
-    let (t, u, v) = (dot(&e2, &q).div(det), dot(&s, &p).div(det), dot(&dir, &q).div(det));
-    let w = Wide::sum(1.0, 0.0).add(u.add(v).neg());
-    Some(Met { t: t.hi, u: u.hi, v: v.hi, least: u.hi.min(v.hi).min(w.hi) })
+    let s = apart(ray.org, *a);
+    let q = s.cross(e1);
+    let (u, v) = (s.dot(p) / det, dir.dot(q) / det);
+    let least = [u, v, DoubleDouble::from(1.0) - u - v].map(DoubleDouble::round);
+    let [u, v] = [u, v].map(DoubleDouble::round);
+    let least = least.into_iter().fold(f64::INFINITY, f64::min);
+    Some(Met { t: (e2.dot(q) / det).round(), u, v, least })
 }
 
 /// Distance between `ray`'s line and the segment from `a` to `b`.
