@@ -77,10 +77,9 @@ pub fn longest_edge([a, b, c]: &[DVec3; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
-    fn the_court_sees_what_f64_cannot() {
+    fn sees_what_f64_cannot() {
+        use super::{DVec3, Ray, meet};
         // A weight of 2^-60: 1 + 2^-60 rounds to 1 in f64.
         let tiny = 1.0 / (1u64 << 60) as f64;
         let corners = [DVec3::ZERO, DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.0, 1.0, 0.0)];
@@ -93,6 +92,7 @@ mod tests {
 
     #[test]
     fn distances_are_those_of_the_nearest_part() {
+        use super::{DVec3, Ray, line_to_triangle, point_to_triangle};
         let corners = [DVec3::ZERO, DVec3::new(2.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
         for (point, distance) in [
             ((0.5, 0.5, 3.0), 3.0),
