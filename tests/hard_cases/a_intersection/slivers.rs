@@ -1,6 +1,6 @@
 //! Slivers met at grazing angles (Embree's issue 387): phantoms, distances, and who is hit at all.
 
-use super::ways::{OneByOne, stock, to_scene};
+use super::ways::{OneByOne, distance, stock, to_scene};
 use super::wide;
 use crate::shapes;
 use crate::suite::{self, Outcome, Size};
@@ -144,7 +144,7 @@ fn judge_phantom(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Phanto
     let corners = corners(scene, hit);
     let limit = PHANTOM * wide::longest_edge(&corners);
     let line = wide::line_to_triangle(ray, &corners);
-    let point = wide::point_to_triangle(ray.at(hit.t), &corners);
+    let point = wide::point_to_triangle(ray.at(distance(scene, ray, hit)), &corners);
     found.beside += u64::from(line > limit);
     found.off += u64::from(point > limit);
     let world = [line, point].map(|d| scene.recentring.length_to_world(d));
@@ -211,8 +211,12 @@ fn judge_distance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Dista
         // A phantom: what its `t` should be nobody can say.
         return;
     }
-    let off = wide::point_to_triangle(ray.at(hit.t), &corners);
-    let error = if met.least < 0.0 && off <= limit { 0.0 } else { (hit.t - met.t).abs() };
+    let off = wide::point_to_triangle(ray.at(distance(scene, ray, hit)), &corners);
+    let error = if met.least < 0.0 && off <= limit {
+        0.0
+    } else {
+        (distance(scene, ray, hit) - met.t).abs()
+    };
     let relative = error / met.t.abs();
     found.hits += 1;
     found.wrong += u64::from(relative > 1e-6);

@@ -1,7 +1,7 @@
 //! The naive way, shown beside ours, and rays between spaces.
 
-use tweenray::intersect::{Hit, Intersector, Ray};
-use tweenray::scene::{HitRules, Recentring, Recheck};
+use tweenray::intersect::{Hit, Intersector, Ray, SurfaceInteraction};
+use tweenray::scene::{HitRules, Recentring, Recheck, Scene};
 use tweenray::stats::RayCounts;
 
 /// Embree as it comes, with or without its ROBUST traversal.
@@ -12,6 +12,16 @@ pub fn stock(robust: bool) -> HitRules {
 /// A world ray in scene space; `t` stays what it was.
 pub fn to_scene(ray: &Ray, recentring: &Recentring) -> Ray {
     Ray { org: recentring.point_to_scene(ray.org), dir: ray.dir * recentring.scale(), ..*ray }
+}
+
+/// A hit's distance as the renderer uses it: that of a rough hit follows from the point that the
+/// surface gives it.
+pub fn distance(scene: &Scene, ray: &Ray, hit: &Hit) -> f64 {
+    if !hit.rough {
+        return hit.t;
+    }
+    let p = SurfaceInteraction::new(scene, ray, hit).p;
+    (p - ray.org).dot(ray.dir) / ray.dir.length_squared()
 }
 
 /// Rays one by one, as mirrors and glass trace them, instead of in packets.
