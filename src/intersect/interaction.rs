@@ -42,29 +42,96 @@ impl SurfaceInteraction {
 
     /// A ray from here along `dir`, on the side of the surface that `dir` points to.
     pub fn spawn(&self, dir: DVec3, offset: bool) -> Ray {
-        let org = if offset { self.start(dir) } else { self.p };
-        let exclude = if offset { self.prim } else { PrimRef::NONE };
-        Ray { exclude, ..Ray::new(org, dir) }
+        self.towards(dir, offset).along(dir)
     }
 
     /// A ray from here that ends at `target`, a point of a surface with unit normal `normal`:
     /// it stops short of that surface by its rounding-error bound. `t` runs from 0 to 1.
     pub fn spawn_to(&self, target: DVec3, normal: DVec3, offset: bool) -> Ray {
-        if !offset {
-            return Ray { tfar: 1.0, ..Ray::new(self.p, target - self.p) };
-        }
-        let org = self.start(target - self.p);
-        // Embree sees origin and direction rounded and works in f32, so the end moves by some ulp: with
-        // 4, one ray in 3,000 still met its own light; with 16, none of 2.4 million.
-        let bound = 16.0 * ROUNDING * (org.abs().max(target.abs())).dot(DVec3::ONE);
-        let facing = if normal.dot(org - target) >= 0.0 { normal } else { -normal };
-        let end = target + facing * bound;
-        Ray { exclude: self.prim, tfar: 1.0, ..Ray::new(org, end - org) }
+        self.towards(target - self.p, offset).to(target, normal)
     }
 
-    fn start(&self, dir: DVec3) -> DVec3 {
-        self.p + self.ng * if self.is_outside(dir) { self.offset } else { -self.offset }
+    /// Where the shadow rays of a viewer start who sees the side that the unit normal `front`
+    /// (`ng` or `-ng`) points to; `lift` is [`lift_to_smooth`]'s, or zero.
+    pub fn shadow_start(&self, front: DVec3, lift: DVec3, offset: bool) -> SpawnPoint {
+        let p = self.p + lift;
+        let org = if offset { p + front * self.offset } else { p };
+        SpawnPoint { org, front, prim: self.prim, offset }
     }
+
+    fn towards(&self, dir: DVec3, offset: bool) -> SpawnPoint {
+        let front = if self.is_outside(dir) { self.ng } else { -self.ng };
+        self.shadow_start(front, DVec3::ZERO, offset)
+    }
+}
+
+/// A place on one side of a surface from which rays start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpawnPoint {
+    /// Origin of the rays, moved by the rounding-error bound.
+    org: DVec3,
+    /// Unit geometric normal on the side where `org` lies.
+    front: DVec3,
+    /// The primitive that the rays leave.
+    prim: PrimRef,
+    /// Whether the spawn rules hold; off, rays are what a naive tracer makes of them.
+    offset: bool,
+}
+
+impl SpawnPoint {
+    /// The ray along `dir`.
+    pub fn along(&self, dir: DVec3) -> Ray {
+        Ray { exclude: self.excluded(dir), ..Ray::new(self.org, dir) }
+    }
+
+    /// The ray that ends just before `target`, as [`SurfaceInteraction::spawn_to`].
+    pub fn to(&self, target: DVec3, normal: DVec3) -> Ray {
+        let org = self.org;
+        let end = if self.offset {
+            // Embree sees origin and direction rounded and works in f32, so the end moves by some
+            // ulp: with 4, one ray in 3,000 still met its own light; with 16, none of 2.4 million.
+            let bound = 16.0 * ROUNDING * (org.abs().max(target.abs())).dot(DVec3::ONE);
+            target + if normal.dot(org - target) >= 0.0 { normal } else { -normal } * bound
+        } else {
+            target
+        };
+        Ray { exclude: self.excluded(end - org), tfar: 1.0, ..Ray::new(org, end - org) }
+    }
+
+    /// A ray that goes below the plane of its own facet (which the shading normal allows) can be
+    /// blocked by it; else light would leak into rooms with smooth walls.
+    fn excluded(&self, dir: DVec3) -> PrimRef {
+        let leaves = self.offset && dir.dot(self.front) > 0.0;
+        if leaves { self.prim } else { PrimRef::NONE }
+    }
+}
+
+/// How far the smooth surface that a mesh's shading normals stand for bulges over `hit`, on the
+/// outside or the inside: from the point on the facet to there, scene space. Zero where the mesh is
+/// flat or hollow there.
+///
+/// The point's projections onto the planes through the corners, each across its corner's normal,
+/// weighted like the corners (Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021).
+/// Shadow rays that start there clear the neighbouring facets, so that shadows end where the
+/// shading does.
+pub fn lift_to_smooth(scene: &Scene, hit: &Hit, si: &SurfaceInteraction, outside: bool) -> DVec3 {
+    let mesh = scene.meshes.get(hit.prim.geom_id as usize);
+    let Some((mesh, normals)) = mesh.and_then(|m| m.normals.as_ref().map(|n| (m, n))) else {
+        return DVec3::ZERO;
+    };
+    let prim = hit.prim.prim_id as usize;
+    let front = if outside { si.ng } else { -si.ng };
+    let corners = mesh.corners(prim);
+    let normals = normals.get(prim, mesh.triangles[prim]);
+    let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+    let mut lift = DVec3::ZERO;
+    for ((corner, normal), weight) in corners.iter().zip(normals).zip(weights) {
+        let normal = on_side_of(normal.as_dvec3(), front);
+        let below = (*corner - si.p).dot(normal).max(0.0);
+        lift += normal * (weight * below);
+    }
+    // Normals that have little to do with the facet would move the point through it.
+    if lift.dot(front) > 0.0 { lift } else { DVec3::ZERO }
 }
 
 fn on_triangle(mesh: &Mesh, ray: &Ray, hit: &Hit) -> SurfaceInteraction {

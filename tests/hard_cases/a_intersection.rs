@@ -1,5 +1,12 @@
 //! A. Intersection.
 
+mod coincident;
+mod crossings;
+mod garbage;
+mod isa;
+mod refused;
+mod scale;
+
 use crate::shapes::{self, FAR};
 use crate::suite::{self, Outcome, Size, cases};
 use rand::Rng;
@@ -11,6 +18,17 @@ cases! {
     1 watertight_random "Embree allows 2e-5 of 10,875 rays" => watertight_random;
     2 watertight_vertex "stock ROBUST misses 2.1e-2" => watertight_vertex;
     3 watertight_edge "stock ROBUST, compact, misses 2.5e-7" => watertight_edge;
+    15 scale_ratio "OSPRay's spheres allow an error of 4e-4" => scale::ratio;
+    16 far_sphere "b² − ac in f32 loses the sphere (Mitsuba 512, pbrt 265)" => scale::far_sphere_silhouette;
+    17 invalid_rays "Embree allows 2.5 times a good ray's cost; stock default 1041 times" => refused::invalid_rays;
+    18 ftz_independence "stock Embree's answer to a direction of 1e38 changes" => refused::ftz_independence;
+    19 degenerate_geometry "Embree builds it and traces none" => garbage::degenerate;
+    20 garbage_fuzz "Embree builds 1,000 such scenes and traces none" => garbage::fuzz;
+    21 coincident_faces "no public test" => coincident::faces;
+    22 crossing_counts "Embree 188: odd counts at edges" => crossings::parity;
+    23 in_plane_ray "Embree 298: it hits or not" => coincident::in_plane;
+    24 isa_agreement "Embree 423: answers differ by processor" => isa::agreement;
+    25 unrelated_mesh "Embree 181: a far mesh changes near hits" => scale::unrelated_mesh;
 }
 
 /// Leaks of closed spheres at the origin and far away. `aim` gives the target of ray `i`.
