@@ -7,7 +7,7 @@
 use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
-use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
+use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::{cosine_hemisphere, to_world};
 use crate::scene::Light;
@@ -101,7 +101,7 @@ impl ShadowScratch {
     /// A shadow ray to the sample, where it lies above the horizon.
     fn push_sample(&mut self, point: &LitPoint, sample: &LightSample) {
         if sample.weight > 0.0 {
-            self.push(point.smooth.to(sample.point, sample.normal), sample.weight);
+            self.push(point.smooth.to(&sample.target), sample.weight);
         }
     }
 
@@ -227,7 +227,11 @@ impl Renderer<'_> {
                 if let Some((_, target)) = sent {
                     let ray = match target {
                         // No surface to stop short of: the normal along the ray costs a few ulp.
-                        ShadowTarget::Point(q) => point.smooth.to(q, (point.p - q).normalize()),
+                        ShadowTarget::Point(q) => point.smooth.to(&Target {
+                            point: q,
+                            normal: (point.p - q).normalize(),
+                            error: 0.0,
+                        }),
                         ShadowTarget::Direction(d) => point.smooth.along(d),
                     };
                     s.push(ray, 1.0);

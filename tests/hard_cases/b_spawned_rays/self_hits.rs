@@ -6,7 +6,8 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
 use tweenray::intersect::{
-    EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray, SurfaceInteraction,
+    EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray, SurfaceInteraction, Target,
+    facet_error,
 };
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{HitRules, Material, Recheck, Scene, World};
@@ -91,6 +92,7 @@ fn pair(i: u64, rays: u64) -> Tally {
     let scene = world.into_scene(i % 2 == 0).unwrap();
     let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
     let mut rng = suite::rng(27, i);
+    let error = facet_error(&scene.meshes[1].corners(0));
     let (mut spawned, mut sent) = (Vec::new(), Vec::new());
     let (mut bare, mut naive) = (Vec::new(), Vec::new());
     for _ in 0..rays {
@@ -99,8 +101,9 @@ fn pair(i: u64, rays: u64) -> Tally {
         let dir = shapes::direction(&mut rng);
         spawned.push(from.spawn(dir, true));
         bare.push(from.spawn(dir, false));
-        sent.push(from.spawn_to(to.p, to.ng, true));
-        naive.push(from.spawn_to(to.p, to.ng, false));
+        let target = Target { point: to.p, normal: to.ng, error };
+        sent.push(from.spawn_to(&target, true));
+        naive.push(from.spawn_to(&target, false));
     }
     let own = |rays: &[Ray]| {
         let mut hits = vec![None; rays.len()];
