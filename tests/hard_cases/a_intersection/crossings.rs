@@ -47,7 +47,8 @@ pub fn parity(size: Size) -> Outcome {
             if let Some(i) = found.iter().position(|v| *v == Verdict::Wrong) {
                 let ray = aimed(&scene, i as u64, aim);
                 let ours = crossings(&embree, &fans, &ray);
-                outcome.example(format!("{name}, {aim:?}: {ray:?}: {ours:?}"));
+                let exact = exact_crossings(&scene, &fans, &ray);
+                outcome.example(format!("{name}, {aim:?}: {ray:?}: {ours:?}, exact {exact:?}"));
             }
         }
     }
@@ -187,11 +188,12 @@ enum Verdict {
 
 fn judge(scene: &Scene, fans: &Fans, ray: &Ray, found: &[Crossing]) -> Verdict {
     let plain = found.iter().filter(|c| !c.touches).count();
-    let touched = found.len() > plain;
-    if !touched {
-        // In, out, in, out.
-        let in_turn = found.iter().enumerate().all(|(i, c)| c.ways[i % 2]);
-        return if plain % 2 == 0 && in_turn { Verdict::Even } else { Verdict::Wrong };
+    let in_turn = found.iter().enumerate().all(|(i, c)| c.ways[i % 2] && c.ways != [true; 2]);
+    if found.len() % 2 == 0 && in_turn {
+        return Verdict::Even;
+    }
+    if plain == found.len() {
+        return Verdict::Wrong;
     }
     let together = 2.0 * TOGETHER / ray.dir.length();
     let exact = exact_crossings(scene, fans, ray);
@@ -199,14 +201,15 @@ fn judge(scene: &Scene, fans: &Fans, ray: &Ray, found: &[Crossing]) -> Verdict {
         let near = |c: &Crossing| (c.near - together..=c.far + together).contains(&t);
         found.iter().any(|c| c.touches && near(c))
     };
-    let elsewhere = exact.iter().filter(|t| !at_outline(**t)).count();
+    let elsewhere = exact.iter().filter(|(t, _)| !at_outline(*t)).count();
     let right = exact.len() % 2 == 0 && elsewhere % 2 == plain % 2;
     if right { Verdict::Settled } else { Verdict::Wrong }
 }
 
 /// Where the line of `ray`, which starts outside, crosses the mesh: by exact signs of the line
-/// against every edge, an edge that it meets exactly counted to one fixed side.
-fn exact_crossings(scene: &Scene, fans: &Fans, ray: &Ray) -> Vec<f64> {
+/// against every edge, an edge that it meets exactly counted to one fixed side. Ray parameter and
+/// triangle of each.
+fn exact_crossings(scene: &Scene, fans: &Fans, ray: &Ray) -> Vec<(f64, usize)> {
     let mesh = &scene.meshes[0];
     let point = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
     // Not `org + dir`, which may be a vertex to the last bit: then nothing would decide.
@@ -222,7 +225,7 @@ fn exact_crossings(scene: &Scene, fans: &Fans, ray: &Ray) -> Vec<f64> {
         if first == side(b, c) && first == side(c, a) {
             let normal = fans.normals[prim];
             let corner = mesh.positions[a as usize].as_dvec3();
-            crossed.push((corner - ray.org).dot(normal) / ray.dir.dot(normal));
+            crossed.push(((corner - ray.org).dot(normal) / ray.dir.dot(normal), prim));
         }
     }
     crossed

@@ -10,8 +10,9 @@ use tweenray::scene::{HitRules, Recheck, Scene};
 use tweenray::stats::RayCounts;
 
 const SETS: [&str; 3] = ["sse4.2", "avx2", "avx512"];
-/// A hit whose smallest weight is below this lies in the edge band: 4 ulp of f32 over an edge.
-const BAND: f64 = 4.0 * 1.2e-7 / 0.0157;
+/// A ray that passes an edge of its triangle closer than this is in the edge band: 4 ulp of f32 at
+/// the largest distance, 4.
+const BAND: f64 = 4.0 * 4.0 * 1.2e-7;
 
 /// Differences between two instruction sets.
 #[derive(Default, Clone, Copy)]
@@ -50,7 +51,7 @@ pub fn agreement(size: Size) -> Outcome {
             let with = |set: &&str| EmbreeIntersector::new(&scene, rules, Some(set), 4).unwrap();
             let tracers: Vec<EmbreeIntersector> = sets.iter().map(with).collect();
             for (set, tracer) in sets.iter().zip(&tracers).skip(1) {
-                let d = compare(&tracers[0], tracer, rays, make);
+                let d = compare(&scene, &tracers[0], tracer, rays, make);
                 let first = sets[0];
                 outcome.show(format!(
                     "{kind}, recheck {recheck:?}, {set} against {first}: {} ties at edges, {} at \
@@ -99,6 +100,7 @@ fn aimed(scene: &Scene, i: u64, at_edge: bool) -> Ray {
 }
 
 fn compare(
+    scene: &Scene,
     a: &EmbreeIntersector,
     b: &EmbreeIntersector,
     rays: u64,
@@ -112,20 +114,22 @@ fn compare(
             tracer.intersect_batch(&rays, &mut hits, &mut RayCounts::default());
             hits
         };
-        let pairs = hits(a).into_iter().zip(hits(b));
-        pairs.fold(Differences::default(), |sum, (a, b)| sum.plus(difference(a, b)))
+        let pairs = rays.iter().zip(hits(a).into_iter().zip(hits(b)));
+        pairs.fold(Differences::default(), |sum, (ray, (a, b))| {
+            sum.plus(difference(scene, ray, a, b))
+        })
     };
     batches.map(one).reduce(Differences::default, Differences::plus)
 }
 
-fn difference(a: Option<Hit>, b: Option<Hit>) -> Differences {
-    let at_edge = |h: &Hit| h.u.min(h.v).min(1.0 - h.u - h.v) < BAND;
+fn difference(scene: &Scene, ray: &Ray, a: Option<Hit>, b: Option<Hit>) -> Differences {
+    let at_edge = |h: &Hit| edge_distance(scene, ray, h) < BAND;
     let mut d = Differences::default();
     match (a, b) {
         (Some(a), Some(b)) if a.prim == b.prim => d.values += u64::from(a != b),
         (Some(a), Some(b)) => {
             let (near, far) = if a.t <= b.t { (a, b) } else { (b, a) };
-            let neighbours = far.t - near.t < 1e-5 * near.t;
+            let neighbours = (far.t - near.t) * ray.dir.length() < 1e-4;
             if neighbours && at_edge(&near) && at_edge(&far) {
                 d.ties += 1;
             } else if at_edge(&near) {
@@ -139,4 +143,15 @@ fn difference(a: Option<Hit>, b: Option<Hit>) -> Differences {
         _ => d.others += 1,
     }
     d
+}
+
+/// How close the line of `ray` passes the nearest edge of what it hits.
+fn edge_distance(scene: &Scene, ray: &Ray, hit: &Hit) -> f64 {
+    let corners = scene.meshes[0].corners(hit.prim.prim_id as usize);
+    let distance = |k: usize| {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        let across = ray.dir.cross(b - a);
+        ((a - ray.org).dot(across) / across.length()).abs()
+    };
+    distance(0).min(distance(1)).min(distance(2))
 }
