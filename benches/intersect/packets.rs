@@ -3,7 +3,7 @@
 use super::support::{self, Candidate};
 use super::{BLOCK, intersector};
 use tweenray::embree::{CommittedScene, Packet, QueryFlags};
-use tweenray::intersect::{Intersector, Ray, SurfaceInteraction, Target, facet_error};
+use tweenray::intersect::{Facet, Intersector, Ray, SurfaceInteraction, Target};
 use tweenray::math::orthonormal_basis;
 use tweenray::sampling::{PixelSampler, QuadWarp, cosine_hemisphere, to_world};
 use tweenray::scene::{Light, Recheck, Scene};
@@ -86,7 +86,7 @@ fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
     };
     let (warp, normal) = (QuadWarp::new(quad.corners), quad.normal());
     let [a, b, c, _] = quad.corners;
-    let error = facet_error(&[a, b, c]);
+    let facet = Facet::of(&[a, b, c]);
     let (mut area, mut sky) = (Vec::new(), Vec::new());
     for (k, (ray, hit)) in camera.iter().zip(&hits).enumerate() {
         let Some(hit) = hit.filter(|hit| hit.prim.geom_id == 0) else { continue };
@@ -96,7 +96,7 @@ fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
         sampler.fill2(0, 0, &mut u);
         area.extend(u.map(|u| {
             let point = warp.point(u.map(f64::from));
-            si.spawn_to(&Target { point, normal, error }, true)
+            si.spawn_to(&Target { point, normal, facet }, true)
         }));
         sampler.fill2(0, 1, &mut u);
         let n = if si.is_outside(ray.dir) { -si.ng } else { si.ng };

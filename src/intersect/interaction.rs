@@ -71,21 +71,39 @@ pub struct Target {
     pub point: DVec3,
     /// The surface's unit normal there, to either side.
     pub normal: DVec3,
-    /// How far off that point Embree may find the surface, beyond what rounding the ray explains:
-    /// [`facet_error`] of its triangle; 0 for spheres, which are tested in f64.
-    pub error: f64,
+    /// The triangle that it lies on; [`Facet::EXACT`] for spheres, which are tested in f64.
+    pub facet: Facet,
 }
 
-/// How far off its plane f32 arithmetic may find a triangle: the normal of a sliver is a difference
-/// of almost equal products, and tilts.
-pub fn facet_error(corners: &[DVec3; 3]) -> f64 {
-    let [a, b, c] = *corners;
-    let (e1, e2) = ((b - a).length(), (c - a).length());
-    let longest = e1.max(e2).max((c - b).length());
-    let area = (b - a).cross(c - a).length();
-    let most = 0.5 / ROUNDING;
-    let tilt = if area > 0.0 { (e1 * e2 / area).min(most) } else { most };
-    4.0 * ROUNDING * longest * tilt
+/// What f32 arithmetic may make of a triangle's plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facet {
+    /// Longest edge, scene space.
+    longest: f64,
+    /// By how much an error of a corner grows along the triangle: about 1, large for slivers, whose
+    /// normal is a difference of almost equal products.
+    tilt: f64,
+}
+
+impl Facet {
+    /// Not a triangle: no error.
+    pub const EXACT: Self = Self { longest: 0.0, tilt: 0.0 };
+
+    /// That of a triangle.
+    pub fn of(corners: &[DVec3; 3]) -> Self {
+        let [a, b, c] = *corners;
+        let (e1, e2) = ((b - a).length(), (c - a).length());
+        let longest = e1.max(e2).max((c - b).length());
+        let area = (b - a).cross(c - a).length();
+        let most = 0.5 / ROUNDING;
+        let tilt = if area > 0.0 { (longest * longest / area).min(most) } else { most };
+        Self { longest, tilt }
+    }
+
+    /// An error bound of both.
+    pub fn max(self, o: Self) -> Self {
+        Self { longest: self.longest.max(o.longest), tilt: self.tilt.max(o.tilt) }
+    }
 }
 
 /// A place on one side of a surface from which rays start.
@@ -119,8 +137,10 @@ impl SpawnPoint {
         let ray = Ray { exclude: self.excluded(target.point - self.p), ..ray };
         // Embree sees origin and direction rounded and works in f32, so the end moves by some
         // ulp: with 4, one ray in 3,000 still met its own light; with 16, none of 1e8.
-        let grain = 16.0 * ROUNDING * (org.abs().max(target.point.abs())).dot(DVec3::ONE);
-        let bound = grain + target.error;
+        // A sliver's corners, rounded relative to the origin, tilt its plane besides.
+        let grain = ROUNDING * (org.abs().max(target.point.abs())).dot(DVec3::ONE);
+        let Facet { longest, tilt } = target.facet;
+        let bound = 16.0 * grain + tilt * (2.0 * grain + 4.0 * ROUNDING * longest);
         let height = (org - target.point).dot(target.normal);
         if height.abs() > bound {
             return Ray { tfar: 1.0 - bound / height.abs(), ..ray };

@@ -1,7 +1,7 @@
 //! Samples on area lights, and what delta lights send: before any shadow ray.
 
 use super::irradiance;
-use crate::intersect::{Target, facet_error};
+use crate::intersect::{Facet, Target};
 use crate::math::{DVec3, Rgb};
 use crate::sampling::{QuadWarp, SphereCone};
 use crate::scene::Light;
@@ -29,8 +29,8 @@ pub enum AreaLight {
         normal: DVec3,
         /// Whether the back emits too.
         two_sided: bool,
-        /// How far off its plane its triangles may be found.
-        error: f64,
+        /// What f32 may make of its two triangles.
+        facet: Facet,
     },
     /// A sphere.
     Sphere {
@@ -43,8 +43,8 @@ pub enum AreaLight {
 
 /// An area light as seen from one surface point.
 pub enum SeenLight<'a> {
-    /// A quad: its points, unit normal and [`facet_error`].
-    Quad(&'a QuadWarp, DVec3, f64),
+    /// A quad: its points, unit normal and facets.
+    Quad(&'a QuadWarp, DVec3, Facet),
     /// A sphere: its cone of directions, and centre.
     Sphere(SphereCone, DVec3),
 }
@@ -58,7 +58,7 @@ impl AreaLight {
                 corners: q.corners,
                 normal: q.normal(),
                 two_sided: q.two_sided,
-                error: quad_error(&q.corners),
+                facet: quad_facet(&q.corners),
             }),
             Light::Sphere { centre, radius, .. } => {
                 Some(Self::Sphere { centre: *centre, radius: *radius })
@@ -71,11 +71,11 @@ impl AreaLight {
     /// normal `n`; `None` where no light can arrive.
     pub fn seen_from(&self, p: DVec3, n: DVec3) -> Option<(SeenLight<'_>, f64)> {
         let (seen, irradiance) = match self {
-            Self::Quad { warp, corners, normal, two_sided, error } => {
+            Self::Quad { warp, corners, normal, two_sided, facet } => {
                 if !two_sided && normal.dot(p - corners[0]) <= 0.0 {
                     return None;
                 }
-                (SeenLight::Quad(warp, *normal, *error), irradiance::polygon(p, n, corners))
+                (SeenLight::Quad(warp, *normal, *facet), irradiance::polygon(p, n, corners))
             }
             Self::Sphere { centre, radius } => {
                 let cone = SphereCone::new(*centre, *radius, p)?;
@@ -91,29 +91,29 @@ impl SeenLight<'_> {
     /// (sphere; Shirley, Wang and Zimmerman, 1996).
     pub fn sample(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
         match self {
-            Self::Quad(warp, normal, error) => {
+            Self::Quad(warp, normal, facet) => {
                 let point = warp.point(u);
                 let to_light = point - p;
                 let d2 = to_light.length_squared();
                 let cos_light = to_light.dot(*normal).abs();
                 let weight = (to_light.dot(n) * cos_light / (d2 * d2)).max(0.0);
-                LightSample { target: Target { point, normal: *normal, error: *error }, weight }
+                LightSample { target: Target { point, normal: *normal, facet: *facet }, weight }
             }
             Self::Sphere(cone, centre) => {
                 let (dir, distance) = cone.direction(u);
                 let point = p + dir * distance;
                 let normal = (point - *centre).normalize();
-                let target = Target { point, normal, error: 0.0 };
+                let target = Target { point, normal, facet: Facet::EXACT };
                 LightSample { target, weight: dir.dot(n).max(0.0) }
             }
         }
     }
 }
 
-/// The larger [`facet_error`] of the two triangles that show the light.
-fn quad_error(corners: &[DVec3; 4]) -> f64 {
+/// The worse of the two triangles that show the light.
+fn quad_facet(corners: &[DVec3; 4]) -> Facet {
     let [a, b, c, d] = *corners;
-    facet_error(&[a, b, c]).max(facet_error(&[a, c, d]))
+    Facet::of(&[a, b, c]).max(Facet::of(&[a, c, d]))
 }
 
 /// Radiance of an area light; zero for delta lights.

@@ -7,7 +7,7 @@
 use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
-use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
+use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::{cosine_hemisphere, to_world};
 use crate::scene::Light;
@@ -230,7 +230,7 @@ impl Renderer<'_> {
                         ShadowTarget::Point(q) => point.smooth.to(&Target {
                             point: q,
                             normal: (point.p - q).normalize(),
-                            error: 0.0,
+                            facet: Facet::EXACT,
                         }),
                         ShadowTarget::Direction(d) => point.smooth.along(d),
                     };

@@ -6,8 +6,7 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
 use tweenray::intersect::{
-    EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray, SurfaceInteraction, Target,
-    facet_error,
+    EmbreeIntersector, Facet, Hit, Intersector, Oracle, PrimRef, Ray, SurfaceInteraction, Target,
 };
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{HitRules, Material, Recheck, Scene, World};
@@ -92,7 +91,7 @@ fn pair(i: u64, rays: u64) -> Tally {
     let scene = world.into_scene(i % 2 == 0).unwrap();
     let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
     let mut rng = suite::rng(27, i);
-    let error = facet_error(&scene.meshes[1].corners(0));
+    let facet = Facet::of(&scene.meshes[1].corners(0));
     let (mut spawned, mut sent) = (Vec::new(), Vec::new());
     let (mut bare, mut naive) = (Vec::new(), Vec::new());
     for _ in 0..rays {
@@ -101,7 +100,7 @@ fn pair(i: u64, rays: u64) -> Tally {
         let dir = shapes::direction(&mut rng);
         spawned.push(from.spawn(dir, true));
         bare.push(from.spawn(dir, false));
-        let target = Target { point: to.p, normal: to.ng, error };
+        let target = Target { point: to.p, normal: to.ng, facet };
         sent.push(from.spawn_to(&target, true));
         naive.push(from.spawn_to(&target, false));
     }

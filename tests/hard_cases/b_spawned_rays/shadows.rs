@@ -6,8 +6,8 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
 use tweenray::intersect::{
-    EmbreeIntersector, Hit, Intersector, PrimRef, Ray, SpawnPoint, SurfaceInteraction, Target,
-    lift_to_smooth,
+    EmbreeIntersector, Facet, Hit, Intersector, PrimRef, Ray, SpawnPoint, SurfaceInteraction,
+    Target, lift_to_smooth,
 };
 use tweenray::math::{DQuat, DVec3, Rgb};
 use tweenray::scene::{Corners, HitRules, Light, Material, Scene, World, WorldMesh};
@@ -16,7 +16,7 @@ use tweenray::stats::RayCounts;
 /// Shadow rays from the walls of closed rooms to lights outside: all are blocked.
 pub fn closed_box(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
-    let rays = size.of(30_000, 2_500_000);
+    let rays = size.of(30_000, 4_200_000);
     let askew = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -2.0);
     for (how, turn) in [("straight", DQuat::IDENTITY), ("askew", askew)] {
         let room = room(turn, Some(1e-3));
@@ -142,7 +142,7 @@ fn lit(
             let si = SurfaceInteraction::new(scene, &Ray::new(DVec3::ZERO, DVec3::X), &hit);
             let target = shapes::direction(&mut rng) * radius;
             if (target - si.p).dot(-si.ns) > 0.0 {
-                let end = Target { point: target, normal: target.normalize(), error: 0.0 };
+                let end = Target { point: target, normal: target.normalize(), facet: Facet::EXACT };
                 shadow.push(start(scene, &hit, &si, target - si.p).to(&end));
             }
         }
