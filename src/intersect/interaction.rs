@@ -159,15 +159,21 @@ impl SpawnPoint {
     }
 }
 
-/// How far the smooth surface that a mesh's shading normals stand for bulges over `hit`, on the
-/// outside or the inside: from the point on the facet to there, scene space. Zero where the mesh is
+/// How far the smooth surface that a mesh's shading normals stand for bulges over `hit` of `ray`, on
+/// the outside or the inside: from the point on the facet to there, scene space. Zero where the mesh is
 /// flat or hollow there.
 ///
 /// The point's projections onto the planes through the corners, each across its corner's normal,
 /// weighted like the corners (Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021).
 /// Shadow rays that start there clear the neighbouring facets, so that shadows end where the
 /// shading does.
-pub fn lift_to_smooth(scene: &Scene, hit: &Hit, si: &SurfaceInteraction, outside: bool) -> DVec3 {
+pub fn lift_to_smooth(
+    scene: &Scene,
+    ray: &Ray,
+    hit: &Hit,
+    si: &SurfaceInteraction,
+    outside: bool,
+) -> DVec3 {
     let mesh = scene.meshes.get(hit.prim.geom_id as usize);
     let Some((mesh, normals)) = mesh.and_then(|m| m.normals.as_ref().map(|n| (m, n))) else {
         return DVec3::ZERO;
@@ -175,6 +181,7 @@ pub fn lift_to_smooth(scene: &Scene, hit: &Hit, si: &SurfaceInteraction, outside
     let prim = hit.prim.prim_id as usize;
     let front = if outside { si.ng } else { -si.ng };
     let corners = mesh.corners(prim);
+    let hit = refined(ray, &corners, hit);
     let normals = normals.get(prim, mesh.triangles[prim]);
     let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
     let mut lift = DVec3::ZERO;

@@ -159,7 +159,7 @@ impl Vertex<'_, '_> {
         if material.diffuse != Rgb::ZERO {
             let albedo = albedo(scene, material, &si);
             let reflectance = state.throughput * albedo;
-            let lit = LitPoint::new(self.renderer, (&si, hit), wo, reflectance, state.place());
+            let lit = LitPoint::new(self.renderer, (&si, ray, hit), wo, reflectance, state.place());
             self.lit.push(lit);
         }
         if MIRROR && may_bounce && material.mirror != Rgb::ZERO {

@@ -47,11 +47,11 @@ pub(super) struct LitPoint {
 }
 
 impl LitPoint {
-    /// The point `si` of `hit`, seen from `wo`, whose reflected light reaches the camera times
-    /// `reflectance`.
+    /// The point `si` where `ray` hit, seen from `wo`, whose reflected light reaches the camera
+    /// times `reflectance`.
     pub fn new(
         renderer: &Renderer,
-        (si, hit): (&SurfaceInteraction, &Hit),
+        (si, ray, hit): (&SurfaceInteraction, &Ray, &Hit),
         wo: DVec3,
         reflectance: Rgb,
         place: SamplePlace,
@@ -62,7 +62,7 @@ impl LitPoint {
         let offset = settings.rules.spawn_offset;
         let facet = si.shadow_start(ng, DVec3::ZERO, offset);
         let smooth = if settings.smooth_terminator {
-            si.shadow_start(ng, lift_to_smooth(renderer.scene, hit, si, outside), offset)
+            si.shadow_start(ng, lift_to_smooth(renderer.scene, ray, hit, si, outside), offset)
         } else {
             facet
         };

@@ -98,6 +98,8 @@ mod with_mpi {
             let name = format!("f_0{frame}.png");
             assert!(job.read(&format!("mixed/{name}")) == job.read(&format!("solo/{name}")));
         }
+    }
+
     /// Hard case 21 over ranks: which of many faces in one place is seen must not depend on who
     /// renders the frame.
     #[test]

@@ -137,7 +137,7 @@ fn point(scene: &Scene, geom: u32, rng: &mut impl Rng) -> SurfaceInteraction {
         _ if a + b > 1.0 => (1.0 - a, 1.0 - b),
         _ => (a, b),
     };
-    let hit = Hit { t: 1.0, u, v, prim: PrimRef { geom_id: geom, prim_id: 0 } };
+    let hit = Hit { t: 1.0, u, v, prim: PrimRef { geom_id: geom, prim_id: 0 }, rough: false };
     SurfaceInteraction::new(scene, &Ray::new(DVec3::ZERO, DVec3::X), &hit)
 }
 

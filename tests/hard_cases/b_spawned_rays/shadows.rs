@@ -13,6 +13,15 @@ use tweenray::math::{DQuat, DVec3, Rgb};
 use tweenray::scene::{Corners, HitRules, Light, Material, Scene, World, WorldMesh};
 use tweenray::stats::RayCounts;
 
+/// Hits that are made up have no ray.
+const ANY_RAY: Ray = Ray {
+    org: DVec3::ZERO,
+    dir: DVec3::X,
+    tnear: 0.0,
+    tfar: f64::INFINITY,
+    exclude: PrimRef::NONE,
+};
+
 /// Shadow rays from the walls of closed rooms to lights outside: all are blocked.
 pub fn closed_box(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
@@ -21,7 +30,7 @@ pub fn closed_box(size: Size) -> Outcome {
     for (how, turn) in [("straight", DQuat::IDENTITY), ("askew", askew)] {
         let room = room(turn, Some(1e-3));
         let lit = lit(&room, rays, |scene, hit, si, _| {
-            si.shadow_start(inwards(si), lift_to_smooth(scene, hit, si, false), true)
+            si.shadow_start(inwards(si), lift_to_smooth(scene, &ANY_RAY, hit, si, false), true)
         });
         outcome.show(format!("box with walls of 1e-3, {how}: {} of {} lit", lit.0, lit.1));
         outcome.count(lit.1, lit.0);
@@ -36,7 +45,7 @@ pub fn closed_box(size: Size) -> Outcome {
     for (columns, rows) in [(8, 8), (64, 32)] {
         let dome = dome(columns, rows);
         let ours = lit(&dome, rays, |scene, hit, si, _| {
-            si.shadow_start(inwards(si), lift_to_smooth(scene, hit, si, false), true)
+            si.shadow_start(inwards(si), lift_to_smooth(scene, &ANY_RAY, hit, si, false), true)
         });
         let naive = lit(&dome, rays, |_, _, si, dir| {
             let front = if si.is_outside(dir) { si.ng } else { -si.ng };
@@ -138,8 +147,8 @@ fn lit(
             };
             let prim =
                 PrimRef { geom_id: 0, prim_id: rng.random_range(0..mesh.triangles.len()) as u32 };
-            let hit = Hit { t: 1.0, u, v, prim };
-            let si = SurfaceInteraction::new(scene, &Ray::new(DVec3::ZERO, DVec3::X), &hit);
+            let hit = Hit { t: 1.0, u, v, prim, rough: false };
+            let si = SurfaceInteraction::new(scene, &ANY_RAY, &hit);
             let target = shapes::direction(&mut rng) * radius;
             if (target - si.p).dot(-si.ns) > 0.0 {
                 let end = Target { point: target, normal: target.normalize(), facet: Facet::EXACT };
