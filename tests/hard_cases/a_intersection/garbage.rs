@@ -146,6 +146,8 @@ fn traced(name: &str, mut world: World, rays: u64) -> Outcome {
     };
     outcome.merge(suite::trace(&embree, rays, make, judge, sum, Outcome::default));
     let oracle = Oracle::new(&scene);
+    let name = format!("{name}, oracle");
+    let judge = |rays: &[Ray], hits: &[Option<Hit>]| sound(&name, &scene, rays, hits);
     outcome.merge(suite::trace(&oracle, rays / 10, make, judge, sum, Outcome::default));
     outcome
 }
