@@ -1,12 +1,12 @@
 //! Rates of every packet width and flag for camera and shadow rays: decision 003's table.
 
+use super::support::camera_rays::BLOCK;
 use super::support::{self, Candidate};
-use super::{BLOCK, intersector};
 use tweenray::embree::{CommittedScene, Packet, QueryFlags};
-use tweenray::intersect::{Facet, Intersector, Ray, SurfaceInteraction, Target};
+use tweenray::intersect::{EmbreeIntersector, Facet, Intersector, Ray, SurfaceInteraction, Target};
 use tweenray::math::orthonormal_basis;
 use tweenray::sampling::{PixelSampler, QuadWarp, cosine_hemisphere, to_world};
-use tweenray::scene::{Light, Recheck, Scene};
+use tweenray::scene::{HitRules, Light, Recheck, Scene};
 use tweenray::stats::RayCounts;
 
 const TURNS: usize = 9;
@@ -78,7 +78,8 @@ fn trace<const W: usize>(scene: &CommittedScene, rays: &[Ray], flags: QueryFlags
 /// The shadow rays that the renderer would send from the terrain that `camera` sees: to the area
 /// light and to the sky.
 fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
-    let layer = intersector(scene, true, true, Recheck::Always);
+    let rules = HitRules { recheck: Recheck::Always, ..HitRules::default() };
+    let layer = EmbreeIntersector::new(scene, rules, None, 2).expect("Embree builds");
     let mut hits = vec![None; camera.len()];
     layer.intersect_batch(camera, &mut hits, &mut RayCounts::default());
     let Some(Light::Quad(quad)) = scene.lights.first() else {

@@ -5,6 +5,8 @@
 #![allow(dead_code, reason = "each bench uses its part")]
 #![allow(clippy::print_stdout, reason = "benches print their figures")]
 
+pub mod camera_rays;
+
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;

@@ -1,5 +1,5 @@
 //! `./x stress`: every hard case in full size, as a table. Arguments name cases: `7`, `a`,
-//! `watertight`; `--small` runs the small size.
+//! `watertight`, `costs` (of the hit rules); `--small` runs the small size.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "prints its table")]
 
@@ -7,6 +7,7 @@ mod a_intersection;
 mod b_spawned_rays;
 #[path = "../common/mod.rs"]
 mod common;
+mod costs;
 mod shapes;
 mod suite;
 #[path = "../../benches/support/mod.rs"]
@@ -46,9 +47,19 @@ fn main() {
             }
         }
     }
-    println!("\n{run} cases, {} failed{}", failed.len(), list(&failed));
+    let mut within = true;
+    if names.is_empty() || names.iter().any(|n| *n == "costs") {
+        println!(
+            "\nWhat each hit rule costs: spheres_on_terrain, camera rays on one thread, frames"
+        );
+        println!("of 320 x 180 on all.");
+        within = costs::report(size);
+        run += 1;
+    }
+    let costs = if within { "" } else { "; the rules cost too much" };
+    println!("\n{run} cases, {} failed{}{costs}", failed.len(), list(&failed));
     println!("load average at the end {}", support::load_average());
-    if run == 0 || !failed.is_empty() {
+    if run == 0 || !failed.is_empty() || !within {
         std::process::exit(1);
     }
 }
