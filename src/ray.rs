@@ -63,7 +63,8 @@ impl Ray {
     }
 
     /// Whether an intersector may see the ray: no NaN, an origin and a direction whose squares f32
-    /// can hold, a direction that is not zero, `tnear <= tfar`, a finite `tnear`.
+    /// can hold, a direction that is not zero, `0 <= tnear <= tfar`, a finite `tnear`. (Embree
+    /// would cut a segment that begins behind the origin; the oracle would not.)
     ///
     /// (A NaN origin costs Embree a thousand times a normal ray, and returns nothing useful.)
     #[inline]
@@ -76,6 +77,7 @@ impl Ray {
         org <= LARGEST
             && (1.0 / LARGEST..=LARGEST).contains(&dir)
             && !sum.is_nan()
+            && self.tnear >= 0.0
             && self.tnear <= self.tfar
             && self.tnear.is_finite()
     }
@@ -102,6 +104,7 @@ mod tests {
             Ray { tnear: nan, ..good },
             Ray { tfar: nan, ..good },
             Ray { tnear: 2.0, tfar: 1.0, ..good },
+            Ray { tnear: -1.0, ..good },
         ] {
             assert!(!bad.is_valid(), "{bad:?}");
         }

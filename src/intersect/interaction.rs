@@ -42,29 +42,156 @@ impl SurfaceInteraction {
 
     /// A ray from here along `dir`, on the side of the surface that `dir` points to.
     pub fn spawn(&self, dir: DVec3, offset: bool) -> Ray {
-        let org = if offset { self.start(dir) } else { self.p };
-        let exclude = if offset { self.prim } else { PrimRef::NONE };
-        Ray { exclude, ..Ray::new(org, dir) }
+        self.towards(dir, offset).along(dir)
     }
 
-    /// A ray from here that ends at `target`, a point of a surface with unit normal `normal`:
-    /// it stops short of that surface by its rounding-error bound. `t` runs from 0 to 1.
-    pub fn spawn_to(&self, target: DVec3, normal: DVec3, offset: bool) -> Ray {
-        if !offset {
-            return Ray { tfar: 1.0, ..Ray::new(self.p, target - self.p) };
+    /// A ray from here to `target` that stops short of its surface. `t` runs from 0 to (almost) 1.
+    pub fn spawn_to(&self, target: &Target, offset: bool) -> Ray {
+        self.towards(target.point - self.p, offset).to(target)
+    }
+
+    /// Where the shadow rays of a viewer start who sees the side that the unit normal `front`
+    /// (`ng` or `-ng`) points to; `lift` is [`lift_to_smooth`]'s, or zero.
+    pub fn shadow_start(&self, front: DVec3, lift: DVec3, offset: bool) -> SpawnPoint {
+        let p = self.p + lift;
+        let org = if offset { p + front * self.offset } else { p };
+        SpawnPoint { p, org, front, prim: self.prim, offset }
+    }
+
+    fn towards(&self, dir: DVec3, offset: bool) -> SpawnPoint {
+        let front = if self.is_outside(dir) { self.ng } else { -self.ng };
+        self.shadow_start(front, DVec3::ZERO, offset)
+    }
+}
+
+/// Where a ray is to end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target {
+    /// A point of a surface, scene space.
+    pub point: DVec3,
+    /// The surface's unit normal there, to either side.
+    pub normal: DVec3,
+    /// The triangle that it lies on; [`Facet::EXACT`] for spheres, which are tested in f64.
+    pub facet: Facet,
+}
+
+/// What f32 arithmetic may make of a triangle's plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facet {
+    /// Longest edge, scene space.
+    longest: f64,
+    /// By how much an error of a corner grows along the triangle: about 1, large for slivers, whose
+    /// normal is a difference of almost equal products.
+    tilt: f64,
+}
+
+impl Facet {
+    /// Not a triangle: no error.
+    pub const EXACT: Self = Self { longest: 0.0, tilt: 0.0 };
+
+    /// That of a triangle.
+    pub fn of(corners: &[DVec3; 3]) -> Self {
+        let [a, b, c] = *corners;
+        let (e1, e2) = ((b - a).length(), (c - a).length());
+        let longest = e1.max(e2).max((c - b).length());
+        let area = (b - a).cross(c - a).length();
+        let most = 0.5 / ROUNDING;
+        let tilt = if area > 0.0 { (longest * longest / area).min(most) } else { most };
+        Self { longest, tilt }
+    }
+
+    /// An error bound of both.
+    pub fn max(self, o: Self) -> Self {
+        Self { longest: self.longest.max(o.longest), tilt: self.tilt.max(o.tilt) }
+    }
+}
+
+/// A place on one side of a surface from which rays start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpawnPoint {
+    /// The place itself.
+    p: DVec3,
+    /// Origin of the rays, moved by the rounding-error bound.
+    org: DVec3,
+    /// Unit geometric normal on the side where `org` lies.
+    front: DVec3,
+    /// The primitive that the rays leave.
+    prim: PrimRef,
+    /// Whether the spawn rules hold; off, rays are what a naive tracer makes of them.
+    offset: bool,
+}
+
+impl SpawnPoint {
+    /// The ray along `dir`.
+    pub fn along(&self, dir: DVec3) -> Ray {
+        Ray { exclude: self.excluded(dir), ..Ray::new(self.org, dir) }
+    }
+
+    /// The ray that ends just before `target`, as [`SurfaceInteraction::spawn_to`].
+    pub fn to(&self, target: &Target) -> Ray {
+        let org = self.org;
+        let ray = Ray { tfar: 1.0, ..Ray::new(org, target.point - org) };
+        if !self.offset {
+            return ray;
         }
-        let org = self.start(target - self.p);
-        // Embree sees origin and direction rounded and works in f32, so the end moves by some ulp: with
-        // 4, one ray in 3,000 still met its own light; with 16, none of 2.4 million.
-        let bound = 16.0 * ROUNDING * (org.abs().max(target.abs())).dot(DVec3::ONE);
-        let facing = if normal.dot(org - target) >= 0.0 { normal } else { -normal };
-        let end = target + facing * bound;
-        Ray { exclude: self.prim, tfar: 1.0, ..Ray::new(org, end - org) }
+        let ray = Ray { exclude: self.excluded(target.point - self.p), ..ray };
+        // Embree sees origin and direction rounded and works in f32, so the end moves by some
+        // ulp: with 4, one ray in 3,000 still met its own light; with 16, none of 1e8.
+        // A sliver's corners, rounded relative to the origin, tilt its plane besides.
+        let grain = ROUNDING * (org.abs().max(target.point.abs())).dot(DVec3::ONE);
+        let Facet { longest, tilt } = target.facet;
+        let bound = 16.0 * grain + tilt * (2.0 * grain + 4.0 * ROUNDING * longest);
+        let height = (org - target.point).dot(target.normal);
+        if height.abs() > bound {
+            return Ray { tfar: 1.0 - bound / height.abs(), ..ray };
+        }
+        // The origin itself lies in the target's surface, as far as f32 can tell: nothing fits
+        // between the two.
+        Ray { org: org + target.normal * bound.copysign(height) * 2.0, tfar: 0.0, ..ray }
     }
 
-    fn start(&self, dir: DVec3) -> DVec3 {
-        self.p + self.ng * if self.is_outside(dir) { self.offset } else { -self.offset }
+    /// A ray that goes below the plane of its own facet (which the shading normal allows) can be
+    /// blocked by it; else light would leak into rooms with smooth walls. `dir` is that of the
+    /// ideal ray: offsets at both ends may turn a grazing one below the plane.
+    fn excluded(&self, dir: DVec3) -> PrimRef {
+        let leaves = self.offset && dir.dot(self.front) >= 0.0;
+        if leaves { self.prim } else { PrimRef::NONE }
     }
+}
+
+/// How far the smooth surface that a mesh's shading normals stand for bulges over `hit` of `ray`, on
+/// the outside or the inside: from the point on the facet to there, scene space. Zero where the mesh is
+/// flat or hollow there.
+///
+/// The point's projections onto the planes through the corners, each across its corner's normal,
+/// weighted like the corners (Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021).
+/// Shadow rays that start there clear the neighbouring facets, so that shadows end where the
+/// shading does.
+pub fn lift_to_smooth(
+    scene: &Scene,
+    ray: &Ray,
+    hit: &Hit,
+    si: &SurfaceInteraction,
+    outside: bool,
+) -> DVec3 {
+    let mesh = scene.meshes.get(hit.prim.geom_id as usize);
+    let Some((mesh, normals)) = mesh.and_then(|m| m.normals.as_ref().map(|n| (m, n))) else {
+        return DVec3::ZERO;
+    };
+    let prim = hit.prim.prim_id as usize;
+    let front = if outside { si.ng } else { -si.ng };
+    let corners = mesh.corners(prim);
+    let hit = refined(ray, &corners, hit);
+    let normals = normals.get(prim, mesh.triangles[prim]);
+    let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+    let mut lift = DVec3::ZERO;
+    for ((corner, normal), weight) in corners.iter().zip(normals).zip(weights) {
+        let normal = on_side_of(normal.as_dvec3(), front);
+        let below = (*corner - si.p).dot(normal).max(0.0);
+        lift += normal * (weight * below);
+    }
+    // Normals that have little to do with the facet would move the point through it.
+    if lift.dot(front) > 0.0 { lift } else { DVec3::ZERO }
 }
 
 fn on_triangle(mesh: &Mesh, ray: &Ray, hit: &Hit) -> SurfaceInteraction {

@@ -15,7 +15,7 @@ mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
 pub use embree::EmbreeIntersector;
-pub use interaction::SurfaceInteraction;
+pub use interaction::{Facet, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
 pub use oracle::{CourtHit, Oracle};
 
 use crate::error::Result;

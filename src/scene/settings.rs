@@ -18,6 +18,8 @@ pub struct Settings {
     pub shadow_samples: u32,
     /// Sky rays per camera sample where the sky lights the scene.
     pub sky_samples: u32,
+    /// Start shadow rays of smooth meshes on the smooth surface, not on its facets.
+    pub smooth_terminator: bool,
     /// Specular bounces after the camera ray.
     pub bounces: u32,
     /// A specular branch whose throughput (largest channel) falls below this is dropped.
@@ -49,6 +51,7 @@ impl Default for Settings {
             filter: Filter::Box,
             shadow_samples: 16,
             sky_samples: 16,
+            smooth_terminator: true,
             bounces: 4,
             cutoff: 1e-3,
             seed: 0,

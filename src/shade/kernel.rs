@@ -158,7 +158,9 @@ impl Vertex<'_, '_> {
         }
         if material.diffuse != Rgb::ZERO {
             let albedo = albedo(scene, material, &si);
-            self.lit.push(LitPoint::new(&si, wo, state.throughput * albedo, state.place()));
+            let reflectance = state.throughput * albedo;
+            let lit = LitPoint::new(self.renderer, (&si, ray, hit), wo, reflectance, state.place());
+            self.lit.push(lit);
         }
         if MIRROR && may_bounce && material.mirror != Rgb::ZERO {
             self.mirror(&si, wo, material, state);

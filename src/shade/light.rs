@@ -1,6 +1,7 @@
 //! Samples on area lights, and what delta lights send: before any shadow ray.
 
 use super::irradiance;
+use crate::intersect::{Facet, Target};
 use crate::math::{DVec3, Rgb};
 use crate::sampling::{QuadWarp, SphereCone};
 use crate::scene::Light;
@@ -9,9 +10,7 @@ use crate::scene::Light;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSample {
     /// The point, scene space.
-    pub point: DVec3,
-    /// Unit normal of the light there.
-    pub normal: DVec3,
+    pub target: Target,
     /// Unshadowed irradiance that the sample stands for, up to a factor that all samples of one
     /// surface point share; 0 where the light does not shine.
     pub weight: f64,
@@ -30,6 +29,8 @@ pub enum AreaLight {
         normal: DVec3,
         /// Whether the back emits too.
         two_sided: bool,
+        /// What f32 may make of its two triangles.
+        facet: Facet,
     },
     /// A sphere.
     Sphere {
@@ -42,8 +43,8 @@ pub enum AreaLight {
 
 /// An area light as seen from one surface point.
 pub enum SeenLight<'a> {
-    /// A quad: its points and unit normal.
-    Quad(&'a QuadWarp, DVec3),
+    /// A quad: its points, unit normal and facets.
+    Quad(&'a QuadWarp, DVec3, Facet),
     /// A sphere: its cone of directions, and centre.
     Sphere(SphereCone, DVec3),
 }
@@ -57,6 +58,7 @@ impl AreaLight {
                 corners: q.corners,
                 normal: q.normal(),
                 two_sided: q.two_sided,
+                facet: quad_facet(&q.corners),
             }),
             Light::Sphere { centre, radius, .. } => {
                 Some(Self::Sphere { centre: *centre, radius: *radius })
@@ -69,11 +71,11 @@ impl AreaLight {
     /// normal `n`; `None` where no light can arrive.
     pub fn seen_from(&self, p: DVec3, n: DVec3) -> Option<(SeenLight<'_>, f64)> {
         let (seen, irradiance) = match self {
-            Self::Quad { warp, corners, normal, two_sided } => {
+            Self::Quad { warp, corners, normal, two_sided, facet } => {
                 if !two_sided && normal.dot(p - corners[0]) <= 0.0 {
                     return None;
                 }
-                (SeenLight::Quad(warp, *normal), irradiance::polygon(p, n, corners))
+                (SeenLight::Quad(warp, *normal, *facet), irradiance::polygon(p, n, corners))
             }
             Self::Sphere { centre, radius } => {
                 let cone = SphereCone::new(*centre, *radius, p)?;
@@ -89,22 +91,29 @@ impl SeenLight<'_> {
     /// (sphere; Shirley, Wang and Zimmerman, 1996).
     pub fn sample(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
         match self {
-            Self::Quad(warp, normal) => {
+            Self::Quad(warp, normal, facet) => {
                 let point = warp.point(u);
                 let to_light = point - p;
                 let d2 = to_light.length_squared();
                 let cos_light = to_light.dot(*normal).abs();
                 let weight = (to_light.dot(n) * cos_light / (d2 * d2)).max(0.0);
-                LightSample { point, normal: *normal, weight }
+                LightSample { target: Target { point, normal: *normal, facet: *facet }, weight }
             }
             Self::Sphere(cone, centre) => {
                 let (dir, distance) = cone.direction(u);
                 let point = p + dir * distance;
                 let normal = (point - *centre).normalize();
-                LightSample { point, normal, weight: dir.dot(n).max(0.0) }
+                let target = Target { point, normal, facet: Facet::EXACT };
+                LightSample { target, weight: dir.dot(n).max(0.0) }
             }
         }
     }
+}
+
+/// The worse of the two triangles that show the light.
+fn quad_facet(corners: &[DVec3; 4]) -> Facet {
+    let [a, b, c, d] = *corners;
+    Facet::of(&[a, b, c]).max(Facet::of(&[a, c, d]))
 }
 
 /// Radiance of an area light; zero for delta lights.

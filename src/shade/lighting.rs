@@ -7,7 +7,7 @@
 use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
-use crate::intersect::{Ray, SurfaceInteraction};
+use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::{cosine_hemisphere, to_world};
 use crate::scene::Light;
@@ -32,24 +32,41 @@ pub(super) struct SamplePlace {
 /// A diffuse point that waits for light.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LitPoint {
-    si: SurfaceInteraction,
+    p: DVec3,
+    /// Geometric normal on the viewer's side.
+    ng: DVec3,
     /// Shading normal on the viewer's side.
     n: DVec3,
+    /// Where rays to the sky start: from the facet.
+    facet: SpawnPoint,
+    /// Where rays to lights start: from the smooth surface that the facet stands for.
+    smooth: SpawnPoint,
     /// Radiance towards the camera per unit of irradiance.
     weight: Rgb,
     place: SamplePlace,
 }
 
 impl LitPoint {
-    /// A point seen from `wo` whose reflected light reaches the camera times `reflectance`.
-    pub fn new(si: &SurfaceInteraction, wo: DVec3, reflectance: Rgb, place: SamplePlace) -> Self {
-        let n = if si.is_outside(wo) { si.ns } else { -si.ns };
-        Self { si: *si, n, weight: reflectance * FRAC_1_PI, place }
-    }
-
-    /// Geometric normal on the viewer's side.
-    fn ng(&self) -> DVec3 {
-        if self.n.dot(self.si.ng) >= 0.0 { self.si.ng } else { -self.si.ng }
+    /// The point `si` where `ray` hit, seen from `wo`, whose reflected light reaches the camera
+    /// times `reflectance`.
+    pub fn new(
+        renderer: &Renderer,
+        (si, ray, hit): (&SurfaceInteraction, &Ray, &Hit),
+        wo: DVec3,
+        reflectance: Rgb,
+        place: SamplePlace,
+    ) -> Self {
+        let outside = si.is_outside(wo);
+        let (n, ng) = if outside { (si.ns, si.ng) } else { (-si.ns, -si.ng) };
+        let settings = renderer.settings;
+        let offset = settings.rules.spawn_offset;
+        let facet = si.shadow_start(ng, DVec3::ZERO, offset);
+        let smooth = if settings.smooth_terminator {
+            si.shadow_start(ng, lift_to_smooth(renderer.scene, ray, hit, si, outside), offset)
+        } else {
+            facet
+        };
+        Self { p: si.p, ng, n, facet, smooth, weight: reflectance * FRAC_1_PI, place }
     }
 }
 
@@ -82,10 +99,9 @@ impl ShadowScratch {
     }
 
     /// A shadow ray to the sample, where it lies above the horizon.
-    fn push_sample(&mut self, point: &LitPoint, sample: &LightSample, offset: bool) {
+    fn push_sample(&mut self, point: &LitPoint, sample: &LightSample) {
         if sample.weight > 0.0 {
-            let ray = point.si.spawn_to(sample.point, sample.normal, offset);
-            self.push(ray, sample.weight);
+            self.push(point.smooth.to(&sample.target), sample.weight);
         }
     }
 
@@ -149,16 +165,15 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         let n = self.settings.shadow_samples as usize;
-        let offset = self.settings.rules.spawn_offset;
         let radiance = light::radiance(source.light);
         for group in lit.chunks((BATCH / n).max(1)) {
             s.clear();
             for point in group {
-                if let Some((seen, exact)) = source.area.seen_from(point.si.p, point.n) {
+                if let Some((seen, exact)) = source.area.seen_from(point.p, point.n) {
                     self.fill(&point.place, source.index, n, pixels, &mut s.u);
                     for k in 0..n {
-                        let sample = seen.sample(point.si.p, point.n, s.u[k].map(f64::from));
-                        s.push_sample(point, &sample, offset);
+                        let sample = seen.sample(point.p, point.n, s.u[k].map(f64::from));
+                        s.push_sample(point, &sample);
                     }
                     if s.is_open() {
                         // All below the horizon, but some of the light is above: go on until one
@@ -189,8 +204,8 @@ impl Renderer<'_> {
         for k in 0..MOST_SEARCHED {
             let index = point.place.sample.wrapping_mul(MOST_SEARCHED) + k;
             let u = sampler.get2(index, dimension).map(f64::from);
-            let sample = seen.sample(point.si.p, point.n, u);
-            s.push_sample(point, &sample, self.settings.rules.spawn_offset);
+            let sample = seen.sample(point.p, point.n, u);
+            s.push_sample(point, &sample);
             if !s.is_open() {
                 return;
             }
@@ -205,18 +220,19 @@ impl Renderer<'_> {
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        let offset = self.settings.rules.spawn_offset;
         for group in lit.chunks(BATCH) {
             s.clear();
             for point in group {
-                let sent = light::delta(light, point.si.p, point.n);
+                let sent = light::delta(light, point.p, point.n);
                 if let Some((_, target)) = sent {
                     let ray = match target {
                         // No surface to stop short of: the normal along the ray costs a few ulp.
-                        ShadowTarget::Point(q) => {
-                            point.si.spawn_to(q, (point.si.p - q).normalize(), offset)
-                        }
-                        ShadowTarget::Direction(d) => point.si.spawn(d, offset),
+                        ShadowTarget::Point(q) => point.smooth.to(&Target {
+                            point: q,
+                            normal: (point.p - q).normalize(),
+                            facet: Facet::EXACT,
+                        }),
+                        ShadowTarget::Direction(d) => point.smooth.along(d),
                     };
                     s.push(ray, 1.0);
                 }
@@ -235,7 +251,6 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         let n = self.settings.sky_samples as usize;
-        let offset = self.settings.rules.spawn_offset;
         // A constant sky of radiance L sends the irradiance πL to an open surface.
         let irradiance = self.scene.sky.radiance * std::f32::consts::PI;
         for group in lit.chunks((BATCH / n).max(1)) {
@@ -243,14 +258,14 @@ impl Renderer<'_> {
             for point in group {
                 let dimension = self.scene.lights.len() as u32;
                 self.fill(&point.place, dimension, n, pixels, &mut s.u);
-                let (ng, basis) = (point.ng(), orthonormal_basis(point.n));
+                let (ng, basis) = (point.ng, orthonormal_basis(point.n));
                 for k in 0..n {
                     let local = cosine_hemisphere(s.u[k].map(f64::from));
                     let dir = to_world(local, basis, point.n);
                     // Below the facet but above the smooth surface that it stands for: the
                     // facet's own plane is no occluder.
                     let dir = super::optics::keep_side(dir, ng, true);
-                    s.push(point.si.spawn(dir, offset), 1.0);
+                    s.push(point.facet.along(dir), 1.0);
                 }
                 s.close(irradiance);
             }

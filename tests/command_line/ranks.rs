@@ -100,6 +100,39 @@ mod with_mpi {
         }
     }
 
+    /// Hard case 21 over ranks: which of many faces in one place is seen must not depend on who
+    /// renders the frame.
+    #[test]
+    fn coincident_faces_look_the_same_on_every_rank() {
+        let job = Job::new();
+        for (name, order) in [("red", ["red", "blue"]), ("blue", ["blue", "red"])] {
+            let mut scene = String::from(
+                "[settings]\nsize = [48, 32]\nspp = 1\n[camera]\nframes = 4\n\
+                 [material.red]\ndiffuse = [0.8, 0.1, 0.1]\n\
+                 [material.blue]\ndiffuse = [0.1, 0.1, 0.8]\n\
+                 [[light]]\ndirectional = { to_light = [1, 2, 3], irradiance = 3 }\n",
+            );
+            for copy in 0..40 {
+                let material = order[copy % 2];
+                scene += &format!("[[mesh]]\nfile = \"cube.obj\"\nmaterial = \"{material}\"\n");
+            }
+            fs::write(job.path(format!("{name}.toml")), scene).expect("written");
+            job.done(&format!("render {name}.toml --no-video --threads 1 -o {name}1/f_##.png"));
+            for ranks in [2, 4] {
+                let line = format!("render {name}.toml --no-video -o {name}{ranks}/f_##.png");
+                let Some(ran) = under_mpirun(&job, ranks, &line) else { return };
+                assert_eq!(ran.code, Some(0), "{}", ran.err);
+                for frame in 1..=4 {
+                    let ours = job.read(&format!("{name}{ranks}/f_0{frame}.png"));
+                    let alone = job.read(&format!("{name}1/f_0{frame}.png"));
+                    assert!(ours == alone, "{name} first, {ranks} ranks, frame {frame}");
+                }
+            }
+        }
+        let differ = job.read("red1/f_01.png") != job.read("blue1/f_01.png");
+        assert!(differ, "the first of them is not the one that is seen");
+    }
+
     #[test]
     fn a_failing_rank_ends_the_job_with_its_words() {
         let job = Job::new();

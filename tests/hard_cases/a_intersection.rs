@@ -1,10 +1,16 @@
 //! A. Intersection.
 
 mod accuracy;
+mod coincident;
+mod crossings;
 mod fields;
+mod garbage;
 mod holes;
 mod invariance;
+mod isa;
 mod ranges;
+mod refused;
+mod scale;
 mod slivers;
 mod ways;
 mod wide;
@@ -31,6 +37,17 @@ cases! {
     12 translation_invariance "raw f32 Embree at 1e6: 43 % of hits on the wrong triangle" => invariance::translation;
     13 scale_invariance "LuxCore #79 fails at 10 cm" => invariance::scale;
     14 range_guard "Embree: 49 % holes at a radius of 1e-18, 21 % at 2e18" => ranges::range_guard;
+    15 scale_ratio "OSPRay's spheres allow an error of 4e-4" => scale::ratio;
+    16 far_sphere "b² − ac in f32 loses the sphere (Mitsuba 512, pbrt 265)" => scale::far_sphere_silhouette;
+    17 invalid_rays "Embree allows 2.5 times a good ray's cost; stock default 1041 times" => refused::invalid_rays;
+    18 ftz_independence "stock Embree's answer to a direction of 1e38 changes" => refused::ftz_independence;
+    19 degenerate_geometry "Embree builds it and traces none" => garbage::degenerate;
+    20 garbage_fuzz "Embree builds 1,000 such scenes and traces none" => garbage::fuzz;
+    21 coincident_faces "no public test" => coincident::faces;
+    22 crossing_counts "Embree 188: odd counts at edges" => crossings::parity;
+    23 in_plane_ray "Embree 298: it hits or not" => coincident::in_plane;
+    24 isa_agreement "Embree 423: answers differ by processor" => isa::agreement;
+    25 unrelated_mesh "Embree 181: a far mesh changes near hits" => scale::unrelated_mesh;
 }
 
 /// Leaks of closed spheres at the origin and far away. `aim` gives the target of ray `i`.

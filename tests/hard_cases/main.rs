@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod a_intersection;
+mod b_spawned_rays;
 #[path = "../common/mod.rs"]
 mod common;
 mod shapes;

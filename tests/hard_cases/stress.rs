@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "prints its table")]
 
 mod a_intersection;
+mod b_spawned_rays;
 #[path = "../common/mod.rs"]
 mod common;
 mod costs;
@@ -16,7 +17,8 @@ use std::io::Write;
 use suite::{Case, Outcome, Size};
 
 /// Letter, what it is about, its cases.
-const LETTERS: [(&str, &str, &[Case]); 1] = [("a", "intersection", a_intersection::CASES)];
+const LETTERS: [(&str, &str, &[Case]); 2] =
+    [("a", "intersection", a_intersection::CASES), ("b", "spawned rays", b_spawned_rays::CASES)];
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();

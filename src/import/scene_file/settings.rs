@@ -37,6 +37,9 @@ pub(super) struct Settings {
     shadow_samples: Samples,
     /// Sky rays per camera sample where the sky lights the scene.
     sky_samples: Samples,
+    /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
+    /// shadows end where the shading does.
+    smooth_terminator: bool,
     /// Specular bounces after the camera ray.
     bounces: Int<0, { limits::MAX_BOUNCES as i64 }>,
     /// Mirror and glass branches that contribute less than this share are dropped.
@@ -85,6 +88,7 @@ impl Default for Settings {
             filter: s.filter,
             shadow_samples: Int::clamped(s.shadow_samples.into()),
             sky_samples: Int::clamped(s.sky_samples.into()),
+            smooth_terminator: s.smooth_terminator,
             bounces: Int::clamped(s.bounces.into()),
             cutoff: Share(shortest(s.cutoff)),
             seed: Int::clamped(s.seed as i64),
@@ -124,6 +128,7 @@ impl Settings {
             filter: self.filter,
             shadow_samples: self.shadow_samples.u32(),
             sky_samples: self.sky_samples.u32(),
+            smooth_terminator: self.smooth_terminator,
             bounces: self.bounces.u32(),
             cutoff: self.cutoff.0 as f32,
             seed: self.seed.u64(),

@@ -21,7 +21,8 @@ fn an_empty_file_is_an_empty_scene_with_all_defaults() {
 fn every_setting_reaches_its_place() {
     let loaded = good(
         "[settings]\nsize = [320, 200]\nspp = 7\nfilter = 'tent'\nshadow_samples = 5\n\
-         sky_samples = 6\nbounces = 2\ncutoff = 0.25\nseed = 11\nexposure = 1.5\n\
+         sky_samples = 6\nsmooth_terminator = false\nbounces = 2\ncutoff = 0.25\nseed = 11\n\
+         exposure = 1.5\n\
          tone = 'filmic'\npng_bits = 16\nintersector = 'oracle'\nisa = 'sse4.2'\n\
          rules = { robust = false, retry = false, recheck = 'always', spawn_offset = false, \
          recentre = false }\ncrop = [1, 2, 30, 40]\nframes = [2, 3]\n\
@@ -32,6 +33,7 @@ fn every_setting_reaches_its_place() {
     assert_eq!((s.width, s.height, s.spp, s.seed), (320, 200, 7, 11));
     assert_eq!((s.shadow_samples, s.sky_samples, s.bounces, s.png_bits), (5, 6, 2, 16));
     assert_eq!((s.cutoff, s.exposure, s.isa.as_deref()), (0.25, 1.5, Some("sse4.2")));
+    assert!(!s.smooth_terminator);
     // What is left at its default would show here.
     let d = SceneSettings::default();
     assert!(s.filter != d.filter && s.tone != d.tone && s.intersector != d.intersector);
