@@ -3,7 +3,7 @@
 use super::Check;
 use super::judge::{BAND_ULPS, Class, Difference};
 use crate::intersect::court::{Line, Place};
-use crate::intersect::{CourtHit, Hit, PrimRef, Ray};
+use crate::intersect::{CourtHit, Hit, PrimRef, Ray, SurfaceInteraction};
 use crate::math::{DVec3, orthonormal_basis};
 
 /// Rays around the given one that are tried for a gap: on the band's rim and half-way to it.
@@ -55,6 +55,7 @@ impl<'a> Closely<'a> {
         let Some(hit) = product else {
             return Some(self.missed(self.ray.tfar, oracle?));
         };
+        let hit = self.refined(hit);
         let pass = self.pass(hit.prim);
         if pass.ulps > BAND_ULPS || hit.prim == self.ray.exclude {
             return Some(Difference { class: Class::Phantom, ulps: pass.ulps });
@@ -81,6 +82,16 @@ impl<'a> Closely<'a> {
         } else {
             Some(self.missed(hit.t - pass.along() / length, true_hit))
         }
+    }
+
+    /// A hit whose numbers were left rough, as it is when its surface is looked at.
+    fn refined(&self, hit: Hit) -> Hit {
+        if !hit.rough {
+            return hit;
+        }
+        let point = SurfaceInteraction::new(self.check.scene, &self.ray, &hit).p;
+        let t = (point - self.ray.org).dot(self.ray.dir) / self.ray.dir.length_squared();
+        Hit { t, ..hit }
     }
 
     /// A product's hit, on its primitive, where the oracle has none or a farther one.
