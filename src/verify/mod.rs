@@ -10,8 +10,6 @@ mod differ;
 mod judge;
 mod rays;
 mod tally;
-#[cfg(test)]
-mod tests;
 
 pub use judge::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};

@@ -4,6 +4,7 @@ use super::judge::{Class, Difference};
 use super::rays::{Kind, RayId};
 use crate::measure::proportion_upper_bound;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 const KINDS: usize = Kind::ALL.len();
 const CLASSES: usize = Class::ALL.len();
@@ -39,7 +40,7 @@ pub struct Row {
     /// Share of such rays that the truth does not exceed, at 95 %.
     pub bound: f64,
     /// The same count by kind of ray.
-    pub by_kind: Vec<(Kind, u64)>,
+    pub by_kind: BTreeMap<Kind, u64>,
     /// The worst one.
     pub worst: Option<Worst>,
 }
@@ -94,10 +95,10 @@ impl Tally {
 
     fn row(&self, class: Class) -> Row {
         let kinds = Kind::ALL.iter().filter(|kind| class.befalls(**kind));
-        let by_kind: Vec<(Kind, u64)> =
+        let by_kind: BTreeMap<Kind, u64> =
             kinds.map(|kind| (*kind, self.found[*kind as usize][class as usize])).collect();
-        let count = by_kind.iter().map(|(_, count)| count).sum();
-        let rays = by_kind.iter().map(|(kind, _)| self.rays(*kind)).sum();
+        let count = by_kind.values().sum();
+        let rays = by_kind.keys().map(|kind| self.rays(*kind)).sum();
         Row {
             class,
             explained: class.is_explained(),

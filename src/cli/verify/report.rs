@@ -5,6 +5,7 @@ use crate::cli::say;
 use crate::error::{Error, Result};
 use crate::verify::{BAND_ULPS, Check, Class, Kind, Row, Tally};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The JSON document; `docs/verify.md` describes it.
@@ -16,7 +17,7 @@ struct Report {
     triangles: usize,
     seed: u64,
     band_ulps: f64,
-    rays: Vec<(Kind, u64)>,
+    rays: BTreeMap<Kind, u64>,
     passed: bool,
     unexplained: u64,
     classes: Vec<ClassReport>,
@@ -42,7 +43,7 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally) -> Result<()> {
         triangles: check.scene.triangle_count(),
         seed: check.settings.seed,
         band_ulps: BAND_ULPS,
-        rays: Kind::ALL.map(|kind| (kind, tally.rays(kind))).to_vec(),
+        rays: Kind::ALL.map(|kind| (kind, tally.rays(kind))).into(),
         passed: tally.unexplained() == 0,
         unexplained: tally.unexplained(),
         classes: classes.collect(),
