@@ -1,5 +1,7 @@
 //! `verify` catches faults: rules switched off, and an intersector that lies.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::sync::atomic::AtomicBool;

@@ -62,8 +62,9 @@ impl<'a> Closely<'a> {
         }
         let length = self.ray.dir.length();
         let off = pass.t.map_or(0.0, |t| (hit.t - t).abs()) * length;
-        // Not <=: a t that is no number is wrong too.
-        if !(off <= pass.along()) {
+        // So that a t that is no number is wrong too.
+        let right = off <= pass.along();
+        if !right {
             return Some(Difference { class: Class::WrongDistance, ulps: off / pass.ulp });
         }
         let Some(true_hit) = oracle else {

@@ -48,7 +48,7 @@ fn a_fault_ends_with_1_and_its_command_shows_that_ray() {
     let ran = job.run(&format!("verify {} --rays 3000 --recheck off", scene("cornell")));
     assert_eq!(ran.code, Some(1), "{}", ran.err);
     assert!(ran.out.contains("FAILED: "), "{}", ran.out);
-    let replay = ran.out.lines().filter(|line| line.starts_with("  tweenray verify ")).next_back();
+    let replay = ran.out.lines().rfind(|line| line.starts_with("  tweenray verify "));
     let replay = replay.expect("a command").trim().trim_start_matches("tweenray ");
     let again = job.run(replay);
     assert_eq!(again.code, Some(1), "{replay}\n{}", again.err);
