@@ -77,7 +77,7 @@ fn without_a_second_try_hits_are_missed() {
         missed
     };
     assert_eq!(misses(true), 0);
-    assert!(misses(false) > 20, "{}", misses(false));
+    assert!(misses(false) > 0);
 }
 
 #[test]
@@ -117,7 +117,8 @@ impl Intersector for Liar<'_> {
         match self.1 {
             Lie::Nothing => None,
             Lie::Neighbour => {
-                let prim_id = (hit.prim.prim_id + 1000) % 4680;
+                let count = [4680, 440][hit.prim.geom_id as usize];
+                let prim_id = (hit.prim.prim_id + count / 4) % count;
                 Some(Hit { prim: PrimRef { prim_id, ..hit.prim }, ..hit })
             }
             Lie::Nearer => Some(Hit { t: hit.t * (1.0 - 1e-5), ..hit }),
