@@ -26,8 +26,9 @@ pub mod intersect;
 pub mod measure;
 pub mod output;
 
-// Floor 4: radiance along a ray.
+// Floor 4: radiance along a ray; one intersector against the other.
 pub mod shade;
+pub mod verify;
 
 // Floor 5: one frame after another.
 pub mod sequence;

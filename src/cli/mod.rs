@@ -19,6 +19,7 @@ mod schema;
 mod signals;
 mod stats;
 mod values;
+mod verify;
 
 use crate::error::Result;
 use clap::{Parser, Subcommand};
@@ -45,6 +46,7 @@ struct Arguments {
 enum Command {
     Render(Box<render::RenderArgs>),
     Inspect(Box<inspect::InspectArgs>),
+    Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
     Convert(convert::ConvertArgs),
     Schema(schema::SchemaArgs),
@@ -82,6 +84,7 @@ fn dispatch(command: &Command) -> Exit {
     let result = match command {
         Command::Render(args) => return render::run(args),
         Command::Inspect(args) => inspect::run(args),
+        Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
         Command::Schema(args) => schema::run(args),

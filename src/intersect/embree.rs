@@ -35,6 +35,11 @@ const MOST_PHANTOMS: usize = 4096;
 /// Rays that go through the steps together: a block of the renderer's.
 const BLOCK: usize = triangle::MOST;
 
+/// Faults that no build has but those by which `./x faults` shows that `tweenray verify` sees them:
+/// a comparison of the recheck the wrong way round, and no second try.
+const PLANTED_FLIP: bool = cfg!(feature = "planted-flip");
+const PLANTED_NO_RETRY: bool = cfg!(feature = "planted-no-retry");
+
 /// A scene traced by Embree.
 pub struct EmbreeIntersector<'s> {
     committed: CommittedScene<'s>,
@@ -114,6 +119,10 @@ impl<'s> EmbreeIntersector<'s> {
         Some((moved, near))
     }
 
+    fn retries(&self) -> bool {
+        self.rules.retry && !PLANTED_NO_RETRY
+    }
+
     // ---- one ray -----------------------------------------------------------------------------
 
     /// One Embree query that cannot hit the `passed` primitives.
@@ -161,7 +170,7 @@ impl<'s> EmbreeIntersector<'s> {
             }
         }
         let bundle = Bundle::of([ray])?;
-        if !self.rules.retry || !self.coarse.may_meet(&bundle) {
+        if !self.retries() || !self.coarse.may_meet(&bundle) {
             return None;
         }
         counts.retry += 1;
@@ -233,7 +242,7 @@ impl<'s> EmbreeIntersector<'s> {
         counts: &mut RayCounts,
     ) -> Lanes {
         let Some(bundle) = Bundle::of(each(missed).map(|lane| &rays[lane])) else { return 0 };
-        if !self.rules.retry || !self.coarse.may_meet(&bundle) {
+        if !self.retries() || !self.coarse.may_meet(&bundle) {
             return 0;
         }
         let tried = missed.count_ones();
@@ -361,7 +370,8 @@ impl<'s> EmbreeIntersector<'s> {
             let t = nearly_on(ray, &corners, &met, &beside)?;
             (beside.u, beside.v, t)
         };
-        (t >= ray.tnear && t <= ray.tfar).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
+        let begun = if PLANTED_FLIP { t <= ray.tnear } else { t >= ray.tnear };
+        (begun && t <= ray.tfar).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
     }
 
     /// Embree's own numbers. Unless the recheck is off they are computed again when the surface is

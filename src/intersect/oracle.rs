@@ -61,6 +61,15 @@ impl<'s> Oracle<'s> {
         Some(mesh.corners(prim.prim_id as usize))
     }
 
+    /// Where `ray` first hits a sphere between its ends.
+    ///
+    /// # Panics
+    /// When `prim` is no sphere.
+    pub fn sphere_root(&self, ray: &Ray, prim: PrimRef) -> Option<f64> {
+        let s = &self.scene.spheres[prim.prim_id as usize];
+        sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude)
+    }
+
     /// All hits of `ray` between its ends, nearest first, ties by primitive: a ray exactly through
     /// an edge hits all triangles there. Spheres count once, with their first root.
     pub fn all_hits(&self, ray: &Ray) -> Vec<CourtHit> {

@@ -5,4 +5,5 @@ mod interrupted;
 mod job;
 mod ranks;
 mod rendering;
+mod verify;
 mod words;

@@ -1,0 +1,115 @@
+//! What `verify` found, as a table or as JSON.
+
+use super::{VerifyArgs, replay_command};
+use crate::cli::say;
+use crate::error::{Error, Result};
+use crate::verify::{BAND_ULPS, Check, Class, Kind, Row, Tally};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// The JSON document; `docs/verify.md` describes it.
+#[derive(Serialize)]
+struct Report {
+    scene: String,
+    product: String,
+    oracle: String,
+    triangles: usize,
+    seed: u64,
+    band_ulps: f64,
+    rays: BTreeMap<Kind, u64>,
+    passed: bool,
+    unexplained: u64,
+    classes: Vec<ClassReport>,
+}
+
+#[derive(Serialize)]
+struct ClassReport {
+    #[serde(flatten)]
+    row: Row,
+    replay: Option<String>,
+}
+
+/// Prints what was found.
+pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally) -> Result<()> {
+    let classes = tally
+        .rows()
+        .into_iter()
+        .map(|row| ClassReport { replay: row.worst.map(|worst| replay_command(worst.ray)), row });
+    let report = Report {
+        scene: args.scene.scene.display().to_string(),
+        product: check.product.describe(),
+        oracle: crate::intersect::Intersector::describe(check.oracle),
+        triangles: check.scene.triangle_count(),
+        seed: check.settings.seed,
+        band_ulps: BAND_ULPS,
+        rays: Kind::ALL.map(|kind| (kind, tally.rays(kind))).into(),
+        passed: tally.unexplained() == 0,
+        unexplained: tally.unexplained(),
+        classes: classes.collect(),
+    };
+    if args.json {
+        let text = serde_json::to_string_pretty(&report)
+            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
+        return say::result(text);
+    }
+    say::text(&report.to_text())
+}
+
+/// What a class means, in a few words.
+pub fn meaning(class: Class) -> &'static str {
+    match class {
+        Class::Tie => "another triangle at the same place",
+        Class::EdgeBand => "within the band of an edge",
+        Class::RayEnd => "at the ray's own start or end",
+        Class::Phantom => "phantom hit",
+        Class::Missed => "missed hit",
+        Class::WrongDistance => "wrong distance",
+        Class::ShadowLeak => "shadow leak",
+        Class::FalseShadow => "false shadow",
+    }
+}
+
+impl Report {
+    fn to_text(&self) -> String {
+        let mut text = String::new();
+        let kinds = self.rays.iter().map(|(kind, rays)| format!("{} {rays}", kind.name()));
+        let kinds: Vec<String> = kinds.collect();
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{} against the {}", self.product, self.oracle);
+        let _ = writeln!(text, "rays: {}", kinds.join(", "));
+        let _ = writeln!(
+            text,
+            "band: {} ulp (2^-23) of the largest scene-space coordinate involved\n",
+            self.band_ulps
+        );
+        let _ = writeln!(
+            text,
+            "{:<36} {:>9} {:>12} {:>10} {:>10}  worst ray",
+            "difference", "count", "rays", "95 % bound", "worst ulp"
+        );
+        for explained in [true, false] {
+            let _ = writeln!(text, "{}", if explained { "explained" } else { "unexplained" });
+            for class in self.classes.iter().filter(|c| c.row.explained == explained) {
+                let Row { class, count, rays, bound, worst, .. } = &class.row;
+                let ulps = worst.map_or("-".into(), |w| format!("{:.3}", w.ulps));
+                let ray = worst.map_or("-".into(), |w| w.ray.to_string());
+                let _ = writeln!(
+                    text,
+                    "  {:<34} {count:>9} {rays:>12} {bound:>10.1e} {ulps:>10}  {ray}",
+                    meaning(*class)
+                );
+            }
+        }
+        let replays = self.classes.iter().filter_map(|c| c.replay.as_ref());
+        let replays: Vec<String> = replays.map(|line| format!("  {line}\n")).collect();
+        if !replays.is_empty() {
+            let _ = write!(text, "\nthe worst rays again:\n{}", replays.concat());
+        }
+        let _ = match self.unexplained {
+            0 => writeln!(text, "\npassed: every difference is explained"),
+            n => writeln!(text, "\nFAILED: {n} unexplained"),
+        };
+        text
+    }
+}

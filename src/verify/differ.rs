@@ -1,0 +1,255 @@
+//! A ray looked at closely: where it passes the primitives that the two intersectors name.
+
+use super::Check;
+use super::judge::{BAND_ULPS, Class, Difference};
+use crate::intersect::court::{Line, Place};
+use crate::intersect::{CourtHit, Hit, PrimRef, Ray, SurfaceInteraction};
+use crate::math::{DVec3, orthonormal_basis};
+
+/// Rays around the given one that are tried for a gap: on the band's rim and half-way to it.
+const AROUND: u32 = 16;
+
+/// A ray with its line, and the scene to look it up in.
+pub struct Closely<'a> {
+    check: &'a Check<'a>,
+    ray: Ray,
+    line: Line,
+}
+
+/// Where the ray passes one primitive.
+#[derive(Debug, Clone, Copy)]
+struct Pass {
+    /// Whether the ray's line meets it, by the court.
+    met: bool,
+    /// Distance from the primitive, in ulp; zero where it is met.
+    ulps: f64,
+    /// Distance from its nearest edge or silhouette, in ulp.
+    edge_ulps: f64,
+    /// One ulp, scene space.
+    ulp: f64,
+    /// Where it meets the primitive's plane, or the sphere.
+    t: Option<f64>,
+    /// How far along the ray a step of one across it leads.
+    slope: f64,
+}
+
+impl Pass {
+    fn in_band(&self) -> bool {
+        self.edge_ulps <= BAND_ULPS
+    }
+
+    /// Uncertainty along the ray, scene space: of a hit within the band, that of a ray that passes
+    /// anywhere in the band.
+    fn along(&self) -> f64 {
+        BAND_ULPS * self.ulp * if self.in_band() { 1.0 + self.slope } else { 1.0 }
+    }
+}
+
+impl<'a> Closely<'a> {
+    pub fn new(check: &'a Check<'a>, ray: &Ray) -> Self {
+        Self { check, ray: *ray, line: check.oracle.line(ray) }
+    }
+
+    /// Classifies two closest hits.
+    pub fn hits(&self, product: Option<Hit>, oracle: Option<Hit>) -> Option<Difference> {
+        let Some(hit) = product else {
+            return Some(self.missed(self.ray.tfar, oracle?));
+        };
+        let hit = self.refined(hit);
+        let pass = self.pass(hit.prim);
+        if pass.ulps > BAND_ULPS || hit.prim == self.ray.exclude {
+            return Some(Difference { class: Class::Phantom, ulps: pass.ulps });
+        }
+        let length = self.ray.dir.length();
+        let off = pass.t.map_or(0.0, |t| (hit.t - t).abs()) * length;
+        // So that a t that is no number is wrong too.
+        let right = off <= pass.along();
+        if !right {
+            return Some(Difference { class: Class::WrongDistance, ulps: off / pass.ulp });
+        }
+        let Some(true_hit) = oracle else {
+            return Some(self.extra(&pass));
+        };
+        if true_hit.prim == hit.prim {
+            return None;
+        }
+        let true_pass = self.pass(true_hit.prim);
+        let apart = (hit.t - true_hit.t) * length;
+        let ulps = apart.abs() / pass.ulp;
+        if apart.abs() <= pass.along() + true_pass.along() {
+            Some(Difference { class: Class::Tie, ulps })
+        } else if apart < 0.0 {
+            Some(self.extra(&pass))
+        } else {
+            Some(self.missed(hit.t - pass.along() / length, true_hit))
+        }
+    }
+
+    /// A hit whose numbers were left rough, as it is when its surface is looked at.
+    fn refined(&self, hit: Hit) -> Hit {
+        if !hit.rough {
+            return hit;
+        }
+        let point = SurfaceInteraction::new(self.check.scene, &self.ray, &hit).p;
+        let t = (point - self.ray.org).dot(self.ray.dir) / self.ray.dir.length_squared();
+        Hit { t, ..hit }
+    }
+
+    /// A product's hit, on its primitive, where the oracle has none or a farther one.
+    fn extra(&self, pass: &Pass) -> Difference {
+        if !pass.met {
+            return Difference { class: Class::EdgeBand, ulps: pass.edge_ulps };
+        }
+        // Met exactly, so the oracle left it out for where it is.
+        match pass.t.filter(|t| self.at_end(*t, pass)) {
+            Some(_) => Difference { class: Class::RayEnd, ulps: pass.edge_ulps },
+            None => Difference { class: Class::Phantom, ulps: pass.ulps },
+        }
+    }
+
+    fn at_end(&self, t: f64, pass: &Pass) -> bool {
+        let along = BAND_ULPS * pass.ulp * (1.0 + pass.slope) / self.ray.dir.length();
+        (t - self.ray.tnear).abs() <= along || (t - self.ray.tfar).abs() <= along
+    }
+
+    /// A hit that the product does not have although nothing nearer than `limit` was reported.
+    fn missed(&self, limit: f64, hit: Hit) -> Difference {
+        let pass = self.pass(hit.prim);
+        let class = self.gap(limit).unwrap_or(Class::Missed);
+        Difference { class, ulps: pass.edge_ulps }
+    }
+
+    /// The product says occluded, the oracle does not.
+    pub fn false_shadow(&self) -> Difference {
+        let none = Difference { class: Class::FalseShadow, ulps: f64::INFINITY };
+        self.near()
+            .into_iter()
+            .filter(|prim| *prim != self.ray.exclude)
+            .filter_map(|prim| {
+                let pass = self.pass(prim);
+                let t = pass.t?;
+                let ends = self.at_end(t, &pass);
+                let within = t >= self.ray.tnear && t <= self.ray.tfar;
+                let class = if ends { Class::RayEnd } else { Class::EdgeBand };
+                let explains = pass.ulps <= BAND_ULPS && (ends || within);
+                explains.then_some(Difference { class, ulps: pass.edge_ulps })
+            })
+            .min_by(|a, b| a.ulps.total_cmp(&b.ulps))
+            .unwrap_or(none)
+    }
+
+    /// The oracle says occluded, the product does not.
+    pub fn leak(&self) -> Difference {
+        let hits = self.check.oracle.all_hits(&self.ray);
+        let clearest = hits.iter().map(|h| self.pass(h.hit.prim).edge_ulps).fold(0.0, f64::max);
+        let class = self.gap(self.ray.tfar).unwrap_or(Class::ShadowLeak);
+        Difference { class, ulps: clearest }
+    }
+
+    /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, or since
+    /// a ray within the band passes everything by. Between triangles that share an edge there is
+    /// no such ray.
+    fn gap(&self, limit: f64) -> Option<Class> {
+        let hits = self.check.oracle.all_hits(&self.ray);
+        let nearer = hits.iter().filter(|h| h.hit.t <= limit);
+        let (at_end, others): (Vec<&CourtHit>, Vec<&CourtHit>) =
+            nearer.partition(|h| self.at_end(h.hit.t, &self.pass(h.hit.prim)));
+        if others.is_empty() {
+            return (!at_end.is_empty()).then_some(Class::RayEnd);
+        }
+        if others.iter().any(|h| !self.pass(h.hit.prim).in_band()) {
+            return None;
+        }
+        let near = self.near();
+        let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
+        let free = |by: &DVec3| !near.iter().any(|prim| self.is_hit_beside(*prim, *by, limit));
+        self.offsets(BAND_ULPS * width, &near).iter().any(free).then_some(Class::EdgeBand)
+    }
+
+    /// Whether the ray, moved aside by `by`, certainly hits `prim` before `limit`.
+    fn is_hit_beside(&self, prim: PrimRef, by: DVec3, limit: f64) -> bool {
+        let pass = self.pass(prim);
+        let t = match self.check.oracle.corners(prim) {
+            Some(corners) => self.line.moved(by).meet(&corners).map(|m| m.t),
+            None => self.sphere_root(&Ray { org: self.ray.org + by, ..self.ray }, prim),
+        };
+        let certain = |t: f64| t >= self.ray.tnear && t <= limit && !self.at_end(t, &pass);
+        prim != self.ray.exclude && t.is_some_and(certain)
+    }
+
+    /// Ways aside: around on two circles, and straight off the edges of the triangles near by, which
+    /// finds the gap beside a sliver.
+    fn offsets(&self, radius: f64, near: &[PrimRef]) -> Vec<DVec3> {
+        let along = self.ray.dir.normalize();
+        let (s, t) = orthonormal_basis(along);
+        let mut offsets = Vec::new();
+        for step in 0..AROUND {
+            let angle = std::f64::consts::TAU * f64::from(step) / f64::from(AROUND);
+            let aside = s * libm::cos(angle) + t * libm::sin(angle);
+            offsets.extend([aside * radius, aside * (0.5 * radius)]);
+        }
+        for [a, b, c] in near.iter().filter_map(|prim| self.check.oracle.corners(*prim)) {
+            for edge in [b - a, c - b, a - c] {
+                if let Some(aside) = edge.cross(along).try_normalize() {
+                    offsets.extend([aside * radius, aside * -radius]);
+                }
+            }
+        }
+        offsets
+    }
+
+    /// Everything that passes the ray within twice the band, spheres included.
+    fn near(&self) -> Vec<PrimRef> {
+        let scene = self.check.scene;
+        // The largest ulp of any triangle that there can be.
+        let largest = scene.bounds.min.abs().max(scene.bounds.max.abs()).max(self.line.start.abs());
+        let ulp = largest.max_element() * f64::from(f32::EPSILON);
+        let mut near = self.check.oracle.near(&self.ray, 2.0 * BAND_ULPS * ulp);
+        let geom_id = scene.sphere_geom_id();
+        near.extend((0..scene.spheres.len() as u32).map(|prim_id| PrimRef { geom_id, prim_id }));
+        near
+    }
+
+    fn pass(&self, prim: PrimRef) -> Pass {
+        match self.check.oracle.corners(prim) {
+            Some(corners) => self.pass_triangle(&corners),
+            None => self.pass_sphere(prim),
+        }
+    }
+
+    fn pass_triangle(&self, corners: &[DVec3; 3]) -> Pass {
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let cos = normal.dot(self.ray.dir).abs() / (normal.length() * self.ray.dir.length());
+        Pass {
+            met: self.line.place(corners) != Place::Outside,
+            ulps: self.line.ulps(corners),
+            edge_ulps: self.line.edge_ulps(corners),
+            ulp: self.line.ulp(corners),
+            t: self.line.plane_t(corners),
+            slope: if cos > 0.0 { 1.0 / cos } else { f64::INFINITY },
+        }
+    }
+
+    fn pass_sphere(&self, prim: PrimRef) -> Pass {
+        let s = &self.check.scene.spheres[prim.prim_id as usize];
+        let along = self.ray.dir.normalize();
+        let from = self.ray.org - s.centre;
+        let offset = (from - along * from.dot(along)).length();
+        let largest = (s.centre.abs() + s.radius).max(self.line.start.abs()).max_element();
+        let ulp = largest * f64::from(f32::EPSILON);
+        let t = self.sphere_root(&self.ray, prim);
+        let silhouette = s.radius - offset;
+        Pass {
+            met: t.is_some(),
+            ulps: if t.is_some() { 0.0 } else { silhouette.abs() / ulp },
+            edge_ulps: silhouette.abs() / ulp,
+            ulp,
+            t,
+            slope: s.radius / silhouette.max(0.0).sqrt() / (s.radius + offset).sqrt(),
+        }
+    }
+
+    fn sphere_root(&self, ray: &Ray, prim: PrimRef) -> Option<f64> {
+        self.check.oracle.sphere_root(ray, prim)
+    }
+}

@@ -1,0 +1,256 @@
+//! The rays: six kinds, each ray a function of seed, kind and index.
+
+use super::Check;
+use crate::intersect::{PrimRef, Ray, SurfaceInteraction};
+use crate::math::DVec3;
+use crate::scene::Light;
+use crate::stats::RayCounts;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::Serialize;
+use std::f64::consts::TAU;
+use std::fmt;
+
+/// Half the grazing rays' range of angles to the plane, radians.
+const GRAZING: f64 = 0.02;
+/// Triangles among which a grazing ray picks the thinnest.
+const CANDIDATES: usize = 8;
+
+/// What a ray is shot for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Through a random image point of a random frame.
+    Camera,
+    /// From a surface to a light.
+    Shadow,
+    /// From a surface, reflected there.
+    Mirror,
+    /// From inside the bounds in any direction, or from outside to a point inside.
+    Random,
+    /// At a vertex.
+    Vertex,
+    /// At a point of an edge; every third grazes a thin triangle.
+    Edge,
+}
+
+impl Kind {
+    /// All kinds, in the order in which they are shot.
+    pub const ALL: [Self; 6] =
+        [Self::Camera, Self::Shadow, Self::Mirror, Self::Random, Self::Vertex, Self::Edge];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        ["camera", "shadow", "mirror", "random", "vertex", "edge"][self as usize]
+    }
+}
+
+/// Which ray: `camera:1234`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RayId {
+    /// Its kind.
+    pub kind: Kind,
+    /// Its number, from 0.
+    pub index: u64,
+}
+
+impl fmt::Display for RayId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.kind.name(), self.index)
+    }
+}
+
+impl Serialize for RayId {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl Check<'_> {
+    /// The ray; `None` where the scene has none of the kind here (nothing hit to start from,
+    /// no triangle to aim at).
+    pub fn ray(&self, id: RayId) -> Option<Ray> {
+        let mut rng = random(self.settings.seed, id);
+        let rng = &mut rng;
+        let ray = match id.kind {
+            Kind::Camera => self.camera_ray(rng)?,
+            Kind::Shadow => self.shadow_ray(rng)?,
+            Kind::Mirror => self.mirror_ray(rng)?,
+            Kind::Random => self.random_ray(rng)?,
+            Kind::Vertex => {
+                let corners = self.triangle(rng)?;
+                self.ray_at(corners[rng.random_range(0..3)], rng)?
+            }
+            Kind::Edge if id.index % 3 == 2 => self.grazing_ray(rng)?,
+            Kind::Edge => {
+                let corners = self.triangle(rng)?;
+                let first = rng.random_range(0..3);
+                let (a, b) = (corners[first], corners[(first + 1) % 3]);
+                self.ray_at(a + (b - a) * rng.random::<f64>(), rng)?
+            }
+        };
+        ray.is_valid().then_some(ray)
+    }
+
+    fn camera_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
+        let (width, height) = (self.settings.width, self.settings.height);
+        let frame = rng.random_range(1..=self.shot.frames);
+        let camera = self.shot.camera(frame, width, height).ok()?;
+        let camera = camera.to_scene(&self.scene.recentring);
+        let at = |rng: &mut Pcg64, size: u32| rng.random::<f64>() * f64::from(size);
+        let (x, y) = (at(rng, width), at(rng, height));
+        Some(Ray::new(camera.eye, camera.direction(x, y)))
+    }
+
+    fn random_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
+        let inside = self.inside(rng)?;
+        if rng.random() {
+            return Some(Ray::new(inside, direction(rng)));
+        }
+        let bounds = &self.scene.bounds;
+        // Up to 1000 radii: further out than Embree gets its rays.
+        let distance = bounds.radius() * libm::exp10(rng.random_range(0.1..3.0));
+        let org = bounds.centre() + direction(rng) * distance;
+        Some(Ray::new(org, inside - org))
+    }
+
+    /// A ray to a point inside: from within the bounds, or from just outside.
+    fn ray_at(&self, target: DVec3, rng: &mut Pcg64) -> Option<Ray> {
+        let org = match rng.random() {
+            true => self.inside(rng)?,
+            false => {
+                let bounds = &self.scene.bounds;
+                bounds.centre() + direction(rng) * bounds.radius() * rng.random_range(1.0..3.0)
+            }
+        };
+        Some(Ray::new(org, target - org))
+    }
+
+    fn inside(&self, rng: &mut Pcg64) -> Option<DVec3> {
+        let bounds = &self.scene.bounds;
+        if bounds.is_empty() {
+            return None;
+        }
+        let share = DVec3::from_array([(); 3].map(|()| rng.random()));
+        Some(bounds.min + bounds.extent() * share)
+    }
+
+    /// Nearly in the plane of the thinnest of a few triangles, through a point of its rim.
+    fn grazing_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
+        let mut thinnest = self.triangle(rng)?;
+        for _ in 1..CANDIDATES {
+            let other = self.triangle(rng)?;
+            if thinness(&other) < thinness(&thinnest) {
+                thinnest = other;
+            }
+        }
+        let [a, b, c] = thinnest;
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        let target = a + (b - a) * rng.random::<f64>();
+        let along = (c - a) * rng.random_range(-1.0..1.0) + (b - a) * rng.random_range(-1.0..1.0);
+        let along = along.try_normalize()? + normal * rng.random_range(-GRAZING..GRAZING);
+        let distance = self.scene.bounds.radius() * rng.random_range(0.01..1.5);
+        Some(Ray::new(target - along * distance, along))
+    }
+
+    fn mirror_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
+        let (si, incoming) = self.surface_point(rng)?;
+        let dir = incoming - si.ns * (2.0 * incoming.dot(si.ns));
+        Some(si.spawn(dir, self.settings.rules.spawn_offset))
+    }
+
+    /// To a random point of a random light as the renderer sends them; to nowhere in particular
+    /// where there is none.
+    fn shadow_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
+        let (si, incoming) = self.surface_point(rng)?;
+        let offset = self.settings.rules.spawn_offset;
+        let lights = &self.scene.lights;
+        if lights.is_empty() || rng.random_ratio(1, 8) {
+            let dir = direction(rng);
+            // To the side from which the point was seen.
+            let same_side = si.is_outside(dir) != si.is_outside(incoming);
+            return Some(si.spawn(if same_side { dir } else { -dir }, offset));
+        }
+        Some(match &lights[rng.random_range(0..lights.len())] {
+            Light::Point { position, .. } => {
+                si.spawn_to(*position, (si.p - *position).try_normalize()?, offset)
+            }
+            Light::Directional { to_light, .. } => si.spawn(*to_light, offset),
+            Light::Quad(quad) => {
+                let [a, b, c, d] = quad.corners;
+                let (u, v) = (rng.random::<f64>(), rng.random::<f64>());
+                let (near, far) = (a + (b - a) * u, d + (c - d) * u);
+                si.spawn_to(near + (far - near) * v, quad.normal(), offset)
+            }
+            Light::Sphere { centre, radius, .. } => {
+                let normal = direction(rng);
+                // The half that can be seen.
+                let normal = if normal.dot(si.p - *centre) < 0.0 { -normal } else { normal };
+                si.spawn_to(*centre + normal * *radius, normal, offset)
+            }
+        })
+    }
+
+    /// A surface point that the product sees, and the direction it is seen along: half of them by
+    /// a camera, half by a ray at a random triangle, so that a shot that looks away tests as well.
+    fn surface_point(&self, rng: &mut Pcg64) -> Option<(SurfaceInteraction, DVec3)> {
+        let by_camera = rng.random();
+        let camera = if by_camera { self.camera_ray(rng) } else { None };
+        let counts = &mut RayCounts::default();
+        let hit = |ray: Ray, counts: &mut RayCounts| {
+            let hit = self.product.intersect(&ray, counts)?;
+            Some((SurfaceInteraction::new(self.scene, &ray, &hit), ray.dir.normalize()))
+        };
+        camera.and_then(|ray| hit(ray, counts)).or_else(|| {
+            let target = match self.triangle(rng) {
+                Some([a, b, c]) => (a + b + c) / 3.0,
+                None => self.inside(rng)?,
+            };
+            hit(self.ray_at(target, rng)?, counts)
+        })
+    }
+
+    /// Corners of a random triangle; every mesh is as likely as its share of triangles.
+    fn triangle(&self, rng: &mut Pcg64) -> Option<[DVec3; 3]> {
+        let count = self.scene.triangle_count();
+        if count == 0 {
+            return None;
+        }
+        let mut index = rng.random_range(0..count as u64) as usize;
+        for (geom_id, mesh) in self.scene.meshes.iter().enumerate() {
+            if index < mesh.triangles.len() {
+                let prim = PrimRef { geom_id: geom_id as u32, prim_id: index as u32 };
+                return self.oracle.corners(prim);
+            }
+            index -= mesh.triangles.len();
+        }
+        None
+    }
+}
+
+/// Height over the longest edge, up to a factor.
+fn thinness([a, b, c]: &[DVec3; 3]) -> f64 {
+    let longest = a.distance_squared(*b).max(b.distance_squared(*c)).max(c.distance_squared(*a));
+    (*b - *a).cross(*c - *a).length() / longest
+}
+
+fn direction(rng: &mut Pcg64) -> DVec3 {
+    let z: f64 = rng.random_range(-1.0..=1.0);
+    let angle = TAU * rng.random::<f64>();
+    let r = (1.0 - z * z).max(0.0).sqrt();
+    DVec3::new(r * libm::cos(angle), r * libm::sin(angle), z)
+}
+
+/// Numbers of their own for every ray.
+fn random(seed: u64, id: RayId) -> Pcg64 {
+    let mixed = mix(mix(mix(seed) ^ (id.kind as u64 + 1)) ^ id.index);
+    Pcg64::seed_from_u64(mixed)
+}
+
+/// The finaliser of SplitMix64 (Steele, Lea and Flood, 2014).
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

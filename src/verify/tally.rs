@@ -1,0 +1,123 @@
+//! Counts of differences. Sums and maxima only, so that the order of merging does not matter.
+
+use super::judge::{Class, Difference};
+use super::rays::{Kind, RayId};
+use crate::measure::proportion_upper_bound;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+const KINDS: usize = Kind::ALL.len();
+const CLASSES: usize = Class::ALL.len();
+
+/// Rays and differences by kind and class.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tally {
+    rays: [u64; KINDS],
+    found: [[u64; CLASSES]; KINDS],
+    worst: [Option<Worst>; CLASSES],
+}
+
+/// The worst difference of a class.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Worst {
+    /// Which ray.
+    pub ray: RayId,
+    /// How far apart the answers are, in ulp (see [`Difference`]).
+    pub ulps: f64,
+}
+
+/// What was found of one class.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The class.
+    pub class: Class,
+    /// Whether such a difference is no fault.
+    pub explained: bool,
+    /// How many, of all kinds of rays that can show it.
+    pub count: u64,
+    /// Rays of these kinds.
+    pub rays: u64,
+    /// Share of such rays that the truth does not exceed, at 95 %.
+    pub bound: f64,
+    /// The same count by kind of ray.
+    pub by_kind: BTreeMap<Kind, u64>,
+    /// The worst one.
+    pub worst: Option<Worst>,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, id: RayId, difference: Option<Difference>) {
+        self.rays[id.kind as usize] += 1;
+        if let Some(Difference { class, ulps }) = difference {
+            self.found[id.kind as usize][class as usize] += 1;
+            let slot = &mut self.worst[class as usize];
+            *slot = worse(*slot, Some(Worst { ray: id, ulps }));
+        }
+    }
+
+    pub(super) fn with(mut self, other: Self) -> Self {
+        for kind in 0..KINDS {
+            self.rays[kind] += other.rays[kind];
+            for class in 0..CLASSES {
+                self.found[kind][class] += other.found[kind][class];
+            }
+        }
+        for (mine, theirs) in self.worst.iter_mut().zip(other.worst) {
+            *mine = worse(*mine, theirs);
+        }
+        self
+    }
+
+    /// Rays of a kind.
+    pub fn rays(&self, kind: Kind) -> u64 {
+        self.rays[kind as usize]
+    }
+
+    /// All rays.
+    pub fn total(&self) -> u64 {
+        self.rays.iter().sum()
+    }
+
+    /// How many of a class.
+    pub fn count(&self, class: Class) -> u64 {
+        self.found.iter().map(|kind| kind[class as usize]).sum()
+    }
+
+    /// Differences that nothing explains.
+    pub fn unexplained(&self) -> u64 {
+        Class::ALL.iter().filter(|c| !c.is_explained()).map(|c| self.count(*c)).sum()
+    }
+
+    /// Every class with what was found of it.
+    pub fn rows(&self) -> Vec<Row> {
+        Class::ALL.iter().map(|class| self.row(*class)).collect()
+    }
+
+    fn row(&self, class: Class) -> Row {
+        let kinds = Kind::ALL.iter().filter(|kind| class.befalls(**kind));
+        let by_kind: BTreeMap<Kind, u64> =
+            kinds.map(|kind| (*kind, self.found[*kind as usize][class as usize])).collect();
+        let count = by_kind.values().sum();
+        let rays = by_kind.keys().map(|kind| self.rays(*kind)).sum();
+        Row {
+            class,
+            explained: class.is_explained(),
+            count,
+            rays,
+            bound: proportion_upper_bound(count, rays),
+            by_kind,
+            worst: self.worst[class as usize],
+        }
+    }
+}
+
+/// Of equally bad ones the first ray.
+fn worse(a: Option<Worst>, b: Option<Worst>) -> Option<Worst> {
+    match (a, b) {
+        (Some(a), Some(b)) => {
+            let a_first = a.ulps > b.ulps || (a.ulps == b.ulps && a.ray <= b.ray);
+            Some(if a_first { a } else { b })
+        }
+        (a, b) => a.or(b),
+    }
+}

@@ -1,0 +1,223 @@
+//! `verify` catches faults: rules switched off, and an intersector that lies.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use std::sync::atomic::AtomicBool;
+use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
+use tweenray::math::DVec3;
+use tweenray::scene::{CameraPath, Easing, HitRules, Pose, Recheck, Scene, Settings, Shot};
+use tweenray::stats::RayCounts;
+use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, Trial};
+
+#[path = "hard_cases/shapes.rs"]
+mod shapes;
+
+/// From inside a closed sphere, where every ray hits.
+fn shot() -> Shot {
+    let (eye, target, up) = (DVec3::new(0.1, 0.2, 0.3), DVec3::X, DVec3::Y);
+    let pose = Pose { eye, target, up, roll_degrees: 0.0 };
+    Shot { path: CameraPath::Still(pose), easing: Easing::Linear, frames: 1, vfov_degrees: 60.0 }
+}
+
+fn sphere() -> Scene {
+    shapes::scene_of(shapes::sphere(DVec3::ZERO, 2.0, 60, 40))
+}
+
+fn tally(scene: &Scene, product: &dyn Intersector, rays: u64) -> Tally {
+    let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(scene));
+    let check = Check { scene, settings: &settings, shot: &shot, product, oracle: &oracle };
+    check.run(rays, &AtomicBool::new(false), &|_| ())
+}
+
+fn embree(scene: &Scene, rules: HitRules) -> EmbreeIntersector<'_> {
+    EmbreeIntersector::new(scene, rules, None, 1).unwrap()
+}
+
+#[test]
+fn the_oracle_agrees_with_itself() {
+    let scene = sphere();
+    let tally = tally(&scene, &Oracle::new(&scene), 256);
+    assert!(Kind::ALL.iter().all(|kind| tally.rays(*kind) == 256));
+    assert!(Class::ALL.iter().all(|class| tally.count(*class) == 0), "{tally:?}");
+}
+
+/// Every ray that should hit a vertex of the sphere from within does so only by the second try.
+#[test]
+fn without_a_second_try_hits_are_missed() {
+    let scene = sphere();
+    let misses = |retry| {
+        let product = embree(&scene, HitRules { retry, ..HitRules::default() });
+        let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
+        let check = Check {
+            scene: &scene,
+            settings: &settings,
+            shot: &shot,
+            product: &product,
+            oracle: &oracle,
+        };
+        let mut rng = Pcg64::seed_from_u64(1);
+        let counts = &mut RayCounts::default();
+        let mut missed = 0;
+        for vertex in &scene.meshes[0].positions[..scene.meshes[0].vertex_count] {
+            for _ in 0..4 {
+                let org = shapes::in_ball(&mut rng, 0.3);
+                let ray = Ray::new(org, vertex.as_dvec3() - org);
+                let (product, oracle) =
+                    (product.intersect(&ray, counts), oracle.intersect(&ray, counts));
+                let difference =
+                    check.judge(&Trial { ray, answers: Answers::Hits { product, oracle } });
+                if let Some(difference) = difference.filter(|d| !d.class.is_explained()) {
+                    assert_eq!(difference.class, Class::Missed);
+                    missed += 1;
+                }
+            }
+        }
+        missed
+    };
+    assert_eq!(misses(true), 0);
+    assert!(misses(false) > 0);
+}
+
+#[test]
+fn without_the_recheck_distances_are_wrong() {
+    let scene = sphere();
+    let rules = HitRules { recheck: Recheck::Off, ..HitRules::default() };
+    let found = tally(&scene, &embree(&scene, rules), 4096);
+    assert!(found.count(Class::WrongDistance) > 0, "{found:?}");
+}
+
+/// What a lying intersector makes of the oracle's answers.
+#[derive(Clone, Copy)]
+enum Lie {
+    Nothing,
+    Neighbour,
+    Nearer,
+    Behind,
+    NotOccluded,
+    Occluded,
+}
+
+/// The oracle, but for one ray in eight.
+struct Liar<'s>(Oracle<'s>, Lie);
+
+impl Liar<'_> {
+    fn lies(ray: &Ray) -> bool {
+        ray.dir.x.to_bits().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 61 == 0
+    }
+}
+
+impl Intersector for Liar<'_> {
+    fn intersect(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit> {
+        let hit = self.0.intersect(ray, counts)?;
+        if !Self::lies(ray) {
+            return Some(hit);
+        }
+        match self.1 {
+            Lie::Nothing => None,
+            Lie::Neighbour => {
+                let count = [4680, 440][hit.prim.geom_id as usize];
+                let prim_id = (hit.prim.prim_id + count / 4) % count;
+                Some(Hit { prim: PrimRef { prim_id, ..hit.prim }, ..hit })
+            }
+            Lie::Nearer => Some(Hit { t: hit.t * (1.0 - 1e-5), ..hit }),
+            Lie::Behind => self.0.all_hits(ray).get(1).map(|h| h.hit),
+            Lie::NotOccluded | Lie::Occluded => Some(hit),
+        }
+    }
+
+    fn occluded(&self, ray: &Ray, counts: &mut RayCounts) -> bool {
+        match (self.1, Self::lies(ray)) {
+            (Lie::NotOccluded, true) => false,
+            (Lie::Occluded, true) => true,
+            _ => self.0.occluded(ray, counts),
+        }
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts) {
+        rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.intersect(ray, counts));
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], counts: &mut RayCounts) {
+        rays.iter().zip(occluded).for_each(|(ray, out)| *out = self.occluded(ray, counts));
+    }
+
+    fn describe(&self) -> String {
+        "a liar".into()
+    }
+
+    fn memory(&self) -> u64 {
+        0
+    }
+}
+
+/// Each lie is told as what it is, and as nothing else that is unexplained.
+#[test]
+fn lies_are_caught_and_named() {
+    let inner = shapes::sphere(DVec3::new(0.3, 0.2, 0.1), 0.5, 20, 12);
+    let mut world = shapes::world_of(shapes::sphere(DVec3::ZERO, 2.0, 60, 40));
+    world.meshes.push(inner);
+    let scene = world.into_scene(true).unwrap();
+    for (lie, class) in [
+        (Lie::Nothing, Class::Missed),
+        (Lie::Neighbour, Class::Phantom),
+        (Lie::Nearer, Class::WrongDistance),
+        (Lie::Behind, Class::Missed),
+        (Lie::NotOccluded, Class::ShadowLeak),
+        (Lie::Occluded, Class::FalseShadow),
+    ] {
+        let found = tally(&scene, &Liar(Oracle::new(&scene), lie), 512);
+        assert!(found.count(class) > 10, "{class:?}: {found:?}");
+        assert_eq!(found.unexplained(), found.count(class), "{class:?}: {found:?}");
+        let row = found.rows().into_iter().find(|row| row.class == class).unwrap();
+        let (share, worst) = (row.count as f64 / row.rays as f64, row.worst.unwrap());
+        assert!(row.bound > share && row.bound < 2.0 * share, "{row:?}");
+        assert!(worst.ulps > 4.0 || class == Class::Missed, "{row:?}");
+    }
+}
+
+#[test]
+fn a_ray_depends_on_seed_kind_and_number_alone() {
+    let scene = sphere();
+    let oracle = Oracle::new(&scene);
+    let shot = shot();
+    let ray = |seed, kind, index| {
+        let settings = Settings { seed, ..Settings::default() };
+        let check = Check {
+            scene: &scene,
+            settings: &settings,
+            shot: &shot,
+            product: &oracle,
+            oracle: &oracle,
+        };
+        let replay = check.replay(RayId { kind, index }).unwrap();
+        assert_eq!(Some(replay.trial.ray), check.ray(RayId { kind, index }));
+        replay.trial.ray
+    };
+    for kind in Kind::ALL {
+        assert_eq!(ray(1, kind, 77), ray(1, kind, 77));
+        assert_ne!(ray(1, kind, 77), ray(1, kind, 78));
+        assert_ne!(ray(1, kind, 77), ray(2, kind, 77));
+    }
+}
+
+#[test]
+fn tallies_do_not_depend_on_threads_and_stop_when_told() {
+    let scene = sphere();
+    let product = embree(&scene, HitRules { retry: false, ..HitRules::default() });
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| tally(&scene, &product, 500))
+    };
+    assert_eq!(with(1), with(3));
+    let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
+    let check = Check {
+        scene: &scene,
+        settings: &settings,
+        shot: &shot,
+        product: &product,
+        oracle: &oracle,
+    };
+    assert_eq!(check.run(500, &AtomicBool::new(true), &|_| ()).total(), 0);
+}
