@@ -100,6 +100,12 @@ impl Facet {
         Self { longest, tilt }
     }
 
+    /// The worse of the two triangles that show a quad light.
+    pub fn of_quad(corners: &[DVec3; 4]) -> Self {
+        let [a, b, c, d] = *corners;
+        Self::of(&[a, b, c]).max(Self::of(&[a, c, d]))
+    }
+
     /// An error bound of both.
     pub fn max(self, o: Self) -> Self {
         Self { longest: self.longest.max(o.longest), tilt: self.tilt.max(o.tilt) }

@@ -58,7 +58,7 @@ impl AreaLight {
                 corners: q.corners,
                 normal: q.normal(),
                 two_sided: q.two_sided,
-                facet: quad_facet(&q.corners),
+                facet: Facet::of_quad(&q.corners),
             }),
             Light::Sphere { centre, radius, .. } => {
                 Some(Self::Sphere { centre: *centre, radius: *radius })
@@ -108,12 +108,6 @@ impl SeenLight<'_> {
             }
         }
     }
-}
-
-/// The worse of the two triangles that show the light.
-fn quad_facet(corners: &[DVec3; 4]) -> Facet {
-    let [a, b, c, d] = *corners;
-    Facet::of(&[a, b, c]).max(Facet::of(&[a, c, d]))
 }
 
 /// Radiance of an area light; zero for delta lights.
