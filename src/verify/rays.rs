@@ -1,7 +1,7 @@
 //! The rays: six kinds, each ray a function of seed, kind and index.
 
 use super::Check;
-use crate::intersect::{PrimRef, Ray, SurfaceInteraction};
+use crate::intersect::{Facet, PrimRef, Ray, SurfaceInteraction, Target};
 use crate::math::DVec3;
 use crate::scene::Light;
 use crate::stats::RayCounts;
@@ -173,20 +173,24 @@ impl Check<'_> {
         }
         Some(match &lights[rng.random_range(0..lights.len())] {
             Light::Point { position, .. } => {
-                si.spawn_to(*position, (si.p - *position).try_normalize()?, offset)
+                let normal = (si.p - *position).try_normalize()?;
+                si.spawn_to(&Target { point: *position, normal, facet: Facet::EXACT }, offset)
             }
             Light::Directional { to_light, .. } => si.spawn(*to_light, offset),
             Light::Quad(quad) => {
                 let [a, b, c, d] = quad.corners;
                 let (u, v) = (rng.random::<f64>(), rng.random::<f64>());
                 let (near, far) = (a + (b - a) * u, d + (c - d) * u);
-                si.spawn_to(near + (far - near) * v, quad.normal(), offset)
+                let point = near + (far - near) * v;
+                let facet = Facet::of(&[a, b, c]).max(Facet::of(&[a, c, d]));
+                si.spawn_to(&Target { point, normal: quad.normal(), facet }, offset)
             }
             Light::Sphere { centre, radius, .. } => {
                 let normal = direction(rng);
                 // The half that can be seen.
                 let normal = if normal.dot(si.p - *centre) < 0.0 { -normal } else { normal };
-                si.spawn_to(*centre + normal * *radius, normal, offset)
+                let point = *centre + normal * *radius;
+                si.spawn_to(&Target { point, normal, facet: Facet::EXACT }, offset)
             }
         })
     }
