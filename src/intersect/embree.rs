@@ -6,6 +6,7 @@
 //! * A hit's `t, u, v` are recomputed in f64; one that lies beside its triangle is a phantom, and
 //!   the ray goes on past it.
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
+//! * Triangles overlap a little, so that no ray passes between them.
 //! * A ray that misses although it comes near some triangle gets one second try, moved by 4 ulp.
 //!
 //! Shadow rays report no primitive, so only the first rule reaches them.
@@ -15,7 +16,8 @@
 
 use super::coarse::{Bundle, CoarseTree};
 use super::coincident;
-use super::triangle::{self, Pairs};
+use super::overlap::{self, OVERLAP};
+use super::triangle::{self, Pairs, PlaneHit};
 use super::{Hit, Intersector, PrimRef, Ray, sphere};
 use crate::embree::{
     BuildOptions, CommittedScene, Packet, PacketHit, QueryFlags, SceneBuilder, SphereData,
@@ -32,12 +34,14 @@ const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 const NEAR: f64 = 4.0;
 /// Phantoms that one ray may pass.
 const MOST_PHANTOMS: usize = 4096;
+/// How far beside its triangle a ray may pass, per unit of the largest coordinate: 4 ulp, less the
+/// rounding of measuring it.
+const EDGE_BAND: f64 = 7.99 * ROUNDING;
 /// Rays that go through the steps together: a block of the renderer's.
 const BLOCK: usize = triangle::MOST;
 
-/// Faults that no build has but those by which `./x faults` shows that `tweenray verify` sees them:
-/// a comparison of the recheck the wrong way round, and no second try.
-const PLANTED_FLIP: bool = cfg!(feature = "planted-flip");
+/// A fault that no build has but one by which `./x faults` shows that `tweenray verify` sees it: no
+/// second try.
 const PLANTED_NO_RETRY: bool = cfg!(feature = "planted-no-retry");
 
 /// A scene traced by Embree.
@@ -93,7 +97,11 @@ impl<'s> EmbreeIntersector<'s> {
         };
         for (mesh, geom_id) in scene.meshes.iter().zip(0..) {
             let omit = copies_in(geom_id);
-            builder.add_triangles(&mesh.positions, mesh.vertex_count, &mesh.triangles, omit)?;
+            if rules.overlap {
+                builder.add_soup(overlap::grown(mesh), omit)?;
+            } else {
+                builder.add_triangles(&mesh.positions, mesh.vertex_count, &mesh.triangles, omit)?;
+            }
         }
         let spheres = scene.spheres.iter();
         let spheres =
@@ -340,8 +348,7 @@ impl<'s> EmbreeIntersector<'s> {
         for (k, lane) in lanes[..wanted].iter().map(|lane| *lane as usize).enumerate() {
             let met = pairs.get(k);
             let (ray, prim) = (&rays[lane], found[lane].prim);
-            // Not finite: neither is the least weight, or it is below zero.
-            if met.least_weight() >= 0.0 && (ray.tnear..=ray.tfar).contains(&met.t) {
+            if met.is_inside() && (ray.tnear..=ray.tfar).contains(&met.t) {
                 hits[lane] = Some(Hit { t: met.t, u: met.u, v: met.v, prim, rough: false });
             } else {
                 hits[lane] = self.recheck(ray, &Candidate { hit: found[lane], shift: 0.0 });
@@ -362,16 +369,12 @@ impl<'s> EmbreeIntersector<'s> {
             return Some(self.as_it_is(hit, candidate.shift));
         }
         let corners = mesh.corners(hit.prim.prim_id as usize);
-        let met = triangle::meet_plane(ray, &corners)?;
-        let (u, v, t) = if met.least_weight() >= 0.0 {
-            (met.u, met.v, met.t)
-        } else {
-            let beside = met.clamped();
-            let t = nearly_on(ray, &corners, &met, &beside)?;
-            (beside.u, beside.v, t)
+        let inside = triangle::meet_plane(ray, &corners).filter(PlaneHit::is_inside);
+        let PlaneHit { t, u, v } = match inside {
+            Some(met) => met,
+            None => beside(ray, &corners, candidate.shift)?,
         };
-        let begun = if PLANTED_FLIP { t <= ray.tnear } else { t >= ray.tnear };
-        (begun && t <= ray.tfar).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
+        (ray.tnear..=ray.tfar).contains(&t).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
     }
 
     /// Embree's own numbers. Unless the recheck is off they are computed again when the surface is
@@ -418,8 +421,10 @@ fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
     let length = ray.dir.length();
     let reach = ray.org.length() + f64::from(hit.t) * length;
     let area = hit.ng.as_dvec3().dot(ray.dir).abs();
+    // The true edge lies inside the one that Embree has, by the overlap.
+    let bound = 16.0 * ROUNDING * reach + OVERLAP;
     // Written so that NaN is risky.
-    let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
+    let is_safe = f64::from(least) * area > bound * edge * length;
     !is_safe
 }
 
@@ -433,24 +438,18 @@ fn longest_edge(mesh: &Mesh) -> f64 {
     f64::from(longest.reduce(|| 0.0, f32::max)).sqrt() * (1.0 + 8.0 * ROUNDING)
 }
 
-/// A plane point just beside its triangle: where the ray passes the nearest point of the triangle,
-/// when that is as near as rounding the ray to f32 explains; `None` for a phantom.
-fn nearly_on(
-    ray: &Ray,
-    corners: &[DVec3; 3],
-    met: &triangle::PlaneHit,
-    beside: &triangle::PlaneHit,
-) -> Option<f64> {
-    if met.least_weight() >= -1e-4 {
-        return Some(met.t);
+/// Where a ray that passes its triangle by is nearest to it, if that is within the edge band: what
+/// rounding the ray to f32, and the overlap, explain. `None` for a phantom. The ray's origin was
+/// moved by `shift` along it.
+fn beside(ray: &Ray, corners: &[DVec3; 3], shift: f64) -> Option<PlaneHit> {
+    // A triangle without an inside is never hit, not even at its edge.
+    if (corners[1] - corners[0]).cross(corners[2] - corners[0]) == DVec3::ZERO {
+        return None;
     }
-    let point =
-        corners[0] + (corners[1] - corners[0]) * beside.u + (corners[2] - corners[0]) * beside.v;
-    let to_point = point - ray.org;
-    let t = to_point.dot(ray.dir) / ray.dir.length_squared();
-    let distance = (to_point - ray.dir * t).length();
-    let reach = ray.org.abs().max_element() + point.abs().max_element();
-    (distance <= 8.0 * ROUNDING * reach).then_some(t)
+    let (met, distance) = triangle::nearest_on_outline(ray, corners)?;
+    let largest = |p: DVec3| p.abs().max_element();
+    let reach = corners.iter().fold(largest(ray.at(shift)), |reach, c| reach.max(largest(*c)));
+    (distance <= EDGE_BAND * reach).then_some(met)
 }
 
 /// A box with a margin for the rounding of rays.

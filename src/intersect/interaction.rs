@@ -1,6 +1,7 @@
 //! From a [`Hit`] to a surface point, and from there to new rays.
 
-use super::{Hit, PrimRef, Ray, triangle};
+use super::triangle::{self, PlaneHit};
+use super::{Hit, PrimRef, Ray};
 use crate::math::{DVec3, Vec2};
 use crate::scene::{Mesh, Scene, Surface};
 
@@ -235,8 +236,11 @@ fn refined(ray: &Ray, corners: &[DVec3; 3], hit: &Hit) -> Hit {
     if !hit.rough {
         return *hit;
     }
-    let Some(met) = triangle::meet_plane(ray, corners) else { return *hit };
-    let met = if met.least_weight() >= 0.0 { met } else { met.clamped() };
+    let met = triangle::meet_plane(ray, corners).filter(PlaneHit::is_inside);
+    // A rough hit is one that Embree's error bound has cleared; should f64 doubt it all the same,
+    // the nearest point is right.
+    let nearest = || triangle::nearest_on_outline(ray, corners).map(|(met, _)| met);
+    let Some(met) = met.or_else(nearest) else { return *hit };
     Hit { t: met.t, u: met.u, v: met.v, rough: false, ..*hit }
 }
 

@@ -9,6 +9,7 @@ pub mod court;
 mod embree;
 mod interaction;
 mod oracle;
+mod overlap;
 mod sieve;
 mod sphere;
 mod triangle;

@@ -3,6 +3,10 @@
 use super::Ray;
 use crate::math::DVec3;
 
+/// A fault that no build has but one by which `./x faults` shows that `tweenray verify` sees it: a
+/// comparison the wrong way round.
+const PLANTED_FLIP: bool = cfg!(feature = "planted-flip");
+
 /// Where a ray meets a triangle's plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlaneHit {
@@ -15,18 +19,41 @@ pub(super) struct PlaneHit {
 }
 
 impl PlaneHit {
-    /// The smallest of the three weights: negative outside the triangle, NaN where there is no
-    /// plane point.
-    pub fn least_weight(&self) -> f64 {
-        self.u.min(self.v).min(1.0 - self.u - self.v)
+    /// Whether the plane point lies on the triangle, edges included.
+    #[inline(always)]
+    pub fn is_inside(&self) -> bool {
+        // All of it is false for NaN.
+        let right_of_edge = if PLANTED_FLIP { self.u <= 0.0 } else { self.u >= 0.0 };
+        right_of_edge && self.v >= 0.0 && self.u + self.v <= 1.0 && self.t.is_finite()
     }
+}
 
-    /// The same plane point moved onto the triangle, where rounding left it just beside.
-    pub fn clamped(self) -> Self {
-        let (u, v) = (self.u.max(0.0), self.v.max(0.0));
-        let sum = (u + v).max(1.0);
-        Self { t: self.t, u: u / sum, v: v / sum }
+/// The point of the triangle's outline that is nearest to the line of `ray`, and how far from it
+/// the line passes. `None` where no corner is a number away.
+pub(super) fn nearest_on_outline(ray: &Ray, corners: &[DVec3; 3]) -> Option<(PlaneHit, f64)> {
+    // Seen along the ray: the line is the origin of a plane.
+    let dir = ray.dir / ray.dir.length();
+    let flat = corners.map(|c| {
+        let from = c - ray.org;
+        from - dir * from.dot(dir)
+    });
+    let mut best: Option<(PlaneHit, f64)> = None;
+    for k in 0..3 {
+        let (a, b) = (k, (k + 1) % 3);
+        let edge = flat[b] - flat[a];
+        let along = (-flat[a].dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        // An edge seen end on, or without length: its first point will do.
+        let along = if along.is_nan() { 0.0 } else { along };
+        let distance = (flat[a] + edge * along).length();
+        let mut weights = [0.0; 3];
+        (weights[a], weights[b]) = (1.0 - along, along);
+        let point = corners[a] + (corners[b] - corners[a]) * along;
+        let t = (point - ray.org).dot(dir) / ray.dir.length();
+        if distance.is_finite() && best.is_none_or(|(_, least)| distance < least) {
+            best = Some((PlaneHit { t, u: weights[1], v: weights[2] }, distance));
+        }
     }
+    best
 }
 
 /// Intersects `ray`'s line with the plane of the triangle `corners`.
@@ -138,11 +165,32 @@ mod tests {
     }
 
     #[test]
-    fn clamping_lands_on_the_triangle() {
-        for (u, v) in [(-1e-9, 0.5), (0.5, -1e-9), (0.6, 0.4 + 1e-9), (-1.0, -1.0), (3.0, 3.0)] {
-            let c = PlaneHit { t: 1.0, u, v }.clamped();
-            assert!(c.least_weight() >= -f64::EPSILON, "{c:?}");
-        }
+    fn a_line_beside_is_measured_to_the_nearest_corner_or_edge() {
+        let beside = |x: f64, y: f64| {
+            let ray = Ray::new(DVec3::new(x, y, 2.0), DVec3::new(0.0, 0.0, -2.0));
+            nearest_on_outline(&ray, &UNIT).unwrap()
+        };
+        let (met, distance) = beside(-3.0, -4.0);
+        assert_eq!((met.t, met.u, met.v, distance), (1.0, 0.0, 0.0, 5.0));
+        let (met, distance) = beside(0.25, -0.5);
+        assert_eq!((met.u, met.v, distance), (0.25, 0.0, 0.5));
+        let (met, distance) = beside(1.0, 1.0);
+        assert!(
+            (met.u - 0.5).abs() + (met.v - 0.5).abs() + (distance - 0.5f64.sqrt()).abs() < 1e-12
+        );
+        // A needle: the weights of the plane point say nothing about the distance.
+        let needle = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1e-9, 0.0)];
+        let ray = Ray::new(DVec3::new(0.5, -1e-6, 1.0), DVec3::NEG_Z);
+        let (met, distance) = nearest_on_outline(&ray, &needle).unwrap();
+        assert!((distance - 1e-6).abs() < 1e-12 && (met.u - 0.5).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_inside() {
+        let nan = PlaneHit { t: f64::INFINITY, u: f64::NAN, v: f64::INFINITY };
+        assert!(!nan.is_inside());
+        assert!(!PlaneHit { t: f64::INFINITY, u: 0.5, v: 0.25 }.is_inside());
+        assert!(PlaneHit { t: 1.0, u: 0.5, v: 0.5 }.is_inside());
     }
 
     #[test]

@@ -16,9 +16,10 @@ const MOST: f64 = 1.2;
 const FRAME: u32 = 8;
 
 /// The rules, each added to those before it; the last is the slow form of the one before.
-const STEPS: [(&str, HitRules); 7] = {
+const STEPS: [(&str, HitRules); 8] = {
     let off = HitRules {
         robust: false,
+        overlap: false,
         retry: false,
         recheck: Recheck::Off,
         spawn_offset: false,
@@ -26,7 +27,8 @@ const STEPS: [(&str, HitRules); 7] = {
     };
     let recentre = HitRules { recentre: true, ..off };
     let robust = HitRules { robust: true, ..recentre };
-    let retry = HitRules { retry: true, ..robust };
+    let overlap = HitRules { overlap: true, ..robust };
+    let retry = HitRules { retry: true, ..overlap };
     let offset = HitRules { spawn_offset: true, ..retry };
     let risky = HitRules { recheck: Recheck::Risky, ..offset };
     let always = HitRules { recheck: Recheck::Always, ..offset };
@@ -34,6 +36,7 @@ const STEPS: [(&str, HitRules); 7] = {
         ("no rules", off),
         ("+ recentring", recentre),
         ("+ robust", robust),
+        ("+ overlap", overlap),
         ("+ second try", retry),
         ("+ spawn offset", offset),
         ("+ recheck, risky hits at once", risky),
@@ -41,7 +44,7 @@ const STEPS: [(&str, HitRules); 7] = {
     ]
 };
 /// The default, all rules on.
-const ALL: usize = 5;
+const ALL: usize = 6;
 
 /// Prints the table; whether all rules together keep below their limit.
 pub fn report(size: Size) -> bool {

@@ -160,6 +160,7 @@ pub fn offset_far(size: Size) -> Outcome {
         let raw = shapes::world_of(mesh()).into_scene(false).unwrap();
         let off = HitRules {
             robust: true,
+            overlap: false,
             retry: false,
             recheck: Recheck::Off,
             spawn_offset: false,
