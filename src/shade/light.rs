@@ -82,7 +82,8 @@ impl AreaLight {
                 (SeenLight::Sphere(cone, *centre), irradiance::sphere(p, n, *centre, *radius))
             }
         };
-        (irradiance > 0.0).then_some((seen, irradiance))
+        // What is NaN goes on, to be counted at its pixel.
+        (irradiance != 0.0).then_some((seen, irradiance))
     }
 }
 
@@ -127,14 +128,19 @@ pub fn delta(light: &Light, p: DVec3, n: DVec3) -> Option<(Rgb, ShadowTarget)> {
             let to_light = *position - p;
             let d2 = to_light.length_squared();
             let cos = to_light.dot(n) / d2.sqrt();
-            (cos > 0.0).then(|| (*intensity * (cos / d2) as f32, ShadowTarget::Point(*position)))
+            lit(cos).then(|| (*intensity * (cos / d2) as f32, ShadowTarget::Point(*position)))
         }
         Light::Directional { to_light, irradiance } => {
             let cos = to_light.dot(n);
-            (cos > 0.0).then(|| (*irradiance * cos as f32, ShadowTarget::Direction(*to_light)))
+            lit(cos).then(|| (*irradiance * cos as f32, ShadowTarget::Direction(*to_light)))
         }
         Light::Quad(_) | Light::Sphere { .. } => None,
     }
+}
+
+/// Whether light arrives from above; NaN goes on, to be counted at its pixel.
+fn lit(cos: f64) -> bool {
+    cos > 0.0 || cos.is_nan()
 }
 
 /// Where a shadow ray to a delta light goes.

@@ -135,7 +135,7 @@ impl Renderer<'_> {
     ) {
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
-            lit.iter().for_each(|p| pixels.add(p.place.pixel, p.weight * ambient));
+            lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
         }
         for (index, light) in self.scene.lights.iter().enumerate() {
             match light {
@@ -315,7 +315,8 @@ impl Renderer<'_> {
             start = span.end;
             if open > 0.0 {
                 let ratio = (open / all) as f32;
-                pixels.add(point.place.pixel, point.weight * span.unshadowed * ratio);
+                let light = point.weight * span.unshadowed * ratio;
+                pixels.add(point.place.pixel, point.place.sample, light);
             }
         }
     }
