@@ -146,15 +146,25 @@ pub(super) fn cross(
     let cos = first.ng.dot(ray.dir).abs();
     let reach = TOUCHING / cos.max(LEAST_COS * ray.dir.length());
     let mut tnear = (t - reach).max(ray.tnear);
-    while count < MOST_TOUCHING {
+    for _ in 0..2 * MOST_TOUCHING {
+        if count == MOST_TOUCHING {
+            break;
+        }
         let exclude = crossed[count - 1].prim;
         let probe = Ray { tnear, tfar: (t + reach).min(ray.tfar), exclude, ..*ray };
         counts.glass += 1;
         let Some(hit) = renderer.intersector.intersect(&probe, counts) else { break };
         let si = SurfaceInteraction::new(scene, &probe, &hit);
-        // Seen again, or something solid that what goes through meets next.
-        let known = crossed[..count].iter().any(|c| c.prim == si.prim);
-        if known || body_of(scene, &si).is_none() {
+        if si.prim == ray.exclude || crossed[..count].iter().any(|c| c.prim == si.prim) {
+            // Where the ray started, or seen already: what else there is lies further on.
+            if tnear >= t {
+                break;
+            }
+            tnear = t;
+            continue;
+        }
+        // Something solid, which what goes through meets next.
+        if body_of(scene, &si).is_none() {
             break;
         }
         crossed[count] = si;

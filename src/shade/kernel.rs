@@ -307,6 +307,8 @@ impl Vertex<'_, '_> {
         if r < least && g < least && b < least {
             return false;
         }
+        // Two negative weights would make light that looks right.
+        self.pixels.check(from.pixel, from.sample, throughput);
         self.next_rays.push(si.spawn(dir, settings.rules.spawn_offset));
         if NESTED {
             self.next_interiors.push(*inside);

@@ -88,6 +88,23 @@ impl AreaLight {
 }
 
 impl SeenLight<'_> {
+    /// A point of the light above the horizon of `n`, in the middle of what is: for slivers that
+    /// no sample meets. `None` where nothing is.
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+        match self {
+            Self::Quad(warp, normal) => {
+                let point = irradiance::middle_above(p, n, &warp.corners())?;
+                Some(LightSample { point, normal: *normal, weight: 1.0 })
+            }
+            Self::Sphere(cone, centre) => {
+                let (dir, distance) = cone.above(n)?;
+                let point = p + dir * distance;
+                let normal = (point - *centre).normalize();
+                Some(LightSample { point, normal, weight: 1.0 })
+            }
+        }
+    }
+
     /// The light's point for `u` in the unit square: uniform over area (quad) or over solid angle
     /// (sphere; Shirley, Wang and Zimmerman, 1996).
     pub fn sample(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {

@@ -88,10 +88,16 @@ impl BlockPixels {
     #[inline]
     pub fn add(&mut self, pixel: u32, sample: u32, radiance: Rgb) {
         self.sums[pixel as usize] += radiance;
+        self.check(pixel, sample, radiance);
+    }
+
+    /// Notes a sample whose light, or weight of light, is no radiance.
+    #[inline]
+    pub fn check(&mut self, pixel: u32, sample: u32, light: Rgb) {
         // The bits of what is finite and has no sign lie below those of infinity.
-        let [r, g, b] = radiance.to_array().map(f32::to_bits);
+        let [r, g, b] = light.to_array().map(f32::to_bits);
         if r.max(g).max(b) >= f32::INFINITY.to_bits() {
-            self.suspect(pixel, sample, radiance);
+            self.suspect(pixel, sample, light);
         }
     }
 

@@ -5,6 +5,7 @@
 
 mod a_intersection;
 mod b_spawned_rays;
+mod c_shading;
 #[path = "../common/mod.rs"]
 mod common;
 mod shapes;
