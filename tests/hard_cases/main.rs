@@ -8,5 +8,6 @@ mod b_spawned_rays;
 mod c_shading;
 #[path = "../common/mod.rs"]
 mod common;
+mod f_statistics;
 mod shapes;
 mod suite;

@@ -9,6 +9,7 @@ mod c_shading;
 #[path = "../common/mod.rs"]
 mod common;
 mod costs;
+mod f_statistics;
 mod shapes;
 mod suite;
 #[path = "../../benches/support/mod.rs"]
@@ -18,10 +19,11 @@ use std::io::Write;
 use suite::{Case, Outcome, Size};
 
 /// Letter, what it is about, its cases.
-const LETTERS: [(&str, &str, &[Case]); 3] = [
+const LETTERS: [(&str, &str, &[Case]); 4] = [
     ("a", "intersection", a_intersection::CASES),
     ("b", "spawned rays", b_spawned_rays::CASES),
     ("c", "shading, normals, glass", c_shading::CASES),
+    ("f", "statistics and effects", f_statistics::CASES),
 ];
 
 fn main() {
