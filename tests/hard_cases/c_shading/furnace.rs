@@ -3,6 +3,7 @@
 use crate::common::{self, Job};
 use crate::shapes;
 use crate::suite::{Outcome, Size};
+use rayon::prelude::*;
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Corners, Glass, Material, Sky, Texture, World, WorldMesh, WorldSphere};
@@ -135,16 +136,21 @@ pub fn white_furnace(size: Size) -> Outcome {
 pub fn energy(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let (spp, sky) = size.of((4, 64), (256, 4096));
-    let mut samples = 0;
-    for (name, world, target) in furnaces().into_iter().filter(|(_, _, target)| *target == 1.0) {
+    // Small pictures are one thread's work, so materials run side by side.
+    let full: Vec<_> = furnaces().into_iter().filter(|(_, _, target)| *target == 1.0).collect();
+    let seen = full.into_par_iter().map(|(name, world, target)| {
         let mut job = job(world, 14);
         // Close enough that the grazing rim fills pixels of its own.
         let pose = common::pose((0.0, 0.8, 2.6), (0.0, 0.0, 0.0));
         job.camera = tweenray::scene::Camera::new(&pose, 45.0, 14, 14).unwrap();
         let diffuse = job.world.materials[0].diffuse != Rgb::ZERO;
+        // Mirrors and glass draw no samples but those within the pixel.
         (job.settings.spp, job.settings.sky_samples) =
-            if diffuse { (spp, sky) } else { (size.of(64, 65_536), 1) };
-        let (film, counts) = common::render(&job);
+            if diffuse { (spp, sky) } else { (size.of(64, 4096), 1) };
+        (name, target, common::render(&job))
+    });
+    let mut samples = 0;
+    for (name, target, (film, counts)) in seen.collect::<Vec<_>>() {
         samples += counts.total();
         let values: Vec<f64> = pixels_on(&film).map(|c| f64::from(c.max_element())).collect();
         let most = values.iter().fold(0.0, |a: f64, b| a.max(*b));
