@@ -92,15 +92,17 @@ impl SeenLight<'_> {
     /// no sample meets. `None` where nothing is.
     pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
         match self {
-            Self::Quad(warp, normal) => {
+            Self::Quad(warp, normal, facet) => {
                 let point = irradiance::middle_above(p, n, &warp.corners())?;
-                Some(LightSample { point, normal: *normal, weight: 1.0 })
+                let target = Target { point, normal: *normal, facet: *facet };
+                Some(LightSample { target, weight: 1.0 })
             }
             Self::Sphere(cone, centre) => {
                 let (dir, distance) = cone.above(n)?;
                 let point = p + dir * distance;
                 let normal = (point - *centre).normalize();
-                Some(LightSample { point, normal, weight: 1.0 })
+                let target = Target { point, normal, facet: Facet::EXACT };
+                Some(LightSample { target, weight: 1.0 })
             }
         }
     }
