@@ -4,6 +4,7 @@
 //! its kernel by this plan. `tweenray inspect` prints [`EffectPlan::reasons`].
 
 use crate::error::counted;
+use crate::math::Rgb;
 use crate::scene::{Light, Scene, Settings};
 
 /// Which effects run.
@@ -13,6 +14,8 @@ pub struct EffectPlan {
     pub mirror: bool,
     /// Glass exists and bounces are allowed.
     pub glass: bool,
+    /// Some of the glass has a priority: paths carry the bodies that they are in.
+    pub nested_glass: bool,
     /// Diffuse surfaces are lit by area lights with shadow samples.
     pub area_lights: bool,
     /// Diffuse surfaces are lit by point or directional lights with hard shadows.
@@ -53,6 +56,7 @@ impl EffectPlan {
     pub const EVERYTHING: Self = Self {
         mirror: true,
         glass: true,
+        nested_glass: true,
         area_lights: true,
         delta_lights: true,
         sky_light: true,
@@ -72,7 +76,7 @@ impl EffectPlan {
         let bounces = settings.bounces;
         let bounced = counted(bounces as usize, "bounce");
         let samples = settings.shadow_samples;
-        let sky_bright = scene.sky.radiance.max_element() > 0.0;
+        let sky_bright = is_something(scene.sky.radiance);
         let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
         let mut reasons = Vec::new();
         let mut decide = |effect, runs: bool, why: String| {
@@ -91,6 +95,11 @@ impl EffectPlan {
                 "glass",
                 used.glass > 0 && bounces > 0,
                 format!("{} in use, {}", counted(used.glass, "glass material"), bounced),
+            ),
+            nested_glass: decide(
+                "nested glass",
+                used.ranked > 0 && bounces > 0,
+                format!("{} with a priority in use", counted(used.ranked, "glass material")),
             ),
             area_lights: decide(
                 "soft shadows",
@@ -125,7 +134,7 @@ impl EffectPlan {
             ),
             ambient: decide(
                 "ambient term",
-                diffuse && scene.sky.ambient.max_element() > 0.0,
+                diffuse && is_something(scene.sky.ambient),
                 if diffuse { format!("ambient {}", scene.sky.ambient) } else { no_diffuse() },
             ),
             textures: decide(
@@ -143,12 +152,19 @@ impl EffectPlan {
     }
 }
 
+/// Whether a colour does anything: not only what is positive, since what is NaN or negative must
+/// reach its pixel to be counted there.
+fn is_something(colour: Rgb) -> bool {
+    colour != Rgb::ZERO
+}
+
 /// How many materials that some surface uses call for what.
 #[derive(Default)]
 struct UsedMaterials {
     diffuse: usize,
     mirror: usize,
     glass: usize,
+    ranked: usize,
     textured: usize,
 }
 
@@ -161,9 +177,11 @@ impl UsedMaterials {
             .for_each(|s| used[s.material as usize] = true);
         let mut counts = Self::default();
         for (material, _) in scene.materials.iter().zip(&used).filter(|(_, used)| **used) {
-            counts.diffuse += usize::from(material.diffuse.max_element() > 0.0);
-            counts.mirror += usize::from(material.mirror.max_element() > 0.0);
+            counts.diffuse += usize::from(is_something(material.diffuse));
+            counts.mirror += usize::from(is_something(material.mirror));
             counts.glass += usize::from(material.glass.is_some());
+            let ranked = material.glass.as_ref().is_some_and(|g| g.priority.is_some());
+            counts.ranked += usize::from(ranked);
             counts.textured += usize::from(material.texture.is_some());
         }
         counts

@@ -127,7 +127,7 @@ fn a_white_sphere_in_a_furnace_is_one() {
 #[test]
 fn a_glass_sphere_in_a_furnace_vanishes() {
     use tweenray::scene::Glass;
-    let glass = Glass { ior: 1.5, tint: Rgb::ONE };
+    let glass = Glass { ior: 1.5, tint: Rgb::ONE, priority: None };
     let mut world = sphere_world(Material { glass: Some(glass), ..Material::black("g") }, false);
     world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
     let mut job = job(world, pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), 48, 36);

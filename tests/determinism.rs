@@ -34,7 +34,7 @@ fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
         ball(Material { mirror: Rgb::splat(0.9), ..Material::black("mirror") }, -1.2);
     }
     if glass {
-        let glass = Glass { ior: 1.5, tint: Rgb::splat(0.98) };
+        let glass = Glass { ior: 1.5, tint: Rgb::splat(0.98), priority: None };
         ball(Material { glass: Some(glass), ..Material::black("glass") }, 0.1);
     }
     ball(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)), 1.3);

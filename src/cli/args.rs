@@ -59,6 +59,9 @@ pub struct SettingArgs {
     /// Bits a channel of png files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", value_parser = png_bits)]
     pub png_bits: Option<u8>,
+    /// Show pixels with a sample that is NaN, infinite or negative in magenta [default: off]
+    #[arg(long, value_name = "on|off", value_parser = values::switch())]
+    pub flag_bad: Option<bool>,
 
     /// Shadow samples per area light and camera sample; 0 leaves area lights unlit [default: 16]
     #[arg(long, value_name = "N", help_heading = "Light",
@@ -127,6 +130,7 @@ impl SettingArgs {
         put(&mut s.exposure, self.exposure);
         put(&mut s.tone, self.tone);
         put(&mut s.png_bits, self.png_bits);
+        put(&mut s.flag_bad, self.flag_bad);
         put(&mut s.shadow_samples, self.shadow_samples);
         put(&mut s.sky_samples, self.sky_samples);
         put(&mut s.bounces, self.bounces);
@@ -155,6 +159,9 @@ pub struct OutputArgs {
     /// Replace frames that exist
     #[arg(long)]
     pub overwrite: bool,
+    /// Fail (exit code 1, frames written) where a sample is NaN, infinite or negative
+    #[arg(long)]
+    pub strict: bool,
     /// Make no video of the sequence
     #[arg(long, overrides_with = "video")]
     pub no_video: bool,

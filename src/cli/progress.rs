@@ -119,8 +119,14 @@ mod tests {
     #[test]
     fn a_line_says_frame_seconds_rays_and_time_left() {
         let rays = RayCounts { camera: 4_920_000, ..RayCounts::default() };
-        let report =
-            FrameReport { frame: 9, trace_seconds: 0.4, write_seconds: 0.01, bytes: 1, rays };
+        let report = FrameReport {
+            frame: 9,
+            trace_seconds: 0.4,
+            write_seconds: 0.01,
+            bytes: 1,
+            rays,
+            bad: Default::default(),
+        };
         assert_eq!(
             line(&report, 3, 16, left(Duration::from_secs(2), 2, 13)),
             "frame 3 of 16  0.41 s  12.3 Mrays/s  left 13 s"

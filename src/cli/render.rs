@@ -105,7 +105,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         say_stopped(&job, &outcome);
         return Ok(Exit::Stopped);
     }
-    finish(&job, start, quiet)
+    let done = finish(&job, start, quiet)?;
+    Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
 }
 
 /// Holds every rank to the best instruction set that all their machines have, unless one was
@@ -210,6 +211,33 @@ fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
         _ => {}
     }
     Ok(Exit::Done)
+}
+
+/// Says which samples are no radiance; an exit code where that is a failure.
+fn judge_samples(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
+    let bad = stats::bad_of(job.plan, outcome);
+    if bad.is_none() {
+        return None;
+    }
+    let rendered = outcome.frames.iter().map(|(_, report)| (report.frame, report.bad));
+    let all = job.plan.kept_bad.iter().copied().chain(rendered);
+    let first = all.filter(|(_, bad)| !bad.is_none()).min_by_key(|(frame, _)| *frame);
+    let place = first.and_then(|(frame, bad)| Some((frame, bad.first?)));
+    let place = place.map_or(String::new(), |(frame, [x, y])| {
+        format!("; the first at pixel {x},{y} of frame {frame}")
+    });
+    let samples = if bad.total() == 1 { "camera sample is" } else { "camera samples are" };
+    let message = format!(
+        "{} {samples} no radiance ({bad}){place}\n  \
+         help: --flag-bad on shows such pixels in magenta",
+        bad.total()
+    );
+    if job.request.strict {
+        say::error(&Error::Failed(message));
+        return Some(Exit::Failed);
+    }
+    tell(quiet, &[message], |m| say::warning(m));
+    None
 }
 
 /// Makes the video of the frames asked for; gives the line to print. Only of the whole shot does

@@ -24,6 +24,8 @@ pub struct Request {
     pub pattern: FramePattern,
     /// Whether frames that exist are replaced.
     pub overwrite: bool,
+    /// Whether a sample that is no radiance makes the job fail.
+    pub strict: bool,
     /// Frames per second of the video; `None` for no video.
     pub fps: Option<f64>,
     /// Rendering threads, where somebody said how many.
@@ -57,6 +59,7 @@ impl Request {
             frames,
             pattern,
             overwrite: output.overwrite || loaded.overwrite,
+            strict: output.strict || loaded.strict,
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,

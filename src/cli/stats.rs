@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::output::atomic;
 use crate::output::manifest::Header;
 use crate::sequence::{FrameReport, Plan};
-use crate::stats::RayCounts;
+use crate::stats::{BadSamples, RayCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -49,6 +49,7 @@ struct Stats<'a> {
     render_seconds: f64,
     peak_memory_bytes: Option<u64>,
     rays: RayCounts,
+    bad_samples: BadSamples,
     kept: &'a [u32],
     frames: Vec<Frame<'a>>,
     ranks: &'a [RankStats],
@@ -59,6 +60,14 @@ struct Frame<'a> {
     rank: u32,
     #[serde(flatten)]
     report: &'a FrameReport,
+}
+
+/// Samples that are no radiance, of all frames asked for, rendered now or kept.
+pub fn bad_of(plan: &Plan, outcome: &Outcome) -> BadSamples {
+    let mut sum = BadSamples::default();
+    plan.kept_bad.iter().for_each(|(_, bad)| sum += *bad);
+    outcome.frames.iter().for_each(|(_, report)| sum += report.bad);
+    sum
 }
 
 /// Writes the file at `path`, whole. `ranks` starts with rank 0, whose times the top level shows.
@@ -72,6 +81,9 @@ pub fn write(
 ) -> Result<()> {
     let mut rays = RayCounts::default();
     outcome.frames.iter().for_each(|(_, report)| rays += report.rays);
+    // The first pixel of several frames is none's; each frame tells its own.
+    let mut bad_samples = bad_of(plan, outcome);
+    bad_samples.first = None;
     let slowest = |of: fn(&RankStats) -> f64| ranks.iter().map(of).fold(0.0, f64::max);
     let stats = Stats {
         tweenray: &header.tweenray,
@@ -87,6 +99,7 @@ pub fn write(
         render_seconds: slowest(|r| r.render_seconds),
         peak_memory_bytes: ranks.iter().filter_map(|r| r.peak_memory_bytes).max(),
         rays,
+        bad_samples,
         kept: &plan.kept,
         frames: outcome.frames.iter().map(|(rank, report)| Frame { rank: *rank, report }).collect(),
         ranks,

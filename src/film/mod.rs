@@ -1,6 +1,7 @@
 //! Images and what else a pixel records: plain data, no behaviour beyond indexing.
 
 use crate::math::{Rgb, Vec3};
+use crate::stats::BadSamples;
 
 mod image;
 
@@ -17,6 +18,8 @@ pub struct Film {
     pub rgb: Vec<Rgb>,
     /// First-hit records, when asked for.
     pub gbuffer: Option<GBuffer>,
+    /// Camera samples in it that are no radiance.
+    pub bad: BadSamples,
 }
 
 /// Per-pixel first-hit record, of the camera sample nearest the pixel's middle; AOVs are never
@@ -70,6 +73,7 @@ impl Film {
             height,
             rgb: vec![Rgb::ZERO; n],
             gbuffer: with_gbuffer.then(|| GBuffer::new(n)),
+            bad: BadSamples::default(),
         }
     }
 

@@ -86,6 +86,8 @@ pub struct Loaded {
     pub video: bool,
     /// Whether existing frames are replaced.
     pub overwrite: bool,
+    /// Whether a sample that is no radiance makes the job fail.
+    pub strict: bool,
     /// Rendering threads, where the file says.
     pub threads: Option<u32>,
     /// File for statistics, where the file says, relative to the current folder.
@@ -128,6 +130,7 @@ impl Loaded {
             fps: 24.0,
             video: true,
             overwrite: false,
+            strict: false,
             threads: None,
             stats: None,
             warnings: Vec::new(),

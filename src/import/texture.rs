@@ -6,6 +6,7 @@ use super::model::Model;
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::Rgb;
 use crate::scene::{Texture, TextureId};
+use crate::stats::Fault;
 use image::{DynamicImage, ImageReader, Limits};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -62,8 +63,9 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
     decoder.limits(limits);
     let image = decoder.decode().map_err(bad)?;
     let texels = linear(image);
-    if texels.iter().any(|c| !c.is_finite()) {
-        return Err(Error::input(path, "a pixel of the image is not a finite number"));
+    if texels.iter().any(|c| Fault::of(c.to_array()).is_some()) {
+        let message = "a pixel of the image is negative or not a finite number";
+        return Err(Error::input(path, message));
     }
     Ok(Texture { name: path.display().to_string(), width, height, texels })
 }
@@ -71,7 +73,7 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
 fn linear(image: DynamicImage) -> Vec<Rgb> {
     match image {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            image.into_rgb32f().pixels().map(|p| Rgb::from_array(p.0).max(Rgb::ZERO)).collect()
+            image.into_rgb32f().pixels().map(|p| Rgb::from_array(p.0)).collect()
         }
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)

@@ -3,6 +3,8 @@
 //! The rule is that the lowest `(geom_id, prim_id)` wins. Embree would return any of them, so the
 //! others are taken out before it builds: no ray pays for the rule, and a thousand copies of a
 //! mesh trace as fast as one.
+//!
+//! Glass with a priority is left alone: where two such bodies touch, a ray crosses both boundaries.
 
 use super::PrimRef;
 use crate::math::Vec3;
@@ -29,8 +31,10 @@ pub(super) fn copies(scene: &Scene) -> Vec<PrimRef> {
         })
         .collect();
     spheres.sort_unstable();
-    let pairs = spheres.windows(2).filter(|pair| pair[0].0 == pair[1].0);
-    copies.extend(pairs.map(|pair| PrimRef { geom_id, prim_id: pair[1].1 }));
+    for same in spheres.chunk_by(|a, b| a.0 == b.0) {
+        let prims = same.iter().map(|(_, prim_id)| PrimRef { geom_id, prim_id: *prim_id });
+        copies.extend(all_but_first(scene, prims));
+    }
     copies.sort_unstable();
     copies
 }
@@ -54,8 +58,26 @@ fn triangle_copies(scene: &Scene) -> Vec<PrimRef> {
         })
         .collect();
     suspects.par_sort_unstable();
-    let pairs = suspects.windows(2).filter(|pair| pair[0].0 == pair[1].0);
-    pairs.map(|pair| pair[1].1).collect()
+    let groups = suspects.chunk_by(|a, b| a.0 == b.0);
+    groups.flat_map(|same| all_but_first(scene, same.iter().map(|(_, prim)| *prim))).collect()
+}
+
+/// Of coincident primitives, ascending, those that are never hit.
+fn all_but_first<'s>(
+    scene: &'s Scene,
+    mut prims: impl Iterator<Item = PrimRef> + 's,
+) -> impl Iterator<Item = PrimRef> + 's {
+    let first_is_ranked = prims.next().is_some_and(|prim| is_ranked_glass(scene, prim));
+    prims.filter(move |prim| !(first_is_ranked && is_ranked_glass(scene, *prim)))
+}
+
+fn is_ranked_glass(scene: &Scene, prim: PrimRef) -> bool {
+    let surface = match scene.meshes.get(prim.geom_id as usize) {
+        Some(mesh) => mesh.surface,
+        None => scene.spheres[prim.prim_id as usize].surface,
+    };
+    let glass = &scene.materials[surface.material as usize].glass;
+    glass.as_ref().is_some_and(|g| g.priority.is_some())
 }
 
 /// Runs of triangles: geometry and first triangle.

@@ -15,7 +15,7 @@
 use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
-use crate::stats::RayCounts;
+use crate::stats::{BadSamples, RayCounts};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -63,6 +63,9 @@ pub struct Row {
     pub seconds: f64,
     /// Rays cast for it.
     pub rays: RayCounts,
+    /// Camera samples that are no radiance.
+    #[serde(default, skip_serializing_if = "BadSamples::is_none")]
+    pub bad: BadSamples,
     /// Whether the frame is left from a sequence of other settings, of which only a part was
     /// replaced.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -39,6 +39,12 @@ impl QuadWarp {
         Self { origin: a, edge_u: b - a, edge_v: d - a, twist, stretch }
     }
 
+    /// The quad's corners in order, to rounding.
+    pub fn corners(&self) -> [DVec3; 4] {
+        let (b, d) = (self.origin + self.edge_u, self.origin + self.edge_v);
+        [self.origin, b, b + self.edge_v + self.twist, d]
+    }
+
     /// The point for `u` in (0, 1)²; density 1/area.
     pub fn point(&self, u: [f64; 2]) -> DVec3 {
         let [u, v] = match self.stretch {

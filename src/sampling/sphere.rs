@@ -55,6 +55,29 @@ impl SphereCone {
         self.axis
     }
 
+    /// A unit direction in the cone whose height above the horizon of the unit normal `n` is half
+    /// of the highest one's, and the distance along it to the sphere; `None` where the cone lies
+    /// below the horizon.
+    pub fn above(&self, n: DVec3) -> Option<(DVec3, f64)> {
+        let sin = self.axis.dot(n);
+        let level = self.axis - n * sin;
+        let half_angle = 2.0 * libm::asin((0.5 * self.one_minus_cos).sqrt());
+        let axis_height = libm::atan2(sin, level.length());
+        let height = 0.5 * (axis_height + half_angle);
+        if height.is_nan() || height <= 0.0 {
+            return None;
+        }
+        let away = height - axis_height;
+        // Straight above, every level direction is as good.
+        let level = level.try_normalize().unwrap_or(self.basis.0);
+        let dir = level * libm::cos(height) + n * libm::sin(height);
+        let versine = 2.0 * libm::sin(0.5 * away).powi(2);
+        let k = self.one_minus_cos;
+        let margin = (k * (2.0 - k) - versine * (2.0 - versine)).max(0.0);
+        let tangent2 = (1.0 - k) * (1.0 - k);
+        Some((dir, self.distance * tangent2 / (1.0 - versine + margin.sqrt())))
+    }
+
     /// For `u` in (0, 1)²: a unit direction in the cone, and the distance along it to the
     /// sphere's surface (never NaN; at the rim the tangent's length).
     pub fn direction(&self, u: [f64; 2]) -> (DVec3, f64) {
@@ -135,6 +158,20 @@ mod tests {
             assert!(sum.y.abs() < 2e-4 * radius && sum.z.abs() < 2e-4 * radius);
             assert!((sum.x - (1.0 - 0.5 * cone.one_minus_cos())).abs() < 1e-5);
         }
+    }
+
+    #[test]
+    fn slivers_above_the_horizon_are_met() {
+        for height in [-0.999_999, -0.9, -0.3, 0.0, 0.4, 2.0] {
+            let centre = DVec3::new(3.0, height, 0.5);
+            let cone = SphereCone::new(centre, 1.0, DVec3::ZERO).expect("outside");
+            let (d, t) = cone.above(DVec3::Y).expect("some of it is above");
+            assert!(d.y > 0.0 && (d.length() - 1.0).abs() < 1e-12);
+            let miss = ((d * t).distance(centre) - 1.0).abs();
+            assert!(miss < 1e-6, "{height}: {miss:e}");
+        }
+        let below = SphereCone::new(DVec3::new(3.0, -1.000_001, 0.0), 1.0, DVec3::ZERO);
+        assert!(below.expect("outside").above(DVec3::Y).is_none());
     }
 
     #[test]

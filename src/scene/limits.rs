@@ -7,7 +7,7 @@ pub const MAX_EDGE: u32 = 32_768;
 /// Most samples of one kind.
 pub const MAX_SAMPLES: u32 = 65_536;
 /// Most specular bounces.
-pub const MAX_BOUNCES: u32 = 64;
+pub const MAX_BOUNCES: u32 = 1024;
 /// Most rendering threads.
 pub const MAX_THREADS: u32 = 4096;
 /// The largest seed: the largest whole number that TOML has.

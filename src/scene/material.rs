@@ -48,12 +48,19 @@ impl Material {
 }
 
 /// A smooth dielectric boundary; the mesh's outward normals point to the outside medium.
+///
+/// With a `priority` the body that it bounds may overlap others: where several are, the one of
+/// the highest priority is, and the rest are not (Schmidt and Budge, 2002).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Glass {
-    /// Index of refraction inside, relative to outside; positive.
+    /// Index of refraction inside; positive. Relative to outside, whatever that is; with a
+    /// `priority`, relative to air.
     pub ior: f64,
     /// Share of light that each crossing transmits, linear RGB (white is clear).
     pub tint: Rgb,
+    /// Which of several bodies at one place is there: the highest. Those that overlap need
+    /// different ones.
+    pub priority: Option<u8>,
 }
 
 /// A decoded image, linear RGB, row 0 at the top.

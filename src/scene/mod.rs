@@ -17,6 +17,7 @@ mod path;
 mod place;
 mod recentre;
 mod settings;
+mod winding;
 
 pub use camera::{Camera, Pose};
 pub use light::{Light, QuadLight, Sky};

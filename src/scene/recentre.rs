@@ -2,7 +2,7 @@
 
 use super::{
     Corners, Light, Material, Mesh, QuadLight, Scene, Sphere, Surface, World, WorldMesh,
-    WorldSphere,
+    WorldSphere, winding,
 };
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Rgb, Vec3};
@@ -79,13 +79,36 @@ impl World {
         bounds
     }
 
+    /// Refuses lights and spheres whose place is no number: no bounds would hold them. (Meshes
+    /// are finite by invariant.)
+    fn check_finite(&self) -> Result<()> {
+        let finite = |light: &Light| match light {
+            Light::Point { position, .. } => position.is_finite(),
+            Light::Directional { to_light, .. } => to_light.is_finite(),
+            Light::Quad(q) => q.corners.iter().all(|c| c.is_finite()),
+            Light::Sphere { centre, radius, .. } => centre.is_finite() && radius.is_finite(),
+        };
+        let what = |what: &str| {
+            Err(Error::Usage(format!("the place or size of {what} is not a finite number")))
+        };
+        if let Some(index) = self.lights.iter().position(|l| !finite(l)) {
+            return what(&format!("light {}", index + 1));
+        }
+        match self.spheres.iter().find(|s| !(s.centre.is_finite() && s.radius.is_finite())) {
+            Some(sphere) => what(&format!("`{}`", sphere.name)),
+            None => Ok(()),
+        }
+    }
+
     /// Moves the world to scene space and rounds positions to f32, once. Area lights get their
     /// emitting surface. With `recentre` false the world's own coordinates are rounded as they
     /// are: that shows what the rule is worth.
     ///
-    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a mesh,
-    /// sphere or area light so small beside the scene that f32 would crush it (`recentre` only).
+    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
+    /// sphere whose place is not finite; a mesh, sphere or area light so small beside the scene
+    /// that f32 would crush it (`recentre` only).
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
+        self.check_finite()?;
         let bounds = self.bounds();
         let size = bounds.extent().max_element();
         let renders = size == 0.0 || (1e-30..=1e30).contains(&size);
@@ -226,12 +249,19 @@ fn to_scene_sphere(s: WorldSphere, r: &Recentring) -> Sphere {
 
 fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> Mesh {
     let WorldMesh { name, positions, mut triangles, mut normals, mut uvs, material } = mesh;
-    let inside_out = materials[material as usize].glass.is_some()
-        && closed_volume(&positions, &triangles).is_some_and(|volume| volume < 0.0);
-    if inside_out {
-        // Glass tells inside from outside by the winding; a file with reversed faces would
-        // otherwise refract as a hole in glass.
-        reverse(&mut triangles, &mut normals, &mut uvs);
+    if materials[material as usize].glass.is_some() {
+        // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
+        // would otherwise refract as a hole in glass.
+        let mut volume = closed_volume(&positions, &triangles);
+        if volume.is_none() {
+            let strays = winding::strays(&positions, &triangles, &weld(&positions));
+            let strays = strays.into_iter().flatten().enumerate().filter(|(_, stray)| *stray);
+            strays.for_each(|(i, _)| reverse_one(i, &mut triangles, &mut normals, &mut uvs));
+            volume = closed_volume(&positions, &triangles);
+        }
+        if volume.is_some_and(|volume| volume < 0.0) {
+            reverse(&mut triangles, &mut normals, &mut uvs);
+        }
     }
     let positions = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
     scene_mesh(name, positions, triangles, normals, uvs, Surface { material, light: None })
@@ -254,6 +284,18 @@ fn scene_mesh(
     Mesh { name, positions, vertex_count, triangles, normals, uvs, surface, bounds }
 }
 
+fn reverse_one(
+    index: usize,
+    triangles: &mut [[u32; 3]],
+    normals: &mut Option<Corners<Vec3>>,
+    uvs: &mut Option<Corners<crate::math::Vec2>>,
+) {
+    triangles[index].swap(1, 2);
+    let normals = normals.as_mut().and_then(|n| n.corners.as_mut());
+    let uvs = uvs.as_mut().and_then(|uv| uv.corners.as_mut());
+    normals.into_iter().chain(uvs).for_each(|corners| corners[index].swap(1, 2));
+}
+
 fn reverse(
     triangles: &mut [[u32; 3]],
     normals: &mut Option<Corners<Vec3>>,
@@ -269,19 +311,22 @@ fn reverse(
     }
 }
 
+/// For each vertex a number that it shares with all at the same place: they are one corner, however
+/// often the file lists them.
+fn weld(positions: &[DVec3]) -> Vec<u32> {
+    let mut welded = std::collections::HashMap::with_capacity(positions.len());
+    let number = |p: &DVec3| {
+        let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+        let next = welded.len() as u32;
+        *welded.entry(key).or_insert(next)
+    };
+    positions.iter().map(number).collect()
+}
+
 /// Signed volume of a closed mesh: positive when its faces wind counter-clockwise seen from
 /// outside; `None` when an edge has not exactly one partner that runs the other way.
 fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
-    // Vertices at the same place are one corner, however often the file lists them.
-    let mut welded = std::collections::HashMap::with_capacity(positions.len());
-    let weld: Vec<u32> = positions
-        .iter()
-        .map(|p| {
-            let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
-            let next = welded.len() as u32;
-            *welded.entry(key).or_insert(next)
-        })
-        .collect();
+    let weld = weld(positions);
     let mut edges = std::collections::HashMap::with_capacity(triangles.len() * 3);
     for t in triangles {
         let t = t.map(|i| weld[i as usize]);

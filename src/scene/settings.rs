@@ -40,6 +40,8 @@ pub struct Settings {
     pub rules: HitRules,
     /// Which part of the image is rendered; `None` for all of it.
     pub crop: Option<Rect>,
+    /// Show pixels with a sample that is no radiance (NaN, infinite, negative) in magenta.
+    pub flag_bad: bool,
 }
 
 impl Default for Settings {
@@ -62,6 +64,7 @@ impl Default for Settings {
             isa: None,
             rules: HitRules::default(),
             crop: None,
+            flag_bad: false,
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::output::manifest::{Journal, Row};
 use crate::output::{WriteOptions, write_image};
-use crate::stats::RayCounts;
+use crate::stats::{BadSamples, RayCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -46,6 +46,9 @@ pub struct FrameReport {
     pub bytes: u64,
     /// Rays cast.
     pub rays: RayCounts,
+    /// Camera samples that are no radiance.
+    #[serde(default, skip_serializing_if = "BadSamples::is_none")]
+    pub bad: BadSamples,
 }
 
 /// Renders `frames` in order into `target`; rows go to the journal at `journal`. `done` hears of
@@ -70,7 +73,8 @@ pub fn render_frames(
         let row = write_frame(target, frame, &film, rays, start)?;
         journal.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes: row.bytes, rays })?;
+        let (bytes, bad) = (row.bytes, film.bad);
+        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, bad })?;
     }
     Ok(())
 }
@@ -94,6 +98,7 @@ fn write_frame(
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
         rays,
+        bad: film.bad,
         other_settings: false,
     })
 }

@@ -4,6 +4,7 @@ use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Header, Manifest, Row, manifest_path};
 use crate::output::{FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
+use crate::stats::BadSamples;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -33,6 +34,8 @@ pub struct Target {
 pub struct Plan {
     /// Frames that exist whole, with the same settings.
     pub kept: Vec<u32>,
+    /// Those of the kept frames that have samples which are no radiance.
+    pub kept_bad: Vec<(u32, BadSamples)>,
     /// Frames to render.
     pub render: Vec<u32>,
     /// What the user should know: damaged frames.
@@ -79,7 +82,7 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
 
 /// How a frame stands on disk.
 enum State {
-    Whole,
+    Whole(BadSamples),
     Missing,
     Damaged(String),
 }
@@ -98,7 +101,7 @@ fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State
     };
     let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
     let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
-    Ok(if whole { State::Whole } else { State::Damaged(note()) })
+    Ok(if whole { State::Whole(row.bad) } else { State::Damaged(note()) })
 }
 
 /// Frames of another sequence that a job over `frames` does not replace.
@@ -139,7 +142,12 @@ impl Plan {
         let mut plan = Self::default();
         for (frame, state) in states {
             match state {
-                State::Whole => plan.kept.push(frame),
+                State::Whole(bad) => {
+                    plan.kept.push(frame);
+                    if !bad.is_none() {
+                        plan.kept_bad.push((frame, bad));
+                    }
+                }
                 State::Missing => plan.render.push(frame),
                 State::Damaged(note) => {
                     plan.render.push(frame);

@@ -28,6 +28,14 @@ pub fn polygon(p: DVec3, n: DVec3, corners: &[DVec3; 4]) -> f64 {
     0.5 * sum.abs()
 }
 
+/// The mean of the corners of what of a flat convex polygon lies above the horizon of `n` at `p`.
+pub fn middle_above(p: DVec3, n: DVec3, corners: &[DVec3; 4]) -> Option<DVec3> {
+    let mut above = [DVec3::ZERO; 8];
+    let count = clip_to_horizon(p, n, corners, &mut above);
+    let middle = above[..count].iter().sum::<DVec3>() / count as f64;
+    (count > 0 && middle.dot(n) > 0.0).then(|| p + middle)
+}
+
 /// Sutherland–Hodgman clipping by the plane through `p` with normal `n`; corners relative to `p`.
 fn clip_to_horizon(p: DVec3, n: DVec3, corners: &[DVec3; 4], out: &mut [DVec3; 8]) -> usize {
     let mut count = 0;

@@ -5,6 +5,7 @@
 //! Per block: camera rays in packets, specular rays one by one until none is left, then shadow
 //! rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
+use super::interior::{self, Interior};
 use super::lighting::{LitPoint, ShadowScratch};
 use super::optics;
 use super::pixels::BlockPixels;
@@ -13,8 +14,11 @@ use super::{FrameInput, Renderer};
 use crate::film::GPixel;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
-use crate::scene::{Glass, Material};
+use crate::scene::Material;
 use crate::stats::RayCounts;
+
+/// Boundaries of ranked glass that a ray passes without another medium behind them.
+const MOST_PASSED: usize = 1024;
 
 /// Camera rays traced together: enough for packets, few enough to stay in the L1 cache.
 const CHUNK: usize = 256;
@@ -37,15 +41,26 @@ struct PathState {
 pub(super) struct Scratch {
     rays: Vec<Ray>,
     states: Vec<PathState>,
+    /// Bodies of ranked glass around each ray's start; empty in kernels without.
+    interiors: Vec<Interior>,
     hits: Vec<Option<Hit>>,
     next_rays: Vec<Ray>,
     next_states: Vec<PathState>,
+    next_interiors: Vec<Interior>,
     lit: Vec<LitPoint>,
     shadow: ShadowScratch,
 }
 
 /// Renders one block into `pixels`, which holds its radiance sums and records.
-pub(super) fn block<const MIRROR: bool, const GLASS: bool, const AREA: bool, const SKY: bool>(
+///
+/// `NESTED` is glass with priorities, on top of `GLASS`.
+pub(super) fn block<
+    const MIRROR: bool,
+    const GLASS: bool,
+    const NESTED: bool,
+    const AREA: bool,
+    const SKY: bool,
+>(
     renderer: &Renderer,
     input: &FrameInput,
     pixels: &mut BlockPixels,
@@ -58,9 +73,14 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const AREA: bool, con
         let last = (first + samples_per_chunk).min(renderer.settings.spp);
         camera_rays(renderer, input, pixels, first..last, scratch);
         counts.camera += scratch.rays.len() as u64;
-        trace_paths::<MIRROR, GLASS>(renderer, input, pixels, scratch, &mut counts);
+        if NESTED {
+            scratch.interiors.clear();
+            scratch.interiors.resize(scratch.rays.len(), input.around_eye);
+        }
+        trace_paths::<MIRROR, GLASS, NESTED>(renderer, input, pixels, scratch, &mut counts);
         let Scratch { lit, shadow, .. } = scratch;
         renderer.light_points::<AREA, SKY>(input, lit, pixels, shadow, &mut counts);
+        pixels.end_samples();
         first = last;
     }
     counts
@@ -85,14 +105,15 @@ fn camera_rays(
     }
 }
 
-fn trace_paths<const MIRROR: bool, const GLASS: bool>(
+fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     renderer: &Renderer,
     input: &FrameInput,
     pixels: &mut BlockPixels,
     scratch: &mut Scratch,
     counts: &mut RayCounts,
 ) {
-    let Scratch { rays, states, hits, next_rays, next_states, lit, .. } = scratch;
+    let Scratch { rays, states, interiors, hits, lit, .. } = scratch;
+    let Scratch { next_rays, next_states, next_interiors, .. } = scratch;
     lit.clear();
     for depth in 0..=renderer.settings.bounces {
         hits.clear();
@@ -109,12 +130,22 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool>(
         }
         next_rays.clear();
         next_states.clear();
-        let mut vertex = Vertex { renderer, pixels, lit, next_rays, next_states, counts };
+        next_interiors.clear();
+        let mut vertex =
+            Vertex { renderer, pixels, lit, next_rays, next_states, next_interiors, counts };
         let may_bounce = depth < renderer.settings.bounces;
-        for ((ray, hit), state) in rays.iter().zip(hits.iter()).zip(states.iter()) {
+        for (i, ((ray, hit), state)) in rays.iter().zip(hits.iter()).zip(states.iter()).enumerate()
+        {
+            if NESTED {
+                vertex.pass::<MIRROR>(*ray, *hit, state, interiors[i], may_bounce);
+                continue;
+            }
             match hit {
-                None => vertex.escape(state),
-                Some(hit) => vertex.meet::<MIRROR, GLASS>(ray, hit, state, may_bounce),
+                None => vertex.escape(ray, state),
+                Some(hit) => {
+                    let no = Interior::default();
+                    vertex.meet::<MIRROR, GLASS, NESTED>(ray, hit, state, &no, may_bounce);
+                }
             }
         }
         if !(MIRROR || GLASS) || next_rays.is_empty() {
@@ -122,6 +153,7 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool>(
         }
         std::mem::swap(rays, next_rays);
         std::mem::swap(states, next_states);
+        std::mem::swap(interiors, next_interiors);
     }
 }
 
@@ -132,20 +164,67 @@ struct Vertex<'v, 'r> {
     lit: &'v mut Vec<LitPoint>,
     next_rays: &'v mut Vec<Ray>,
     next_states: &'v mut Vec<PathState>,
+    next_interiors: &'v mut Vec<Interior>,
     counts: &'v mut RayCounts,
 }
 
 impl Vertex<'_, '_> {
-    fn escape(&mut self, state: &PathState) {
-        let sky = self.renderer.scene.sky.radiance;
-        self.pixels.add(state.pixel, state.throughput * sky);
+    fn escape(&mut self, ray: &Ray, state: &PathState) {
+        // A ray that nobody could trace has not seen the sky.
+        let sky = if ray.is_valid() { self.renderer.scene.sky.radiance } else { Rgb::NAN };
+        self.add(state, state.throughput * sky);
     }
 
-    fn meet<const MIRROR: bool, const GLASS: bool>(
+    fn add(&mut self, state: &PathState, radiance: Rgb) {
+        self.pixels.add(state.pixel, state.sample, radiance);
+    }
+
+    /// Follows the ray through boundaries of ranked glass that lead to no other medium, then to
+    /// what it meets.
+    fn pass<const MIRROR: bool>(
+        &mut self,
+        mut ray: Ray,
+        mut hit: Option<Hit>,
+        state: &PathState,
+        mut inside: Interior,
+        may_bounce: bool,
+    ) {
+        let renderer = self.renderer;
+        for _ in 0..MOST_PASSED {
+            let Some(met) = &hit else { return self.escape(&ray, state) };
+            let si = SurfaceInteraction::new(renderer.scene, &ray, met);
+            let material = &renderer.scene.materials[si.surface.material as usize];
+            if !material.glass.as_ref().is_some_and(interior::is_ranked) {
+                return self.meet::<MIRROR, true, true>(&ray, met, state, &inside, may_bounce);
+            }
+            let crossing = interior::cross(renderer, &ray, &si, met.t, &inside, self.counts);
+            if let Some(boundary) = &crossing.boundary {
+                if may_bounce {
+                    let ways = Ways {
+                        reflected: (&si, &inside),
+                        refracted: (&crossing.last, &crossing.after),
+                    };
+                    let wo = -ray.dir.normalize();
+                    let bend = Bend { eta: boundary.eta, tint: boundary.tint };
+                    self.split::<true>(&boundary.surface, wo, &bend, &ways, state);
+                }
+                return;
+            }
+            inside = crossing.after;
+            ray = crossing.last.spawn(ray.dir, renderer.settings.rules.spawn_offset);
+            self.counts.glass += 1;
+            hit = renderer.intersector.intersect(&ray, self.counts);
+        }
+        // Given up, and not silently.
+        self.add(state, Rgb::NAN);
+    }
+
+    fn meet<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
         &mut self,
         ray: &Ray,
         hit: &Hit,
         state: &PathState,
+        inside: &Interior,
         may_bounce: bool,
     ) {
         let scene = self.renderer.scene;
@@ -154,7 +233,7 @@ impl Vertex<'_, '_> {
         let wo = -ray.dir.normalize();
         let le = emitted(material, si.is_outside(wo));
         if le != Rgb::ZERO {
-            self.pixels.add(state.pixel, state.throughput * le);
+            self.add(state, state.throughput * le);
         }
         if material.diffuse != Rgb::ZERO {
             let albedo = albedo(scene, material, &si);
@@ -163,61 +242,96 @@ impl Vertex<'_, '_> {
             self.lit.push(lit);
         }
         if MIRROR && may_bounce && material.mirror != Rgb::ZERO {
-            self.mirror(&si, wo, material, state);
+            self.mirror::<NESTED>(&si, wo, material, inside, state);
         }
         if GLASS && may_bounce {
             if let Some(glass) = &material.glass {
-                self.glass(&si, wo, glass, state);
+                let eta = if si.is_outside(wo) { glass.ior } else { 1.0 / glass.ior };
+                let ways = Ways { reflected: (&si, inside), refracted: (&si, inside) };
+                self.split::<NESTED>(&si, wo, &Bend { eta, tint: glass.tint }, &ways, state);
             }
         }
     }
 
-    fn mirror(
+    fn mirror<const NESTED: bool>(
         &mut self,
         si: &SurfaceInteraction,
         wo: DVec3,
         material: &Material,
+        inside: &Interior,
         state: &PathState,
     ) {
         let dir = optics::keep_side(optics::reflect(wo, si.ns), si.ng, si.is_outside(wo));
-        if self.push(si, dir, state, state.throughput * material.mirror, 2) {
+        let weight = state.throughput * material.mirror;
+        if self.push::<NESTED>((si, inside), dir, state, weight, 2) {
             self.counts.mirror += 1;
         }
     }
 
-    fn glass(&mut self, si: &SurfaceInteraction, wo: DVec3, glass: &Glass, state: &PathState) {
+    /// Sends the two rays that leave a boundary with the surface `si`.
+    fn split<const NESTED: bool>(
+        &mut self,
+        si: &SurfaceInteraction,
+        wo: DVec3,
+        bend: &Bend,
+        ways: &Ways,
+        state: &PathState,
+    ) {
         let outside = si.is_outside(wo);
-        let eta = if outside { glass.ior } else { 1.0 / glass.ior };
-        let split = optics::split(wo, si.ns, eta);
+        let split = optics::split(wo, si.ns, bend.eta);
         let reflected = optics::keep_side(optics::reflect(wo, si.ns), si.ng, outside);
         let weight = state.throughput * split.reflectance as f32;
-        self.counts.glass += u64::from(self.push(si, reflected, state, weight, 2));
+        let sent = self.push::<NESTED>(ways.reflected, reflected, state, weight, 2);
+        self.counts.glass += u64::from(sent);
         if let Some(refracted) = split.refracted {
             let refracted = optics::keep_side(refracted, si.ng, !outside);
-            let weight = state.throughput * (1.0 - split.reflectance) as f32 * glass.tint;
-            self.counts.glass += u64::from(self.push(si, refracted, state, weight, 3));
+            let weight = state.throughput * (1.0 - split.reflectance) as f32 * bend.tint;
+            let sent = self.push::<NESTED>(ways.refracted, refracted, state, weight, 3);
+            self.counts.glass += u64::from(sent);
         }
     }
 
     /// Queues a ray unless its weight is below the cut-off; says whether it did.
-    fn push(
+    fn push<const NESTED: bool>(
         &mut self,
-        si: &SurfaceInteraction,
+        (si, inside): (&SurfaceInteraction, &Interior),
         dir: DVec3,
         from: &PathState,
         throughput: Rgb,
         child: u32,
     ) -> bool {
         let settings = self.renderer.settings;
-        if throughput.max_element() < settings.cutoff.max(f32::MIN_POSITIVE) {
+        // Without a sign, and so that a NaN is not below: neither is dropped unseen.
+        let [r, g, b] = throughput.to_array().map(f32::abs);
+        let least = settings.cutoff.max(f32::MIN_POSITIVE);
+        if r < least && g < least && b < least {
             return false;
         }
+        // Two negative weights would make light that looks right.
+        self.pixels.check(from.pixel, from.sample, throughput);
         self.next_rays.push(si.spawn(dir, settings.rules.spawn_offset));
+        if NESTED {
+            self.next_interiors.push(*inside);
+        }
         // 2b and 2b + 1; the tree is at most 31 deep before branches share dimensions.
         let branch = from.branch.wrapping_mul(2) + (child - 2);
         self.next_states.push(PathState { throughput, branch, ..*from });
         true
     }
+}
+
+/// What a boundary does to light.
+struct Bend {
+    /// Index of refraction behind over that before.
+    eta: f64,
+    /// Share of light that it lets through.
+    tint: Rgb,
+}
+
+/// Where the two rays of a boundary start, and the ranked glass around them.
+struct Ways<'w> {
+    reflected: (&'w SurfaceInteraction, &'w Interior),
+    refracted: (&'w SurfaceInteraction, &'w Interior),
 }
 
 impl PathState {

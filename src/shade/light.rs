@@ -82,11 +82,31 @@ impl AreaLight {
                 (SeenLight::Sphere(cone, *centre), irradiance::sphere(p, n, *centre, *radius))
             }
         };
-        (irradiance > 0.0).then_some((seen, irradiance))
+        // What is NaN goes on, to be counted at its pixel.
+        (irradiance != 0.0).then_some((seen, irradiance))
     }
 }
 
 impl SeenLight<'_> {
+    /// A point of the light above the horizon of `n`, in the middle of what is: for slivers that
+    /// no sample meets. `None` where nothing is.
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+        match self {
+            Self::Quad(warp, normal, facet) => {
+                let point = irradiance::middle_above(p, n, &warp.corners())?;
+                let target = Target { point, normal: *normal, facet: *facet };
+                Some(LightSample { target, weight: 1.0 })
+            }
+            Self::Sphere(cone, centre) => {
+                let (dir, distance) = cone.above(n)?;
+                let point = p + dir * distance;
+                let normal = (point - *centre).normalize();
+                let target = Target { point, normal, facet: Facet::EXACT };
+                Some(LightSample { target, weight: 1.0 })
+            }
+        }
+    }
+
     /// The light's point for `u` in the unit square: uniform over area (quad) or over solid angle
     /// (sphere; Shirley, Wang and Zimmerman, 1996).
     pub fn sample(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
@@ -127,14 +147,19 @@ pub fn delta(light: &Light, p: DVec3, n: DVec3) -> Option<(Rgb, ShadowTarget)> {
             let to_light = *position - p;
             let d2 = to_light.length_squared();
             let cos = to_light.dot(n) / d2.sqrt();
-            (cos > 0.0).then(|| (*intensity * (cos / d2) as f32, ShadowTarget::Point(*position)))
+            lit(cos).then(|| (*intensity * (cos / d2) as f32, ShadowTarget::Point(*position)))
         }
         Light::Directional { to_light, irradiance } => {
             let cos = to_light.dot(n);
-            (cos > 0.0).then(|| (*irradiance * cos as f32, ShadowTarget::Direction(*to_light)))
+            lit(cos).then(|| (*irradiance * cos as f32, ShadowTarget::Direction(*to_light)))
         }
         Light::Quad(_) | Light::Sphere { .. } => None,
     }
+}
+
+/// Whether light arrives from above; NaN goes on, to be counted at its pixel.
+fn lit(cos: f64) -> bool {
+    cos > 0.0 || cos.is_nan()
 }
 
 /// Where a shadow ray to a delta light goes.

@@ -4,7 +4,7 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse.
 
-use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
+use super::light::{self, AreaLight, LightSample, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
 use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
@@ -16,10 +16,6 @@ use std::f32::consts::FRAC_1_PI;
 
 /// Shadow rays traced together.
 const BATCH: usize = 256;
-/// Further samples of a light that shows only a sliver above the horizon.
-const MOST_SEARCHED: u32 = 64;
-/// Sets their dimensions apart.
-const SEARCH: u32 = 1 << 31;
 
 /// Which camera sample and which branch of its tree a point belongs to.
 #[derive(Debug, Clone, Copy)]
@@ -135,7 +131,7 @@ impl Renderer<'_> {
     ) {
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
-            lit.iter().for_each(|p| pixels.add(p.place.pixel, p.weight * ambient));
+            lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
         }
         for (index, light) in self.scene.lights.iter().enumerate() {
             match light {
@@ -176,9 +172,11 @@ impl Renderer<'_> {
                         s.push_sample(point, &sample);
                     }
                     if s.is_open() {
-                        // All below the horizon, but some of the light is above: go on until one
-                        // sample is, or the horizon's own shadow would be counted twice.
-                        self.search_above_horizon(&seen, point, source.index, pixels, s);
+                        // All below the horizon, but some of the light is above: a point of that
+                        // decides, or the horizon's own shadow would be counted twice.
+                        if let Some(sample) = seen.above(point.p, point.n) {
+                            s.push_sample(point, &sample);
+                        }
                     }
                     s.close(radiance * exact as f32);
                 } else {
@@ -187,28 +185,6 @@ impl Renderer<'_> {
             }
             counts.shadow_area += s.rays.len() as u64;
             self.settle(group, pixels, s, counts);
-        }
-    }
-
-    /// Adds the first of further samples that lies above the point's horizon.
-    fn search_above_horizon(
-        &self,
-        seen: &SeenLight,
-        point: &LitPoint,
-        light: u32,
-        pixels: &BlockPixels,
-        s: &mut ShadowScratch,
-    ) {
-        let dimension = self.dimension(&point.place, light) ^ SEARCH;
-        let sampler = pixels.sampler(point.place.pixel);
-        for k in 0..MOST_SEARCHED {
-            let index = point.place.sample.wrapping_mul(MOST_SEARCHED) + k;
-            let u = sampler.get2(index, dimension).map(f64::from);
-            let sample = seen.sample(point.p, point.n, u);
-            s.push_sample(point, &sample);
-            if !s.is_open() {
-                return;
-            }
         }
     }
 
@@ -315,7 +291,8 @@ impl Renderer<'_> {
             start = span.end;
             if open > 0.0 {
                 let ratio = (open / all) as f32;
-                pixels.add(point.place.pixel, point.weight * span.unshadowed * ratio);
+                let light = point.weight * span.unshadowed * ratio;
+                pixels.add(point.place.pixel, point.place.sample, light);
             }
         }
     }

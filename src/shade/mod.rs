@@ -6,11 +6,12 @@
 //!
 //! Not done: light through glass (its shadow is opaque), glossy lobes, diffuse interreflection.
 
+mod interior;
 mod irradiance;
 mod kernel;
 mod light;
 mod lighting;
-mod optics;
+pub mod optics;
 mod pixels;
 mod surface;
 
@@ -20,7 +21,8 @@ use crate::intersect::Intersector;
 use crate::math::Rgb;
 use crate::sampling::PixelFilter;
 use crate::scene::{Camera, Filter, Rect, Scene, Settings};
-use crate::stats::RayCounts;
+use crate::stats::{BadSamples, RayCounts};
+use interior::Interior;
 use kernel::Scratch;
 use light::AreaLight;
 use pixels::{BLOCK, BlockPixels};
@@ -61,10 +63,19 @@ struct FrameInput {
     filter: PixelFilter,
     /// For each light of the scene, its area form.
     area_lights: Vec<Option<AreaLight>>,
+    /// Bodies of ranked glass that the camera is in.
+    around_eye: Interior,
 }
 
-/// One finished tile: each pixel's place, radiance and record.
-type TilePixels = Vec<(u32, u32, Rgb, Option<GPixel>)>;
+/// One finished tile.
+#[derive(Default)]
+struct TileDone {
+    /// Each pixel's place, radiance and record.
+    pixels: Vec<(u32, u32, Rgb, Option<GPixel>)>,
+    rays: RayCounts,
+    bad: BadSamples,
+}
+
 type BlockKernel = fn(&Renderer, &FrameInput, &mut BlockPixels, &mut Scratch) -> RayCounts;
 
 impl Renderer<'_> {
@@ -81,11 +92,17 @@ impl Renderer<'_> {
         stop: &AtomicBool,
         progress: &dyn Progress,
     ) -> Option<(Film, RayCounts)> {
+        let own = camera.to_scene(&self.scene.recentring);
+        let around_eye = match self.plan.nested_glass {
+            true => Interior::at(self, own.eye, own.forward),
+            false => Interior::default(),
+        };
         let input = FrameInput {
-            camera: camera.to_scene(&self.scene.recentring),
+            camera: own,
             frame,
             filter: pixel_filter(self.settings.filter),
             area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
+            around_eye,
         };
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
@@ -98,10 +115,10 @@ impl Renderer<'_> {
         let start = || (BlockPixels::new(with_gbuffer), Scratch::default());
         let one = |state: &mut (BlockPixels, Scratch), tile: &Rect| {
             let done = self.tile(&input, tile, &crop, kernel, state, stop)?;
-            progress.tile_done(share, &done.1);
+            progress.tile_done(share, &done.rays);
             Some(done)
         };
-        let done: Option<Vec<(TilePixels, RayCounts)>> = if samples < PARALLEL_FROM {
+        let done: Option<Vec<TileDone>> = if samples < PARALLEL_FROM {
             let mut state = start();
             tiles.iter().map(|tile| one(&mut state, tile)).collect()
         } else {
@@ -118,38 +135,49 @@ impl Renderer<'_> {
         kernel: BlockKernel,
         (pixels, scratch): &mut (BlockPixels, Scratch),
         stop: &AtomicBool,
-    ) -> Option<(TilePixels, RayCounts)> {
-        let mut out = TilePixels::new();
-        let mut counts = RayCounts::default();
+    ) -> Option<TileDone> {
+        let mut out = TileDone::default();
         for block in split(tile, BLOCK) {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
             pixels.start(&block, self.settings.seed, input.frame);
-            counts += kernel(self, input, pixels, scratch);
+            out.rays += kernel(self, input, pixels, scratch);
             let inside =
                 |x: u32, y: u32| x >= crop.x0 && x < crop.x1 && y >= crop.y0 && y < crop.y1;
-            out.extend(pixels.finished(self.settings.spp).filter(|(x, y, _, _)| inside(*x, *y)));
+            let finished = pixels.finished(self.settings.spp, self.settings.flag_bad);
+            out.pixels.extend(finished.filter(|(x, y, _, _)| inside(*x, *y)));
+            let bad = pixels.bad().filter(|(x, y, _)| inside(*x, *y));
+            bad.for_each(|(x, y, fault)| out.bad.count(fault, x, y));
         }
-        Some((out, counts))
+        Some(out)
     }
 
-    /// The kernel that the plan calls for: one of sixteen.
+    /// The kernel that the plan calls for: one of twenty-four.
     fn kernel(&self) -> BlockKernel {
+        let EffectPlan { mirror, glass, nested_glass, area_lights, sky_light, .. } = self.plan;
         macro_rules! choose {
-            ($([$m:literal $g:literal $a:literal $s:literal])*) => {
-                match (self.plan.mirror, self.plan.glass, self.plan.area_lights, self.plan.sky_light) {
-                    $(($m, $g, $a, $s) => kernel::block::<$m, $g, $a, $s>,)*
+            ($([$m:literal $g:literal $n:literal $a:literal $s:literal])*) => {
+                match (mirror, glass, glass && nested_glass, area_lights, sky_light) {
+                    $(($m, $g, $n, $a, $s) => kernel::block::<$m, $g, $n, $a, $s>,)*
+                    // Nested glass is glass.
+                    (_, false, true, _, _) => unreachable!(),
                 }
             };
         }
         choose! {
-            [false false false false] [false false false true] [false false true false]
-            [false false true true] [false true false false] [false true false true]
-            [false true true false] [false true true true] [true false false false]
-            [true false false true] [true false true false] [true false true true]
-            [true true false false] [true true false true] [true true true false]
-            [true true true true]
+            [false false false false false] [false false false false true]
+            [false false false true false] [false false false true true]
+            [false true false false false] [false true false false true]
+            [false true false true false] [false true false true true]
+            [false true true false false] [false true true false true]
+            [false true true true false] [false true true true true]
+            [true false false false false] [true false false false true]
+            [true false false true false] [true false false true true]
+            [true true false false false] [true true false false true]
+            [true true false true false] [true true false true true]
+            [true true true false false] [true true true false true]
+            [true true true true false] [true true true true true]
         }
     }
 }
@@ -163,16 +191,13 @@ fn pixel_filter(filter: Filter) -> PixelFilter {
     }
 }
 
-fn assemble(
-    camera: &Camera,
-    with_gbuffer: bool,
-    tiles: Vec<(TilePixels, RayCounts)>,
-) -> (Film, RayCounts) {
+fn assemble(camera: &Camera, with_gbuffer: bool, tiles: Vec<TileDone>) -> (Film, RayCounts) {
     let mut film = Film::new(camera.width, camera.height, with_gbuffer);
     let mut counts = RayCounts::default();
-    for (pixels, rays) in tiles {
-        counts += rays;
-        for (x, y, rgb, record) in pixels {
+    for tile in tiles {
+        counts += tile.rays;
+        film.bad += tile.bad;
+        for (x, y, rgb, record) in tile.pixels {
             let index = film.index(x, y);
             film.rgb[index] = rgb;
             if let (Some(gbuffer), Some(record)) = (&mut film.gbuffer, record) {

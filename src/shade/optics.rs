@@ -18,8 +18,12 @@ pub struct Split {
 
 /// Fresnel's equations and Snell's law at a boundary with unit normal `n`, for `wo` leaving
 /// towards the viewer; `n` may point to either side. `eta` is the index on the far side of the
-/// boundary over the index on the viewer's side.
+/// boundary over the index on the viewer's side; where that is no positive number the reflectance
+/// is NaN.
 pub fn split(wo: DVec3, n: DVec3, eta: f64) -> Split {
+    if !(eta > 0.0 && eta < f64::INFINITY) {
+        return Split { reflectance: f64::NAN, refracted: None };
+    }
     let cos = wo.dot(n);
     let (n, cos) = if cos < 0.0 { (-n, -cos) } else { (n, cos) };
     let cos = cos.min(1.0);
@@ -39,7 +43,7 @@ fn fresnel(cos: f64, cos_t: f64, eta: f64) -> f64 {
     let perpendicular = (cos - eta * cos_t) / (cos + eta * cos_t);
     let both = 0.5 * (parallel * parallel + perpendicular * perpendicular);
     // Grazing on both sides of eta = 1 is 0/0; nothing is there to reflect.
-    if both.is_nan() { 0.0 } else { both.min(1.0) }
+    if eta == 1.0 && both.is_nan() { 0.0 } else { both.clamp(0.0, 1.0) }
 }
 
 /// `direction`, mirrored at the plane of `ng` where it points to the other side than `wanted`.

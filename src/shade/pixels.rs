@@ -5,9 +5,12 @@ use crate::film::GPixel;
 use crate::math::Rgb;
 use crate::sampling::PixelSampler;
 use crate::scene::Rect;
+use crate::stats::Fault;
 
 /// Edge of a block in pixels.
 pub(super) const BLOCK: u32 = 8;
+/// What no light looks like.
+const MAGENTA: Rgb = Rgb::new(1.0, 0.0, 1.0);
 /// Dimension of the camera samples' pixel positions.
 const FILM_DIMENSION: u32 = 0;
 
@@ -18,6 +21,10 @@ pub(super) struct BlockPixels {
     film_samplers: Vec<PixelSampler>,
     samplers: Vec<PixelSampler>,
     sums: Vec<Rgb>,
+    /// Light of the present chunk of samples that is no radiance: pixel, sample, fault.
+    suspects: Vec<(u32, u32, Fault)>,
+    /// Pixels with such a sample, once a sample.
+    bad: Vec<(u32, Fault)>,
     records: Vec<Record>,
     with_records: bool,
 }
@@ -36,6 +43,8 @@ impl BlockPixels {
             film_samplers: Vec::new(),
             samplers: Vec::new(),
             sums: Vec::new(),
+            suspects: Vec::new(),
+            bad: Vec::new(),
             records: Vec::new(),
             with_records,
         }
@@ -60,6 +69,8 @@ impl BlockPixels {
         }
         self.sums.clear();
         self.sums.resize(self.places.len(), Rgb::ZERO);
+        self.suspects.clear();
+        self.bad.clear();
         self.records.clear();
         if self.with_records {
             let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
@@ -72,9 +83,55 @@ impl BlockPixels {
         self.places.len()
     }
 
-    /// Adds radiance to a pixel's sum.
-    pub fn add(&mut self, pixel: u32, radiance: Rgb) {
+    /// Adds radiance of one camera sample to its pixel's sum. What is no radiance is added as it
+    /// is, and noted.
+    #[inline]
+    pub fn add(&mut self, pixel: u32, sample: u32, radiance: Rgb) {
         self.sums[pixel as usize] += radiance;
+        self.check(pixel, sample, radiance);
+    }
+
+    /// Notes a sample whose light, or weight of light, is no radiance.
+    #[inline]
+    pub fn check(&mut self, pixel: u32, sample: u32, light: Rgb) {
+        // The bits of what is finite and has no sign lie below those of infinity.
+        let [r, g, b] = light.to_array().map(f32::to_bits);
+        if r.max(g).max(b) >= f32::INFINITY.to_bits() {
+            self.suspect(pixel, sample, light);
+        }
+    }
+
+    #[cold]
+    fn suspect(&mut self, pixel: u32, sample: u32, radiance: Rgb) {
+        if let Some(fault) = Fault::of(radiance.to_array()) {
+            self.suspects.push((pixel, sample, fault));
+        }
+    }
+
+    /// Ends a chunk of camera samples: each bad one counts once, by its worst fault.
+    pub fn end_samples(&mut self) {
+        if self.suspects.is_empty() {
+            return;
+        }
+        self.suspects.sort_unstable_by(|a, b| b.cmp(a));
+        self.suspects.dedup_by_key(|(pixel, sample, _)| (*pixel, *sample));
+        self.bad.extend(self.suspects.drain(..).map(|(pixel, _, fault)| (pixel, fault)));
+    }
+
+    /// Bad samples of the finished block, by place. A sum of good samples that overflows is one.
+    pub fn bad(&self) -> impl Iterator<Item = (u32, u32, Fault)> {
+        let overflows = self.sums.iter().enumerate().filter_map(|(pixel, sum)| {
+            let pixel = pixel as u32;
+            (!sum.is_finite() && !self.is_bad(pixel)).then_some((pixel, Fault::Infinite))
+        });
+        self.bad.iter().copied().chain(overflows).map(|(pixel, fault)| {
+            let (x, y) = self.places[pixel as usize];
+            (x, y, fault)
+        })
+    }
+
+    fn is_bad(&self, pixel: u32) -> bool {
+        self.bad.iter().any(|(bad, _)| *bad == pixel)
     }
 
     /// The sampler of a pixel's shading.
@@ -135,11 +192,19 @@ impl BlockPixels {
         self.records[pixel].pixel = record;
     }
 
-    /// Each pixel's place, mean radiance and record.
-    pub fn finished(&self, spp: u32) -> impl Iterator<Item = (u32, u32, Rgb, Option<GPixel>)> {
+    /// Each pixel's place, mean radiance and record. With `flag_bad`, pixels with a bad sample are
+    /// magenta.
+    pub fn finished(
+        &self,
+        spp: u32,
+        flag_bad: bool,
+    ) -> impl Iterator<Item = (u32, u32, Rgb, Option<GPixel>)> {
         let share = 1.0 / spp as f32;
         self.places.iter().enumerate().map(move |(i, (x, y))| {
-            (*x, *y, self.sums[i] * share, self.records.get(i).map(|r| r.pixel))
+            let sum = self.sums[i];
+            let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
+            let rgb = if flagged { MAGENTA } else { sum * share };
+            (*x, *y, rgb, self.records.get(i).map(|r| r.pixel))
         })
     }
 }

@@ -5,7 +5,9 @@
 
 mod a_intersection;
 mod b_spawned_rays;
+mod c_shading;
 #[path = "../common/mod.rs"]
 mod common;
+mod f_statistics;
 mod shapes;
 mod suite;

@@ -5,9 +5,11 @@
 
 mod a_intersection;
 mod b_spawned_rays;
+mod c_shading;
 #[path = "../common/mod.rs"]
 mod common;
 mod costs;
+mod f_statistics;
 mod shapes;
 mod suite;
 #[path = "../../benches/support/mod.rs"]
@@ -17,8 +19,12 @@ use std::io::Write;
 use suite::{Case, Outcome, Size};
 
 /// Letter, what it is about, its cases.
-const LETTERS: [(&str, &str, &[Case]); 2] =
-    [("a", "intersection", a_intersection::CASES), ("b", "spawned rays", b_spawned_rays::CASES)];
+const LETTERS: [(&str, &str, &[Case]); 4] = [
+    ("a", "intersection", a_intersection::CASES),
+    ("b", "spawned rays", b_spawned_rays::CASES),
+    ("c", "shading, normals, glass", c_shading::CASES),
+    ("f", "statistics and effects", f_statistics::CASES),
+];
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();

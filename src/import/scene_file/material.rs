@@ -1,7 +1,7 @@
 //! `[material.NAME]`.
 
 use super::at::At;
-use super::number::Ior;
+use super::number::{Int, Ior};
 use super::report::Source;
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
@@ -41,6 +41,10 @@ pub(super) struct Glass {
     /// Share of light that each crossing of the surface lets through.
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
+    /// For bodies that touch, overlap or lie in one another, as tea in a glass: where several are,
+    /// the one of the highest priority is. `ior` is then that of the body itself. Absent: the body
+    /// overlaps nothing.
+    priority: Option<Int<0, 255>>,
 }
 
 fn window_glass() -> Ior {
@@ -56,7 +60,11 @@ impl Material {
         texture: Option<TextureId>,
     ) -> Result<scene::Material> {
         self.check(source)?;
-        let glass = self.glass.as_ref().map(|g| scene::Glass { ior: g.ior.0, tint: g.tint.rgb() });
+        let glass = self.glass.as_ref().map(|g| scene::Glass {
+            ior: g.ior.0,
+            tint: g.tint.rgb(),
+            priority: g.priority.map(|p| p.u32() as u8),
+        });
         Ok(scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),

@@ -62,6 +62,10 @@ pub(super) struct Settings {
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, as `[x0, y0, x1, y1]`; row 0 is the top.
     /// Absent: all of them.
     crop: Option<At<List<Corner, 4>>>,
+    /// Show pixels with a sample that is NaN, infinite or negative in magenta.
+    flag_bad: bool,
+    /// Whether such a sample makes the job fail, with its frames written.
+    strict: bool,
     /// First and last frame to render, as `[first, last]`, counted from 1. Absent: all.
     frames: Option<At<List<Int<1, 1_000_000>, 2>>>,
     /// Where frames go, relative to the current folder: `####` is the frame's number, the ending
@@ -99,6 +103,8 @@ impl Default for Settings {
             isa: None,
             rules: Rules::default(),
             crop: None,
+            flag_bad: s.flag_bad,
+            strict: false,
             frames: None,
             output: None,
             fps: FrameRate(24.0),
@@ -139,6 +145,7 @@ impl Settings {
             isa: self.isa.map(|isa| isa.name().to_owned()),
             rules: HitRules { robust, overlap, retry, recheck, spawn_offset, recentre },
             crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
+            flag_bad: self.flag_bad,
         })
     }
 
@@ -169,6 +176,7 @@ impl Settings {
         }
         loaded.fps = self.fps.0;
         loaded.video = self.video;
+        loaded.strict = self.strict;
         loaded.overwrite = self.overwrite;
         loaded.threads = self.threads.map(Int::u32);
         loaded.stats.clone_from(&self.stats);

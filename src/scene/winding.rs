@@ -1,0 +1,103 @@
+//! Faces of one closed mesh wound the same way round.
+
+use crate::math::DVec3;
+use std::collections::HashMap;
+
+/// Which `triangles` must be reversed so that neighbours agree on what is outside: of each
+/// connected part the lesser share by area. `None` where that is no question with an answer: an
+/// edge has not exactly two triangles, or the part is one-sided.
+///
+/// `weld` names for each vertex the first one at its place.
+pub(super) fn strays(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    weld: &[u32],
+) -> Option<Vec<bool>> {
+    let welded: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|i| weld[i as usize])).collect();
+    let solid = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    let mut edges: HashMap<(u32, u32), Vec<(u32, bool)>> = HashMap::new();
+    for (index, t) in welded.iter().enumerate().filter(|(_, t)| solid(t)) {
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            edges.entry((a.min(b), a.max(b))).or_default().push((index as u32, a < b));
+        }
+    }
+    if edges.values().any(|sides| sides.len() != 2) {
+        return None;
+    }
+    let mut reversed: Vec<Option<bool>> = vec![None; triangles.len()];
+    for start in 0..triangles.len() {
+        if reversed[start].is_none() && solid(&welded[start]) {
+            orient_part(positions, triangles, &welded, &edges, &mut reversed, start)?;
+        }
+    }
+    Some(reversed.into_iter().map(|r| r == Some(true)).collect())
+}
+
+/// Orients the part that `start` belongs to.
+fn orient_part(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    welded: &[[u32; 3]],
+    edges: &HashMap<(u32, u32), Vec<(u32, bool)>>,
+    reversed: &mut [Option<bool>],
+    start: usize,
+) -> Option<()> {
+    let mut part = vec![start];
+    let mut areas = [0.0; 2];
+    reversed[start] = Some(false);
+    let mut next = 0;
+    while let Some(&index) = part.get(next) {
+        next += 1;
+        let own = reversed[index] == Some(true);
+        let [a, b, c] = triangles[index].map(|i| positions[i as usize]);
+        areas[usize::from(own)] += (b - a).cross(c - a).length();
+        let t = welded[index];
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            let sides = &edges[&(a.min(b), a.max(b))];
+            let other = sides.iter().find(|(side, _)| *side as usize != index)?;
+            // Neighbours that agree run along their edge in opposite directions.
+            let wanted = own ^ (other.1 == (a < b));
+            match reversed[other.0 as usize] {
+                None => {
+                    reversed[other.0 as usize] = Some(wanted);
+                    part.push(other.0 as usize);
+                }
+                Some(found) if found != wanted => return None,
+                Some(_) => {}
+            }
+        }
+    }
+    if areas[1] > areas[0] {
+        part.iter().for_each(|i| reversed[*i] = reversed[*i].map(|r| !r));
+    }
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+
+    fn corners() -> Vec<DVec3> {
+        vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]
+    }
+
+    #[test]
+    fn the_stray_face_is_found() {
+        let weld = [0, 1, 2, 3];
+        assert_eq!(strays(&corners(), &TETRAHEDRON, &weld), Some(vec![false; 4]));
+        for stray in 0..4 {
+            let mut triangles = TETRAHEDRON;
+            triangles[stray].swap(0, 1);
+            // The slanted face has the most area of one, not of all.
+            let expected: Vec<bool> = (0..4).map(|i| i == stray).collect();
+            assert_eq!(strays(&corners(), &triangles, &weld), Some(expected), "{stray}");
+        }
+    }
+
+    #[test]
+    fn an_open_mesh_has_no_answer() {
+        assert_eq!(strays(&corners(), &TETRAHEDRON[..3], &[0, 1, 2, 3]), None);
+    }
+}

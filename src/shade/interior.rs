@@ -1,0 +1,246 @@
+//! Bodies of glass in one another: which of them is there, and where one really ends.
+//!
+//! Each body of glass with a priority is a closed surface. Where several overlap, the one of the
+//! highest priority is, so a boundary counts only when nothing higher is around it (Schmidt and
+//! Budge, "Simple nested dielectrics in ray traced images", 2002). A path carries the bodies that
+//! it is in. Boundaries that touch are crossed at once, or what lies between them by rounding or
+//! by design would decide whether light is totally reflected.
+//!
+//! Only the kernels for such glass use this. A body is a mesh or an exact sphere; it must be
+//! closed. Of boundaries that coincide bit for bit two are told apart, not three.
+
+use super::Renderer;
+use crate::intersect::{Ray, SurfaceInteraction};
+use crate::math::{DVec3, Rgb};
+use crate::scene::{Glass, MaterialId, Scene};
+use crate::stats::RayCounts;
+
+/// Bodies that one point can be in; of more, the lowest priority is forgotten.
+const MOST_BODIES: usize = 8;
+/// Scene units between boundaries that touch: the gap of a model whose coordinates have six
+/// decimals, and ten times what rounding positions to f32 moves them.
+const TOUCHING: f64 = 4e-6;
+/// A ray sees touching boundaries further apart the flatter it meets them, down to this cosine.
+const LEAST_COS: f64 = 0.05;
+/// Boundaries that are crossed at once.
+const MOST_TOUCHING: usize = 4;
+/// Boundaries between the eye and the end of the scene.
+const MOST_CROSSED: usize = 1024;
+
+/// A body of glass: a mesh or a sphere.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Body {
+    /// Mesh, or number of meshes plus sphere.
+    index: u32,
+    material: MaterialId,
+    priority: u8,
+}
+
+/// The bodies that a point lies in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Interior {
+    bodies: [Body; MOST_BODIES],
+    len: u8,
+}
+
+impl Interior {
+    fn bodies(&self) -> &[Body] {
+        &self.bodies[..usize::from(self.len)]
+    }
+
+    fn enter(&mut self, body: Body) {
+        if self.bodies().contains(&body) {
+            // A ray on an edge meets both of its triangles.
+            return;
+        }
+        if usize::from(self.len) == MOST_BODIES {
+            let lowest = self.bodies().iter().enumerate().min_by_key(|(_, b)| b.priority);
+            let lowest = lowest.map_or(0, |(at, _)| at);
+            self.bodies[lowest] = body;
+            return;
+        }
+        self.bodies[usize::from(self.len)] = body;
+        self.len += 1;
+    }
+
+    fn leave(&mut self, body: Body) {
+        let Some(at) = self.bodies().iter().position(|b| *b == body) else { return };
+        self.len -= 1;
+        self.bodies[at] = self.bodies[usize::from(self.len)];
+    }
+
+    /// What is there: of equal priorities the later material, so that the order of entry is
+    /// nothing.
+    fn medium(&self) -> Option<Body> {
+        self.bodies().iter().copied().max_by_key(|b| (b.priority, b.material))
+    }
+
+    /// The bodies at `eye`, by what a ray along `dir` leaves before it has entered it.
+    pub fn at(renderer: &Renderer, eye: DVec3, dir: DVec3) -> Self {
+        let mut inside = Self::default();
+        let mut met = Vec::new();
+        let mut ray = Ray::new(eye, dir);
+        for _ in 0..MOST_CROSSED {
+            let hit = renderer.intersector.intersect(&ray, &mut RayCounts::default());
+            let Some(hit) = hit else { break };
+            let si = SurfaceInteraction::new(renderer.scene, &ray, &hit);
+            if let Some(body) = body_of(renderer.scene, &si) {
+                if !met.contains(&body) {
+                    met.push(body);
+                    if si.is_outside(dir) {
+                        inside.enter(body);
+                    }
+                }
+            }
+            ray = si.spawn(dir, renderer.settings.rules.spawn_offset);
+        }
+        inside
+    }
+}
+
+/// The body that a surface bounds, if it is glass with a priority.
+fn body_of(scene: &Scene, si: &SurfaceInteraction) -> Option<Body> {
+    let glass = scene.materials[si.surface.material as usize].glass.as_ref()?;
+    let priority = glass.priority?;
+    let sphere = if si.prim.geom_id == scene.sphere_geom_id() { si.prim.prim_id } else { 0 };
+    Some(Body { index: si.prim.geom_id + sphere, material: si.surface.material, priority })
+}
+
+/// Whether `glass` is this module's business.
+pub(super) fn is_ranked(glass: &Glass) -> bool {
+    glass.priority.is_some()
+}
+
+/// Touching boundaries of ranked glass, crossed at once.
+pub(super) struct Crossing {
+    /// The last of them: what goes through starts here.
+    pub last: SurfaceInteraction,
+    /// The bodies behind it.
+    pub after: Interior,
+    /// The boundary between two media, or `None` where the medium stays what it was.
+    pub boundary: Option<Boundary>,
+}
+
+/// Where one medium ends and another begins.
+pub(super) struct Boundary {
+    /// The surface of the medium of the higher priority.
+    pub surface: SurfaceInteraction,
+    /// Index of refraction behind over that before.
+    pub eta: f64,
+    /// Share of light that it lets through.
+    pub tint: Rgb,
+}
+
+/// Crosses what `ray` meets at `first`, where `t` is its parameter and `before` the bodies there.
+pub(super) fn cross(
+    renderer: &Renderer,
+    ray: &Ray,
+    first: &SurfaceInteraction,
+    t: f64,
+    before: &Interior,
+    counts: &mut RayCounts,
+) -> Crossing {
+    let scene = renderer.scene;
+    let mut crossed = [*first; MOST_TOUCHING];
+    let mut count = 1;
+    let cos = first.ng.dot(ray.dir).abs();
+    let reach = TOUCHING / cos.max(LEAST_COS * ray.dir.length());
+    let mut tnear = (t - reach).max(ray.tnear);
+    for _ in 0..2 * MOST_TOUCHING {
+        if count == MOST_TOUCHING {
+            break;
+        }
+        let exclude = crossed[count - 1].prim;
+        let probe = Ray { tnear, tfar: (t + reach).min(ray.tfar), exclude, ..*ray };
+        counts.glass += 1;
+        let Some(hit) = renderer.intersector.intersect(&probe, counts) else { break };
+        let si = SurfaceInteraction::new(scene, &probe, &hit);
+        if si.prim == ray.exclude || crossed[..count].iter().any(|c| c.prim == si.prim) {
+            // Where the ray started, or seen already: what else there is lies further on.
+            if tnear >= t {
+                break;
+            }
+            tnear = t;
+            continue;
+        }
+        // Something solid, which what goes through meets next.
+        if body_of(scene, &si).is_none() {
+            break;
+        }
+        crossed[count] = si;
+        count += 1;
+        // Beyond it by what Embree's f32 needs to tell the two apart.
+        tnear = hit.t.max(t) * (1.0 + 2.0 * f64::from(f32::EPSILON));
+    }
+    let crossed = &crossed[..count];
+    let mut after = *before;
+    for (si, body) in crossed.iter().filter_map(|si| Some((si, body_of(scene, si)?))) {
+        if si.is_outside(ray.dir) { after.leave(body) } else { after.enter(body) }
+    }
+    let boundary = boundary(scene, crossed, before.medium(), after.medium());
+    Crossing { last: crossed[count - 1], after, boundary }
+}
+
+fn boundary(
+    scene: &Scene,
+    crossed: &[SurfaceInteraction],
+    before: Option<Body>,
+    after: Option<Body>,
+) -> Option<Boundary> {
+    let material = |body: Option<Body>| body.map(|b| b.material);
+    if material(before) == material(after) {
+        return None;
+    }
+    let higher = [before, after].into_iter().flatten().max_by_key(|b| (b.priority, b.material))?;
+    let own = crossed.iter().find(|si| si.surface.material == higher.material);
+    let glass = |body: &Body| scene.materials[body.material as usize].glass.as_ref();
+    let ior = |body: Option<Body>| body.as_ref().and_then(glass).map_or(1.0, |g| g.ior);
+    Some(Boundary {
+        surface: *own.unwrap_or(&crossed[0]),
+        eta: ior(after) / ior(before),
+        tint: glass(&higher).map_or(Rgb::ONE, |g| g.tint),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn body(index: u32, priority: u8) -> Body {
+        Body { index, material: index, priority }
+    }
+
+    #[test]
+    fn the_highest_priority_is_there_in_any_order() {
+        let (glass, tea, ice) = (body(0, 2), body(1, 1), body(2, 3));
+        for order in [[glass, tea, ice], [ice, tea, glass], [tea, ice, glass]] {
+            let mut inside = Interior::default();
+            order.iter().for_each(|b| inside.enter(*b));
+            assert_eq!(inside.medium(), Some(ice));
+            inside.leave(ice);
+            assert_eq!(inside.medium(), Some(glass));
+            inside.leave(glass);
+            assert_eq!(inside.medium(), Some(tea));
+            inside.leave(tea);
+            assert_eq!(inside.medium(), None);
+        }
+    }
+
+    #[test]
+    fn edges_and_strangers_do_not_count_twice() {
+        let mut inside = Interior::default();
+        inside.enter(body(0, 1));
+        inside.enter(body(0, 1));
+        inside.leave(body(5, 1));
+        inside.leave(body(0, 1));
+        assert_eq!(inside.medium(), None);
+    }
+
+    #[test]
+    fn of_too_many_bodies_the_lowest_is_forgotten() {
+        let mut inside = Interior::default();
+        (0..20).for_each(|i| inside.enter(body(i, i as u8)));
+        assert_eq!(inside.medium(), Some(body(19, 19)));
+        assert_eq!(usize::from(inside.len), MOST_BODIES);
+    }
+}
