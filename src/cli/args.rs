@@ -98,9 +98,6 @@ pub struct SettingArgs {
     /// Watertight traversal of Embree [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub robust: Option<bool>,
-    /// Triangles overlap by a few ulp, so that no ray passes between them [default: on]
-    #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
-    pub overlap: Option<bool>,
     /// A second try for rays that miss inside the bounds [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub retry: Option<bool>,
@@ -139,7 +136,6 @@ impl SettingArgs {
         put(&mut s.intersector, self.intersector);
         put(&mut s.rules.recheck, self.recheck);
         put(&mut s.rules.robust, self.robust);
-        put(&mut s.rules.overlap, self.overlap);
         put(&mut s.rules.retry, self.retry);
         put(&mut s.rules.spawn_offset, self.spawn_offset);
         put(&mut s.rules.recentre, self.recentre);

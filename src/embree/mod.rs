@@ -149,7 +149,6 @@ pub struct SceneBuilder<'g> {
     device: Device,
     spheres: Vec<Box<[SphereData]>>,
     indices: Vec<Box<[[u32; 3]]>>,
-    corners: Vec<Box<[Vec3]>>,
     next_id: u32,
     geometry: PhantomData<&'g ()>,
 }
@@ -188,7 +187,6 @@ impl<'g> SceneBuilder<'g> {
             device,
             spheres: Vec::new(),
             indices: Vec::new(),
-            corners: Vec::new(),
             next_id: 0,
             geometry: PhantomData,
         })
@@ -207,51 +205,25 @@ impl<'g> SceneBuilder<'g> {
         triangles: &'g [[u32; 3]],
         omit: impl ExactSizeIterator<Item = u32>,
     ) -> Result<u32> {
-        if omit.len() == 0 {
-            return self.add_mesh(positions, vertex_count, triangles);
-        }
-        let own = without(triangles.to_vec(), omit);
-        let id = self.add_mesh(positions, vertex_count, &own);
-        self.indices.push(own);
-        id
-    }
-
-    /// Adds triangles with corners of their own, three after another and one spare element, and
-    /// returns their `geom_id`. Otherwise like [`Self::add_triangles`].
-    pub fn add_soup(
-        &mut self,
-        corners: Vec<Vec3>,
-        omit: impl ExactSizeIterator<Item = u32>,
-    ) -> Result<u32> {
-        let corners = corners.into_boxed_slice();
-        let count = corners.len().saturating_sub(1) / 3;
-        let triangles = (0..count as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-        let own = without(triangles, omit);
-        let id = self.add_mesh(&corners, 3 * count, &own);
-        self.indices.push(own);
-        self.corners.push(corners);
-        id
-    }
-
-    /// The slices must stay where they are until the scene is dropped: those of the callers live
-    /// for 'g, and boxes of our own are dropped after the scene (field order here and in
-    /// [`CommittedScene`]).
-    fn add_mesh(
-        &mut self,
-        positions: &[Vec3],
-        vertex_count: usize,
-        triangles: &[[u32; 3]],
-    ) -> Result<u32> {
         if positions.len() <= vertex_count {
             return Err(Error::Embree("a vertex buffer lacks its spare element".into()));
         }
         if triangles.iter().flatten().any(|i| *i as usize >= vertex_count) {
             return Err(Error::Embree("a triangle names a vertex that does not exist".into()));
         }
-        self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
-            // SAFETY: both slices outlive the scene (see above); sizes, strides and the 16-byte
-            // read of the last vertex were checked ("rtcSetSharedGeometryBuffer": the buffer must
-            // be padded to 16 bytes and stay alive).
+        let mut triangles = triangles;
+        let mut own: Box<[[u32; 3]]> = Box::default();
+        if omit.len() > 0 {
+            own = Box::from(triangles);
+            // A triangle of one point has no inside.
+            omit.for_each(|prim| own[prim as usize] = [own[prim as usize][0]; 3]);
+            triangles = &own;
+        }
+        let id = self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
+            // SAFETY: both slices live for 'g, which the committed scene borrows, or are boxes that
+            // do not move and are dropped after the scene (as with spheres); sizes, strides
+            // and the 16-byte read of the last vertex were checked above ("rtcSetSharedGeometry-
+            // Buffer": the buffer must be padded to 16 bytes and stay alive).
             unsafe {
                 sys::rtcSetSharedGeometryBuffer(
                     geometry,
@@ -274,7 +246,9 @@ impl<'g> SceneBuilder<'g> {
                     triangles.len(),
                 );
             }
-        })
+        });
+        self.indices.push(own);
+        id
     }
 
     /// Adds analytic spheres as one geometry and returns its `geom_id`. Those numbered in `omit`
@@ -331,18 +305,11 @@ impl<'g> SceneBuilder<'g> {
             scene: self.scene,
             device: self.device,
             spheres: self.spheres,
-            indices: self.indices,
-            corners: self.corners,
+            _indices: self.indices,
             width,
             geometry: PhantomData,
         })
     }
-}
-
-/// Index triples in which those numbered in `omit` name one point, which has no inside.
-fn without(mut triangles: Vec<[u32; 3]>, omit: impl Iterator<Item = u32>) -> Box<[[u32; 3]]> {
-    omit.for_each(|prim| triangles[prim as usize] = [triangles[prim as usize][0]; 3]);
-    triangles.into_boxed_slice()
 }
 
 /// A built scene: immutable, traceable from any thread.
@@ -350,8 +317,7 @@ pub struct CommittedScene<'g> {
     scene: SceneHandle,
     device: Device,
     spheres: Vec<Box<[SphereData]>>,
-    indices: Vec<Box<[[u32; 3]]>>,
-    corners: Vec<Box<[Vec3]>>,
+    _indices: Vec<Box<[[u32; 3]]>>,
     width: usize,
     geometry: PhantomData<&'g ()>,
 }
@@ -362,11 +328,9 @@ impl CommittedScene<'_> {
         self.width
     }
 
-    /// Bytes that Embree holds for this scene, and those of the buffers made for it.
+    /// Bytes that Embree holds for this scene.
     pub fn memory(&self) -> u64 {
-        let own = self.indices.iter().map(|i| size_of_val(&**i)).sum::<usize>()
-            + self.corners.iter().map(|c| size_of_val(&**c)).sum::<usize>();
-        self.device.memory.load(Ordering::Relaxed).max(0) as u64 + own as u64
+        self.device.memory.load(Ordering::Relaxed).max(0) as u64
     }
 
     /// Version of the Embree library that is loaded, "4.3.3".

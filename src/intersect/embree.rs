@@ -6,7 +6,6 @@
 //! * A hit's `t, u, v` are recomputed in f64; one that lies beside its triangle is a phantom, and
 //!   the ray goes on past it.
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
-//! * Triangles overlap a little, so that no ray passes between them.
 //! * A ray that misses although it comes near some triangle gets one second try, moved by 4 ulp.
 //!
 //! Shadow rays report no primitive, so only the first rule reaches them.
@@ -16,7 +15,6 @@
 
 use super::coarse::{Bundle, CoarseTree};
 use super::coincident;
-use super::overlap::{self, OVERLAP};
 use super::triangle::{self, Pairs, PlaneHit};
 use super::{Hit, Intersector, PrimRef, Ray, sphere};
 use crate::embree::{
@@ -35,7 +33,7 @@ const NEAR: f64 = 4.0;
 /// Phantoms that one ray may pass.
 const MOST_PHANTOMS: usize = 4096;
 /// How far beside its triangle a ray may pass, per unit of the largest coordinate: 4 ulp, less the
-/// rounding of measuring it.
+/// rounding of measuring it. That is what rounding the ray to f32 explains.
 const EDGE_BAND: f64 = 7.99 * ROUNDING;
 /// Rays that go through the steps together: a block of the renderer's.
 const BLOCK: usize = triangle::MOST;
@@ -64,6 +62,15 @@ struct Candidate {
     hit: PacketHit,
     /// How far the ray's origin was moved along it before Embree saw it.
     shift: f64,
+}
+
+/// How Embree sees a ray's direction.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    /// As it is.
+    None,
+    /// Turned by a few ulp, for a second try.
+    Nudged,
 }
 
 /// Lanes of a block, a bit each.
@@ -97,11 +104,7 @@ impl<'s> EmbreeIntersector<'s> {
         };
         for (mesh, geom_id) in scene.meshes.iter().zip(0..) {
             let omit = copies_in(geom_id);
-            if rules.overlap {
-                builder.add_soup(overlap::grown(mesh), omit)?;
-            } else {
-                builder.add_triangles(&mesh.positions, mesh.vertex_count, &mesh.triangles, omit)?;
-            }
+            builder.add_triangles(&mesh.positions, mesh.vertex_count, &mesh.triangles, omit)?;
         }
         let spheres = scene.spheres.iter();
         let spheres =
@@ -134,8 +137,12 @@ impl<'s> EmbreeIntersector<'s> {
     // ---- one ray -----------------------------------------------------------------------------
 
     /// One Embree query that cannot hit the `passed` primitives.
-    fn query(&self, ray: &Ray, passed: &[PrimRef]) -> Option<Candidate> {
-        let (moved, shift) = self.approach(ray)?;
+    fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
+        let (mut moved, shift) = self.approach(ray)?;
+        // After the approach: from afar, 4 ulp would lead past what is looked at.
+        if turn == Turn::Nudged {
+            moved = nudged(&moved);
+        }
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
@@ -146,18 +153,42 @@ impl<'s> EmbreeIntersector<'s> {
 
     /// The first true hit of a valid ray.
     fn first_hit(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit> {
-        match self.query(ray, &[]) {
-            Some(candidate) => self
-                .recheck(ray, &candidate)
-                .or_else(|| self.settle(ray, Some(candidate.hit.prim), counts)),
-            None => self.settle(ray, None, counts),
+        let Some(candidate) = self.query(ray, Turn::None, &[]) else {
+            return self.settle(ray, None, counts);
+        };
+        let hit = self.recheck(ray, &candidate);
+        if self.retries() && self.is_doubtful(ray, &candidate.hit) {
+            counts.retry += 1;
+            let again = self.query(ray, Turn::Nudged, &[]);
+            let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
+            let again = again.and_then(|again| self.recheck(ray, &again));
+            if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
+                return again;
+            }
+        }
+        hit.or_else(|| self.settle(ray, Some(candidate.hit.prim), counts))
+    }
+
+    /// Whether the ray must have met another triangle before: from outside of a closed surface it
+    /// meets a front first, and once it went in, in glass say, a back of the same mesh.
+    fn is_doubtful(&self, ray: &Ray, hit: &PacketHit) -> bool {
+        let left = ray.exclude;
+        let inside = self.scene.meshes.get(left.geom_id as usize).is_some_and(|mesh| {
+            let [a, b, c] = mesh.corners(left.prim_id as usize);
+            (b - a).cross(c - a).dot(ray.dir) < 0.0
+        });
+        if inside {
+            !is_back(ray, hit) && hit.prim.geom_id == left.geom_id
+        } else {
+            is_back(ray, hit)
         }
     }
 
-    /// The first true hit of `ray`, sought along `cast`: itself, or what a second try makes of it.
-    fn pursue(&self, ray: &Ray, cast: &Ray, passed: &mut Vec<PrimRef>) -> Option<Hit> {
+    /// The first true hit of `ray`, turned by a second try or not.
+    fn pursue(&self, ray: &Ray, turn: Turn, passed: &mut Vec<PrimRef>) -> Option<Hit> {
         while passed.len() < MOST_PHANTOMS {
-            let candidate = self.query(cast, passed)?;
+            let candidate = self.query(ray, turn, passed)?;
+            // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
             if let Some(hit) = self.recheck(ray, &candidate) {
                 return Some(hit);
             }
@@ -172,7 +203,7 @@ impl<'s> EmbreeIntersector<'s> {
         let mut passed = Vec::new();
         if let Some(phantom) = phantom {
             passed.push(phantom);
-            let hit = self.pursue(ray, ray, &mut passed);
+            let hit = self.pursue(ray, Turn::None, &mut passed);
             if hit.is_some() {
                 return hit;
             }
@@ -182,8 +213,7 @@ impl<'s> EmbreeIntersector<'s> {
             return None;
         }
         counts.retry += 1;
-        // Judged by the ray that was asked for: the nudge is smaller than the tolerance.
-        self.pursue(ray, &nudged(ray), &mut passed)
+        self.pursue(ray, Turn::Nudged, &mut passed)
     }
 
     // ---- a block -----------------------------------------------------------------------------
@@ -206,7 +236,11 @@ impl<'s> EmbreeIntersector<'s> {
         }
         let mut found = [NOTHING; BLOCK];
         let mut hit = self.trace::<W>(rays, valid, &mut found);
-        hit |= self.second_tries::<W>(rays, valid & !hit, &mut found, counts);
+        if self.retries() {
+            let missed = self.missed_near(rays, valid & !hit);
+            let doubtful = missed | back_faces(rays, hit, &found);
+            hit |= self.second_tries::<W>(rays, doubtful, &mut found, counts);
+        }
         for lane in each(self.recheck_block(rays, hit, &found, hits)) {
             hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
         }
@@ -241,30 +275,37 @@ impl<'s> EmbreeIntersector<'s> {
         hit
     }
 
-    /// Gives the `missed` lanes that come near some triangle a second try; returns those that hit.
+    /// The lanes of `missed` that may all the same have met a triangle.
+    fn missed_near(&self, rays: &[Ray], missed: Lanes) -> Lanes {
+        let bundle = Bundle::of(each(missed).map(|lane| &rays[lane]));
+        if bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle)) { missed } else { 0 }
+    }
+
+    /// Gives the `doubtful` lanes a second try and keeps what it finds where that is nearer; returns
+    /// those that hit.
     fn second_tries<const W: usize>(
         &self,
         rays: &[Ray],
-        missed: Lanes,
+        doubtful: Lanes,
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
     ) -> Lanes {
-        let Some(bundle) = Bundle::of(each(missed).map(|lane| &rays[lane])) else { return 0 };
-        if !self.retries() || !self.coarse.may_meet(&bundle) {
+        let tried = doubtful.count_ones();
+        if tried == 0 {
             return 0;
         }
-        let tried = missed.count_ones();
         counts.retry += u64::from(tried);
         let mut again = [rays[0]; BLOCK];
-        for (k, lane) in each(missed).enumerate() {
+        for (k, lane) in each(doubtful).enumerate() {
             again[k] = nudged(&rays[lane]);
         }
         let mut found_again = [NOTHING; BLOCK];
         let all = Lanes::MAX >> (BLOCK as u32 - tried);
         let hit_again = self.trace::<W>(&again[..tried as usize], all, &mut found_again);
         let mut hit = 0;
-        for (k, lane) in each(missed).enumerate() {
-            if hit_again >> k & 1 == 1 {
+        for (k, lane) in each(doubtful).enumerate() {
+            let is_hit = hit_again >> k & 1 == 1;
+            if is_hit && is_well_before(&rays[lane], found_again[k].t, found[lane].t) {
                 found[lane] = found_again[k];
                 hit |= 1 << lane;
             }
@@ -369,11 +410,10 @@ impl<'s> EmbreeIntersector<'s> {
             return Some(self.as_it_is(hit, candidate.shift));
         }
         let corners = mesh.corners(hit.prim.prim_id as usize);
-        let inside = triangle::meet_plane(ray, &corners).filter(PlaneHit::is_inside);
-        let PlaneHit { t, u, v } = match inside {
-            Some(met) => met,
-            None => beside(ray, &corners, candidate.shift)?,
-        };
+        // A ray in the triangle's plane hits nothing, nor is a triangle without an inside hit.
+        let met = triangle::meet_plane(ray, &corners)?;
+        let met = if met.is_inside() { met } else { beside(ray, &corners, met, candidate.shift)? };
+        let PlaneHit { t, u, v } = met;
         (ray.tnear..=ray.tfar).contains(&t).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
     }
 
@@ -393,8 +433,32 @@ impl<'s> EmbreeIntersector<'s> {
 }
 
 /// What a lane holds before Embree found anything.
-const NOTHING: PacketHit =
-    PacketHit { t: 0.0, u: 0.0, v: 0.0, ng: crate::math::Vec3::ZERO, prim: PrimRef::NONE };
+const NOTHING: PacketHit = PacketHit {
+    t: f32::INFINITY,
+    u: 0.0,
+    v: 0.0,
+    ng: crate::math::Vec3::ZERO,
+    prim: PrimRef::NONE,
+};
+
+/// The lanes of `hit` that met the back of a triangle, though most of the block's met a front: a ray
+/// from outside of a closed surface meets its front first, unless it slipped through at a vertex.
+fn back_faces(rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
+    let back = each(hit).filter(|lane| is_back(&rays[*lane], &found[*lane]));
+    let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
+    if 2 * back.count_ones() > hit.count_ones() { 0 } else { back }
+}
+
+/// Whether `t` lies before `other` on `ray` by more than both may be off.
+fn is_well_before(ray: &Ray, t: f32, other: f32) -> bool {
+    let length = ray.dir.length();
+    let reach = ray.org.length() + f64::from(t) * length;
+    f64::from(other - t) * length > 32.0 * ROUNDING * reach
+}
+
+fn is_back(ray: &Ray, hit: &PacketHit) -> bool {
+    hit.ng.as_dvec3().dot(ray.dir) > 0.0
+}
 
 /// The lanes whose rays are valid.
 fn valid_lanes(rays: &[Ray]) -> Lanes {
@@ -421,10 +485,8 @@ fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
     let length = ray.dir.length();
     let reach = ray.org.length() + f64::from(hit.t) * length;
     let area = hit.ng.as_dvec3().dot(ray.dir).abs();
-    // The true edge lies inside the one that Embree has, by the overlap.
-    let bound = 16.0 * ROUNDING * reach + OVERLAP;
     // Written so that NaN is risky.
-    let is_safe = f64::from(least) * area > bound * edge * length;
+    let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
     !is_safe
 }
 
@@ -438,18 +500,18 @@ fn longest_edge(mesh: &Mesh) -> f64 {
     f64::from(longest.reduce(|| 0.0, f32::max)).sqrt() * (1.0 + 8.0 * ROUNDING)
 }
 
-/// Where a ray that passes its triangle by is nearest to it, if that is within the edge band: what
-/// rounding the ray to f32, and the overlap, explain. `None` for a phantom. The ray's origin was
-/// moved by `shift` along it.
-fn beside(ray: &Ray, corners: &[DVec3; 3], shift: f64) -> Option<PlaneHit> {
-    // A triangle without an inside is never hit, not even at its edge.
-    if (corners[1] - corners[0]).cross(corners[2] - corners[0]) == DVec3::ZERO {
-        return None;
-    }
-    let (met, distance) = triangle::nearest_on_outline(ray, corners)?;
+/// Where a ray that meets its triangle's plane at `met`, outside, is nearest to the triangle, if that
+/// is within the edge band. `None` for a phantom. The ray's origin was moved by `shift` along it.
+fn beside(ray: &Ray, corners: &[DVec3; 3], met: PlaneHit, shift: f64) -> Option<PlaneHit> {
+    let (nearest, distance) = triangle::nearest_on_outline(ray, corners)?;
     let largest = |p: DVec3| p.abs().max_element();
     let reach = corners.iter().fold(largest(ray.at(shift)), |reach, c| reach.max(largest(*c)));
-    (distance <= EDGE_BAND * reach).then_some(met)
+    if distance > EDGE_BAND * reach {
+        return None;
+    }
+    // The plane's own t, unless the ray grazes it: then that point may be far away.
+    let apart = (met.t - nearest.t).abs() * ray.dir.length();
+    Some(PlaneHit { t: if apart <= EDGE_BAND * reach { met.t } else { nearest.t }, ..nearest })
 }
 
 /// A box with a margin for the rounding of rays.

@@ -9,7 +9,6 @@ pub mod court;
 mod embree;
 mod interaction;
 mod oracle;
-mod overlap;
 mod sieve;
 mod sphere;
 mod triangle;

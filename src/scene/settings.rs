@@ -112,8 +112,6 @@ pub enum IntersectorKind {
 pub struct HitRules {
     /// Embree's ROBUST traversal.
     pub robust: bool,
-    /// Triangles that overlap their neighbours by a few ulp inside Embree.
-    pub overlap: bool,
     /// One deterministic second try for a camera or specular ray that misses inside the bounds.
     pub retry: bool,
     /// Which hits are recomputed in f64.
@@ -128,7 +126,6 @@ impl Default for HitRules {
     fn default() -> Self {
         Self {
             robust: true,
-            overlap: true,
             retry: true,
             recheck: Recheck::Risky,
             spawn_offset: true,

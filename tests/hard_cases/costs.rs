@@ -16,10 +16,9 @@ const MOST: f64 = 1.2;
 const FRAME: u32 = 8;
 
 /// The rules, each added to those before it; the last is the slow form of the one before.
-const STEPS: [(&str, HitRules); 8] = {
+const STEPS: [(&str, HitRules); 7] = {
     let off = HitRules {
         robust: false,
-        overlap: false,
         retry: false,
         recheck: Recheck::Off,
         spawn_offset: false,
@@ -27,8 +26,7 @@ const STEPS: [(&str, HitRules); 8] = {
     };
     let recentre = HitRules { recentre: true, ..off };
     let robust = HitRules { robust: true, ..recentre };
-    let overlap = HitRules { overlap: true, ..robust };
-    let retry = HitRules { retry: true, ..overlap };
+    let retry = HitRules { retry: true, ..robust };
     let offset = HitRules { spawn_offset: true, ..retry };
     let risky = HitRules { recheck: Recheck::Risky, ..offset };
     let always = HitRules { recheck: Recheck::Always, ..offset };
@@ -36,7 +34,6 @@ const STEPS: [(&str, HitRules); 8] = {
         ("no rules", off),
         ("+ recentring", recentre),
         ("+ robust", robust),
-        ("+ overlap", overlap),
         ("+ second try", retry),
         ("+ spawn offset", offset),
         ("+ recheck, risky hits at once", risky),
@@ -44,7 +41,7 @@ const STEPS: [(&str, HitRules); 8] = {
     ]
 };
 /// The default, all rules on.
-const ALL: usize = 6;
+const ALL: usize = 5;
 
 /// Prints the table; whether all rules together keep below their limit.
 pub fn report(size: Size) -> bool {

@@ -126,7 +126,7 @@ impl Settings {
     ///
     /// Errors: a crop that leaves the image or is empty.
     pub fn build(&self, source: &Source) -> Result<scene::Settings> {
-        let Rules { robust, overlap, retry, recheck, spawn_offset, recentre } = self.rules;
+        let Rules { robust, retry, recheck, spawn_offset, recentre } = self.rules;
         Ok(scene::Settings {
             width: self.size.0[0].u32(),
             height: self.size.0[1].u32(),
@@ -143,7 +143,7 @@ impl Settings {
             png_bits: self.png_bits.0,
             intersector: self.intersector,
             isa: self.isa.map(|isa| isa.name().to_owned()),
-            rules: HitRules { robust, overlap, retry, recheck, spawn_offset, recentre },
+            rules: HitRules { robust, retry, recheck, spawn_offset, recentre },
             crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
             flag_bad: self.flag_bad,
         })

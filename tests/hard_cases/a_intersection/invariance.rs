@@ -14,7 +14,6 @@ use tweenray::scene::{
 /// Our rules, but the world's own coordinates rounded to f32, and Embree's word for the hit.
 const NAIVE: HitRules = HitRules {
     robust: true,
-    overlap: false,
     retry: true,
     recheck: Recheck::Off,
     spawn_offset: true,

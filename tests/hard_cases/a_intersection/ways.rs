@@ -6,14 +6,7 @@ use tweenray::stats::RayCounts;
 
 /// Embree as it comes, with or without its ROBUST traversal.
 pub fn stock(robust: bool) -> HitRules {
-    HitRules {
-        robust,
-        overlap: false,
-        retry: false,
-        recheck: Recheck::Off,
-        spawn_offset: false,
-        recentre: false,
-    }
+    HitRules { robust, retry: false, recheck: Recheck::Off, spawn_offset: false, recentre: false }
 }
 
 /// A world ray in scene space; `t` stays what it was.

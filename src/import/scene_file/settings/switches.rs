@@ -13,8 +13,6 @@ use std::borrow::Cow;
 pub(super) struct Rules {
     /// Watertight traversal of Embree.
     pub robust: bool,
-    /// Triangles that overlap their neighbours by a few ulp, so that no ray passes between them.
-    pub overlap: bool,
     /// One second try for a camera or specular ray that misses inside the scene's bounds.
     pub retry: bool,
     /// Which hits are recomputed in f64 at once: "risky" (grazing, slivers, near an edge; the others
@@ -90,8 +88,7 @@ impl JsonSchema for PngBits {
 
 impl Default for Rules {
     fn default() -> Self {
-        let HitRules { robust, overlap, retry, recheck, spawn_offset, recentre } =
-            HitRules::default();
-        Self { robust, overlap, retry, recheck, spawn_offset, recentre }
+        let HitRules { robust, retry, recheck, spawn_offset, recentre } = HitRules::default();
+        Self { robust, retry, recheck, spawn_offset, recentre }
     }
 }

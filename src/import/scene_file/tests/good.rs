@@ -24,7 +24,7 @@ fn every_setting_reaches_its_place() {
          sky_samples = 6\nsmooth_terminator = false\nbounces = 2\ncutoff = 0.25\nseed = 11\n\
          exposure = 1.5\n\
          tone = 'filmic'\npng_bits = 16\nintersector = 'oracle'\nisa = 'sse4.2'\n\
-         rules = { robust = false, overlap = false, retry = false, recheck = 'always', spawn_offset = false, \
+         rules = { robust = false, retry = false, recheck = 'always', spawn_offset = false, \
          recentre = false }\ncrop = [1, 2, 30, 40]\nframes = [2, 3]\n\
          output = 'out/f_####.exr'\nfps = 30\nvideo = false\noverwrite = true\nthreads = 2\n\
          stats = 's.json'\n[camera]\nframes = 5\n",
