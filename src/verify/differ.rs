@@ -57,7 +57,10 @@ impl<'a> Closely<'a> {
         };
         let hit = self.refined(hit);
         let pass = self.pass(hit.prim);
-        if pass.ulps > BAND_ULPS || hit.prim == self.ray.exclude {
+        // A ray that leaves a sphere may meet its far side.
+        let leaves_it =
+            hit.prim == self.ray.exclude && self.check.oracle.corners(hit.prim).is_some();
+        if pass.ulps > BAND_ULPS || leaves_it {
             return Some(Difference { class: Class::Phantom, ulps: pass.ulps });
         }
         let length = self.ray.dir.length();
@@ -81,8 +84,29 @@ impl<'a> Closely<'a> {
         } else if apart < 0.0 {
             Some(self.extra(&pass))
         } else {
-            Some(self.missed(hit.t - pass.along() / length, true_hit))
+            let missed = self.missed(hit.t - pass.along() / length, true_hit);
+            let slipped = missed.class == Class::Missed
+                && self.is_at_vertex(true_hit.prim)
+                && self.faces(hit.prim);
+            Some(if slipped { Difference { class: Class::PastVertex, ..missed } } else { missed })
         }
+    }
+
+    /// Whether the ray passes a corner of the triangle within the band.
+    fn is_at_vertex(&self, prim: PrimRef) -> bool {
+        let dir = self.ray.dir.normalize();
+        self.check.oracle.corners(prim).is_some_and(|corners| {
+            let off = corners.map(|c| (c - self.ray.org).cross(dir).length());
+            off[0].min(off[1]).min(off[2]) <= BAND_ULPS * self.line.ulp(&corners)
+        })
+    }
+
+    /// Whether the triangle's front faces the ray's start.
+    fn faces(&self, prim: PrimRef) -> bool {
+        self.check
+            .oracle
+            .corners(prim)
+            .is_some_and(|[a, b, c]| (b - a).cross(c - a).dot(self.ray.dir) < 0.0)
     }
 
     /// A hit whose numbers were left rough, as it is when its surface is looked at.

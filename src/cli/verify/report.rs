@@ -61,6 +61,7 @@ pub fn meaning(class: Class) -> &'static str {
     match class {
         Class::Tie => "another triangle at the same place",
         Class::EdgeBand => "within the band of an edge",
+        Class::PastVertex => "past a vertex, onto a front",
         Class::RayEnd => "at the ray's own start or end",
         Class::Phantom => "phantom hit",
         Class::Missed => "missed hit",
