@@ -98,7 +98,7 @@ pub struct SettingArgs {
     /// Watertight traversal of Embree [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub robust: Option<bool>,
-    /// A second try for rays that miss inside the bounds [default: on]
+    /// A second try for rays that miss near a triangle or hit a back from outside [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub retry: Option<bool>,
     /// Start secondary rays outside the rounding error of their hit [default: on]

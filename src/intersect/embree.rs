@@ -6,7 +6,8 @@
 //! * A hit's `t, u, v` are recomputed in f64; one that lies beside its triangle is a phantom, and
 //!   the ray goes on past it.
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
-//! * A ray that misses although it comes near some triangle gets one second try, moved by 4 ulp.
+//! * A ray that misses although it comes near some triangle is tried again, turned by 4 ulp to one
+//!   side and then to the other; and so is one that must have missed something before its hit.
 //!
 //! Shadow rays report no primitive, so only the first rule reaches them.
 //!
@@ -64,13 +65,12 @@ struct Candidate {
     shift: f64,
 }
 
-/// How Embree sees a ray's direction.
+/// How Embree sees a ray's direction: as it is, or turned by a few ulp to one side or the other.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// As it is.
     None,
-    /// Turned by a few ulp, for a second try.
-    Nudged,
+    OneWay,
+    OtherWay,
 }
 
 /// Lanes of a block, a bit each.
@@ -140,8 +140,8 @@ impl<'s> EmbreeIntersector<'s> {
     fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
         let (mut moved, shift) = self.approach(ray)?;
         // After the approach: from afar, 4 ulp would lead past what is looked at.
-        if turn == Turn::Nudged {
-            moved = nudged(&moved);
+        if turn != Turn::None {
+            moved = nudged(&moved, turn);
         }
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
@@ -159,7 +159,7 @@ impl<'s> EmbreeIntersector<'s> {
         let hit = self.recheck(ray, &candidate);
         if self.retries() && self.is_doubtful(ray, &candidate.hit) {
             counts.retry += 1;
-            let again = self.query(ray, Turn::Nudged, &[]);
+            let again = self.query(ray, Turn::OneWay, &[]);
             let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
             let again = again.and_then(|again| self.recheck(ray, &again));
             if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
@@ -212,8 +212,10 @@ impl<'s> EmbreeIntersector<'s> {
         if !self.retries() || !self.coarse.may_meet(&bundle) {
             return None;
         }
-        counts.retry += 1;
-        self.pursue(ray, Turn::Nudged, &mut passed)
+        [Turn::OneWay, Turn::OtherWay].into_iter().find_map(|turn| {
+            counts.retry += 1;
+            self.pursue(ray, turn, &mut passed)
+        })
     }
 
     // ---- a block -----------------------------------------------------------------------------
@@ -239,7 +241,9 @@ impl<'s> EmbreeIntersector<'s> {
         if self.retries() {
             let missed = self.missed_near(rays, valid & !hit);
             let doubtful = missed | back_faces(rays, hit, &found);
-            hit |= self.second_tries::<W>(rays, doubtful, &mut found, counts);
+            hit |= self.try_again::<W>(rays, doubtful, Turn::OneWay, &mut found, counts);
+            let missed = missed & !hit;
+            hit |= self.try_again::<W>(rays, missed, Turn::OtherWay, &mut found, counts);
         }
         for lane in each(self.recheck_block(rays, hit, &found, hits)) {
             hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
@@ -281,12 +285,13 @@ impl<'s> EmbreeIntersector<'s> {
         if bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle)) { missed } else { 0 }
     }
 
-    /// Gives the `doubtful` lanes a second try and keeps what it finds where that is nearer; returns
+    /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
     /// those that hit.
-    fn second_tries<const W: usize>(
+    fn try_again<const W: usize>(
         &self,
         rays: &[Ray],
         doubtful: Lanes,
+        turn: Turn,
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
     ) -> Lanes {
@@ -297,7 +302,7 @@ impl<'s> EmbreeIntersector<'s> {
         counts.retry += u64::from(tried);
         let mut again = [rays[0]; BLOCK];
         for (k, lane) in each(doubtful).enumerate() {
-            again[k] = nudged(&rays[lane]);
+            again[k] = nudged(&rays[lane], turn);
         }
         let mut found_again = [NOTHING; BLOCK];
         let all = Lanes::MAX >> (BLOCK as u32 - tried);
@@ -467,10 +472,11 @@ fn valid_lanes(rays: &[Ray]) -> Lanes {
 
 /// The ray turned by 4 ulp of f32, across: a factor on each component would leave an
 /// axis-parallel direction, the likeliest to pass through a vertex, as it is.
-fn nudged(ray: &Ray) -> Ray {
+fn nudged(ray: &Ray, turn: Turn) -> Ray {
     let length = ray.dir.length();
     let (across, _) = orthonormal_basis(ray.dir / length);
-    Ray { dir: ray.dir + across * (8.0 * ROUNDING * length), ..*ray }
+    let by = if turn == Turn::OtherWay { -8.0 } else { 8.0 };
+    Ray { dir: ray.dir + across * (by * ROUNDING * length), ..*ray }
 }
 
 /// Whether the ray may in truth pass beside the triangle that Embree named.

@@ -112,7 +112,8 @@ pub enum IntersectorKind {
 pub struct HitRules {
     /// Embree's ROBUST traversal.
     pub robust: bool,
-    /// One deterministic second try for a camera or specular ray that misses inside the bounds.
+    /// A deterministic second try for a camera or specular ray that misses near a triangle, or whose
+    /// hit it cannot have met first.
     pub retry: bool,
     /// Which hits are recomputed in f64.
     pub recheck: Recheck,

@@ -18,6 +18,8 @@ use tweenray::stats::RayCounts;
 
 /// Hits closer than this, of the scene's size 1, are one crossing.
 const TOGETHER: f64 = 1e-5;
+/// The same for faces that share a vertex.
+const FANNED: f64 = 1e-3;
 /// A weight below this is at the edge of its triangle.
 const BAND: f64 = 1e-4;
 
@@ -120,6 +122,11 @@ impl Fans {
         Self { of_vertex, normals, triangles: mesh.triangles.clone() }
     }
 
+    /// Whether two faces share a vertex.
+    fn are_neighbours(&self, a: u32, b: u32) -> bool {
+        self.triangles[a as usize].iter().any(|v| self.triangles[b as usize].contains(v))
+    }
+
     /// Whether the faces around `prim`'s corners look both ways from `dir`.
     fn look_both_ways(&self, prim: u32, dir: DVec3) -> bool {
         let around =
@@ -152,7 +159,17 @@ fn crossings(embree: &EmbreeIntersector, fans: &Fans, ray: &Ray) -> Vec<Crossing
     let mut all: Vec<Crossing> = Vec::new();
     let mut next = *ray;
     while let Some(hit) = embree.intersect(&next, &mut RayCounts::default()) {
-        let open = all.last_mut().filter(|c| hit.t - c.far <= together);
+        let leaves = fans.normals[hit.prim.prim_id as usize].dot(ray.dir) >= 0.0;
+        let at_edge = hit.u.min(hit.v).min(1.0 - hit.u - hit.v) < BAND;
+        let open = all.last_mut().filter(|c| {
+            // Where a ray grazes the edge of two faces it may be said to meet both, a little apart;
+            // that it went the same way twice gives it away.
+            let again = c.ways == [!leaves, leaves]
+                && at_edge
+                && hit.t - c.far <= FANNED / ray.dir.length()
+                && fans.are_neighbours(c.prims[c.prims.len() - 1].prim_id, hit.prim.prim_id);
+            hit.t - c.far <= together || again
+        });
         if let Some(seen) = open.as_ref().filter(|c| c.prims.contains(&hit.prim)) {
             // All here have had their turn: on.
             next.tnear = seen.far + together;
@@ -167,9 +184,7 @@ fn crossings(embree: &EmbreeIntersector, fans: &Fans, ray: &Ray) -> Vec<Crossing
         };
         crossing.prims.push(hit.prim);
         crossing.far = crossing.far.max(hit.t);
-        let leaves = fans.normals[hit.prim.prim_id as usize].dot(ray.dir) >= 0.0;
         crossing.ways[usize::from(leaves)] = true;
-        let at_edge = hit.u.min(hit.v).min(1.0 - hit.u - hit.v) < BAND;
         crossing.touches |=
             crossing.ways == [true; 2] || at_edge && fans.look_both_ways(hit.prim.prim_id, ray.dir);
         (next.tnear, next.exclude) = (hit.t, hit.prim);

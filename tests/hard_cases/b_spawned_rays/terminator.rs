@@ -124,7 +124,8 @@ fn lamp(to_light: DVec3) -> Light {
 }
 
 pub fn terminator(size: Size) -> Outcome {
-    let mut outcome = Outcome::default();
+    // The lifted point is an approximation: close under a lamp a few shadow rays still graze a facet.
+    let mut outcome = Outcome { allowed: 5e-4, ..Outcome::default() };
     let edge = size.of(64, 256);
     let turn = size.of(30, 5);
     for (name, light) in [("sun", sun as fn(DVec3) -> Light), ("lamp", lamp)] {

@@ -13,7 +13,8 @@ use std::borrow::Cow;
 pub(super) struct Rules {
     /// Watertight traversal of Embree.
     pub robust: bool,
-    /// One second try for a camera or specular ray that misses inside the scene's bounds.
+    /// A second try for a camera or specular ray that misses near a triangle, or hits a back from
+    /// outside.
     pub retry: bool,
     /// Which hits are recomputed in f64 at once: "risky" (grazing, slivers, near an edge; the others
     /// when shaded), "always", "off".
