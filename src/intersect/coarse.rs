@@ -6,11 +6,11 @@
 
 use super::Ray;
 use crate::math::{Bounds3, DVec3, Vec3};
-use crate::scene::Scene;
+use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
 /// Cells along each axis of the grid that groups the triangles.
-const CELLS: usize = 32;
+const CELLS: usize = 64;
 /// Triangles that one task groups.
 const TASK: usize = 1 << 18;
 
@@ -34,21 +34,28 @@ impl CoarseTree {
         let mut cells = vec![Cell::EMPTY; if all.is_empty() { 0 } else { CELLS.pow(3) }];
         let longest = all.extent().max_element();
         let per_unit = if longest > 0.0 { CELLS as f64 / longest } else { 0.0 };
-        for mesh in &scene.meshes {
-            let grouped = mesh.triangles.par_chunks(TASK).map(|triangles| {
-                let mut cells = vec![Cell::EMPTY; CELLS.pow(3)];
-                for triangle in triangles {
+        let tasks: Vec<(&Mesh, &[[u32; 3]])> = scene
+            .meshes
+            .iter()
+            .flat_map(|mesh| mesh.triangles.chunks(TASK).map(move |part| (mesh, part)))
+            .collect();
+        // A grid for each thread's share, not for each mesh; the union of boxes does not depend on
+        // the order.
+        let share = tasks.len().div_ceil(rayon::current_num_threads()).max(1);
+        let grouped = tasks.par_chunks(share).map(|tasks| {
+            let mut cells = vec![Cell::EMPTY; CELLS.pow(3)];
+            for (mesh, triangles) in tasks {
+                for triangle in *triangles {
                     let corners = triangle.map(|i| mesh.positions[i as usize]);
                     let at = (corners[0].as_dvec3() - all.min) * per_unit;
                     let [x, y, z] = at.to_array().map(|c| (c as usize).min(CELLS - 1));
                     corners.iter().for_each(|c| cells[(z * CELLS + y) * CELLS + x].include(*c));
                 }
-                cells
-            });
-            // The union of boxes does not depend on the order.
-            for part in grouped.collect::<Vec<_>>() {
-                cells.iter_mut().zip(part).for_each(|(cell, other)| cell.union(&other));
             }
+            cells
+        });
+        for part in grouped.collect::<Vec<_>>() {
+            cells.iter_mut().zip(part).for_each(|(cell, other)| cell.union(&other));
         }
         let mut boxes: Vec<Bounds3> = cells.iter().filter_map(Cell::bounds).collect();
         for b in &mut boxes {

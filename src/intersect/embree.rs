@@ -16,6 +16,7 @@
 
 use super::coarse::{Bundle, CoarseTree};
 use super::coincident;
+use super::facts::MeshFacts;
 use super::triangle::{self, Pairs, PlaneHit};
 use super::{Hit, Intersector, PrimRef, Ray, sphere};
 use crate::embree::{
@@ -23,9 +24,8 @@ use crate::embree::{
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
-use crate::scene::{HitRules, Mesh, Recheck, Scene};
+use crate::scene::{HitRules, Recheck, Scene};
 use crate::stats::RayCounts;
-use rayon::prelude::*;
 
 /// Half an ulp at 1 in f32.
 const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
@@ -38,6 +38,8 @@ const MOST_PHANTOMS: usize = 4096;
 const EDGE_BAND: f64 = 7.99 * ROUNDING;
 /// Rays that go through the steps together: a block of the renderer's.
 const BLOCK: usize = triangle::MOST;
+/// Rays of a block that are asked about together, whether they come near a triangle.
+const PART: usize = 16;
 
 /// A fault that no build has but one by which `./x faults` shows that `tweenray verify` sees it: no
 /// second try.
@@ -52,8 +54,7 @@ pub struct EmbreeIntersector<'s> {
     near: f64,
     /// Where a miss deserves a second try; spheres need none, since their test is exact.
     coarse: CoarseTree,
-    /// Longest edge of each mesh.
-    longest_edges: Vec<f64>,
+    meshes: Vec<MeshFacts>,
     bounds: Bounds3,
 }
 
@@ -72,6 +73,10 @@ enum Turn {
     OneWay,
     OtherWay,
 }
+
+/// The further tries of a ray whose first query found nothing. (Two more, to the other sides, find
+/// one in nine more of lost slivers: docs/decisions/016-vertices-leak.md.)
+const TURNS: [Turn; 2] = [Turn::OneWay, Turn::OtherWay];
 
 /// Lanes of a block, a bit each.
 type Lanes = u64;
@@ -112,10 +117,10 @@ impl<'s> EmbreeIntersector<'s> {
         builder.add_spheres(spheres, copies_in(scene.sphere_geom_id()))?;
         let largest = largest_coordinate(&scene.bounds);
         let coarse = CoarseTree::new(scene, margin(largest));
-        let longest_edges = scene.meshes.iter().map(longest_edge).collect();
+        let meshes = scene.meshes.iter().map(MeshFacts::of).collect();
         let bounds = padded(&scene.bounds);
         let committed = builder.commit()?;
-        Ok(Self { committed, scene, rules, near, coarse, longest_edges, bounds })
+        Ok(Self { committed, scene, rules, near, coarse, meshes, bounds })
     }
 
     /// The ray that Embree should see, and by how much its origin was moved along it; `None` for
@@ -140,9 +145,7 @@ impl<'s> EmbreeIntersector<'s> {
     fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
         let (mut moved, shift) = self.approach(ray)?;
         // After the approach: from afar, 4 ulp would lead past what is looked at.
-        if turn != Turn::None {
-            moved = nudged(&moved, turn);
-        }
+        moved = nudged(&moved, turn);
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
@@ -159,7 +162,7 @@ impl<'s> EmbreeIntersector<'s> {
         let hit = self.recheck(ray, &candidate);
         if self.retries() && self.is_doubtful(ray, &candidate.hit) {
             counts.retry += 1;
-            let again = self.query(ray, Turn::OneWay, &[]);
+            let again = self.query(ray, TURNS[0], &[]);
             let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
             let again = again.and_then(|again| self.recheck(ray, &again));
             if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
@@ -172,16 +175,13 @@ impl<'s> EmbreeIntersector<'s> {
     /// Whether the ray must have met another triangle before: from outside of a closed surface it
     /// meets a front first, and once it went in, in glass say, a back of the same mesh.
     fn is_doubtful(&self, ray: &Ray, hit: &PacketHit) -> bool {
-        let left = ray.exclude;
-        let inside = self.scene.meshes.get(left.geom_id as usize).is_some_and(|mesh| {
-            let [a, b, c] = mesh.corners(left.prim_id as usize);
-            (b - a).cross(c - a).dot(ray.dir) < 0.0
+        let left = ray.exclude.geom_id;
+        let inside = self.scene.meshes.get(left as usize).is_some_and(|mesh| {
+            let [a, b, c] = mesh.corners(ray.exclude.prim_id as usize);
+            (b - a).cross(c - a).dot(ray.dir) * self.meshes[left as usize].sense < 0.0
         });
-        if inside {
-            !is_back(ray, hit) && hit.prim.geom_id == left.geom_id
-        } else {
-            is_back(ray, hit)
-        }
+        let back = self.is_back(ray, hit);
+        if inside { !back && hit.prim.geom_id == left } else { back }
     }
 
     /// The first true hit of `ray`, turned by a second try or not.
@@ -212,7 +212,7 @@ impl<'s> EmbreeIntersector<'s> {
         if !self.retries() || !self.coarse.may_meet(&bundle) {
             return None;
         }
-        [Turn::OneWay, Turn::OtherWay].into_iter().find_map(|turn| {
+        TURNS.into_iter().find_map(|turn| {
             counts.retry += 1;
             self.pursue(ray, turn, &mut passed)
         })
@@ -230,7 +230,7 @@ impl<'s> EmbreeIntersector<'s> {
         let valid = valid_lanes(rays);
         counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
         if rays.iter().any(|ray| ray.org.abs().max_element() > self.near) {
-            // Rays of a camera outside the scene: rare enough to go one by one.
+            // A camera more than a scene's size away: each ray is moved up to the scene.
             for lane in each(valid) {
                 hits[lane] = self.first_hit(&rays[lane], counts);
             }
@@ -240,10 +240,11 @@ impl<'s> EmbreeIntersector<'s> {
         let mut hit = self.trace::<W>(rays, valid, &mut found);
         if self.retries() {
             let missed = self.missed_near(rays, valid & !hit);
-            let doubtful = missed | back_faces(rays, hit, &found);
-            hit |= self.try_again::<W>(rays, doubtful, Turn::OneWay, &mut found, counts);
-            let missed = missed & !hit;
-            hit |= self.try_again::<W>(rays, missed, Turn::OtherWay, &mut found, counts);
+            let mut doubtful = missed | self.back_faces(rays, hit, &found);
+            for turn in TURNS {
+                hit |= self.try_again::<W>(rays, doubtful, turn, &mut found, counts);
+                doubtful = missed & !hit;
+            }
         }
         for lane in each(self.recheck_block(rays, hit, &found, hits)) {
             hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
@@ -281,8 +282,32 @@ impl<'s> EmbreeIntersector<'s> {
 
     /// The lanes of `missed` that may all the same have met a triangle.
     fn missed_near(&self, rays: &[Ray], missed: Lanes) -> Lanes {
-        let bundle = Bundle::of(each(missed).map(|lane| &rays[lane]));
-        if bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle)) { missed } else { 0 }
+        let come_near = |lanes: Lanes| {
+            let bundle = Bundle::of(each(lanes).map(|lane| &rays[lane]));
+            bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle))
+        };
+        if !come_near(missed) {
+            return 0;
+        }
+        // Smaller bundles are slimmer.
+        let parts = (0..BLOCK / PART).map(|k| missed & Lanes::MAX >> (BLOCK - PART) << (k * PART));
+        parts.filter(|part| come_near(*part)).fold(0, |near, part| near | part)
+    }
+
+    /// The lanes of `hit` that met the back of a surface, though most of the block's met a front: a
+    /// ray from outside of a closed surface meets its front first, unless it slipped through at a
+    /// vertex. A camera inside of one sees backs only, and they are no sign of anything.
+    fn back_faces(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
+        let back = each(hit).filter(|lane| self.is_back(&rays[*lane], &found[*lane]));
+        let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
+        if 2 * back.count_ones() > hit.count_ones() { 0 } else { back }
+    }
+
+    /// Whether the ray met a surface from inside.
+    fn is_back(&self, ray: &Ray, hit: &PacketHit) -> bool {
+        // Spheres have no facts, and no normal here; nothing slips into them.
+        let mesh = self.meshes.get(hit.prim.geom_id as usize);
+        mesh.is_some_and(|mesh| hit.ng.as_dvec3().dot(ray.dir) * mesh.sense > 0.0)
     }
 
     /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
@@ -350,7 +375,9 @@ impl<'s> EmbreeIntersector<'s> {
     fn is_wanted(&self, ray: &Ray, hit: &PacketHit) -> bool {
         match self.rules.recheck {
             Recheck::Always => true,
-            Recheck::Risky => is_risky(ray, hit, self.longest_edges[hit.prim.geom_id as usize]),
+            Recheck::Risky => {
+                is_risky(ray, hit, self.meshes[hit.prim.geom_id as usize].longest_edge)
+            }
             Recheck::Off => false,
         }
     }
@@ -446,23 +473,11 @@ const NOTHING: PacketHit = PacketHit {
     prim: PrimRef::NONE,
 };
 
-/// The lanes of `hit` that met the back of a triangle, though most of the block's met a front: a ray
-/// from outside of a closed surface meets its front first, unless it slipped through at a vertex.
-fn back_faces(rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
-    let back = each(hit).filter(|lane| is_back(&rays[*lane], &found[*lane]));
-    let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
-    if 2 * back.count_ones() > hit.count_ones() { 0 } else { back }
-}
-
 /// Whether `t` lies before `other` on `ray` by more than both may be off.
 fn is_well_before(ray: &Ray, t: f32, other: f32) -> bool {
     let length = ray.dir.length();
     let reach = ray.org.length() + f64::from(t) * length;
     f64::from(other - t) * length > 32.0 * ROUNDING * reach
-}
-
-fn is_back(ray: &Ray, hit: &PacketHit) -> bool {
-    hit.ng.as_dvec3().dot(ray.dir) > 0.0
 }
 
 /// The lanes whose rays are valid.
@@ -473,9 +488,13 @@ fn valid_lanes(rays: &[Ray]) -> Lanes {
 /// The ray turned by 4 ulp of f32, across: a factor on each component would leave an
 /// axis-parallel direction, the likeliest to pass through a vertex, as it is.
 fn nudged(ray: &Ray, turn: Turn) -> Ray {
+    let by = match turn {
+        Turn::None => return *ray,
+        Turn::OneWay => 8.0,
+        Turn::OtherWay => -8.0,
+    };
     let length = ray.dir.length();
     let (across, _) = orthonormal_basis(ray.dir / length);
-    let by = if turn == Turn::OtherWay { -8.0 } else { 8.0 };
     Ray { dir: ray.dir + across * (by * ROUNDING * length), ..*ray }
 }
 
@@ -494,16 +513,6 @@ fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
     // Written so that NaN is risky.
     let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
     !is_safe
-}
-
-/// Longest edge of a mesh's triangles, or a little more.
-fn longest_edge(mesh: &Mesh) -> f64 {
-    let longest = mesh.triangles.par_iter().map(|triangle| {
-        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
-        let [x, y, z] = [b - a, c - b, a - c].map(|edge| edge.length_squared());
-        x.max(y).max(z)
-    });
-    f64::from(longest.reduce(|| 0.0, f32::max)).sqrt() * (1.0 + 8.0 * ROUNDING)
 }
 
 /// Where a ray that meets its triangle's plane at `met`, outside, is nearest to the triangle, if that

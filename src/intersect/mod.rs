@@ -7,6 +7,7 @@ mod coarse;
 mod coincident;
 pub mod court;
 mod embree;
+mod facts;
 mod interaction;
 mod oracle;
 mod sieve;
@@ -33,7 +34,8 @@ pub trait Intersector: Sync {
     /// Whether anything lies between `tnear` and `tfar`.
     fn occluded(&self, ray: &Ray, counts: &mut RayCounts) -> bool;
     /// [`Self::intersect`] of every ray, into `hits` (same length); their numbers may be left
-    /// rough ([`Hit::rough`]), what is hit is the same.
+    /// rough ([`Hit::rough`]). What is hit is the same, but for rays that slip past a vertex onto a
+    /// back: there the block decides whether backs are to be expected.
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts);
     /// [`Self::occluded`] of every ray, into `occluded` (same length).
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], counts: &mut RayCounts);
