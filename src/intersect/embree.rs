@@ -14,17 +14,20 @@
 //! A batch goes through Embree, the second tries and the recheck a block at a time, so that each
 //! step works on arrays; what they leave open is settled ray by ray.
 
+mod block;
+mod recheck;
+
 use super::coarse::{Bundle, CoarseTree};
 use super::coincident;
 use super::facts::MeshFacts;
-use super::triangle::{self, Pairs, PlaneHit};
-use super::{Hit, Intersector, PrimRef, Ray, sphere};
+use super::triangle;
+use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
     BuildOptions, CommittedScene, Packet, PacketHit, QueryFlags, SceneBuilder, SphereData,
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
-use crate::scene::{HitRules, Recheck, Scene};
+use crate::scene::{HitRules, Scene};
 use crate::stats::RayCounts;
 
 /// Half an ulp at 1 in f32.
@@ -33,14 +36,8 @@ const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 const NEAR: f64 = 4.0;
 /// Phantoms that one ray may pass.
 const MOST_PHANTOMS: usize = 4096;
-/// How far beside its triangle a ray may pass, per unit of the largest coordinate: 4 ulp, less the
-/// rounding of measuring it. That is what rounding the ray to f32 explains.
-const EDGE_BAND: f64 = 7.99 * ROUNDING;
 /// Rays that go through the steps together: a block of the renderer's.
 const BLOCK: usize = triangle::MOST;
-/// Rays of a block that are asked about together, whether they come near a triangle.
-const PART: usize = 16;
-
 /// A fault that no build has but one by which `./x faults` shows that `tweenray verify` sees it: no
 /// second try.
 const PLANTED_NO_RETRY: bool = cfg!(feature = "planted-no-retry");
@@ -78,17 +75,6 @@ enum Turn {
 /// one in nine more of lost slivers: docs/decisions/016-vertices-leak.md.)
 const TURNS: [Turn; 2] = [Turn::OneWay, Turn::OtherWay];
 
-/// Lanes of a block, a bit each.
-type Lanes = u64;
-
-fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = lanes.trailing_zeros() as usize;
-        lanes &= lanes.wrapping_sub(1);
-        (lane < BLOCK).then_some(lane)
-    })
-}
-
 impl<'s> EmbreeIntersector<'s> {
     /// Builds the BVH of `scene` with `threads` threads.
     ///
@@ -123,10 +109,15 @@ impl<'s> EmbreeIntersector<'s> {
         Ok(Self { committed, scene, rules, near, coarse, meshes, bounds })
     }
 
+    /// Whether the ray's f32 origin would be too coarse.
+    fn is_far(&self, ray: &Ray) -> bool {
+        ray.org.abs().max_element() > self.near
+    }
+
     /// The ray that Embree should see, and by how much its origin was moved along it; `None` for
     /// a ray that passes the scene by.
     fn approach(&self, ray: &Ray) -> Option<(Ray, f64)> {
-        if ray.org.abs().max_element() <= self.near {
+        if !self.is_far(ray) {
             return Some((*ray, 0.0));
         }
         let (near, _) = self.bounds.clip(ray.org, 1.0 / ray.dir, ray.tnear, ray.tfar)?;
@@ -138,8 +129,6 @@ impl<'s> EmbreeIntersector<'s> {
     fn retries(&self) -> bool {
         self.rules.retry && !PLANTED_NO_RETRY
     }
-
-    // ---- one ray -----------------------------------------------------------------------------
 
     /// One Embree query that cannot hit the `passed` primitives.
     fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
@@ -217,272 +206,6 @@ impl<'s> EmbreeIntersector<'s> {
             self.pursue(ray, turn, &mut passed)
         })
     }
-
-    // ---- a block -----------------------------------------------------------------------------
-
-    fn intersect_block<const W: usize>(
-        &self,
-        rays: &[Ray],
-        hits: &mut [Option<Hit>],
-        counts: &mut RayCounts,
-    ) {
-        hits.fill(None);
-        let valid = valid_lanes(rays);
-        counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
-        if rays.iter().any(|ray| ray.org.abs().max_element() > self.near) {
-            // A camera more than a scene's size away: each ray is moved up to the scene.
-            for lane in each(valid) {
-                hits[lane] = self.first_hit(&rays[lane], counts);
-            }
-            return;
-        }
-        let mut found = [NOTHING; BLOCK];
-        let mut hit = self.trace::<W>(rays, valid, &mut found);
-        if self.retries() {
-            let missed = self.missed_near(rays, valid & !hit);
-            let mut doubtful = missed | self.back_faces(rays, hit, &found);
-            for turn in TURNS {
-                hit |= self.try_again::<W>(rays, doubtful, turn, &mut found, counts);
-                doubtful = missed & !hit;
-            }
-        }
-        for lane in each(self.recheck_block(rays, hit, &found, hits)) {
-            hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
-        }
-    }
-
-    /// Sends the `valid` lanes through Embree in packets; returns those that hit.
-    fn trace<const W: usize>(
-        &self,
-        rays: &[Ray],
-        valid: Lanes,
-        found: &mut [PacketHit; BLOCK],
-    ) -> Lanes {
-        let mut packet = Packet::<W>::new();
-        let mut hit = 0;
-        for (k, rays) in rays.chunks(W).enumerate() {
-            let mut mask = [0; W];
-            let mut exclude = false;
-            for (lane, ray) in rays.iter().enumerate() {
-                packet.set(lane, ray);
-                mask[lane] = -((valid >> (k * W + lane) & 1) as i32);
-                exclude |= ray.exclude != PrimRef::NONE;
-            }
-            let flags = QueryFlags { coherent: true, exclude, passed: &[] };
-            self.committed.intersect(&mask, &mut packet, rays, flags);
-            for lane in 0..rays.len() {
-                if let Some(candidate) = packet.hit(lane) {
-                    found[k * W + lane] = candidate;
-                    hit |= 1 << (k * W + lane);
-                }
-            }
-        }
-        hit
-    }
-
-    /// The lanes of `missed` that may all the same have met a triangle.
-    fn missed_near(&self, rays: &[Ray], missed: Lanes) -> Lanes {
-        let come_near = |lanes: Lanes| {
-            let bundle = Bundle::of(each(lanes).map(|lane| &rays[lane]));
-            bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle))
-        };
-        if !come_near(missed) {
-            return 0;
-        }
-        // Smaller bundles are slimmer.
-        let parts = (0..BLOCK / PART).map(|k| missed & Lanes::MAX >> (BLOCK - PART) << (k * PART));
-        parts.filter(|part| come_near(*part)).fold(0, |near, part| near | part)
-    }
-
-    /// The lanes of `hit` that met the back of a surface, though most of the block's met a front: a
-    /// ray from outside of a closed surface meets its front first, unless it slipped through at a
-    /// vertex. A camera inside of one sees backs only, and they are no sign of anything.
-    fn back_faces(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
-        let back = each(hit).filter(|lane| self.is_back(&rays[*lane], &found[*lane]));
-        let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
-        if 2 * back.count_ones() > hit.count_ones() { 0 } else { back }
-    }
-
-    /// Whether the ray met a surface from inside.
-    fn is_back(&self, ray: &Ray, hit: &PacketHit) -> bool {
-        // Spheres have no facts, and no normal here; nothing slips into them.
-        let mesh = self.meshes.get(hit.prim.geom_id as usize);
-        mesh.is_some_and(|mesh| hit.ng.as_dvec3().dot(ray.dir) * mesh.sense > 0.0)
-    }
-
-    /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
-    /// those that hit.
-    fn try_again<const W: usize>(
-        &self,
-        rays: &[Ray],
-        doubtful: Lanes,
-        turn: Turn,
-        found: &mut [PacketHit; BLOCK],
-        counts: &mut RayCounts,
-    ) -> Lanes {
-        let tried = doubtful.count_ones();
-        if tried == 0 {
-            return 0;
-        }
-        counts.retry += u64::from(tried);
-        let mut again = [rays[0]; BLOCK];
-        for (k, lane) in each(doubtful).enumerate() {
-            again[k] = nudged(&rays[lane], turn);
-        }
-        let mut found_again = [NOTHING; BLOCK];
-        let all = Lanes::MAX >> (BLOCK as u32 - tried);
-        let hit_again = self.trace::<W>(&again[..tried as usize], all, &mut found_again);
-        let mut hit = 0;
-        for (k, lane) in each(doubtful).enumerate() {
-            let is_hit = hit_again >> k & 1 == 1;
-            if is_hit && is_well_before(&rays[lane], found_again[k].t, found[lane].t) {
-                found[lane] = found_again[k];
-                hit |= 1 << lane;
-            }
-        }
-        hit
-    }
-
-    fn occluded_packets<const W: usize>(
-        &self,
-        rays: &[Ray],
-        occluded: &mut [bool],
-        counts: &mut RayCounts,
-    ) {
-        let mut packet = Packet::<W>::new();
-        for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
-            let mut mask = [0; W];
-            let mut exclude = false;
-            for (lane, ray) in rays.iter().enumerate() {
-                packet.set(lane, ray);
-                let valid = ray.is_valid();
-                mask[lane] = -i32::from(valid);
-                counts.invalid += u64::from(!valid);
-                exclude |= ray.exclude != PrimRef::NONE;
-            }
-            let flags = QueryFlags { coherent: false, exclude, passed: &[] };
-            self.committed.occluded(&mask, &mut packet, rays, flags);
-            for (lane, out) in occluded.iter_mut().enumerate() {
-                *out = mask[lane] != 0 && packet.is_occluded(lane);
-            }
-        }
-    }
-
-    // ---- the recheck -------------------------------------------------------------------------
-
-    /// Whether the rules want `hit`, one of a block, recomputed before anybody looks at its triangle.
-    #[inline(always)]
-    fn is_wanted(&self, ray: &Ray, hit: &PacketHit) -> bool {
-        match self.rules.recheck {
-            Recheck::Always => true,
-            Recheck::Risky => {
-                is_risky(ray, hit, self.meshes[hit.prim.geom_id as usize].longest_edge)
-            }
-            Recheck::Off => false,
-        }
-    }
-
-    /// Rechecks the hits `found` in the lanes `hit`, many at once; returns the lanes whose hit may
-    /// be a phantom.
-    fn recheck_block(
-        &self,
-        rays: &[Ray],
-        hit: Lanes,
-        found: &[PacketHit; BLOCK],
-        hits: &mut [Option<Hit>],
-    ) -> Lanes {
-        let mut pairs = Pairs::new();
-        let mut lanes = [0u8; BLOCK];
-        let mut corners = [[0u32; 3]; BLOCK];
-        let mut wanted = 0;
-        let mut open = 0;
-        // Indices first, then vertices: so the processor waits for many cache misses at a time.
-        for lane in each(hit) {
-            let (ray, candidate) = (&rays[lane], &found[lane]);
-            match self.scene.meshes.get(candidate.prim.geom_id as usize) {
-                Some(mesh) if self.is_wanted(ray, candidate) => {
-                    lanes[wanted] = lane as u8;
-                    corners[wanted] = mesh.triangles[candidate.prim.prim_id as usize];
-                    wanted += 1;
-                }
-                Some(_) => hits[lane] = Some(self.as_it_is(candidate, 0.0)),
-                None => {
-                    hits[lane] = self.recheck_sphere(ray, candidate.prim);
-                    open |= Lanes::from(hits[lane].is_none()) << lane;
-                }
-            }
-        }
-        for (lane, corners) in lanes[..wanted].iter().zip(&corners) {
-            let lane = *lane as usize;
-            let mesh = &self.scene.meshes[found[lane].prim.geom_id as usize];
-            pairs.push(&rays[lane], &corners.map(|i| mesh.positions[i as usize].as_dvec3()));
-        }
-        pairs.compute();
-        for (k, lane) in lanes[..wanted].iter().map(|lane| *lane as usize).enumerate() {
-            let met = pairs.get(k);
-            let (ray, prim) = (&rays[lane], found[lane].prim);
-            if met.is_inside() && (ray.tnear..=ray.tfar).contains(&met.t) {
-                hits[lane] = Some(Hit { t: met.t, u: met.u, v: met.v, prim, rough: false });
-            } else {
-                hits[lane] = self.recheck(ray, &Candidate { hit: found[lane], shift: 0.0 });
-                open |= Lanes::from(hits[lane].is_none()) << lane;
-            }
-        }
-        open
-    }
-
-    /// The hit in f64, or `None` for a phantom.
-    #[inline]
-    fn recheck(&self, ray: &Ray, candidate: &Candidate) -> Option<Hit> {
-        let hit = &candidate.hit;
-        let Some(mesh) = self.scene.meshes.get(hit.prim.geom_id as usize) else {
-            return self.recheck_sphere(ray, hit.prim);
-        };
-        if self.rules.recheck == Recheck::Off {
-            return Some(self.as_it_is(hit, candidate.shift));
-        }
-        let corners = mesh.corners(hit.prim.prim_id as usize);
-        // A ray in the triangle's plane hits nothing, nor is a triangle without an inside hit.
-        let met = triangle::meet_plane(ray, &corners)?;
-        let met = if met.is_inside() { met } else { beside(ray, &corners, met, candidate.shift)? };
-        let PlaneHit { t, u, v } = met;
-        (ray.tnear..=ray.tfar).contains(&t).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
-    }
-
-    /// Embree's own numbers. Unless the recheck is off they are computed again when the surface is
-    /// looked at.
-    #[inline(always)]
-    fn as_it_is(&self, hit: &PacketHit, shift: f64) -> Hit {
-        let (t, u, v) = (f64::from(hit.t) + shift, f64::from(hit.u), f64::from(hit.v));
-        Hit { t, u, v, prim: hit.prim, rough: self.rules.recheck != Recheck::Off }
-    }
-
-    fn recheck_sphere(&self, ray: &Ray, prim: PrimRef) -> Option<Hit> {
-        let s = &self.scene.spheres[prim.prim_id as usize];
-        let t = sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude)?;
-        Some(Hit { t, u: 0.0, v: 0.0, prim, rough: false })
-    }
-}
-
-/// What a lane holds before Embree found anything.
-const NOTHING: PacketHit = PacketHit {
-    t: f32::INFINITY,
-    u: 0.0,
-    v: 0.0,
-    ng: crate::math::Vec3::ZERO,
-    prim: PrimRef::NONE,
-};
-
-/// Whether `t` lies before `other` on `ray` by more than both may be off.
-fn is_well_before(ray: &Ray, t: f32, other: f32) -> bool {
-    let length = ray.dir.length();
-    let reach = ray.org.length() + f64::from(t) * length;
-    f64::from(other - t) * length > 32.0 * ROUNDING * reach
-}
-
-/// The lanes whose rays are valid.
-fn valid_lanes(rays: &[Ray]) -> Lanes {
-    rays.iter().enumerate().fold(0, |lanes, (k, ray)| lanes | Lanes::from(ray.is_valid()) << k)
 }
 
 /// The ray turned by 4 ulp of f32, across: a factor on each component would leave an
@@ -496,37 +219,6 @@ fn nudged(ray: &Ray, turn: Turn) -> Ray {
     let length = ray.dir.length();
     let (across, _) = orthonormal_basis(ray.dir / length);
     Ray { dir: ray.dir + across * (by * ROUNDING * length), ..*ray }
-}
-
-/// Whether the ray may in truth pass beside the triangle that Embree named.
-///
-/// Embree's edge functions are off by about 10 half ulp of (edge x distance x direction), rounding
-/// of vertices and ray included, and the weights are those over the triangle's area as the ray sees
-/// it: grazing hits, slivers and hits near an edge fail the test. `edge` is the longest of the
-/// mesh, so that no corner need be fetched.
-#[inline(always)]
-fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
-    let least = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
-    let length = ray.dir.length();
-    let reach = ray.org.length() + f64::from(hit.t) * length;
-    let area = hit.ng.as_dvec3().dot(ray.dir).abs();
-    // Written so that NaN is risky.
-    let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
-    !is_safe
-}
-
-/// Where a ray that meets its triangle's plane at `met`, outside, is nearest to the triangle, if that
-/// is within the edge band. `None` for a phantom. The ray's origin was moved by `shift` along it.
-fn beside(ray: &Ray, corners: &[DVec3; 3], met: PlaneHit, shift: f64) -> Option<PlaneHit> {
-    let (nearest, distance) = triangle::nearest_on_outline(ray, corners)?;
-    let largest = |p: DVec3| p.abs().max_element();
-    let reach = corners.iter().fold(largest(ray.at(shift)), |reach, c| reach.max(largest(*c)));
-    if distance > EDGE_BAND * reach {
-        return None;
-    }
-    // The plane's own t, unless the ray grazes it: then that point may be far away.
-    let apart = (met.t - nearest.t).abs() * ray.dir.length();
-    Some(PlaneHit { t: if apart <= EDGE_BAND * reach { met.t } else { nearest.t }, ..nearest })
 }
 
 /// A box with a margin for the rounding of rays.

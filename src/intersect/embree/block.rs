@@ -1,0 +1,254 @@
+//! A block of rays: through Embree in packets, the further tries and the recheck, each step on arrays.
+
+use super::super::coarse::Bundle;
+use super::super::triangle::Pairs;
+use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn, nudged};
+use crate::embree::{Packet, PacketHit, QueryFlags};
+use crate::ray::{Hit, PrimRef, Ray};
+use crate::stats::RayCounts;
+
+/// Rays of a block that are asked about together, whether they come near a triangle.
+const PART: usize = 16;
+
+/// Lanes of a block, a bit each.
+type Lanes = u64;
+
+fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes.wrapping_sub(1);
+        (lane < BLOCK).then_some(lane)
+    })
+}
+
+/// A block after Embree.
+struct Block<'b> {
+    /// As they were asked for.
+    rays: &'b [Ray],
+    /// As Embree saw them, each moved by its shift along it.
+    cast: &'b [Ray],
+    shifts: &'b [f64; BLOCK],
+    found: &'b [PacketHit; BLOCK],
+}
+
+impl EmbreeIntersector<'_> {
+    pub(super) fn intersect_block<const W: usize>(
+        &self,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+        counts: &mut RayCounts,
+    ) {
+        hits.fill(None);
+        let valid = valid_lanes(rays);
+        counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
+        // A camera more than a scene's size away: what Embree sees is moved up to the scene.
+        let (mut moved, mut shifts) = ([rays[0]; BLOCK], [0.0; BLOCK]);
+        let (mut cast, mut valid) = (rays, valid);
+        if rays.iter().any(|ray| self.is_far(ray)) {
+            for lane in each(valid) {
+                match self.approach(&rays[lane]) {
+                    Some((ray, shift)) => (moved[lane], shifts[lane]) = (ray, shift),
+                    None => valid &= !(1 << lane),
+                }
+            }
+            cast = &moved[..rays.len()];
+        }
+        let mut found = [NOTHING; BLOCK];
+        let mut hit = self.trace::<W>(cast, valid, &mut found);
+        if self.retries() {
+            let missed = self.missed_near(cast, valid & !hit);
+            let mut doubtful = missed | self.back_faces(cast, hit, &found);
+            for turn in TURNS {
+                hit |= self.try_again::<W>(cast, doubtful, turn, &mut found, counts);
+                doubtful = missed & !hit;
+            }
+        }
+        let block = Block { rays, cast, shifts: &shifts, found: &found };
+        for lane in each(self.recheck_block(&block, hit, hits)) {
+            hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
+        }
+    }
+
+    /// Sends the `valid` lanes through Embree in packets; returns those that hit.
+    pub(super) fn trace<const W: usize>(
+        &self,
+        rays: &[Ray],
+        valid: Lanes,
+        found: &mut [PacketHit; BLOCK],
+    ) -> Lanes {
+        let mut packet = Packet::<W>::new();
+        let mut hit = 0;
+        for (k, rays) in rays.chunks(W).enumerate() {
+            let mut mask = [0; W];
+            let mut exclude = false;
+            for (lane, ray) in rays.iter().enumerate() {
+                packet.set(lane, ray);
+                mask[lane] = -((valid >> (k * W + lane) & 1) as i32);
+                exclude |= ray.exclude != PrimRef::NONE;
+            }
+            let flags = QueryFlags { coherent: true, exclude, passed: &[] };
+            self.committed.intersect(&mask, &mut packet, rays, flags);
+            for lane in 0..rays.len() {
+                if let Some(candidate) = packet.hit(lane) {
+                    found[k * W + lane] = candidate;
+                    hit |= 1 << (k * W + lane);
+                }
+            }
+        }
+        hit
+    }
+
+    /// The lanes of `missed` that may all the same have met a triangle.
+    pub(super) fn missed_near(&self, rays: &[Ray], missed: Lanes) -> Lanes {
+        let come_near = |lanes: Lanes| {
+            let bundle = Bundle::of(each(lanes).map(|lane| &rays[lane]));
+            bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle))
+        };
+        if !come_near(missed) {
+            return 0;
+        }
+        // Smaller bundles are slimmer.
+        let parts = (0..BLOCK / PART).map(|k| missed & Lanes::MAX >> (BLOCK - PART) << (k * PART));
+        parts.filter(|part| come_near(*part)).fold(0, |near, part| near | part)
+    }
+
+    /// The lanes of `hit` that met the back of a surface, unless all did: a ray from outside of a closed
+    /// surface meets its front first, if it did not slip through at a vertex. A camera inside of one
+    /// sees backs only, and they are no sign of anything.
+    pub(super) fn back_faces(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
+        let back = each(hit).filter(|lane| self.is_back(&rays[*lane], &found[*lane]));
+        let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
+        if back == hit { 0 } else { back }
+    }
+
+    /// Whether the ray met a surface from inside.
+    pub(super) fn is_back(&self, ray: &Ray, hit: &PacketHit) -> bool {
+        // Spheres have no facts, and no normal here; nothing slips into them.
+        let mesh = self.meshes.get(hit.prim.geom_id as usize);
+        mesh.is_some_and(|mesh| hit.ng.as_dvec3().dot(ray.dir) * mesh.sense > 0.0)
+    }
+
+    /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
+    /// those that hit.
+    pub(super) fn try_again<const W: usize>(
+        &self,
+        rays: &[Ray],
+        doubtful: Lanes,
+        turn: Turn,
+        found: &mut [PacketHit; BLOCK],
+        counts: &mut RayCounts,
+    ) -> Lanes {
+        let tried = doubtful.count_ones();
+        if tried == 0 {
+            return 0;
+        }
+        counts.retry += u64::from(tried);
+        let mut again = [rays[0]; BLOCK];
+        for (k, lane) in each(doubtful).enumerate() {
+            again[k] = nudged(&rays[lane], turn);
+        }
+        let mut found_again = [NOTHING; BLOCK];
+        let all = Lanes::MAX >> (BLOCK as u32 - tried);
+        let hit_again = self.trace::<W>(&again[..tried as usize], all, &mut found_again);
+        let mut hit = 0;
+        for (k, lane) in each(doubtful).enumerate() {
+            let is_hit = hit_again >> k & 1 == 1;
+            if is_hit && is_well_before(&rays[lane], found_again[k].t, found[lane].t) {
+                found[lane] = found_again[k];
+                hit |= 1 << lane;
+            }
+        }
+        hit
+    }
+
+    pub(super) fn occluded_packets<const W: usize>(
+        &self,
+        rays: &[Ray],
+        occluded: &mut [bool],
+        counts: &mut RayCounts,
+    ) {
+        let mut packet = Packet::<W>::new();
+        for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
+            let mut mask = [0; W];
+            let mut exclude = false;
+            for (lane, ray) in rays.iter().enumerate() {
+                packet.set(lane, ray);
+                let valid = ray.is_valid();
+                mask[lane] = -i32::from(valid);
+                counts.invalid += u64::from(!valid);
+                exclude |= ray.exclude != PrimRef::NONE;
+            }
+            let flags = QueryFlags { coherent: false, exclude, passed: &[] };
+            self.committed.occluded(&mask, &mut packet, rays, flags);
+            for (lane, out) in occluded.iter_mut().enumerate() {
+                *out = mask[lane] != 0 && packet.is_occluded(lane);
+            }
+        }
+    }
+
+    /// Rechecks the hits of the lanes `hit`, many at once; returns the lanes whose hit may
+    /// be a phantom.
+    fn recheck_block(&self, block: &Block, hit: Lanes, hits: &mut [Option<Hit>]) -> Lanes {
+        let Block { rays, cast, shifts, found } = *block;
+        let mut pairs = Pairs::new();
+        let mut lanes = [0u8; BLOCK];
+        let mut corners = [[0u32; 3]; BLOCK];
+        let mut wanted = 0;
+        let mut open = 0;
+        // Indices first, then vertices: so the processor waits for many cache misses at a time.
+        for lane in each(hit) {
+            let (ray, candidate) = (&rays[lane], &found[lane]);
+            match self.scene.meshes.get(candidate.prim.geom_id as usize) {
+                Some(mesh) if self.is_wanted(&cast[lane], candidate) => {
+                    lanes[wanted] = lane as u8;
+                    corners[wanted] = mesh.triangles[candidate.prim.prim_id as usize];
+                    wanted += 1;
+                }
+                Some(_) => hits[lane] = Some(self.as_it_is(candidate, shifts[lane])),
+                None => {
+                    hits[lane] = self.recheck_sphere(ray, candidate.prim);
+                    open |= Lanes::from(hits[lane].is_none()) << lane;
+                }
+            }
+        }
+        for (lane, corners) in lanes[..wanted].iter().zip(&corners) {
+            let lane = *lane as usize;
+            let mesh = &self.scene.meshes[found[lane].prim.geom_id as usize];
+            pairs.push(&rays[lane], &corners.map(|i| mesh.positions[i as usize].as_dvec3()));
+        }
+        pairs.compute();
+        for (k, lane) in lanes[..wanted].iter().map(|lane| *lane as usize).enumerate() {
+            let met = pairs.get(k);
+            let (ray, prim) = (&rays[lane], found[lane].prim);
+            if met.is_inside() && (ray.tnear..=ray.tfar).contains(&met.t) {
+                hits[lane] = Some(Hit { t: met.t, u: met.u, v: met.v, prim, rough: false });
+            } else {
+                hits[lane] =
+                    self.recheck(ray, &Candidate { hit: found[lane], shift: shifts[lane] });
+                open |= Lanes::from(hits[lane].is_none()) << lane;
+            }
+        }
+        open
+    }
+}
+
+/// What a lane holds before Embree found anything.
+const NOTHING: PacketHit = PacketHit {
+    t: f32::INFINITY,
+    u: 0.0,
+    v: 0.0,
+    ng: crate::math::Vec3::ZERO,
+    prim: PrimRef::NONE,
+};
+
+/// The lanes whose rays are valid.
+fn valid_lanes(rays: &[Ray]) -> Lanes {
+    rays.iter().enumerate().fold(0, |lanes, (k, ray)| lanes | Lanes::from(ray.is_valid()) << k)
+}
+
+/// Whether `t` lies before `other` on `ray` by more than both may be off.
+fn is_well_before(ray: &Ray, t: f32, other: f32) -> bool {
+    let length = ray.dir.length();
+    let reach = ray.org.length() + f64::from(t) * length;
+    f64::from(other - t) * length > 32.0 * ROUNDING * reach
+}

@@ -1,0 +1,89 @@
+//! The recheck: Embree's f32 hit computed again in f64, or found out to be none.
+
+use super::super::sphere;
+use super::super::triangle::{self, PlaneHit};
+use super::{Candidate, EmbreeIntersector, ROUNDING};
+use crate::embree::PacketHit;
+use crate::math::DVec3;
+use crate::ray::{Hit, PrimRef, Ray};
+use crate::scene::Recheck;
+
+/// How far beside its triangle a ray may pass, per unit of the largest coordinate: 4 ulp, less the
+/// rounding of measuring it. That is what rounding the ray to f32 explains.
+const EDGE_BAND: f64 = 7.99 * ROUNDING;
+impl EmbreeIntersector<'_> {
+    /// Whether the rules want `hit`, one of a block, recomputed before anybody looks at its triangle.
+    #[inline(always)]
+    pub(super) fn is_wanted(&self, ray: &Ray, hit: &PacketHit) -> bool {
+        match self.rules.recheck {
+            Recheck::Always => true,
+            Recheck::Risky => {
+                is_risky(ray, hit, self.meshes[hit.prim.geom_id as usize].longest_edge)
+            }
+            Recheck::Off => false,
+        }
+    }
+
+    /// The hit in f64, or `None` for a phantom.
+    #[inline]
+    pub(super) fn recheck(&self, ray: &Ray, candidate: &Candidate) -> Option<Hit> {
+        let hit = &candidate.hit;
+        let Some(mesh) = self.scene.meshes.get(hit.prim.geom_id as usize) else {
+            return self.recheck_sphere(ray, hit.prim);
+        };
+        if self.rules.recheck == Recheck::Off {
+            return Some(self.as_it_is(hit, candidate.shift));
+        }
+        let corners = mesh.corners(hit.prim.prim_id as usize);
+        // A ray in the triangle's plane hits nothing, nor is a triangle without an inside hit.
+        let met = triangle::meet_plane(ray, &corners)?;
+        let met = if met.is_inside() { met } else { beside(ray, &corners, met, candidate.shift)? };
+        let PlaneHit { t, u, v } = met;
+        (ray.tnear..=ray.tfar).contains(&t).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
+    }
+
+    /// Embree's own numbers. Unless the recheck is off they are computed again when the surface is
+    /// looked at.
+    #[inline(always)]
+    pub(super) fn as_it_is(&self, hit: &PacketHit, shift: f64) -> Hit {
+        let (t, u, v) = (f64::from(hit.t) + shift, f64::from(hit.u), f64::from(hit.v));
+        Hit { t, u, v, prim: hit.prim, rough: self.rules.recheck != Recheck::Off }
+    }
+
+    pub(super) fn recheck_sphere(&self, ray: &Ray, prim: PrimRef) -> Option<Hit> {
+        let s = &self.scene.spheres[prim.prim_id as usize];
+        let t = sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude)?;
+        Some(Hit { t, u: 0.0, v: 0.0, prim, rough: false })
+    }
+}
+
+/// Whether the ray may in truth pass beside the triangle that Embree named.
+///
+/// Embree's edge functions are off by about 10 half ulp of (edge x distance x direction), rounding
+/// of vertices and ray included, and the weights are those over the triangle's area as the ray sees
+/// it: grazing hits, slivers and hits near an edge fail the test. `edge` is the longest of the
+/// mesh, so that no corner need be fetched.
+#[inline(always)]
+fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
+    let least = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
+    let length = ray.dir.length();
+    let reach = ray.org.length() + f64::from(hit.t) * length;
+    let area = hit.ng.as_dvec3().dot(ray.dir).abs();
+    // Written so that NaN is risky.
+    let is_safe = f64::from(least) * area > 16.0 * ROUNDING * edge * reach * length;
+    !is_safe
+}
+
+/// Where a ray that meets its triangle's plane at `met`, outside, is nearest to the triangle, if that
+/// is within the edge band. `None` for a phantom. The ray's origin was moved by `shift` along it.
+fn beside(ray: &Ray, corners: &[DVec3; 3], met: PlaneHit, shift: f64) -> Option<PlaneHit> {
+    let (nearest, distance) = triangle::nearest_on_outline(ray, corners)?;
+    let largest = |p: DVec3| p.abs().max_element();
+    let reach = corners.iter().fold(largest(ray.at(shift)), |reach, c| reach.max(largest(*c)));
+    if distance > EDGE_BAND * reach {
+        return None;
+    }
+    // The plane's own t, unless the ray grazes it: then that point may be far away.
+    let apart = (met.t - nearest.t).abs() * ray.dir.length();
+    Some(PlaneHit { t: if apart <= EDGE_BAND * reach { met.t } else { nearest.t }, ..nearest })
+}
