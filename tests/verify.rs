@@ -27,7 +27,7 @@ fn sphere() -> Scene {
 
 fn tally(scene: &Scene, product: &dyn Intersector, rays: u64) -> Tally {
     let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(scene));
-    let check = Check { scene, settings: &settings, shot: &shot, product, oracle: &oracle };
+    let check = Check::new(scene, &settings, &shot, product, &oracle);
     check.run(rays, &AtomicBool::new(false), &|_| ())
 }
 
@@ -50,13 +50,7 @@ fn without_a_second_try_hits_are_missed() {
     let misses = |retry| {
         let product = embree(&scene, HitRules { retry, ..HitRules::default() });
         let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
-        let check = Check {
-            scene: &scene,
-            settings: &settings,
-            shot: &shot,
-            product: &product,
-            oracle: &oracle,
-        };
+        let check = Check::new(&scene, &settings, &shot, &product, &oracle);
         let mut rng = Pcg64::seed_from_u64(1);
         let counts = &mut RayCounts::default();
         let mut missed = 0;
@@ -184,13 +178,7 @@ fn a_ray_depends_on_seed_kind_and_number_alone() {
     let shot = shot();
     let ray = |seed, kind, index| {
         let settings = Settings { seed, ..Settings::default() };
-        let check = Check {
-            scene: &scene,
-            settings: &settings,
-            shot: &shot,
-            product: &oracle,
-            oracle: &oracle,
-        };
+        let check = Check::new(&scene, &settings, &shot, &oracle, &oracle);
         let replay = check.replay(RayId { kind, index }).unwrap();
         assert_eq!(Some(replay.trial.ray), check.ray(RayId { kind, index }));
         replay.trial.ray
@@ -212,12 +200,6 @@ fn tallies_do_not_depend_on_threads_and_stop_when_told() {
     };
     assert_eq!(with(1), with(3));
     let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
-    let check = Check {
-        scene: &scene,
-        settings: &settings,
-        shot: &shot,
-        product: &product,
-        oracle: &oracle,
-    };
+    let check = Check::new(&scene, &settings, &shot, &product, &oracle);
     assert_eq!(check.run(500, &AtomicBool::new(true), &|_| ()).total(), 0);
 }
