@@ -30,8 +30,8 @@ const MOST_RAYS: u64 = 1 << 40;
 Shoots camera, shadow, mirror and random rays and rays aimed at vertices and edges through both, and
 classifies every difference. docs/verify.md says what the classes mean.
 
-Exit codes: 0 every difference is explained, 1 some are not, 2 usage, bad input or nothing to compare,
-75 stopped.
+Exit codes: 0 every difference is explained, 1 some are not or too many slip past vertices, 2 usage,
+bad input or nothing to compare, 75 stopped.
 
 Examples:
   tweenray verify scene.toml
