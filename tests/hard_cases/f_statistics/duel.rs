@@ -155,7 +155,7 @@ fn duel(number: u64, rules: HitRules) -> Tally {
             let (_, difference) = judged(check, ray, truth);
             let Some(Difference { class, .. }) = difference else { continue };
             tally.found[class as usize] += 1;
-            if !class.is_explained() && tally.examples.len() < 1 {
+            if !class.is_explained() && tally.examples.is_empty() {
                 tally.examples.push(format!("scene {number}: {}", minimised(&scene, rules, ray)));
             }
         }
