@@ -198,8 +198,10 @@ fn duels(scenes: u64, rules: HitRules) -> Tally {
 }
 
 pub fn oracle_duel(size: Size) -> Outcome {
-    let mut outcome = Outcome::default();
-    let scenes = size.of(50_000, 20_000_000) / RAYS + 1;
+    // Slivers at less than 1e-5 rad to the ray are isolated, their edges nobody else's, and narrower than
+    // Embree's rounding: a ray that meets one inside may miss it by all three tries.
+    let mut outcome = Outcome { allowed: 1e-7, ..Outcome::default() };
+    let scenes = size.of(50_000, 100_000_000) / RAYS + 1;
     let tally = duels(scenes, HitRules::default());
     let share = |count: u64| count as f64 / tally.rays as f64;
     let unexplained = Class::ALL.iter().filter(|class| !class.is_explained());
