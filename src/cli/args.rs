@@ -83,6 +83,13 @@ pub struct SettingArgs {
         value_parser = clap::value_parser!(u64).range(0..=limits::MAX_SEED))]
     pub seed: Option<u64>,
 
+    #[command(flatten)]
+    pub tracing: TracingArgs,
+}
+
+/// What traces, and by which rules.
+#[derive(Debug, Default, Clone, Args)]
+pub struct TracingArgs {
     /// What traces: Embree, or the brute-force f64 oracle for small scenes [default: embree]
     #[arg(long, value_name = "KIND", help_heading = "Tracing",
         value_parser = values::choice::<IntersectorKind>(&["embree", "oracle"]))]
@@ -119,9 +126,6 @@ impl SettingArgs {
         if self.crop.is_some() {
             s.crop = self.crop;
         }
-        if self.isa.is_some() {
-            s.isa.clone_from(&self.isa);
-        }
         put(&mut s.spp, self.spp);
         put(&mut s.filter, self.filter);
         put(&mut s.exposure, self.exposure);
@@ -133,6 +137,15 @@ impl SettingArgs {
         put(&mut s.bounces, self.bounces);
         put(&mut s.cutoff, self.cutoff);
         put(&mut s.seed, self.seed);
+        self.tracing.apply(s);
+    }
+}
+
+impl TracingArgs {
+    fn apply(&self, s: &mut Settings) {
+        if self.isa.is_some() {
+            s.isa.clone_from(&self.isa);
+        }
         put(&mut s.intersector, self.intersector);
         put(&mut s.rules.recheck, self.recheck);
         put(&mut s.rules.robust, self.robust);

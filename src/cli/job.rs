@@ -8,17 +8,38 @@ use crate::import::{self, Loaded, OutputName};
 use crate::output::FramePattern;
 use crate::scene::Settings;
 use crate::scene::limits::MAX_EDGE;
+use std::path::{Path, PathBuf};
 
 /// Reads the scene and puts the options over its settings.
 ///
 /// Errors: `Error::Input` and `Error::Usage`; a scene that cannot be read is bad input too.
 pub fn load(scene: &SceneArgs, options: &SettingArgs) -> Result<Loaded> {
+    refuse_folder(&scene.scene)?;
     let mut loaded =
         import::load(&scene.scene, &scene.load_options(options.size)).map_err(as_input)?;
     options.apply(&mut loaded.settings);
     check(&loaded.settings)?;
     check_output(&loaded)?;
     Ok(loaded)
+}
+
+/// A folder is no scene; says which file in it may be meant.
+fn refuse_folder(path: &Path) -> Result<()> {
+    if !path.is_dir() {
+        return Ok(());
+    }
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+    let files = entries.map(|entry| entry.path()).filter(|p| p.is_file());
+    // Scene files before bare meshes, then by name.
+    let rank = |p: &PathBuf| {
+        let ending = p.extension()?.to_str()?.to_ascii_lowercase();
+        ["toml", "obj", "ply"].iter().position(|known| *known == ending)
+    };
+    let meant = files.filter_map(|p| Some((rank(&p)?, p))).min();
+    let help = meant.map_or("a scene is a .toml, .obj or .ply file".into(), |(_, file)| {
+        format!("give a file in it: {}", file.display())
+    });
+    Err(Error::input(path, format!("is a folder, not a scene file\n  help: {help}")))
 }
 
 /// Whether the scene file's output can be a pattern; a fault is shown where it stands.

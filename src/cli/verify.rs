@@ -3,16 +3,17 @@
 mod replay;
 mod report;
 
-use super::args::{SceneArgs, SettingArgs};
+use super::args::{SceneArgs, SettingArgs, TracingArgs};
 use super::exit::Exit;
 use super::progress::duration;
 use super::signals::Interrupt;
-use super::{job, say};
+use super::{job, say, values};
 use crate::cluster;
 use crate::error::{Error, Result};
 use crate::import::Loaded;
 use crate::intersect::{self, Oracle};
-use crate::scene::limits::MAX_THREADS;
+use crate::scene::limits::{MAX_SEED, MAX_THREADS};
+use crate::scene::{IntersectorKind, Scene, Settings};
 use crate::verify::{self, Check, Kind, RayId, Tally};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -29,7 +30,8 @@ const MOST_RAYS: u64 = 1 << 40;
 Shoots camera, shadow, mirror and random rays and rays aimed at vertices and edges through both, and
 classifies every difference. docs/verify.md says what the classes mean.
 
-Exit codes: 0 every difference is explained, 1 some are not, 2 usage or bad input, 75 stopped.
+Exit codes: 0 every difference is explained, 1 some are not or too many slip past vertices, 2 usage,
+bad input or nothing to compare, 75 stopped.
 
 Examples:
   tweenray verify scene.toml
@@ -55,8 +57,27 @@ pub struct VerifyArgs {
     /// Say nothing but the result and errors
     #[arg(short, long)]
     quiet: bool,
+    /// Image size in pixels, which camera rays are shot for [default: 640x360]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    size: Option<(u32, u32)>,
+    /// Seed of the rays [default: the scene's, or 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(0..=MAX_SEED))]
+    seed: Option<u64>,
     #[command(flatten)]
-    settings: SettingArgs,
+    tracing: TracingArgs,
+}
+
+impl VerifyArgs {
+    /// What stands over the scene file.
+    fn settings(&self) -> SettingArgs {
+        SettingArgs {
+            size: self.size,
+            seed: self.seed,
+            tracing: self.tracing.clone(),
+            ..SettingArgs::default()
+        }
+    }
 }
 
 fn ray_id(text: &str) -> std::result::Result<RayId, String> {
@@ -72,25 +93,33 @@ fn ray_id(text: &str) -> std::result::Result<RayId, String> {
 /// Runs the command.
 pub fn run(args: &VerifyArgs) -> Result<Exit> {
     let interrupt = Interrupt::listen()?;
-    let Loaded { world, shot, settings, warnings, .. } = job::load(&args.scene, &args.settings)?;
+    let Loaded { world, shot, settings, warnings, .. } = job::load(&args.scene, &args.settings())?;
     if !args.quiet {
         warnings.iter().for_each(say::warning);
     }
     let scene = world.into_scene(settings.rules.recentre)?;
+    refuse_the_pointless(&scene, &settings)?;
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);
     let product = intersect::build(&scene, &settings, threads)?;
     let oracle = Oracle::new(&scene);
-    let check = Check {
-        scene: &scene,
-        settings: &settings,
-        shot: &shot,
-        product: &*product,
-        oracle: &oracle,
-    };
+    let check = Check::new(&scene, &settings, &shot, &*product, &oracle);
     match args.ray {
         Some(id) => replay::run(args, &check, id),
         None => all(args, &check, threads, &interrupt),
     }
+}
+
+/// A check that could only pass would say nothing.
+fn refuse_the_pointless(scene: &Scene, settings: &Settings) -> Result<()> {
+    if settings.intersector == IntersectorKind::Oracle {
+        let message = "verify holds an intersector against the oracle; the oracle against itself \
+                       says nothing\n  help: --intersector embree";
+        return Err(Error::Usage(message.into()));
+    }
+    if scene.triangle_count() == 0 && scene.spheres.is_empty() {
+        return Err(Error::Usage("nothing to compare: the scene has no geometry".into()));
+    }
+    Ok(())
 }
 
 fn all(args: &VerifyArgs, check: &Check, threads: usize, interrupt: &Interrupt) -> Result<Exit> {
@@ -111,12 +140,13 @@ fn all(args: &VerifyArgs, check: &Check, threads: usize, interrupt: &Interrupt) 
     let progress = |more| bar.iter().for_each(|bar| bar.inc(more));
     let tally = interrupt.watched(|| pool.install(|| check.run(rays, &interrupt.stop, &progress)));
     bar.iter().for_each(ProgressBar::finish_and_clear);
-    if interrupt.stop.load(Ordering::Relaxed) {
+    let complete = !interrupt.stop.load(Ordering::Relaxed);
+    report::print(args, check, &tally, complete)?;
+    if !complete {
         say_stopped(&tally, kinds * rays);
         return Ok(Exit::Stopped);
     }
-    report::print(args, check, &tally)?;
-    Ok(if tally.unexplained() == 0 { Exit::Done } else { Exit::Failed })
+    Ok(if tally.passed() { Exit::Done } else { Exit::Failed })
 }
 
 fn say_stopped(tally: &Tally, rays: u64) {
@@ -138,7 +168,9 @@ fn bar(rays: u64) -> ProgressBar {
 /// rays and manner.
 fn replay_command(id: RayId) -> String {
     let mut words = vec!["tweenray".to_string()];
-    let mut given = std::env::args().skip(1);
+    // A name that is not UTF-8 cannot be printed as it is.
+    let given = std::env::args_os().skip(1);
+    let mut given = given.map(|word| word.to_string_lossy().into_owned());
     while let Some(word) = given.next() {
         match word.as_str() {
             "--json" | "--quiet" | "-q" => {}

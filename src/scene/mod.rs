@@ -25,6 +25,7 @@ pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentre::Recentring;
+pub(crate) use recentre::closed_volume;
 pub use settings::{
     Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };

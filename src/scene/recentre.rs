@@ -325,7 +325,7 @@ fn weld(positions: &[DVec3]) -> Vec<u32> {
 
 /// Signed volume of a closed mesh: positive when its faces wind counter-clockwise seen from
 /// outside; `None` when an edge has not exactly one partner that runs the other way.
-fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
+pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
     let weld = weld(positions);
     let mut edges = std::collections::HashMap::with_capacity(triangles.len() * 3);
     for t in triangles {

@@ -9,7 +9,7 @@
 mod interior;
 mod irradiance;
 mod kernel;
-mod light;
+pub(crate) mod light;
 mod lighting;
 pub mod optics;
 mod pixels;

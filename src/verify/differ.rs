@@ -101,12 +101,12 @@ impl<'a> Closely<'a> {
         })
     }
 
-    /// Whether the triangle's front faces the ray's start.
+    /// Whether the triangle's outside faces the ray's start.
     fn faces(&self, prim: PrimRef) -> bool {
-        self.check
-            .oracle
-            .corners(prim)
-            .is_some_and(|[a, b, c]| (b - a).cross(c - a).dot(self.ray.dir) < 0.0)
+        self.check.oracle.corners(prim).is_some_and(|[a, b, c]| {
+            let along = (b - a).cross(c - a).dot(self.ray.dir);
+            if self.check.is_inwards(prim.geom_id) { along > 0.0 } else { along < 0.0 }
+        })
     }
 
     /// A hit whose numbers were left rough, as it is when its surface is looked at.

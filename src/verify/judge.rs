@@ -19,9 +19,9 @@ pub enum Class {
     EdgeBand,
     /// The hit lies within [`BAND_ULPS`] of the ray's own start or end. Explained.
     RayEnd,
-    /// Past a vertex, within the band, onto the front of something behind: what Embree's robust mode
-    /// leaves open and no second try can see. (A back there would have given it away, and nothing
-    /// at all, too.) Explained, but a limit; `docs/accuracy.md` says how rare.
+    /// Past a vertex, within the band, onto the outside of something behind: what Embree's robust
+    /// mode leaves open and no second try can see. (An inside there would have given it away, and
+    /// nothing at all, too.) Explained, but only so many: [`super::PAST_VERTEX_LIMIT`].
     PastVertex,
     /// A hit that is not on its triangle.
     Phantom,

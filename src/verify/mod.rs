@@ -13,19 +13,23 @@ mod tally;
 
 pub use judge::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
-pub use tally::{Row, Tally, Worst};
+pub use tally::{PAST_VERTEX_LIMIT, Row, Tally, Worst};
 
 use crate::intersect::{CourtHit, Hit, Intersector, Oracle, Ray};
-use crate::scene::{Scene, Settings, Shot};
+use crate::math::DVec3;
+use crate::scene::{Scene, Settings, Shot, closed_volume};
 use crate::stats::RayCounts;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Rays that are made and traced together. Always whole groups, since packets of rays may differ
 /// from single rays in the last bits.
 const GROUP: u64 = 64;
-/// Groups between two looks at the stop flag.
-const TURN: u64 = 64;
+/// Ray-triangle pairs of the oracle between two looks at the stop flag: about 0.1 s.
+const PAIRS_A_LOOK: usize = 100_000_000;
+/// Rays at least that share one of the oracle's passes over the triangles; fewer cost too much each.
+const LEAST_A_PASS: usize = 8;
 /// Ray-triangle pairs of all kinds together when nobody says how many rays.
 const BUDGET: u64 = 100_000_000_000;
 /// Rays of a kind at least and at most when nobody says how many.
@@ -47,6 +51,8 @@ pub struct Check<'a> {
     pub product: &'a dyn Intersector,
     /// The one that is right.
     pub oracle: &'a Oracle<'a>,
+    /// For each mesh, once somebody asks, whether it is closed and wound inwards.
+    inwards: Vec<OnceLock<bool>>,
 }
 
 /// One ray, traced by both.
@@ -100,83 +106,130 @@ pub fn estimate(rays: u64, triangles: usize, threads: usize) -> f64 {
     all * (RAY_SECONDS + PAIR_SECONDS * triangles as f64) / threads as f64
 }
 
-impl Check<'_> {
+impl<'a> Check<'a> {
+    /// A check of `product`, which traces `scene` by the rules of `settings`.
+    pub fn new(
+        scene: &'a Scene,
+        settings: &'a Settings,
+        shot: &'a Shot,
+        product: &'a dyn Intersector,
+        oracle: &'a Oracle<'a>,
+    ) -> Self {
+        let inwards = scene.meshes.iter().map(|_| OnceLock::new()).collect();
+        Self { scene, settings, shot, product, oracle, inwards }
+    }
+
+    /// Whether the mesh is closed and its faces wind clockwise seen from outside, so that their
+    /// backs are its outside.
+    fn is_inwards(&self, geom_id: u32) -> bool {
+        let mesh = &self.scene.meshes[geom_id as usize];
+        *self.inwards[geom_id as usize].get_or_init(|| {
+            let positions = mesh.positions[..mesh.vertex_count].iter().map(|p| p.as_dvec3());
+            let positions: Vec<DVec3> = positions.collect();
+            closed_volume(&positions, &mesh.triangles).is_some_and(|volume| volume < 0.0)
+        })
+    }
+
     /// Shoots `rays` of each kind on the current pool's threads. `progress` hears how many more
-    /// were shot; once `stop` is set the tally is of what was shot until then.
+    /// were shot; once `stop` is set, which is looked at some times a second, the tally is of what
+    /// was shot until then.
     pub fn run(&self, rays: u64, stop: &AtomicBool, progress: &(dyn Fn(u64) + Sync)) -> Tally {
         let mut tally = Tally::default();
         for kind in Kind::ALL {
-            let groups = rays.div_ceil(GROUP);
-            let mut first = 0;
-            while first < groups && !stop.load(Ordering::Relaxed) {
-                let turn = first..groups.min(first + TURN);
-                let group = |group| {
-                    let tally = self.group(kind, group, rays);
-                    progress(GROUP.min(rays - group * GROUP));
-                    tally
-                };
-                let done =
-                    turn.clone().into_par_iter().map(group).reduce(Tally::default, Tally::with);
-                tally = tally.with(done);
-                first = turn.end;
-            }
+            let group = |group| {
+                let tally = self.group(kind, group, rays, stop)?;
+                progress(GROUP.min(rays - group * GROUP));
+                Some(tally)
+            };
+            let groups = (0..rays.div_ceil(GROUP)).into_par_iter();
+            tally = tally.with(groups.filter_map(group).reduce(Tally::default, Tally::with));
         }
         tally
     }
 
     /// One ray again; `None` where the scene has no such ray (no triangle to aim at, say).
     pub fn replay(&self, id: RayId) -> Option<Replay> {
-        let group = self.trace(id.kind, id.index / GROUP);
+        let group = self.trace(id.kind, id.index / GROUP, &AtomicBool::new(false))?;
         let trial = group.into_iter().find(|(index, _)| *index == id.index)?.1;
         let difference = self.judge(&trial);
         Some(Replay { trial, all_hits: self.oracle.all_hits(&trial.ray), difference })
     }
 
-    fn group(&self, kind: Kind, group: u64, rays: u64) -> Tally {
+    /// Makes, traces and judges the rays of one group; `None` when told to stop.
+    fn group(&self, kind: Kind, group: u64, rays: u64, stop: &AtomicBool) -> Option<Tally> {
         let mut tally = Tally::default();
-        for (index, trial) in self.trace(kind, group) {
+        for (index, trial) in self.trace(kind, group, stop)? {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
             if index < rays {
                 tally.add(RayId { kind, index }, self.judge(&trial));
             }
         }
-        tally
+        Some(tally)
     }
 
-    /// Makes and traces the rays of one group: each with its index.
-    fn trace(&self, kind: Kind, group: u64) -> Vec<(u64, Trial)> {
+    /// Makes and traces the rays of one group: each with its index. `None` when told to stop.
+    fn trace(&self, kind: Kind, group: u64, stop: &AtomicBool) -> Option<Vec<(u64, Trial)>> {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
         let indices = group * GROUP..(group + 1) * GROUP;
         let made = indices.filter_map(|index| Some((index, self.ray(RayId { kind, index })?)));
         let (indices, rays): (Vec<u64>, Vec<Ray>) = made.unzip();
         let answers = match kind {
-            Kind::Shadow => self.occlusion(&rays),
-            _ => self.hits(kind, &rays),
-        };
+            Kind::Shadow => self.occlusion(&rays, stop),
+            _ => self.hits(kind, &rays, stop),
+        }?;
         let trials = rays.into_iter().zip(answers).map(|(ray, answers)| Trial { ray, answers });
-        indices.into_iter().zip(trials).collect()
+        Some(indices.into_iter().zip(trials).collect())
     }
 
-    fn occlusion(&self, rays: &[Ray]) -> Vec<Answers> {
+    /// `answer`, the oracle's, for so few of the rays at a time that `stop` is looked at often
+    /// enough; `None` when told to stop.
+    fn in_passes<T>(
+        &self,
+        rays: &[Ray],
+        out: &mut [T],
+        stop: &AtomicBool,
+        mut answer: impl FnMut(&[Ray], &mut [T]),
+    ) -> Option<()> {
+        let fit = PAIRS_A_LOOK / self.scene.triangle_count().max(1);
+        let pass = fit.clamp(LEAST_A_PASS, GROUP as usize);
+        for (rays, out) in rays.chunks(pass).zip(out.chunks_mut(pass)) {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            answer(rays, out);
+        }
+        Some(())
+    }
+
+    fn occlusion(&self, rays: &[Ray], stop: &AtomicBool) -> Option<Vec<Answers>> {
         let (mut product, mut oracle) = (vec![false; rays.len()], vec![false; rays.len()]);
         let counts = &mut RayCounts::default();
         self.product.occluded_batch(rays, &mut product, counts);
-        self.oracle.occluded_batch(rays, &mut oracle, counts);
+        let answer = |r: &[Ray], o: &mut [bool]| self.oracle.occluded_batch(r, o, counts);
+        self.in_passes(rays, &mut oracle, stop, answer)?;
         let answers = product.into_iter().zip(oracle);
-        answers.map(|(product, oracle)| Answers::Occlusion { product, oracle }).collect()
+        Some(answers.map(|(product, oracle)| Answers::Occlusion { product, oracle }).collect())
     }
 
-    /// In packets or one by one, as the renderer traces rays of this kind; both for what it has not.
-    fn hits(&self, kind: Kind, rays: &[Ray]) -> Vec<Answers> {
+    /// Camera rays in packets, the others one by one, as the renderer does: what a block has rules
+    /// for is rays that start together.
+    fn hits(&self, kind: Kind, rays: &[Ray], stop: &AtomicBool) -> Option<Vec<Answers>> {
         let (mut product, mut oracle) = (vec![None; rays.len()], vec![None; rays.len()]);
         let counts = &mut RayCounts::default();
-        if matches!(kind, Kind::Mirror | Kind::Edge) {
+        if kind == Kind::Camera {
+            self.product.intersect_batch(rays, &mut product, counts);
+        } else {
             for (ray, hit) in rays.iter().zip(&mut product) {
                 *hit = self.product.intersect(ray, counts);
             }
-        } else {
-            self.product.intersect_batch(rays, &mut product, counts);
         }
-        self.oracle.intersect_batch(rays, &mut oracle, counts);
+        let answer = |r: &[Ray], o: &mut [Option<Hit>]| self.oracle.intersect_batch(r, o, counts);
+        self.in_passes(rays, &mut oracle, stop, answer)?;
         let answers = product.into_iter().zip(oracle);
-        answers.map(|(product, oracle)| Answers::Hits { product, oracle }).collect()
+        Some(answers.map(|(product, oracle)| Answers::Hits { product, oracle }).collect())
     }
 }

@@ -1,9 +1,12 @@
 //! The rays: six kinds, each ray a function of seed, kind and index.
 
 use super::Check;
-use crate::intersect::{Facet, PrimRef, Ray, SurfaceInteraction, Target};
+use crate::intersect::{
+    Facet, Hit, PrimRef, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth,
+};
 use crate::math::DVec3;
-use crate::scene::Light;
+use crate::scene::{Light, Settings};
+use crate::shade::light::{self, AreaLight, ShadowTarget};
 use crate::stats::RayCounts;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -63,6 +66,46 @@ impl fmt::Display for RayId {
 impl Serialize for RayId {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
+    }
+}
+
+/// A surface point with the ray that sees it.
+struct Seen {
+    si: SurfaceInteraction,
+    ray: Ray,
+    hit: Hit,
+}
+
+/// A surface point that waits for light, as the renderer's (`shade`, its lighting): normals on the
+/// viewer's side.
+struct Lit {
+    p: DVec3,
+    /// Shading normal.
+    n: DVec3,
+    /// Geometric normal.
+    ng: DVec3,
+    /// Where rays to the sky start.
+    facet: SpawnPoint,
+    /// Where rays to lights start.
+    smooth: SpawnPoint,
+}
+
+impl Lit {
+    /// A ray to a random point of the light that the renderer's sampling gives; `None` where the
+    /// light does not shine or the point lies below the horizon.
+    fn ray_to(&self, light: &Light, rng: &mut Pcg64) -> Option<Ray> {
+        if let Some(area) = AreaLight::new(light) {
+            let (seen, _) = area.seen_from(self.p, self.n)?;
+            let sample = seen.sample(self.p, self.n, [rng.random(), rng.random()]);
+            return (sample.weight > 0.0).then(|| self.smooth.to(&sample.target));
+        }
+        Some(match light::delta(light, self.p, self.n)?.1 {
+            ShadowTarget::Point(point) => {
+                let normal = (self.p - point).normalize();
+                self.smooth.to(&Target { point, normal, facet: Facet::EXACT })
+            }
+            ShadowTarget::Direction(dir) => self.smooth.along(dir),
+        })
     }
 }
 
@@ -154,55 +197,50 @@ impl Check<'_> {
     }
 
     fn mirror_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
-        let (si, incoming) = self.surface_point(rng)?;
+        let Seen { si, ray, .. } = self.surface_point(rng)?;
+        let incoming = ray.dir.normalize();
         let dir = incoming - si.ns * (2.0 * incoming.dot(si.ns));
         Some(si.spawn(dir, self.settings.rules.spawn_offset))
     }
 
-    /// To a random point of a random light as the renderer sends them; to nowhere in particular
-    /// where there is none.
+    /// From a lit point to a random light as the renderer sends them; to the sky for one in eight and
+    /// where that light does not shine.
     fn shadow_ray(&self, rng: &mut Pcg64) -> Option<Ray> {
-        let (si, incoming) = self.surface_point(rng)?;
-        let offset = self.settings.rules.spawn_offset;
+        let seen = self.surface_point(rng)?;
+        let lit = self.lit(&seen);
         let lights = &self.scene.lights;
-        if lights.is_empty() || rng.random_ratio(1, 8) {
-            let dir = direction(rng);
-            // To the side from which the point was seen.
-            let same_side = si.is_outside(dir) != si.is_outside(incoming);
-            return Some(si.spawn(if same_side { dir } else { -dir }, offset));
+        if !lights.is_empty() && !rng.random_ratio(1, 8) {
+            let ray = lit.ray_to(&lights[rng.random_range(0..lights.len())], rng);
+            if ray.is_some() {
+                return ray;
+            }
         }
-        Some(match &lights[rng.random_range(0..lights.len())] {
-            Light::Point { position, .. } => {
-                let normal = (si.p - *position).try_normalize()?;
-                si.spawn_to(&Target { point: *position, normal, facet: Facet::EXACT }, offset)
-            }
-            Light::Directional { to_light, .. } => si.spawn(*to_light, offset),
-            Light::Quad(quad) => {
-                let [a, b, c, d] = quad.corners;
-                let (u, v) = (rng.random::<f64>(), rng.random::<f64>());
-                let (near, far) = (a + (b - a) * u, d + (c - d) * u);
-                let (point, normal) = (near + (far - near) * v, quad.normal());
-                si.spawn_to(&Target { point, normal, facet: Facet::of_quad(&quad.corners) }, offset)
-            }
-            Light::Sphere { centre, radius, .. } => {
-                let normal = direction(rng);
-                // The half that can be seen.
-                let normal = if normal.dot(si.p - *centre) < 0.0 { -normal } else { normal };
-                let point = *centre + normal * *radius;
-                si.spawn_to(&Target { point, normal, facet: Facet::EXACT }, offset)
-            }
-        })
+        let dir = direction(rng);
+        Some(lit.facet.along(if dir.dot(lit.ng) < 0.0 { -dir } else { dir }))
     }
 
-    /// A surface point that the product sees, and the direction it is seen along: half of them by
-    /// a camera, half by a ray at a random triangle, so that a shot that looks away tests as well.
-    fn surface_point(&self, rng: &mut Pcg64) -> Option<(SurfaceInteraction, DVec3)> {
+    /// Where the renderer's shadow rays start.
+    fn lit(&self, Seen { si, ray, hit }: &Seen) -> Lit {
+        let Settings { smooth_terminator, rules, .. } = self.settings;
+        let outside = si.is_outside(-ray.dir);
+        let (n, ng) = if outside { (si.ns, si.ng) } else { (-si.ns, -si.ng) };
+        let lift = match smooth_terminator {
+            true => lift_to_smooth(self.scene, ray, hit, si, outside),
+            false => DVec3::ZERO,
+        };
+        let facet = si.shadow_start(ng, DVec3::ZERO, rules.spawn_offset);
+        Lit { p: si.p, n, ng, facet, smooth: si.shadow_start(ng, lift, rules.spawn_offset) }
+    }
+
+    /// A surface point that the product sees: half of them by a camera, half by a ray at a random
+    /// triangle, so that a shot that looks away tests as well.
+    fn surface_point(&self, rng: &mut Pcg64) -> Option<Seen> {
         let by_camera = rng.random();
         let camera = if by_camera { self.camera_ray(rng) } else { None };
         let counts = &mut RayCounts::default();
         let hit = |ray: Ray, counts: &mut RayCounts| {
             let hit = self.product.intersect(&ray, counts)?;
-            Some((SurfaceInteraction::new(self.scene, &ray, &hit), ray.dir.normalize()))
+            Some(Seen { si: SurfaceInteraction::new(self.scene, &ray, &hit), ray, hit })
         };
         camera.and_then(|ray| hit(ray, counts)).or_else(|| {
             let target = match self.triangle(rng) {

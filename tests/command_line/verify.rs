@@ -1,7 +1,11 @@
 //! `tweenray verify`.
 
-use super::job::Job;
+use super::job::{Job, Ran};
 use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// A scene of the repository.
 fn scene(name: &str) -> String {
@@ -11,13 +15,16 @@ fn scene(name: &str) -> String {
 #[test]
 fn scenes_pass_and_every_class_is_listed() {
     let job = Job::new();
-    for name in ["cornell", "reflective_spheres"] {
-        let ran = job.done(&format!("verify {} --rays 300", scene(name)));
+    // The brute force looks at a million triangles in the last one.
+    for (name, rays) in
+        [("cornell", 300), ("reflective_spheres", 300), ("demo", 64), ("spheres_on_terrain", 16)]
+    {
+        let ran = job.done(&format!("verify {} --rays {rays}", scene(name)));
         assert!(ran.out.contains("passed: every difference is explained"), "{}", ran.out);
         for word in ["phantom hit", "missed hit", "wrong distance", "shadow leak", "false shadow"] {
             assert!(ran.out.contains(word), "{}", ran.out);
         }
-        assert!(ran.err.contains("6 x 300 rays against"), "{}", ran.err);
+        assert!(ran.err.contains(&format!("6 x {rays} rays against")), "{}", ran.err);
     }
     assert_eq!(job.names("."), ["cube.obj"], "verify writes nothing");
 }
@@ -32,7 +39,10 @@ fn json_is_one_document_and_quiet_is_quiet() {
     assert_eq!(report["seed"], 3);
     assert_eq!(report["rays"]["vertex"], 100);
     let classes = report["classes"].as_array().expect("classes");
-    assert_eq!(classes.len(), 8);
+    assert_eq!(classes.len(), 9);
+    assert_eq!(report["complete"], true);
+    assert_eq!(report["past_vertex_limit"], 1e-3);
+    assert_eq!(report["past_vertex_allowed"], 1);
     let tie = &classes[0];
     assert_eq!(tie["class"], "tie");
     // Rays at vertices meet several triangles.
@@ -69,4 +79,72 @@ fn mistakes_are_told() {
     job.refused("verify cube.obj --ray side:1", "kinds are camera, shadow, mirror");
     job.refused("verify cube.obj --ray edge:1 --rays 5", "cannot be used with");
     job.refused("verify cube.obj --threads 0", "1..=4096");
+    job.refused("verify cube.obj --intersector oracle", "help: --intersector embree");
+    job.refused("verify cube.obj --spp 4", "'--spp'");
+}
+
+/// Only options that change what is compared are offered.
+#[test]
+fn help_lists_what_matters_alone() {
+    let help = Job::new().done("verify --help").out;
+    for word in ["--size", "--seed", "--recheck", "--isa", "--retry", "--rays", "--up"] {
+        assert!(help.contains(word), "{word}\n{help}");
+    }
+    for word in ["--spp", "--tone", "--png-bits", "--flag-bad", "--exposure", "--cutoff", "--crop"]
+    {
+        assert!(!help.contains(word), "{word}\n{help}");
+    }
+}
+
+#[test]
+fn a_folder_is_no_scene_and_an_empty_scene_nothing_to_compare() {
+    let job = Job::new();
+    job.refused("verify .", "help: give a file in it: ./cube.obj");
+    fs::write(job.path("scene.toml"), "").expect("written");
+    job.refused("verify .", "help: give a file in it: ./scene.toml");
+    job.refused("render .", "is a folder");
+    fs::create_dir(job.path("bare")).expect("a folder");
+    job.refused("verify bare", "a scene is a .toml, .obj or .ply file");
+    job.refused("verify scene.toml", "nothing to compare: the scene has no geometry");
+}
+
+/// A name that is not UTF-8 can be verified; it is printed as well as it can be.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_name_that_is_not_utf8_is_no_fault() {
+    use std::os::unix::ffi::OsStrExt;
+    let job = Job::new();
+    let name = std::ffi::OsStr::from_bytes(b"cub\xe9.obj");
+    fs::rename(job.path("cube.obj"), job.path(name)).expect("renamed");
+    let output = job.command("verify --rays 100 -q").arg(name).output().expect("it starts");
+    let ran = Ran::of(&output);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.out.contains("the worst rays again:\n  tweenray verify "), "{}", ran.out);
+}
+
+#[test]
+fn stopped_it_tells_within_a_second_what_was_found() {
+    let job = Job::new();
+    let line = format!("verify {} --rays 100000000 --json", scene("spheres_on_terrain"));
+    let mut command = job.command(&line);
+    let mut child =
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut said = String::new();
+    while !said.contains("6 x 100000000 rays") {
+        assert!(err.read_line(&mut said).expect("a line") > 0, "{said}");
+    }
+    // So that there is something to tell.
+    std::thread::sleep(Duration::from_secs(2));
+    let asked = Instant::now();
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
+    let ran = Ran::of(&child.wait_with_output().expect("it ends"));
+    assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());
+    assert_eq!(ran.code, Some(75));
+    err.read_to_string(&mut said).expect("text");
+    assert!(said.contains("stopped: "), "{said}");
+    let report: Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert_eq!((&report["complete"], &report["passed"]), (&false.into(), &false.into()));
+    assert!(report["rays"]["camera"].as_u64() > Some(0), "{}", ran.out);
 }

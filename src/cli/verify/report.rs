@@ -3,7 +3,7 @@
 use super::{VerifyArgs, replay_command};
 use crate::cli::say;
 use crate::error::{Error, Result};
-use crate::verify::{BAND_ULPS, Check, Class, Kind, Row, Tally};
+use crate::verify::{BAND_ULPS, Check, Class, Kind, PAST_VERTEX_LIMIT, Row, Tally};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -18,8 +18,13 @@ struct Report {
     seed: u64,
     band_ulps: f64,
     rays: BTreeMap<Kind, u64>,
+    /// Whether all rays were compared that were asked for.
+    complete: bool,
     passed: bool,
     unexplained: u64,
+    /// Share of the vertex rays that may be past-vertex, and how many that makes.
+    past_vertex_limit: f64,
+    past_vertex_allowed: u64,
     classes: Vec<ClassReport>,
 }
 
@@ -30,8 +35,8 @@ struct ClassReport {
     replay: Option<String>,
 }
 
-/// Prints what was found.
-pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally) -> Result<()> {
+/// Prints what was found; of a run that was stopped, until then.
+pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) -> Result<()> {
     let classes = tally
         .rows()
         .into_iter()
@@ -44,8 +49,11 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally) -> Result<()> {
         seed: check.settings.seed,
         band_ulps: BAND_ULPS,
         rays: Kind::ALL.map(|kind| (kind, tally.rays(kind))).into(),
-        passed: tally.unexplained() == 0,
+        complete,
+        passed: complete && tally.passed(),
         unexplained: tally.unexplained(),
+        past_vertex_limit: PAST_VERTEX_LIMIT,
+        past_vertex_allowed: tally.past_vertex_allowed(),
         classes: classes.collect(),
     };
     if args.json {
@@ -108,7 +116,13 @@ impl Report {
             let _ = write!(text, "\nthe worst rays again:\n{}", replays.concat());
         }
         let _ = match self.unexplained {
-            0 => writeln!(text, "\npassed: every difference is explained"),
+            _ if self.passed => writeln!(text, "\npassed: every difference is explained"),
+            0 if !self.complete => writeln!(text, "\nnot complete: stopped before the end"),
+            0 => writeln!(
+                text,
+                "\nFAILED: more than {} slipped past a vertex, {PAST_VERTEX_LIMIT} of the vertex rays",
+                self.past_vertex_allowed
+            ),
             n => writeln!(text, "\nFAILED: {n} unexplained"),
         };
         text
