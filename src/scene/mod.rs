@@ -9,6 +9,7 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod crushed;
 mod light;
 pub mod limits;
 mod material;
@@ -20,6 +21,7 @@ mod settings;
 mod winding;
 
 pub use camera::{Camera, Pose};
+pub use crushed::Collapsed;
 pub use light::{Light, QuadLight, Sky};
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
@@ -68,6 +70,8 @@ pub struct Scene {
     pub sky: Sky,
     /// Bounds of all geometry, f64, scene space.
     pub bounds: Bounds3,
+    /// Meshes that lost triangles to rounding. Nothing traces by it; it is to be told.
+    pub collapsed: Vec<Collapsed>,
 }
 
 impl Scene {
