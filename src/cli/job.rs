@@ -6,8 +6,8 @@ use super::machine;
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::{self, Loaded, OutputName};
 use crate::output::FramePattern;
-use crate::scene::Settings;
 use crate::scene::limits::MAX_EDGE;
+use crate::scene::{Collapsed, Scene, Settings};
 use std::path::{Path, PathBuf};
 
 /// Reads the scene and puts the options over its settings.
@@ -40,6 +40,20 @@ fn refuse_folder(path: &Path) -> Result<()> {
         format!("give a file in it: {}", file.display())
     });
     Err(Error::input(path, format!("is a folder, not a scene file\n  help: {help}")))
+}
+
+/// Warnings about meshes of the scene at `file` that lost triangles to rounding.
+pub fn collapsed(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
+    let warning = |c: &Collapsed| {
+        let Collapsed { mesh, lost, of } = c;
+        let message = format!(
+            "{lost} of the {of} triangles of `{mesh}` are lost: beside the rest of the scene they \
+             are too small to be told from a line or a point"
+        );
+        Diagnostic::new(file, message)
+            .help("leave out what is far away from them, or render them apart")
+    };
+    scene.collapsed.iter().map(warning).collect()
 }
 
 /// Whether the scene file's output can be a pattern; a fault is shown where it stands.

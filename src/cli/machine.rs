@@ -1,6 +1,8 @@
 //! The machine and this process, from `/proc`; what is not there is absent, never guessed.
 
+use crate::error::{Error, Result};
 use serde::Serialize;
+use std::ffi::OsStr;
 use std::fs;
 
 /// What a job ran on.
@@ -34,15 +36,28 @@ impl Machine {
 /// Instruction sets that Embree has kernels for, narrow to wide.
 pub const ISAS: [&str; 5] = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
 
+/// Environment variable that names the widest instruction set to use.
+const MAX_ISA: &str = "TWEENRAY_MAX_ISA";
+
 /// The instruction set to use unless told otherwise, by which the last bits of a hit differ:
 /// this machine's widest, or the narrower one that `TWEENRAY_MAX_ISA` names.
-pub fn best_isa() -> &'static str {
-    let place = |name: &str| ISAS.iter().position(|isa| *isa == name);
-    let most = std::env::var("TWEENRAY_MAX_ISA").ok().and_then(|name| place(&name));
-    match (place(detected_isa()), most) {
-        (Some(own), Some(most)) => ISAS[own.min(most)],
-        _ => detected_isa(),
-    }
+///
+/// Errors: `Error::Usage` where the variable names none of [`ISAS`] (empty is as good as unset).
+pub fn best_isa() -> Result<&'static str> {
+    let most = std::env::var_os(MAX_ISA).filter(|name| !name.is_empty());
+    narrower(detected_isa(), most.as_deref())
+}
+
+fn narrower(own: &'static str, most: Option<&OsStr>) -> Result<&'static str> {
+    let Some(name) = most else { return Ok(own) };
+    let Some(most) = ISAS.iter().position(|isa| name == *isa) else {
+        let (name, isas) = (name.to_string_lossy(), ISAS.join(", "));
+        let message = format!("{MAX_ISA} is '{name}', which is no instruction set; use {isas}");
+        return Err(Error::Usage(message));
+    };
+    // Another kind of processor has none of these.
+    let own_place = ISAS.iter().position(|isa| *isa == own);
+    Ok(own_place.map_or(own, |place| ISAS[place.min(most)]))
 }
 
 /// The widest instruction set that every machine of `best` has; `None` where they are of
@@ -103,6 +118,16 @@ mod tests {
         assert_eq!(shared(&["avx512", "avx2", "avx512"]), Some("avx2"));
         assert_eq!(shared(&["sse4.2"]), Some("sse4.2"));
         assert_eq!(shared(&["avx2", "aarch64"]), None);
-        assert!(ISAS.contains(&best_isa()) || cfg!(not(target_arch = "x86_64")));
+        assert!(ISAS.contains(&detected_isa()) || cfg!(not(target_arch = "x86_64")));
+    }
+
+    #[test]
+    fn the_variable_narrows_and_never_widens() {
+        let of = |own, most: Option<&str>| narrower(own, most.map(OsStr::new)).ok();
+        assert_eq!(of("avx2", None), Some("avx2"));
+        assert_eq!(of("avx2", Some("sse4.2")), Some("sse4.2"));
+        assert_eq!(of("avx2", Some("avx512")), Some("avx2"));
+        assert_eq!(of("aarch64", Some("sse2")), Some("aarch64"));
+        assert_eq!(of("avx2", Some("SSE4.2")), None);
     }
 }

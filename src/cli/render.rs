@@ -74,7 +74,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let loaded = Instant::now();
     let intersector = world.agree(intersect::build(&request.scene, &request.settings, threads))?;
     let built = Instant::now();
-    let tracer = request.tracer(&intersector.describe());
+    let tracer = request.tracer(&intersector.describe())?;
     let target = request.target(world.same_everywhere("traces with", tracer)?);
     let prepare = || {
         request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
@@ -112,7 +112,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
 /// Holds every rank to the best instruction set that all their machines have, unless one was
 /// asked for: frames differ in their last bits by it.
 fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> {
-    let best: Vec<String> = world.all(machine::best_isa().to_string())?;
+    let best: Vec<String> = world.all(machine::best_isa()?.to_string())?;
     let Some(isa) = machine::shared_isa(&best) else { return Ok(()) };
     // Where Embree would choose the same on every machine it may.
     let needed = world.all(isa != machine::detected_isa())?.contains(&true);

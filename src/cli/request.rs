@@ -32,7 +32,7 @@ pub struct Request {
     pub threads: Option<usize>,
     /// Where the statistics go, if anywhere.
     pub stats: Option<PathBuf>,
-    /// What import warns of.
+    /// What import warns of, and what rounding lost.
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     scene_hash: String,
@@ -41,6 +41,8 @@ pub struct Request {
 impl Request {
     /// Reads the scene and puts the options over it.
     pub fn load(scene: &SceneArgs, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
+        // Before the work of reading a scene.
+        machine::best_isa()?;
         let loaded = job::load(scene, settings)?;
         let frames = frames(output, &loaded)?;
         let name =
@@ -50,10 +52,13 @@ impl Request {
         let video = output.video || (loaded.video && !output.no_video);
         let stats = output.stats.clone().or(loaded.stats);
         refuse_input(stats.as_deref(), &loaded.files)?;
-        let Loaded { world, shot, settings, warnings, .. } = loaded;
+        let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let scene_hash = fingerprint(&world, &shot);
+        let path = &scene.scene;
+        let scene = world.into_scene(settings.rules.recentre)?;
+        warnings.extend(job::collapsed(&scene, path));
         Ok(Self {
-            scene: world.into_scene(settings.rules.recentre)?,
+            scene,
             shot,
             settings,
             frames,
@@ -64,19 +69,21 @@ impl Request {
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
             warnings,
-            scene_name: scene.scene.display().to_string(),
+            scene_name: path.display().to_string(),
             scene_hash,
         })
     }
 
     /// What traces, as far as frames differ by it: `intersector` by its own description, and the
     /// instruction set.
-    pub fn tracer(&self, intersector: &str) -> String {
-        match (self.settings.intersector, &self.settings.isa) {
+    ///
+    /// Errors: [`machine::best_isa`]'s.
+    pub fn tracer(&self, intersector: &str) -> Result<String> {
+        Ok(match (self.settings.intersector, &self.settings.isa) {
             (IntersectorKind::Oracle, _) => intersector.into(),
             (IntersectorKind::Embree, Some(isa)) => format!("{intersector}, {isa}"),
-            (IntersectorKind::Embree, None) => format!("{intersector}, {}", machine::best_isa()),
-        }
+            (IntersectorKind::Embree, None) => format!("{intersector}, {}", machine::best_isa()?),
+        })
     }
 
     /// Where frames traced by `tracer` go, and what they share.

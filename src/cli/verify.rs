@@ -94,10 +94,11 @@ fn ray_id(text: &str) -> std::result::Result<RayId, String> {
 pub fn run(args: &VerifyArgs) -> Result<Exit> {
     let interrupt = Interrupt::listen()?;
     let Loaded { world, shot, settings, warnings, .. } = job::load(&args.scene, &args.settings())?;
-    if !args.quiet {
-        warnings.iter().for_each(say::warning);
-    }
     let scene = world.into_scene(settings.rules.recentre)?;
+    if !args.quiet {
+        let collapsed = job::collapsed(&scene, &args.scene.scene);
+        warnings.iter().chain(&collapsed).for_each(say::warning);
+    }
     refuse_the_pointless(&scene, &settings)?;
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);
     let product = intersect::build(&scene, &settings, threads)?;

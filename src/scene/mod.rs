@@ -9,6 +9,7 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod crushed;
 mod light;
 pub mod limits;
 mod material;
@@ -20,15 +21,16 @@ mod settings;
 mod winding;
 
 pub use camera::{Camera, Pose};
+pub use crushed::Collapsed;
 pub use light::{Light, QuadLight, Sky};
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentre::Recentring;
-pub(crate) use recentre::closed_volume;
 pub use settings::{
     Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
+pub(crate) use winding::closed_volume;
 
 use crate::math::Bounds3;
 
@@ -69,6 +71,8 @@ pub struct Scene {
     pub sky: Sky,
     /// Bounds of all geometry, f64, scene space.
     pub bounds: Bounds3,
+    /// Meshes that lost triangles to rounding. Nothing traces by it; it is to be told.
+    pub collapsed: Vec<Collapsed>,
 }
 
 impl Scene {

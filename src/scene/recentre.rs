@@ -1,8 +1,8 @@
 //! From world space (f64, the user's units) to scene space (f32, about unit size).
 
 use super::{
-    Corners, Light, Material, Mesh, QuadLight, Scene, Sphere, Surface, World, WorldMesh,
-    WorldSphere, winding,
+    Collapsed, Corners, Light, Material, Mesh, QuadLight, Scene, Sphere, Surface, World, WorldMesh,
+    WorldSphere, crushed, winding,
 };
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Rgb, Vec3};
@@ -106,7 +106,7 @@ impl World {
     ///
     /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
     /// sphere whose place is not finite; a mesh, sphere or area light so small beside the scene
-    /// that f32 would crush it (`recentre` only).
+    /// that f32 would crush it, or a mesh of which it would crush most triangles (`recentre` only).
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
         self.check_finite()?;
         let bounds = self.bounds();
@@ -123,17 +123,26 @@ impl World {
         }
         let recentring = if recentre { Recentring::of(&bounds) } else { Recentring::IDENTITY };
         if recentre {
-            refuse_crushed(&self, &recentring)?;
+            crushed::refuse(&self, &recentring)?;
         }
         let lights: Vec<Light> = std::mem::take(&mut self.lights)
             .into_iter()
             .map(|l| to_scene_light(l, &recentring))
             .collect();
 
-        let mut meshes: Vec<Mesh> = std::mem::take(&mut self.meshes)
-            .into_iter()
-            .map(|m| to_scene_mesh(m, &self.materials, &recentring))
-            .collect();
+        let mut meshes = Vec::with_capacity(self.meshes.len());
+        let mut collapsed = Vec::new();
+        for mesh in std::mem::take(&mut self.meshes) {
+            let (mesh, lost) = to_scene_mesh(mesh, &self.materials, &recentring);
+            let lost = Collapsed { mesh: mesh.name.clone(), lost, of: mesh.triangles.len() };
+            if recentre {
+                crushed::refuse_collapsed(&lost)?;
+            }
+            if lost.lost > 0 {
+                collapsed.push(lost);
+            }
+            meshes.push(mesh);
+        }
         let mut spheres: Vec<Sphere> =
             self.spheres.into_iter().map(|s| to_scene_sphere(s, &recentring)).collect();
         for (index, light) in lights.iter().enumerate() {
@@ -159,63 +168,9 @@ impl World {
             lights,
             sky: self.sky,
             bounds: scene_bounds,
+            collapsed,
         })
     }
-}
-
-/// Errors for what is lost beside the rest of the scene, by its name: rather no picture than one
-/// with a hole in it.
-fn refuse_crushed(world: &World, r: &Recentring) -> Result<()> {
-    for mesh in &world.meshes {
-        let mut bounds = Bounds3::EMPTY;
-        mesh.positions.iter().for_each(|p| bounds.include(*p));
-        refuse_crushed_box(&mesh.name, &bounds, r)?;
-    }
-    // Spheres stay f64, so their place does not matter.
-    for s in &world.spheres {
-        refuse_narrower(&s.name, 2.0 * s.radius, r, NARROWEST)?;
-    }
-    for (index, light) in world.lights.iter().enumerate() {
-        let name = format!("light {}", index + 1);
-        match light {
-            Light::Quad(q) => {
-                let mut bounds = Bounds3::EMPTY;
-                q.corners.iter().for_each(|c| bounds.include(*c));
-                refuse_crushed_box(&name, &bounds, r)?;
-            }
-            Light::Sphere { radius, .. } => refuse_narrower(&name, 2.0 * radius, r, NARROWEST)?,
-            Light::Point { .. } | Light::Directional { .. } => {}
-        }
-    }
-    Ok(())
-}
-
-/// Widths of scene space: what is narrower has triangles whose determinants underflow in f32.
-const NARROWEST: f64 = 1.0 / (1u64 << 32) as f64;
-/// Numbers of f32 that must fit across a mesh; with fewer, rounding moves its surface by more than
-/// a quarter of its radius.
-const FEWEST_STEPS: f64 = 8.0;
-
-/// Errors for triangles within `bounds` (world) whose corners would fall together in f32. What is
-/// a point in f64 already is nothing that could be lost.
-fn refuse_crushed_box(name: &str, bounds: &Bounds3, r: &Recentring) -> Result<()> {
-    let largest = r.point_to_scene(bounds.min).abs().max(r.point_to_scene(bounds.max).abs());
-    let step = f64::from(f32::EPSILON) * largest.max_element();
-    let width = bounds.extent().max_element();
-    refuse_narrower(name, width, r, NARROWEST.max(FEWEST_STEPS * step))
-}
-
-/// Errors for what is wider than nothing (world units) but narrower than `least` (scene units).
-fn refuse_narrower(name: &str, width: f64, r: &Recentring, least: f64) -> Result<()> {
-    if width == 0.0 || width * r.scale() >= least {
-        return Ok(());
-    }
-    let least = r.length_to_world(least);
-    Err(Error::Usage(format!(
-        "`{name}` is {width:.1e} units wide, too small to be told from a point beside the rest of \
-         the scene, which holds things from {least:.1e} units there. Leave it out, or render it \
-         apart"
-    )))
 }
 
 fn to_scene_light(light: Light, r: &Recentring) -> Light {
@@ -247,24 +202,27 @@ fn to_scene_sphere(s: WorldSphere, r: &Recentring) -> Sphere {
     }
 }
 
-fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> Mesh {
+/// The mesh in scene space, and how many of its triangles rounding took.
+fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Mesh, usize) {
     let WorldMesh { name, positions, mut triangles, mut normals, mut uvs, material } = mesh;
     if materials[material as usize].glass.is_some() {
         // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
         // would otherwise refract as a hole in glass.
-        let mut volume = closed_volume(&positions, &triangles);
+        let mut volume = winding::closed_volume(&positions, &triangles);
         if volume.is_none() {
-            let strays = winding::strays(&positions, &triangles, &weld(&positions));
+            let strays = winding::strays(&positions, &triangles, &winding::weld(&positions));
             let strays = strays.into_iter().flatten().enumerate().filter(|(_, stray)| *stray);
             strays.for_each(|(i, _)| reverse_one(i, &mut triangles, &mut normals, &mut uvs));
-            volume = closed_volume(&positions, &triangles);
+            volume = winding::closed_volume(&positions, &triangles);
         }
         if volume.is_some_and(|volume| volume < 0.0) {
             reverse(&mut triangles, &mut normals, &mut uvs);
         }
     }
-    let positions = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
-    scene_mesh(name, positions, triangles, normals, uvs, Surface { material, light: None })
+    let rounded: Vec<Vec3> = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
+    let lost = crushed::count_collapsed(&positions, &rounded, &triangles);
+    let surface = Surface { material, light: None };
+    (scene_mesh(name, rounded, triangles, normals, uvs, surface), lost)
 }
 
 fn scene_mesh(
@@ -309,42 +267,6 @@ fn reverse(
     if let Some(uv) = uvs {
         uv.corners.iter_mut().flatten().for_each(|t| t.swap(1, 2));
     }
-}
-
-/// For each vertex a number that it shares with all at the same place: they are one corner, however
-/// often the file lists them.
-fn weld(positions: &[DVec3]) -> Vec<u32> {
-    let mut welded = std::collections::HashMap::with_capacity(positions.len());
-    let number = |p: &DVec3| {
-        let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
-        let next = welded.len() as u32;
-        *welded.entry(key).or_insert(next)
-    };
-    positions.iter().map(number).collect()
-}
-
-/// Signed volume of a closed mesh: positive when its faces wind counter-clockwise seen from
-/// outside; `None` when an edge has not exactly one partner that runs the other way.
-pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
-    let weld = weld(positions);
-    let mut edges = std::collections::HashMap::with_capacity(triangles.len() * 3);
-    for t in triangles {
-        let t = t.map(|i| weld[i as usize]);
-        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            if a != b {
-                *edges.entry((a.min(b), a.max(b))).or_insert(0i64) += if a < b { 1 } else { -1 };
-            }
-        }
-    }
-    if triangles.is_empty() || edges.values().any(|balance| *balance != 0) {
-        return None;
-    }
-    let origin = positions[triangles[0][0] as usize];
-    let volume = triangles.iter().map(|t| {
-        let [a, b, c] = t.map(|i| positions[i as usize] - origin);
-        a.dot(b.cross(c))
-    });
-    Some(volume.sum())
 }
 
 fn add_emitting_surface(
@@ -401,35 +323,5 @@ mod tests {
             }
         }
         assert_eq!(scale_of(0.0), 1.0);
-    }
-
-    #[test]
-    fn what_would_be_crushed_is_refused_by_name() {
-        const DIRECTIONS: [DVec3; 6] =
-            [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
-        let with = |radius: f64, at: f64| {
-            let mut world = World::default();
-            world.materials.push(Material::black("m"));
-            for (name, centre, radius) in [("large", 0.0, 1.0), ("tiny", at, radius)] {
-                let centre = DVec3::X * centre;
-                let corner = |dir: DVec3| centre + dir * radius;
-                world.meshes.push(WorldMesh {
-                    name: name.into(),
-                    positions: DIRECTIONS.map(corner).into(),
-                    triangles: vec![[0, 2, 4], [1, 5, 3]],
-                    normals: None,
-                    uvs: None,
-                    material: 0,
-                });
-            }
-            world.into_scene(true)
-        };
-        assert!(with(1e-5, 1.0).is_ok());
-        assert!(with(0.0, 1.0).is_ok(), "a point is no loss");
-        let error = with(1e-7, 1.0).expect_err("crushed").to_string();
-        assert!(error.contains("`tiny` is 2.0e-7 units wide"), "{error}");
-        // Near the middle numbers are finer.
-        assert!(with(1e-7, 0.0).is_ok());
-        assert!(with(1e-12, 0.0).is_err());
     }
 }

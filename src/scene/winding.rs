@@ -1,4 +1,4 @@
-//! Faces of one closed mesh wound the same way round.
+//! Which way round the faces of a closed mesh are wound.
 
 use crate::math::DVec3;
 use std::collections::HashMap;
@@ -7,7 +7,7 @@ use std::collections::HashMap;
 /// connected part the lesser share by area. `None` where that is no question with an answer: an
 /// edge has not exactly two triangles, or the part is one-sided.
 ///
-/// `weld` names for each vertex the first one at its place.
+/// `weld` is [`weld`]'s for `positions`.
 pub(super) fn strays(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
@@ -71,6 +71,43 @@ fn orient_part(
         part.iter().for_each(|i| reversed[*i] = reversed[*i].map(|r| !r));
     }
     Some(())
+}
+
+/// For each vertex a number that it shares with all at the same place: they are one corner, however
+/// often the file lists them. The numbers count the places, from 0 in order of their first vertex; they
+/// are not indices of vertices. (0 and -0 are the same place.)
+pub(super) fn weld(positions: &[DVec3]) -> Vec<u32> {
+    let mut welded = HashMap::with_capacity(positions.len());
+    let number = |p: &DVec3| {
+        let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+        let next = welded.len() as u32;
+        *welded.entry(key).or_insert(next)
+    };
+    positions.iter().map(number).collect()
+}
+
+/// Signed volume of a closed mesh: positive when its faces wind counter-clockwise seen from
+/// outside; `None` when an edge has not exactly one partner that runs the other way.
+pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
+    let weld = weld(positions);
+    let mut edges = HashMap::with_capacity(triangles.len() * 3);
+    for t in triangles {
+        let t = t.map(|i| weld[i as usize]);
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            if a != b {
+                *edges.entry((a.min(b), a.max(b))).or_insert(0i64) += if a < b { 1 } else { -1 };
+            }
+        }
+    }
+    if triangles.is_empty() || edges.values().any(|balance| *balance != 0) {
+        return None;
+    }
+    let origin = positions[triangles[0][0] as usize];
+    let volume = triangles.iter().map(|t| {
+        let [a, b, c] = t.map(|i| positions[i as usize] - origin);
+        a.dot(b.cross(c))
+    });
+    Some(volume.sum())
 }
 
 #[cfg(test)]

@@ -18,7 +18,8 @@ use crate::stats::RayCounts;
 /// Bodies that one point can be in; of more, the lowest priority is forgotten.
 const MOST_BODIES: usize = 8;
 /// Scene units between boundaries that touch: the gap of a model whose coordinates have six
-/// decimals, and ten times what rounding positions to f32 moves them.
+/// decimals, and ten times what rounding positions to f32 moves them. (World units where the scene
+/// is not recentred.)
 const TOUCHING: f64 = 4e-6;
 /// A ray sees touching boundaries further apart the flatter it meets them, down to this cosine.
 const LEAST_COS: f64 = 0.05;
@@ -34,6 +35,13 @@ struct Body {
     index: u32,
     material: MaterialId,
     priority: u8,
+}
+
+impl Body {
+    /// Of equal priorities the later material is higher, so that the order of entry is nothing.
+    fn rank(&self) -> (u8, MaterialId) {
+        (self.priority, self.material)
+    }
 }
 
 /// The bodies that a point lies in.
@@ -54,9 +62,11 @@ impl Interior {
             return;
         }
         if usize::from(self.len) == MOST_BODIES {
-            let lowest = self.bodies().iter().enumerate().min_by_key(|(_, b)| b.priority);
-            let lowest = lowest.map_or(0, |(at, _)| at);
-            self.bodies[lowest] = body;
+            if let Some(lowest) = self.bodies.iter_mut().min_by_key(|b| b.rank()) {
+                if lowest.rank() < body.rank() {
+                    *lowest = body;
+                }
+            }
             return;
         }
         self.bodies[usize::from(self.len)] = body;
@@ -69,10 +79,9 @@ impl Interior {
         self.bodies[at] = self.bodies[usize::from(self.len)];
     }
 
-    /// What is there: of equal priorities the later material, so that the order of entry is
-    /// nothing.
+    /// What is there.
     fn medium(&self) -> Option<Body> {
-        self.bodies().iter().copied().max_by_key(|b| (b.priority, b.material))
+        self.bodies().iter().copied().max_by_key(Body::rank)
     }
 
     /// The bodies at `eye`, by what a ray along `dir` leaves before it has entered it.
@@ -84,15 +93,18 @@ impl Interior {
             let hit = renderer.intersector.intersect(&ray, &mut RayCounts::default());
             let Some(hit) = hit else { break };
             let si = SurfaceInteraction::new(renderer.scene, &ray, &hit);
-            if let Some(body) = body_of(renderer.scene, &si) {
-                if !met.contains(&body) {
-                    met.push(body);
-                    if si.is_outside(dir) {
-                        inside.enter(body);
-                    }
+            // A ray that starts beyond the first of several that touch would miss the others.
+            let touching = Touching::at(renderer, &ray, &si, true, &mut RayCounts::default());
+            for si in touching.surfaces() {
+                let Some(body) = body_of(renderer.scene, si).filter(|b| !met.contains(b)) else {
+                    continue;
+                };
+                met.push(body);
+                if si.is_outside(dir) {
+                    inside.enter(body);
                 }
             }
-            ray = si.spawn(dir, renderer.settings.rules.spawn_offset);
+            ray = touching.last().spawn(dir, renderer.settings.rules.spawn_offset);
         }
         inside
     }
@@ -131,54 +143,86 @@ pub(super) struct Boundary {
     pub tint: Rgb,
 }
 
-/// Crosses what `ray` meets at `first`, where `t` is its parameter and `before` the bodies there.
+/// Boundaries that touch.
+struct Touching {
+    found: [SurfaceInteraction; MOST_TOUCHING],
+    count: usize,
+}
+
+impl Touching {
+    /// What touches `first`, which `ray` meets, up to something solid (which what goes through
+    /// meets next), or with `solid` beyond it.
+    fn at(
+        renderer: &Renderer,
+        ray: &Ray,
+        first: &SurfaceInteraction,
+        solid: bool,
+        counts: &mut RayCounts,
+    ) -> Self {
+        let scene = renderer.scene;
+        let mut found = [*first; MOST_TOUCHING];
+        let mut count = 1;
+        let length = ray.dir.length();
+        let reach = TOUCHING / first.ng.dot(ray.dir).abs().max(LEAST_COS * length);
+        // The probe starts close by, so that its rounding is that of the place: seen from a camera far
+        // away, what touches would be less than an ulp of `t` apart.
+        let t = (first.p - ray.org).dot(ray.dir) / (length * length);
+        let back = reach.min(t - ray.tnear).max(0.0);
+        let ahead = reach.min(ray.tfar - t).max(0.0);
+        let org = first.p - ray.dir * back;
+        let tfar = back + ahead;
+        // What Embree's f32 needs to tell two boundaries apart, likewise longer the flatter they are met.
+        let step = reach * (2.0 * f64::from(f32::EPSILON) * first.p.abs().max_element() / TOUCHING);
+        let mut tnear = 0.0;
+        for _ in 0..2 * MOST_TOUCHING {
+            if count == MOST_TOUCHING || tnear >= tfar {
+                break;
+            }
+            let exclude = found[count - 1].prim;
+            let probe = Ray { org, tnear, tfar, exclude, ..*ray };
+            counts.glass += 1;
+            let Some(hit) = renderer.intersector.intersect(&probe, counts) else { break };
+            let si = SurfaceInteraction::new(scene, &probe, &hit);
+            if si.prim == ray.exclude || found[..count].iter().any(|c| c.prim == si.prim) {
+                // Where the ray started, or seen already: what else there is lies further on.
+                tnear = if tnear < back { back } else { hit.t.max(tnear) + step };
+                continue;
+            }
+            if !solid && body_of(scene, &si).is_none() {
+                break;
+            }
+            found[count] = si;
+            count += 1;
+            tnear = hit.t.max(back) + step;
+        }
+        Self { found, count }
+    }
+
+    fn surfaces(&self) -> &[SurfaceInteraction] {
+        &self.found[..self.count]
+    }
+
+    fn last(&self) -> &SurfaceInteraction {
+        &self.found[self.count - 1]
+    }
+}
+
+/// Crosses what `ray` meets at `first`; `before` are the bodies in front of it.
 pub(super) fn cross(
     renderer: &Renderer,
     ray: &Ray,
     first: &SurfaceInteraction,
-    t: f64,
     before: &Interior,
     counts: &mut RayCounts,
 ) -> Crossing {
     let scene = renderer.scene;
-    let mut crossed = [*first; MOST_TOUCHING];
-    let mut count = 1;
-    let cos = first.ng.dot(ray.dir).abs();
-    let reach = TOUCHING / cos.max(LEAST_COS * ray.dir.length());
-    let mut tnear = (t - reach).max(ray.tnear);
-    for _ in 0..2 * MOST_TOUCHING {
-        if count == MOST_TOUCHING {
-            break;
-        }
-        let exclude = crossed[count - 1].prim;
-        let probe = Ray { tnear, tfar: (t + reach).min(ray.tfar), exclude, ..*ray };
-        counts.glass += 1;
-        let Some(hit) = renderer.intersector.intersect(&probe, counts) else { break };
-        let si = SurfaceInteraction::new(scene, &probe, &hit);
-        if si.prim == ray.exclude || crossed[..count].iter().any(|c| c.prim == si.prim) {
-            // Where the ray started, or seen already: what else there is lies further on.
-            if tnear >= t {
-                break;
-            }
-            tnear = t;
-            continue;
-        }
-        // Something solid, which what goes through meets next.
-        if body_of(scene, &si).is_none() {
-            break;
-        }
-        crossed[count] = si;
-        count += 1;
-        // Beyond it by what Embree's f32 needs to tell the two apart.
-        tnear = hit.t.max(t) * (1.0 + 2.0 * f64::from(f32::EPSILON));
-    }
-    let crossed = &crossed[..count];
+    let touching = Touching::at(renderer, ray, first, false, counts);
     let mut after = *before;
-    for (si, body) in crossed.iter().filter_map(|si| Some((si, body_of(scene, si)?))) {
+    for (si, body) in touching.surfaces().iter().filter_map(|si| Some((si, body_of(scene, si)?))) {
         if si.is_outside(ray.dir) { after.leave(body) } else { after.enter(body) }
     }
-    let boundary = boundary(scene, crossed, before.medium(), after.medium());
-    Crossing { last: crossed[count - 1], after, boundary }
+    let boundary = boundary(scene, touching.surfaces(), before.medium(), after.medium());
+    Crossing { last: *touching.last(), after, boundary }
 }
 
 fn boundary(
@@ -191,7 +235,7 @@ fn boundary(
     if material(before) == material(after) {
         return None;
     }
-    let higher = [before, after].into_iter().flatten().max_by_key(|b| (b.priority, b.material))?;
+    let higher = [before, after].into_iter().flatten().max_by_key(Body::rank)?;
     let own = crossed.iter().find(|si| si.surface.material == higher.material);
     let glass = |body: &Body| scene.materials[body.material as usize].glass.as_ref();
     let ior = |body: Option<Body>| body.as_ref().and_then(glass).map_or(1.0, |g| g.ior);
@@ -238,9 +282,17 @@ mod tests {
 
     #[test]
     fn of_too_many_bodies_the_lowest_is_forgotten() {
-        let mut inside = Interior::default();
-        (0..20).for_each(|i| inside.enter(body(i, i as u8)));
-        assert_eq!(inside.medium(), Some(body(19, 19)));
-        assert_eq!(usize::from(inside.len), MOST_BODIES);
+        let ascending: Vec<Body> = (0..20).map(|i| body(i, i as u8)).collect();
+        let descending: Vec<Body> = ascending.iter().rev().copied().collect();
+        for order in [ascending, descending] {
+            let mut inside = Interior::default();
+            order.iter().for_each(|b| inside.enter(*b));
+            assert_eq!(usize::from(inside.len), MOST_BODIES);
+            for i in (20 - MOST_BODIES as u32..20).rev() {
+                assert_eq!(inside.medium(), Some(body(i, i as u8)));
+                inside.leave(body(i, i as u8));
+            }
+            assert_eq!(inside.medium(), None);
+        }
     }
 }

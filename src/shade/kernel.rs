@@ -197,7 +197,7 @@ impl Vertex<'_, '_> {
             if !material.glass.as_ref().is_some_and(interior::is_ranked) {
                 return self.meet::<MIRROR, true, true>(&ray, met, state, &inside, may_bounce);
             }
-            let crossing = interior::cross(renderer, &ray, &si, met.t, &inside, self.counts);
+            let crossing = interior::cross(renderer, &ray, &si, &inside, self.counts);
             if let Some(boundary) = &crossing.boundary {
                 if may_bounce {
                     let ways = Ways {

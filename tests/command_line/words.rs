@@ -50,6 +50,43 @@ fn mistakes_are_answered_with_what_was_meant() {
 }
 
 #[test]
+fn an_unknown_instruction_set_in_the_environment_is_refused() {
+    let job = Job::new();
+    let line = "render cube.obj --size 8x8 --spp 1 --frames 1 -o f.png";
+    let run = |isa: &str| {
+        let output = job.command(line).env("TWEENRAY_MAX_ISA", isa).output();
+        Ran::of(&output.expect("the program starts"))
+    };
+    let ran = run("avx1024");
+    assert_eq!(ran.code, Some(2), "{}", ran.err);
+    assert!(ran.err.contains("TWEENRAY_MAX_ISA is 'avx1024'"), "{}", ran.err);
+    assert!(ran.err.contains("sse2, sse4.2, avx, avx2, avx512"), "{}", ran.err);
+    assert_eq!(job.names("."), ["cube.obj"], "a refused job leaves nothing");
+    assert_eq!(run("").code, Some(0));
+}
+
+#[test]
+fn triangles_lost_beside_far_ones_are_told() {
+    let job = Job::new();
+    let cube = String::from_utf8(job.read("cube.obj")).expect("text");
+    let far = "v 1e9 0 0\nv 1e9 1e9 0\nv 1e9 0 1e9\n";
+    std::fs::write(job.path("lost.obj"), format!("{cube}{far}f 9 10 11\n")).expect("written");
+    for command in ["render", "inspect", "verify"] {
+        job.refused(&format!("{command} lost.obj"), "12 of the 13 triangles of `");
+    }
+    // Twenty more that are kept: no longer most.
+    let fan: String =
+        (0..20).map(|i| format!("v {}e7 1e9 1e9\nf 9 10 {}\n", i + 1, 12 + i)).collect();
+    std::fs::write(job.path("part.obj"), format!("{cube}{far}f 9 10 11\n{fan}")).expect("written");
+    let says = "12 of the 33 triangles of `";
+    let ran = job.done("render part.obj --size 8x8 --spp 1 --frames 1 -o f.png");
+    assert!(ran.err.contains("warning: part.obj: ") && ran.err.contains(says), "{}", ran.err);
+    assert!(ran.err.contains("help: leave out what is far away"), "{}", ran.err);
+    let text = job.done("inspect part.obj").out;
+    assert!(text.contains(says), "{text}");
+}
+
+#[test]
 fn a_scene_of_another_ending_or_with_a_wrong_output_is_told_so() {
     let job = Job::new();
     std::fs::write(job.path("scene.txt"), "[camera]\n").expect("written");

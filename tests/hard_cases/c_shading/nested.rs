@@ -173,20 +173,32 @@ const VIEWS: [(DVec3, DVec3); 4] = [
     (DVec3::new(0.9, -0.2, 0.3), DVec3::new(0.0, 0.0, 0.0)),
 ];
 
-/// Turned by no particular angle, so that surfaces which coincide do so up to rounding only.
-fn film(mut world: World, (eye, target): (DVec3, DVec3), edge: u32, turned: bool) -> Film {
+fn film(world: World, view: (DVec3, DVec3), edge: u32, turned: bool) -> Film {
+    film_within(world, view, 50.0, edge, turned)
+}
+
+/// `degrees` wide. Turned by no particular angle, so that surfaces which coincide do so up to
+/// rounding only.
+fn film_within(
+    mut world: World,
+    (eye, target): (DVec3, DVec3),
+    degrees: f64,
+    edge: u32,
+    turned: bool,
+) -> Film {
     let turn =
         if turned { DQuat::from_axis_angle(DVec3::ONE.normalize(), 0.7) } else { DQuat::IDENTITY };
     world.apply_transform(&DAffine3::from_quat(turn)).unwrap();
     let pose =
         Pose { eye: turn * eye, target: turn * target, up: turn * DVec3::Y, roll_degrees: 0.0 };
-    let camera = Camera::new(&pose, 50.0, edge, edge).unwrap();
+    let camera = Camera::new(&pose, degrees, edge, edge).unwrap();
     let mut job: Job = common::job(world, pose, edge, edge);
     job.camera = camera;
     job.settings.bounces = 12;
     job.settings.cutoff = 0.004;
-    let (film, _) = common::render(&job);
+    let (film, counts) = common::render(&job);
     assert!(film.bad.is_none());
+    assert_eq!(counts.invalid, 0);
     film
 }
 
@@ -231,5 +243,83 @@ pub fn nested_dielectrics(size: Size) -> Outcome {
             outcome.show(format!("without priorities: {:.1} % of pixels off", 100.0 * share));
         }
     }
+    for distance in [3.0, 50.0, 500.0] {
+        from_afar(&mut outcome, distance, edge);
+    }
     outcome
+}
+
+/// Half width of a box in a box, level of the inner one's floor, and half width of a lid.
+const INNER: f64 = 0.6;
+const FLOOR: f64 = -0.5;
+const LID: f64 = 1.2;
+
+/// A box in a box, both up to y = 1 but for `apart`, and if asked for a lid on both, again but for
+/// `apart`.
+fn boxes(apart: f64, lid: bool) -> World {
+    let mut world = surroundings();
+    let [a, b, c] =
+        [(GLASS, 1), (TEA, 2), (1.8, 3)].map(|(ior, p)| glass(&mut world, ior, Some(p)));
+    let mut push = |lo: DVec3, hi: DVec3, material| {
+        world.meshes.push(Shell::cuboid(lo, hi).mesh(material));
+    };
+    push(DVec3::splat(-OUT), DVec3::new(OUT, 1.0 - apart, OUT), a);
+    push(DVec3::new(-INNER, FLOOR, -INNER), DVec3::new(INNER, 1.0, INNER), b);
+    if lid {
+        push(DVec3::new(-LID, 1.0 + apart, -LID), DVec3::new(LID, 1.5, LID), c);
+    }
+    world
+}
+
+/// The same cut by hand.
+fn cut_boxes(lid: bool) -> World {
+    let mut world = surroundings();
+    let mut push = |ior, shell: Shell| {
+        let material = glass(&mut world, ior, None);
+        world.meshes.push(shell.mesh(material));
+    };
+    let wide = [-OUT, -OUT, OUT, OUT];
+    let inner = [-INNER, -INNER, INNER, INNER];
+    let above = if lid { 1.8 } else { 1.0 };
+    let mut outer_air = Shell::default();
+    outer_air.walls(DVec3::splat(-OUT), DVec3::splat(OUT), 1.0);
+    outer_air.face(1, -OUT, [-OUT; 2], [OUT; 2], -1.0);
+    push(GLASS, outer_air);
+    let mut outer_above = Shell::default();
+    outer_above.ring(1.0, wide, inner);
+    push(GLASS / above, outer_above);
+    let mut inner_above = Shell::default();
+    inner_above.face(1, 1.0, [-INNER; 2], [INNER; 2], 1.0);
+    push(TEA / above, inner_above);
+    let mut inner_outer = Shell::default();
+    inner_outer.walls(DVec3::new(-INNER, FLOOR, -INNER), DVec3::new(INNER, 1.0, INNER), 1.0);
+    inner_outer.face(1, FLOOR, [-INNER; 2], [INNER; 2], -1.0);
+    push(TEA / GLASS, inner_outer);
+    if lid {
+        let mut lid_air = Shell::default();
+        lid_air.walls(DVec3::new(-LID, 1.0, -LID), DVec3::new(LID, 1.5, LID), 1.0);
+        lid_air.face(1, 1.5, [-LID; 2], [LID; 2], 1.0);
+        let mut below = Shell::default();
+        below.ring(1.0, [-LID, -LID, LID, LID], wide);
+        below.0.iter_mut().for_each(|quad| quad.reverse());
+        lid_air.0.extend(below.0);
+        push(1.8, lid_air);
+    }
+    world
+}
+
+/// Boundaries that touch, two and three, looked at from ever further away through an ever longer
+/// lens.
+fn from_afar(outcome: &mut Outcome, distance: f64, edge: u32) {
+    let eye = DVec3::new(0.17, 1.0, 0.23).normalize() * distance;
+    let degrees = 2.0 * (1.3 / distance).atan().to_degrees();
+    let film = |world| film_within(world, (eye, DVec3::ZERO), degrees, edge, true);
+    // Under 4 units to the scene's unit: a quarter of what still touches.
+    for (lid, gap) in [(false, 0.0), (false, 4e-6), (true, 4e-6), (true, -4e-6)] {
+        let (mean, share) = apart(&film(boxes(gap, lid)), &film(cut_boxes(lid)));
+        outcome.count(u64::from(edge * edge), 0);
+        let name = format!("{} boxes {gap:e} apart, from {distance}", if lid { 3 } else { 2 });
+        outcome.at_most(&format!("{name}: mean difference from the cut"), mean, 1e-4);
+        outcome.at_most(&format!("{name}: pixels off by over 1 %"), share, 1e-3);
+    }
 }
