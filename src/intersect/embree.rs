@@ -7,7 +7,8 @@
 //!   the ray goes on past it.
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
 //! * A ray that misses although it comes near some triangle is tried again, turned by 4 ulp to one
-//!   side and then to the other; and so is one that must have missed something before its hit.
+//!   side and then to the other; and so is one that must have missed something before its hit,
+//!   until a try finds something nearer or hits the same again.
 //!
 //! Shadow rays report no primitive, so only the first rule reaches them.
 //!
@@ -75,6 +76,14 @@ enum Turn {
 
 /// Lanes of a block, a bit each.
 type Lanes = u64;
+
+/// What came of another try.
+struct Tried {
+    /// These lanes hit something nearer.
+    nearer: Lanes,
+    /// These hit the same primitive again.
+    confirmed: Lanes,
+}
 
 fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -158,12 +167,17 @@ impl<'s> EmbreeIntersector<'s> {
         };
         let hit = self.recheck(ray, &candidate);
         if self.retries() && self.is_doubtful(ray, &candidate.hit) {
-            counts.retry += 1;
-            let again = self.query(ray, Turn::OneWay, &[]);
-            let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
-            let again = again.and_then(|again| self.recheck(ray, &again));
-            if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
-                return again;
+            for turn in [Turn::OneWay, Turn::OtherWay] {
+                counts.retry += 1;
+                let again = self.query(ray, turn, &[]);
+                if again.is_some_and(|again| again.hit.prim == candidate.hit.prim) {
+                    break;
+                }
+                let again = again.and_then(|again| self.recheck(ray, &again));
+                if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
+                    return again;
+                }
+                // Neither confirmed nor nearer: the turn may have led past an outline.
             }
         }
         hit.or_else(|| self.settle(ray, Some(candidate.hit.prim), counts))
@@ -240,10 +254,12 @@ impl<'s> EmbreeIntersector<'s> {
         let mut hit = self.trace::<W>(rays, valid, &mut found);
         if self.retries() {
             let missed = self.missed_near(rays, valid & !hit);
-            let doubtful = missed | back_faces(rays, hit, &found);
-            hit |= self.try_again::<W>(rays, doubtful, Turn::OneWay, &mut found, counts);
-            let missed = missed & !hit;
-            hit |= self.try_again::<W>(rays, missed, Turn::OtherWay, &mut found, counts);
+            let mut doubtful = missed | back_faces(rays, hit, &found);
+            for turn in [Turn::OneWay, Turn::OtherWay] {
+                let tried = self.try_again::<W>(rays, doubtful, turn, &mut found, counts);
+                hit |= tried.nearer;
+                doubtful &= !(tried.nearer | tried.confirmed);
+            }
         }
         for lane in each(self.recheck_block(rays, hit, &found, hits)) {
             hits[lane] = self.settle(&rays[lane], Some(found[lane].prim), counts);
@@ -285,8 +301,7 @@ impl<'s> EmbreeIntersector<'s> {
         if bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle)) { missed } else { 0 }
     }
 
-    /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
-    /// those that hit.
+    /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer.
     fn try_again<const W: usize>(
         &self,
         rays: &[Ray],
@@ -294,10 +309,11 @@ impl<'s> EmbreeIntersector<'s> {
         turn: Turn,
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
-    ) -> Lanes {
+    ) -> Tried {
+        let mut outcome = Tried { nearer: 0, confirmed: 0 };
         let tried = doubtful.count_ones();
         if tried == 0 {
-            return 0;
+            return outcome;
         }
         counts.retry += u64::from(tried);
         let mut again = [rays[0]; BLOCK];
@@ -307,15 +323,19 @@ impl<'s> EmbreeIntersector<'s> {
         let mut found_again = [NOTHING; BLOCK];
         let all = Lanes::MAX >> (BLOCK as u32 - tried);
         let hit_again = self.trace::<W>(&again[..tried as usize], all, &mut found_again);
-        let mut hit = 0;
         for (k, lane) in each(doubtful).enumerate() {
-            let is_hit = hit_again >> k & 1 == 1;
-            if is_hit && is_well_before(&rays[lane], found_again[k].t, found[lane].t) {
-                found[lane] = found_again[k];
-                hit |= 1 << lane;
+            let (was, again) = (found[lane], found_again[k]);
+            if hit_again >> k & 1 == 0 {
+                continue;
+            }
+            if again.prim == was.prim {
+                outcome.confirmed |= 1 << lane;
+            } else if is_well_before(&rays[lane], again.t, was.t) {
+                found[lane] = again;
+                outcome.nearer |= 1 << lane;
             }
         }
-        hit
+        outcome
     }
 
     fn occluded_packets<const W: usize>(
