@@ -74,7 +74,7 @@ pub fn agreement(size: Size) -> Outcome {
                     d.example.into_iter().for_each(|line| outcome.example(line));
                     if kind == "random" {
                         let name = format!("{kind}, {set}: other triangles");
-                        let most = (1e-6 * rays as f64).max(1.0);
+                        let most = (5e-6 * rays as f64).max(1.0);
                         outcome.at_most(&name, (d.ties + d.along + d.outlines) as f64, most);
                     }
                 }
