@@ -71,7 +71,8 @@ enum Turn {
     OtherWay,
 }
 
-/// The further tries of a ray whose first query found nothing. (Two more, to the other sides, find
+/// The further tries of a ray whose first query found nothing, or what it cannot have met first:
+/// one turn alone may lead past an outline, or past the vertex as well. (Two more, to the other sides, find
 /// one in nine more of lost slivers: docs/decisions/016-vertices-leak.md.)
 const TURNS: [Turn; 2] = [Turn::OneWay, Turn::OtherWay];
 
@@ -150,12 +151,14 @@ impl<'s> EmbreeIntersector<'s> {
         };
         let hit = self.recheck(ray, &candidate);
         if self.retries() && self.is_doubtful(ray, &candidate.hit) {
-            counts.retry += 1;
-            let again = self.query(ray, TURNS[0], &[]);
-            let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
-            let again = again.and_then(|again| self.recheck(ray, &again));
-            if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
-                return again;
+            for turn in TURNS {
+                counts.retry += 1;
+                let again = self.query(ray, turn, &[]);
+                let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
+                let again = again.and_then(|again| self.recheck(ray, &again));
+                if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
+                    return again;
+                }
             }
         }
         hit.or_else(|| self.settle(ray, Some(candidate.hit.prim), counts))

@@ -21,6 +21,7 @@ use rand::Rng;
 use tweenray::intersect::{EmbreeIntersector, Ray};
 use tweenray::math::DVec3;
 use tweenray::scene::{HitRules, Scene};
+use ways::OneByOne;
 
 cases! {
     1 watertight_random "Embree allows 2e-5 of 10,875 rays" => watertight_random;
@@ -50,7 +51,8 @@ cases! {
     25 unrelated_mesh "Embree 181: a far mesh changes near hits" => scale::unrelated_mesh;
 }
 
-/// Leaks of closed spheres at the origin and far away. `aim` gives the target of ray `i`.
+/// Leaks of closed spheres at the origin and far away, by both ways to trace. `aim` gives the
+/// target of ray `i`.
 fn watertight(
     rays: u64,
     columns_rows: &[(u32, u32)],
@@ -62,12 +64,16 @@ fn watertight(
         for (columns, rows) in columns_rows {
             let scene = shapes::scene_of(shapes::sphere(centre, 2.0, *columns, *rows));
             let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 4).unwrap();
-            let leaks = suite::misses(&embree, each, |i| {
+            let make = |i| {
                 let mut rng = suite::rng(1, i);
                 let eye = shapes::in_ball(&mut rng, 0.4);
                 Ray::new(eye, aim(&scene, &mut rng) - eye)
-            });
-            outcome.count(each, leaks);
+            };
+            // Half in packets, half one by one.
+            let half = each / 2;
+            outcome.count(half, suite::misses(&embree, half, make));
+            let rest = |i| make(half + i);
+            outcome.count(each - half, suite::misses(&OneByOne(&embree), each - half, rest));
         }
     }
     outcome

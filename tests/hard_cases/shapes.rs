@@ -5,7 +5,7 @@
 use rand::Rng;
 use std::f64::consts::{PI, TAU};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Material, Scene, World, WorldMesh};
+use tweenray::scene::{Corners, Material, Scene, World, WorldMesh};
 
 /// The far centre that Embree's own tests use.
 pub const FAR: DVec3 = DVec3::new(148_376.0, 1_234.0, -223_423.0);
@@ -54,6 +54,14 @@ pub fn sphere(centre: DVec3, radius: f64, columns: u32, rows: u32) -> WorldMesh 
         }
     }
     WorldMesh { name: "sphere".into(), positions, triangles, normals: None, uvs: None, material: 0 }
+}
+
+/// [`sphere`] with the normals of a true sphere.
+pub fn smooth_sphere(centre: DVec3, radius: f64, columns: u32, rows: u32) -> WorldMesh {
+    let mut mesh = sphere(centre, radius, columns, rows);
+    let values = mesh.positions.iter().map(|p| (*p - centre).normalize().as_vec3()).collect();
+    mesh.normals = Some(Corners { values, corners: None });
+    mesh
 }
 
 /// A direction, uniform over the sphere.

@@ -1,7 +1,13 @@
 //! `./x stress`: every hard case in full size, as a table. Arguments name cases: `7`, `a`,
-//! `watertight`, `costs` (of the hit rules); `--small` runs the small size.
+//! `watertight`, `costs` (of the hit rules); `--small` runs the small size, `--list` only names the
+//! cases. A word that names nothing ends it with exit code 2.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "prints its table")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "prints its table"
+)]
 
 mod a_intersection;
 mod b_spawned_rays;
@@ -26,19 +32,40 @@ const LETTERS: [(&str, &str, &[Case]); 4] = [
     ("f", "statistics and effects", f_statistics::CASES),
 ];
 
+/// Picks the costs of the hit rules.
+const COSTS: &str = "costs";
+
+/// Whether `name` picks a case of `letter`.
+fn picks(name: &str, letter: &str, case: &Case) -> bool {
+    name == letter || name == case.number.to_string() || case.name.contains(name)
+}
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
-    let size = if words.iter().any(|w| w == "--small") { Size::Small } else { Size::Full };
-    let names: Vec<&String> = words.iter().filter(|w| !w.starts_with("--")).collect();
+    let (flags, names): (Vec<&str>, Vec<&str>) =
+        words.iter().map(String::as_str).partition(|w| w.starts_with("--"));
+    let all = || LETTERS.iter().flat_map(|(l, _, cases)| cases.iter().map(move |c| (*l, c)));
+    let unknown_flag = |flag: &&&str| !["--small", "--list"].contains(*flag);
+    let names_nothing = |name: &&&str| **name != COSTS && !all().any(|(l, c)| picks(name, l, c));
+    if let Some(word) = flags.iter().find(unknown_flag).or_else(|| names.iter().find(names_nothing))
+    {
+        eprintln!("stress: '{word}' is neither a case nor an option; --list names the cases");
+        std::process::exit(2);
+    }
     let wanted = |letter: &str, case: &Case| {
-        names.is_empty()
-            || names.iter().any(|n| {
-                *n == letter || **n == case.number.to_string() || case.name.contains(n.as_str())
-            })
+        names.is_empty() || names.iter().any(|name| picks(name, letter, case))
     };
+    if flags.contains(&"--list") {
+        for (letter, case) in all().filter(|(letter, case)| wanted(letter, case)) {
+            println!("{letter} {:>3}  {}", case.number, case.name);
+        }
+        println!("       {COSTS}");
+        return;
+    }
+    let size = if flags.contains(&"--small") { Size::Small } else { Size::Full };
     support::title("stress: hard cases");
     println!("{HEAD}");
-    let (mut run, mut failed) = (0, Vec::new());
+    let (mut run, mut skipped, mut failed) = (0, Vec::new(), Vec::new());
     for (letter, about, cases) in LETTERS {
         let cases: Vec<&Case> = cases.iter().filter(|case| wanted(letter, case)).collect();
         if !cases.is_empty() {
@@ -50,11 +77,13 @@ fn main() {
             run += 1;
             if !outcome.passes() {
                 failed.push(case.number);
+            } else if !outcome.skipped.is_empty() {
+                skipped.push(case.number);
             }
         }
     }
     let mut within = true;
-    if names.is_empty() || names.iter().any(|n| *n == "costs") {
+    if names.is_empty() || names.contains(&COSTS) {
         println!(
             "\nWhat each hit rule costs: spheres_on_terrain, camera rays on one thread, frames"
         );
@@ -63,9 +92,11 @@ fn main() {
         run += 1;
     }
     let costs = if within { "" } else { "; the rules cost too much" };
-    println!("\n{run} cases, {} failed{}{costs}", failed.len(), list(&failed));
+    let (failures, parts) = (failed.len(), skipped.len());
+    let (failed, skipped) = (list(&failed), list(&skipped));
+    println!("\n{run} cases, {failures} failed{failed}, {parts} skipped in part{skipped}{costs}");
     println!("load average at the end {}", support::load_average());
-    if run == 0 || !failed.is_empty() || !within {
+    if failures > 0 || !within {
         std::process::exit(1);
     }
 }
@@ -76,13 +107,18 @@ case                                       rays    failures     bound    seconds
 
 fn print_row(case: &Case, outcome: &Outcome, seconds: f64) {
     let (trials, failures, bound) = (outcome.trials, outcome.failures, outcome.bound());
-    let result = if outcome.passes() { "ok" } else { "FAILED" };
+    let result = match outcome.passes() {
+        true if outcome.skipped.is_empty() => "ok",
+        true => "skipped",
+        false => "FAILED",
+    };
     let (number, name) = (case.number, case.name);
     println!(
         "{number:>3}  {name:<30} {trials:>12}  {failures:>10}  {bound:>8.1e}  {seconds:>9.1}  {result}"
     );
     println!("     anchor: {}", case.anchor);
     outcome.shown.iter().for_each(|line| println!("     {line}"));
+    outcome.skipped.iter().for_each(|line| println!("     skipped: {line}"));
     if !outcome.passes() {
         outcome.faults().for_each(|line| println!("     wrong: {line}"));
     }

@@ -45,7 +45,7 @@ pub struct Case {
 macro_rules! cases {
     ($($number:literal $name:ident $anchor:literal => $($run:ident)::+;)*) => {
         /// All cases of this letter.
-        #[cfg_attr(test, expect(dead_code, reason = "the stress run reads it"))]
+        #[allow(dead_code, reason = "the stress run reads it, the tests do not")]
         pub const CASES: &[$crate::suite::Case] = &[$($crate::suite::Case {
             number: $number,
             name: stringify!($name),
@@ -59,6 +59,7 @@ macro_rules! cases {
             fn $name() {
                 let outcome = super::$($run)::+($crate::suite::Size::Small);
                 println!("{}", outcome.shown.join("\n"));
+                outcome.skipped.iter().for_each(|part| println!("SKIPPED {part}"));
                 outcome.assert();
             })*
         }
@@ -81,6 +82,8 @@ pub struct Outcome {
     pub examples: Vec<String>,
     /// What is wrong whatever the counts say, a line each.
     pub wrong: Vec<String>,
+    /// Parts that could not be run here, and why, a line each: such a case is no plain "ok".
+    pub skipped: Vec<String>,
 }
 
 /// Examples that are kept.
@@ -128,6 +131,11 @@ impl Outcome {
         self.wrong.push(what);
     }
 
+    /// Leaves out a part that cannot be run here: says which, and why.
+    pub fn skip(&mut self, what: impl Into<String>) {
+        self.skipped.push(what.into());
+    }
+
     /// Describes a failed trial, which is counted elsewhere.
     pub fn example(&mut self, what: String) {
         if self.examples.len() < MOST_EXAMPLES {
@@ -140,6 +148,7 @@ impl Outcome {
         self.count(other.trials, other.failures);
         self.shown.extend(other.shown);
         self.wrong.extend(other.wrong);
+        self.skipped.extend(other.skipped);
         other.examples.into_iter().for_each(|line| self.example(line));
     }
 

@@ -59,8 +59,9 @@ impl EmbreeIntersector<'_> {
             let missed = self.missed_near(cast, valid & !hit);
             let mut doubtful = missed | self.back_faces(cast, hit, &found);
             for turn in TURNS {
-                hit |= self.try_again::<W>(cast, doubtful, turn, &mut found, counts);
-                doubtful = missed & !hit;
+                let nearer = self.try_again::<W>(cast, doubtful, turn, &mut found, counts);
+                hit |= nearer;
+                doubtful &= !nearer;
             }
         }
         let block = Block { rays, cast, shifts: &shifts, found: &found };

@@ -19,7 +19,7 @@ use tweenray::stats::RayCounts;
 /// Hits closer than this, of the scene's size 1, are one crossing.
 const TOGETHER: f64 = 1e-5;
 /// The same for faces that share a vertex.
-const FANNED: f64 = 1e-3;
+const FANNED: f64 = 1e-4;
 /// A weight below this is at the edge of its triangle.
 const BAND: f64 = 1e-4;
 

@@ -200,20 +200,15 @@ enum Fate {
     Traced(f64, Outcome),
 }
 
+/// Times an ordinary mesh's time that each garbage mesh may take.
+const MOST_TIME: f64 = 10.0;
+/// A mesh that seems slow is timed so often: other work on the machine is no fault of it.
+const TIMINGS: usize = 8;
+
 pub fn fuzz(size: Size) -> Outcome {
     let meshes = size.of(200, 10_000u64);
-    let fates: Vec<Fate> = (0..meshes).into_par_iter().map(garbage).collect();
-    let mut outcome = Outcome::default();
-    let mut times = Vec::new();
-    for fate in fates {
-        outcome.trials += 1;
-        if let Fate::Traced(seconds, traced) = fate {
-            outcome.merge(traced);
-            times.push(seconds);
-        }
-    }
-    // The same rays at as many ordinary triangles, in the same turmoil.
-    let ordinary: Vec<f64> = (0..meshes.min(400))
+    // As many rays at ordinary triangles, in the same turmoil.
+    let mut ordinary: Vec<f64> = (0..meshes.min(400))
         .into_par_iter()
         .map(|i| {
             let mut rng = suite::rng(21, i);
@@ -222,17 +217,26 @@ pub fn fuzz(size: Size) -> Outcome {
             trace_garbage(&scene, i, false).0
         })
         .collect();
+    ordinary.sort_by(f64::total_cmp);
+    let ordinary = ordinary[ordinary.len() / 2];
+    let fates: Vec<Fate> =
+        (0..meshes).into_par_iter().map(|i| garbage(i, MOST_TIME * ordinary)).collect();
+    let mut outcome = Outcome::default();
+    let mut times = Vec::new();
+    for fate in fates {
+        outcome.trials += 1;
+        if let Fate::Traced(seconds, traced) = fate {
+            outcome.merge(traced);
+            times.push(seconds / ordinary);
+        }
+    }
     let (traced, refused) = (times.len(), meshes as usize - times.len());
     outcome.show(format!("{traced} meshes traced, {refused} refused with an error"));
     outcome.at_least("meshes traced, share", traced as f64 / meshes as f64, 0.5);
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let worst = times.iter().fold(0f64, |a, b| a.max(*b));
-    outcome.show(format!("slowest mesh {:.1} of an ordinary one's time", worst / mean(&ordinary)));
-    outcome.at_most(
-        "time of a garbage mesh, of an ordinary one's",
-        mean(&times) / mean(&ordinary),
-        10.0,
-    );
+    let mean = times.iter().sum::<f64>() / traced as f64;
+    outcome.show(format!("time of a garbage mesh, of an ordinary one's: {mean:.2} in the mean"));
+    let worst = times.into_iter().fold(0f64, f64::max);
+    outcome.at_most("time of the slowest garbage mesh, of an ordinary one's", worst, MOST_TIME);
     outcome
 }
 
@@ -242,8 +246,9 @@ fn random_faces(rng: &mut impl Rng) -> Vec<[u32; 3]> {
     (0..40).map(|_| [0; 3].map(|_: u32| rng.random_range(0..VERTICES as u32))).collect()
 }
 
-/// A mesh of random bits through a file, the importer and the tracer.
-fn garbage(i: u64) -> Fate {
+/// A mesh of random bits through a file, the importer and the tracer; timed again where it takes
+/// more than `limit` seconds.
+fn garbage(i: u64, limit: f64) -> Fate {
     let mut rng = suite::rng(19, i);
     let faces = random_faces(&mut rng);
     // Every fourth mesh takes any bits: NaN, infinities, numbers too large to render. The others
@@ -269,7 +274,12 @@ fn garbage(i: u64) -> Fate {
     }
     let Ok(model) = load("garbage.ply", &file) else { return Fate::Refused };
     let Ok(scene) = model.world.into_scene(i % 2 == 0) else { return Fate::Refused };
-    let (seconds, outcome) = trace_garbage(&scene, i, true);
+    let (mut seconds, outcome) = trace_garbage(&scene, i, true);
+    for _ in 1..TIMINGS {
+        if seconds > limit {
+            seconds = seconds.min(trace_garbage(&scene, i, true).0);
+        }
+    }
     Fate::Traced(seconds, outcome)
 }
 

@@ -7,8 +7,8 @@ use tweenray::film::Film;
 use tweenray::math::{DAffine3, DVec3, Rgb, Vec3};
 use tweenray::output::Display;
 use tweenray::scene::{
-    Camera, Corners, Glass, HitRules, Light, Material, Pose, QuadLight, Recheck, Sky, World,
-    WorldMesh, WorldSphere,
+    Camera, Glass, HitRules, Light, Material, Pose, QuadLight, Recheck, Sky, World, WorldMesh,
+    WorldSphere,
 };
 
 /// Our rules, but the world's own coordinates rounded to f32, and Embree's word for the hit.
@@ -55,11 +55,7 @@ fn studio(spp: u32) -> Job {
 
 /// A sphere of triangles with smooth normals.
 fn smooth(centre: DVec3, radius: f64, material: u32) -> WorldMesh {
-    let mut mesh = shapes::sphere(centre, radius, 48, 24);
-    let values = mesh.positions.iter().map(|p| (*p - centre).normalize().as_vec3()).collect();
-    mesh.normals = Some(Corners { values, corners: None });
-    mesh.material = material;
-    mesh
+    WorldMesh { material, ..shapes::smooth_sphere(centre, radius, 48, 24) }
 }
 
 /// The jobs that are moved about.

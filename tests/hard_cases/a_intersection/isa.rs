@@ -1,39 +1,49 @@
-//! The same rays on different instruction sets.
+//! The same rays on different instruction sets, around and inside a closed sphere.
+//!
+//! Where two sets hit different triangles the exact court decides what it means.
 
+use super::wide;
 use crate::shapes;
 use crate::suite::{self, BATCH, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
-use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
+use tweenray::intersect::court::Line;
+use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
 use tweenray::math::DVec3;
 use tweenray::scene::{HitRules, Recheck, Scene};
 use tweenray::stats::RayCounts;
 
 const SETS: [&str; 3] = ["sse4.2", "avx2", "avx512"];
-/// A ray that passes an edge of its triangle closer than this is in the edge band: 4 ulp of f32 at
-/// the largest distance, 4.
-const BAND: f64 = 4.0 * 4.0 * 1.2e-7;
+/// ulps from an edge within which a ray may be said to meet either triangle.
+const BAND: f64 = 4.0;
 
 /// Differences between two instruction sets.
-#[derive(Default, Clone, Copy)]
+#[derive(Default, Clone)]
 struct Differences {
-    /// The neighbour across an edge, with the point within the edge band of both.
+    /// Two triangles that the ray passes within the band, at the same distance to what that leaves
+    /// open.
     ties: u64,
-    /// One passes the outline of the mesh by, where the other's hit lies within the edge band.
+    /// From one hit to the other the ray keeps to the surface within the band: it runs along an edge.
+    along: u64,
+    /// The ray touches the outline: within the band it passes faces that look both ways, at the
+    /// nearer hit. Going on from there, or hitting nothing, is as right as hitting it.
     outlines: u64,
-    /// Anything else.
-    others: u64,
+    /// One set goes through the closed surface where the other hits it.
+    holes: u64,
     /// The same primitive, but another t, u or v.
     values: u64,
+    example: Option<String>,
 }
 
 impl Differences {
     fn plus(self, o: Self) -> Self {
         Self {
             ties: self.ties + o.ties,
+            along: self.along + o.along,
             outlines: self.outlines + o.outlines,
-            others: self.others + o.others,
+            holes: self.holes + o.holes,
             values: self.values + o.values,
+            example: self.example.or(o.example),
         }
     }
 }
@@ -43,7 +53,8 @@ pub fn agreement(size: Size) -> Outcome {
     let scene = shapes::scene_of(shapes::sphere(DVec3::ZERO, 1.0, 400, 200));
     let sets: Vec<&str> = SETS.into_iter().filter(|set| runs_here(set)).collect();
     outcome.show(format!("instruction sets here: {}", sets.join(", ")));
-    for (kind, share) in [("random", 1e-6), ("edge-aimed", 1.0)] {
+    let oracle = Oracle::new(&scene);
+    for kind in ["random", "edge-aimed"] {
         let rays = size.of(100_000, 4_000_000);
         let make = |i: u64| aimed(&scene, i, kind == "edge-aimed");
         for recheck in [Recheck::Always, Recheck::Off] {
@@ -51,19 +62,21 @@ pub fn agreement(size: Size) -> Outcome {
             let with = |set: &&str| EmbreeIntersector::new(&scene, rules, Some(set), 4).unwrap();
             let tracers: Vec<EmbreeIntersector> = sets.iter().map(with).collect();
             for (set, tracer) in sets.iter().zip(&tracers).skip(1) {
-                let d = compare(&scene, &tracers[0], tracer, rays, make);
+                let d = compare(&oracle, &tracers[0], tracer, rays, make);
                 let first = sets[0];
                 outcome.show(format!(
-                    "{kind}, recheck {recheck:?}, {set} against {first}: {} ties at edges, {} at \
-                     outlines, {} other primitives, {} other values of {rays}",
-                    d.ties, d.outlines, d.others, d.values
+                    "{kind}, recheck {recheck:?}, {set} against {first}: {} ties at edges, {} along \
+                     edges, {} touch the outline, {} holes, {} other values of {rays}",
+                    d.ties, d.along, d.outlines, d.holes, d.values
                 ));
                 if recheck == Recheck::Always {
-                    outcome.count(rays, d.others + d.values);
-                    // Ties at random rays are rare.
-                    let most = (share * rays as f64).max(1.0);
-                    let name = format!("{kind}, {set}: ties");
-                    outcome.at_most(&name, (d.ties + d.outlines) as f64, most);
+                    outcome.count(rays, d.holes + d.values);
+                    d.example.into_iter().for_each(|line| outcome.example(line));
+                    if kind == "random" {
+                        let name = format!("{kind}, {set}: other triangles");
+                        let most = (5e-6 * rays as f64).max(1.0);
+                        outcome.at_most(&name, (d.ties + d.along + d.outlines) as f64, most);
+                    }
                 }
             }
         }
@@ -88,7 +101,11 @@ fn runs_here(set: &str) -> bool {
 
 fn aimed(scene: &Scene, i: u64, at_edge: bool) -> Ray {
     let mut rng = suite::rng(24, i);
-    let org = shapes::direction(&mut rng) * rng.random_range(0.0..3.0);
+    // A block is inside or outside as a whole, as the renderer's blocks are: of one that is half
+    // inside no hit can be told to be the wrong side's (docs/decisions/016-vertices-leak.md).
+    let inside = i / BATCH % 3 == 0;
+    let distance = if inside { 0.0..0.95 } else { 1.05..3.0 };
+    let org = shapes::direction(&mut rng) * rng.random_range(distance);
     if !at_edge {
         return Ray::new(org, shapes::direction(&mut rng));
     }
@@ -100,7 +117,7 @@ fn aimed(scene: &Scene, i: u64, at_edge: bool) -> Ray {
 }
 
 fn compare(
-    scene: &Scene,
+    oracle: &Oracle,
     a: &EmbreeIntersector,
     b: &EmbreeIntersector,
     rays: u64,
@@ -116,42 +133,82 @@ fn compare(
         };
         let pairs = rays.iter().zip(hits(a).into_iter().zip(hits(b)));
         pairs.fold(Differences::default(), |sum, (ray, (a, b))| {
-            sum.plus(difference(scene, ray, a, b))
+            sum.plus(difference(oracle, ray, a, b))
         })
     };
     batches.map(one).reduce(Differences::default, Differences::plus)
 }
 
-fn difference(scene: &Scene, ray: &Ray, a: Option<Hit>, b: Option<Hit>) -> Differences {
-    let at_edge = |h: &Hit| edge_distance(scene, ray, h) < BAND;
+fn difference(oracle: &Oracle, ray: &Ray, a: Option<Hit>, b: Option<Hit>) -> Differences {
     let mut d = Differences::default();
-    match (a, b) {
-        (Some(a), Some(b)) if a.prim == b.prim => d.values += u64::from(a != b),
-        (Some(a), Some(b)) => {
-            let (near, far) = if a.t <= b.t { (a, b) } else { (b, a) };
-            let neighbours = (far.t - near.t) * ray.dir.length() < 1e-4;
-            if neighbours && at_edge(&near) && at_edge(&far) {
-                d.ties += 1;
-            } else if at_edge(&near) {
-                d.outlines += 1;
-            } else {
-                d.others += 1;
-            }
+    let (near, far) = match (a, b) {
+        (None, None) => return d,
+        (Some(a), Some(b)) if a.prim == b.prim => {
+            d.values += u64::from(a != b);
+            return d;
         }
-        (Some(hit), None) | (None, Some(hit)) if at_edge(&hit) => d.outlines += 1,
-        (None, None) => {}
-        _ => d.others += 1,
+        (Some(a), Some(b)) if b.t < a.t => (b, Some(a)),
+        (Some(a), b) => (a, b),
+        (None, Some(b)) => (b, None),
+    };
+    let line = oracle.line(ray);
+    if far.is_some_and(|far| is_tie(oracle, &line, ray, &near, &far)) {
+        d.ties += 1;
+    } else if far.is_some_and(|far| runs_along(oracle, &line, ray, &near, &far)) {
+        d.along += 1;
+    } else if touches_outline(oracle, &line, ray, &near) {
+        d.outlines += 1;
+    } else {
+        d.holes += 1;
+        let met = oracle.all_hits(ray);
+        d.example = Some(format!("{ray:?}: {a:?} or {b:?}; the court: {met:?}"));
     }
     d
 }
 
-/// How close the line of `ray` passes the nearest edge of what it hits.
-fn edge_distance(scene: &Scene, ray: &Ray, hit: &Hit) -> f64 {
-    let corners = scene.meshes[0].corners(hit.prim.prim_id as usize);
-    let distance = |k: usize| {
-        let (a, b) = (corners[k], corners[(k + 1) % 3]);
-        let across = ray.dir.cross(b - a);
-        ((a - ray.org).dot(across) / across.length()).abs()
-    };
-    distance(0).min(distance(1)).min(distance(2))
+/// How far apart the ray may be said to meet a plane that it passes at an angle of this cosine.
+fn slack(line: &Line, corners: &[DVec3; 3], cosine: f64) -> f64 {
+    2.0 * BAND * line.ulp(corners) / cosine.abs().max(1e-3)
+}
+
+/// The cosine between the ray and the triangle's normal; negative where it meets the front.
+fn cosine([a, b, c]: &[DVec3; 3], ray: &Ray) -> f64 {
+    (*b - *a).cross(*c - *a).normalize().dot(ray.dir.normalize())
+}
+
+fn is_tie(oracle: &Oracle, line: &Line, ray: &Ray, near: &Hit, far: &Hit) -> bool {
+    let corners = [near, far].map(|hit| oracle.corners(hit.prim).unwrap());
+    let slack = corners.map(|c| slack(line, &c, cosine(&c, ray)));
+    corners.iter().all(|c| line.edge_ulps(c) <= BAND)
+        && (far.t - near.t) * ray.dir.length() <= slack[0] + slack[1]
+}
+
+/// Whether every part of the ray between the two hits lies within the band of the surface, so that
+/// it went through nothing.
+fn runs_along(oracle: &Oracle, line: &Line, ray: &Ray, near: &Hit, far: &Hit) -> bool {
+    let band = BAND * line.ulp(&oracle.corners(near.prim).unwrap());
+    let around = oracle.near(ray, band);
+    let around: Vec<_> = around.into_iter().map(|prim| oracle.corners(prim).unwrap()).collect();
+    const PARTS: u32 = 16;
+    (0..=PARTS).all(|k| {
+        let p = ray.at(near.t + (far.t - near.t) * f64::from(k) / f64::from(PARTS));
+        around.iter().any(|corners| wide::point_to_triangle(p, corners) <= band)
+    })
+}
+
+/// Whether the ray passes, within the band and around `near`, faces that look both ways.
+fn touches_outline(oracle: &Oracle, line: &Line, ray: &Ray, near: &Hit) -> bool {
+    let corners = oracle.corners(near.prim).unwrap();
+    if line.edge_ulps(&corners) > BAND {
+        return false;
+    }
+    // Faces of one edge or vertex: such as share a corner with what was hit.
+    let shares = |c: &[DVec3; 3]| c.iter().any(|p| corners.contains(p));
+    let around: Vec<PrimRef> = oracle.near(ray, BAND * line.ulp(&corners));
+    let cosines = around.into_iter().filter_map(|prim| {
+        let corners = oracle.corners(prim)?;
+        shares(&corners).then(|| cosine(&corners, ray))
+    });
+    let (front, back) = cosines.fold((false, false), |(f, b), c| (f || c < 0.0, b || c >= 0.0));
+    front && back
 }

@@ -201,7 +201,7 @@ struct Distances {
     example: Option<String>,
 }
 
-/// `t` against the plane's; where the ray passes just beside the triangle, where it is nearest.
+/// `t` against the plane's; where the ray passes just beside the triangle, its point against that.
 fn judge_distance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Distances) {
     let Some(hit) = hit else { return };
     let corners = corners(scene, hit);
@@ -212,11 +212,9 @@ fn judge_distance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Dista
         return;
     }
     let off = wide::point_to_triangle(ray.at(distance(scene, ray, hit)), &corners);
-    let error = if met.least < 0.0 && off <= limit {
-        0.0
-    } else {
-        (distance(scene, ray, hit) - met.t).abs()
-    };
+    let from_plane = (distance(scene, ray, hit) - met.t).abs();
+    // Beside it the plane may be far from the triangle: there the point's distance from that counts.
+    let error = if met.least < 0.0 && off <= limit { off.min(from_plane) } else { from_plane };
     let relative = error / met.t.abs();
     found.hits += 1;
     found.wrong += u64::from(relative > 1e-6);

@@ -6,14 +6,11 @@ use crate::suite::{Outcome, Size};
 use std::f32::consts::PI;
 use std::time::Instant;
 use tweenray::math::{DVec3, Rgb, luminance};
-use tweenray::scene::{Corners, Light};
+use tweenray::scene::Light;
 
 /// A ball of `rows` by `rows` facets with the normals of a sphere.
 fn ball(rows: u32, light: Light, edge: u32, smooth_terminator: bool) -> Job {
-    let mut mesh = shapes::sphere(DVec3::ZERO, 1.0, rows, rows);
-    let values = mesh.positions.iter().map(|p| p.normalize().as_vec3()).collect();
-    mesh.normals = Some(Corners { values, corners: None });
-    let mut world = shapes::world_of(mesh);
+    let mut world = shapes::world_of(shapes::smooth_sphere(DVec3::ZERO, 1.0, rows, rows));
     world.lights.push(light);
     let mut job = common::job(world, common::pose((0.4, 0.9, 3.2), (0.0, 0.0, 0.0)), edge, edge);
     job.settings.smooth_terminator = smooth_terminator;

@@ -5,9 +5,7 @@ use crate::shapes;
 use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DAffine3, DMat3, DVec3, Rgb};
-use tweenray::scene::{
-    Camera, Corners, Glass, Light, Material, Pose, QuadLight, Sky, World, WorldMesh,
-};
+use tweenray::scene::{Camera, Glass, Light, Material, Pose, QuadLight, Sky, World, WorldMesh};
 
 const EYE: DVec3 = DVec3::new(1.0, 1.2, 4.0);
 
@@ -44,11 +42,7 @@ fn world() -> World {
 }
 
 fn smooth(centre: DVec3, radius: f64, material: u32) -> WorldMesh {
-    let mut mesh = shapes::sphere(centre, radius, 64, 32);
-    let values = mesh.positions.iter().map(|p| (*p - centre).normalize().as_vec3()).collect();
-    mesh.normals = Some(Corners { values, corners: None });
-    mesh.material = material;
-    mesh
+    WorldMesh { material, ..shapes::smooth_sphere(centre, radius, 64, 32) }
 }
 
 fn job(world: World, edge: u32, by: &DMat3) -> Job {

@@ -125,7 +125,7 @@ pub fn effects_cost_nothing(size: Size) -> Outcome {
 fn count_instructions(outcome: &mut Outcome, size: Size) {
     let (edge, times) = size.of((96, 2), (128, 2));
     let Some(plain) = of_one_render("plain", edge, times, size) else {
-        outcome.show("instructions: SKIPPED, nothing here counts them in time");
+        outcome.skip("the count of instructions: neither perf nor valgrind counts them in time");
         return;
     };
     let ratio = |which| of_one_render(which, edge, times, size).map_or(f64::NAN, |n| n / plain);
