@@ -88,7 +88,16 @@ pub fn degenerate(size: Size) -> Outcome {
     }
     // Past the importer: what f32 makes of geometry that was sound in f64.
     for (name, mesh) in collapsed() {
-        outcome.merge(traced(name, shapes::world_of(mesh), rays));
+        let world = shapes::world_of(mesh);
+        match world.clone().into_scene(true) {
+            Ok(_) => outcome.merge(traced(name, world, rays)),
+            // Most of it would be gone: refused by name.
+            Err(error) => {
+                let said = error.to_string();
+                outcome.check(said.contains("`test`"), || format!("{name}: {said}"));
+                outcome.show(format!("{name}: refused"));
+            }
+        }
     }
     outcome
 }
