@@ -44,7 +44,7 @@ impl EmbreeIntersector<'_> {
         // A camera more than a scene's size away: what Embree sees is moved up to the scene.
         let (mut moved, mut shifts) = ([rays[0]; BLOCK], [0.0; BLOCK]);
         let (mut cast, mut valid) = (rays, valid);
-        if rays.iter().any(|ray| self.is_far(ray)) {
+        if each(valid).any(|lane| self.is_far(&rays[lane])) {
             for lane in each(valid) {
                 match self.approach(&rays[lane]) {
                     Some((ray, shift)) => (moved[lane], shifts[lane]) = (ray, shift),
