@@ -87,6 +87,9 @@ pub fn degenerate(size: Size) -> Outcome {
         }
     }
     // Past the importer: what f32 makes of geometry that was sound in f64.
+    let refused = shapes::world_of(strip(1e-3)).into_scene(true).err().map(|e| e.to_string());
+    let named = refused.as_ref().is_some_and(|said| said.contains("98 of the 98 triangles of"));
+    outcome.check(named, || format!("a strip below f32's grain: {refused:?}"));
     for (name, mesh) in collapsed() {
         let world = shapes::world_of(mesh);
         match world.clone().into_scene(true) {
@@ -104,24 +107,37 @@ pub fn degenerate(size: Size) -> Outcome {
 
 /// Meshes whose triangles lose their area when they are rounded, or never had any.
 fn collapsed() -> Vec<(&'static str, WorldMesh)> {
-    let far = DVec3::splat(1e9);
-    let strip = |step: f64| {
-        let positions = (0..100).map(|i| {
-            far + DVec3::new(f64::from(i / 2), f64::from(i % 2) * step, f64::from(i) * step)
-        });
-        let mut positions: Vec<DVec3> = positions.collect();
-        positions.push(-far);
-        common::mesh(positions, (0..98).map(|i| [i, i + 1, i + 2]).collect(), 0)
-    };
     let line: Vec<DVec3> = (0..10).map(|i| DVec3::splat(f64::from(i))).collect();
     let point = vec![DVec3::ONE; 3];
     vec![
-        ("strip below f32's grain", strip(1e-3)),
-        ("strip at f32's grain", strip(64.0)),
+        ("strip below f32's grain, among more", among_more(strip(1e-3))),
+        ("strip at f32's grain, among more", among_more(strip(64.0))),
         ("a line of triangles", common::mesh(line, (0..8).map(|i| [i, i + 1, i + 2]).collect(), 0)),
         ("a point of triangles", common::mesh(point, vec![[0, 1, 2]; 50], 0)),
         ("a vertex three times", common::mesh(vec![DVec3::X], vec![[0, 0, 0]; 50], 0)),
     ]
+}
+
+/// 98 triangles of a strip of width `step`, far from a vertex that nothing uses.
+fn strip(step: f64) -> WorldMesh {
+    let far = DVec3::splat(1e9);
+    let positions = (0..100)
+        .map(|i| far + DVec3::new(f64::from(i / 2), f64::from(i % 2) * step, f64::from(i) * step));
+    let mut positions: Vec<DVec3> = positions.collect();
+    positions.push(-far);
+    common::mesh(positions, (0..98).map(|i| [i, i + 1, i + 2]).collect(), 0)
+}
+
+/// With as many large triangles, so that what is lost is not most of it.
+fn among_more(mut mesh: WorldMesh) -> WorldMesh {
+    let next = mesh.positions.len() as u32;
+    for i in 0..mesh.triangles.len() as u32 + 2 {
+        let turn = 1e9 * f64::from(i) / 100.0;
+        mesh.positions.push(DVec3::new(turn, -1e9, 1e9 - turn));
+    }
+    let fan = (next..mesh.positions.len() as u32 - 1).map(|i| [next - 1, i, i + 1]);
+    mesh.triangles.extend(fan);
+    mesh
 }
 
 /// Random rays at a world, both tracers, and a small picture: all finite.
