@@ -39,12 +39,13 @@ impl EmbreeIntersector<'_> {
         counts: &mut RayCounts,
     ) {
         hits.fill(None);
-        let valid = valid_lanes(rays);
+        let mut valid = valid_lanes(rays);
         counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
         // A camera more than a scene's size away: what Embree sees is moved up to the scene.
-        let (mut moved, mut shifts) = ([rays[0]; BLOCK], [0.0; BLOCK]);
-        let (mut cast, mut valid) = (rays, valid);
+        let (mut moved, mut shifts, mut cast);
+        (cast, shifts) = (rays, [0.0; BLOCK]);
         if each(valid).any(|lane| self.is_far(&rays[lane])) {
+            moved = [rays[0]; BLOCK];
             for lane in each(valid) {
                 match self.approach(&rays[lane]) {
                     Some((ray, shift)) => (moved[lane], shifts[lane]) = (ray, shift),
