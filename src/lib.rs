@@ -26,12 +26,12 @@ pub mod intersect;
 pub mod measure;
 pub mod output;
 
-// Floor 4: radiance along a ray; one intersector against the other.
+// Floor 4: radiance along a ray.
 pub mod shade;
-pub mod verify;
 
-// Floor 5: one frame after another.
+// Floor 5: one frame after another; one intersector against the other, by the renderer's rays.
 pub mod sequence;
+pub mod verify;
 
 // Floor 6: who renders which frames.
 pub mod cluster;
