@@ -9,8 +9,8 @@ use crate::math::{Bounds3, DVec3, Vec3};
 use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
-/// Cells along each axis of the grid that groups the triangles.
-const CELLS: usize = 64;
+/// Most cells along each axis of the grid that groups the triangles; small scenes need fewer.
+const MOST_CELLS: usize = 64;
 /// Triangles that one task groups.
 const TASK: usize = 1 << 18;
 
@@ -31,9 +31,10 @@ impl CoarseTree {
     /// rays.
     pub fn new(scene: &Scene, margin: DVec3) -> Self {
         let all = scene.meshes.iter().fold(Bounds3::EMPTY, |b, m| b.union(m.bounds));
-        let mut cells = vec![Cell::EMPTY; if all.is_empty() { 0 } else { CELLS.pow(3) }];
+        let edge = ((2.0 * (scene.triangle_count() as f64).cbrt()) as usize).clamp(1, MOST_CELLS);
+        let mut cells = vec![Cell::EMPTY; if all.is_empty() { 0 } else { edge.pow(3) }];
         let longest = all.extent().max_element();
-        let per_unit = if longest > 0.0 { CELLS as f64 / longest } else { 0.0 };
+        let per_unit = if longest > 0.0 { edge as f64 / longest } else { 0.0 };
         let tasks: Vec<(&Mesh, &[[u32; 3]])> = scene
             .meshes
             .iter()
@@ -43,13 +44,13 @@ impl CoarseTree {
         // the order.
         let share = tasks.len().div_ceil(rayon::current_num_threads()).max(1);
         let grouped = tasks.par_chunks(share).map(|tasks| {
-            let mut cells = vec![Cell::EMPTY; CELLS.pow(3)];
+            let mut cells = vec![Cell::EMPTY; edge.pow(3)];
             for (mesh, triangles) in tasks {
                 for triangle in *triangles {
                     let corners = triangle.map(|i| mesh.positions[i as usize]);
                     let at = (corners[0].as_dvec3() - all.min) * per_unit;
-                    let [x, y, z] = at.to_array().map(|c| (c as usize).min(CELLS - 1));
-                    corners.iter().for_each(|c| cells[(z * CELLS + y) * CELLS + x].include(*c));
+                    let [x, y, z] = at.to_array().map(|c| (c as usize).min(edge - 1));
+                    corners.iter().for_each(|c| cells[(z * edge + y) * edge + x].include(*c));
                 }
             }
             cells
