@@ -15,6 +15,7 @@ const MOST_CELLS: usize = 64;
 const TASK: usize = 1 << 18;
 
 /// Boxes in depth-first order; `skip` leads past a node's children.
+#[derive(Default)]
 pub(super) struct CoarseTree {
     nodes: Vec<Node>,
 }

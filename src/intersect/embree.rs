@@ -9,7 +9,7 @@
 //! * A ray that misses although it comes near some triangle is tried again, turned by 4 ulp to one
 //!   side and then to the other; and so is one that must have missed something before its hit.
 //!
-//! Shadow rays report no primitive, so only the first rule reaches them.
+//! Shadow rays report no primitive: of these, only validation and coincidence reach them.
 //!
 //! A batch goes through Embree, the second tries and the recheck a block at a time, so that each
 //! step works on arrays; what they leave open is settled ray by ray.
@@ -49,7 +49,8 @@ pub struct EmbreeIntersector<'s> {
     rules: HitRules,
     /// Largest coordinate of an origin that is not moved.
     near: f64,
-    /// Where a miss deserves a second try; spheres need none, since their test is exact.
+    /// Where a miss deserves a second try; spheres need none, since their test is exact. Empty where
+    /// nothing is tried twice.
     coarse: CoarseTree,
     meshes: Vec<MeshFacts>,
     bounds: Bounds3,
@@ -72,8 +73,8 @@ enum Turn {
 }
 
 /// The further tries of a ray whose first query found nothing, or what it cannot have met first:
-/// one turn alone may lead past an outline, or past the vertex as well. (Two more, to the other sides, find
-/// one in nine more of lost slivers: docs/decisions/016-vertices-leak.md.)
+/// one turn alone may lead past an outline, or past the vertex as well. (Two more, to the other sides,
+/// find one in nine more of lost slivers: docs/decisions/016-vertices-leak.md.)
 const TURNS: [Turn; 2] = [Turn::OneWay, Turn::OtherWay];
 
 impl<'s> EmbreeIntersector<'s> {
@@ -102,10 +103,12 @@ impl<'s> EmbreeIntersector<'s> {
         let spheres =
             spheres.map(|s| SphereData { centre: s.centre.to_array(), radius: s.radius }).collect();
         builder.add_spheres(spheres, copies_in(scene.sphere_geom_id()))?;
-        let largest = largest_coordinate(&scene.bounds);
-        let coarse = CoarseTree::new(scene, margin(largest));
+        let margin = rounding_margin(&scene.bounds);
+        let coarse =
+            if rules.retry { CoarseTree::new(scene, margin) } else { CoarseTree::default() };
         let meshes = scene.meshes.iter().map(MeshFacts::of).collect();
-        let bounds = padded(&scene.bounds);
+        let Bounds3 { min, max } = scene.bounds;
+        let bounds = Bounds3 { min: min - margin, max: max + margin };
         let committed = builder.commit()?;
         Ok(Self { committed, scene, rules, near, coarse, meshes, bounds })
     }
@@ -133,9 +136,9 @@ impl<'s> EmbreeIntersector<'s> {
 
     /// One Embree query that cannot hit the `passed` primitives.
     fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
-        let (mut moved, shift) = self.approach(ray)?;
+        let (moved, shift) = self.approach(ray)?;
         // After the approach: from afar, 4 ulp would lead past what is looked at.
-        moved = nudged(&moved, turn);
+        let moved = nudged(&moved, turn);
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
@@ -224,19 +227,9 @@ fn nudged(ray: &Ray, turn: Turn) -> Ray {
     Ray { dir: ray.dir + across * (by * ROUNDING * length), ..*ray }
 }
 
-/// A box with a margin for the rounding of rays.
-fn padded(bounds: &Bounds3) -> Bounds3 {
-    let margin = margin(largest_coordinate(bounds));
-    Bounds3 { min: bounds.min - margin, max: bounds.max + margin }
-}
-
-fn largest_coordinate(bounds: &Bounds3) -> f64 {
-    bounds.min.abs().max(bounds.max.abs()).max_element()
-}
-
-/// How far rounding a ray to f32 may move it near points of this largest coordinate.
-fn margin(largest: f64) -> DVec3 {
-    DVec3::splat(16.0 * ROUNDING * largest)
+/// How far rounding a ray to f32 may move it within `bounds`.
+fn rounding_margin(bounds: &Bounds3) -> DVec3 {
+    DVec3::splat(16.0 * ROUNDING * bounds.largest_coordinate())
 }
 
 impl Intersector for EmbreeIntersector<'_> {

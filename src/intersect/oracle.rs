@@ -44,9 +44,11 @@ impl<'s> Oracle<'s> {
         for mesh in &scene.meshes {
             starts.push(starts[starts.len() - 1] + mesh.triangles.len());
         }
-        let reach = scene.meshes.iter().filter(|m| !m.bounds.is_empty()).fold(0f64, |reach, m| {
-            reach.max(m.bounds.min.abs().max(m.bounds.max.abs()).max_element())
-        });
+        let reach = scene
+            .meshes
+            .iter()
+            .filter(|m| !m.bounds.is_empty())
+            .fold(0f64, |reach, m| reach.max(m.bounds.largest_coordinate()));
         Self { scene, soup: Soup::new(scene.triangle_count(), corners), starts, reach }
     }
 

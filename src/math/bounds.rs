@@ -46,6 +46,11 @@ impl Bounds3 {
         0.5 * self.extent().length()
     }
 
+    /// The largest coordinate of any point in the box, its sign left out; infinite for an empty box.
+    pub fn largest_coordinate(&self) -> f64 {
+        self.min.abs().max(self.max.abs()).max_element()
+    }
+
     /// Whether `p` lies in the closed box.
     pub fn contains(&self, p: DVec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()

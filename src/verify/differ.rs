@@ -226,8 +226,8 @@ impl<'a> Closely<'a> {
     fn near(&self) -> Vec<PrimRef> {
         let scene = self.check.scene;
         // The largest ulp of any triangle that there can be.
-        let largest = scene.bounds.min.abs().max(scene.bounds.max.abs()).max(self.line.start.abs());
-        let ulp = largest.max_element() * f64::from(f32::EPSILON);
+        let largest = scene.bounds.largest_coordinate().max(self.line.start.abs().max_element());
+        let ulp = largest * f64::from(f32::EPSILON);
         let mut near = self.check.oracle.near(&self.ray, 2.0 * BAND_ULPS * ulp);
         let geom_id = scene.sphere_geom_id();
         near.extend((0..scene.spheres.len() as u32).map(|prim_id| PrimRef { geom_id, prim_id }));

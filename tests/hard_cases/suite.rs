@@ -152,6 +152,12 @@ impl Outcome {
         other.examples.into_iter().for_each(|line| self.example(line));
     }
 
+    /// Both, for sums.
+    pub fn merged(mut self, other: Self) -> Self {
+        self.merge(other);
+        self
+    }
+
     /// Whether the case passes: few enough failures, nothing else wrong, something tried.
     pub fn passes(&self) -> bool {
         let few = self.failures as f64 <= self.allowed * self.trials as f64;

@@ -69,7 +69,7 @@ fn needs_doubles(parts: &[Flat<'_>]) -> bool {
     let mut bounds = Bounds3::EMPTY;
     all().for_each(|p| bounds.include(*p));
     let size = bounds.extent().max_element();
-    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let reach = bounds.largest_coordinate();
     let fits = reach < f64::from(f32::MAX) && size > f64::from(f32::MIN_POSITIVE) * 1e8;
     let exact = || all().all(|p| p.as_vec3().as_dvec3() == *p);
     !(fits && reach <= FAR * size || exact())

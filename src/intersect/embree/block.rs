@@ -4,6 +4,7 @@ use super::super::coarse::Bundle;
 use super::super::triangle::Pairs;
 use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn, nudged};
 use crate::embree::{Packet, PacketHit, QueryFlags};
+use crate::math::Vec3;
 use crate::ray::{Hit, PrimRef, Ray};
 use crate::stats::RayCounts;
 
@@ -72,7 +73,7 @@ impl EmbreeIntersector<'_> {
     }
 
     /// Sends the `valid` lanes through Embree in packets; returns those that hit.
-    pub(super) fn trace<const W: usize>(
+    fn trace<const W: usize>(
         &self,
         rays: &[Ray],
         valid: Lanes,
@@ -81,13 +82,7 @@ impl EmbreeIntersector<'_> {
         let mut packet = Packet::<W>::new();
         let mut hit = 0;
         for (k, rays) in rays.chunks(W).enumerate() {
-            let mut mask = [0; W];
-            let mut exclude = false;
-            for (lane, ray) in rays.iter().enumerate() {
-                packet.set(lane, ray);
-                mask[lane] = -((valid >> (k * W + lane) & 1) as i32);
-                exclude |= ray.exclude != PrimRef::NONE;
-            }
+            let (mask, exclude) = fill(&mut packet, rays, valid >> (k * W));
             let flags = QueryFlags { coherent: true, exclude, passed: &[] };
             self.committed.intersect(&mask, &mut packet, rays, flags);
             for lane in 0..rays.len() {
@@ -101,7 +96,7 @@ impl EmbreeIntersector<'_> {
     }
 
     /// The lanes of `missed` that may all the same have met a triangle.
-    pub(super) fn missed_near(&self, rays: &[Ray], missed: Lanes) -> Lanes {
+    fn missed_near(&self, rays: &[Ray], missed: Lanes) -> Lanes {
         let come_near = |lanes: Lanes| {
             let bundle = Bundle::of(each(lanes).map(|lane| &rays[lane]));
             bundle.is_some_and(|bundle| self.coarse.may_meet(&bundle))
@@ -117,7 +112,7 @@ impl EmbreeIntersector<'_> {
     /// The lanes of `hit` that met the back of a surface, unless all did: a ray from outside of a closed
     /// surface meets its front first, if it did not slip through at a vertex. A camera inside of one
     /// sees backs only, and they are no sign of anything.
-    pub(super) fn back_faces(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
+    fn back_faces(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
         let back = each(hit).filter(|lane| self.is_back(&rays[*lane], &found[*lane]));
         let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
         if back == hit { 0 } else { back }
@@ -132,7 +127,7 @@ impl EmbreeIntersector<'_> {
 
     /// Gives the `doubtful` lanes another try and keeps what it finds where that is nearer; returns
     /// those that hit.
-    pub(super) fn try_again<const W: usize>(
+    fn try_again<const W: usize>(
         &self,
         rays: &[Ray],
         doubtful: Lanes,
@@ -171,15 +166,9 @@ impl EmbreeIntersector<'_> {
     ) {
         let mut packet = Packet::<W>::new();
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
-            let mut mask = [0; W];
-            let mut exclude = false;
-            for (lane, ray) in rays.iter().enumerate() {
-                packet.set(lane, ray);
-                let valid = ray.is_valid();
-                mask[lane] = -i32::from(valid);
-                counts.invalid += u64::from(!valid);
-                exclude |= ray.exclude != PrimRef::NONE;
-            }
+            let valid = valid_lanes(rays);
+            counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
+            let (mask, exclude) = fill(&mut packet, rays, valid);
             let flags = QueryFlags { coherent: false, exclude, passed: &[] };
             self.committed.occluded(&mask, &mut packet, rays, flags);
             for (lane, out) in occluded.iter_mut().enumerate() {
@@ -235,17 +224,25 @@ impl EmbreeIntersector<'_> {
 }
 
 /// What a lane holds before Embree found anything.
-const NOTHING: PacketHit = PacketHit {
-    t: f32::INFINITY,
-    u: 0.0,
-    v: 0.0,
-    ng: crate::math::Vec3::ZERO,
-    prim: PrimRef::NONE,
-};
+const NOTHING: PacketHit =
+    PacketHit { t: f32::INFINITY, u: 0.0, v: 0.0, ng: Vec3::ZERO, prim: PrimRef::NONE };
 
 /// The lanes whose rays are valid.
 fn valid_lanes(rays: &[Ray]) -> Lanes {
     rays.iter().enumerate().fold(0, |lanes, (k, ray)| lanes | Lanes::from(ray.is_valid()) << k)
+}
+
+/// Puts `rays` into `packet`; gives Embree's mask of the `valid` ones, and whether any excludes a
+/// primitive.
+#[inline(always)]
+fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], valid: Lanes) -> ([i32; W], bool) {
+    let (mut mask, mut exclude) = ([0; W], false);
+    for (lane, ray) in rays.iter().enumerate() {
+        packet.set(lane, ray);
+        mask[lane] = -((valid >> lane & 1) as i32);
+        exclude |= ray.exclude != PrimRef::NONE;
+    }
+    (mask, exclude)
 }
 
 /// Whether `t` lies before `other` on `ray` by more than both may be off.

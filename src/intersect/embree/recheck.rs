@@ -11,6 +11,7 @@ use crate::scene::Recheck;
 /// How far beside its triangle a ray may pass, per unit of the largest coordinate: 4 ulp, less the
 /// rounding of measuring it. That is what rounding the ray to f32 explains.
 const EDGE_BAND: f64 = 7.99 * ROUNDING;
+
 impl EmbreeIntersector<'_> {
     /// Whether the rules want `hit`, one of a block, recomputed before anybody looks at its triangle.
     #[inline(always)]

@@ -90,7 +90,7 @@ fn measure(i: u64, rules: HitRules) -> Accuracy {
 fn judge(mesh: &Mesh, aimed: &[DVec3; 3], ray: &Ray, hit: Option<Hit>, found: &mut Accuracy) {
     // What is hit may lie before the triangle that was aimed at, but no further behind it than the
     // nearest of two by Embree's f32 distances may be the farther one.
-    let line = Line::new(ray, mesh.bounds.min.abs().max(mesh.bounds.max.abs()).max_element());
+    let line = Line::new(ray, mesh.bounds.largest_coordinate());
     let in_band = |corners: &[DVec3; 3]| line.edge_ulps(corners) <= BAND;
     let wanted = line.meet(aimed).filter(|_| !in_band(aimed));
     let depth = BAND * line.ulp(aimed) / ray.dir.length();

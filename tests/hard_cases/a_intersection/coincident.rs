@@ -74,15 +74,10 @@ fn lowest_wins(outcome: &mut Outcome, size: Size) {
             wrong.check(agree, || format!("{name}: {:?}, oracle {truth:?}", hits[0]));
             wrong
         };
-        let wrong = suite::trace(&embree, rays, make, judge, merged, Outcome::default);
+        let wrong = suite::trace(&embree, rays, make, judge, Outcome::merged, Outcome::default);
         outcome.show(format!("{COPIES} {name}: {} answers not the lowest", wrong.failures));
         outcome.merge(wrong);
     }
-}
-
-fn merged(mut a: Outcome, b: Outcome) -> Outcome {
-    a.merge(b);
-    a
 }
 
 /// 1, 2 and 8 threads, for the tree and for the frame; materials in both orders.

@@ -78,7 +78,7 @@ fn cube_on_ground(distance: f64, spread: f64, rays: u64) -> Outcome {
         }
         (swaps, edges)
     };
-    let sum = |a: (Outcome, u64), b: (Outcome, u64)| (merged(a.0, b.0), a.1 + b.1);
+    let sum = |a: (Outcome, u64), b: (Outcome, u64)| (a.0.merged(b.0), a.1 + b.1);
     let (mut outcome, edges) =
         suite::trace(&embree, rays, make, judge, sum, || (Outcome::default(), 0));
     let swaps = outcome.failures;
@@ -87,11 +87,6 @@ fn cube_on_ground(distance: f64, spread: f64, rays: u64) -> Outcome {
          4 ulp of an edge"
     ));
     outcome
-}
-
-fn merged(mut a: Outcome, b: Outcome) -> Outcome {
-    a.merge(b);
-    a
 }
 
 /// A scene of one analytic sphere, and the eye (scene space) that sees it along -z.

@@ -275,7 +275,7 @@ fn judge_balance(scene: &Scene, ray: &Ray, hit: Option<&Hit>, found: &mut Balanc
     let hit_prim = hit.map(|h| h.prim.prim_id as usize);
     let (mut nearest, mut in_band, mut legal) = (None::<(f64, usize)>, false, hit.is_none());
     let dir = ray.dir.normalize();
-    let line = Line::new(ray, scene.bounds.min.abs().max(scene.bounds.max.abs()).max_element());
+    let line = Line::new(ray, scene.bounds.largest_coordinate());
     // No sliver has an edge longer than 11.2, and no band is wider than the rest.
     let reach = 12.0 * scene.recentring.scale();
     for prim in 0..mesh.triangles.len() {
