@@ -22,11 +22,13 @@ pub mod scene;
 // Floor 3: what makes scenes, hits, files and measurements.
 pub mod effects;
 pub mod import;
+pub mod inference;
 pub mod intersect;
 pub mod measure;
 pub mod output;
 
-// Floor 4: radiance along a ray.
+// Floor 4: radiance along a ray; what earlier rays already told.
+pub mod reuse;
 pub mod shade;
 
 // Floor 5: one frame after another; one intersector against the other, by the renderer's rays.

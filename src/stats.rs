@@ -50,6 +50,35 @@ impl AddAssign for RayCounts {
     }
 }
 
+/// Surface points that a kept light could shine on, and how many of them needed no ray to one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReuseCounts {
+    /// Points seen directly.
+    pub direct: u64,
+    /// Those of them that were inferred.
+    pub direct_inferred: u64,
+    /// Points seen in mirrors and through glass.
+    pub specular: u64,
+    /// Those of them that were inferred.
+    pub specular_inferred: u64,
+}
+
+impl ReuseCounts {
+    /// Whether there was nothing to infer.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl AddAssign for ReuseCounts {
+    fn add_assign(&mut self, o: Self) {
+        self.direct += o.direct;
+        self.direct_inferred += o.direct_inferred;
+        self.specular += o.specular;
+        self.specular_inferred += o.specular_inferred;
+    }
+}
+
 /// What is wrong with light that is no radiance; later kinds outdo earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {

@@ -125,6 +125,7 @@ mod tests {
             write_seconds: 0.01,
             bytes: 1,
             rays,
+            reuse: Default::default(),
             bad: Default::default(),
         };
         assert_eq!(

@@ -4,8 +4,10 @@ use crate::math::{Rgb, Vec3};
 use crate::stats::BadSamples;
 
 mod image;
+mod provenance;
 
 pub use image::{Encoding, Image};
+pub use provenance::{PixelSource, Provenance};
 
 /// A rendered image with its AOVs. Row 0 is the top; linear radiance.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +20,8 @@ pub struct Film {
     pub rgb: Vec<Rgb>,
     /// First-hit records, when asked for.
     pub gbuffer: Option<GBuffer>,
+    /// Where each pixel's light comes from; `None` where every frame is traced.
+    pub sources: Option<Vec<PixelSource>>,
     /// Camera samples in it that are no radiance.
     pub bad: BadSamples,
 }
@@ -73,6 +77,7 @@ impl Film {
             height,
             rgb: vec![Rgb::ZERO; n],
             gbuffer: with_gbuffer.then(|| GBuffer::new(n)),
+            sources: None,
             bad: BadSamples::default(),
         }
     }

@@ -106,6 +106,11 @@ impl Camera {
         (depth > 0.0 && x.is_finite() && y.is_finite()).then_some((x, y, depth))
     }
 
+    /// Edge of a pixel (its height) at distance 1 along the view axis.
+    pub fn pixel_size(&self) -> f64 {
+        2.0 * self.half_up.length() / f64::from(self.height)
+    }
+
     /// The same camera in scene space.
     pub fn to_scene(&self, recentring: &Recentring) -> Self {
         Self { eye: recentring.point_to_scene(self.eye), ..*self }

@@ -8,10 +8,14 @@
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
 mod fingerprint;
+mod inferrer;
+mod pyramid;
 mod resume;
 mod tracer;
 
 pub use fingerprint::fingerprint;
+pub use inferrer::Inferrer;
+pub use pyramid::Pyramid;
 pub use resume::{Plan, Target, prepare};
 pub use tracer::Tracer;
 
@@ -22,15 +26,31 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::output::manifest::{Journal, Row};
 use crate::output::{WriteOptions, write_image};
-use crate::stats::{BadSamples, RayCounts};
+use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
 /// Makes the film of a frame.
 pub trait FrameMaker {
-    /// The film of frame `frame` (from 1), or `None` when the job was asked to stop first.
-    fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>>;
+    /// Frame `frame` (from 1), or `None` when the job was asked to stop first.
+    fn make(&self, frame: u32) -> Result<Option<Made>>;
+
+    /// `frames` (ascending) in the order in which they are best made, cut into lists that have
+    /// little to do with one another.
+    fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
+        frames.iter().map(|frame| vec![*frame]).collect()
+    }
+}
+
+/// A frame as it was made.
+pub struct Made {
+    /// Its film.
+    pub film: Film,
+    /// Rays cast for it.
+    pub rays: RayCounts,
+    /// How much of it was inferred.
+    pub reuse: ReuseCounts,
 }
 
 /// What a finished frame took.
@@ -46,6 +66,9 @@ pub struct FrameReport {
     pub bytes: u64,
     /// Rays cast.
     pub rays: RayCounts,
+    /// How much was inferred.
+    #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
+    pub reuse: ReuseCounts,
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
@@ -68,13 +91,13 @@ pub fn render_frames(
     let mut journal = Journal::open(journal)?;
     for &frame in frames {
         let start = Instant::now();
-        let Some((film, rays)) = maker.make(frame)? else { break };
+        let Some(Made { film, rays, reuse }) = maker.make(frame)? else { break };
         let trace_seconds = start.elapsed().as_secs_f64();
         let row = write_frame(target, frame, &film, rays, start)?;
         journal.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
         let (bytes, bad) = (row.bytes, film.bad);
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, bad })?;
+        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, bad })?;
     }
     Ok(())
 }

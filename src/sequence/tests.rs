@@ -18,14 +18,15 @@ struct Plain {
 }
 
 impl FrameMaker for Plain {
-    fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>> {
+    fn make(&self, frame: u32) -> Result<Option<Made>> {
         if frame == self.stop_before {
             return Ok(None);
         }
         self.made.borrow_mut().push(frame);
         let mut film = Film::new(4, 2, false);
         film.rgb[0].x = frame as f32 / 255.0 * self.settings.exposure;
-        Ok(Some((film, RayCounts { camera: 8, ..RayCounts::default() })))
+        let rays = RayCounts { camera: 8, ..RayCounts::default() };
+        Ok(Some(Made { film, rays, reuse: ReuseCounts::default() }))
     }
 }
 

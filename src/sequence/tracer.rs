@@ -1,11 +1,10 @@
 //! The maker that traces every frame on its own.
 
-use super::FrameMaker;
+use super::{FrameMaker, Made};
 use crate::error::Result;
-use crate::film::Film;
 use crate::scene::Shot;
 use crate::shade::{Progress, Renderer};
-use crate::stats::RayCounts;
+use crate::stats::ReuseCounts;
 use std::sync::atomic::AtomicBool;
 
 /// Traces each frame through the shot's camera.
@@ -25,11 +24,12 @@ pub struct Tracer<'a> {
 }
 
 impl FrameMaker for Tracer<'_> {
-    fn make(&self, frame: u32) -> Result<Option<(Film, RayCounts)>> {
+    fn make(&self, frame: u32) -> Result<Option<Made>> {
         let settings = self.renderer.settings;
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render =
             || self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress);
-        Ok(self.pool.install(render))
+        let made = self.pool.install(render);
+        Ok(made.map(|(film, rays)| Made { film, rays, reuse: ReuseCounts::default() }))
     }
 }

@@ -10,7 +10,7 @@ use super::lighting::{LitPoint, ShadowScratch};
 use super::optics;
 use super::pixels::BlockPixels;
 use super::surface::{albedo, emitted};
-use super::{FrameInput, Renderer};
+use super::{FrameInput, Left, Renderer};
 use crate::film::GPixel;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
@@ -65,6 +65,7 @@ pub(super) fn block<
     input: &FrameInput,
     pixels: &mut BlockPixels,
     scratch: &mut Scratch,
+    left: &mut Left,
 ) -> RayCounts {
     let mut counts = RayCounts::default();
     let samples_per_chunk = (CHUNK / pixels.len().max(1)).max(1) as u32;
@@ -80,6 +81,9 @@ pub(super) fn block<
         trace_paths::<MIRROR, GLASS, NESTED>(renderer, input, pixels, scratch, &mut counts);
         let Scratch { lit, shadow, .. } = scratch;
         renderer.light_points::<AREA, SKY>(input, lit, pixels, shadow, &mut counts);
+        if let Some(reuse) = &input.reuse {
+            shadow.groups.finish(reuse.channels.len(), pixels, &mut left.sources, &mut left.reuse);
+        }
         pixels.end_samples();
         first = last;
     }
@@ -238,8 +242,7 @@ impl Vertex<'_, '_> {
         if material.diffuse != Rgb::ZERO {
             let albedo = albedo(scene, material, &si);
             let reflectance = state.throughput * albedo;
-            let lit = LitPoint::new(self.renderer, (&si, ray, hit), wo, reflectance, state.place());
-            self.lit.push(lit);
+            self.lit.push(LitPoint::new((&si, ray, hit), wo, reflectance, state.place()));
         }
         if MIRROR && may_bounce && material.mirror != Rgb::ZERO {
             self.mirror::<NESTED>(&si, wo, material, inside, state);

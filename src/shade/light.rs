@@ -67,19 +67,28 @@ impl AreaLight {
         }
     }
 
+    /// Unshadowed irradiance at `p` with unit normal `n` per unit radiance: what
+    /// [`seen_from`](Self::seen_from) gives, 0 where no light can arrive.
+    pub fn irradiance(&self, p: DVec3, n: DVec3) -> f64 {
+        match self {
+            Self::Quad { corners, normal, two_sided, .. } => {
+                if !two_sided && normal.dot(p - corners[0]) <= 0.0 {
+                    return 0.0;
+                }
+                irradiance::polygon(p, n, corners)
+            }
+            Self::Sphere { centre, radius } => irradiance::sphere(p, n, *centre, *radius),
+        }
+    }
+
     /// The light as seen from `p`, with its unshadowed irradiance per unit radiance for the unit
     /// normal `n`; `None` where no light can arrive.
     pub fn seen_from(&self, p: DVec3, n: DVec3) -> Option<(SeenLight<'_>, f64)> {
-        let (seen, irradiance) = match self {
-            Self::Quad { warp, corners, normal, two_sided, facet } => {
-                if !two_sided && normal.dot(p - corners[0]) <= 0.0 {
-                    return None;
-                }
-                (SeenLight::Quad(warp, *normal, *facet), irradiance::polygon(p, n, corners))
-            }
+        let irradiance = self.irradiance(p, n);
+        let seen = match self {
+            Self::Quad { warp, normal, facet, .. } => SeenLight::Quad(warp, *normal, *facet),
             Self::Sphere { centre, radius } => {
-                let cone = SphereCone::new(*centre, *radius, p)?;
-                (SeenLight::Sphere(cone, *centre), irradiance::sphere(p, n, *centre, *radius))
+                SeenLight::Sphere(SphereCone::new(*centre, *radius, p)?, *centre)
             }
         };
         // What is NaN goes on, to be counted at its pixel.

@@ -4,13 +4,14 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse.
 
+use super::groups::Groups;
 use super::light::{self, AreaLight, LightSample, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
 use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::{cosine_hemisphere, to_world};
-use crate::scene::Light;
+use crate::scene::{Light, Scene, Settings};
 use crate::stats::RayCounts;
 use std::f32::consts::FRAC_1_PI;
 
@@ -28,41 +29,72 @@ pub(super) struct SamplePlace {
 /// A diffuse point that waits for light.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LitPoint {
-    p: DVec3,
+    pub si: SurfaceInteraction,
+    /// What hit it.
+    pub ray: Ray,
+    hit: Hit,
     /// Geometric normal on the viewer's side.
     ng: DVec3,
     /// Shading normal on the viewer's side.
-    n: DVec3,
-    /// Where rays to the sky start: from the facet.
-    facet: SpawnPoint,
-    /// Where rays to lights start: from the smooth surface that the facet stands for.
-    smooth: SpawnPoint,
+    pub n: DVec3,
     /// Radiance towards the camera per unit of irradiance.
     weight: Rgb,
-    place: SamplePlace,
+    pub place: SamplePlace,
 }
 
 impl LitPoint {
     /// The point `si` where `ray` hit, seen from `wo`, whose reflected light reaches the camera
     /// times `reflectance`.
     pub fn new(
-        renderer: &Renderer,
         (si, ray, hit): (&SurfaceInteraction, &Ray, &Hit),
         wo: DVec3,
         reflectance: Rgb,
         place: SamplePlace,
     ) -> Self {
-        let outside = si.is_outside(wo);
-        let (n, ng) = if outside { (si.ns, si.ng) } else { (-si.ns, -si.ng) };
-        let settings = renderer.settings;
+        let (n, ng) = if si.is_outside(wo) { (si.ns, si.ng) } else { (-si.ns, -si.ng) };
+        Self { si: *si, ray: *ray, hit: *hit, ng, n, weight: reflectance * FRAC_1_PI, place }
+    }
+}
+
+/// Where shadow rays leave a lit point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShadowStarts {
+    /// Those to the sky: the facet.
+    pub facet: SpawnPoint,
+    /// Those to lights: the smooth surface that the facet stands for.
+    pub smooth: SpawnPoint,
+}
+
+impl ShadowStarts {
+    /// Those of the point `si` where `ray` hit, on the side of the unit geometric normal `ng`.
+    pub fn of(
+        scene: &Scene,
+        settings: &Settings,
+        (si, ray, hit): (&SurfaceInteraction, &Ray, &Hit),
+        ng: DVec3,
+    ) -> Self {
         let offset = settings.rules.spawn_offset;
         let facet = si.shadow_start(ng, DVec3::ZERO, offset);
         let smooth = if settings.smooth_terminator {
-            si.shadow_start(ng, lift_to_smooth(renderer.scene, ray, hit, si, outside), offset)
+            let outside = ng.dot(si.ng) > 0.0;
+            si.shadow_start(ng, lift_to_smooth(scene, ray, hit, si, outside), offset)
         } else {
             facet
         };
-        Self { p: si.p, ng, n, facet, smooth, weight: reflectance * FRAC_1_PI, place }
+        Self { facet, smooth }
+    }
+
+    /// The ray from the point `p` to a delta light.
+    pub fn ray_to_delta(&self, p: DVec3, target: ShadowTarget) -> Ray {
+        match target {
+            // No surface to stop short of: the normal along the ray costs a few ulp.
+            ShadowTarget::Point(q) => self.smooth.to(&Target {
+                point: q,
+                normal: (p - q).normalize(),
+                facet: Facet::EXACT,
+            }),
+            ShadowTarget::Direction(d) => self.smooth.along(d),
+        }
     }
 }
 
@@ -74,6 +106,12 @@ pub(super) struct ShadowScratch {
     occluded: Vec<bool>,
     spans: Vec<Span>,
     u: Vec<[f32; 2]>,
+    /// Lit points that the present light must be traced for.
+    wanted: Vec<u32>,
+    /// Where the rays of each lit point start, once one has cast any.
+    starts: Vec<Option<ShadowStarts>>,
+    /// What is known already; unused where nothing is reused.
+    pub groups: Groups,
 }
 
 /// The shadow rays of one point, and the irradiance they decide on.
@@ -95,9 +133,9 @@ impl ShadowScratch {
     }
 
     /// A shadow ray to the sample, where it lies above the horizon.
-    fn push_sample(&mut self, point: &LitPoint, sample: &LightSample) {
+    fn push_sample(&mut self, starts: &ShadowStarts, sample: &LightSample) {
         if sample.weight > 0.0 {
-            self.push(point.smooth.to(&sample.target), sample.weight);
+            self.push(starts.smooth.to(&sample.target), sample.weight);
         }
     }
 
@@ -110,6 +148,14 @@ impl ShadowScratch {
     fn close(&mut self, unshadowed: Rgb) {
         self.spans.push(Span { end: self.rays.len(), unshadowed });
     }
+
+    fn starts(&mut self, renderer: &Renderer, lit: &[LitPoint], i: u32) -> ShadowStarts {
+        let point = &lit[i as usize];
+        *self.starts[i as usize].get_or_insert_with(|| {
+            let seen = (&point.si, &point.ray, &point.hit);
+            ShadowStarts::of(renderer.scene, renderer.settings, seen, point.ng)
+        })
+    }
 }
 
 /// An area light with its place in the scene.
@@ -120,7 +166,8 @@ struct AreaSource<'a> {
 }
 
 impl Renderer<'_> {
-    /// Adds the direct light of all `lit` points to their pixels.
+    /// Adds the direct light of all `lit` points to their pixels. What is known about a point is
+    /// used; the rest is traced.
     pub(super) fn light_points<const AREA: bool, const SKY: bool>(
         &self,
         input: &FrameInput,
@@ -129,6 +176,11 @@ impl Renderer<'_> {
         scratch: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
+        scratch.starts.clear();
+        scratch.starts.resize(lit.len(), None);
+        if let Some(reuse) = &input.reuse {
+            scratch.groups.ask(input, reuse, lit, pixels);
+        }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
             lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
@@ -139,7 +191,7 @@ impl Renderer<'_> {
                     let area = input.area_lights[index].as_ref();
                     let Some(area) = area else { continue };
                     let source = AreaSource { index: index as u32, light, area };
-                    self.area_light(&source, lit, pixels, scratch, counts);
+                    self.area_light(input, &source, lit, pixels, scratch, counts);
                 }
                 Light::Point { .. } | Light::Directional { .. } if self.plan.delta_lights => {
                     self.delta_light(light, lit, pixels, scratch, counts);
@@ -148,12 +200,13 @@ impl Renderer<'_> {
             }
         }
         if SKY {
-            self.sky_light(lit, pixels, scratch, counts);
+            self.sky_light(input, lit, pixels, scratch, counts);
         }
     }
 
     fn area_light(
         &self,
+        input: &FrameInput,
         source: &AreaSource,
         lit: &[LitPoint],
         pixels: &mut BlockPixels,
@@ -162,20 +215,27 @@ impl Renderer<'_> {
     ) {
         let n = self.settings.shadow_samples as usize;
         let radiance = light::radiance(source.light);
-        for group in lit.chunks((BATCH / n).max(1)) {
+        let channel = input.channel_of(source.index);
+        let wanted = self.use_known(lit, channel, pixels, s, |point| {
+            radiance * source.area.irradiance(point.si.p, point.n) as f32
+        });
+        for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
-            for point in group {
-                if let Some((seen, exact)) = source.area.seen_from(point.p, point.n) {
+            for &i in group {
+                let point = &lit[i as usize];
+                let p = point.si.p;
+                if let Some((seen, exact)) = source.area.seen_from(p, point.n) {
+                    let starts = s.starts(self, lit, i);
                     self.fill(&point.place, source.index, n, pixels, &mut s.u);
                     for k in 0..n {
-                        let sample = seen.sample(point.p, point.n, s.u[k].map(f64::from));
-                        s.push_sample(point, &sample);
+                        let sample = seen.sample(p, point.n, s.u[k].map(f64::from));
+                        s.push_sample(&starts, &sample);
                     }
                     if s.is_open() {
                         // All below the horizon, but some of the light is above: a point of that
                         // decides, or the horizon's own shadow would be counted twice.
-                        if let Some(sample) = seen.above(point.p, point.n) {
-                            s.push_sample(point, &sample);
+                        if let Some(sample) = seen.above(p, point.n) {
+                            s.push_sample(&starts, &sample);
                         }
                     }
                     s.close(radiance * exact as f32);
@@ -184,8 +244,9 @@ impl Renderer<'_> {
                 }
             }
             counts.shadow_area += s.rays.len() as u64;
-            self.settle(group, pixels, s, counts);
+            self.settle(lit, group, channel, pixels, s, counts);
         }
+        s.wanted = wanted;
     }
 
     fn delta_light(
@@ -196,31 +257,27 @@ impl Renderer<'_> {
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        for group in lit.chunks(BATCH) {
+        let wanted = all_of(lit, s);
+        for group in wanted.chunks(BATCH) {
             s.clear();
-            for point in group {
-                let sent = light::delta(light, point.p, point.n);
+            for &i in group {
+                let point = &lit[i as usize];
+                let sent = light::delta(light, point.si.p, point.n);
                 if let Some((_, target)) = sent {
-                    let ray = match target {
-                        // No surface to stop short of: the normal along the ray costs a few ulp.
-                        ShadowTarget::Point(q) => point.smooth.to(&Target {
-                            point: q,
-                            normal: (point.p - q).normalize(),
-                            facet: Facet::EXACT,
-                        }),
-                        ShadowTarget::Direction(d) => point.smooth.along(d),
-                    };
+                    let ray = s.starts(self, lit, i).ray_to_delta(point.si.p, target);
                     s.push(ray, 1.0);
                 }
                 s.close(sent.map_or(Rgb::ZERO, |(irradiance, _)| irradiance));
             }
             counts.shadow_delta += s.rays.len() as u64;
-            self.settle(group, pixels, s, counts);
+            self.settle(lit, group, None, pixels, s, counts);
         }
+        s.wanted = wanted;
     }
 
     fn sky_light(
         &self,
+        input: &FrameInput,
         lit: &[LitPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
@@ -229,9 +286,13 @@ impl Renderer<'_> {
         let n = self.settings.sky_samples as usize;
         // A constant sky of radiance L sends the irradiance πL to an open surface.
         let irradiance = self.scene.sky.radiance * std::f32::consts::PI;
-        for group in lit.chunks((BATCH / n).max(1)) {
+        let channel = input.sky_channel();
+        let wanted = self.use_known(lit, channel, pixels, s, |_| irradiance);
+        for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
-            for point in group {
+            for &i in group {
+                let point = &lit[i as usize];
+                let facet = s.starts(self, lit, i).facet;
                 let dimension = self.scene.lights.len() as u32;
                 self.fill(&point.place, dimension, n, pixels, &mut s.u);
                 let (ng, basis) = (point.ng, orthonormal_basis(point.n));
@@ -241,13 +302,43 @@ impl Renderer<'_> {
                     // Below the facet but above the smooth surface that it stands for: the
                     // facet's own plane is no occluder.
                     let dir = super::optics::keep_side(dir, ng, true);
-                    s.push(point.facet.along(dir), 1.0);
+                    s.push(facet.along(dir), 1.0);
                 }
                 s.close(irradiance);
             }
             counts.shadow_sky += s.rays.len() as u64;
-            self.settle(group, pixels, s, counts);
+            self.settle(lit, group, channel, pixels, s, counts);
         }
+        s.wanted = wanted;
+    }
+
+    /// Adds the light of `channel` where its ratio is known; `unshadowed` is the irradiance. Returns
+    /// the points where it must be traced: all of them without a channel.
+    fn use_known(
+        &self,
+        lit: &[LitPoint],
+        channel: Option<(usize, usize)>,
+        pixels: &mut BlockPixels,
+        s: &mut ShadowScratch,
+        unshadowed: impl Fn(&LitPoint) -> Rgb,
+    ) -> Vec<u32> {
+        let Some((channel, channels)) = channel else { return all_of(lit, s) };
+        let mut wanted = std::mem::take(&mut s.wanted);
+        wanted.clear();
+        for (i, point) in lit.iter().enumerate() {
+            let ratio = s.groups.known(i, channel, channels);
+            if ratio.is_nan() {
+                wanted.push(i as u32);
+                continue;
+            }
+            let irradiance = unshadowed(point);
+            if irradiance != Rgb::ZERO {
+                s.groups.note_lit(i);
+                let light = point.weight * irradiance * ratio;
+                pixels.add(point.place.pixel, point.place.sample, light);
+            }
+        }
+        wanted
     }
 
     /// Stratified points of one light and one place.
@@ -270,10 +361,13 @@ impl Renderer<'_> {
         place.branch.wrapping_mul(lights).wrapping_add(light)
     }
 
-    /// Traces the batch and adds `weight · unshadowed · ratio` to each point's pixel.
+    /// Traces the batch of points `group` and adds `weight · unshadowed · ratio` to each one's pixel;
+    /// in a channel that is kept, also to its surface point.
     fn settle(
         &self,
-        group: &[LitPoint],
+        lit: &[LitPoint],
+        group: &[u32],
+        channel: Option<(usize, usize)>,
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -282,11 +376,16 @@ impl Renderer<'_> {
         s.occluded.resize(s.rays.len(), false);
         self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
         let mut start = 0;
-        for (point, span) in group.iter().zip(&s.spans) {
+        for (&i, span) in group.iter().zip(&s.spans) {
+            let point = &lit[i as usize];
             let (mut open, mut all) = (0.0, 0.0);
             for k in start..span.end {
                 all += s.weights[k];
                 open += if s.occluded[k] { 0.0 } else { s.weights[k] };
+            }
+            if let (Some((channel, channels)), true) = (channel, span.end > start) {
+                s.groups.note_lit(i as usize);
+                s.groups.add(i as usize, channel, channels, open, all);
             }
             start = span.end;
             if open > 0.0 {
@@ -296,4 +395,12 @@ impl Renderer<'_> {
             }
         }
     }
+}
+
+/// All points, in order.
+fn all_of(lit: &[LitPoint], s: &mut ShadowScratch) -> Vec<u32> {
+    let mut wanted = std::mem::take(&mut s.wanted);
+    wanted.clear();
+    wanted.extend(0..lit.len() as u32);
+    wanted
 }

@@ -6,6 +6,7 @@
 //!
 //! Not done: light through glass (its shadow is opaque), glossy lobes, diffuse interreflection.
 
+mod groups;
 mod interior;
 mod irradiance;
 mod kernel;
@@ -16,16 +17,17 @@ mod pixels;
 mod surface;
 
 use crate::effects::EffectPlan;
-use crate::film::{Film, GPixel};
+use crate::film::{Film, PixelSource};
+use crate::inference::{Channels, Inference, TracedPoints};
 use crate::intersect::Intersector;
-use crate::math::Rgb;
 use crate::sampling::PixelFilter;
 use crate::scene::{Camera, Filter, Rect, Scene, Settings};
-use crate::stats::{BadSamples, RayCounts};
+use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use interior::Interior;
 use kernel::Scratch;
 use light::AreaLight;
-use pixels::{BLOCK, BlockPixels};
+pub(crate) use lighting::ShadowStarts;
+use pixels::{BLOCK, BlockPixels, FinishedPixel};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -55,28 +57,89 @@ pub trait Progress: Sync {
     fn tile_done(&self, share: f64, rays: &RayCounts);
 }
 
+/// Reuse between frames: what is known before a frame, and what it is to leave behind.
+#[derive(Clone, Copy)]
+pub struct Reuse<'a> {
+    /// The lights whose ratios are kept.
+    pub channels: &'a Channels,
+    /// Who knows about surface points; nobody where the frame is traced whole.
+    pub inference: Option<&'a dyn Inference>,
+}
+
+/// A frame to render.
+pub struct FrameJob<'a> {
+    /// World space.
+    pub camera: &'a Camera,
+    /// Number that its random numbers depend on: the frame's, from 1, or another for other samples
+    /// of the same frame.
+    pub stream: u32,
+    /// Whether first-hit records are kept.
+    pub with_gbuffer: bool,
+    /// `None` traces everything and keeps nothing.
+    pub reuse: Option<Reuse<'a>>,
+    /// Which pixels, row by row; `None` for all of the crop.
+    pub mask: Option<&'a [bool]>,
+}
+
+/// A rendered frame.
+pub struct Rendered {
+    /// The picture. Pixels outside of crop and mask are black.
+    pub film: Film,
+    /// Rays cast.
+    pub rays: RayCounts,
+    /// What was traced of the kept lights: sources for other frames.
+    pub sources: TracedPoints,
+    /// How much was inferred.
+    pub reuse: ReuseCounts,
+}
+
 /// What is fixed for one frame.
-struct FrameInput {
+struct FrameInput<'a> {
     /// Scene space.
     camera: Camera,
-    frame: u32,
+    /// Edge of a pixel at distance 1 along the view axis, scene units.
+    pixel_size: f64,
+    stream: u32,
     filter: PixelFilter,
     /// For each light of the scene, its area form.
     area_lights: Vec<Option<AreaLight>>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: Interior,
+    reuse: Option<Reuse<'a>>,
+}
+
+impl FrameInput<'_> {
+    /// The channel of a light with the number of channels, if its ratio is kept.
+    fn channel_of(&self, light: u32) -> Option<(usize, usize)> {
+        let channels = self.reuse?.channels;
+        channels.of_light(light).map(|c| (c, channels.len()))
+    }
+
+    /// That of the sky.
+    fn sky_channel(&self) -> Option<(usize, usize)> {
+        let channels = self.reuse?.channels;
+        channels.sky().map(|c| (c, channels.len()))
+    }
+}
+
+/// What blocks leave behind beside their pixels.
+#[derive(Default)]
+struct Left {
+    sources: TracedPoints,
+    reuse: ReuseCounts,
 }
 
 /// One finished tile.
 #[derive(Default)]
 struct TileDone {
-    /// Each pixel's place, radiance and record.
-    pixels: Vec<(u32, u32, Rgb, Option<GPixel>)>,
+    pixels: Vec<FinishedPixel>,
     rays: RayCounts,
     bad: BadSamples,
+    left: Left,
 }
 
-type BlockKernel = fn(&Renderer, &FrameInput, &mut BlockPixels, &mut Scratch) -> RayCounts;
+type BlockKernel =
+    fn(&Renderer, &FrameInput, &mut BlockPixels, &mut Scratch, &mut Left) -> RayCounts;
 
 impl Renderer<'_> {
     /// Renders frame number `frame` (from 1) through `camera` (world space) on the current rayon
@@ -92,6 +155,18 @@ impl Renderer<'_> {
         stop: &AtomicBool,
         progress: &dyn Progress,
     ) -> Option<(Film, RayCounts)> {
+        let job = FrameJob { camera, stream: frame, with_gbuffer, reuse: None, mask: None };
+        self.render_job(&job, stop, progress).map(|done| (done.film, done.rays))
+    }
+
+    /// Renders a frame with all that one can ask for; `None` as [`render`](Self::render).
+    pub fn render_job(
+        &self,
+        job: &FrameJob,
+        stop: &AtomicBool,
+        progress: &dyn Progress,
+    ) -> Option<Rendered> {
+        let camera = job.camera;
         let own = camera.to_scene(&self.scene.recentring);
         let around_eye = match self.plan.nested_glass {
             true => Interior::at(self, own.eye, own.forward),
@@ -99,10 +174,12 @@ impl Renderer<'_> {
         };
         let input = FrameInput {
             camera: own,
-            frame,
+            pixel_size: own.pixel_size(),
+            stream: job.stream,
             filter: pixel_filter(self.settings.filter),
             area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
             around_eye,
+            reuse: job.reuse,
         };
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
@@ -111,10 +188,11 @@ impl Renderer<'_> {
             * u64::from(self.settings.spp);
         let tiles = split(&aligned(&crop, &full), if samples < SMALL { BLOCK } else { TILE });
         let share = 1.0 / tiles.len().max(1) as f64;
+        let part = Part { crop, mask: job.mask, width: camera.width };
         let kernel = self.kernel();
-        let start = || (BlockPixels::new(with_gbuffer), Scratch::default());
+        let start = || (BlockPixels::new(job.with_gbuffer), Scratch::default());
         let one = |state: &mut (BlockPixels, Scratch), tile: &Rect| {
-            let done = self.tile(&input, tile, &crop, kernel, state, stop)?;
+            let done = self.tile(&input, tile, &part, kernel, state, stop)?;
             progress.tile_done(share, &done.rays);
             Some(done)
         };
@@ -124,14 +202,14 @@ impl Renderer<'_> {
         } else {
             tiles.par_iter().map_init(start, one).collect()
         };
-        Some(assemble(camera, with_gbuffer, done?))
+        Some(assemble(job, done?))
     }
 
     fn tile(
         &self,
         input: &FrameInput,
         tile: &Rect,
-        crop: &Rect,
+        part: &Part,
         kernel: BlockKernel,
         (pixels, scratch): &mut (BlockPixels, Scratch),
         stop: &AtomicBool,
@@ -141,13 +219,15 @@ impl Renderer<'_> {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            pixels.start(&block, self.settings.seed, input.frame);
-            out.rays += kernel(self, input, pixels, scratch);
-            let inside =
-                |x: u32, y: u32| x >= crop.x0 && x < crop.x1 && y >= crop.y0 && y < crop.y1;
+            let wanted = |x: u32, y: u32| part.is_masked_in(x, y);
+            pixels.start(&block, self.settings.seed, input.stream, wanted);
+            if pixels.len() == 0 {
+                continue;
+            }
+            out.rays += kernel(self, input, pixels, scratch, &mut out.left);
             let finished = pixels.finished(self.settings.spp, self.settings.flag_bad);
-            out.pixels.extend(finished.filter(|(x, y, _, _)| inside(*x, *y)));
-            let bad = pixels.bad().filter(|(x, y, _)| inside(*x, *y));
+            out.pixels.extend(finished.filter(|p| part.is_in_crop(p.x, p.y)));
+            let bad = pixels.bad().filter(|(x, y, _)| part.is_in_crop(*x, *y));
             bad.for_each(|(x, y, fault)| out.bad.count(fault, x, y));
         }
         Some(out)
@@ -191,21 +271,48 @@ fn pixel_filter(filter: Filter) -> PixelFilter {
     }
 }
 
-fn assemble(camera: &Camera, with_gbuffer: bool, tiles: Vec<TileDone>) -> (Film, RayCounts) {
-    let mut film = Film::new(camera.width, camera.height, with_gbuffer);
-    let mut counts = RayCounts::default();
+/// Which part of the image is wanted.
+struct Part<'a> {
+    crop: Rect,
+    mask: Option<&'a [bool]>,
+    /// Of the image.
+    width: u32,
+}
+
+impl Part<'_> {
+    /// Blocks are whole but for the mask.
+    fn is_masked_in(&self, x: u32, y: u32) -> bool {
+        self.mask.is_none_or(|mask| mask[y as usize * self.width as usize + x as usize])
+    }
+
+    fn is_in_crop(&self, x: u32, y: u32) -> bool {
+        let crop = &self.crop;
+        x >= crop.x0 && x < crop.x1 && y >= crop.y0 && y < crop.y1
+    }
+}
+
+fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
+    let mut film = Film::new(job.camera.width, job.camera.height, job.with_gbuffer);
+    film.sources = job.reuse.map(|_| vec![PixelSource::default(); film.rgb.len()]);
+    let mut rays = RayCounts::default();
+    let mut left = Left::default();
     for tile in tiles {
-        counts += tile.rays;
+        rays += tile.rays;
         film.bad += tile.bad;
-        for (x, y, rgb, record) in tile.pixels {
-            let index = film.index(x, y);
-            film.rgb[index] = rgb;
-            if let (Some(gbuffer), Some(record)) = (&mut film.gbuffer, record) {
+        left.reuse += tile.left.reuse;
+        left.sources.append(tile.left.sources);
+        for pixel in tile.pixels {
+            let index = film.index(pixel.x, pixel.y);
+            film.rgb[index] = pixel.rgb;
+            if let (Some(gbuffer), Some(record)) = (&mut film.gbuffer, pixel.record) {
                 gbuffer.set(index, &record);
+            }
+            if let Some(sources) = &mut film.sources {
+                sources[index] = pixel.source;
             }
         }
     }
-    (film, counts)
+    Rendered { film, rays, sources: left.sources, reuse: left.reuse }
 }
 
 fn intersection(a: &Rect, b: &Rect) -> Rect {

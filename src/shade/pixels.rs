@@ -1,7 +1,8 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
 use super::{FrameInput, Renderer};
-use crate::film::GPixel;
+use crate::film::{GPixel, PixelSource, Provenance};
+use crate::inference::Origin;
 use crate::math::Rgb;
 use crate::sampling::PixelSampler;
 use crate::scene::Rect;
@@ -27,6 +28,21 @@ pub(super) struct BlockPixels {
     bad: Vec<(u32, Fault)>,
     records: Vec<Record>,
     with_records: bool,
+    sources: Vec<PixelSource>,
+}
+
+/// A pixel as it goes to the film.
+pub(super) struct FinishedPixel {
+    /// Column.
+    pub x: u32,
+    /// Row.
+    pub y: u32,
+    /// Mean radiance of its samples.
+    pub rgb: Rgb,
+    /// First hit, where asked for.
+    pub record: Option<GPixel>,
+    /// Where its light comes from.
+    pub source: PixelSource,
 }
 
 #[derive(Clone, Copy)]
@@ -47,16 +63,18 @@ impl BlockPixels {
             bad: Vec::new(),
             records: Vec::new(),
             with_records,
+            sources: Vec::new(),
         }
     }
 
-    /// Starts the block `rect` (within the image).
-    pub fn start(&mut self, rect: &Rect, seed: u64, frame: u32) {
+    /// Starts those pixels of the block `rect` (within the image) that are `wanted`.
+    pub fn start(&mut self, rect: &Rect, seed: u64, frame: u32, wanted: impl Fn(u32, u32) -> bool) {
         self.places.clear();
         for sub_y in (rect.y0..rect.y1).step_by(4) {
             for sub_x in (rect.x0..rect.x1).step_by(4) {
                 for y in sub_y..(sub_y + 4).min(rect.y1) {
-                    self.places.extend((sub_x..(sub_x + 4).min(rect.x1)).map(|x| (x, y)));
+                    let row = (sub_x..(sub_x + 4).min(rect.x1)).map(|x| (x, y));
+                    self.places.extend(row.filter(|(x, y)| wanted(*x, *y)));
                 }
             }
         }
@@ -71,11 +89,41 @@ impl BlockPixels {
         self.sums.resize(self.places.len(), Rgb::ZERO);
         self.suspects.clear();
         self.bad.clear();
+        self.sources.clear();
+        self.sources.resize(self.places.len(), PixelSource::default());
         self.records.clear();
         if self.with_records {
             let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
             self.records.resize(self.places.len(), empty);
         }
+    }
+
+    /// Column and row of a pixel in the image.
+    pub fn place(&self, pixel: u32) -> (u32, u32) {
+        self.places[pixel as usize]
+    }
+
+    /// Where a pixel lies in its block: row by row.
+    pub fn cell(&self, pixel: u32) -> usize {
+        let (x, y) = self.place(pixel);
+        ((y % BLOCK) * BLOCK + x % BLOCK) as usize
+    }
+
+    /// Notes where the light of a pixel's surface point comes from; `None` where it was traced.
+    pub fn set_origin(&mut self, pixel: u32, origin: Option<&Origin>) {
+        let source = match origin {
+            None => PixelSource { provenance: Provenance::Traced, ..PixelSource::default() },
+            Some(o) => PixelSource {
+                provenance: match (o.earlier, o.later) {
+                    (true, true) => Provenance::Both,
+                    (false, true) => Provenance::Later,
+                    _ => Provenance::Earlier,
+                },
+                frame: o.frame,
+                distance: o.distance,
+            },
+        };
+        self.sources[pixel as usize].join(&source);
     }
 
     /// Pixels in the block.
@@ -192,19 +240,16 @@ impl BlockPixels {
         self.records[pixel].pixel = record;
     }
 
-    /// Each pixel's place, mean radiance and record. With `flag_bad`, pixels with a bad sample are
+    /// Each finished pixel. With `flag_bad`, pixels with a bad sample are
     /// magenta.
-    pub fn finished(
-        &self,
-        spp: u32,
-        flag_bad: bool,
-    ) -> impl Iterator<Item = (u32, u32, Rgb, Option<GPixel>)> {
+    pub fn finished(&self, spp: u32, flag_bad: bool) -> impl Iterator<Item = FinishedPixel> {
         let share = 1.0 / spp as f32;
-        self.places.iter().enumerate().map(move |(i, (x, y))| {
+        self.places.iter().enumerate().map(move |(i, &(x, y))| {
             let sum = self.sums[i];
             let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
             let rgb = if flagged { MAGENTA } else { sum * share };
-            (*x, *y, rgb, self.records.get(i).map(|r| r.pixel))
+            let record = self.records.get(i).map(|r| r.pixel);
+            FinishedPixel { x, y, rgb, record, source: self.sources[i] }
         })
     }
 }

@@ -1,12 +1,11 @@
 //! The rays: six kinds, each ray a function of seed, kind and index.
 
 use super::Check;
-use crate::intersect::{
-    Facet, Hit, PrimRef, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth,
-};
+use crate::intersect::{Hit, PrimRef, Ray, SurfaceInteraction};
 use crate::math::DVec3;
-use crate::scene::{Light, Settings};
-use crate::shade::light::{self, AreaLight, ShadowTarget};
+use crate::scene::Light;
+use crate::shade::ShadowStarts;
+use crate::shade::light::{self, AreaLight};
 use crate::stats::RayCounts;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -76,18 +75,14 @@ struct Seen {
     hit: Hit,
 }
 
-/// A surface point that waits for light, as the renderer's (`shade`, its lighting): normals on the
-/// viewer's side.
+/// A surface point that waits for light: normals on the viewer's side.
 struct Lit {
     p: DVec3,
     /// Shading normal.
     n: DVec3,
     /// Geometric normal.
     ng: DVec3,
-    /// Where rays to the sky start.
-    facet: SpawnPoint,
-    /// Where rays to lights start.
-    smooth: SpawnPoint,
+    starts: ShadowStarts,
 }
 
 impl Lit {
@@ -97,15 +92,9 @@ impl Lit {
         if let Some(area) = AreaLight::new(light) {
             let (seen, _) = area.seen_from(self.p, self.n)?;
             let sample = seen.sample(self.p, self.n, [rng.random(), rng.random()]);
-            return (sample.weight > 0.0).then(|| self.smooth.to(&sample.target));
+            return (sample.weight > 0.0).then(|| self.starts.smooth.to(&sample.target));
         }
-        Some(match light::delta(light, self.p, self.n)?.1 {
-            ShadowTarget::Point(point) => {
-                let normal = (self.p - point).normalize();
-                self.smooth.to(&Target { point, normal, facet: Facet::EXACT })
-            }
-            ShadowTarget::Direction(dir) => self.smooth.along(dir),
-        })
+        Some(self.starts.ray_to_delta(self.p, light::delta(light, self.p, self.n)?.1))
     }
 }
 
@@ -216,20 +205,15 @@ impl Check<'_> {
             }
         }
         let dir = direction(rng);
-        Some(lit.facet.along(if dir.dot(lit.ng) < 0.0 { -dir } else { dir }))
+        Some(lit.starts.facet.along(if dir.dot(lit.ng) < 0.0 { -dir } else { dir }))
     }
 
     /// Where the renderer's shadow rays start.
     fn lit(&self, Seen { si, ray, hit }: &Seen) -> Lit {
-        let Settings { smooth_terminator, rules, .. } = self.settings;
         let outside = si.is_outside(-ray.dir);
         let (n, ng) = if outside { (si.ns, si.ng) } else { (-si.ns, -si.ng) };
-        let lift = match smooth_terminator {
-            true => lift_to_smooth(self.scene, ray, hit, si, outside),
-            false => DVec3::ZERO,
-        };
-        let facet = si.shadow_start(ng, DVec3::ZERO, rules.spawn_offset);
-        Lit { p: si.p, n, ng, facet, smooth: si.shadow_start(ng, lift, rules.spawn_offset) }
+        let starts = ShadowStarts::of(self.scene, self.settings, (si, ray, hit), ng);
+        Lit { p: si.p, n, ng, starts }
     }
 
     /// A surface point that the product sees: half of them by a camera, half by a ray at a random

@@ -1,0 +1,150 @@
+//! The seam between shading and reuse: what is asked about a surface point, what is answered, and
+//! what tracing leaves behind for later frames.
+//!
+//! `shade` asks an [`Inference`] before it casts shadow rays and never learns where the answer
+//! comes from; `reuse` answers and never traces. All in scene space.
+
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Light, Scene};
+
+/// A surface point whose light is wanted: where one or more camera samples of a pixel end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// The point; the mean where there are several samples.
+    pub p: DVec3,
+    /// Unit shading normal on the viewer's side.
+    pub n: Vec3,
+    /// Mesh, or the spheres' number.
+    pub geom_id: u32,
+    /// Distance on the surface to what the neighbouring pixels see, at right angles to the ray.
+    pub footprint: f32,
+    /// Cosine between `n` and the direction back along the ray.
+    pub cos: f32,
+    /// Whether a camera ray ends here, not one from a mirror or glass.
+    pub direct: bool,
+    /// Camera samples that it stands for.
+    pub samples: u32,
+}
+
+/// Where an inferred point's light comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Origin {
+    /// Number of the reference frame that gave most; 0 where nothing was found.
+    pub frame: u32,
+    /// Whether an earlier frame gave some.
+    pub earlier: bool,
+    /// Whether a later frame gave some.
+    pub later: bool,
+    /// Weighted mean distance to the samples that gave it, footprints.
+    pub distance: f32,
+}
+
+/// Points in a batch with the answers about them.
+#[derive(Debug, Default)]
+pub struct Questions {
+    /// What is asked about.
+    pub points: Vec<SurfacePoint>,
+    /// For each point the ratio in each channel; NaN where it is unknown and must be traced.
+    pub ratios: Vec<f32>,
+    /// For each point where its ratios come from.
+    pub origins: Vec<Origin>,
+}
+
+/// A point that was traced: a source for other frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TracedPoint {
+    /// Pixel column.
+    pub x: u32,
+    /// Pixel row.
+    pub y: u32,
+    /// The point.
+    pub point: SurfacePoint,
+}
+
+/// Traced points with their ratios.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TracedPoints {
+    /// The points.
+    pub points: Vec<TracedPoint>,
+    /// For each point the ratio in each channel; NaN where it was not traced.
+    pub ratios: Vec<f32>,
+}
+
+impl TracedPoints {
+    /// Takes in all of `other`, behind its own.
+    pub fn append(&mut self, mut other: Self) {
+        self.points.append(&mut other.points);
+        self.ratios.append(&mut other.ratios);
+    }
+}
+
+/// Answers what is known about the light at surface points.
+pub trait Inference: Sync {
+    /// Fills ratios and origins for all points.
+    fn infer(&self, questions: &mut Questions);
+}
+
+/// Which light a channel of ratios belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channel {
+    /// The area light of this index.
+    Area(u32),
+    /// The sky.
+    Sky,
+}
+
+/// The lights whose ratios are kept.
+///
+/// For an area light the ratio is that of shadowed to unshadowed irradiance at the shading normal;
+/// for the sky that of arriving to unoccluded irradiance. Neither depends on where the camera is.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Channels {
+    list: Vec<Channel>,
+    of_light: Vec<Option<usize>>,
+    sky: Option<usize>,
+}
+
+impl Channels {
+    /// Channels for those lights of `scene` that `is_kept` keeps.
+    pub fn of(scene: &Scene, is_kept: impl Fn(Channel) -> bool) -> Self {
+        let mut channels = Self { of_light: vec![None; scene.lights.len()], ..Self::default() };
+        for (index, light) in scene.lights.iter().enumerate() {
+            let channel = Channel::Area(index as u32);
+            let is_area = matches!(light, Light::Quad(_) | Light::Sphere { .. });
+            if is_area && is_kept(channel) {
+                channels.of_light[index] = Some(channels.list.len());
+                channels.list.push(channel);
+            }
+        }
+        if is_kept(Channel::Sky) {
+            channels.sky = Some(channels.list.len());
+            channels.list.push(Channel::Sky);
+        }
+        channels
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether nothing is kept.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Channel> + '_ {
+        self.list.iter().copied()
+    }
+
+    /// The channel of light `index`, if its ratio is kept.
+    pub fn of_light(&self, index: u32) -> Option<usize> {
+        self.of_light.get(index as usize).copied().flatten()
+    }
+
+    /// The sky's channel, if its ratio is kept.
+    pub fn sky(&self) -> Option<usize> {
+        self.sky
+    }
+}

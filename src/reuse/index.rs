@@ -1,0 +1,145 @@
+//! Samples found by place: a hash grid over cells as large as the samples are apart.
+
+use super::reference::Sample;
+use crate::math::DVec3;
+
+/// Cells of a level that a query looks at: those whose middles surround it.
+pub(super) const CELLS: usize = 8;
+
+/// A cell: level of size, mesh and place, hashed.
+type Key = u64;
+
+/// Samples by cell.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Index {
+    /// Sorted by cell, then as they came.
+    members: Vec<u32>,
+    /// Open addressing: cell, first member, one past the last.
+    table: Vec<(Key, u32, u32)>,
+}
+
+impl Index {
+    /// Indexes those of `samples` whose numbers are `members`.
+    pub fn new(samples: &[Sample], members: Vec<u32>) -> Self {
+        if members.is_empty() {
+            return Self::default();
+        }
+        let key = |i: &u32| {
+            let s = &samples[*i as usize];
+            let level = level_of(s.footprint);
+            key_of(level, s.geom_id, cell_of(s.position(), edge_of(level)))
+        };
+        let mut keyed: Vec<(Key, u32)> = members.iter().map(|i| (key(i), *i)).collect();
+        keyed.sort_unstable();
+        let runs = keyed.chunk_by(|a, b| a.0 == b.0);
+        let cells = runs.clone().count();
+        let mut table = vec![(0, 0, 0); (2 * cells).next_power_of_two()];
+        let mut first = 0;
+        for run in runs {
+            let mut at = run[0].0 as usize & (table.len() - 1);
+            while table[at].2 != 0 {
+                at = (at + 1) & (table.len() - 1);
+            }
+            table[at] = (run[0].0, first, first + run.len() as u32);
+            first += run.len() as u32;
+        }
+        Self { members: keyed.into_iter().map(|(_, i)| i).collect(), table }
+    }
+
+    /// Calls `found` with the samples of mesh `geom_id` in the cells of `level` around `p`.
+    pub fn around(&self, level: i32, geom_id: u32, p: DVec3, mut found: impl FnMut(u32)) {
+        if self.table.is_empty() {
+            return;
+        }
+        let edge = edge_of(level);
+        let corner = cell_of(p - DVec3::splat(0.5 * edge), edge);
+        for k in 0..CELLS as i64 {
+            let cell = [corner[0] + (k & 1), corner[1] + (k >> 1 & 1), corner[2] + (k >> 2)];
+            let key = key_of(level, geom_id, cell);
+            let mut at = key as usize & (self.table.len() - 1);
+            while self.table[at].2 != 0 {
+                let (there, first, end) = self.table[at];
+                if there == key {
+                    let members = &self.members[first as usize..end as usize];
+                    members.iter().for_each(|i| found(*i));
+                    break;
+                }
+                at = (at + 1) & (self.table.len() - 1);
+            }
+        }
+    }
+
+    /// Bytes that it holds.
+    pub fn memory(&self) -> u64 {
+        (4 * self.members.len() + size_of::<(Key, u32, u32)>() * self.table.len()) as u64
+    }
+}
+
+/// The level whose cells are at least a footprint wide, and less than two.
+pub(super) fn level_of(footprint: f32) -> i32 {
+    // The exponent bits: what log2 would give, the same on every machine.
+    let bits = footprint.max(f32::MIN_POSITIVE).to_bits();
+    (bits >> 23) as i32 - 127 + i32::from(bits & 0x7f_ffff != 0)
+}
+
+/// Edge of the cells of a level, scene units.
+pub(super) fn edge_of(level: i32) -> f64 {
+    f64::from_bits(((level + 1023) as u64) << 52)
+}
+
+fn cell_of(p: DVec3, edge: f64) -> [i64; 3] {
+    (p / edge).floor().to_array().map(|c| c as i64)
+}
+
+fn key_of(level: i32, geom_id: u32, cell: [i64; 3]) -> Key {
+    let mut key = u64::from(geom_id) << 32 | u64::from(level as u32 & 0xffff);
+    for c in cell {
+        // SplitMix64's finaliser (Steele, Lea and Flood, 2014).
+        key = (key ^ c as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        key = (key ^ (key >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        key = (key ^ (key >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        key ^= key >> 31;
+    }
+    key
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    fn sample(p: Vec3, footprint: f32) -> Sample {
+        Sample { p, n: Vec3::Y, geom_id: 3, samples: 1, footprint }
+    }
+
+    #[test]
+    fn a_level_is_as_wide_as_its_footprints() {
+        for footprint in [1e-9f32, 0.3, 0.5, 0.500_01, 1.0, 1.7, 1e9] {
+            let edge = edge_of(level_of(footprint));
+            assert!(edge >= f64::from(footprint) && edge < 2.0 * f64::from(footprint));
+        }
+    }
+
+    #[test]
+    fn everything_within_half_a_cell_is_found_and_nothing_of_another_mesh() {
+        let place = |i: usize| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32);
+        let samples: Vec<Sample> =
+            (0..1000).map(|i| sample(place(i) * 0.1 - Vec3::splat(0.45), 0.12)).collect();
+        let index = Index::new(&samples, (0..1000).collect());
+        let level = level_of(0.12);
+        for p in [DVec3::ZERO, DVec3::new(0.11, -0.32, 0.4), DVec3::splat(-0.449)] {
+            let mut found = Vec::new();
+            index.around(level, 3, p, |i| found.push(i));
+            let reach = 0.5 * edge_of(level);
+            for (i, s) in samples.iter().enumerate() {
+                let near = (s.position() - p).abs().max_element() <= reach;
+                assert!(!near || found.contains(&(i as u32)), "{p} misses {i}");
+            }
+            found.sort_unstable();
+            found.dedup();
+            assert!(found.len() < 64 * 2, "{}", found.len());
+            index.around(level, 4, p, |_| panic!("another mesh"));
+            index.around(level + 1, 3, p, |_| panic!("another level"));
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! Reprojection with evidence: what a surface point's ratios are, as far as references tell.
+//!
+//! A point is projected into each reference. Of the four samples around it those count that lie on
+//! the same surface: same mesh, compatible normal, within the pixel's footprint on the surface, and
+//! sampled no more coarsely than the point itself. Their weights are renormalised; in each channel
+//! they must carry enough weight together and agree as well as their sampling noise allows.
+
+use super::index::{edge_of, level_of};
+use super::reference::{NONE, Reference, Sample};
+use crate::inference::{Inference, Origin, Questions, SurfacePoint};
+use crate::math::DVec3;
+
+/// Samples that one point's answer is made of, at most.
+const MOST_TAPS: usize = 24;
+
+/// What counts as evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// Least sum of weights, of 1 that a whole reference gives.
+    pub least_weight: f64,
+    /// With this sum of weights no further reference is asked.
+    pub enough_weight: f64,
+    /// Least cosine between normals.
+    pub least_cos: f32,
+    /// Height above the tangent plane, in footprints and as a slope.
+    pub height: f64,
+    /// See `height`.
+    pub slope: f64,
+    /// By how much a sample's area on the surface may exceed the point's.
+    pub coarser: f64,
+    /// Deviation of ratios that is always allowed.
+    pub tolerance: f32,
+    /// Variance allowed on top, in that of independent shadow samples.
+    pub noise: f32,
+}
+
+impl Default for Evidence {
+    fn default() -> Self {
+        Self {
+            least_weight: 0.2,
+            enough_weight: 0.6,
+            least_cos: 0.8,
+            height: 0.7,
+            slope: 0.35,
+            coarser: 6.0,
+            tolerance: 0.01,
+            noise: 2.0,
+        }
+    }
+}
+
+/// Answers from reference frames, asked in their order.
+pub struct Lookup<'a> {
+    /// The frame that is inferred.
+    pub frame: u32,
+    /// The first two are asked always, the others where those do not tell enough.
+    pub references: &'a [&'a Reference],
+    /// Shadow rays of one camera sample, by channel.
+    pub rays: &'a [u32],
+    /// What counts.
+    pub evidence: Evidence,
+}
+
+/// A sample that lies on the point's surface.
+#[derive(Clone, Copy)]
+struct Tap {
+    reference: u32,
+    sample: u32,
+    weight: f32,
+    distance: f32,
+}
+
+#[derive(Clone, Copy)]
+struct Taps {
+    list: [Tap; MOST_TAPS],
+    len: usize,
+    weight: f64,
+}
+
+impl Taps {
+    const NONE: Self = Self {
+        list: [Tap { reference: 0, sample: 0, weight: 0.0, distance: 0.0 }; MOST_TAPS],
+        len: 0,
+        weight: 0.0,
+    };
+
+    fn push(&mut self, tap: Tap) {
+        if self.len < MOST_TAPS && tap.weight > 0.0 {
+            self.list[self.len] = tap;
+            self.len += 1;
+            self.weight += f64::from(tap.weight);
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &Tap> {
+        self.list[..self.len].iter()
+    }
+}
+
+impl Inference for Lookup<'_> {
+    fn infer(&self, questions: &mut Questions) {
+        let Questions { points, ratios, origins } = questions;
+        let channels = self.rays.len();
+        let answers = ratios.chunks_exact_mut(channels).zip(origins.iter_mut());
+        for (point, (ratios, origin)) in points.iter().zip(answers) {
+            let taps = self.taps(point);
+            if taps.weight >= self.evidence.least_weight {
+                self.answer(&taps, ratios);
+                *origin = self.origin(&taps, point);
+            }
+        }
+    }
+}
+
+impl Lookup<'_> {
+    fn taps(&self, point: &SurfacePoint) -> Taps {
+        let mut taps = Taps::NONE;
+        for (number, reference) in self.references.iter().enumerate() {
+            if number >= 2 && taps.weight >= self.evidence.enough_weight {
+                break;
+            }
+            self.screen_taps(number as u32, reference, point, &mut taps);
+        }
+        if !point.direct {
+            for (number, reference) in self.references.iter().enumerate() {
+                if taps.weight >= self.evidence.enough_weight {
+                    break;
+                }
+                self.index_taps(number as u32, reference, point, &mut taps);
+            }
+        }
+        taps
+    }
+
+    /// The four samples around the point's image in the reference.
+    fn screen_taps(
+        &self,
+        number: u32,
+        reference: &Reference,
+        point: &SurfacePoint,
+        taps: &mut Taps,
+    ) {
+        let camera = &reference.camera;
+        let Some((x, y, depth)) = camera.project(point.p) else { return };
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (left, top) = (x.floor(), y.floor());
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        if !(left >= -1.0 && top >= -1.0 && left < width && top < height) {
+            return;
+        }
+        let n = point.n.as_dvec3();
+        let to_eye = camera.eye - point.p;
+        let cos = (n.dot(to_eye) / to_eye.length()).max(0.02);
+        let footprint = depth * reference.pixel_size;
+        let own = f64::from(point.footprint);
+        let own_area = own * own / if point.direct { f64::from(point.cos).max(0.02) } else { 1.0 };
+        if footprint * footprint / cos > self.evidence.coarser * own_area {
+            return;
+        }
+        let (fx, fy) = (x - left, y - top);
+        let reach = 2.0 * footprint / cos;
+        for k in 0..4 {
+            let (dx, dy) = (f64::from(k & 1), f64::from(k >> 1));
+            let (tx, ty) = (left + dx, top + dy);
+            if tx < 0.0 || ty < 0.0 || tx >= width || ty >= height {
+                continue;
+            }
+            let sample = reference.slots[ty as usize * camera.width as usize + tx as usize];
+            if sample == NONE {
+                continue;
+            }
+            let s = &reference.samples[sample as usize];
+            let Some(distance) = self.on_surface(point, n, s, footprint, reach) else { continue };
+            let wx = if dx > 0.0 { fx } else { 1.0 - fx };
+            let wy = if dy > 0.0 { fy } else { 1.0 - fy };
+            let distance = (distance / footprint) as f32;
+            taps.push(Tap { reference: number, sample, weight: (wx * wy) as f32, distance });
+        }
+    }
+
+    /// Samples near the point, by place.
+    fn index_taps(
+        &self,
+        number: u32,
+        reference: &Reference,
+        point: &SurfacePoint,
+        taps: &mut Taps,
+    ) {
+        let n = point.n.as_dvec3();
+        let footprint = f64::from(point.footprint);
+        let own = level_of(point.footprint);
+        for level in [own, own - 1] {
+            let reach = edge_of(level);
+            reference.index.around(level, point.geom_id, point.p, |sample| {
+                let s = &reference.samples[sample as usize];
+                let Some(distance) = self.on_surface(point, n, s, footprint, reach) else { return };
+                let weight = 0.5 * (1.0 - distance / reach);
+                let distance = (distance / footprint) as f32;
+                taps.push(Tap { reference: number, sample, weight: weight as f32, distance });
+            });
+        }
+    }
+
+    /// Distance to a sample on the point's own surface; `None` where it is on another.
+    fn on_surface(
+        &self,
+        point: &SurfacePoint,
+        n: DVec3,
+        s: &Sample,
+        footprint: f64,
+        reach: f64,
+    ) -> Option<f64> {
+        if s.geom_id != point.geom_id || s.n.dot(point.n) < self.evidence.least_cos {
+            return None;
+        }
+        let apart = s.position() - point.p;
+        let distance = apart.length();
+        let height = apart.dot(n).abs();
+        let allowed = self.evidence.height * footprint + self.evidence.slope * distance;
+        (distance <= reach && height <= allowed).then_some(distance)
+    }
+
+    /// Weighted means of the ratios that agree.
+    fn answer(&self, taps: &Taps, ratios: &mut [f32]) {
+        for (channel, out) in ratios.iter_mut().enumerate() {
+            let (mut weight, mut sum, mut squares, mut rays) = (0.0, 0.0, 0.0, 0.0);
+            for tap in taps.iter() {
+                let reference = self.references[tap.reference as usize];
+                let ratio = reference.ratio(tap.sample, channel);
+                if ratio.is_nan() {
+                    continue;
+                }
+                weight += tap.weight;
+                sum += tap.weight * ratio;
+                squares += tap.weight * ratio * ratio;
+                rays += tap.weight * reference.samples[tap.sample as usize].samples as f32;
+            }
+            if f64::from(weight) < self.evidence.least_weight {
+                continue;
+            }
+            let mean = sum / weight;
+            let variance = (squares / weight - mean * mean).max(0.0);
+            let rays = rays / weight * self.rays[channel] as f32;
+            let Evidence { tolerance, noise, .. } = self.evidence;
+            let allowed = tolerance * tolerance + noise * (mean * (1.0 - mean)).max(0.0) / rays;
+            if variance <= allowed {
+                *out = mean;
+            }
+        }
+    }
+
+    fn origin(&self, taps: &Taps, _point: &SurfacePoint) -> Origin {
+        let mut origin = Origin::default();
+        let mut most = 0.0;
+        let mut distance = 0.0;
+        let mut by_reference = 0.0;
+        let mut last = NONE;
+        for tap in taps.iter() {
+            let frame = self.references[tap.reference as usize].frame;
+            origin.earlier |= frame < self.frame;
+            origin.later |= frame > self.frame;
+            distance += tap.weight * tap.distance;
+            by_reference =
+                if last == tap.reference { by_reference + tap.weight } else { tap.weight };
+            last = tap.reference;
+            if by_reference > most {
+                most = by_reference;
+                origin.frame = frame;
+            }
+        }
+        origin.distance = distance / taps.weight as f32;
+        origin
+    }
+}

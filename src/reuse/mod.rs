@@ -1,0 +1,15 @@
+//! What traced frames tell about others. Never traces.
+//!
+//! A [`Reference`] holds a frame's camera and the surface points that were traced for it, with their
+//! ratios. A [`Lookup`] answers from several of them, with evidence: what it cannot vouch for it
+//! leaves unknown, and that is traced. Only traced points are sources, so nothing blurs or drifts
+//! however many frames are inferred. All in scene space.
+
+mod cost;
+mod index;
+mod lookup;
+mod reference;
+
+pub use cost::{channels, lookup_reasons, rays_of};
+pub use lookup::{Evidence, Lookup};
+pub use reference::Reference;

@@ -1,0 +1,128 @@
+//! A frame's traced surface points, found by image position or by place in the scene.
+
+use super::index::Index;
+use crate::inference::{SurfacePoint, TracedPoints};
+use crate::math::{DVec3, Vec3};
+use crate::scene::Camera;
+
+/// No sample.
+pub(super) const NONE: u32 = u32::MAX;
+/// Normals of one surface within a pixel: cosine.
+const SAME_SURFACE: f32 = 0.9;
+
+/// A traced surface point: 36 bytes, read four at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample {
+    pub p: Vec3,
+    pub n: Vec3,
+    pub geom_id: u32,
+    /// Camera samples whose shadow rays it gathers.
+    pub samples: u32,
+    /// Distance to its neighbours.
+    pub footprint: f32,
+}
+
+/// What one frame knows.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// Its number.
+    pub frame: u32,
+    /// Scene space.
+    pub(super) camera: Camera,
+    /// Edge of a pixel at distance 1.
+    pub(super) pixel_size: f64,
+    /// For each pixel the sample of what is seen there directly.
+    pub(super) slots: Vec<u32>,
+    pub(super) samples: Vec<Sample>,
+    /// For each sample the ratio in each channel; NaN where unknown.
+    pub(super) ratios: Vec<f32>,
+    pub(super) channels: usize,
+    /// Samples that are no pixel's own: seen in mirrors, through glass, beside another surface.
+    pub(super) index: Index,
+}
+
+impl Reference {
+    /// What `traced` tells of frame `frame`, seen by `camera` (scene space).
+    pub fn new(frame: u32, camera: &Camera, traced: &TracedPoints, channels: usize) -> Self {
+        let mut slots = vec![NONE; camera.width as usize * camera.height as usize];
+        let mut samples: Vec<Sample> = Vec::with_capacity(traced.points.len());
+        let mut ratios: Vec<f32> = Vec::with_capacity(traced.ratios.len());
+        let mut others = Vec::new();
+        for (i, t) in traced.points.iter().enumerate() {
+            let own = &traced.ratios[i * channels..(i + 1) * channels];
+            let sample = Sample::of(&t.point);
+            let slot = &mut slots[t.y as usize * camera.width as usize + t.x as usize];
+            let mut at = samples.len();
+            if t.point.direct && *slot != NONE && samples[*slot as usize].is_one_surface(&sample) {
+                at = *slot as usize;
+                samples[at].join(&sample, &mut ratios[at * channels..(at + 1) * channels], own);
+                continue;
+            }
+            let is_own = t.point.direct
+                && (*slot == NONE || samples[*slot as usize].samples < sample.samples);
+            if is_own {
+                let displaced = std::mem::replace(slot, at as u32);
+                others.extend((displaced != NONE).then_some(displaced));
+            } else {
+                others.push(at as u32);
+            }
+            at += 1;
+            debug_assert_eq!(at, samples.len() + 1);
+            samples.push(sample);
+            ratios.extend_from_slice(own);
+        }
+        let index = Index::new(&samples, others);
+        let pixel_size = camera.pixel_size();
+        Self { frame, camera: *camera, pixel_size, slots, samples, ratios, channels, index }
+    }
+
+    /// Whether it knows nothing.
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// Bytes that it holds.
+    pub fn memory(&self) -> u64 {
+        let sample = size_of::<Sample>() + 4 * self.channels;
+        (self.samples.len() * sample + 4 * self.slots.len()) as u64 + self.index.memory()
+    }
+
+    pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {
+        self.ratios[sample as usize * self.channels + channel]
+    }
+}
+
+impl Sample {
+    fn of(point: &SurfacePoint) -> Self {
+        Self {
+            p: point.p.as_vec3(),
+            n: point.n,
+            geom_id: point.geom_id,
+            samples: point.samples,
+            footprint: point.footprint,
+        }
+    }
+
+    fn is_one_surface(&self, other: &Self) -> bool {
+        self.geom_id == other.geom_id && self.n.dot(other.n) > SAME_SURFACE
+    }
+
+    /// Takes in more camera samples of the same pixel and surface.
+    fn join(&mut self, other: &Self, ratios: &mut [f32], others: &[f32]) {
+        let share = other.samples as f32 / (self.samples + other.samples) as f32;
+        self.p += (other.p - self.p) * share;
+        self.n = (self.n + (other.n - self.n) * share).normalize_or(self.n);
+        for (own, other) in ratios.iter_mut().zip(others) {
+            match (own.is_nan(), other.is_nan()) {
+                (true, _) => *own = *other,
+                (false, false) => *own += (other - *own) * share,
+                (false, true) => {}
+            }
+        }
+        self.samples += other.samples;
+    }
+
+    pub(super) fn position(&self) -> DVec3 {
+        self.p.as_dvec3()
+    }
+}

@@ -1,0 +1,155 @@
+//! Which frames a frame is inferred from.
+//!
+//! The shot is cut into segments of a fixed number of frames, whose ends are key frames. Inside,
+//! the middle frame is inferred from both ends, then the quarters from these three, and so on. So
+//! a frame depends on its segment's ends and a handful of frames between, whoever renders it and
+//! whatever else is rendered.
+
+use std::ops::RangeInclusive;
+
+/// The segments of a shot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pyramid {
+    /// Frames from one key frame to the next.
+    pub segment: u32,
+    /// Frames of the shot.
+    pub frames: u32,
+}
+
+impl Pyramid {
+    /// Whether `frame` is a key frame: a segment's end, or the shot's.
+    pub fn is_key(&self, frame: u32) -> bool {
+        (frame - 1) % self.segment == 0 || frame == self.frames
+    }
+
+    /// Number of the segment that `frame` lies in; a key frame belongs to the one that it starts.
+    pub fn segment_of(&self, frame: u32) -> u32 {
+        (frame - 1) / self.segment
+    }
+
+    /// First and last frame of the segment that `frame`, which is no key frame, lies in.
+    fn ends(&self, frame: u32) -> (u32, u32) {
+        let first = self.segment_of(frame) * self.segment + 1;
+        (first, first.saturating_add(self.segment).min(self.frames))
+    }
+
+    /// The frames that `frame` is inferred from: the segment's ends, then the frames between, the
+    /// nearest first. None for a key frame.
+    pub fn ancestors(&self, frame: u32) -> Vec<u32> {
+        if self.is_key(frame) {
+            return Vec::new();
+        }
+        let (mut low, mut high) = self.ends(frame);
+        let mut all = vec![low, high];
+        loop {
+            let middle = middle(low, high);
+            if middle == frame {
+                break;
+            }
+            all.push(middle);
+            if frame < middle { high = middle } else { low = middle }
+        }
+        all[2..].sort_by_key(|other| (other.abs_diff(frame), *other));
+        all
+    }
+
+    /// `frames` in the order that needs the fewest references at a time: segment by segment, each
+    /// frame after its ancestors.
+    pub fn order(&self, frames: &[u32]) -> Vec<u32> {
+        let mut ordered = frames.to_vec();
+        ordered.sort_by_cached_key(|frame| (self.segment_of(*frame), self.place(*frame)));
+        ordered
+    }
+
+    /// Where a frame stands among those of its segment: the frames that it comes after lie before
+    /// it in the order of places.
+    fn place(&self, frame: u32) -> Vec<bool> {
+        if self.is_key(frame) {
+            return Vec::new();
+        }
+        let (mut low, mut high) = self.ends(frame);
+        let mut turns = Vec::new();
+        loop {
+            let middle = middle(low, high);
+            if middle == frame {
+                return turns;
+            }
+            turns.push(frame > middle);
+            if frame < middle { high = middle } else { low = middle }
+        }
+    }
+
+    /// The most references that a frame of the shot is inferred from.
+    pub fn depth(&self) -> u32 {
+        let longest = self.segment.min(self.frames.saturating_sub(1));
+        if longest < 2 { 0 } else { 2 + longest.ilog2() - 1 }
+    }
+
+    /// `frames`, cut into lists that share no in-between references, each in order.
+    pub fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
+        let ordered = self.order(frames);
+        let segments = ordered.chunk_by(|a, b| self.segment_of(*a) == self.segment_of(*b));
+        segments.map(<[u32]>::to_vec).collect()
+    }
+
+    /// All frames of the shot.
+    pub fn all(&self) -> RangeInclusive<u32> {
+        1..=self.frames
+    }
+}
+
+fn middle(low: u32, high: u32) -> u32 {
+    low + (high - low) / 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn the_textbook_order_of_nine_frames() {
+        let pyramid = Pyramid { segment: 8, frames: 9 };
+        assert_eq!(pyramid.order(&(1..=9).collect::<Vec<_>>()), [1, 5, 3, 2, 4, 7, 6, 8, 9]);
+        assert_eq!(pyramid.ancestors(4), [1, 9, 3, 5]);
+        assert_eq!(pyramid.ancestors(5), [1, 9]);
+        assert!(pyramid.ancestors(9).is_empty());
+    }
+
+    #[test]
+    fn every_frame_comes_after_its_ancestors_in_its_segment() {
+        for (segment, frames) in [(1, 5), (2, 9), (8, 9), (32, 100), (64, 64), (64, 65), (7, 30)] {
+            let pyramid = Pyramid { segment, frames };
+            let all: Vec<u32> = pyramid.all().collect();
+            let order = pyramid.order(&all);
+            assert_eq!(order.iter().collect::<BTreeSet<_>>().len(), frames as usize);
+            let place = |frame| order.iter().position(|f| *f == frame);
+            for frame in pyramid.all() {
+                let ancestors = pyramid.ancestors(frame);
+                assert!(ancestors.len() <= pyramid.depth() as usize, "{pyramid:?} {frame}");
+                for other in ancestors {
+                    assert!(pyramid.is_key(other) || place(other) < place(frame));
+                    let further = pyramid.ancestors(other);
+                    let known = pyramid.ancestors(frame);
+                    assert!(further.iter().all(|f| known.contains(f)), "{frame} by {other}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_longer_shot_changes_no_whole_segment() {
+        let (short, long) =
+            (Pyramid { segment: 8, frames: 20 }, Pyramid { segment: 8, frames: 50 });
+        for frame in 1..=17 {
+            assert_eq!(short.ancestors(frame), long.ancestors(frame));
+        }
+    }
+
+    #[test]
+    fn batches_hold_every_frame_once() {
+        let pyramid = Pyramid { segment: 4, frames: 11 };
+        let batches = pyramid.batches(&[2, 3, 7, 11, 5]);
+        assert_eq!(batches, [vec![3, 2], vec![5, 7], vec![11]]);
+    }
+}

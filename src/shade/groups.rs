@@ -1,0 +1,228 @@
+//! The lit points of one chunk as reuse sees them: camera samples of a pixel that end on one surface
+//! are one surface point.
+//!
+//! Points behind mirrors and glass stay apart, since neighbouring samples may end far from one
+//! another there. What is traced is gathered per surface point and becomes a source.
+
+use super::lighting::LitPoint;
+use super::pixels::{BLOCK, BlockPixels};
+use super::{FrameInput, Reuse};
+use crate::inference::{Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
+use crate::stats::ReuseCounts;
+
+/// Pixels of a block.
+const PIXELS: usize = (BLOCK * BLOCK) as usize;
+/// No point.
+const NONE: u32 = u32::MAX;
+/// Samples of a pixel lie on one surface where their normals differ by less: cosine.
+const SAME_SURFACE: f64 = 0.9;
+
+/// Light gathered in one channel of one surface point, in shares of what would arrive unshadowed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gathered {
+    open: f64,
+    all: f64,
+}
+
+/// The surface points of a chunk.
+#[derive(Default)]
+pub(super) struct Groups {
+    /// For each lit point its surface point.
+    of_lit: Vec<u32>,
+    asked: Questions,
+    /// Pixel of each surface point, in the block.
+    pixels: Vec<u32>,
+    /// Next surface point of the same pixel.
+    next: Vec<u32>,
+    gathered: Vec<Gathered>,
+    /// Whether a ray to a kept light was cast from the surface point.
+    traced: Vec<bool>,
+    /// Whether any kept light could shine on it.
+    lit: Vec<bool>,
+    order: Vec<(u64, u32)>,
+}
+
+impl Groups {
+    /// Groups `lit` and asks what is known about each surface point.
+    pub fn ask(
+        &mut self,
+        input: &FrameInput,
+        reuse: &Reuse,
+        lit: &[LitPoint],
+        pixels: &BlockPixels,
+    ) {
+        self.gather_points(input, lit);
+        self.measure_footprints(lit, pixels);
+        let (count, channels) = (self.asked.points.len(), reuse.channels.len());
+        self.asked.ratios.clear();
+        self.asked.ratios.resize(count * channels, f32::NAN);
+        self.asked.origins.clear();
+        self.asked.origins.resize(count, Origin::default());
+        self.gathered.clear();
+        self.gathered.resize(count * channels, Gathered::default());
+        for flags in [&mut self.traced, &mut self.lit] {
+            flags.clear();
+            flags.resize(count, false);
+        }
+        if let Some(inference) = reuse.inference {
+            inference.infer(&mut self.asked);
+        }
+    }
+
+    fn gather_points(&mut self, input: &FrameInput, lit: &[LitPoint]) {
+        let Self { of_lit, asked: Questions { points, .. }, pixels, next, .. } = self;
+        of_lit.clear();
+        points.clear();
+        pixels.clear();
+        next.clear();
+        let mut heads = [NONE; PIXELS];
+        for point in lit {
+            let own = point.surface_point(input);
+            let head = &mut heads[point.place.pixel as usize];
+            let mut at = if own.direct { *head } else { NONE };
+            while at != NONE && !is_one_surface(&points[at as usize], &own) {
+                at = next[at as usize];
+            }
+            if at == NONE {
+                at = points.len() as u32;
+                points.push(own);
+                pixels.push(point.place.pixel);
+                // Behind mirrors nothing joins.
+                next.push(if own.direct { std::mem::replace(head, at) } else { NONE });
+            } else {
+                join(&mut points[at as usize], &own);
+            }
+            of_lit.push(at);
+        }
+        for point in points.iter_mut().filter(|p| p.samples > 1) {
+            point.n = point.n.normalize_or(point.n);
+        }
+    }
+
+    /// Behind mirrors and glass a pixel's size on the surface is told by its neighbours: how far
+    /// away the same branch of their same sample ends.
+    fn measure_footprints(&mut self, lit: &[LitPoint], pixels: &BlockPixels) {
+        let Self { of_lit, asked: Questions { points, .. }, order, .. } = self;
+        order.clear();
+        let specular = lit.iter().zip(of_lit.iter()).filter(|(l, _)| l.place.branch > 1);
+        order.extend(
+            specular
+                .map(|(l, at)| (u64::from(l.place.branch) << 32 | u64::from(l.place.sample), *at)),
+        );
+        order.sort_unstable();
+        for run in order.chunk_by(|a, b| a.0 == b.0) {
+            let mut grid = [NONE; PIXELS];
+            let cell = |at: u32| pixels.cell(self.pixels[at as usize]);
+            run.iter().for_each(|(_, at)| grid[cell(*at)] = *at);
+            for (_, at) in run {
+                let own = points[*at as usize];
+                let nearest = neighbours(cell(*at))
+                    .filter(|c| grid[*c] != NONE)
+                    .map(|c| &points[grid[c] as usize])
+                    .filter(|other| other.geom_id == own.geom_id)
+                    .map(|other| other.p.distance(own.p) as f32)
+                    .fold(f32::INFINITY, f32::min);
+                if nearest < f32::INFINITY {
+                    points[*at as usize].footprint = nearest;
+                }
+            }
+        }
+    }
+
+    /// The ratio that is known for lit point `i` in `channel`, else NaN.
+    pub fn known(&self, i: usize, channel: usize, channels: usize) -> f32 {
+        self.asked.ratios[self.of_lit[i] as usize * channels + channel]
+    }
+
+    /// Notes that the light of a channel shines on lit point `i`, shadows aside.
+    pub fn note_lit(&mut self, i: usize) {
+        self.lit[self.of_lit[i] as usize] = true;
+    }
+
+    /// Adds what was traced for lit point `i`.
+    pub fn add(&mut self, i: usize, channel: usize, channels: usize, open: f64, all: f64) {
+        let group = self.of_lit[i] as usize;
+        self.traced[group] = true;
+        let gathered = &mut self.gathered[group * channels + channel];
+        gathered.open += open;
+        gathered.all += all;
+    }
+
+    /// Moves what was traced to `sources`, counts, and tells each pixel where its light is from.
+    pub fn finish(
+        &mut self,
+        channels: usize,
+        pixels: &mut BlockPixels,
+        sources: &mut TracedPoints,
+        counts: &mut ReuseCounts,
+    ) {
+        for (i, point) in self.asked.points.iter().enumerate() {
+            if !self.lit[i] {
+                continue;
+            }
+            let (lit, inferred) = match point.direct {
+                true => (&mut counts.direct, &mut counts.direct_inferred),
+                false => (&mut counts.specular, &mut counts.specular_inferred),
+            };
+            *lit += 1;
+            *inferred += u64::from(!self.traced[i]);
+            let origin = (!self.traced[i]).then_some(&self.asked.origins[i]);
+            pixels.set_origin(self.pixels[i], origin);
+            if self.traced[i] {
+                let (x, y) = pixels.place(self.pixels[i]);
+                sources.points.push(TracedPoint { x, y, point: *point });
+                let gathered = &self.gathered[i * channels..(i + 1) * channels];
+                sources.ratios.extend(gathered.iter().map(|g| (g.open / g.all) as f32));
+            }
+        }
+    }
+}
+
+fn is_one_surface(a: &SurfacePoint, b: &SurfacePoint) -> bool {
+    a.geom_id == b.geom_id
+        && a.n.as_dvec3().dot(b.n.as_dvec3()) > SAME_SURFACE * f64::from(a.samples)
+}
+
+/// Until all are in, the normal of several samples is their sum.
+fn join(group: &mut SurfacePoint, own: &SurfacePoint) {
+    let n = group.samples as f32;
+    let share = 1.0 / (n + 1.0);
+    group.p += (own.p - group.p) * f64::from(share);
+    group.n += own.n;
+    group.footprint += (own.footprint - group.footprint) * share;
+    group.cos += (own.cos - group.cos) * share;
+    group.samples += 1;
+}
+
+/// Cells left, right, above and below in the block.
+fn neighbours(cell: usize) -> impl Iterator<Item = usize> {
+    let edge = BLOCK as usize;
+    let (x, y) = (cell % edge, cell / edge);
+    let left = (x > 0).then(|| cell - 1);
+    let right = (x + 1 < edge).then(|| cell + 1);
+    let above = (y > 0).then(|| cell - edge);
+    let below = (y + 1 < edge).then(|| cell + edge);
+    [left, right, above, below].into_iter().flatten()
+}
+
+impl LitPoint {
+    /// The point as reuse sees it.
+    fn surface_point(&self, input: &FrameInput) -> SurfacePoint {
+        let direct = self.place.branch == 1;
+        // Behind mirrors a first guess, as if they were flat.
+        let along = match direct {
+            true => (self.si.p - input.camera.eye).dot(input.camera.forward),
+            false => (self.si.p - input.camera.eye).length(),
+        };
+        let cos = -self.ray.dir.dot(self.n) / self.ray.dir.length();
+        SurfacePoint {
+            p: self.si.p,
+            n: self.n.as_vec3(),
+            geom_id: self.si.prim.geom_id,
+            footprint: (along * input.pixel_size) as f32,
+            cos: cos as f32,
+            direct,
+            samples: 1,
+        }
+    }
+}
