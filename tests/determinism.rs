@@ -85,12 +85,12 @@ fn busy_job(width: u32, height: u32) -> Job {
 
 fn on_threads(job: &Job, threads: usize) -> Film {
     let scene = job.world.clone().into_scene(true).unwrap();
-    let intersector = intersect::build(&scene, &job.settings, threads).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let before = floating_point_mode();
+    let intersector = pool.install(|| intersect::build(&scene, &job.settings, threads)).unwrap();
     let plan = EffectPlan::of(&scene, &job.settings);
     let renderer =
         Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let before = floating_point_mode();
     let stop = AtomicBool::new(false);
     let film = pool.install(|| renderer.render(&job.camera, 7, true, &stop, &Silent)).unwrap().0;
     assert!(pool.broadcast(|_| floating_point_mode()).iter().all(|mode| *mode == before));

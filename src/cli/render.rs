@@ -72,7 +72,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
-    let intersector = world.agree(intersect::build(&request.scene, &request.settings, threads))?;
+    let build = || intersect::build(&request.scene, &request.settings, threads);
+    let intersector = world.agree(pool.install(build))?;
     let built = Instant::now();
     let tracer = request.tracer(&intersector.describe())?;
     let target = request.target(world.same_everywhere("traces with", tracer)?);

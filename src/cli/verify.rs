@@ -17,7 +17,7 @@ use crate::scene::{IntersectorKind, Scene, Settings};
 use crate::verify::{self, Check, Kind, RayId, Tally};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::io::IsTerminal;
 use std::sync::atomic::Ordering;
 
@@ -101,12 +101,14 @@ pub fn run(args: &VerifyArgs) -> Result<Exit> {
     }
     refuse_the_pointless(&scene, &settings)?;
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);
-    let product = intersect::build(&scene, &settings, threads)?;
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
+    let product = pool.install(|| intersect::build(&scene, &settings, threads))?;
     let oracle = Oracle::new(&scene);
     let check = Check::new(&scene, &settings, &shot, &*product, &oracle);
     match args.ray {
         Some(id) => replay::run(args, &check, id),
-        None => all(args, &check, threads, &interrupt),
+        None => all(args, &check, &pool, &interrupt),
     }
 }
 
@@ -123,7 +125,8 @@ fn refuse_the_pointless(scene: &Scene, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-fn all(args: &VerifyArgs, check: &Check, threads: usize, interrupt: &Interrupt) -> Result<Exit> {
+fn all(args: &VerifyArgs, check: &Check, pool: &ThreadPool, interrupt: &Interrupt) -> Result<Exit> {
+    let threads = pool.current_num_threads();
     let triangles = check.scene.triangle_count();
     let rays = args.rays.unwrap_or_else(|| verify::default_rays(triangles));
     let kinds = Kind::ALL.len() as u64;
@@ -135,8 +138,6 @@ fn all(args: &VerifyArgs, check: &Check, threads: usize, interrupt: &Interrupt) 
             duration(verify::estimate(rays, triangles, threads))
         ));
     }
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
     let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| bar(kinds * rays));
     let progress = |more| bar.iter().for_each(|bar| bar.inc(more));
     let tally = interrupt.watched(|| pool.install(|| check.run(rays, &interrupt.stop, &progress)));

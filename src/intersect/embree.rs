@@ -78,7 +78,8 @@ enum Turn {
 const TURNS: [Turn; 2] = [Turn::OneWay, Turn::OtherWay];
 
 impl<'s> EmbreeIntersector<'s> {
-    /// Builds the BVH of `scene` with `threads` threads.
+    /// Builds the BVH of `scene` with `threads` threads, and what stands beside it on those of the
+    /// current rayon pool.
     ///
     /// Errors: `Error::Embree` for an unknown `isa`, or when memory runs out.
     pub fn new(

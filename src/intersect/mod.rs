@@ -45,7 +45,8 @@ pub trait Intersector: Sync {
     fn memory(&self) -> u64;
 }
 
-/// Builds the intersector that `settings` ask for; `threads` build it.
+/// Builds the intersector that `settings` ask for: Embree's part with `threads` threads of its own,
+/// the rest on those of the current rayon pool.
 ///
 /// Errors: `Error::Embree` when Embree refuses or runs out of memory.
 pub fn build<'s>(

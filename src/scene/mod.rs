@@ -18,6 +18,7 @@ mod path;
 mod place;
 mod recentre;
 mod settings;
+mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
@@ -30,6 +31,7 @@ pub use recentre::Recentring;
 pub use settings::{
     Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
+pub(crate) use weld::weld;
 pub(crate) use winding::closed_volume;
 
 use crate::math::Bounds3;

@@ -210,7 +210,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
         // would otherwise refract as a hole in glass.
         let mut volume = winding::closed_volume(&positions, &triangles);
         if volume.is_none() {
-            let strays = winding::strays(&positions, &triangles, &winding::weld(&positions));
+            let strays = winding::strays(&positions, &triangles);
             let strays = strays.into_iter().flatten().enumerate().filter(|(_, stray)| *stray);
             strays.for_each(|(i, _)| reverse_one(i, &mut triangles, &mut normals, &mut uvs));
             volume = winding::closed_volume(&positions, &triangles);

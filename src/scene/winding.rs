@@ -1,19 +1,14 @@
 //! Which way round the faces of a closed mesh are wound.
 
+use super::weld::weld_here;
 use crate::math::DVec3;
 use std::collections::HashMap;
 
 /// Which `triangles` must be reversed so that neighbours agree on what is outside: of each
 /// connected part the lesser share by area. `None` where that is no question with an answer: an
 /// edge has not exactly two triangles, or the part is one-sided.
-///
-/// `weld` is [`weld`]'s for `positions`.
-pub(super) fn strays(
-    positions: &[DVec3],
-    triangles: &[[u32; 3]],
-    weld: &[u32],
-) -> Option<Vec<bool>> {
-    let welded: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|i| weld[i as usize])).collect();
+pub(super) fn strays(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<Vec<bool>> {
+    let welded = welded(positions, triangles);
     let solid = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
     let mut edges: HashMap<(u32, u32), Vec<(u32, bool)>> = HashMap::new();
     for (index, t) in welded.iter().enumerate().filter(|(_, t)| solid(t)) {
@@ -73,26 +68,20 @@ fn orient_part(
     Some(())
 }
 
-/// For each vertex a number that it shares with all at the same place: they are one corner, however
-/// often the file lists them. The numbers count the places, from 0 in order of their first vertex; they
-/// are not indices of vertices. (0 and -0 are the same place.)
-pub(super) fn weld(positions: &[DVec3]) -> Vec<u32> {
-    let mut welded = HashMap::with_capacity(positions.len());
-    let number = |p: &DVec3| {
-        let key = (*p + DVec3::ZERO).to_array().map(f64::to_bits);
-        let next = welded.len() as u32;
-        *welded.entry(key).or_insert(next)
-    };
-    positions.iter().map(number).collect()
+/// `triangles` with the first vertex at each place in the stead of all others there.
+fn welded(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    match weld_here(positions) {
+        Some(first) => triangles.iter().map(|t| t.map(|i| first[i as usize])).collect(),
+        None => triangles.to_vec(),
+    }
 }
 
-/// Signed volume of a closed mesh: positive when its faces wind counter-clockwise seen from
-/// outside; `None` when an edge has not exactly one partner that runs the other way.
+/// Six times the signed volume of a closed mesh: positive when its faces wind counter-clockwise
+/// seen from outside; `None` when an edge has not exactly one partner that runs the other way.
+/// Stays on this thread, since verify asks for it under a lock.
 pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Option<f64> {
-    let weld = weld(positions);
     let mut edges = HashMap::with_capacity(triangles.len() * 3);
-    for t in triangles {
-        let t = t.map(|i| weld[i as usize]);
+    for t in welded(positions, triangles) {
         for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
             if a != b {
                 *edges.entry((a.min(b), a.max(b))).or_insert(0i64) += if a < b { 1 } else { -1 };
@@ -113,6 +102,7 @@ pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
 
@@ -122,19 +112,48 @@ mod tests {
 
     #[test]
     fn the_stray_face_is_found() {
-        let weld = [0, 1, 2, 3];
-        assert_eq!(strays(&corners(), &TETRAHEDRON, &weld), Some(vec![false; 4]));
+        assert_eq!(strays(&corners(), &TETRAHEDRON), Some(vec![false; 4]));
         for stray in 0..4 {
             let mut triangles = TETRAHEDRON;
             triangles[stray].swap(0, 1);
             // The slanted face has the most area of one, not of all.
             let expected: Vec<bool> = (0..4).map(|i| i == stray).collect();
-            assert_eq!(strays(&corners(), &triangles, &weld), Some(expected), "{stray}");
+            assert_eq!(strays(&corners(), &triangles), Some(expected), "{stray}");
         }
     }
 
     #[test]
     fn an_open_mesh_has_no_answer() {
-        assert_eq!(strays(&corners(), &TETRAHEDRON[..3], &[0, 1, 2, 3]), None);
+        assert_eq!(strays(&corners(), &TETRAHEDRON[..3]), None);
+    }
+
+    #[test]
+    fn twins_close_a_mesh() {
+        // Each face has corners of its own, and what is zero there is -0 in every other face.
+        let mut positions = Vec::new();
+        for (face, t) in TETRAHEDRON.iter().enumerate() {
+            let own = t.map(|i| corners()[i as usize]);
+            positions.extend(if face % 2 == 0 { own } else { own.map(|p| -(DVec3::ZERO - p)) });
+        }
+        let mut triangles: Vec<[u32; 3]> = (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        assert_eq!(closed_volume(&positions, &triangles), Some(1.0));
+        triangles[2].swap(0, 1);
+        assert_eq!(closed_volume(&positions, &triangles), None);
+        assert_eq!(strays(&positions, &triangles), Some(vec![false, false, true, false]));
+    }
+
+    /// A worker that waits takes up other work of its pool.
+    #[test]
+    fn the_volume_never_takes_up_other_work() {
+        let positions: Vec<DVec3> = (0..3000).map(|i| DVec3::splat(f64::from(i % 7))).collect();
+        let busy: Vec<AtomicBool> = (0..8).map(|_| AtomicBool::new(false)).collect();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(busy.len()).build().unwrap();
+        let job = |_: &rayon::Scope| {
+            let mine = &busy[rayon::current_thread_index().unwrap()];
+            assert!(!mine.swap(true, Ordering::Relaxed), "taken up while another waits");
+            closed_volume(&positions, &[[0, 1, 2]]);
+            mine.store(false, Ordering::Relaxed);
+        };
+        pool.scope(|scope| (0..1000).for_each(|_| scope.spawn(job)));
     }
 }

@@ -1,7 +1,6 @@
 //! Shading normals as the policy asks for them.
 
 mod smooth;
-mod weld;
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{NormalPolicy, WorldMesh};

@@ -6,9 +6,8 @@
 //! than the crease angle; reversed neighbours meet in a crease.
 
 use super::unit_or_zero;
-use super::weld::weld;
 use crate::math::{DVec3, Vec3};
-use crate::scene::Corners;
+use crate::scene::{Corners, weld};
 use rayon::prelude::*;
 
 /// Vertices a task.

@@ -7,17 +7,28 @@ const EMPTY: u64 = u64::MAX;
 
 /// For each position the first index with the same coordinates (−0 equals 0), or `None` when
 /// all positions differ. Linear; 16 bytes a position while it runs.
-pub(super) fn weld(positions: &[DVec3]) -> Option<Vec<u32>> {
-    // Each shard owns the positions whose hash starts with its number, so none waits.
+pub(crate) fn weld(positions: &[DVec3]) -> Option<Vec<u32>> {
+    // Each shard owns the positions whose hash falls to its number, so none waits.
     let shards = rayon::current_num_threads().next_power_of_two() as u64;
     let twins: Vec<(u32, u32)> = (0..shards)
         .into_par_iter()
         .flat_map_iter(|shard| twins(positions, shard, shards))
         .collect();
+    firsts(positions.len(), &twins)
+}
+
+/// [`weld`] without leaving this thread, for callers that may hold a lock: a worker that waits for
+/// others takes up whatever work its pool has, and that could want the same lock.
+pub(super) fn weld_here(positions: &[DVec3]) -> Option<Vec<u32>> {
+    firsts(positions.len(), &twins(positions, 0, 1))
+}
+
+/// What [`weld`] gives for `count` positions of which `twins` are pairs.
+fn firsts(count: usize, twins: &[(u32, u32)]) -> Option<Vec<u32>> {
     if twins.is_empty() {
         return None;
     }
-    let mut first: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut first: Vec<u32> = (0..count as u32).collect();
     twins.iter().for_each(|(index, twin)| first[*index as usize] = *twin);
     Some(first)
 }
@@ -97,12 +108,13 @@ mod tests {
     fn finds_every_twin_and_only_twins() {
         let point = |i: u32| DVec3::new(f64::from(i % 7), f64::from(i % 11) * 1e-300, -0.0);
         let mut positions: Vec<DVec3> = (0..77).map(point).collect();
-        assert_eq!(weld(&positions), None);
+        assert_eq!((weld(&positions), weld_here(&positions)), (None, None));
         positions.extend((0..1000).map(|i| point(i) * DVec3::new(1.0, 1.0, -1.0)));
         let first = weld(&positions).expect("twins");
         for (i, p) in positions.iter().enumerate() {
             let expected = positions.iter().position(|q| q == p).expect("itself");
             assert_eq!(first[i] as usize, expected);
         }
+        assert_eq!(weld_here(&positions), Some(first));
     }
 }
