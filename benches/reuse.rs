@@ -76,6 +76,7 @@ fn main() {
     e.noise = var("NOISE", e.noise);
     e.alone = var("ALONE", e.alone);
     e.alone_saturated = var("ALONES", e.alone_saturated);
+    e.grazing = var("GRAZING", e.grazing);
     let every: u32 = var("EVERY", 4);
     let order = pyramid.order(&frames);
     let (mut lit, mut spec) = ((0, 0), (0, 0));

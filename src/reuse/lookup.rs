@@ -30,6 +30,8 @@ pub struct Evidence {
     pub coarser: f64,
     /// Deviation that is always allowed, display steps of 1/255.
     pub tolerance: f32,
+    /// Grazing.
+    pub grazing: f64,
     /// Alone.
     pub alone: f32,
     /// Alone saturated.
@@ -49,6 +51,7 @@ impl Default for Evidence {
             coarser: 6.0,
             tolerance: 0.5,
             noise: 2.0,
+            grazing: 0.4,
             alone: 0.35,
             alone_saturated: 0.8,
         }
@@ -171,7 +174,7 @@ impl Lookup<'_> {
             return;
         }
         let (fx, fy) = (x - left, y - top);
-        let reach = 2.0 * footprint / cos;
+        let reach = 2.0 * footprint / cos.max(self.evidence.grazing);
         for k in 0..4 {
             let (dx, dy) = (f64::from(k & 1), f64::from(k >> 1));
             let (tx, ty) = (left + dx, top + dy);
