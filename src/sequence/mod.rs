@@ -11,12 +11,14 @@ mod fingerprint;
 mod inferrer;
 mod pyramid;
 mod resume;
+mod schedule;
 mod tracer;
 
 pub use fingerprint::fingerprint;
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use resume::{Plan, Target, prepare};
+pub use schedule::Schedule;
 pub use tracer::Tracer;
 
 #[cfg(test)]
