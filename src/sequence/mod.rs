@@ -58,6 +58,18 @@ pub struct Made {
     pub reuse: ReuseCounts,
 }
 
+impl Made {
+    /// The same frame once more: no ray was cast for it, and all of it was known.
+    fn copy(&self) -> Self {
+        let reuse = ReuseCounts {
+            direct_inferred: self.reuse.direct,
+            specular_inferred: self.reuse.specular,
+            ..self.reuse
+        };
+        Self { film: self.film.clone(), rays: RayCounts::default(), reuse }
+    }
+}
+
 /// What a finished frame took.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameReport {

@@ -134,6 +134,11 @@ impl<T> Stock<T> {
         self.held.get(&original)
     }
 
+    /// Whether a reference is used that is not made yet.
+    pub fn is_due(&self, original: u32) -> bool {
+        self.due.contains(&original)
+    }
+
     fn holds(&self, original: u32) -> bool {
         self.held.contains_key(&original)
     }
