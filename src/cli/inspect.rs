@@ -1,5 +1,7 @@
 //! `tweenray inspect`: what a scene holds and calls for, without rendering it.
 
+mod reuse;
+
 use super::args::{SceneArgs, SettingArgs};
 use super::exit::Exit;
 use super::findings::findings;
@@ -11,6 +13,7 @@ use crate::import::{Loaded, Stage};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
 use crate::scene::{Light, Mesh, Scene, Settings, Shot};
+use crate::shade::Renderer;
 use clap::Args;
 use serde::Serialize;
 
@@ -50,6 +53,7 @@ struct Inspection {
     camera_start: CameraView,
     camera_end: CameraView,
     memory: Memory,
+    reuse: reuse::Plan,
     effects: Vec<Effect>,
     warnings: Vec<String>,
 }
@@ -110,6 +114,9 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
     warnings.extend(collapsed.iter().map(ToString::to_string));
     warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
     let meshes = own_meshes(&scene, stage);
+    let plan = EffectPlan::of(&scene, &settings);
+    let renderer =
+        Renderer { scene: &scene, settings: &settings, plan, intersector: &*intersector };
     let reasons = EffectPlan::reasons(&scene, &settings);
     Ok(Inspection {
         scene: args.scene.scene.display().to_string(),
@@ -134,6 +141,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
+        reuse: reuse::Plan::of(&renderer, &shot)?,
         effects: reasons
             .into_iter()
             .map(|r| Effect { effect: r.effect, runs: r.runs, why: r.why })
@@ -238,6 +246,7 @@ impl Inspection {
             bytes(m.intersector),
             bytes(m.frame)
         ));
+        lines.extend(self.reuse.to_text());
         lines.push("effects".into());
         for e in &self.effects {
             let runs = if e.runs { "runs" } else { "off" };

@@ -3,7 +3,7 @@
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::Exit;
 use super::machine;
-use super::progress::{Watch, duration};
+use super::progress::{Watch, duration, percent};
 use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
@@ -18,6 +18,7 @@ use crate::output::{Format, atomic};
 use crate::scene::{Policy, Settings};
 use crate::sequence::{self, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
 use crate::shade::Renderer;
+use crate::stats::ReuseCounts;
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::Ordering;
@@ -84,13 +85,14 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
     let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
-    let outcome = job.render(world, &*intersector, &interrupt, quiet)?;
+    let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,
         load_seconds: (loaded - start).as_secs_f64(),
         build_seconds: (built - loaded).as_secs_f64(),
         render_seconds: built.elapsed().as_secs_f64(),
         intersector_bytes: intersector.memory(),
+        reference_bytes,
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
@@ -106,7 +108,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         say_stopped(&job, &outcome);
         return Ok(Exit::Stopped);
     }
-    let done = finish(&job, start, quiet)?;
+    let done = finish(&job, &outcome, start, quiet)?;
     Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
 }
 
@@ -147,13 +149,14 @@ struct Frames<'a> {
 }
 
 impl Frames<'_> {
+    /// What became of the frames, and the most memory that references took, bytes.
     fn render(
         &self,
         world: &World,
         intersector: &dyn Intersector,
         interrupt: &Interrupt,
         quiet: bool,
-    ) -> Result<Outcome> {
+    ) -> Result<(Outcome, u64)> {
         let Request { scene, settings, shot, pattern, .. } = self.request;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
@@ -163,7 +166,7 @@ impl Frames<'_> {
         let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
-                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid);
+                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 Box::new(maker)
             }
@@ -180,7 +183,7 @@ impl Frames<'_> {
             say::error(error);
             world.abort(Exit::of(error).code());
         }
-        outcome
+        Ok((outcome?, maker.reference_memory()))
     }
 
     fn total(&self) -> usize {
@@ -201,7 +204,7 @@ fn say_stopped(job: &Frames, outcome: &Outcome) {
 }
 
 /// Says what there is now, and makes the video of the frames asked for, all of which are there.
-fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
+fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Result<Exit> {
     let result = |line: String| if quiet { Ok(()) } else { say::result(line) };
     let frames = if job.total() == 1 { "frame" } else { "frames" };
     result(format!(
@@ -212,11 +215,21 @@ fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
         job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
     ))?;
+    reused(&stats::reuse_of(outcome)).map_or(Ok(()), result)?;
     match job.request.fps {
         Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
         _ => {}
     }
     Ok(Exit::Done)
+}
+
+/// How much of the job was reused, where anything could be.
+fn reused(counts: &ReuseCounts) -> Option<String> {
+    let all = percent(counts.share()?, 1);
+    let mirrored = counts.specular_share().map_or(String::new(), |share| {
+        format!("; of those in mirrors and glass {}", percent(share, 1))
+    });
+    Some(format!("{all} of the lit surface points were reused{mirrored}"))
 }
 
 /// Says which samples are no radiance; an exit code where that is a failure.

@@ -185,7 +185,8 @@ impl Renderer<'_> {
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
             self.light_without_shadows(input, reuse.channels, lit, scratch);
-            scratch.groups.ask(input, reuse, lit, &scratch.shown, pixels);
+            let asked = (self.scene, reuse);
+            scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
         }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
