@@ -7,12 +7,14 @@
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
+mod colour;
 mod fingerprint;
 mod inferrer;
 mod pyramid;
 mod resume;
 mod tracer;
 
+pub use colour::{ColourMaker, check_upload};
 pub use fingerprint::fingerprint;
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
