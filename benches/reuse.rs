@@ -61,8 +61,8 @@ fn main() {
     };
     let frames: Vec<u32> = (1..=shot.frames).collect();
     let pyramid = Pyramid { segment: var("SEGMENT", 64), frames: shot.frames };
-    let mut maker =
-        Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid, &frames);
+    let mut maker = Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid);
+    maker.expect(&frames);
     let e = &mut maker.evidence;
     e.least_weight = var("LEAST", e.least_weight);
     e.enough_weight = var("ENOUGH", e.enough_weight);
