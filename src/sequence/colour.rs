@@ -233,7 +233,8 @@ fn discoveries(
         if inferred[index].is_none() {
             let depth = film.gbuffer.as_ref().map_or(f32::NAN, |g| g.depth[index]);
             let middle = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            let distance = (f64::from(depth) / middle.dot(camera.forward)) as f32;
+            // Rounding can put a hit at the eye itself a little behind it.
+            let distance = (f64::from(depth) / middle.dot(camera.forward)).max(0.0) as f32;
             entries.push(Entry { pixel: index as u32, rgb: film.rgb[index], distance });
         }
     }
