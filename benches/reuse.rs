@@ -61,7 +61,7 @@ fn main() {
     };
     let frames: Vec<u32> = (1..=shot.frames).collect();
     let pyramid = Pyramid { segment: var("SEGMENT", 64), frames: shot.frames };
-    let mut maker = Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid);
+    let mut maker = Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid).expect("cameras");
     maker.expect(&frames);
     let e = &mut maker.evidence;
     e.least_weight = var("LEAST", e.least_weight);
@@ -107,6 +107,7 @@ fn main() {
             with_gbuffer: false,
             reuse: None,
             mask: None,
+            beyond_crop: false,
         };
         let truth =
             pool.install(|| renderer(&best).render_job(&job, &stop, &Quiet)).expect("x").film;

@@ -163,7 +163,7 @@ impl Frames<'_> {
         let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
-                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid);
+                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 Box::new(maker)
             }

@@ -1,13 +1,14 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
 use super::pyramid::Pyramid;
+use super::schedule::{Schedule, Stock};
 use super::{FrameMaker, Made};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference};
 use crate::reuse::{self, Evidence, Lookup, Reference};
 use crate::scene::{Camera, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -29,6 +30,7 @@ pub struct Inferrer<'a> {
     pub pyramid: Pyramid,
     /// What counts as evidence.
     pub evidence: Evidence,
+    schedule: Schedule,
     channels: Channels,
     /// Shadow rays of a camera sample, by channel.
     rays: Vec<u32>,
@@ -37,13 +39,18 @@ pub struct Inferrer<'a> {
 
 #[derive(Default)]
 struct State {
-    /// Frames that are still to come.
-    to_come: BTreeSet<u32>,
-    references: BTreeMap<u32, Arc<Reference>>,
+    references: Stock<Arc<Reference>>,
+    /// Originals that were made as references before they were asked for.
+    early: BTreeMap<u32, Made>,
+    /// The last original that is asked for again, as its copies are.
+    again: Option<(u32, Made)>,
+    most_memory: u64,
 }
 
 impl<'a> Inferrer<'a> {
     /// A maker of frames of `shot`.
+    ///
+    /// Errors: those of the shot's cameras.
     pub fn new(
         renderer: Renderer<'a>,
         shot: &'a Shot,
@@ -51,29 +58,37 @@ impl<'a> Inferrer<'a> {
         stop: &'a AtomicBool,
         progress: &'a dyn Progress,
         pyramid: Pyramid,
-    ) -> Self {
+    ) -> Result<Self> {
         let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
         let rays = channels.iter().map(|c| reuse::rays_of(c, renderer.settings)).collect();
-        Self {
+        // Where nothing is worth a lookup every frame is a key frame.
+        let pyramid = if channels.is_empty() { Pyramid { segment: 1, ..pyramid } } else { pyramid };
+        Ok(Self {
             renderer,
             shot,
             pool,
             with_gbuffer: false,
             stop,
             progress,
-            pyramid,
             evidence: Evidence::default(),
+            schedule: Schedule::new(pyramid, shot)?,
+            pyramid,
             channels,
             rays,
             state: Mutex::default(),
-        }
+        })
     }
 
-    /// Renders `frame` from the references that it depends on, which are made first where they are
-    /// not at hand.
-    fn frame(&self, frame: u32) -> Result<Option<Rendered>> {
+    /// The most memory that references took at a time, bytes.
+    pub fn most_memory(&self) -> u64 {
+        self.with_state(|s| s.most_memory)
+    }
+
+    /// Renders an original from the references that it depends on, which are made first where they
+    /// are not at hand; leaves a reference where one is needed.
+    fn frame(&self, frame: u32) -> Result<Option<Made>> {
         let mut references = Vec::new();
-        for other in self.pyramid.ancestors(frame) {
+        for other in self.schedule.ancestors(frame) {
             match self.reference(other)? {
                 Some(reference) => references.push(reference),
                 None => return Ok(None),
@@ -85,21 +100,25 @@ impl<'a> Inferrer<'a> {
         let (rays, evidence) = (&self.rays, self.evidence);
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
+        let reuse = Reuse { channels: &self.channels, inference };
+        let is_due = self.with_state(|s| s.references.is_due(frame));
         let job = FrameJob {
             camera: &camera,
             stream: frame,
             with_gbuffer: self.with_gbuffer,
-            reuse: Some(Reuse { channels: &self.channels, inference }),
+            reuse: (!self.channels.is_empty()).then_some(reuse),
             mask: None,
+            beyond_crop: is_due,
         };
         let render = || self.renderer.render_job(&job, self.stop, self.progress);
         let Some(rendered) = self.pool.install(render) else { return Ok(None) };
-        if self.is_needed(frame) {
+        let Rendered { film, rays, reuse, sources } = rendered;
+        if is_due {
             let own = camera.to_scene(&self.renderer.scene.recentring);
-            let reference = Reference::new(frame, &own, &rendered.sources, self.channels.len());
-            self.with_state(|s| s.references.insert(frame, Arc::new(reference)));
+            let reference = Reference::new(frame, &own, &sources, self.channels.len());
+            self.with_state(|s| s.keep(&self.schedule, frame, reference));
         }
-        Ok(Some(rendered))
+        Ok(Some(Made { film, rays, reuse }))
     }
 
     fn camera(&self, frame: u32) -> Result<Camera> {
@@ -107,19 +126,21 @@ impl<'a> Inferrer<'a> {
         self.shot.camera(frame, settings.width, settings.height)
     }
 
+    /// The reference of an original, which is in use.
     fn reference(&self, frame: u32) -> Result<Option<Arc<Reference>>> {
-        if let Some(found) = self.with_state(|s| s.references.get(&frame).cloned()) {
+        if let Some(found) = self.with_state(|s| s.references.get(frame).cloned()) {
             return Ok(Some(found));
         }
-        if self.frame(frame)?.is_none() {
-            return Ok(None);
-        }
-        Ok(self.with_state(|s| s.references.get(&frame).cloned()))
-    }
-
-    /// Whether a frame to come is inferred from `frame`.
-    fn is_needed(&self, frame: u32) -> bool {
-        self.with_state(|s| s.to_come.iter().any(|f| self.pyramid.ancestors(*f).contains(&frame)))
+        let Some(made) = self.frame(frame)? else { return Ok(None) };
+        self.with_state(|s| {
+            if s.references.asked(frame) > 0 {
+                s.early.insert(frame, made);
+            }
+            match s.references.get(frame) {
+                Some(reference) => Ok(Some(reference.clone())),
+                None => Err(Error::Failed(format!("the reference of frame {frame} is lost"))),
+            }
+        })
     }
 
     fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
@@ -127,16 +148,51 @@ impl<'a> Inferrer<'a> {
     }
 }
 
+impl State {
+    fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
+        self.references.keep(schedule, frame, || Arc::new(reference));
+        let memory = self.references.held().map(|r| r.memory()).sum();
+        self.most_memory = self.most_memory.max(memory);
+    }
+
+    /// An original that is finished already.
+    fn finished(&mut self, frame: u32) -> Option<Made> {
+        if let Some(made) = self.early.remove(&frame) {
+            return Some(made);
+        }
+        self.again.as_ref().filter(|(other, _)| *other == frame).map(|(_, made)| made.copy())
+    }
+
+    /// An original goes out; it is held while the next copy of it may follow.
+    fn hand_out(&mut self, schedule: &Schedule, frame: u32, made: &Made) {
+        self.references.done(schedule, frame);
+        let is_held = self.again.as_ref().is_some_and(|(other, _)| *other == frame);
+        if self.references.asked(frame) == 0 {
+            self.again = self.again.take().filter(|(other, _)| *other != frame);
+        } else if !is_held {
+            self.again = Some((frame, made.copy()));
+        }
+    }
+}
+
 impl FrameMaker for Inferrer<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
-        let Some(rendered) = self.frame(frame)? else { return Ok(None) };
-        self.with_state(|s| s.to_come.remove(&frame));
-        let kept: Vec<u32> = self.with_state(|s| s.references.keys().copied().collect());
-        for other in kept.into_iter().filter(|f| !self.is_needed(*f)) {
-            self.with_state(|s| s.references.remove(&other));
-        }
-        let Rendered { film, rays, reuse, .. } = rendered;
-        Ok(Some(Made { film, rays, reuse }))
+        let original = self.schedule.original(frame);
+        let made = self.with_state(|s| {
+            if s.references.asked(original) == 0 {
+                s.references.expect(&self.schedule, &[frame]);
+            }
+            s.finished(original)
+        });
+        let made = match made {
+            Some(made) => made,
+            None => match self.frame(original)? {
+                Some(made) => made,
+                None => return Ok(None),
+            },
+        };
+        self.with_state(|s| s.hand_out(&self.schedule, original, &made));
+        Ok(Some(made))
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
@@ -144,6 +200,6 @@ impl FrameMaker for Inferrer<'_> {
     }
 
     fn expect(&self, frames: &[u32]) {
-        self.with_state(|s| s.to_come.extend(frames));
+        self.with_state(|s| s.references.expect(&self.schedule, frames));
     }
 }

@@ -12,6 +12,7 @@ mod fingerprint;
 mod inferrer;
 mod pyramid;
 mod resume;
+mod schedule;
 mod tracer;
 
 pub use colour::{ColourMaker, check_upload};
@@ -19,6 +20,7 @@ pub use fingerprint::fingerprint;
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use resume::{Plan, Target, prepare};
+pub use schedule::Schedule;
 pub use tracer::Tracer;
 
 #[cfg(test)]
@@ -56,6 +58,18 @@ pub struct Made {
     pub rays: RayCounts,
     /// How much of it was inferred.
     pub reuse: ReuseCounts,
+}
+
+impl Made {
+    /// The same frame once more: no ray was cast for it, and all of it was known.
+    fn copy(&self) -> Self {
+        let reuse = ReuseCounts {
+            direct_inferred: self.reuse.direct,
+            specular_inferred: self.reuse.specular,
+            ..self.reuse
+        };
+        Self { film: self.film.clone(), rays: RayCounts::default(), reuse }
+    }
 }
 
 /// What a finished frame took.

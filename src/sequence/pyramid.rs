@@ -57,7 +57,9 @@ impl Pyramid {
     /// frame after its ancestors.
     pub fn order(&self, frames: &[u32]) -> Vec<u32> {
         let mut ordered = frames.to_vec();
-        ordered.sort_by_cached_key(|frame| (self.segment_of(*frame), self.place(*frame)));
+        let place =
+            |frame: &u32| (self.segment_of(*frame), !self.is_key(*frame), self.place(*frame));
+        ordered.sort_by_cached_key(place);
         ordered
     }
 
@@ -79,10 +81,31 @@ impl Pyramid {
         }
     }
 
+    /// All frames, each after its ancestors and as early as a frame of its segment needs it.
+    pub fn by_need(&self) -> Vec<u32> {
+        let mut frames = Vec::with_capacity(self.frames as usize);
+        let mut low = 1;
+        if self.frames > 0 {
+            frames.push(low);
+        }
+        while low < self.frames {
+            let high = low.saturating_add(self.segment).min(self.frames);
+            frames.push(high);
+            between(low, high, &mut frames);
+            low = high;
+        }
+        frames
+    }
+
+    /// How many key frames there are.
+    pub fn keys(&self) -> u32 {
+        self.frames.saturating_sub(1).div_ceil(self.segment) + self.frames.min(1)
+    }
+
     /// The most references that a frame of the shot is inferred from.
     pub fn depth(&self) -> u32 {
         let longest = self.segment.min(self.frames.saturating_sub(1));
-        if longest < 2 { 0 } else { 2 + longest.ilog2() - 1 }
+        if longest < 2 { 0 } else { 1 + longest.next_power_of_two().ilog2() }
     }
 
     /// `frames`, cut into lists that share no in-between references, each in order.
@@ -95,6 +118,16 @@ impl Pyramid {
     /// All frames of the shot.
     pub fn all(&self) -> RangeInclusive<u32> {
         1..=self.frames
+    }
+}
+
+/// The frames between, each after its ancestors.
+fn between(low: u32, high: u32, frames: &mut Vec<u32>) {
+    if high - low > 1 {
+        let middle = middle(low, high);
+        frames.push(middle);
+        between(low, middle, frames);
+        between(middle, high, frames);
     }
 }
 
@@ -135,6 +168,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn by_need_every_frame_comes_once_after_all_its_ancestors() {
+        for (segment, frames) in [(8, 9), (8, 20), (1, 5), (64, 3), (7, 1), (4, 0)] {
+            let pyramid = Pyramid { segment, frames };
+            let order = pyramid.by_need();
+            assert_eq!(order.iter().collect::<BTreeSet<_>>().len(), frames as usize);
+            assert_eq!(order.len(), frames as usize);
+            let place = |frame| order.iter().position(|f| *f == frame);
+            for frame in pyramid.all() {
+                assert!(pyramid.ancestors(frame).iter().all(|f| place(*f) < place(frame)));
+            }
+            let keys = pyramid.all().filter(|f| pyramid.is_key(*f)).count();
+            assert_eq!(pyramid.keys() as usize, keys, "{pyramid:?}");
+        }
+        let longer = Pyramid { segment: 8, frames: 50 }.by_need();
+        assert_eq!(Pyramid { segment: 8, frames: 25 }.by_need(), longer[..25]);
     }
 
     #[test]

@@ -79,6 +79,8 @@ pub struct FrameJob<'a> {
     pub reuse: Option<Reuse<'a>>,
     /// Which pixels, row by row; `None` for all of the crop.
     pub mask: Option<&'a [bool]>,
+    /// Whether what lies beyond the crop is traced too, as a source for other frames.
+    pub beyond_crop: bool,
 }
 
 /// A rendered frame.
@@ -155,7 +157,8 @@ impl Renderer<'_> {
         stop: &AtomicBool,
         progress: &dyn Progress,
     ) -> Option<(Film, RayCounts)> {
-        let job = FrameJob { camera, stream: frame, with_gbuffer, reuse: None, mask: None };
+        let (reuse, mask, beyond_crop) = (None, None, false);
+        let job = FrameJob { camera, stream: frame, with_gbuffer, reuse, mask, beyond_crop };
         self.render_job(&job, stop, progress).map(|done| (done.film, done.rays))
     }
 
@@ -183,10 +186,11 @@ impl Renderer<'_> {
         };
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
-        let samples = u64::from(crop.x1 - crop.x0)
-            * u64::from(crop.y1 - crop.y0)
+        let traced = if job.beyond_crop { full } else { crop };
+        let samples = u64::from(traced.x1 - traced.x0)
+            * u64::from(traced.y1 - traced.y0)
             * u64::from(self.settings.spp);
-        let tiles = split(&aligned(&crop, &full), if samples < SMALL { BLOCK } else { TILE });
+        let tiles = split(&aligned(&traced, &full), if samples < SMALL { BLOCK } else { TILE });
         let share = 1.0 / tiles.len().max(1) as f64;
         let part = Part { crop, mask: job.mask, width: camera.width };
         let kernel = self.kernel();
