@@ -61,7 +61,8 @@ fn main() {
     };
     let frames: Vec<u32> = (1..=shot.frames).collect();
     let pyramid = Pyramid { segment: var("SEGMENT", 64), frames: shot.frames };
-    let mut maker = Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid).expect("cameras");
+    let mut maker =
+        Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid).expect("cameras");
     maker.expect(&frames);
     let e = &mut maker.evidence;
     e.least_weight = var("LEAST", e.least_weight);

@@ -54,7 +54,7 @@ struct State {
 }
 
 impl<'a> ColourMaker<'a> {
-    /// A maker of the frames `to_come`.
+    /// A maker of frames of `shot`, which takes `uploads` for the frames that they name.
     ///
     /// # Errors
     /// [`check_upload`]'s, and a frame that has two `uploads`.
@@ -67,7 +67,6 @@ impl<'a> ColourMaker<'a> {
         progress: &'a dyn Progress,
         rule: Rule,
         uploads: &[(u32, Image)],
-        to_come: &[u32],
     ) -> Result<Self> {
         let mut seen = BTreeSet::new();
         let mut known = Vec::new();
@@ -78,7 +77,6 @@ impl<'a> ColourMaker<'a> {
             }
             known.push(known_of_upload(*frame, image, renderer.settings));
         }
-        let to_come = to_come.iter().copied().collect();
         Ok(Self {
             renderer,
             shot,
@@ -89,7 +87,7 @@ impl<'a> ColourMaker<'a> {
             rule,
             pyramid: Pyramid { segment: (shot.frames - 1).max(1), frames: shot.frames },
             uploads: known,
-            state: Mutex::new(State { to_come, ..State::default() }),
+            state: Mutex::default(),
         })
     }
 
@@ -132,6 +130,7 @@ impl<'a> ColourMaker<'a> {
             with_gbuffer: true,
             reuse: None,
             mask: Some(&mask),
+            beyond_crop: false,
         };
         self.pool.install(|| self.renderer.render_job(&job, self.stop, self.progress))
     }
@@ -174,8 +173,15 @@ impl FrameMaker for ColourMaker<'_> {
         Ok(Some(made))
     }
 
+    /// First and last frame, then each between after its ancestors.
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
-        self.pyramid.batches(frames)
+        let mut ordered = self.pyramid.order(frames);
+        ordered.sort_by_key(|frame| !self.pyramid.is_key(*frame));
+        ordered.into_iter().map(|frame| vec![frame]).collect()
+    }
+
+    fn expect(&self, frames: &[u32]) {
+        self.with_state(|s| s.to_come.extend(frames));
     }
 }
 
