@@ -53,6 +53,7 @@ fn terrain(side: u32) -> tweenray::scene::Scene {
         normals: None,
         uvs: None,
         material: 0,
+        always_traced: false,
     };
     let materials = vec![Material::diffuse("white", tweenray::math::Rgb::ONE)];
     let world = World { meshes: vec![mesh], materials, ..World::default() };

@@ -68,6 +68,20 @@ impl ReuseCounts {
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
+
+    /// Share of the points that were inferred, 0 to 1; `None` where there was none to infer.
+    pub fn share(&self) -> Option<f64> {
+        share(self.direct_inferred + self.specular_inferred, self.direct + self.specular)
+    }
+
+    /// That of the points seen in mirrors and through glass.
+    pub fn specular_share(&self) -> Option<f64> {
+        share(self.specular_inferred, self.specular)
+    }
+}
+
+fn share(part: u64, all: u64) -> Option<f64> {
+    (all > 0).then(|| part as f64 / all as f64)
 }
 
 impl AddAssign for ReuseCounts {

@@ -28,6 +28,7 @@ fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
             centre: DVec3::new(x, 0.7, 0.0),
             radius: 0.6,
             material: world.materials.len() as u32 - 1,
+            always_traced: false,
         });
     };
     if mirror {

@@ -124,7 +124,13 @@ fn refraction() -> [Picture; 2] {
     world.materials.push(Material::diffuse("dark", Rgb::new(0.12, 0.14, 0.2)));
     world.materials.push(Material::diffuse("light", Rgb::new(0.75, 0.72, 0.65)));
     let (centre, radius) = (DVec3::new(0.2, 1.0, 0.0), 0.8);
-    world.spheres.push(WorldSphere { name: "ball".into(), centre, radius, material: 0 });
+    world.spheres.push(WorldSphere {
+        name: "ball".into(),
+        centre,
+        radius,
+        material: 0,
+        always_traced: false,
+    });
     for i in -8..8 {
         for j in 0..8 {
             let material = if (i + j) % 2 == 0 { 1 } else { 2 };
@@ -162,5 +168,6 @@ fn quad(corners: [DVec3; 4], material: u32) -> WorldMesh {
         normals: None,
         uvs: None,
         material,
+        always_traced: false,
     }
 }

@@ -53,7 +53,15 @@ pub fn rabbit() -> WorldMesh {
         }
     }
     let normals = Some(Corners { values, corners: None });
-    WorldMesh { name: "rabbit".into(), positions, triangles, normals, uvs: None, material: 0 }
+    WorldMesh {
+        name: "rabbit".into(),
+        positions,
+        triangles,
+        normals,
+        uvs: None,
+        material: 0,
+        always_traced: false,
+    }
 }
 
 /// The first mesh of a file, put in the rabbit's place.

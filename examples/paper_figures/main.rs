@@ -32,7 +32,7 @@ fn main() {
         None => rabbit::rabbit(),
     };
     println!("PSNR in dB against the converged frame, and the share of the pixels that was traced");
-    let spheres = shots::spheres(4.0);
+    let spheres = shots::spheres();
     let truth = spheres.converged(FRAME);
     distances(&spheres);
     uploads(&spheres, &truth);
@@ -52,10 +52,14 @@ fn measured(name: &str, truth: &Film, film: Film) -> Film {
     let shown = |film| Image::of_film(film).clipped(Encoding::Srgb);
     let db = psnr(mse(&shown(truth), &shown(&film)));
     let sources = film.sources.as_deref();
-    let traced = |s: &&PixelSource| s.provenance == Provenance::Traced;
-    let share = sources.map_or(1.0, |s| s.iter().filter(traced).count() as f64 / s.len() as f64);
+    let traced = |s: &[PixelSource]| s.iter().filter(|s| is_traced(s)).count() as f64;
+    let share = sources.map_or(1.0, |s| traced(s) / s.len() as f64);
     println!("  {name:<52} {db:5.1} dB  {:5.1} %", 100.0 * share);
     film
+}
+
+fn is_traced(source: &PixelSource) -> bool {
+    source.provenance == Provenance::Traced
 }
 
 /// Figures 3 and 4: where the distance differs from the first sample's; what is traced again.
@@ -66,14 +70,12 @@ fn distances(spheres: &Filmed) {
         painted(&frame, |i| by_difference(distance_difference(depth(&first, i), depth(&frame, i))));
     let lenient = spheres.colour(FRAME, LENIENT, &[]);
     let sources = lenient.sources.as_ref().unwrap();
-    let traced = painted(&lenient, |i| match sources[i].provenance {
-        Provenance::Traced => hit_or_traced(&sources[i]),
-        _ => None,
-    });
+    let traced =
+        painted(&lenient, |i| hit_or_traced(&sources[i]).filter(|_| is_traced(&sources[i])));
     save("figure-3-4-distances", 2, &[differences, traced]);
 }
 
-/// Figure 5: traced; three, one and no uploaded pictures; ours; what the last but one traced.
+/// Figure 5: traced; three, one and no uploaded pictures; what the last of these traced; ours.
 fn uploads(spheres: &Filmed, truth: &Film) {
     let upload = |frame| (frame, Image::of_film(&spheres.traced(frame)).clipped(Encoding::Srgb));
     let [three, one] = [[5, 9, 13].as_slice(), &[9]].map(|frames| {
@@ -84,7 +86,9 @@ fn uploads(spheres: &Filmed, truth: &Film) {
     let none = measured("figure 5: colour, none", truth, spheres.colour(FRAME, LENIENT, &[]));
     let ours = measured("figure 5: surface", truth, spheres.surface(FRAME));
     let traced = measured("figure 5: every pixel traced", truth, spheres.traced(FRAME));
-    save("figure-5-uploads", 3, &[traced, three, one, none, ours]);
+    let sources = none.sources.clone().unwrap();
+    let map = painted(&none, |i| hit_or_traced(&sources[i]).filter(|_| is_traced(&sources[i])));
+    save("figure-5-uploads", 3, &[traced, three, one, none, map, ours]);
 }
 
 /// Figure 6: the frame and where its pixels come from, for the paper's policy and for ours.

@@ -33,13 +33,18 @@ impl Progress for Silent {
     fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
-/// The paper's test scene, its camera on a pan of `width` world units.
-pub fn spheres(width: f64) -> Filmed {
+/// The paper's test scene under a lamp so bright that shadows show, and a pan close by.
+pub fn spheres() -> Filmed {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/reflective_spheres/scene.toml");
     let loaded = import::load(&file, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-    let half = 0.5 * width;
-    let (from, to) = (DVec3::new(half, 3.0, 10.0), DVec3::new(-half, 3.0, 10.0));
-    Filmed::new(loaded.world, pan(from, to, DVec3::new(0.5, 0.0, -0.5)), loaded.settings)
+    let mut world = loaded.world;
+    for light in &mut world.lights {
+        if let Light::Quad(lamp) = light {
+            lamp.radiance *= 20.0;
+        }
+    }
+    let (from, to) = (DVec3::new(2.2, 1.4, 4.6), DVec3::new(-2.2, 1.4, 4.6));
+    Filmed::new(world, pan(from, to, DVec3::new(0.2, -0.1, -0.5)), loaded.settings)
 }
 
 /// A rabbit under a lamp, and a pan far to both sides of it.
@@ -54,6 +59,7 @@ pub fn rabbit(mesh: WorldMesh) -> Filmed {
         positions: floor.map(|(x, z)| DVec3::new(x, 0.0, z)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         normals: None,
+        always_traced: false,
         uvs: None,
         material: 1,
     });

@@ -7,6 +7,7 @@ use crate::stats::RayCounts;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Bar units in a frame, so that the bar moves within a frame.
@@ -21,6 +22,8 @@ pub struct Watch {
     total: u32,
     finished: AtomicU32,
     rays: AtomicU64,
+    /// Of the last frame, as it is shown.
+    reused: Mutex<String>,
     /// Share of the frames in flight that is done, in units.
     partly: AtomicU64,
 }
@@ -37,6 +40,7 @@ impl Watch {
             total: total as u32,
             finished: AtomicU32::new(0),
             rays: AtomicU64::new(0),
+            reused: Mutex::default(),
             partly: AtomicU64::new(0),
         }
     }
@@ -47,12 +51,17 @@ impl Watch {
         self.partly.store(0, Ordering::Relaxed);
         let number = self.kept + finished;
         if let Some(bar) = &self.bar {
+            *self.reused() = reused(report.reuse.share());
             bar.set_position(u64::from(finished) * UNITS as u64);
             bar.set_prefix(format!("frame {} of {}", (number + 1).min(self.total), self.total));
         } else if self.lines {
             let left = left(self.start.elapsed(), finished, self.total - number);
             say::aside(line(report, number, self.total, left));
         }
+    }
+
+    fn reused(&self) -> MutexGuard<'_, String> {
+        self.reused.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes the bar away, so that what follows stands on clean lines.
@@ -73,7 +82,8 @@ impl Progress for Watch {
         let finished = f64::from(self.finished.load(Ordering::Relaxed)) * UNITS;
         bar.set_position((finished + partly) as u64);
         let seconds = self.start.elapsed().as_secs_f64();
-        bar.set_message(format!("{:.1} Mrays/s", cast as f64 * 1e-6 / seconds.max(1e-9)));
+        let mrays = cast as f64 * 1e-6 / seconds.max(1e-9);
+        bar.set_message(format!("{mrays:.1} Mrays/s{}", self.reused()));
     }
 }
 
@@ -87,14 +97,26 @@ fn bar(frames: usize) -> ProgressBar {
     bar
 }
 
-/// `frame 3 of 16  0.41 s  12.3 Mrays/s  left 5 s`
+/// `frame 3 of 16  0.41 s  12.3 Mrays/s  98 % reused  left 5 s`
 fn line(report: &FrameReport, number: u32, total: u32, left: Duration) -> String {
     let seconds = report.trace_seconds + report.write_seconds;
     let mrays = report.rays.total() as f64 * 1e-6 / report.trace_seconds.max(1e-9);
     format!(
-        "frame {number} of {total}  {seconds:.2} s  {mrays:.1} Mrays/s  left {}",
+        "frame {number} of {total}  {seconds:.2} s  {mrays:.1} Mrays/s{}  left {}",
+        reused(report.reuse.share()),
         duration(left.as_secs_f64())
     )
+}
+
+/// `  98 % reused`, or nothing.
+fn reused(share: Option<f64>) -> String {
+    share.map_or(String::new(), |share| format!("  {} reused", percent(share, 0)))
+}
+
+/// A share as people say it; all of it only where it is all.
+pub fn percent(share: f64, digits: usize) -> String {
+    let unit = 10f64.powi(digits as i32);
+    format!("{:.digits$} %", (share * 100.0 * unit).floor() / unit)
 }
 
 fn left(elapsed: Duration, finished: u32, remaining: u32) -> Duration {
@@ -132,6 +154,11 @@ mod tests {
             line(&report, 3, 16, left(Duration::from_secs(2), 2, 13)),
             "frame 3 of 16  0.41 s  12.3 Mrays/s  left 13 s"
         );
+        let (direct, direct_inferred) = (1000, 999);
+        let reuse = crate::stats::ReuseCounts { direct, direct_inferred, ..report.reuse };
+        let shown = line(&FrameReport { reuse, ..report }, 3, 16, Duration::ZERO);
+        assert!(shown.contains("Mrays/s  99 % reused  left"), "{shown}");
+        assert_eq!((percent(0.9996, 1), percent(1.0, 1)), ("99.9 %".into(), "100.0 %".into()));
         assert_eq!(duration(200.0), "3 min 20 s");
         assert_eq!(duration(7500.0), "2 h 5 min");
     }

@@ -3,7 +3,7 @@
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::Exit;
 use super::machine;
-use super::progress::{Watch, duration};
+use super::progress::{Watch, duration, percent};
 use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
@@ -19,6 +19,7 @@ use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
 use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
 use crate::shade::Renderer;
+use crate::stats::ReuseCounts;
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::Ordering;
@@ -85,13 +86,14 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
     let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
-    let outcome = job.render(world, &*intersector, &interrupt, quiet)?;
+    let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,
         load_seconds: (loaded - start).as_secs_f64(),
         build_seconds: (built - loaded).as_secs_f64(),
         render_seconds: built.elapsed().as_secs_f64(),
         intersector_bytes: intersector.memory(),
+        reference_bytes,
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
@@ -107,7 +109,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         say_stopped(&job, &outcome);
         return Ok(Exit::Stopped);
     }
-    let done = finish(&job, start, quiet)?;
+    let done = finish(&job, &outcome, start, quiet)?;
     Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
 }
 
@@ -148,13 +150,14 @@ struct Frames<'a> {
 }
 
 impl Frames<'_> {
+    /// What became of the frames, and the most memory that references took, bytes.
     fn render(
         &self,
         world: &World,
         intersector: &dyn Intersector,
         interrupt: &Interrupt,
         quiet: bool,
-    ) -> Result<Outcome> {
+    ) -> Result<(Outcome, u64)> {
         let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
@@ -191,7 +194,7 @@ impl Frames<'_> {
             say::error(error);
             world.abort(Exit::of(error).code());
         }
-        outcome
+        Ok((outcome?, maker.reference_memory()))
     }
 
     fn total(&self) -> usize {
@@ -212,7 +215,7 @@ fn say_stopped(job: &Frames, outcome: &Outcome) {
 }
 
 /// Says what there is now, and makes the video of the frames asked for, all of which are there.
-fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
+fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Result<Exit> {
     let result = |line: String| if quiet { Ok(()) } else { say::result(line) };
     let frames = if job.total() == 1 { "frame" } else { "frames" };
     result(format!(
@@ -223,11 +226,21 @@ fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
         job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
     ))?;
+    reused(&stats::reuse_of(outcome)).map_or(Ok(()), result)?;
     match job.request.fps {
         Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
         _ => {}
     }
     Ok(Exit::Done)
+}
+
+/// How much of the job was reused, where anything could be.
+fn reused(counts: &ReuseCounts) -> Option<String> {
+    let all = percent(counts.share()?, 1);
+    let mirrored = counts.specular_share().map_or(String::new(), |share| {
+        format!("; of those in mirrors and glass {}", percent(share, 1))
+    });
+    Some(format!("{all} of the lit surface points were reused{mirrored}"))
 }
 
 /// Says which samples are no radiance; an exit code where that is a failure.

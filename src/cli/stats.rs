@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::output::atomic;
 use crate::output::manifest::Header;
 use crate::sequence::{FrameReport, Plan};
-use crate::stats::{BadSamples, RayCounts};
+use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -23,6 +23,8 @@ pub struct RankStats {
     pub render_seconds: f64,
     /// Memory of the acceleration structure.
     pub intersector_bytes: u64,
+    /// Most memory that reference frames took at a time.
+    pub reference_bytes: u64,
     /// Most memory held at once, where the system tells.
     pub peak_memory_bytes: Option<u64>,
 }
@@ -48,7 +50,9 @@ struct Stats<'a> {
     build_seconds: f64,
     render_seconds: f64,
     peak_memory_bytes: Option<u64>,
+    reference_bytes: u64,
     rays: RayCounts,
+    reuse: ReuseCounts,
     bad_samples: BadSamples,
     kept: &'a [u32],
     frames: Vec<Frame<'a>>,
@@ -67,6 +71,13 @@ pub fn bad_of(plan: &Plan, outcome: &Outcome) -> BadSamples {
     let mut sum = BadSamples::default();
     plan.kept_bad.iter().for_each(|(_, bad)| sum += *bad);
     outcome.frames.iter().for_each(|(_, report)| sum += report.bad);
+    sum
+}
+
+/// How much of the frames rendered now was inferred.
+pub fn reuse_of(outcome: &Outcome) -> ReuseCounts {
+    let mut sum = ReuseCounts::default();
+    outcome.frames.iter().for_each(|(_, report)| sum += report.reuse);
     sum
 }
 
@@ -98,7 +109,9 @@ pub fn write(
         build_seconds: slowest(|r| r.build_seconds),
         render_seconds: slowest(|r| r.render_seconds),
         peak_memory_bytes: ranks.iter().filter_map(|r| r.peak_memory_bytes).max(),
+        reference_bytes: ranks.iter().map(|r| r.reference_bytes).max().unwrap_or(0),
         rays,
+        reuse: reuse_of(outcome),
         bad_samples,
         kept: &plan.kept,
         frames: outcome.frames.iter().map(|(rank, report)| Frame { rank: *rank, report }).collect(),

@@ -128,7 +128,7 @@ mod tests {
         let positions =
             vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, raise), DVec3::Y, DVec3::Z];
         let (name, normals, uvs, material) = ("lamp".into(), None, None, 0);
-        WorldMesh { name, positions, triangles, normals, uvs, material }
+        WorldMesh { name, positions, triangles, normals, uvs, material, always_traced: false }
     }
 
     fn world(mesh: WorldMesh) -> World {
@@ -170,7 +170,13 @@ mod tests {
         let (centre, radius) = (DVec3::X, 0.5);
         for material in [0, 1] {
             let name = format!("{material}");
-            world.spheres.push(WorldSphere { name, centre, radius, material });
+            world.spheres.push(WorldSphere {
+                name,
+                centre,
+                radius,
+                material,
+                always_traced: false,
+            });
         }
         assert_eq!(adopt(&mut world, 0, 0), []);
         assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 1, 1));

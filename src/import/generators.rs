@@ -50,6 +50,7 @@ pub fn uv_sphere(
         normals: Some(Corners { values, corners: None }),
         uvs: None,
         material,
+        always_traced: false,
     })
 }
 
@@ -117,6 +118,7 @@ pub fn bench_terrain(name: &str, n: u32, half: f64, material: MaterialId) -> Res
         normals: None,
         uvs: None,
         material,
+        always_traced: false,
     })
 }
 

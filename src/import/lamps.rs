@@ -131,6 +131,7 @@ mod tests {
             normals: None,
             uvs: None,
             material: 0,
+            always_traced: false,
         };
         for [p, q] in [[[0, 1, 2], [0, 2, 3]], [[1, 2, 0], [3, 0, 2]], [[2, 0, 1], [2, 3, 0]]] {
             let lights = of_mesh(&mesh(vec![p, q]), Rgb::ONE).expect("few");

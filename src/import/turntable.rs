@@ -123,6 +123,7 @@ impl Studio {
             normals: None,
             uvs: None,
             material,
+            always_traced: false,
         }
     }
 

@@ -79,6 +79,7 @@ mod tests {
             normals,
             uvs: None,
             material: 0,
+            always_traced: false,
         });
         MeshFacts::of(&world.into_scene(false).expect("a scene").meshes[0])
     }

@@ -15,7 +15,7 @@
 use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
-use crate::stats::{BadSamples, RayCounts};
+use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -63,6 +63,9 @@ pub struct Row {
     pub seconds: f64,
     /// Rays cast for it.
     pub rays: RayCounts,
+    /// How much of it was inferred.
+    #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
+    pub reuse: ReuseCounts,
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,

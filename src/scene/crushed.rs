@@ -129,6 +129,7 @@ mod tests {
                     normals: None,
                     uvs: None,
                     material: 0,
+                    always_traced: false,
                 });
             }
             world.into_scene(true)
@@ -164,7 +165,15 @@ mod tests {
         positions.extend([corner, corner + DVec3::Y * far, corner + DVec3::Z * far]);
         let (normals, uvs) = (None, None);
         let name = "grid".into();
-        world.meshes.push(WorldMesh { name, positions, triangles, normals, uvs, material: 0 });
+        world.meshes.push(WorldMesh {
+            name,
+            positions,
+            triangles,
+            normals,
+            uvs,
+            material: 0,
+            always_traced: false,
+        });
         world
     }
 

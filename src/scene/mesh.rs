@@ -46,6 +46,8 @@ pub struct Surface {
     pub material: MaterialId,
     /// The area light whose emitting surface this is: an index into `Scene::lights`.
     pub light: Option<u32>,
+    /// Whether its light is traced in every frame, never reused.
+    pub always_traced: bool,
 }
 
 /// A mesh in world space, f64. Invariant: every index is in range and every number finite.
@@ -63,6 +65,8 @@ pub struct WorldMesh {
     pub uvs: Option<Corners<Vec2>>,
     /// The material of all its triangles.
     pub material: MaterialId,
+    /// Whether its light is traced in every frame, never reused.
+    pub always_traced: bool,
 }
 
 /// A mesh in scene space, f32: the very numbers that Embree holds.
@@ -105,6 +109,8 @@ pub struct WorldSphere {
     pub radius: f64,
     /// Its material.
     pub material: MaterialId,
+    /// Whether its light is traced in every frame, never reused.
+    pub always_traced: bool,
 }
 
 /// An analytic sphere in scene space, f64.

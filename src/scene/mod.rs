@@ -36,7 +36,7 @@ pub use settings::{
 pub(crate) use weld::weld;
 pub(crate) use winding::closed_volume;
 
-use crate::math::Bounds3;
+use crate::math::{Bounds3, DVec3};
 
 /// A scene as read: f64 positions in world units (y up unless the file says otherwise).
 #[derive(Debug, Clone, Default)]
@@ -54,6 +54,8 @@ pub struct World {
     pub lights: Vec<Light>,
     /// What a ray that hits nothing sees.
     pub sky: Sky,
+    /// Boxes in which light is traced in every frame, never reused; world space.
+    pub traced_regions: Vec<Bounds3>,
 }
 
 /// A scene ready to trace: immutable, in scene space (see [`Recentring`]).
@@ -73,6 +75,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// What a ray that hits nothing sees.
     pub sky: Sky,
+    /// Boxes in which light is traced in every frame, never reused.
+    pub traced_regions: Vec<Bounds3>,
     /// Bounds of all geometry, f64, scene space.
     pub bounds: Bounds3,
     /// Meshes that lost triangles to rounding. Nothing traces by it; it is to be told.
@@ -83,6 +87,22 @@ impl Scene {
     /// The `geom_id` under which the analytic spheres are traced.
     pub fn sphere_geom_id(&self) -> u32 {
         self.meshes.len() as u32
+    }
+
+    /// Whether any light must be traced in every frame.
+    pub fn has_always_traced(&self) -> bool {
+        !self.traced_regions.is_empty()
+            || self.meshes.iter().any(|m| m.surface.always_traced)
+            || self.spheres.iter().any(|s| s.surface.always_traced)
+    }
+
+    /// Whether the light at `p`, on mesh `geom_id` or on sphere number `prim_id`, must be.
+    pub fn is_always_traced(&self, geom_id: u32, prim_id: u32, p: DVec3) -> bool {
+        let surface = match self.meshes.get(geom_id as usize) {
+            Some(mesh) => &mesh.surface,
+            None => &self.spheres[prim_id as usize].surface,
+        };
+        surface.always_traced || self.traced_regions.iter().any(|region| region.contains(p))
     }
 
     /// Triangles in all meshes.

@@ -63,6 +63,7 @@ impl World {
         self.materials.append(&mut other.materials);
         self.textures.append(&mut other.textures);
         self.lights.append(&mut other.lights);
+        self.traced_regions.append(&mut other.traced_regions);
     }
 }
 
@@ -148,6 +149,7 @@ mod tests {
             }),
             uvs: Some(Corners { values: vec![], corners: Some(vec![[5, 6, 7]]) }),
             material: 0,
+            always_traced: false,
         }
     }
 
@@ -194,7 +196,7 @@ mod tests {
             two_sided: false,
         };
         World {
-            spheres: vec![WorldSphere { name, centre, radius, material: 0 }],
+            spheres: vec![WorldSphere { name, centre, radius, material: 0, always_traced: false }],
             materials: vec![Material { texture: Some(0), ..Material::black("m") }],
             lights: vec![Light::Quad(light)],
             ..World::default()

@@ -129,6 +129,11 @@ impl World {
             .into_iter()
             .map(|l| to_scene_light(l, &recentring))
             .collect();
+        let to_scene_box = |b: &Bounds3| Bounds3 {
+            min: recentring.point_to_scene(b.min),
+            max: recentring.point_to_scene(b.max),
+        };
+        let traced_regions = self.traced_regions.iter().map(to_scene_box).collect();
 
         let mut meshes = Vec::with_capacity(self.meshes.len());
         let mut collapsed = Vec::new();
@@ -167,6 +172,7 @@ impl World {
             textures: self.textures,
             lights,
             sky: self.sky,
+            traced_regions,
             bounds: scene_bounds,
             collapsed,
         })
@@ -198,13 +204,14 @@ fn to_scene_sphere(s: WorldSphere, r: &Recentring) -> Sphere {
         name: s.name,
         centre: r.point_to_scene(s.centre),
         radius: s.radius * r.scale(),
-        surface: Surface { material: s.material, light: None },
+        surface: Surface { material: s.material, light: None, always_traced: s.always_traced },
     }
 }
 
 /// The mesh in scene space, and how many of its triangles rounding took.
 fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Mesh, usize) {
-    let WorldMesh { name, positions, mut triangles, mut normals, mut uvs, material } = mesh;
+    let WorldMesh { name, positions, mut triangles, mut normals, mut uvs, material, always_traced } =
+        mesh;
     if materials[material as usize].glass.is_some() {
         // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
         // would otherwise refract as a hole in glass.
@@ -221,7 +228,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
     }
     let rounded: Vec<Vec3> = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
     let lost = crushed::count_collapsed(&positions, &rounded, &triangles);
-    let surface = Surface { material, light: None };
+    let surface = Surface { material, light: None, always_traced };
     (scene_mesh(name, rounded, triangles, normals, uvs, surface), lost)
 }
 
@@ -279,7 +286,8 @@ fn add_emitting_surface(
     let mut emitter = |radiance: Rgb, emits_back: bool| {
         let name = format!("light {}", index + 1);
         materials.push(Material { emission: radiance, emits_back, ..Material::black(name) });
-        Surface { material: materials.len() as u32 - 1, light: Some(index) }
+        let material = materials.len() as u32 - 1;
+        Surface { material, light: Some(index), always_traced: false }
     };
     let name = format!("light {}", index + 1);
     match light {

@@ -51,6 +51,8 @@ struct State {
     to_come: BTreeSet<u32>,
     /// What the frames so far discovered, as far as it is still needed.
     known: BTreeMap<u32, Arc<Known>>,
+    /// The most that all of it took at a time, bytes.
+    most_memory: u64,
 }
 
 impl<'a> ColourMaker<'a> {
@@ -146,7 +148,10 @@ impl<'a> ColourMaker<'a> {
 
     fn keep(&self, known: Known) -> Arc<Known> {
         let known = Arc::new(known);
-        self.with_state(|s| s.known.insert(known.frame, Arc::clone(&known)));
+        self.with_state(|s| {
+            s.known.insert(known.frame, Arc::clone(&known));
+            s.most_memory = s.most_memory.max(memory(s.known.values().map(|k| &**k)));
+        });
         known
     }
 
@@ -183,6 +188,15 @@ impl FrameMaker for ColourMaker<'_> {
     fn expect(&self, frames: &[u32]) {
         self.with_state(|s| s.to_come.extend(frames));
     }
+
+    fn reference_memory(&self) -> u64 {
+        memory(&self.uploads) + self.with_state(|s| s.most_memory)
+    }
+}
+
+/// Bytes that entries take.
+fn memory<'k>(known: impl IntoIterator<Item = &'k Known>) -> u64 {
+    known.into_iter().map(|k| size_of_val(&k.entries[..]) as u64).sum()
 }
 
 /// Whether `image` can stand for frame `frame`.

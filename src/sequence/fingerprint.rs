@@ -13,13 +13,13 @@ pub fn fingerprint(world: &World, shot: &Shot) -> String {
     world.meshes.iter().for_each(|mesh| hash.mesh(mesh));
     world.textures.iter().for_each(|texture| hash.texture(texture));
     for sphere in &world.spheres {
-        hash.text(&(sphere.centre, sphere.radius, sphere.material));
+        hash.text(&(sphere.centre, sphere.radius, sphere.material, sphere.always_traced));
     }
     for material in &world.materials {
         // Names are for people.
         hash.text(&crate::scene::Material { name: String::new(), ..material.clone() });
     }
-    hash.text(&(&world.lights, &world.sky, shot));
+    hash.text(&(&world.lights, &world.sky, &world.traced_regions, shot));
     hash.0.finalize().to_hex().to_string()
 }
 
@@ -31,7 +31,7 @@ impl Hash {
         self.array(&mesh.triangles);
         self.attribute(mesh.normals.as_ref());
         self.attribute(mesh.uvs.as_ref());
-        self.text(&mesh.material);
+        self.text(&(mesh.material, mesh.always_traced));
     }
 
     fn attribute<T: bytemuck::NoUninit>(&mut self, attribute: Option<&Corners<T>>) {
@@ -65,7 +65,7 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DVec3, Rgb, Vec3};
+    use crate::math::{Bounds3, DVec3, Rgb, Vec3};
     use crate::scene::{CameraPath, Easing, Material, Pose};
 
     fn world() -> World {
@@ -77,6 +77,7 @@ mod tests {
                 normals: Some(Corners { values: vec![Vec3::Z], corners: Some(vec![[0; 3]]) }),
                 uvs: None,
                 material: 0,
+                always_traced: false,
             }],
             materials: vec![Material::diffuse("m", Rgb::ONE)],
             ..World::default()
@@ -97,12 +98,14 @@ mod tests {
         renamed.materials[0].name = "n".into();
         assert_eq!(base, fingerprint(&renamed, &shot()));
 
-        let changes: [fn(&mut World); 5] = [
+        let changes: [fn(&mut World); 7] = [
             |w| w.meshes[0].positions[1].x += 1e-15,
             |w| w.meshes[0].triangles[0] = [0, 2, 1],
             |w| w.meshes[0].normals = None,
             |w| w.materials[0].diffuse.x = 0.5,
             |w| w.sky.lights = false,
+            |w| w.meshes[0].always_traced = true,
+            |w| w.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }],
         ];
         for change in changes {
             let mut changed = world();

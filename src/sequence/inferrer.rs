@@ -79,11 +79,6 @@ impl<'a> Inferrer<'a> {
         })
     }
 
-    /// The most memory that references took at a time, bytes.
-    pub fn most_memory(&self) -> u64 {
-        self.with_state(|s| s.most_memory)
-    }
-
     /// Renders an original from the references that it depends on, which are made first where they
     /// are not at hand; leaves a reference where one is needed.
     fn frame(&self, frame: u32) -> Result<Option<Made>> {
@@ -201,5 +196,9 @@ impl FrameMaker for Inferrer<'_> {
 
     fn expect(&self, frames: &[u32]) {
         self.with_state(|s| s.references.expect(&self.schedule, frames));
+    }
+
+    fn reference_memory(&self) -> u64 {
+        self.with_state(|s| s.most_memory)
     }
 }

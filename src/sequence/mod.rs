@@ -48,6 +48,11 @@ pub trait FrameMaker {
 
     /// Hears which frames it will be asked for, before the first of them.
     fn expect(&self, _frames: &[u32]) {}
+
+    /// The most memory that references took at a time so far, bytes.
+    fn reference_memory(&self) -> u64 {
+        0
+    }
 }
 
 /// A frame as it was made.
@@ -110,25 +115,20 @@ pub fn render_frames(
     let mut journal = Journal::open(journal)?;
     for &frame in frames {
         let start = Instant::now();
-        let Some(Made { film, rays, reuse }) = maker.make(frame)? else { break };
+        let Some(made) = maker.make(frame)? else { break };
         let trace_seconds = start.elapsed().as_secs_f64();
-        let row = write_frame(target, frame, &film, rays, start)?;
+        let row = write_frame(target, frame, &made, start)?;
         journal.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-        let (bytes, bad) = (row.bytes, film.bad);
+        let Row { bytes, bad, rays, reuse, .. } = row;
         done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, bad })?;
     }
     Ok(())
 }
 
 /// Writes the frame's file whole; gives its row.
-fn write_frame(
-    target: &Target,
-    frame: u32,
-    film: &Film,
-    rays: RayCounts,
-    start: Instant,
-) -> Result<Row> {
+fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Result<Row> {
+    let Made { film, rays, reuse } = made;
     let path = target.pattern.path(frame);
     let options = WriteOptions { frame: Some(frame), ..target.write.clone() };
     let written = write_image(&path, film, &options)?;
@@ -139,7 +139,8 @@ fn write_frame(
         blake3: written.hash.to_hex().to_string(),
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
-        rays,
+        rays: *rays,
+        reuse: *reuse,
         bad: film.bad,
         other_settings: false,
     })

@@ -8,6 +8,7 @@ use super::lighting::LitPoint;
 use super::pixels::{BLOCK, BlockPixels};
 use super::{FrameInput, Reuse};
 use crate::inference::{Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
+use crate::scene::Scene;
 use crate::stats::ReuseCounts;
 
 /// Pixels of a block.
@@ -39,6 +40,8 @@ pub(super) struct Groups {
     traced: Vec<bool>,
     /// Whether any kept light could shine on it.
     lit: Vec<bool>,
+    /// Surface points that must be traced; empty where the scene has none.
+    forbidden: Vec<bool>,
     order: Vec<(u64, u32)>,
 }
 
@@ -47,11 +50,12 @@ impl Groups {
     pub fn ask(
         &mut self,
         input: &FrameInput,
-        reuse: &Reuse,
+        (scene, reuse): (&Scene, &Reuse),
         lit: &[LitPoint],
         pixels: &BlockPixels,
     ) {
         self.gather_points(input, lit);
+        self.forbid(scene, lit);
         self.measure_footprints(lit, pixels);
         let (count, channels) = (self.asked.points.len(), reuse.channels.len());
         self.asked.ratios.clear();
@@ -66,6 +70,9 @@ impl Groups {
         }
         if let Some(inference) = reuse.inference {
             inference.infer(&mut self.asked);
+            let ratios = self.asked.ratios.chunks_exact_mut(channels);
+            let forbidden = ratios.zip(&self.forbidden).filter(|(_, forbidden)| **forbidden);
+            forbidden.for_each(|(ratios, _)| ratios.fill(f32::NAN));
         }
     }
 
@@ -126,6 +133,20 @@ impl Groups {
                     points[*at as usize].footprint = nearest;
                 }
             }
+        }
+    }
+
+    /// Notes the surface points that must be traced whatever is known.
+    fn forbid(&mut self, scene: &Scene, lit: &[LitPoint]) {
+        self.forbidden.clear();
+        if !scene.has_always_traced() {
+            return;
+        }
+        self.forbidden.resize(self.asked.points.len(), false);
+        for (point, group) in lit.iter().zip(&self.of_lit) {
+            let prim = point.si.prim;
+            self.forbidden[*group as usize] |=
+                scene.is_always_traced(prim.geom_id, prim.prim_id, point.si.p);
         }
     }
 

@@ -179,7 +179,7 @@ impl Renderer<'_> {
         scratch.starts.clear();
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
-            scratch.groups.ask(input, reuse, lit, pixels);
+            scratch.groups.ask(input, (self.scene, reuse), lit, pixels);
         }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;

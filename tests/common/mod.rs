@@ -60,7 +60,15 @@ pub fn pixel_of(job: &Job, p: DVec3) -> (u32, u32) {
 }
 
 pub fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, material: u32) -> WorldMesh {
-    WorldMesh { name: "test".into(), positions, triangles, normals: None, uvs: None, material }
+    WorldMesh {
+        name: "test".into(),
+        positions,
+        triangles,
+        normals: None,
+        uvs: None,
+        material,
+        always_traced: false,
+    }
 }
 
 pub fn quad(corners: [DVec3; 4], material: u32) -> WorldMesh {
@@ -89,8 +97,13 @@ pub fn sphere_world(material: Material, tessellated: bool) -> World {
         m.normals = Some(tweenray::scene::Corners { values, corners: None });
         world.meshes.push(m);
     } else {
-        let sphere =
-            WorldSphere { name: "sphere".into(), centre: DVec3::ZERO, radius: 1.0, material: 0 };
+        let sphere = WorldSphere {
+            name: "sphere".into(),
+            centre: DVec3::ZERO,
+            radius: 1.0,
+            material: 0,
+            always_traced: false,
+        };
         world.spheres.push(sphere);
     }
     world

@@ -53,7 +53,15 @@ pub fn sphere(centre: DVec3, radius: f64, columns: u32, rows: u32) -> WorldMesh 
             }
         }
     }
-    WorldMesh { name: "sphere".into(), positions, triangles, normals: None, uvs: None, material: 0 }
+    WorldMesh {
+        name: "sphere".into(),
+        positions,
+        triangles,
+        normals: None,
+        uvs: None,
+        material: 0,
+        always_traced: false,
+    }
 }
 
 /// [`sphere`] with the normals of a true sphere.

@@ -78,7 +78,13 @@ fn add_spheres(file: &File, materials: &[CourseMaterial], model: &mut Model) {
         } else {
             let material = sphere.material.unwrap_or_else(|| default_material(model));
             let name = format!("sphere {}", number + 1);
-            model.world.spheres.push(WorldSphere { name, centre, radius, material });
+            model.world.spheres.push(WorldSphere {
+                name,
+                centre,
+                radius,
+                material,
+                always_traced: false,
+            });
         }
     }
 }
@@ -146,5 +152,13 @@ fn mesh_of(
         let values = file.uvs.iter().map(|uv| uv.unwrap_or(Vec2::ZERO)).collect();
         Corners { values: tidy::compact_owned(values, &mut uv_triangles), corners: None }
     });
-    Ok(WorldMesh { name: String::new(), positions, triangles, normals: None, uvs, material })
+    Ok(WorldMesh {
+        name: String::new(),
+        positions,
+        triangles,
+        normals: None,
+        uvs,
+        material,
+        always_traced: false,
+    })
 }

@@ -10,7 +10,7 @@ fn cloud(min: DVec3, max: DVec3) -> WorldMesh {
         }
     }
     let (name, triangles, normals, uvs, material) = ("cloud".into(), vec![], None, None, 0);
-    WorldMesh { name, positions, triangles, normals, uvs, material }
+    WorldMesh { name, positions, triangles, normals, uvs, material, always_traced: false }
 }
 
 /// How far from the image's middle the world comes in any of many frames: 1 is the edge.
@@ -49,6 +49,7 @@ fn shapes() -> Vec<World> {
         centre: DVec3::new(x, 0.3, 0.0),
         radius,
         material: 0,
+        always_traced: false,
     };
     vec![
         mesh([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]),

@@ -273,6 +273,14 @@ impl Builder {
             })
         });
         let name = String::new();
-        Some(WorldMesh { name, positions, triangles: v, normals, uvs, material: 0 })
+        Some(WorldMesh {
+            name,
+            positions,
+            triangles: v,
+            normals,
+            uvs,
+            material: 0,
+            always_traced: false,
+        })
     }
 }

@@ -168,6 +168,7 @@ fn build(
         normals: normals.map(|values| Corners { values, corners: None }),
         uvs: uvs.map(|values| Corners { values, corners: None }),
         material: 0,
+        always_traced: false,
     }))
 }
 

@@ -60,6 +60,7 @@ impl<'a> Builder<'a> {
         for light in &file.light {
             this.world.lights.push(light.build(source)?);
         }
+        this.world.traced_regions = file.reuse.regions(source)?;
         this.world.sky = file.sky.as_ref().map_or_else(Default::default, |sky| sky.build());
         this.warn_of_unused_materials();
         this.warn_of_darkness();
@@ -110,6 +111,8 @@ impl<'a> Builder<'a> {
             self.world.meshes[meshes..].iter_mut().for_each(|m| m.material = id);
             self.world.spheres[spheres..].iter_mut().for_each(|s| s.material = id);
         }
+        self.world.meshes[meshes..].iter_mut().for_each(|m| m.always_traced = !mesh.reuse);
+        self.world.spheres[spheres..].iter_mut().for_each(|s| s.always_traced = !mesh.reuse);
         self.light_up(meshes, spheres, &mesh.span);
         Ok(())
     }
@@ -122,7 +125,8 @@ impl<'a> Builder<'a> {
         let (meshes, spheres) = (self.world.meshes.len(), self.world.spheres.len());
         let name = sphere.name.clone().unwrap_or_else(|| format!("sphere {}", spheres + 1));
         let (centre, radius) = (sphere.centre.vec(), sphere.radius.0);
-        self.world.spheres.push(WorldSphere { name, centre, radius, material });
+        let always_traced = !sphere.reuse;
+        self.world.spheres.push(WorldSphere { name, centre, radius, material, always_traced });
         self.light_up(meshes, spheres, &sphere.span);
         Ok(())
     }

@@ -49,6 +49,9 @@ pub(super) struct Mesh {
     /// Steps that place the mesh, applied one after the other.
     #[serde(default)]
     pub transform: Vec<At<Step>>,
+    /// Whether its light may come from other frames; if not it is traced in every frame.
+    #[serde(default = "yes")]
+    pub reuse: bool,
 }
 
 /// Where shading normals come from.
@@ -75,6 +78,13 @@ pub(super) struct Sphere {
     pub radius: Positive,
     /// Name of a `[material.NAME]`. Absent: a light grey.
     pub material: Option<At<String>>,
+    /// Whether its light may come from other frames; if not it is traced in every frame.
+    #[serde(default = "yes")]
+    pub reuse: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn auto() -> Normals {

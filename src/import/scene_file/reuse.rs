@@ -1,7 +1,12 @@
 //! `[reuse]`: what frames take over from one another.
 
+use super::at::At;
 use super::number::{Amount, Int, Share, Steps};
+use super::report::Source;
 use super::settings::shortest;
+use super::vector::Point;
+use crate::error::Result;
+use crate::math::Bounds3;
 use crate::scene::{Policy, ReuseSettings, limits};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -28,6 +33,18 @@ pub(super) struct Reuse {
     colour_epsilon: Amount,
     /// Colour policy: cached distances agree within this share of the distance.
     distance_epsilon: Amount,
+    /// Boxes in which light is traced in every frame.
+    traced: Vec<At<Region>>,
+}
+
+/// A box in which light is traced in every frame.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+struct Region {
+    /// Corner with the smallest coordinates, world units.
+    min: Point,
+    /// Corner with the largest coordinates, world units.
+    max: Point,
 }
 
 impl Default for Reuse {
@@ -41,11 +58,27 @@ impl Default for Reuse {
             max_rmse: r.max_rmse.map(|x| Steps(shortest(x))),
             colour_epsilon: Amount(shortest(r.colour_epsilon)),
             distance_epsilon: Amount(shortest(r.distance_epsilon)),
+            traced: Vec::new(),
         }
     }
 }
 
 impl Reuse {
+    /// The boxes of `traced`, world space.
+    ///
+    /// Errors: corners the wrong way round.
+    pub fn regions(&self, source: &Source) -> Result<Vec<Bounds3>> {
+        let region = |region: &At<Region>| {
+            let (min, max) = (region.min.vec(), region.max.vec());
+            if min.cmplt(max).all() {
+                return Ok(Bounds3 { min, max });
+            }
+            let message = "`min` must be smaller than `max` in x, y and z";
+            Err(source.fault(&region.span, message).into())
+        };
+        self.traced.iter().map(region).collect()
+    }
+
     /// As scene data.
     pub fn build(&self) -> ReuseSettings {
         ReuseSettings {

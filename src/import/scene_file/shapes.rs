@@ -26,7 +26,15 @@ fn flat(
     triangles: Vec<[u32; 3]>,
     material: MaterialId,
 ) -> WorldMesh {
-    WorldMesh { name, positions, triangles, normals: None, uvs: None, material }
+    WorldMesh {
+        name,
+        positions,
+        triangles,
+        normals: None,
+        uvs: None,
+        material,
+        always_traced: false,
+    }
 }
 
 #[cfg(test)]

@@ -20,7 +20,15 @@ pub fn field(cells: u32, height: impl Fn(u32, u32) -> f64) -> WorldMesh {
     };
     let triangles = (0..cells * cells).flat_map(cell).collect();
     let name = "field".into();
-    WorldMesh { name, positions, triangles, normals: None, uvs: None, material: 0 }
+    WorldMesh {
+        name,
+        positions,
+        triangles,
+        normals: None,
+        uvs: None,
+        material: 0,
+        always_traced: false,
+    }
 }
 
 /// A whole number from 0 to 7, the same for the same corner.

@@ -43,7 +43,15 @@ impl Field {
         }
         let triangles = (0..SLIVERS).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let name = "slivers".into();
-        let mesh = WorldMesh { name, positions, triangles, normals: None, uvs: None, material: 0 };
+        let mesh = WorldMesh {
+            name,
+            positions,
+            triangles,
+            normals: None,
+            uvs: None,
+            material: 0,
+            always_traced: false,
+        };
         Self { world: shapes::world_of(mesh), seed }
     }
 

@@ -25,7 +25,13 @@ fn unit_sphere(material: Material, exact: bool) -> World {
     });
     if exact {
         let (name, centre) = ("ball".into(), DVec3::ZERO);
-        world.spheres.push(WorldSphere { name, centre, radius: 1.0, material: 0 });
+        world.spheres.push(WorldSphere {
+            name,
+            centre,
+            radius: 1.0,
+            material: 0,
+            always_traced: false,
+        });
     } else {
         world.meshes.push(fine_sphere());
     }
@@ -67,7 +73,13 @@ fn furnaces() -> Vec<(String, World, f32)> {
     let mut nested = unit_sphere(glass(1.0, Some(1)), true);
     nested.materials.push(glass(1.0, Some(2)));
     let (name, centre) = ("core".into(), DVec3::new(0.3, 0.2, 0.1));
-    nested.spheres.push(WorldSphere { name, centre, radius: 0.8, material: 1 });
+    nested.spheres.push(WorldSphere {
+        name,
+        centre,
+        radius: 0.8,
+        material: 1,
+        always_traced: false,
+    });
     list.push(("nested glass, overlapping".into(), nested, 1.0));
     list
 }
