@@ -27,7 +27,8 @@ fn world(with_lamp: bool) -> World {
     let floor = [(-9.0, 9.0), (9.0, 9.0), (9.0, -9.0), (-9.0, -9.0)];
     world.meshes.push(common::quad(floor.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
     let centre = DVec3::new(0.0, 1.2, 0.0);
-    world.spheres.push(WorldSphere { name: "ball".into(), centre, radius: 0.5, material: 1 });
+    let (name, always_traced) = ("ball".into(), false);
+    world.spheres.push(WorldSphere { name, centre, radius: 0.5, material: 1, always_traced });
     if with_lamp {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let corners = corners.map(|(x, z)| DVec3::new(x, 4.0, z));

@@ -8,8 +8,8 @@ use tweenray::scene::Settings;
 
 /// White pixels between panels.
 const GAP: u32 = 6;
-const RED: Rgb = Rgb::new(0.9, 0.0, 0.0);
-const PINK: Rgb = Rgb::new(1.0, 0.3, 0.6);
+const RED: Rgb = Rgb::new(0.6, 0.0, 0.0);
+const PINK: Rgb = Rgb::new(1.0, 0.4, 0.8);
 
 /// Writes panels of one size as a grid of `columns`, row by row.
 pub fn save_grid(path: &Path, columns: u32, panels: &[Film]) {
@@ -33,12 +33,12 @@ pub fn save_grid(path: &Path, columns: u32, panels: &[Film]) {
 /// What a pixel is painted with, if with anything.
 pub type Paint = Option<Rgb>;
 
-/// The film under half a coat of paint.
+/// The film in grey under a coat of paint, where it is painted.
 pub fn painted(film: &Film, paint: impl Fn(usize) -> Paint) -> Film {
     let mut out = film.clone();
     for (i, c) in out.rgb.iter_mut().enumerate() {
         if let Some(paint) = paint(i) {
-            *c = c.min(Rgb::ONE) * 0.4 + paint * 0.6;
+            *c = Rgb::splat(c.min(Rgb::ONE).element_sum() / 3.0) * 0.25 + paint * 0.75;
         }
     }
     out
@@ -56,8 +56,8 @@ pub fn hit_or_traced(source: &PixelSource) -> Paint {
 /// Figure 3's: how far two distances are apart, as a share of the nearer one.
 pub fn by_difference(share: f32) -> Paint {
     Some(match share {
-        s if s <= 0.02 => RED,
-        s if s <= 0.1 => Rgb::new(0.0, 0.8, 0.0),
-        _ => Rgb::new(0.0, 0.1, 1.0),
+        s if s <= 0.05 => RED,
+        s if s <= 0.2 => Rgb::new(0.0, 0.5, 0.0),
+        _ => Rgb::new(0.0, 0.05, 0.7),
     })
 }

@@ -9,7 +9,8 @@
 //! frame that is asked for alone has these made first.
 //!
 //! Not done: ranks do not send each other discoveries, each makes the ancestors that it needs. First
-//! hits of inferred pixels are not known: their records say that nothing is hit.
+//! hits of inferred pixels are not known: their records say that nothing is hit. What a scene names
+//! as always traced may be inferred: an inferred pixel does not know what it shows.
 
 use super::pyramid::Pyramid;
 use super::{FrameMaker, Made};
