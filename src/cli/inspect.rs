@@ -1,5 +1,7 @@
 //! `tweenray inspect`: what a scene holds and calls for, without rendering it.
 
+mod reuse;
+
 use super::args::{SceneArgs, SettingArgs};
 use super::exit::Exit;
 use super::findings::findings;
@@ -50,6 +52,7 @@ struct Inspection {
     camera_start: CameraView,
     camera_end: CameraView,
     memory: Memory,
+    reuse: reuse::Plan,
     effects: Vec<Effect>,
     warnings: Vec<String>,
 }
@@ -134,6 +137,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
+        reuse: reuse::Plan::of(&scene, &settings, &shot)?,
         effects: reasons
             .into_iter()
             .map(|r| Effect { effect: r.effect, runs: r.runs, why: r.why })
@@ -238,6 +242,7 @@ impl Inspection {
             bytes(m.intersector),
             bytes(m.frame)
         ));
+        lines.extend(self.reuse.to_text());
         lines.push("effects".into());
         for e in &self.effects {
             let runs = if e.runs { "runs" } else { "off" };

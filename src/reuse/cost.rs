@@ -3,7 +3,7 @@
 
 use crate::effects::EffectPlan;
 use crate::inference::{Channel, Channels};
-use crate::scene::{Scene, Settings};
+use crate::scene::{Light, Scene, Settings};
 
 /// A shadow ray with its sample; the unit is a camera ray with the look at its surface.
 const SHADOW_RAY: f64 = 1.2;
@@ -35,8 +35,55 @@ pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channe
     })
 }
 
-/// What is looked up and what traced, and why: lines for `inspect`.
-pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Vec<String> {
-    let channels = channels(scene, plan, settings);
-    channels.iter().map(|c| format!("{c:?}: {} rays", rays_of(c, settings))).collect()
+/// Whether a light's shadowing is looked up in other frames, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LookupReason {
+    /// The light, as it is called in messages.
+    pub light: String,
+    /// Whether it is looked up; else it is traced in every frame.
+    pub looked_up: bool,
+    /// Why.
+    pub why: String,
+}
+
+/// What is looked up and what traced, and why: all lights that shine, then the sky.
+pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Vec<LookupReason> {
+    let kept = channels(scene, plan, settings);
+    let mut reasons = Vec::new();
+    for (index, light) in scene.lights.iter().enumerate() {
+        let (kind, channel) = match light {
+            Light::Point { .. } => ("point", None),
+            Light::Directional { .. } => ("directional", None),
+            Light::Quad(_) => ("quad", Some(Channel::Area(index as u32))),
+            Light::Sphere { .. } => ("sphere", Some(Channel::Area(index as u32))),
+        };
+        let looked_up = kept.of_light(index as u32).is_some();
+        let why = channel.map_or_else(
+            || "one hard shadow ray is not worth a lookup".into(),
+            |channel| why(rays_of(channel, settings), settings.spp),
+        );
+        reasons.push(LookupReason {
+            light: format!("light {}, {kind}", index + 1),
+            looked_up,
+            why,
+        });
+    }
+    if plan.sky_light {
+        let why = why(rays_of(Channel::Sky, settings), settings.spp);
+        reasons.push(LookupReason { light: "sky".into(), looked_up: kept.sky().is_some(), why });
+    }
+    reasons
+}
+
+/// Why `rays` shadow rays of each of `spp` camera samples are looked up or not.
+fn why(rays: u32, spp: u32) -> String {
+    let all = rays.saturating_mul(spp);
+    if all == 0 {
+        return "it has no samples".into();
+    }
+    let rays = if all == 1 { "one shadow ray".into() } else { format!("{all} shadow rays") };
+    match is_worth(all) {
+        true => format!("one lookup costs less than a pixel's {rays}"),
+        false => format!("a lookup costs more than a pixel's {rays}"),
+    }
 }

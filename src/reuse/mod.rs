@@ -11,6 +11,6 @@ mod index;
 mod lookup;
 mod reference;
 
-pub use cost::{channels, lookup_reasons, rays_of};
+pub use cost::{LookupReason, channels, lookup_reasons, rays_of};
 pub use lookup::{Evidence, Lookup};
 pub use reference::Reference;

@@ -51,9 +51,15 @@ impl Schedule {
         ancestors
     }
 
-    /// Frames of the shot that are inferred from none.
+    /// How many frames are traced whole: key frames that are their own originals.
     pub fn key_frames(&self) -> u32 {
-        self.pyramid.keys()
+        let copies = self.copies.keys().filter(|frame| self.pyramid.is_key(**frame)).count();
+        self.pyramid.keys() - copies as u32
+    }
+
+    /// How many frames are not their own originals.
+    pub fn copies(&self) -> u32 {
+        self.copies.len() as u32
     }
 
     /// The most references that a job over `frames` holds at a time: key frames, and others.

@@ -55,7 +55,7 @@ impl Groups {
         pixels: &BlockPixels,
     ) {
         self.gather_points(input, lit);
-        self.forbid(scene, lit);
+        self.forbid(input, scene, lit);
         self.measure_footprints(lit, pixels);
         let (count, channels) = (self.asked.points.len(), reuse.channels.len());
         self.asked.ratios.clear();
@@ -137,9 +137,9 @@ impl Groups {
     }
 
     /// Notes the surface points that must be traced whatever is known.
-    fn forbid(&mut self, scene: &Scene, lit: &[LitPoint]) {
+    fn forbid(&mut self, input: &FrameInput, scene: &Scene, lit: &[LitPoint]) {
         self.forbidden.clear();
-        if !scene.has_always_traced() {
+        if !input.has_always_traced {
             return;
         }
         self.forbidden.resize(self.asked.points.len(), false);

@@ -108,6 +108,8 @@ struct FrameInput<'a> {
     /// Bodies of ranked glass that the camera is in.
     around_eye: Interior,
     reuse: Option<Reuse<'a>>,
+    /// Whether any light must be traced in every frame.
+    has_always_traced: bool,
 }
 
 impl FrameInput<'_> {
@@ -183,6 +185,7 @@ impl Renderer<'_> {
             area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
             around_eye,
             reuse: job.reuse,
+            has_always_traced: self.scene.has_always_traced(),
         };
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));

@@ -5,5 +5,6 @@ mod interrupted;
 mod job;
 mod ranks;
 mod rendering;
+mod reuse;
 mod verify;
 mod words;

@@ -3,7 +3,9 @@
 use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
-use crate::scene::{CameraPath, Light as SceneLight, Settings as SceneSettings};
+use crate::scene::{
+    CameraPath, Light as SceneLight, Policy, ReuseSettings, Settings as SceneSettings,
+};
 
 #[test]
 fn an_empty_file_is_an_empty_scene_with_all_defaults() {
@@ -47,6 +49,39 @@ fn every_setting_reaches_its_place() {
     assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
     assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
     assert!(loaded.overwrite && !loaded.video);
+}
+
+#[test]
+fn everything_about_reuse_reaches_its_place() {
+    let loaded = good(
+        "[reuse]\npolicy = 'colour'\nsegment = 9\ntolerance = 0.5\naudit = 0.25\nmax_rmse = 2\n\
+         colour_epsilon = 0.125\ndistance_epsilon = 4\n\
+         [[reuse.traced]]\nmin = [0, 0, 0]\nmax = [1, 2, 3]\n\
+         [[mesh]]\nreuse = false\nbox = { min = [0, 0, 0], max = [9, 9, 9] }\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nreuse = false\n",
+    );
+    let reuse = ReuseSettings {
+        policy: Policy::Colour,
+        segment: 9,
+        tolerance: 0.5,
+        audit: 0.25,
+        max_rmse: Some(2.0),
+        colour_epsilon: 0.125,
+        distance_epsilon: 4.0,
+    };
+    assert_eq!(loaded.settings.reuse, reuse);
+    let region = loaded.world.traced_regions[0];
+    assert_eq!((region.min, region.max), (DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)));
+    let scene = loaded.world.into_scene(true).expect("a scene");
+    let region = scene.traced_regions[0];
+    let corner = |p| scene.recentring.point_to_world(p);
+    assert_eq!((corner(region.min), corner(region.max)), (DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)));
+    let spheres: Vec<bool> = scene.spheres.iter().map(|s| s.surface.always_traced).collect();
+    assert_eq!((scene.meshes[0].surface.always_traced, spheres), (true, vec![false, true]));
+    assert!(scene.is_always_traced(1, 1, DVec3::splat(9.0)));
+    assert!(!scene.is_always_traced(1, 0, DVec3::splat(9.0)));
+    assert!(scene.is_always_traced(1, 0, region.centre()));
 }
 
 #[test]

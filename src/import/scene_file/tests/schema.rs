@@ -64,6 +64,11 @@ fn ranges_and_defaults_are_in_the_schema() {
     assert_eq!(settings["spp"]["maximum"], 65_536);
     assert_eq!(settings["spp"]["default"], 4);
     assert_eq!(settings["cutoff"]["default"], 0.001);
+    let reuse = &schema()["$defs"]["Reuse"]["properties"];
+    assert_eq!(
+        (&reuse["segment"]["maximum"], &reuse["audit"]["default"]),
+        (&1_000_000.into(), &0.03.into())
+    );
     assert_eq!(settings["size"]["default"], serde_json::json!([640, 360]));
     let fov = &schema()["$defs"]["Camera"]["properties"]["fov"];
     assert_eq!((&fov["exclusiveMaximum"], &fov["default"]), (&180.into(), &40.0.into()));

@@ -1,0 +1,222 @@
+//! Reuse between frames as a user meets it: the policies, their words, and the same bytes however a
+//! job is cut.
+
+use super::job::Job;
+use serde_json::Value;
+use std::fs;
+
+/// A cube on a floor under a lamp, in a mirror; `camera` moves through 9 frames.
+fn scene(job: &Job, camera: &str, more: &str) {
+    let text = format!(
+        "[camera]\n{camera}\n[settings]\nsize = [48, 27]\nspp = 1\nvideo = false\n\
+         sky_samples = 4\n[sky]\nradiance = 0.3\n\
+         [reuse]\nsegment = 4\n{more}\n[material.mirror]\nmirror = 0.9\n\
+         [[light]]\nquad = {{ centre = [2, 5, 3], normal = '-y', size = [2, 2], radiance = 20 }}\n\
+         [[mesh]]\nquad = {{ centre = [0, -1, 0], normal = 'y', size = [20, 20] }}\n\
+         [[mesh]]\nquad = {{ centre = [0, 0, -3], normal = 'z', size = [8, 4] }}\n\
+         material = 'mirror'\n[[mesh]]\nfile = 'cube.obj'\n"
+    );
+    fs::write(job.path("scene.toml"), text).expect("written");
+}
+
+const PAN: &str = "frames = 9\npan = { from = [-1, 1.5, 7], to = [1, 1.5, 7], target = [0, 0, 0] }";
+
+fn frames(job: &Job, folder: &str, frames: impl Iterator<Item = u32>) -> Vec<Vec<u8>> {
+    frames.map(|frame| job.read(&format!("{folder}/f_{frame}.png"))).collect()
+}
+
+/// The rows of a manifest, in the order of their frames.
+fn rows(job: &Job, folder: &str) -> Vec<Value> {
+    let text = String::from_utf8(job.read(&format!("{folder}/f.manifest.jsonl"))).expect("UTF-8");
+    let row = |line| serde_json::from_str::<Value>(line).expect("JSON");
+    let mut rows: Vec<Value> = text.lines().skip(1).map(row).collect();
+    rows.sort_by_key(|row| row["frame"].as_u64());
+    rows
+}
+
+#[test]
+fn the_words_of_reuse_are_checked() {
+    let job = Job::new();
+    job.refused("render cube.obj --policy surfaces", "'surface'");
+    job.refused("render cube.obj --segmnt 4", "'--segment'");
+    job.refused("render cube.obj --segment 0", "1..=1000000");
+    job.refused("render cube.obj --tolerance -1", "from 0 to 255");
+    job.refused("render cube.obj --audit 1.5", "from 0 to 1");
+    job.refused("render cube.obj --max-rmse nan", "from 0 to 255");
+    job.refused("inspect cube.obj --colour-epsilon -1", "from 0 to 1e30");
+    job.refused("inspect cube.obj --distance-epsilon x", "not a number");
+    let help = job.done("render --help").out;
+    assert!(help.contains("\nReuse:\n") && help.contains("--max-rmse <STEPS>"), "{help}");
+}
+
+#[test]
+fn each_setting_of_reuse_keeps_frames_apart() {
+    let job = Job::new();
+    scene(&job, PAN, "max_rmse = 3");
+    job.done("render scene.toml --frames 1 -o o/f_#.png");
+    for (option, says) in [
+        ("--policy off", "policy was surface, now it is off"),
+        ("--policy colour", "policy was surface, now it is colour"),
+        ("--segment 5", "segment was 4, now it is 5"),
+        ("--tolerance 2", "tolerance was 1, now it is 2"),
+        ("--audit 0.5", "audit was 0.03, now it is 0.5"),
+        ("--max-rmse 4", "max-rmse was 3, now it is 4"),
+        ("--colour-epsilon 1", "colour-epsilon was 0.02, now it is 1"),
+        ("--distance-epsilon 1", "distance-epsilon was 0.02, now it is 1"),
+    ] {
+        job.refused(&format!("render scene.toml --frames 1 -o o/f_#.png {option}"), says);
+    }
+    scene(&job, PAN, "max_rmse = 3\ntraced = [{ min = [0, 0, 0], max = [1, 1, 1] }]");
+    job.refused("render scene.toml --frames 1 -o o/f_#.png", "scene content");
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_threads_ranges_order_or_resuming() {
+    let job = Job::new();
+    scene(&job, PAN, "");
+    let ran = job.done("render scene.toml --threads 4 -o all/f_#.png");
+    assert!(ran.err.contains(" % reused  left ") && ran.out.contains(" reused"), "{}", ran.out);
+    let all = frames(&job, "all", 1..=9);
+    for threads in [1, 2] {
+        let folder = format!("t{threads}");
+        job.done(&format!("render scene.toml --threads {threads} -o {folder}/f_#.png"));
+        assert!(frames(&job, &folder, 1..=9) == all, "{threads} threads");
+    }
+    job.done("render scene.toml --frames 6..7 -o part/f_#.png");
+    assert!(frames(&job, "part", 6..=7) == all[5..7], "a part alone");
+    job.done("render scene.toml --frames 8 -o part/f_#.png");
+    job.done("render scene.toml --frames 2..8 -o part/f_#.png");
+    assert!(frames(&job, "part", 2..=8) == all[1..8], "in pieces");
+    fs::remove_file(job.path("all/f_3.png")).expect("removed");
+    fs::write(job.path("all/f_5.png"), "torn").expect("written");
+    assert!(job.done("render scene.toml -o all/f_#.png").out.contains("2 rendered, 7 kept"));
+    assert!(frames(&job, "all", 1..=9) == all, "gone on with");
+    job.done("render scene.toml --policy off --frames 1..2 -o off/f_#.png");
+    let off = frames(&job, "off", 1..=2);
+    assert!(off[0] == all[0] && off[1] != all[1], "a key frame is traced, the next inferred");
+}
+
+#[test]
+fn a_crop_changes_no_pixel_that_it_keeps() {
+    let job = Job::new();
+    scene(&job, PAN, "");
+    job.done("render scene.toml -o all/f_#.ppm");
+    for frames in ["1..9", "2"] {
+        let line =
+            format!("render scene.toml --crop 9,5,30,20 --frames {frames} -o crop{frames}/f_#.ppm");
+        job.done(&line);
+        let frame = 2;
+        let pixels = |folder: &str| {
+            let bytes = job.read(&format!("{folder}/f_{frame}.ppm"));
+            bytes[bytes.len() - 48 * 27 * 3..].to_vec()
+        };
+        let (whole, crop) = (pixels("all"), pixels(&format!("crop{frames}")));
+        for (i, (a, b)) in whole.chunks(3).zip(crop.chunks(3)).enumerate() {
+            let (x, y) = (i % 48, i / 48);
+            let inside = (9..30).contains(&x) && (5..20).contains(&y);
+            assert_eq!(b, if inside { a } else { &[0, 0, 0] }, "{frames}: pixel {x},{y}");
+        }
+    }
+}
+
+#[test]
+fn a_still_camera_gives_the_same_bytes_and_renders_once() {
+    let job = Job::new();
+    scene(&job, "frames = 9\nstill = { eye = [0, 1, 7], target = [0, 0, 0] }", "");
+    job.done("render scene.toml -o o/f_#.png");
+    let all = frames(&job, "o", 1..=9);
+    assert!(all.iter().all(|frame| *frame == all[0]));
+    let rays: Vec<u64> =
+        rows(&job, "o").iter().map(|r| r["rays"]["camera"].as_u64().expect("a count")).collect();
+    assert_eq!(rays[0], 48 * 27);
+    assert!(rays[1..].iter().all(|n| *n == 0), "{rays:?}");
+    job.done("render scene.toml --frames 6 -o part/f_#.png");
+    assert!(frames(&job, "part", 6..=6)[0] == all[0]);
+    job.done("render scene.toml --policy off --frames 1..2 -o off/f_#.png");
+    let off = frames(&job, "off", 1..=2);
+    assert!(off[0] == all[0] && off[1] != all[0]);
+}
+
+#[test]
+fn a_cut_to_another_view_reuses_nothing() {
+    let job = Job::new();
+    // Frame 5 is a key frame and alone of what it shows; 8 sees what neither 5 nor 9 sees.
+    let pose =
+        |at: f64, x: f64| format!("{{ at = {at}, eye = [{x}, 1, 7], target = [{x}, 0, 0] }}");
+    let keys: Vec<String> = (0..9)
+        .map(|k| pose(f64::from(k) / 8.0, if k == 2 { 300.0 } else { f64::from(k) }))
+        .collect();
+    scene(&job, &format!("frames = 9\nkeys = [{}]", keys.join(", ")), "");
+    let text = fs::read_to_string(job.path("scene.toml")).expect("there");
+    fs::write(job.path("scene.toml"), text.replace("size = [20, 20]", "size = [900, 900]"))
+        .expect("written");
+    job.done("render scene.toml --frames 2..3 -o o/f_#.png");
+    job.done("render scene.toml --frames 2..3 --policy off -o off/f_#.png");
+    let (ours, off) = (frames(&job, "o", 2..=3), frames(&job, "off", 2..=3));
+    let reuse = |row: &Value| row["reuse"].clone();
+    let rows = rows(&job, "o");
+    assert!(reuse(&rows[0])["direct_inferred"].as_u64() > Some(0), "{rows:?}");
+    assert!(reuse(&rows[1])["direct"].as_u64() > Some(0), "{rows:?}");
+    assert_eq!(reuse(&rows[1])["direct_inferred"].as_u64(), Some(0));
+    assert!(ours[1] == off[1] && ours[0] != off[0]);
+}
+
+#[test]
+fn what_is_named_is_traced_in_every_frame() {
+    let job = Job::new();
+    let inferred = |more: &str, folder: &str| {
+        scene(&job, PAN, more);
+        job.done(&format!("render scene.toml --frames 2..3 -o {folder}/f_#.png --stats s.json"));
+        let stats: Value = serde_json::from_slice(&job.read("s.json")).expect("JSON");
+        assert!(stats["reference_bytes"].as_u64() > Some(0));
+        assert!(stats["frames"][0]["reuse"]["direct"].as_u64() > Some(0));
+        let count = |kind: &str| stats["reuse"][kind].as_u64().expect("a count");
+        count("direct_inferred") + count("specular_inferred")
+    };
+    let all = inferred("", "all");
+    let half = "traced = [{ min = [-100, -100, -100], max = [0, 100, 100] }]";
+    let some = inferred(half, "half");
+    assert!(0 < some && some < all, "{some} of {all}");
+    let whole = "traced = [{ min = [-100, -100, -100], max = [100, 100, 100] }]";
+    assert_eq!(inferred(whole, "none"), 0);
+    job.done("render scene.toml --policy off --frames 2..3 -o off/f_#.png");
+    assert!(frames(&job, "none", 2..=3) == frames(&job, "off", 2..=3));
+    scene(&job, PAN, "");
+    let text = fs::read_to_string(job.path("scene.toml")).expect("there");
+    fs::write(job.path("scene.toml"), text.replace("[[mesh]]\n", "[[mesh]]\nreuse = false\n"))
+        .expect("written");
+    job.done("render scene.toml --frames 2..3 -o meshes/f_#.png");
+    assert!(frames(&job, "meshes", 2..=3) == frames(&job, "off", 2..=3));
+}
+
+#[test]
+fn inspect_says_what_is_looked_up_and_what_it_takes() {
+    let job = Job::new();
+    scene(&job, PAN, "");
+    let text = fs::read_to_string(job.path("scene.toml")).expect("there")
+        + "[[light]]\npoint = { position = [0, 4, 0], intensity = 5 }\n";
+    fs::write(job.path("scene.toml"), text).expect("written");
+    let text = job.done("inspect scene.toml").out;
+    for says in [
+        "policy surface: 3 key frames, one every 4 frames",
+        "light 1, quad        looked up  one lookup costs less than a pixel's 16 shadow rays",
+        "light 2, point       traced     one hard shadow ray is not worth a lookup",
+        "sky                  looked up",
+        "references held at a time: ",
+    ] {
+        assert!(text.contains(says), "{says}\n{text}");
+    }
+    let none = job.done("inspect scene.toml --shadow-samples 1 --sky-samples 1").out;
+    assert!(none.contains("no light is worth a lookup"), "{none}");
+    assert!(job.done("inspect scene.toml --policy off").out.contains("every frame is traced"));
+    let json = job.done("inspect scene.toml --json").out;
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    let reuse = &json["reuse"];
+    assert_eq!((&reuse["policy"], &reuse["key_frames"]), (&"surface".into(), &3.into()));
+    assert_eq!(reuse["lights"][1]["looked_up"], false);
+    let predicted = reuse["references"]["bytes"].as_u64().expect("bytes");
+    job.done("render scene.toml -o o/f_#.png --stats s.json");
+    let stats: Value = serde_json::from_slice(&job.read("s.json")).expect("JSON");
+    let taken = stats["reference_bytes"].as_u64().expect("bytes");
+    assert!(predicted < 3 * taken && taken < 3 * predicted, "{predicted}, in fact {taken}");
+}
