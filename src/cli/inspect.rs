@@ -13,6 +13,7 @@ use crate::import::{Loaded, Stage};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
 use crate::scene::{Light, Mesh, Scene, Settings, Shot};
+use crate::shade::Renderer;
 use clap::Args;
 use serde::Serialize;
 
@@ -113,6 +114,9 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
     warnings.extend(collapsed.iter().map(ToString::to_string));
     warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
     let meshes = own_meshes(&scene, stage);
+    let plan = EffectPlan::of(&scene, &settings);
+    let renderer =
+        Renderer { scene: &scene, settings: &settings, plan, intersector: &*intersector };
     let reasons = EffectPlan::reasons(&scene, &settings);
     Ok(Inspection {
         scene: args.scene.scene.display().to_string(),
@@ -137,7 +141,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
-        reuse: reuse::Plan::of(&scene, &settings, &shot)?,
+        reuse: reuse::Plan::of(&renderer, &shot)?,
         effects: reasons
             .into_iter()
             .map(|r| Effect { effect: r.effect, runs: r.runs, why: r.why })

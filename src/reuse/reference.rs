@@ -87,11 +87,6 @@ impl Reference {
         (self.samples.len() * sample + 4 * self.slots.len()) as u64 + self.index.memory()
     }
 
-    /// About as many bytes as a reference takes of which `traced` of `pixels` are traced.
-    pub fn expected_memory(pixels: u64, traced: u64, channels: usize) -> u64 {
-        traced * (size_of::<Sample>() + 4 * channels) as u64 + 4 * pixels
-    }
-
     pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {
         self.ratios[sample as usize * self.channels + channel]
     }

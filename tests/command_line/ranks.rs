@@ -76,6 +76,30 @@ mod with_mpi {
         }
     }
 
+    /// Whoever makes a frame makes the references that it is inferred from.
+    #[test]
+    fn inferred_frames_are_the_same_on_any_number_of_ranks() {
+        let job = Job::new();
+        let line = "render cube.obj --size 48x27 --spp 1 --frames 2..19 --segment 4 --no-video";
+        job.done(&format!("{line} -o solo/f_##.png"));
+        for ranks in [2, 3] {
+            let line = format!("{line} -o r{ranks}/f_##.png --stats s.json");
+            let Some(ran) = under_mpirun(&job, ranks, &line) else { return };
+            assert_eq!(ran.code, Some(0), "{}", ran.err);
+            for frame in 2..=19 {
+                let name = format!("f_{frame:02}.png");
+                let ours = job.read(&format!("r{ranks}/{name}"));
+                assert!(ours == job.read(&format!("solo/{name}")), "{ranks} ranks, {name}");
+            }
+            let stats: serde_json::Value =
+                serde_json::from_slice(&job.read("s.json")).expect("valid JSON");
+            assert!(stats["reuse"]["direct_inferred"].as_u64() > Some(0));
+            let frames = stats["frames"].as_array().expect("frames");
+            let by = |rank: u32| frames.iter().filter(|f| f["rank"] == rank).count();
+            assert!((0..ranks).all(|rank| by(rank) > 0), "{ran:?}", ran = ran.err);
+        }
+    }
+
     /// Ranks on unlike machines use what all have, and say so.
     #[test]
     fn unlike_machines_share_an_instruction_set() {
@@ -137,7 +161,7 @@ mod with_mpi {
         // Frame 5 belongs to rank 1, and a folder stands in its place.
         fs::create_dir_all(job.path("o/f_05.png")).expect("made");
         let start = Instant::now();
-        let line = format!("{LINE} -o o/f_##.png --overwrite");
+        let line = format!("{LINE} --policy off -o o/f_##.png --overwrite");
         let Some(ran) = under_mpirun(&job, 2, &line) else { return };
         assert!(ran.code != Some(0) && ran.err.contains("o/f_05.png"), "{}", ran.err);
         assert!(start.elapsed() < Duration::from_secs(30));

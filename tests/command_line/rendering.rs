@@ -123,7 +123,7 @@ fn quiet_says_nothing_and_otherwise_a_line_a_frame() {
     let lines: Vec<&str> = ran.err.lines().collect();
     assert_eq!(lines.len(), 2, "{}", ran.err);
     assert!(lines[0].starts_with("frame 1 of 2  "), "{}", ran.err);
-    assert!(lines[0].contains(" Mrays/s  left "), "{}", ran.err);
+    assert!(lines[0].contains(" Mrays/s  0 % reused  left "), "{}", ran.err);
 }
 
 #[test]

@@ -25,6 +25,12 @@ fn frames(job: &Job, folder: &str, frames: impl Iterator<Item = u32>) -> Vec<Vec
     frames.map(|frame| job.read(&format!("{folder}/f_{frame}.png"))).collect()
 }
 
+/// The pixels of a ppm file, without its head, which names the frame.
+fn pixels(job: &Job, name: &str) -> Vec<u8> {
+    let bytes = job.read(name);
+    bytes[bytes.len() - 48 * 27 * 3..].to_vec()
+}
+
 /// The rows of a manifest, in the order of their frames.
 fn rows(job: &Job, folder: &str) -> Vec<Value> {
     let text = String::from_utf8(job.read(&format!("{folder}/f.manifest.jsonl"))).expect("UTF-8");
@@ -105,12 +111,8 @@ fn a_crop_changes_no_pixel_that_it_keeps() {
         let line =
             format!("render scene.toml --crop 9,5,30,20 --frames {frames} -o crop{frames}/f_#.ppm");
         job.done(&line);
-        let frame = 2;
-        let pixels = |folder: &str| {
-            let bytes = job.read(&format!("{folder}/f_{frame}.ppm"));
-            bytes[bytes.len() - 48 * 27 * 3..].to_vec()
-        };
-        let (whole, crop) = (pixels("all"), pixels(&format!("crop{frames}")));
+        let whole = pixels(&job, "all/f_2.ppm");
+        let crop = pixels(&job, &format!("crop{frames}/f_2.ppm"));
         for (i, (a, b)) in whole.chunks(3).zip(crop.chunks(3)).enumerate() {
             let (x, y) = (i % 48, i / 48);
             let inside = (9..30).contains(&x) && (5..20).contains(&y);
@@ -120,27 +122,28 @@ fn a_crop_changes_no_pixel_that_it_keeps() {
 }
 
 #[test]
-fn a_still_camera_gives_the_same_bytes_and_renders_once() {
+fn a_still_camera_gives_the_same_pixels_and_renders_once() {
     let job = Job::new();
     scene(&job, "frames = 9\nstill = { eye = [0, 1, 7], target = [0, 0, 0] }", "");
-    job.done("render scene.toml -o o/f_#.png");
-    let all = frames(&job, "o", 1..=9);
+    job.done("render scene.toml -o o/f_#.ppm");
+    let all: Vec<Vec<u8>> =
+        (1..=9).map(|frame| pixels(&job, &format!("o/f_{frame}.ppm"))).collect();
     assert!(all.iter().all(|frame| *frame == all[0]));
     let rays: Vec<u64> =
         rows(&job, "o").iter().map(|r| r["rays"]["camera"].as_u64().expect("a count")).collect();
     assert_eq!(rays[0], 48 * 27);
     assert!(rays[1..].iter().all(|n| *n == 0), "{rays:?}");
-    job.done("render scene.toml --frames 6 -o part/f_#.png");
-    assert!(frames(&job, "part", 6..=6)[0] == all[0]);
-    job.done("render scene.toml --policy off --frames 1..2 -o off/f_#.png");
-    let off = frames(&job, "off", 1..=2);
+    job.done("render scene.toml --frames 6 -o part/f_#.ppm");
+    assert!(pixels(&job, "part/f_6.ppm") == all[0]);
+    job.done("render scene.toml --policy off --frames 1..2 -o off/f_#.ppm");
+    let off = ["off/f_1.ppm", "off/f_2.ppm"].map(|name| pixels(&job, name));
     assert!(off[0] == all[0] && off[1] != all[0]);
 }
 
 #[test]
 fn a_cut_to_another_view_reuses_nothing() {
     let job = Job::new();
-    // Frame 5 is a key frame and alone of what it shows; 8 sees what neither 5 nor 9 sees.
+    // Frame 3 alone stands at another place, which has a floor of its own.
     let pose =
         |at: f64, x: f64| format!("{{ at = {at}, eye = [{x}, 1, 7], target = [{x}, 0, 0] }}");
     let keys: Vec<String> = (0..9)
@@ -148,8 +151,8 @@ fn a_cut_to_another_view_reuses_nothing() {
         .collect();
     scene(&job, &format!("frames = 9\nkeys = [{}]", keys.join(", ")), "");
     let text = fs::read_to_string(job.path("scene.toml")).expect("there");
-    fs::write(job.path("scene.toml"), text.replace("size = [20, 20]", "size = [900, 900]"))
-        .expect("written");
+    let floor = "[[mesh]]\nquad = { centre = [300, -1, 0], normal = 'y', size = [20, 20] }\n";
+    fs::write(job.path("scene.toml"), text + floor).expect("written");
     job.done("render scene.toml --frames 2..3 -o o/f_#.png");
     job.done("render scene.toml --frames 2..3 --policy off -o off/f_#.png");
     let (ours, off) = (frames(&job, "o", 2..=3), frames(&job, "off", 2..=3));

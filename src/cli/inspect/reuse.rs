@@ -1,15 +1,20 @@
 //! What `inspect` tells of reuse between frames.
 
 use super::bytes;
-use crate::effects::EffectPlan;
 use crate::error::{Result, counted};
+use crate::inference::Channels;
 use crate::reuse::{self, Reference};
-use crate::scene::{Policy, Scene, Settings, Shot};
+use crate::scene::{Policy, Settings, Shot};
 use crate::sequence::{Pyramid, Schedule};
+use crate::shade::{FrameJob, Progress, Renderer, Reuse};
+use crate::stats::RayCounts;
 use serde::Serialize;
+use std::sync::atomic::AtomicBool;
 
-/// In an in-between frame about one pixel in so many is traced.
-const TRACED_BETWEEN: u64 = 20;
+/// A reference between key frames takes about one part in so many of a key frame's memory.
+const BETWEEN: u64 = 5;
+/// Longer edge of the small picture that tells how much a key frame's reference takes, pixels.
+const SMALL: u32 = 96;
 
 /// How the frames of the shot come about.
 #[derive(Serialize)]
@@ -40,23 +45,63 @@ struct References {
     bytes: u64,
 }
 
+/// Bytes that a key frame's reference takes: those of a small picture's at the start, the middle or
+/// the end of the shot, whichever is largest, times its pixels.
+fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u64> {
+    let Settings { width, height, .. } = *renderer.settings;
+    let shrink = (width.max(height) / SMALL).max(1);
+    let (w, h) = ((width / shrink).max(1), (height / shrink).max(1));
+    let settings = Settings {
+        width: w,
+        height: h,
+        shadow_samples: 1,
+        sky_samples: 1,
+        ..renderer.settings.clone()
+    };
+    let small = Renderer { settings: &settings, ..*renderer };
+    let mut most = 0;
+    for frame in [1, shot.frames.div_ceil(2), shot.frames] {
+        let camera = shot.camera(frame, w, h)?;
+        let job = FrameJob {
+            camera: &camera,
+            stream: frame,
+            with_gbuffer: false,
+            reuse: Some(Reuse { channels, inference: None }),
+            mask: None,
+            beyond_crop: true,
+        };
+        let traced = small.render_job(&job, &AtomicBool::new(false), &Unseen);
+        let sources = traced.map(|done| done.sources).unwrap_or_default();
+        let camera = camera.to_scene(&renderer.scene.recentring);
+        most = most.max(Reference::new(frame, &camera, &sources, channels.len()).memory());
+    }
+    let larger = f64::from(width) * f64::from(height) / (f64::from(w) * f64::from(h));
+    Ok((most as f64 * larger) as u64)
+}
+
+/// Nobody looks on.
+struct Unseen;
+
+impl Progress for Unseen {
+    fn tile_done(&self, _: f64, _: &RayCounts) {}
+}
+
 impl Plan {
     /// That of rendering the whole shot in one process.
-    pub fn of(scene: &Scene, settings: &Settings, shot: &Shot) -> Result<Self> {
-        let effects = EffectPlan::of(scene, settings);
-        let channels = reuse::channels(scene, &effects, settings).len();
+    pub fn of(renderer: &Renderer, shot: &Shot) -> Result<Self> {
+        let Renderer { scene, settings, plan: effects, .. } = renderer;
+        let channels = reuse::channels(scene, effects, settings);
         let policy = settings.reuse.policy;
         let reasons = match policy {
-            Policy::Surface => reuse::lookup_reasons(scene, &effects, settings),
+            Policy::Surface => reuse::lookup_reasons(scene, effects, settings),
             Policy::Colour | Policy::Off => Vec::new(),
         };
-        let looks_up = policy == Policy::Surface && channels > 0;
+        let looks_up = policy == Policy::Surface && !channels.is_empty();
         let segment = if looks_up { settings.reuse.segment } else { 1 };
         let schedule = Schedule::new(Pyramid { segment, frames: shot.frames }, shot)?;
         let frames: Vec<u32> = (1..=shot.frames).collect();
         let (keys, others) = if looks_up { schedule.most_held(&frames) } else { (0, 0) };
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let size = |traced| Reference::expected_memory(pixels, traced, channels);
+        let key = if keys > 0 { key_bytes(renderer, shot, &channels)? } else { 0 };
         Ok(Self {
             policy,
             segment: if looks_up { segment } else { 0 },
@@ -69,7 +114,7 @@ impl Plan {
             references: References {
                 key_frames: keys,
                 others,
-                bytes: keys as u64 * size(pixels) + others as u64 * size(pixels / TRACED_BETWEEN),
+                bytes: keys as u64 * key + others as u64 * key / BETWEEN,
             },
         })
     }
