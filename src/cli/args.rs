@@ -235,6 +235,10 @@ pub struct OutputArgs {
     /// Frames per second of the video [default: 24]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
     pub fps: Option<f64>,
+    /// Colour policy: take this picture (png, ppm, jpeg, exr) for frame FRAME, and infer others
+    /// from it too; repeatable
+    #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]
+    pub upload: Vec<(u32, PathBuf)>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,

@@ -15,8 +15,9 @@ use crate::intersect::{self, Intersector};
 use crate::output::manifest::beside;
 use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
+use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{self, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
+use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
 use clap::Args;
@@ -157,7 +158,7 @@ impl Frames<'_> {
         interrupt: &Interrupt,
         quiet: bool,
     ) -> Result<(Outcome, u64)> {
-        let Request { scene, settings, shot, pattern, .. } = self.request;
+        let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
         let renderer = Renderer { scene, settings, plan: effects, intersector };
@@ -170,7 +171,17 @@ impl Frames<'_> {
                 maker.with_gbuffer = with_gbuffer;
                 Box::new(maker)
             }
-            Policy::Colour | Policy::Off => {
+            Policy::Colour => {
+                let rule = Rule {
+                    colour_epsilon: settings.reuse.colour_epsilon,
+                    distance_epsilon: settings.reuse.distance_epsilon,
+                };
+                let mut maker =
+                    ColourMaker::new(renderer, shot, pool, stop, &watch, rule, uploads)?;
+                maker.with_gbuffer = with_gbuffer;
+                Box::new(maker)
+            }
+            Policy::Off => {
                 Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress: &watch })
             }
         };

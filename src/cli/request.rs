@@ -1,13 +1,16 @@
 //! What `render` was asked to do, resolved: scene, shot, settings, frames and where they go.
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
+use super::exit::as_input;
 use super::{job, machine, values};
 use crate::error::{Diagnostic, Error, Result};
+use crate::film::Image;
 use crate::import::Loaded;
 use crate::output::manifest::{self, Header};
-use crate::output::{FramePattern, WriteOptions};
-use crate::scene::{FrameRange, IntersectorKind, Scene, Settings, Shot};
-use crate::sequence::{Target, fingerprint};
+use crate::output::{FramePattern, WriteOptions, read_image};
+use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
+use crate::sequence::{Target, check_upload, fingerprint};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Everything that rendering takes.
@@ -32,6 +35,8 @@ pub struct Request {
     pub threads: Option<usize>,
     /// Where the statistics go, if anywhere.
     pub stats: Option<PathBuf>,
+    /// Pictures that are taken for frames.
+    pub uploads: Vec<(u32, Image)>,
     /// What import warns of, and what rounding lost.
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
@@ -53,6 +58,7 @@ impl Request {
         let stats = output.stats.clone().or(loaded.stats);
         refuse_input(stats.as_deref(), &loaded.files)?;
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
+        let uploads = uploads(&output.upload, &shot, &settings)?;
         let scene_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
@@ -68,6 +74,7 @@ impl Request {
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
+            uploads,
             warnings,
             scene_name: path.display().to_string(),
             scene_hash,
@@ -86,6 +93,21 @@ impl Request {
         })
     }
 
+    /// The settings with what decides frames beside them: pictures count by what they show, not by
+    /// their names.
+    fn header_settings(&self) -> Value {
+        let mut settings = Header::settings(&self.settings);
+        let show = |(frame, image): &(u32, Image)| {
+            let hash = blake3::hash(bytemuck::cast_slice(&image.rgb)).to_hex();
+            format!("{frame}={}", &hash[..16])
+        };
+        if !self.uploads.is_empty() {
+            let all: Vec<String> = self.uploads.iter().map(show).collect();
+            settings["reuse"]["upload"] = all.join(" ").into();
+        }
+        settings
+    }
+
     /// Where frames traced by `tracer` go, and what they share.
     pub fn target(&self, tracer: String) -> Target {
         let header = Header {
@@ -96,7 +118,7 @@ impl Request {
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
-            settings: Header::settings(&self.settings),
+            settings: self.header_settings(),
         };
         Target {
             pattern: self.pattern.clone(),
@@ -105,6 +127,23 @@ impl Request {
             overwrite: self.overwrite,
         }
     }
+}
+
+/// Reads the pictures that are uploaded for frames.
+fn uploads(
+    files: &[(u32, PathBuf)],
+    shot: &Shot,
+    settings: &Settings,
+) -> Result<Vec<(u32, Image)>> {
+    if !files.is_empty() && settings.reuse.policy != Policy::Colour {
+        return Err(Error::Usage("--upload needs --policy colour".into()));
+    }
+    let read = |(frame, file): &(u32, PathBuf)| {
+        let image = read_image(file).map_err(as_input)?;
+        check_upload(*frame, &image, shot, settings)?;
+        Ok((*frame, image))
+    };
+    files.iter().map(read).collect()
 }
 
 /// The frames asked for: by option, else by scene file, else all.

@@ -4,6 +4,7 @@ use crate::scene::{FrameRange, Rect};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 /// Frames as asked for; an open end is filled in by the shot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +67,14 @@ pub fn frames(text: &str) -> Result<FrameRequest, String> {
         }
         request => Ok(request),
     }
+}
+
+/// `9=picture.png`: a frame and the picture of it.
+pub fn upload(text: &str) -> Result<(u32, PathBuf), String> {
+    let wrong = || "an upload is written FRAME=FILE, as in 9=picture.png".to_string();
+    let (frame, file) =
+        text.split_once('=').filter(|(_, file)| !file.is_empty()).ok_or_else(wrong)?;
+    Ok((frame.trim().parse().map_err(|_| wrong())?, PathBuf::from(file)))
 }
 
 /// `x0,y0,x1,y1`; the second corner is excluded.
@@ -148,6 +157,14 @@ mod tests {
         assert_eq!(crop("1,2,3,4"), Ok(Rect { x0: 1, y0: 2, x1: 3, y1: 4 }));
         for text in ["3,2,1,4", "1,2,3", "1,2,3,4,5", "a,b,c,d", "1,1,1,1"] {
             assert!(crop(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_upload_names_frame_and_file() {
+        assert_eq!(upload("9=a=b.png"), Ok((9, PathBuf::from("a=b.png"))));
+        for text in ["9", "9=", "=a.png", "x=a.png", "-1=a.png", "a.png"] {
+            assert!(upload(text).is_err(), "{text}");
         }
     }
 

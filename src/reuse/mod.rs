@@ -5,6 +5,7 @@
 //! leaves unknown, and that is traced. Only traced points are sources, so nothing blurs or drifts
 //! however many frames are inferred. All in scene space.
 
+pub mod colour;
 mod cost;
 mod index;
 mod lookup;

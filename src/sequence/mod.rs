@@ -7,6 +7,7 @@
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
+mod colour;
 mod fingerprint;
 mod inferrer;
 mod pyramid;
@@ -14,6 +15,7 @@ mod resume;
 mod schedule;
 mod tracer;
 
+pub use colour::{ColourMaker, check_upload};
 pub use fingerprint::fingerprint;
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;

@@ -209,3 +209,38 @@ fn options_may_stand_in_the_scene_file_and_the_command_line_wins() {
     assert_eq!(job.names("o").len(), 3);
     assert!(job.path("p.png").exists() && job.path("other.json").exists());
 }
+
+#[test]
+fn an_uploaded_picture_is_the_frame_and_decides_the_others() {
+    let job = Job::new();
+    let colour = |rest: &str| small(&format!("--policy colour {rest}"));
+    job.done(&colour("--frames 1..3 -o o/f_##.png"));
+    job.done(&colour("--frames 2 -o p/f_##.png --seed 5"));
+    let upload = "--upload 2=p/f_02.png";
+    job.refused(&colour(&format!("--frames 1..3 -o o/f_##.png {upload}")), "upload was");
+    job.done(&colour(&format!("--frames 1..3 -o q/f_##.png {upload}")));
+    let ran = job.run("compare p/f_02.png q/f_02.png");
+    assert_eq!(ran.code, Some(0), "{}{}", ran.out, ran.err);
+    assert_eq!(job.read("o/f_01.png"), job.read("q/f_01.png"));
+    assert_ne!(job.read("o/f_03.png"), job.read("q/f_03.png"));
+    // Its name does not matter, what it shows does.
+    fs::copy(job.path("p/f_02.png"), job.path("again.png")).expect("copied");
+    let ran = job.done(&colour("--frames 1..3 -o q/f_##.png --upload 2=again.png"));
+    assert!(ran.out.contains("0 rendered, 3 kept"), "{}", ran.out);
+}
+
+#[test]
+fn pictures_that_cannot_be_a_frame_are_refused() {
+    let job = Job::new();
+    job.done(&small("--frames 1 -o o/f_##.png"));
+    let colour = |rest: &str| small(&format!("--policy colour -o p/f_##.png {rest}"));
+    job.refused(&small("--policy off --upload 1=o/f_01.png"), "--upload needs --policy colour");
+    job.refused(&colour("--upload o/f_01.png"), "FRAME=FILE");
+    job.refused(&colour("--upload 999=o/f_01.png"), "frame 999");
+    job.refused(&colour("--upload 1=o/none.png"), "none.png");
+    job.refused(&colour("--upload 1=cube.obj"), "cube.obj");
+    job.refused(&colour("--upload 1=o/f_01.png --upload 1=o/f_01.png"), "two uploaded");
+    job.refused(&colour("--upload 1=o/f_01.png --tone filmic"), "tone curve");
+    fs::write(job.path("a.ppm"), b"P6 1 1 255\nabc").expect("written");
+    job.refused(&colour("--upload 1=a.ppm"), "1x1");
+}

@@ -1,0 +1,224 @@
+//! The source paper's cache: colours of pixels ("Optimized Ray Tracing for Single Scene Renders",
+//! 2023). Kept as a baseline beside the lookup of surface points; never traces.
+//!
+//! What is known of a pixel is a list of entries: frame, colour, distance that the camera ray
+//! travelled. A later frame asks for the nearest entry before it and the nearest after it. Where
+//! their colours agree and their distances agree, the pixel's colour is the interpolation of the two
+//! in time; else the pixel must be traced, which makes a new entry (a *discovery*). Nothing is asked
+//! about surfaces, so what moves through a pixel between two entries unseen is missed, and what
+//! differs by less than the epsilon blurs.
+//!
+//! Where the paper's text is silent, the plainest reading holds:
+//! * Entries of one pixel are compared with each other, since an inferred pixel has no distance of
+//!   its own without tracing it; and only the two around the frame in time, since entries further
+//!   away say less.
+//! * Colours are compared channel by channel in linear radiance, distances by their difference as a
+//!   share of the nearer one. A ray that hits nothing travels infinitely far.
+//! * Only traced pixels and uploaded pictures make entries: what was inferred is no evidence.
+//! * The paper hashes pixels to lists. Here the entries lie frame by frame, so that those of a frame
+//!   that is not needed any more can be dropped; what is found is the same.
+
+use crate::film::{PixelSource, Provenance};
+use crate::math::Rgb;
+
+/// When two entries of a pixel agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rule {
+    /// Largest difference in any channel, linear radiance.
+    pub colour_epsilon: f32,
+    /// Largest difference of the distances, as a share of the nearer one.
+    pub distance_epsilon: f32,
+}
+
+/// What is known of a pixel in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// Which pixel, counted row by row.
+    pub pixel: u32,
+    /// Linear radiance.
+    pub rgb: Rgb,
+    /// From the eye to the first hit, world units; infinite where nothing is hit, NaN where it is
+    /// not known, which agrees with any distance.
+    pub distance: f32,
+}
+
+/// What is known of one frame: all of it, or its discoveries.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Known {
+    /// Its number, from 1.
+    pub frame: u32,
+    /// Each pixel at most once.
+    pub entries: Vec<Entry>,
+}
+
+/// An inferred pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inferred {
+    /// Linear radiance.
+    pub rgb: Rgb,
+    /// Frame of the entry before; the frame itself where that is known.
+    pub before: u32,
+    /// Frame of the entry after; the frame itself where that is known.
+    pub after: u32,
+}
+
+impl Rule {
+    /// Whether `a` and `b` agree.
+    pub fn agree(&self, a: &Entry, b: &Entry) -> bool {
+        let apart = (a.rgb - b.rgb).abs().max_element();
+        // What is not finite agrees with nothing, however large the epsilon.
+        apart.is_finite() && apart <= self.colour_epsilon && self.distances_agree(a, b)
+    }
+
+    fn distances_agree(&self, a: &Entry, b: &Entry) -> bool {
+        let (a, b) = (a.distance, b.distance);
+        let unknown = a.is_nan() || b.is_nan();
+        unknown || a == b || distance_difference(a, b) <= self.distance_epsilon
+    }
+
+    /// What `known`, in any order, tells of the `pixels` pixels of `frame`; `None` where a pixel
+    /// must be traced.
+    pub fn infer(&self, known: &[&Known], frame: u32, pixels: usize) -> Vec<Option<Inferred>> {
+        let before = nearest(known.iter().filter(|k| k.frame <= frame), frame, pixels);
+        let after = nearest(known.iter().filter(|k| k.frame >= frame), frame, pixels);
+        let pairs = before.into_iter().zip(after);
+        pairs.map(|(before, after)| self.between(before?, after?, frame)).collect()
+    }
+
+    fn between(
+        &self,
+        (before, a): (u32, &Entry),
+        (after, b): (u32, &Entry),
+        frame: u32,
+    ) -> Option<Inferred> {
+        let step = (frame - before) as f32 / (after - before).max(1) as f32;
+        // Equal colours stay what they are to the last bit.
+        let rgb = a.rgb + (b.rgb - a.rgb) * step;
+        self.agree(a, b).then_some(Inferred { rgb, before, after })
+    }
+}
+
+/// Difference of two distances as a share of the nearer one; infinite where only one hits.
+pub fn distance_difference(a: f32, b: f32) -> f32 {
+    if a == b { 0.0 } else { (a - b).abs() / a.min(b) }
+}
+
+/// For each pixel the entry nearest to `frame` in time, with its frame.
+fn nearest<'a>(
+    known: impl Iterator<Item = &'a &'a Known>,
+    frame: u32,
+    pixels: usize,
+) -> Vec<Option<(u32, &'a Entry)>> {
+    let mut known: Vec<&Known> = known.copied().collect();
+    known.sort_by_key(|k| std::cmp::Reverse(k.frame.abs_diff(frame)));
+    let mut nearest = vec![None; pixels];
+    for (k, entry) in known.iter().flat_map(|k| k.entries.iter().map(move |e| (k.frame, e))) {
+        nearest[entry.pixel as usize] = Some((k, entry));
+    }
+    nearest
+}
+
+impl Inferred {
+    /// Where the pixel comes from, as `frame` sees it. A pixel of a frame that was known from the
+    /// start is neither traced nor inferred.
+    pub fn source(&self, frame: u32) -> PixelSource {
+        let Self { before, after, .. } = *self;
+        if before == frame {
+            return PixelSource::default();
+        }
+        let nearer = if frame - before <= after - frame { before } else { after };
+        PixelSource { provenance: Provenance::Both, frame: nearer, distance: 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULE: Rule = Rule { colour_epsilon: 0.1, distance_epsilon: 0.25 };
+
+    fn known(frame: u32, pixels: &[(u32, f32, f32)]) -> Known {
+        let entry = |&(pixel, grey, distance)| Entry { pixel, rgb: Rgb::splat(grey), distance };
+        Known { frame, entries: pixels.iter().map(entry).collect() }
+    }
+
+    /// What frame 3 has at pixel 0, known in frames 1 and 5.
+    fn middle(rule: Rule, a: (f32, f32), b: (f32, f32)) -> Option<f32> {
+        let (a, b) = (known(1, &[(0, a.0, a.1)]), known(5, &[(0, b.0, b.1)]));
+        rule.infer(&[&a, &b], 3, 1)[0].map(|i| i.rgb.x)
+    }
+
+    #[test]
+    fn colours_and_distances_must_agree_both() {
+        assert_eq!(middle(RULE, (0.5, 4.0), (0.5625, 5.0)), Some(0.53125));
+        assert_eq!(middle(RULE, (0.5, 4.0), (0.61, 4.0)), None);
+        assert_eq!(middle(RULE, (0.5, 4.0), (0.5, 5.1)), None);
+        assert_eq!(middle(RULE, (0.5, 5.1), (0.5, 4.0)), None);
+    }
+
+    #[test]
+    fn one_channel_is_enough_to_disagree() {
+        let entry = |rgb| Entry { pixel: 0, rgb, distance: 1.0 };
+        let (grey, bluish) = (Rgb::splat(0.5), Rgb::new(0.5, 0.5, 0.7));
+        assert!(!RULE.agree(&entry(grey), &entry(bluish)));
+    }
+
+    #[test]
+    fn the_sky_agrees_with_itself_only_and_the_unknown_with_all() {
+        let (sky, unknown) = (f32::INFINITY, f32::NAN);
+        assert!(middle(RULE, (0.5, sky), (0.5, sky)).is_some());
+        assert!(middle(RULE, (0.5, sky), (0.5, 4.0)).is_none());
+        for distance in [sky, unknown, 4.0] {
+            assert!(middle(RULE, (0.5, unknown), (0.5, distance)).is_some());
+            assert!(middle(RULE, (0.5, unknown), (0.7, distance)).is_none());
+        }
+    }
+
+    #[test]
+    fn no_epsilon_asks_for_equality_and_an_infinite_one_for_finite_numbers() {
+        let none = Rule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
+        assert_eq!(middle(none, (0.3, 4.0), (0.3, 4.0)), Some(0.3));
+        assert_eq!(middle(none, (0.3, 4.0), (0.300_001, 4.0)), None);
+        assert_eq!(middle(none, (0.3, 4.0), (0.3, 4.000_001)), None);
+        let all = Rule { colour_epsilon: f32::INFINITY, distance_epsilon: f32::INFINITY };
+        assert_eq!(middle(all, (0.0, 4.0), (9.0, f32::INFINITY)), Some(4.5));
+        for odd in [f32::NAN, f32::INFINITY] {
+            assert_eq!(middle(all, (odd, 4.0), (0.0, 4.0)), None);
+            assert_eq!(middle(all, (odd, 4.0), (odd, 4.0)), None);
+        }
+    }
+
+    #[test]
+    fn the_nearest_entries_count_whatever_their_order() {
+        // Frame 4 knows pixel 1 only; pixel 2 is known on one side only.
+        let frames = [
+            known(1, &[(0, 0.0, 1.0), (1, 0.0, 1.0), (2, 0.0, 1.0)]),
+            known(4, &[(1, 1.0, 1.0)]),
+            known(9, &[(0, 0.08, 1.0), (1, 1.04, 1.0)]),
+        ];
+        for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
+            let list = order.map(|i| &frames[i]);
+            let found = RULE.infer(&list, 5, 3);
+            let at = |i: usize| found[i].map(|f| (f.rgb.x, f.before, f.after));
+            assert_eq!(at(0), Some((0.04, 1, 9)));
+            assert_eq!(at(1).map(|f| (f.1, f.2)), Some((4, 9)));
+            assert!((at(1).expect("inferred").0 - 1.008).abs() < 1e-6);
+            assert_eq!(at(2), None);
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_known_is_itself() {
+        let frames = [known(1, &[(0, 0.0, 1.0)]), known(2, &[(0, 9.0, f32::NAN)])];
+        let found = RULE.infer(&[&frames[0], &frames[1]], 2, 1)[0].expect("known");
+        assert_eq!((found.rgb.x, found.source(2)), (9.0, PixelSource::default()));
+    }
+
+    #[test]
+    fn the_nearer_frame_is_named() {
+        let inferred = Inferred { rgb: Rgb::ZERO, before: 1, after: 9 };
+        let source = |frame| inferred.source(frame);
+        assert_eq!((source(3).frame, source(7).frame), (1, 9));
+        assert_eq!(source(3).provenance, Provenance::Both);
+    }
+}

@@ -1,0 +1,294 @@
+//! The maker of policy `colour`, the source paper's algorithm: frames from the colours that other
+//! frames have at the same pixels ([`reuse::colour`](crate::reuse::colour)).
+//!
+//! The samples are the first and the last frame of the shot, traced, and the pictures that somebody
+//! uploads, which are taken as they are. The frames between are made in the order of the pyramid
+//! over the whole shot: the middle one from both ends, then the quarters, and so on. The paper's
+//! ranks make their frames side by side and send each other what they discover, so that there a
+//! frame depends on who was faster. Here it depends on its own ancestors and on nothing else, and a
+//! frame that is asked for alone has these made first.
+//!
+//! Not done: ranks do not send each other discoveries, each makes the ancestors that it needs. First
+//! hits of inferred pixels are not known: their records say that nothing is hit. What a scene names
+//! as always traced may be inferred: an inferred pixel does not know what it shows.
+
+use super::pyramid::Pyramid;
+use super::{FrameMaker, Made};
+use crate::error::{Error, Result};
+use crate::film::{Encoding, Film, Image, PixelSource, Provenance};
+use crate::math::{Rgb, srgb_decode};
+use crate::reuse::colour::{Entry, Inferred, Known, Rule};
+use crate::scene::{Camera, Rect, Settings, Shot, ToneCurve};
+use crate::shade::{FrameJob, Progress, Rendered, Renderer};
+use crate::stats::ReuseCounts;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Infers frames from colours.
+pub struct ColourMaker<'a> {
+    /// What traces.
+    pub renderer: Renderer<'a>,
+    /// Where the camera is when.
+    pub shot: &'a Shot,
+    /// The threads that render.
+    pub pool: &'a rayon::ThreadPool,
+    /// Whether films get their first-hit records.
+    pub with_gbuffer: bool,
+    /// Set when the job shall stop.
+    pub stop: &'a AtomicBool,
+    /// Hears of finished tiles.
+    pub progress: &'a dyn Progress,
+    /// When cached colours agree.
+    pub rule: Rule,
+    pyramid: Pyramid,
+    uploads: Vec<Known>,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    /// Frames that are still to come.
+    to_come: BTreeSet<u32>,
+    /// What the frames so far discovered, as far as it is still needed.
+    known: BTreeMap<u32, Arc<Known>>,
+    /// The most that all of it took at a time, bytes.
+    most_memory: u64,
+}
+
+impl<'a> ColourMaker<'a> {
+    /// A maker of frames of `shot`, which takes `uploads` for the frames that they name.
+    ///
+    /// # Errors
+    /// [`check_upload`]'s, and a frame that has two `uploads`.
+    #[allow(clippy::too_many_arguments, reason = "each is a field")]
+    pub fn new(
+        renderer: Renderer<'a>,
+        shot: &'a Shot,
+        pool: &'a rayon::ThreadPool,
+        stop: &'a AtomicBool,
+        progress: &'a dyn Progress,
+        rule: Rule,
+        uploads: &[(u32, Image)],
+    ) -> Result<Self> {
+        let mut seen = BTreeSet::new();
+        let mut known = Vec::new();
+        for (frame, image) in uploads {
+            check_upload(*frame, image, shot, renderer.settings)?;
+            if !seen.insert(*frame) {
+                return Err(Error::Usage(format!("frame {frame} has two uploaded pictures")));
+            }
+            known.push(known_of_upload(*frame, image, renderer.settings));
+        }
+        Ok(Self {
+            renderer,
+            shot,
+            pool,
+            with_gbuffer: false,
+            stop,
+            progress,
+            rule,
+            pyramid: Pyramid { segment: (shot.frames - 1).max(1), frames: shot.frames },
+            uploads: known,
+            state: Mutex::default(),
+        })
+    }
+
+    /// Makes `frame` from what its ancestors know, which are made first where they are not at hand;
+    /// gives its discoveries too.
+    fn frame(&self, frame: u32) -> Result<Option<(Made, Known)>> {
+        let mut ancestors = Vec::new();
+        for other in self.pyramid.ancestors(frame) {
+            match self.known(other)? {
+                Some(known) => ancestors.push(known),
+                None => return Ok(None),
+            }
+        }
+        let known: Vec<&Known> = ancestors.iter().map(|k| &**k).chain(&self.uploads).collect();
+        let settings = self.renderer.settings;
+        let camera = self.shot.camera(frame, settings.width, settings.height)?;
+        let pixels = settings.width as usize * settings.height as usize;
+        let inferred = self.rule.infer(&known, frame, pixels);
+        let Some(mut traced) = self.trace(frame, &camera, &inferred) else { return Ok(None) };
+        let discoveries = discoveries(frame, &traced.film, &inferred, &camera, settings);
+        let reuse = fill(&mut traced.film, frame, &inferred, settings);
+        if !self.with_gbuffer {
+            traced.film.gbuffer = None;
+        }
+        Ok(Some((Made { film: traced.film, rays: traced.rays, reuse }, discoveries)))
+    }
+
+    /// Traces what could not be inferred.
+    fn trace(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        inferred: &[Option<Inferred>],
+    ) -> Option<Rendered> {
+        let mask: Vec<bool> = inferred.iter().map(Option::is_none).collect();
+        let job = FrameJob {
+            camera,
+            stream: frame,
+            // Distances come from it.
+            with_gbuffer: true,
+            reuse: None,
+            mask: Some(&mask),
+            beyond_crop: false,
+        };
+        self.pool.install(|| self.renderer.render_job(&job, self.stop, self.progress))
+    }
+
+    /// What `frame` discovered; makes it where nobody did.
+    fn known(&self, frame: u32) -> Result<Option<Arc<Known>>> {
+        if let Some(found) = self.with_state(|s| s.known.get(&frame).cloned()) {
+            return Ok(Some(found));
+        }
+        let Some((_, known)) = self.frame(frame)? else { return Ok(None) };
+        Ok(Some(self.keep(known)))
+    }
+
+    fn keep(&self, known: Known) -> Arc<Known> {
+        let known = Arc::new(known);
+        self.with_state(|s| {
+            s.known.insert(known.frame, Arc::clone(&known));
+            s.most_memory = s.most_memory.max(memory(s.known.values().map(|k| &**k)));
+        });
+        known
+    }
+
+    /// Drops what no frame to come is inferred from.
+    fn forget(&self, done: u32) {
+        self.with_state(|s| {
+            s.to_come.remove(&done);
+            let ancestors = |frame: &u32| self.pyramid.ancestors(*frame);
+            let needed: BTreeSet<u32> = s.to_come.iter().flat_map(ancestors).collect();
+            s.known.retain(|frame, _| needed.contains(frame));
+        });
+    }
+
+    fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
+        act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl FrameMaker for ColourMaker<'_> {
+    fn make(&self, frame: u32) -> Result<Option<Made>> {
+        let Some((made, known)) = self.frame(frame)? else { return Ok(None) };
+        self.keep(known);
+        self.forget(frame);
+        Ok(Some(made))
+    }
+
+    /// First and last frame, then each between after its ancestors.
+    fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
+        let mut ordered = self.pyramid.order(frames);
+        ordered.sort_by_key(|frame| !self.pyramid.is_key(*frame));
+        ordered.into_iter().map(|frame| vec![frame]).collect()
+    }
+
+    fn expect(&self, frames: &[u32]) {
+        self.with_state(|s| s.to_come.extend(frames));
+    }
+
+    fn reference_memory(&self) -> u64 {
+        memory(&self.uploads) + self.with_state(|s| s.most_memory)
+    }
+}
+
+/// Bytes that entries take.
+fn memory<'k>(known: impl IntoIterator<Item = &'k Known>) -> u64 {
+    known.into_iter().map(|k| size_of_val(&k.entries[..]) as u64).sum()
+}
+
+/// Whether `image` can stand for frame `frame`.
+///
+/// # Errors
+/// [`Error::Usage`]: no such frame in the shot, another size than the job's, or display values of
+/// a tone curve that cannot be undone.
+pub fn check_upload(frame: u32, image: &Image, shot: &Shot, settings: &Settings) -> Result<()> {
+    if !(1..=shot.frames).contains(&frame) {
+        let count = shot.frames;
+        return Err(Error::Usage(format!(
+            "a picture is uploaded for frame {frame}, but the shot has frames 1..{count}"
+        )));
+    }
+    let (width, height) = (settings.width, settings.height);
+    if (image.width, image.height) != (width, height) {
+        return Err(Error::Usage(format!(
+            "the picture uploaded for frame {frame} has {}x{} pixels, the frames have \
+             {width}x{height}",
+            image.width, image.height
+        )));
+    }
+    if image.encoding == Encoding::Srgb && settings.tone != ToneCurve::Srgb {
+        return Err(Error::Usage(format!(
+            "the picture uploaded for frame {frame} holds display values, which stand for radiance \
+             only under the tone curve srgb\n  help: upload an exr, or choose --tone srgb"
+        )));
+    }
+    Ok(())
+}
+
+/// An uploaded picture as entries: display values become radiance again, distances are not known.
+fn known_of_upload(frame: u32, image: &Image, settings: &Settings) -> Known {
+    let decode = |v: f32| (srgb_decode(f64::from(v)) / f64::from(settings.exposure)) as f32;
+    let radiance = |c: &Rgb| match image.encoding {
+        Encoding::Linear => *c,
+        Encoding::Srgb => Rgb::new(decode(c.x), decode(c.y), decode(c.z)),
+    };
+    let entry = |(pixel, c)| Entry { pixel, rgb: radiance(c), distance: f32::NAN };
+    Known { frame, entries: (0..).zip(&image.rgb).map(entry).collect() }
+}
+
+/// The pixels of the film that were traced, as entries.
+fn discoveries(
+    frame: u32,
+    film: &Film,
+    inferred: &[Option<Inferred>],
+    camera: &Camera,
+    settings: &Settings,
+) -> Known {
+    let mut entries = Vec::new();
+    for (x, y) in pixels_of(settings) {
+        let index = film.index(x, y);
+        if inferred[index].is_none() {
+            let depth = film.gbuffer.as_ref().map_or(f32::NAN, |g| g.depth[index]);
+            let middle = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            // Rounding can put a hit at the eye itself a little behind it.
+            let distance = (f64::from(depth) / middle.dot(camera.forward)).max(0.0) as f32;
+            entries.push(Entry { pixel: index as u32, rgb: film.rgb[index], distance });
+        }
+    }
+    Known { frame, entries }
+}
+
+/// Puts inferred pixels into the film, and says of each pixel where it comes from.
+fn fill(
+    film: &mut Film,
+    frame: u32,
+    inferred: &[Option<Inferred>],
+    settings: &Settings,
+) -> ReuseCounts {
+    let mut counts = ReuseCounts::default();
+    let mut sources = vec![PixelSource::default(); film.rgb.len()];
+    for (x, y) in pixels_of(settings) {
+        let index = film.index(x, y);
+        counts.direct += 1;
+        if let Some(known) = &inferred[index] {
+            film.rgb[index] = known.rgb;
+            sources[index] = known.source(frame);
+            counts.direct_inferred += 1;
+        } else {
+            sources[index].provenance = Provenance::Traced;
+        }
+    }
+    film.sources = Some(sources);
+    counts
+}
+
+/// The pixels that are wanted, row by row.
+fn pixels_of(settings: &Settings) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let full = Rect { x0: 0, y0: 0, x1: settings.width, y1: settings.height };
+    let Rect { x0, y0, x1, y1 } = settings.crop.unwrap_or(full);
+    (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
+}
