@@ -78,6 +78,17 @@ impl BlockPixels {
                 }
             }
         }
+        self.start_places(seed, frame);
+    }
+
+    /// Starts the pixels at `places` of the image, which need not be neighbours.
+    pub fn start_scattered(&mut self, places: &[(u32, u32)], seed: u64, frame: u32) {
+        self.places.clear();
+        self.places.extend_from_slice(places);
+        self.start_places(seed, frame);
+    }
+
+    fn start_places(&mut self, seed: u64, frame: u32) {
         self.film_samplers.clear();
         self.samplers.clear();
         for (x, y) in &self.places {
@@ -109,10 +120,11 @@ impl BlockPixels {
         ((y % BLOCK) * BLOCK + x % BLOCK) as usize
     }
 
-    /// Notes where the light of a pixel's surface point comes from; `None` where it was traced.
-    pub fn set_origin(&mut self, pixel: u32, origin: Option<&Origin>) {
+    /// Notes where the light of a pixel's surface point comes from, `None` where it was traced, and
+    /// how far it is from sure.
+    pub fn set_origin(&mut self, pixel: u32, origin: Option<&Origin>, risk: f32) {
         let source = match origin {
-            None => PixelSource { provenance: Provenance::Traced, ..PixelSource::default() },
+            None => PixelSource { provenance: Provenance::Traced, risk, ..PixelSource::default() },
             Some(o) => PixelSource {
                 provenance: match (o.earlier, o.later) {
                     (true, true) => Provenance::Both,
@@ -121,6 +133,7 @@ impl BlockPixels {
                 },
                 frame: o.frame,
                 distance: o.distance,
+                risk,
             },
         };
         self.sources[pixel as usize].join(&source);
