@@ -26,8 +26,9 @@ pub struct PixelSource {
     pub frame: u32,
     /// Weighted mean distance to the samples that gave it, in footprints of a pixel.
     pub distance: f32,
-    /// How far its ratios are from sure, in [0, 1]: the greatest `4r(1 - r)` of any light's ratio r.
-    /// 0 in full light and full shadow, 1 in the middle of a penumbra.
+    /// How far its radiance may be off: over its lights, the sum of √(r(1 - r)) times the radiance
+    /// that a light would give unshadowed, where r is the ratio of it that arrives. 0 in full light
+    /// and full shadow.
     pub risk: f32,
 }
 
@@ -35,7 +36,7 @@ impl PixelSource {
     /// Takes in another surface point of the pixel: one traced point makes the pixel traced.
     pub fn join(&mut self, other: &Self) {
         use Provenance::{Background, Both, Traced};
-        self.risk = self.risk.max(other.risk);
+        self.risk += other.risk;
         self.provenance = match (self.provenance, other.provenance) {
             (Background, p) | (p, Background) => p,
             (Traced, _) | (_, Traced) => Traced,

@@ -148,14 +148,6 @@ impl Groups {
         gathered.all += all;
     }
 
-    /// The greatest risk of any ratio of surface point `i`, known or traced.
-    fn risk(&self, i: usize, channels: usize) -> f32 {
-        let range = i * channels..(i + 1) * channels;
-        let known = self.asked.ratios[range.clone()].iter().map(|r| risk_of(*r));
-        let traced = self.gathered[range].iter().map(|g| risk_of((g.open / g.all) as f32));
-        known.chain(traced).fold(0.0, f32::max)
-    }
-
     /// Moves what was traced to `sources`, counts, and tells each pixel where its light is from.
     pub fn finish(
         &mut self,
@@ -175,7 +167,7 @@ impl Groups {
             *lit += 1;
             *inferred += u64::from(!self.traced[i]);
             let origin = (!self.traced[i]).then_some(&self.asked.origins[i]);
-            pixels.set_origin(self.pixels[i], origin, self.risk(i, channels));
+            pixels.set_origin(self.pixels[i], origin);
             if self.traced[i] {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });
@@ -184,11 +176,6 @@ impl Groups {
             }
         }
     }
-}
-
-/// How far a ratio is from sure shadow and sure light, in [0, 1]; 0 where there is none.
-fn risk_of(ratio: f32) -> f32 {
-    (4.0 * ratio * (1.0 - ratio)).max(0.0)
 }
 
 fn is_one_surface(a: &SurfacePoint, b: &SurfacePoint) -> bool {

@@ -336,6 +336,7 @@ impl Renderer<'_> {
                 s.groups.note_lit(i);
                 let light = point.weight * irradiance * ratio;
                 pixels.add(point.place.pixel, point.place.sample, light);
+                pixels.note_risk(point.place.pixel, point.weight * irradiance, ratio);
             }
         }
         wanted
@@ -392,6 +393,7 @@ impl Renderer<'_> {
                 let ratio = (open / all) as f32;
                 let light = point.weight * span.unshadowed * ratio;
                 pixels.add(point.place.pixel, point.place.sample, light);
+                pixels.note_risk(point.place.pixel, point.weight * span.unshadowed, ratio);
             }
         }
     }
