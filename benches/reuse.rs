@@ -48,6 +48,7 @@ fn main() {
         sky_samples: if loaded.settings.sky_samples > 0 { samples } else { 0 },
         ..loaded.settings.clone()
     };
+    let flat = Settings { bounces: 0, ..settings.clone() };
     let best = Settings { shadow_samples: 1024, sky_samples: 1024, ..settings.clone() };
     let scene = world.into_scene(true).expect("a scene");
     let intersector = EmbreeIntersector::new(&scene, settings.rules, None, 4).expect("a BVH");
@@ -61,8 +62,8 @@ fn main() {
     };
     let frames: Vec<u32> = (1..=shot.frames).collect();
     let pyramid = Pyramid { segment: var("SEGMENT", 64), frames: shot.frames };
-    let mut maker =
-        Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid, &frames);
+    let mut maker = Inferrer::new(renderer(&settings), &shot, &pool, &stop, &Quiet, pyramid);
+    maker.expect(&frames);
     let e = &mut maker.evidence;
     e.least_weight = var("LEAST", e.least_weight);
     e.enough_weight = var("ENOUGH", e.enough_weight);
@@ -72,6 +73,8 @@ fn main() {
     e.coarser = var("COARSER", e.coarser);
     e.tolerance = var("TOL", e.tolerance);
     e.noise = var("NOISE", e.noise);
+    e.alone = var("ALONE", e.alone);
+    e.alone_saturated = var("ALONES", e.alone_saturated);
     let every: u32 = var("EVERY", 4);
     let order = pyramid.order(&frames);
     let (mut lit, mut spec) = ((0, 0), (0, 0));
@@ -121,6 +124,74 @@ fn main() {
             1e3 * seconds,
             1e3 * traced_time,
         );
+        if std::env::var("PROBE").is_ok() {
+            use tweenray::inference::*;
+            use tweenray::reuse::*;
+            struct Tell<'a>(Lookup<'a>);
+            impl Inference for Tell<'_> {
+                fn infer(&self, q: &mut Questions) {
+                    self.0.infer(q);
+                    for (i, p) in q.points.iter().enumerate() {
+                        let c = self.0.rays.len();
+                        println!("   {p:?} -> {:?} {:?}", &q.ratios[i * c..(i + 1) * c], q.origins[i]);
+                    }
+                }
+            }
+            let channels = channels(&scene, &renderer(&settings).plan, &settings);
+            let rays = vec![settings.shadow_samples; channels.len()];
+            let reference = |f: u32| {
+                let camera = shot.camera(f, settings.width, settings.height).expect("camera");
+                let reuse = Some(tweenray::shade::Reuse { channels: &channels, inference: None });
+                let job = FrameJob { camera: &camera, stream: f, with_gbuffer: false, reuse, mask: None };
+                let made = pool.install(|| renderer(&settings).render_job(&job, &stop, &Quiet)).expect("x");
+                Reference::new(f, &camera.to_scene(&scene.recentring), &made.sources, channels.len())
+            };
+            let (a, b) = (reference(1), reference(shot.frames));
+            let refs = [&a, &b];
+            let mut worst: Vec<(f32, usize)> = (0..truth.rgb.len())
+                .map(|i| (made.film.rgb[i].distance(truth.rgb[i]), i))
+                .collect();
+            worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+            for (error, i) in &worst[..12] {
+                println!("pixel {},{}: {error} {:?} {:?}", i % settings.width as usize, i / settings.width as usize, made.film.rgb[*i], truth.rgb[*i]);
+                let mut mask = vec![false; truth.rgb.len()];
+                mask[*i] = true;
+                let tell = Tell(Lookup { frame, references: &refs, rays: &rays, evidence: maker.evidence });
+                for inference in [Some(&tell as &dyn Inference), None] {
+                    let reuse = Some(tweenray::shade::Reuse { channels: &channels, inference });
+                    let job = FrameJob { camera: &camera, stream: frame, with_gbuffer: false, reuse, mask: Some(&mask) };
+                    let r = renderer(&settings).render_job(&job, &stop, &Quiet).expect("x");
+                    let c = channels.len();
+                    for (k, p) in r.sources.points.iter().enumerate() {
+                        println!("     traced {:?} {:?}", p.point.p, &r.sources.ratios[k * c..(k + 1) * c]);
+                    }
+                }
+            }
+        }
+        if std::env::var("SPLIT").is_ok() {
+            let plain: Film = pool
+                .install(|| {
+                    renderer(&flat).render(&camera, frame, false, &stop, &Quiet).expect("x").0
+                });
+            let display = |x: f32| 255.0 * srgb_encode(f64::from(x.clamp(0.0, 1.0)));
+            let mut sums = std::collections::BTreeMap::new();
+            for i in 0..truth.rgb.len() {
+                let specular = plain.rgb[i].distance(traced.rgb[i]) > 0.05;
+                let provenance = made.film.sources.as_ref().expect("s")[i].provenance;
+                let error = |f: &Film| {
+                    let pairs = f.rgb[i].to_array().into_iter().zip(truth.rgb[i].to_array());
+                    pairs.map(|(a, b)| (display(a) - display(b)).powi(2)).sum::<f64>() / 3.0
+                };
+                let entry = sums.entry((specular, provenance as u8)).or_insert((0, 0.0, 0.0, 0.0f64));
+                entry.0 += 1;
+                entry.1 += error(&made.film);
+                entry.2 += error(&traced);
+                entry.3 = entry.3.max(error(&made.film));
+            }
+            for ((specular, provenance), (n, a, b, most)) in sums {
+                println!("    specular {specular:5} provenance {provenance}: {n:6} pixels, squared error {a:9.0} against {b:9.0}; worst {:.1}", most.sqrt());
+            }
+        }
         if std::env::var("DUMP").is_ok() {
             use tweenray::output::{WriteOptions, write_image};
             let o = WriteOptions::of(&settings, None);

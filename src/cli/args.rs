@@ -2,7 +2,9 @@
 
 use super::values::{self, FrameRequest};
 use crate::import::{LoadOptions, UpAxis};
-use crate::scene::{Filter, IntersectorKind, Recheck, Rect, Settings, ToneCurve, limits};
+use crate::scene::{
+    Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings, ToneCurve, limits,
+};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -84,7 +86,45 @@ pub struct SettingArgs {
     pub seed: Option<u64>,
 
     #[command(flatten)]
+    pub reuse: ReuseArgs,
+
+    #[command(flatten)]
     pub tracing: TracingArgs,
+}
+
+/// What frames take over from one another.
+#[derive(Debug, Default, Clone, Args)]
+pub struct ReuseArgs {
+    /// What frames take over from one another: shadowing at surface points, with evidence; the colours
+    /// of pixels; or nothing [default: surface]
+    #[arg(long, value_name = "POLICY", help_heading = "Reuse",
+        value_parser = values::choice::<Policy>(&["surface", "colour", "off"]))]
+    pub policy: Option<Policy>,
+    /// Frames from one key frame to the next [default: 64]
+    #[arg(long, value_name = "FRAMES", help_heading = "Reuse",
+        allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SEGMENT))]
+    pub segment: Option<u32>,
+    /// By how many display steps (1/255) samples may disagree beyond their noise and still stand for
+    /// one another: less is more exact and slower [default: 1]
+    #[arg(long, value_name = "STEPS", help_heading = "Reuse",
+        allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
+    pub tolerance: Option<f32>,
+    /// Share of a frame's cost that goes into measuring its error [default: 0.03]
+    #[arg(long, value_name = "SHARE", help_heading = "Reuse",
+        allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
+    pub audit: Option<f32>,
+    /// Trace what is inferred with a larger measured error, display steps of 1/255 [default: no bound]
+    #[arg(long, value_name = "STEPS", help_heading = "Reuse",
+        allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
+    pub max_rmse: Option<f32>,
+    /// Colour policy: cached colours agree within this linear difference [default: 0.02]
+    #[arg(long, value_name = "DIFFERENCE", help_heading = "Reuse",
+        allow_negative_numbers = true, value_parser = values::within_f32(limits::AMOUNT))]
+    pub colour_epsilon: Option<f32>,
+    /// Colour policy: cached distances agree within this share of the distance [default: 0.02]
+    #[arg(long, value_name = "SHARE", help_heading = "Reuse",
+        allow_negative_numbers = true, value_parser = values::within_f32(limits::AMOUNT))]
+    pub distance_epsilon: Option<f32>,
 }
 
 /// What traces, and by which rules.
@@ -137,7 +177,22 @@ impl SettingArgs {
         put(&mut s.bounces, self.bounces);
         put(&mut s.cutoff, self.cutoff);
         put(&mut s.seed, self.seed);
+        self.reuse.apply(&mut s.reuse);
         self.tracing.apply(s);
+    }
+}
+
+impl ReuseArgs {
+    fn apply(&self, s: &mut ReuseSettings) {
+        put(&mut s.policy, self.policy);
+        put(&mut s.segment, self.segment);
+        put(&mut s.tolerance, self.tolerance);
+        put(&mut s.audit, self.audit);
+        if self.max_rmse.is_some() {
+            s.max_rmse = self.max_rmse;
+        }
+        put(&mut s.colour_epsilon, self.colour_epsilon);
+        put(&mut s.distance_epsilon, self.distance_epsilon);
     }
 }
 

@@ -15,8 +15,8 @@ use crate::intersect::{self, Intersector};
 use crate::output::manifest::beside;
 use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
-use crate::scene::Settings;
-use crate::sequence::{self, Plan, Target, Tracer};
+use crate::scene::{Policy, Settings};
+use crate::sequence::{self, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
 use crate::shade::Renderer;
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -157,18 +157,23 @@ impl Frames<'_> {
         let Request { scene, settings, shot, pattern, .. } = self.request;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
-        let tracer = Tracer {
-            renderer: Renderer { scene, settings, plan: effects, intersector },
-            shot,
-            pool: self.pool,
-            with_gbuffer: pattern.format() == Format::Exr,
-            stop: &interrupt.stop,
-            progress: &watch,
+        let renderer = Renderer { scene, settings, plan: effects, intersector };
+        let with_gbuffer = pattern.format() == Format::Exr;
+        let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
+        let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
+            Policy::Surface => {
+                let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
+                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid);
+                maker.with_gbuffer = with_gbuffer;
+                Box::new(maker)
+            }
+            Policy::Colour | Policy::Off => {
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress: &watch })
+            }
         };
-        let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
         let done = |report: &_| watch.frame_done(report);
         let outcome =
-            interrupt.watched(|| cluster::render(world, target, plan, &tracer, stop, &done));
+            interrupt.watched(|| cluster::render(world, target, plan, &*maker, stop, &done));
         watch.finish();
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.

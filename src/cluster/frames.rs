@@ -6,7 +6,6 @@ use crate::output::manifest::{Manifest, manifest_path, part_path};
 use crate::sequence::{self, FrameMaker, FrameReport, Plan, Target};
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What became of a plan, known on rank 0.
@@ -27,8 +26,8 @@ enum Note {
     Stop,
 }
 
-/// Renders `plan.render`: each rank a contiguous run of it, its rows in its own journal; rank 0
-/// joins the journals. `done` hears on rank 0 of every finished frame of any rank. A rank on which
+/// Renders `plan.render`: each rank a contiguous run of the maker's batches, its rows in its own
+/// journal; rank 0 joins the journals. `done` hears on rank 0 of every finished frame of any rank. A rank on which
 /// `stop` was set tells the others, which stop after the frame in flight. All ranks call it.
 ///
 /// Errors are this rank's own; other ranks may still be at work, and [`World::abort`] ends them.
@@ -45,7 +44,8 @@ pub fn render(
         0 => manifest.clone(),
         rank => part_path(&manifest, rank),
     };
-    let mine = &plan.render[run_of(plan.render.len(), world.size(), world.rank())];
+    let mine = run_of(maker.batches(&plan.render), world.size(), world.rank());
+    maker.expect(&mine);
     let mut finished = Vec::new();
     let told = Cell::new(false);
     let hear = || hear(world, stop, &told, done);
@@ -58,7 +58,7 @@ pub fn render(
         }
         hear()
     };
-    sequence::render_frames(target, mine, &journal, maker, &mut after_frame)?;
+    sequence::render_frames(target, &mine, &journal, maker, &mut after_frame)?;
     if finished.len() < mine.len() && !told.get() {
         let mut others = (0..world.size()).filter(|rank| *rank != world.rank());
         others.try_for_each(|rank| world.post(rank, &Note::Stop))?;
@@ -102,28 +102,47 @@ fn join(world: &World, target: &Target, plan: &Plan, mine: &[FrameReport]) -> Re
     Ok(Outcome { unfinished: plan.render.len() - frames.len(), frames })
 }
 
-/// The run of `count` frames that rank `rank` of `size` renders: contiguous, as even as can be.
-fn run_of(count: usize, size: u32, rank: u32) -> Range<usize> {
-    let cut = |rank: u32| (count as u64 * u64::from(rank) / u64::from(size)) as usize;
-    cut(rank)..cut(rank + 1)
+/// The frames that rank `rank` of `size` renders: a contiguous run of whole `batches`, cut where the
+/// frames are divided most evenly.
+fn run_of(batches: Vec<Vec<u32>>, size: u32, rank: u32) -> Vec<u32> {
+    let count: u64 = batches.iter().map(|batch| batch.len() as u64).sum();
+    let mut before = 0;
+    let mine = batches.into_iter().filter(|batch| {
+        // A batch belongs to the rank in whose even share its middle lies.
+        let middle = 2 * before + batch.len() as u64 - 1;
+        before += batch.len() as u64;
+        middle * u64::from(size) / (2 * count) == u64::from(rank)
+    });
+    mine.flatten().collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::run_of;
 
+    fn runs(sizes: &[u32], ranks: u32) -> Vec<Vec<u32>> {
+        let mut next = 1..;
+        let batch = |size: &u32| next.by_ref().take(*size as usize).collect::<Vec<u32>>();
+        let batches: Vec<Vec<u32>> = sizes.iter().map(batch).collect();
+        (0..ranks).map(|rank| run_of(batches.clone(), ranks, rank)).collect()
+    }
+
     #[test]
-    fn runs_cover_every_frame_once_and_differ_by_one_at_most() {
-        for (count, size) in [(16, 1), (16, 3), (2, 8), (0, 4), (262_144, 4_096)] {
-            let runs: Vec<_> = (0..size).map(|rank| run_of(count, size, rank)).collect();
-            let mut next = 0;
-            for run in &runs {
-                assert_eq!(run.start, next);
-                next = run.end;
-            }
-            assert_eq!(next, count);
-            let lengths = || runs.iter().map(|r| r.len());
-            assert!(lengths().max() <= lengths().min().map(|least| least + 1));
+    fn runs_cover_every_frame_once_and_lone_frames_differ_by_one_at_most() {
+        for (count, ranks) in [(16, 1), (16, 3), (2, 8), (0, 4), (262_144, 64)] {
+            let runs = runs(&vec![1; count], ranks);
+            assert_eq!(runs.concat(), (1..=count as u32).collect::<Vec<_>>());
+            let lengths = || runs.iter().map(Vec::len);
+            assert!(lengths().max() <= lengths().min().map(|least| least + 1), "{count} {ranks}");
         }
+    }
+
+    #[test]
+    fn batches_stay_whole() {
+        assert_eq!(runs(&[3, 3, 2], 2), [vec![1, 2, 3], vec![4, 5, 6, 7, 8]]);
+        assert_eq!(runs(&[64, 64, 64, 64, 1], 2).iter().map(Vec::len).max(), Some(129));
+        assert_eq!(runs(&[9], 3).iter().map(Vec::len).sum::<usize>(), 9);
+        let most = runs(&[10, 1, 10, 1, 10, 1], 3).iter().map(Vec::len).max();
+        assert_eq!(most, Some(12));
     }
 }

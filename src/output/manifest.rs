@@ -130,9 +130,9 @@ impl Header {
         let s = &self.settings;
         entries.push(("size".into(), format!("{}x{}", plain(&s["width"]), plain(&s["height"]))));
         entries.push(("crop".into(), crop(&s["crop"])));
-        for group in [s, &s["rules"]] {
+        for group in [s, &s["rules"], &s["reuse"]] {
             for (key, value) in group.as_object().into_iter().flatten() {
-                if !["width", "height", "crop", "rules"].contains(&key.as_str()) {
+                if !["width", "height", "crop", "rules", "reuse"].contains(&key.as_str()) {
                     entries.push((key.replace('_', "-"), plain(value)));
                 }
             }

@@ -30,6 +30,10 @@ pub struct Evidence {
     pub coarser: f64,
     /// Deviation of ratios that is always allowed.
     pub tolerance: f32,
+    /// Alone.
+    pub alone: f32,
+    /// Alone saturated.
+    pub alone_saturated: f32,
     /// Variance allowed on top, in that of independent shadow samples.
     pub noise: f32,
 }
@@ -45,6 +49,8 @@ impl Default for Evidence {
             coarser: 6.0,
             tolerance: 0.01,
             noise: 2.0,
+            alone: 0.35,
+            alone_saturated: 0.8,
         }
     }
 }
@@ -224,12 +230,16 @@ impl Lookup<'_> {
     fn answer(&self, taps: &Taps, ratios: &mut [f32]) {
         for (channel, out) in ratios.iter_mut().enumerate() {
             let (mut weight, mut sum, mut squares, mut rays) = (0.0, 0.0, 0.0, 0.0);
+            let mut count = 0;
+            let mut nearest = f32::INFINITY;
             for tap in taps.iter() {
                 let reference = self.references[tap.reference as usize];
                 let ratio = reference.ratio(tap.sample, channel);
                 if ratio.is_nan() {
                     continue;
                 }
+                count += 1;
+                nearest = nearest.min(tap.distance);
                 weight += tap.weight;
                 sum += tap.weight * ratio;
                 squares += tap.weight * ratio * ratio;
@@ -239,6 +249,10 @@ impl Lookup<'_> {
                 continue;
             }
             let mean = sum / weight;
+            let saturated = mean == 0.0 || mean == 1.0;
+            if count == 1 && nearest > if saturated { self.evidence.alone_saturated } else { self.evidence.alone } {
+                continue;
+            }
             let variance = (squares / weight - mean * mean).max(0.0);
             let rays = rays / weight * self.rays[channel] as f32;
             let Evidence { tolerance, noise, .. } = self.evidence;

@@ -16,5 +16,11 @@ pub const MAX_SEED: u64 = i64::MAX as u64;
 pub const FACTOR: RangeInclusive<f64> = 1e-30..=1e30;
 /// Shares of a whole.
 pub const SHARE: RangeInclusive<f64> = 0.0..=1.0;
+/// Most frames of a segment.
+pub const MAX_SEGMENT: u32 = 1_000_000;
+/// Differences in display steps of 1/255.
+pub const STEPS: RangeInclusive<f64> = 0.0..=255.0;
+/// Differences in linear colour, and shares that may exceed the whole.
+pub const AMOUNT: RangeInclusive<f64> = 0.0..=1e30;
 /// Frames per second of a video.
 pub const FPS: RangeInclusive<f64> = 1.0..=1000.0;

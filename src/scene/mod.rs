@@ -17,6 +17,7 @@ mod mesh;
 mod path;
 mod place;
 mod recentre;
+mod reuse;
 mod settings;
 mod weld;
 mod winding;
@@ -28,6 +29,7 @@ pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentre::Recentring;
+pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
     Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };

@@ -1,5 +1,6 @@
 //! Everything a job can set, resolved: scene file first, command line over it.
 
+use super::ReuseSettings;
 use serde::{Deserialize, Serialize};
 
 /// The settings of a job. All of them reach the manifest, since a frame is a pure function of
@@ -38,6 +39,8 @@ pub struct Settings {
     pub isa: Option<String>,
     /// The rules that make hits trustworthy.
     pub rules: HitRules,
+    /// What frames take over from one another.
+    pub reuse: ReuseSettings,
     /// Which part of the image is rendered; `None` for all of it.
     pub crop: Option<Rect>,
     /// Show pixels with a sample that is no radiance (NaN, infinite, negative) in magenta.
@@ -63,6 +66,7 @@ impl Default for Settings {
             intersector: IntersectorKind::Embree,
             isa: None,
             rules: HitRules::default(),
+            reuse: ReuseSettings::default(),
             crop: None,
             flag_bad: false,
         }

@@ -43,7 +43,7 @@ struct State {
 }
 
 impl<'a> Inferrer<'a> {
-    /// A maker of the frames `to_come`.
+    /// A maker of frames of `shot`.
     pub fn new(
         renderer: Renderer<'a>,
         shot: &'a Shot,
@@ -51,11 +51,9 @@ impl<'a> Inferrer<'a> {
         stop: &'a AtomicBool,
         progress: &'a dyn Progress,
         pyramid: Pyramid,
-        to_come: &[u32],
     ) -> Self {
         let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
         let rays = channels.iter().map(|c| reuse::rays_of(c, renderer.settings)).collect();
-        let state = State { to_come: to_come.iter().copied().collect(), ..State::default() };
         Self {
             renderer,
             shot,
@@ -67,7 +65,7 @@ impl<'a> Inferrer<'a> {
             evidence: Evidence::default(),
             channels,
             rays,
-            state: Mutex::new(state),
+            state: Mutex::default(),
         }
     }
 
@@ -143,5 +141,9 @@ impl FrameMaker for Inferrer<'_> {
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         self.pyramid.batches(frames)
+    }
+
+    fn expect(&self, frames: &[u32]) {
+        self.with_state(|s| s.to_come.extend(frames));
     }
 }

@@ -41,6 +41,9 @@ pub trait FrameMaker {
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         frames.iter().map(|frame| vec![*frame]).collect()
     }
+
+    /// Hears which frames it will be asked for, before the first of them.
+    fn expect(&self, _frames: &[u32]) {}
 }
 
 /// A frame as it was made.

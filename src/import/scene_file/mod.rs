@@ -16,6 +16,7 @@ mod number;
 mod piece;
 mod quad;
 mod report;
+mod reuse;
 mod schema;
 mod settings;
 mod shapes;
@@ -36,6 +37,7 @@ use light::{Light, Sky};
 use material::Material;
 use mesh::{Mesh, Sphere};
 use report::Source;
+use reuse::Reuse;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use settings::Settings;
@@ -62,6 +64,8 @@ struct SceneFile {
     sphere: Vec<At<Sphere>>,
     /// How to render. Absent: all defaults.
     settings: Settings,
+    /// What frames take over from one another. Absent: all defaults.
+    reuse: Reuse,
 }
 
 impl SceneFile {
@@ -80,7 +84,7 @@ impl SceneFile {
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let source = Source::read(path)?;
     let file = SceneFile::parse(&source)?;
-    let mut settings = file.settings.build(&source)?;
+    let mut settings = file.settings.build(&source, file.reuse.build())?;
     if let Some((width, height)) = options.size {
         (settings.width, settings.height) = (width, height);
     }

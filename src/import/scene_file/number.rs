@@ -83,13 +83,18 @@ number!(
 );
 number!(
     /// An amount of light in one channel.
-    Amount: "a number from 0 to 1e30", |x| (0.0..=1e30).contains(&x),
+    Amount: "a number from 0 to 1e30", |x| limits::AMOUNT.contains(&x),
     { "type": "number", "minimum": 0, "maximum": 1e30 }
 );
 number!(
     /// A share.
     Share: "a number from 0 to 1", |x| limits::SHARE.contains(&x),
     { "type": "number", "minimum": 0, "maximum": 1 }
+);
+number!(
+    /// A difference in display steps of 1/255.
+    Steps: "a number from 0 to 255", |x| limits::STEPS.contains(&x),
+    { "type": "number", "minimum": 0, "maximum": 255 }
 );
 number!(
     /// Frames per second.

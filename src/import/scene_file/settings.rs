@@ -8,7 +8,9 @@ use super::report::Source;
 use super::vector::List;
 use crate::error::Result;
 use crate::import::{Loaded, OutputName};
-use crate::scene::{self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ToneCurve, limits};
+use crate::scene::{
+    self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ReuseSettings, ToneCurve, limits,
+};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -117,15 +119,15 @@ impl Default for Settings {
 }
 
 /// The f64 with the fewest digits that rounds to `x`: 0.001 for the f32 next to it.
-fn shortest(x: f32) -> f64 {
+pub(super) fn shortest(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::from(x))
 }
 
 impl Settings {
-    /// As scene data.
+    /// As scene data, with what `[reuse]` says.
     ///
     /// Errors: a crop that leaves the image or is empty.
-    pub fn build(&self, source: &Source) -> Result<scene::Settings> {
+    pub fn build(&self, source: &Source, reuse: ReuseSettings) -> Result<scene::Settings> {
         let Rules { robust, retry, recheck, spawn_offset, recentre } = self.rules;
         Ok(scene::Settings {
             width: self.size.0[0].u32(),
@@ -144,6 +146,7 @@ impl Settings {
             intersector: self.intersector,
             isa: self.isa.map(|isa| isa.name().to_owned()),
             rules: HitRules { robust, retry, recheck, spawn_offset, recentre },
+            reuse,
             crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
             flag_bad: self.flag_bad,
         })

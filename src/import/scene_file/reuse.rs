@@ -1,0 +1,61 @@
+//! `[reuse]`: what frames take over from one another.
+
+use super::number::{Amount, Int, Share, Steps};
+use super::settings::shortest;
+use crate::scene::{Policy, ReuseSettings, limits};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// What frames take over from one another. The command line's options of the same names stand over
+/// these.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, expecting = "a table")]
+pub(super) struct Reuse {
+    /// What is taken over: shadowing at surface points, with evidence ("surface"), the colours of
+    /// pixels ("colour"), or nothing, so that every frame is traced ("off").
+    policy: Policy,
+    /// Frames from one key frame to the next.
+    segment: Int<1, { limits::MAX_SEGMENT as i64 }>,
+    /// By how much samples may disagree beyond their noise and still stand for one another, display
+    /// steps of 1/255: less is more exact and slower.
+    tolerance: Steps,
+    /// Share of a frame's cost that goes into measuring its error.
+    audit: Share,
+    /// What is inferred with a larger measured root mean square error is traced, display steps of
+    /// 1/255. Absent: no bound.
+    max_rmse: Option<Steps>,
+    /// Colour policy: cached colours agree within this linear difference.
+    colour_epsilon: Amount,
+    /// Colour policy: cached distances agree within this share of the distance.
+    distance_epsilon: Amount,
+}
+
+impl Default for Reuse {
+    fn default() -> Self {
+        let r = ReuseSettings::default();
+        Self {
+            policy: r.policy,
+            segment: Int::clamped(r.segment.into()),
+            tolerance: Steps(shortest(r.tolerance)),
+            audit: Share(shortest(r.audit)),
+            max_rmse: r.max_rmse.map(|x| Steps(shortest(x))),
+            colour_epsilon: Amount(shortest(r.colour_epsilon)),
+            distance_epsilon: Amount(shortest(r.distance_epsilon)),
+        }
+    }
+}
+
+impl Reuse {
+    /// As scene data.
+    pub fn build(&self) -> ReuseSettings {
+        ReuseSettings {
+            policy: self.policy,
+            segment: self.segment.u32(),
+            tolerance: self.tolerance.0 as f32,
+            audit: self.audit.0 as f32,
+            max_rmse: self.max_rmse.map(|x| x.0 as f32),
+            colour_epsilon: self.colour_epsilon.0 as f32,
+            distance_epsilon: self.distance_epsilon.0 as f32,
+        }
+    }
+}
