@@ -12,7 +12,7 @@ use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::{self, Intersector};
-use crate::output::manifest::beside;
+use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
 use crate::scene::{Policy, Settings};
@@ -106,7 +106,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         say_stopped(&job, &outcome);
         return Ok(Exit::Stopped);
     }
-    let done = finish(&job, start, quiet)?;
+    let done = finish(&job, &outcome, start, quiet)?;
     Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
 }
 
@@ -201,7 +201,7 @@ fn say_stopped(job: &Frames, outcome: &Outcome) {
 }
 
 /// Says what there is now, and makes the video of the frames asked for, all of which are there.
-fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
+fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Result<Exit> {
     let result = |line: String| if quiet { Ok(()) } else { say::result(line) };
     let frames = if job.total() == 1 { "frame" } else { "frames" };
     result(format!(
@@ -212,11 +212,36 @@ fn finish(job: &Frames, start: Instant, quiet: bool) -> Result<Exit> {
         job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
     ))?;
+    if let Some(line) = stats::audit_of(job.plan, outcome).and_then(|audit| audit_line(&audit)) {
+        result(line)?;
+    }
     match job.request.fps {
         Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
         _ => {}
     }
     Ok(Exit::Done)
+}
+
+/// How good the inferred frames are, in words.
+fn audit_line(audit: &AuditRow) -> Option<String> {
+    let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
+    let tiles = match audit.sums.tiles_traced {
+        0 => String::new(),
+        1 => "; 1 tile exceeded --max-rmse and was traced".into(),
+        n => format!("; {n} tiles exceeded --max-rmse and were traced"),
+    };
+    Some(format!(
+        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255{tiles}",
+        steps(rmse),
+        steps(low),
+        steps(high),
+        steps(traced)
+    ))
+}
+
+/// Display steps in two digits or so.
+fn steps(x: f64) -> String {
+    if x < 0.095 { format!("{x:.2}") } else { format!("{x:.1}") }
 }
 
 /// Says which samples are no radiance; an exit code where that is a failure.

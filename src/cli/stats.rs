@@ -4,8 +4,8 @@ use super::machine::{Machine, peak_memory};
 use crate::cluster::Outcome;
 use crate::error::{Error, Result};
 use crate::output::atomic;
-use crate::output::manifest::Header;
-use crate::sequence::{FrameReport, Plan};
+use crate::output::manifest::{AuditRow, Header};
+use crate::sequence::{FrameReport, Plan, audit_row};
 use crate::stats::{BadSamples, RayCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -50,6 +50,7 @@ struct Stats<'a> {
     peak_memory_bytes: Option<u64>,
     rays: RayCounts,
     bad_samples: BadSamples,
+    audit: Option<AuditRow>,
     kept: &'a [u32],
     frames: Vec<Frame<'a>>,
     ranks: &'a [RankStats],
@@ -68,6 +69,16 @@ pub fn bad_of(plan: &Plan, outcome: &Outcome) -> BadSamples {
     plan.kept_bad.iter().for_each(|(_, bad)| sum += *bad);
     outcome.frames.iter().for_each(|(_, report)| sum += report.bad);
     sum
+}
+
+/// What the audits of all frames asked for found together, rendered now or kept; `None` where none
+/// was audited.
+pub fn audit_of(plan: &Plan, outcome: &Outcome) -> Option<AuditRow> {
+    let rendered = outcome.frames.iter().filter_map(|(_, report)| Some(report.audit?.sums));
+    let mut all = plan.kept_audit.into_iter().chain(rendered);
+    let mut sums = all.next()?;
+    all.for_each(|more| sums += more);
+    Some(audit_row(&sums))
 }
 
 /// Writes the file at `path`, whole. `ranks` starts with rank 0, whose times the top level shows.
@@ -100,6 +111,7 @@ pub fn write(
         peak_memory_bytes: ranks.iter().filter_map(|r| r.peak_memory_bytes).max(),
         rays,
         bad_samples,
+        audit: audit_of(plan, outcome),
         kept: &plan.kept,
         frames: outcome.frames.iter().map(|(rank, report)| Frame { rank: *rank, report }).collect(),
         ranks,

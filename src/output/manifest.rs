@@ -15,7 +15,7 @@
 use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
-use crate::stats::{BadSamples, RayCounts};
+use crate::stats::{AuditSums, BadSamples, RayCounts};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -63,6 +63,9 @@ pub struct Row {
     pub seconds: f64,
     /// Rays cast for it.
     pub rays: RayCounts,
+    /// How good the inferred part of it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub audit: Option<AuditRow>,
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
@@ -70,6 +73,20 @@ pub struct Row {
     /// replaced.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub other_settings: bool,
+}
+
+/// What the audit of a frame found, with its figures: root mean squared errors in display steps of
+/// 255, each with the ends of its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AuditRow {
+    /// Of the frame as it is.
+    pub rmse: Option<[f64; 3]>,
+    /// Of its inferred pixels.
+    pub rmse_inferred_pixels: Option<[f64; 3]>,
+    /// Of the frame, had it been traced.
+    pub rmse_traced: Option<[f64; 3]>,
+    /// What the figures are made of; frames are pooled by adding these.
+    pub sums: AuditSums,
 }
 
 /// A setting that keeps two headers apart.

@@ -12,8 +12,6 @@ mod index;
 mod lookup;
 mod reference;
 
-pub use cost::{
-    channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of,
-};
+pub use cost::{channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of};
 pub use lookup::{Evidence, Lookup};
 pub use reference::Reference;

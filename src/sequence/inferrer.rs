@@ -29,7 +29,7 @@ pub struct Inferrer<'a> {
     pub pyramid: Pyramid,
     /// What counts as evidence.
     pub evidence: Evidence,
-    channels: Channels,
+    pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
     rays: Vec<u32>,
     state: Mutex<State>,
@@ -102,7 +102,7 @@ impl<'a> Inferrer<'a> {
         Ok(Some(rendered))
     }
 
-    fn camera(&self, frame: u32) -> Result<Camera> {
+    pub(super) fn camera(&self, frame: u32) -> Result<Camera> {
         let settings = self.renderer.settings;
         self.shot.camera(frame, settings.width, settings.height)
     }
@@ -129,14 +129,15 @@ impl<'a> Inferrer<'a> {
 
 impl FrameMaker for Inferrer<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
-        let Some(rendered) = self.frame(frame)? else { return Ok(None) };
+        let Some(mut rendered) = self.frame(frame)? else { return Ok(None) };
+        let Some(audit) = self.audit(frame, &mut rendered)? else { return Ok(None) };
         self.with_state(|s| s.to_come.remove(&frame));
         let kept: Vec<u32> = self.with_state(|s| s.references.keys().copied().collect());
         for other in kept.into_iter().filter(|f| !self.is_needed(*f)) {
             self.with_state(|s| s.references.remove(&other));
         }
         let Rendered { film, rays, reuse, .. } = rendered;
-        Ok(Some(Made { film, rays, reuse }))
+        Ok(Some(Made { film, rays, reuse, audit }))
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {

@@ -7,6 +7,7 @@
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
+mod audit;
 mod fingerprint;
 mod inferrer;
 mod pyramid;
@@ -24,9 +25,10 @@ mod tests;
 
 use crate::error::Result;
 use crate::film::Film;
-use crate::output::manifest::{Journal, Row};
+use crate::output::manifest::{AuditRow, Journal, Row};
 use crate::output::{WriteOptions, write_image};
-use crate::stats::{BadSamples, RayCounts, ReuseCounts};
+use crate::reuse::audit::rmse;
+use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -54,6 +56,8 @@ pub struct Made {
     pub rays: RayCounts,
     /// How much of it was inferred.
     pub reuse: ReuseCounts,
+    /// How good the inferred part is, where that was looked at.
+    pub audit: Option<AuditSums>,
 }
 
 /// What a finished frame took.
@@ -72,6 +76,9 @@ pub struct FrameReport {
     /// How much was inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
+    /// How good the inferred part is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub audit: Option<AuditRow>,
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
@@ -94,15 +101,28 @@ pub fn render_frames(
     let mut journal = Journal::open(journal)?;
     for &frame in frames {
         let start = Instant::now();
-        let Some(Made { film, rays, reuse }) = maker.make(frame)? else { break };
+        let Some(Made { film, rays, reuse, audit }) = maker.make(frame)? else { break };
         let trace_seconds = start.elapsed().as_secs_f64();
-        let row = write_frame(target, frame, &film, rays, start)?;
+        let audit = audit.map(|sums| audit_row(&sums));
+        let row = Row { audit, ..write_frame(target, frame, &film, rays, start)? };
         journal.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
         let (bytes, bad) = (row.bytes, film.bad);
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, bad })?;
+        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })?;
     }
     Ok(())
+}
+
+/// What an audit found, with the figures that it amounts to.
+pub fn audit_row(sums: &AuditSums) -> AuditRow {
+    let of = |i: crate::measure::Interval| [i.estimate, i.low, i.high];
+    let rmse = rmse(sums);
+    AuditRow {
+        rmse: rmse.map(|r| of(r.shown)),
+        rmse_inferred_pixels: rmse.map(|r| of(r.inferred)),
+        rmse_traced: rmse.map(|r| of(r.traced)),
+        sums: *sums,
+    }
 }
 
 /// Writes the frame's file whole; gives its row.
@@ -124,6 +144,7 @@ fn write_frame(
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
         rays,
+        audit: None,
         bad: film.bad,
         other_settings: false,
     })
