@@ -1,7 +1,7 @@
 //! How often the audit's intervals hold the true error, over 60 shots of each scene at the default
 //! share, and how wide they are: the full size of `tests/audit.rs`.
 //!
-//! `SCENE`, `SHOTS`, `EDGE`, `FRAMES`, `SPP`, `SHARE` and `THREADS` change what is run.
+//! `SCENE`, `SHOTS`, `EDGE`, `FRAMES`, `SPP`, `SHARE`, `BEST` and `THREADS` change what is run.
 #![allow(clippy::print_stdout, reason = "a bench prints its figures")]
 
 #[allow(dead_code, missing_docs, reason = "the tests use all of it")]
@@ -15,6 +15,11 @@ use tweenray::measure::Interval;
 fn var<T: std::str::FromStr>(name: &str, default: T) -> T {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }
+
+const HEAD: [&str; 12] = [
+    "scene", "drawn", "RMSE", "shown", "width", "est.", "inferred", "width", "est.", "traced",
+    "width", "est.",
+];
 
 /// How the intervals of one figure did.
 #[derive(Default)]
@@ -52,13 +57,12 @@ fn main() {
         frames: var("FRAMES", 9),
         spp: var("SPP", 1),
         share: var("SHARE", 0.03),
-        best: var("BEST", 256),
+        best: var("BEST", 128),
     };
     println!("{shots} shots of each scene, {trial:?}; shown, inferred and traced:");
     println!("shots whose interval holds the truth, its width and estimate over the truth");
     let scenes = ["cornell", "reflective_spheres", "spheres_on_terrain", "demo"];
     let wanted: String = var("SCENE", scenes.join(" "));
-    let mut rows = Vec::new();
     for scene in wanted.split_whitespace() {
         let set = Set::load(scene);
         let stage = set.stage(var("THREADS", 2));
@@ -75,11 +79,7 @@ fn main() {
         let mut row = vec![scene.into(), format!("{:.0}", drawn as f64 / f64::from(shots))];
         row.push(format!("{true_rmse:.2}"));
         scores.iter().for_each(|s| row.extend(s.cells(shots)));
-        rows.push(row);
+        // A scene takes minutes: nobody waits for the last one to see the first.
+        support::table(&HEAD, &[row]);
     }
-    let head = [
-        "scene", "drawn", "RMSE", "shown", "width", "est.", "inferred", "width", "est.", "traced",
-        "width", "est.",
-    ];
-    support::table(&head, &rows);
 }

@@ -24,6 +24,7 @@ fn intervals_hold_the_true_error() {
     let (mut shown, mut inferred, mut traced, mut width) = (0, 0, 0, 0.0);
     for number in 0..SHOTS {
         let audited = stage.audited(&SMALL, number);
+        assert!(audited.sums.drawn >= 20, "too few to say anything");
         let holds =
             |i: Interval, truth: f64| u32::from(i.low <= truth.sqrt() && truth.sqrt() <= i.high);
         shown += holds(audited.rmse.shown, audited.truth.shown);
