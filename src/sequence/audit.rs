@@ -23,10 +23,10 @@ const AUDIT: [u32; 2] = [1 << 30, 1 << 31];
 const JUDGES: [u32; 2] = [1 << 28, 1 << 29];
 /// Edge of a tile that is judged as one.
 const TILE: u32 = 32;
-/// Pixels that judge a tile. Two traces of each cost a sixteenth of tracing the tile.
-///
-/// With 32, two thirds of which stand where error is foretold, a tile with twice the error allowed is
-/// found nearly always, and few tiles well below it are traced for nothing.
+/// Pixels that judge a tile, two thirds of them where error is foretold. Two traces of each cost a
+/// sixteenth of tracing the tile: judging every tile stays well below tracing every tile. Were a
+/// tenth of a tile's pixels wrong and nothing foretold them, the eleven that are drawn blindly
+/// would miss all in a third of the cases, 0.9^11; where they are foretold, in next to none.
 const PER_TILE: f64 = 32.0;
 
 impl Inferrer<'_> {
