@@ -68,7 +68,7 @@ pub fn mean_interval(values: &[f64]) -> Option<Interval> {
 /// Squared errors of pixels have long tails: a few hold most of the sum, and a sample that missed
 /// them looks surer than it is. 1 is Fay and Feuer's own. In 1,200 draws of some 77 pixels from
 /// shots of `scenes/demo`, whose squared errors have a kurtosis of 30 to 230, the interval held the
-/// truth in 90 % with 1 and in 96 % with 2; in three other scenes in 97 % and more with either.
+/// truth in 90 % with 1 and in 96 % with 2; in three other scenes in 96 % and more with either.
 const TAIL: f64 = 2.0;
 
 /// The total that parts drawn at random estimate, with its 95 % interval: `sum` of the parts, sum

@@ -250,10 +250,7 @@ impl Lookup<'_> {
             }
             let mean = sum / weight;
             let saturated = mean == 0.0 || mean == 1.0;
-            if count == 1
-                && nearest
-                    > if saturated { self.evidence.alone_saturated } else { self.evidence.alone }
-            {
+            if count == 1 && nearest > if saturated { self.evidence.alone_saturated } else { self.evidence.alone } {
                 continue;
             }
             let variance = (squares / weight - mean * mean).max(0.0);
