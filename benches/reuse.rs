@@ -28,6 +28,7 @@ fn var<T: std::str::FromStr>(name: &str, default: T) -> T {
 
 fn main() {
     let scene: String = var("SCENE", "spheres_on_terrain".into());
+    let scene_name = scene.clone();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{scene}/scene.toml"));
     let loaded = import::load(&file, &LoadOptions::default()).expect("loads");
     let mut world = loaded.world.clone();

@@ -44,6 +44,9 @@ pub struct Origin {
 pub struct Questions {
     /// What is asked about.
     pub points: Vec<SurfacePoint>,
+    /// For each point and channel what the pixel would show of that light without shadows:
+    /// luminance, exposure applied; 0 where none can arrive.
+    pub unshadowed: Vec<f32>,
     /// For each point the ratio in each channel; NaN where it is unknown and must be traced.
     pub ratios: Vec<f32>,
     /// For each point where its ratios come from.

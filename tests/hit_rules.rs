@@ -6,7 +6,7 @@ mod common;
 
 use common::{job, pose, render};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector};
-use tweenray::math::{DVec3, Rgb};
+use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::ray::Ray;
 use tweenray::scene::{HitRules, Light, Material, Recheck, Scene, World};
 use tweenray::stats::RayCounts;
@@ -41,6 +41,54 @@ fn no_ray_leaks_through_a_vertex() {
     let without = leaks(&scene, HitRules { retry: false, ..HitRules::default() });
     assert!(without > 0, "the case is not hard: nothing leaks without a second try");
     assert_eq!(leaks(&scene, HitRules::default()), 0, "{without} leak without a second try");
+}
+
+/// A coarse ball, of any size.
+fn ball(columns: u32, rows: u32) -> Scene {
+    let mut ball = common::uv_sphere(columns, rows);
+    let radius = 1.0 + 0.0123 * f64::from(columns * rows);
+    ball.positions.iter_mut().for_each(|p| *p *= radius);
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("white", Rgb::ONE));
+    world.meshes.push(ball);
+    world.into_scene(true).unwrap()
+}
+
+/// Rays from afar at the vertices on the scene's bounds that do not meet them, in blocks and one by one.
+fn leaks_from_afar(scene: &Scene, rules: HitRules) -> usize {
+    let intersector = EmbreeIntersector::new(scene, rules, None, 1).unwrap();
+    let Bounds3 { min, max } = scene.bounds;
+    let mesh = &scene.meshes[0];
+    let vertices = mesh.positions[..mesh.vertex_count].iter().map(|p| p.as_dvec3());
+    let mut counts = RayCounts::default();
+    let mut missed = 0;
+    for vertex in vertices.filter(|p| p.cmpeq(min).any() || p.cmpeq(max).any()) {
+        for a in (0..200).map(f64::from) {
+            let aside = DVec3::new(a.sin(), (1.3 * a).cos(), (0.7 * a).sin()) * 0.3;
+            let eye = (vertex.normalize() + aside) * (8.0 + a);
+            let ray = Ray::new(eye, vertex - eye);
+            // In a block of backs alone nothing is tried again: one that meets a front beside it.
+            let mut hits = [None; 2];
+            intersector.intersect_batch(&[ray, Ray::new(eye, -eye)], &mut hits, &mut counts);
+            hits[1] = intersector.intersect(&ray, &mut counts);
+            let is_there = |hit: &Hit| (ray.at(hit.t) - vertex).length() < 1e-5;
+            missed += hits.iter().filter(|hit| !hit.as_ref().is_some_and(is_there)).count();
+        }
+    }
+    missed
+}
+
+/// Embree sees a ray from afar begin where it enters the scene's bounds: for a vertex on the bounds, at
+/// the vertex itself, and no turn about that point leads past it.
+#[test]
+fn no_ray_from_afar_leaks_through_a_vertex_on_the_bounds() {
+    let leaks = |rules: HitRules| -> usize {
+        let balls = (3..24).flat_map(|columns| (2..10).map(move |rows| ball(columns, rows)));
+        balls.map(|scene| leaks_from_afar(&scene, rules)).sum()
+    };
+    let without = leaks(HitRules { retry: false, ..HitRules::default() });
+    assert!(without > 10, "the case is not hard: {without} leak without a second try");
+    assert_eq!(leaks(HitRules::default()), 0, "{without} leak without a second try");
 }
 
 #[test]

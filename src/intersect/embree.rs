@@ -131,6 +131,26 @@ impl<'s> EmbreeIntersector<'s> {
         Some((moved, near))
     }
 
+    /// The ray, whose origin the approach moved by `shift`, turned by 4 ulp of f32, across: a factor on
+    /// each component would leave an axis-parallel direction, the likeliest to pass through a vertex, as
+    /// it is.
+    ///
+    /// After the approach, since from afar 4 ulp would lead past what is looked at. But a moved origin
+    /// may lie within an ulp of a vertex at the scene's rim, and turned about it the ray would go
+    /// through that vertex again: such a ray is turned about a point a scene's size before.
+    fn nudged(&self, ray: &Ray, shift: f64, turn: Turn) -> Ray {
+        let by = match turn {
+            Turn::None => return *ray,
+            Turn::OneWay => 8.0 * ROUNDING,
+            Turn::OtherWay => -8.0 * ROUNDING,
+        };
+        let length = ray.dir.length();
+        let (across, _) = orthonormal_basis(ray.dir / length);
+        let before = if shift == 0.0 { 0.0 } else { self.bounds.largest_coordinate() };
+        let org = ray.org + across * (by * before);
+        Ray { org, dir: ray.dir + across * (by * length), ..*ray }
+    }
+
     fn retries(&self) -> bool {
         self.rules.retry && !PLANTED_NO_RETRY
     }
@@ -138,8 +158,7 @@ impl<'s> EmbreeIntersector<'s> {
     /// One Embree query that cannot hit the `passed` primitives.
     fn query(&self, ray: &Ray, turn: Turn, passed: &[PrimRef]) -> Option<Candidate> {
         let (moved, shift) = self.approach(ray)?;
-        // After the approach: from afar, 4 ulp would lead past what is looked at.
-        let moved = nudged(&moved, turn);
+        let moved = self.nudged(&moved, shift, turn);
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
@@ -213,19 +232,6 @@ impl<'s> EmbreeIntersector<'s> {
             self.pursue(ray, turn, &mut passed)
         })
     }
-}
-
-/// The ray turned by 4 ulp of f32, across: a factor on each component would leave an
-/// axis-parallel direction, the likeliest to pass through a vertex, as it is.
-fn nudged(ray: &Ray, turn: Turn) -> Ray {
-    let by = match turn {
-        Turn::None => return *ray,
-        Turn::OneWay => 8.0,
-        Turn::OtherWay => -8.0,
-    };
-    let length = ray.dir.length();
-    let (across, _) = orthonormal_basis(ray.dir / length);
-    Ray { dir: ray.dir + across * (by * ROUNDING * length), ..*ray }
 }
 
 /// How far rounding a ray to f32 may move it within `bounds`.

@@ -28,7 +28,7 @@ pub struct Evidence {
     pub slope: f64,
     /// By how much a sample's area on the surface may exceed the point's.
     pub coarser: f64,
-    /// Deviation of ratios that is always allowed.
+    /// Deviation that is always allowed, display steps of 1/255.
     pub tolerance: f32,
     /// Alone.
     pub alone: f32,
@@ -47,7 +47,7 @@ impl Default for Evidence {
             height: 0.7,
             slope: 0.35,
             coarser: 6.0,
-            tolerance: 0.01,
+            tolerance: 0.5,
             noise: 2.0,
             alone: 0.35,
             alone_saturated: 0.8,
@@ -105,13 +105,16 @@ impl Taps {
 
 impl Inference for Lookup<'_> {
     fn infer(&self, questions: &mut Questions) {
-        let Questions { points, ratios, origins } = questions;
+        let Questions { points, unshadowed, ratios, origins } = questions;
         let channels = self.rays.len();
-        let answers = ratios.chunks_exact_mut(channels).zip(origins.iter_mut());
-        for (point, (ratios, origin)) in points.iter().zip(answers) {
+        let lights = unshadowed.chunks_exact(channels).zip(ratios.chunks_exact_mut(channels));
+        for ((point, (shown, ratios)), origin) in points.iter().zip(lights).zip(origins) {
+            if shown.iter().all(|s| *s == 0.0) {
+                continue;
+            }
             let taps = self.taps(point);
             if taps.weight >= self.evidence.least_weight {
-                self.answer(&taps, ratios);
+                self.answer(&taps, shown, ratios);
                 *origin = self.origin(&taps, point);
             }
         }
@@ -127,12 +130,16 @@ impl Lookup<'_> {
             }
             self.screen_taps(number as u32, reference, point, &mut taps);
         }
-        if !point.direct {
+        if !point.direct && taps.weight < self.evidence.enough_weight {
+            let before = taps;
             for (number, reference) in self.references.iter().enumerate() {
                 if taps.weight >= self.evidence.enough_weight {
                     break;
                 }
                 self.index_taps(number as u32, reference, point, &mut taps);
+            }
+            if taps.len - before.len < crate::NEEDN.with(|k| *k) {
+                taps = before;
             }
         }
         taps
@@ -226,41 +233,59 @@ impl Lookup<'_> {
         (distance <= reach && height <= allowed).then_some(distance)
     }
 
-    /// Weighted means of the ratios that agree.
-    fn answer(&self, taps: &Taps, ratios: &mut [f32]) {
+    /// Weighted means of the ratios that agree. `shown` is what the pixel would show of each light
+    /// without shadows.
+    fn answer(&self, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
+        let mut seen = 0.0;
         for (channel, out) in ratios.iter_mut().enumerate() {
-            let (mut weight, mut sum, mut squares, mut rays) = (0.0, 0.0, 0.0, 0.0);
-            let mut count = 0;
-            let mut nearest = f32::INFINITY;
-            for tap in taps.iter() {
-                let reference = self.references[tap.reference as usize];
-                let ratio = reference.ratio(tap.sample, channel);
-                if ratio.is_nan() {
-                    continue;
-                }
-                count += 1;
-                nearest = nearest.min(tap.distance);
+            let (mut weight, mut sum) = (0.0, 0.0);
+            for (tap, ratio) in self.known(taps, channel) {
                 weight += tap.weight;
                 sum += tap.weight * ratio;
-                squares += tap.weight * ratio * ratio;
-                rays += tap.weight * reference.samples[tap.sample as usize].samples as f32;
             }
-            if f64::from(weight) < self.evidence.least_weight {
-                continue;
-            }
-            let mean = sum / weight;
-            let saturated = mean == 0.0 || mean == 1.0;
-            if count == 1 && nearest > if saturated { self.evidence.alone_saturated } else { self.evidence.alone } {
-                continue;
-            }
-            let variance = (squares / weight - mean * mean).max(0.0);
-            let rays = rays / weight * self.rays[channel] as f32;
-            let Evidence { tolerance, noise, .. } = self.evidence;
-            let allowed = tolerance * tolerance + noise * (mean * (1.0 - mean)).max(0.0) / rays;
-            if variance <= allowed {
-                *out = mean;
+            if f64::from(weight) >= self.evidence.least_weight {
+                *out = sum / weight;
+                seen += shown[channel] * *out;
             }
         }
+        let steps = steps_per_radiance(seen);
+        for (channel, out) in ratios.iter_mut().enumerate().filter(|(_, out)| !out.is_nan()) {
+            let allowed = self.evidence.tolerance / (steps * shown[channel]).max(1e-6);
+            if !self.agrees(taps, channel, *out, allowed) {
+                *out = f32::NAN;
+            }
+        }
+    }
+
+    /// The taps whose ratio is known.
+    fn known<'t>(&'t self, taps: &'t Taps, channel: usize) -> impl Iterator<Item = (&'t Tap, f32)> {
+        taps.iter().filter_map(move |tap| {
+            let ratio = self.references[tap.reference as usize].ratio(tap.sample, channel);
+            (!ratio.is_nan()).then_some((tap, ratio))
+        })
+    }
+
+    /// Whether the taps of a channel lie no further from their `mean` than their sampling noise and
+    /// an `allowed` deviation explain.
+    fn agrees(&self, taps: &Taps, channel: usize, mean: f32, allowed: f32) -> bool {
+        let (mut weight, mut squares, mut rays, mut count) = (0.0, 0.0, 0.0, 0);
+        let mut nearest = f32::INFINITY;
+        for (tap, ratio) in self.known(taps, channel) {
+            let sample = &self.references[tap.reference as usize].samples[tap.sample as usize];
+            weight += tap.weight;
+            squares += tap.weight * (ratio - mean) * (ratio - mean);
+            rays += tap.weight * sample.samples as f32;
+            count += 1;
+            nearest = nearest.min(tap.distance);
+        }
+        let Evidence { noise, alone, alone_saturated, .. } = self.evidence;
+        let saturated = mean == 0.0 || mean == 1.0;
+        if count == 1 && nearest > if saturated { alone_saturated } else { alone } {
+            return false;
+        }
+        let rays = rays / weight * self.rays[channel] as f32;
+        let noise = noise * (mean * (1.0 - mean)).max(0.0) / rays;
+        squares / weight <= allowed * allowed + noise
     }
 
     fn origin(&self, taps: &Taps, _point: &SurfacePoint) -> Origin {
@@ -285,4 +310,13 @@ impl Lookup<'_> {
         origin.distance = distance / taps.weight as f32;
         origin
     }
+}
+
+/// How many display steps of 1/255 a unit of radiance makes where `radiance` is shown: the slope of
+/// the sRGB curve, as a power of 1/2.4.
+fn steps_per_radiance(radiance: f32) -> f32 {
+    let shown = f64::from(radiance).clamp(0.003, 1.0);
+    // Nearly x^(-7/12), by square roots, which are the same on every machine.
+    let root = shown.sqrt();
+    (255.0 * 1.055 / 2.4 / (root * root.sqrt().sqrt().sqrt())) as f32
 }

@@ -49,10 +49,12 @@ impl Groups {
         input: &FrameInput,
         reuse: &Reuse,
         lit: &[LitPoint],
+        unshadowed: &[f32],
         pixels: &BlockPixels,
     ) {
         self.gather_points(input, lit);
         self.measure_footprints(lit, pixels);
+        self.gather_unshadowed(reuse.channels.len(), unshadowed);
         let (count, channels) = (self.asked.points.len(), reuse.channels.len());
         self.asked.ratios.clear();
         self.asked.ratios.resize(count * channels, f32::NAN);
@@ -99,6 +101,19 @@ impl Groups {
         }
     }
 
+    /// Means over each surface point's samples.
+    fn gather_unshadowed(&mut self, channels: usize, unshadowed: &[f32]) {
+        let Self { of_lit, asked: Questions { points, unshadowed: out, .. }, .. } = self;
+        out.clear();
+        out.resize(points.len() * channels, 0.0);
+        for (at, own) in of_lit.iter().zip(unshadowed.chunks_exact(channels.max(1))) {
+            let at = *at as usize;
+            let share = 1.0 / points[at].samples as f32;
+            let sums = &mut out[at * channels..(at + 1) * channels];
+            sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * share);
+        }
+    }
+
     /// Behind mirrors and glass a pixel's size on the surface is told by its neighbours: how far
     /// away the same branch of their same sample ends.
     fn measure_footprints(&mut self, lit: &[LitPoint], pixels: &BlockPixels) {
@@ -123,7 +138,8 @@ impl Groups {
                     .map(|other| other.p.distance(own.p) as f32)
                     .fold(f32::INFINITY, f32::min);
                 if nearest < f32::INFINITY {
-                    points[*at as usize].footprint = nearest;
+                    let most = own.footprint * crate::KCAP.with(|k| *k);
+                    points[*at as usize].footprint = nearest.min(most);
                 }
             }
         }

@@ -8,8 +8,9 @@ use super::groups::Groups;
 use super::light::{self, AreaLight, LightSample, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer};
+use crate::inference::{Channel, Channels};
 use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
-use crate::math::{DVec3, Rgb, orthonormal_basis};
+use crate::math::{DVec3, Rgb, luminance, orthonormal_basis};
 use crate::sampling::{cosine_hemisphere, to_world};
 use crate::scene::{Light, Scene, Settings};
 use crate::stats::RayCounts;
@@ -108,6 +109,10 @@ pub(super) struct ShadowScratch {
     u: Vec<[f32; 2]>,
     /// Lit points that the present light must be traced for.
     wanted: Vec<u32>,
+    /// Irradiance without shadows, per unit of radiance, for each lit point and kept channel.
+    exact: Vec<f64>,
+    /// What of it the pixel would show.
+    shown: Vec<f32>,
     /// Where the rays of each lit point start, once one has cast any.
     starts: Vec<Option<ShadowStarts>>,
     /// What is known already; unused where nothing is reused.
@@ -179,7 +184,8 @@ impl Renderer<'_> {
         scratch.starts.clear();
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
-            scratch.groups.ask(input, reuse, lit, pixels);
+            self.light_without_shadows(input, reuse.channels, lit, scratch);
+            scratch.groups.ask(input, reuse, lit, &scratch.shown, pixels);
         }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
@@ -204,6 +210,33 @@ impl Renderer<'_> {
         }
     }
 
+    /// What of the kept lights would arrive if nothing were in the way.
+    fn light_without_shadows(
+        &self,
+        input: &FrameInput,
+        channels: &Channels,
+        lit: &[LitPoint],
+        s: &mut ShadowScratch,
+    ) {
+        s.exact.clear();
+        s.shown.clear();
+        for point in lit {
+            for channel in channels.iter() {
+                let (exact, radiance) = match channel {
+                    Channel::Area(index) => {
+                        let area = input.area_lights[index as usize].as_ref();
+                        let exact = area.map_or(0.0, |a| a.irradiance(point.si.p, point.n));
+                        (exact, light::radiance(&self.scene.lights[index as usize]))
+                    }
+                    Channel::Sky => (std::f64::consts::PI, self.scene.sky.radiance),
+                };
+                s.exact.push(exact);
+                let shown = luminance(point.weight * radiance) * exact as f32;
+                s.shown.push(shown * self.settings.exposure);
+            }
+        }
+    }
+
     fn area_light(
         &self,
         input: &FrameInput,
@@ -216,9 +249,7 @@ impl Renderer<'_> {
         let n = self.settings.shadow_samples as usize;
         let radiance = light::radiance(source.light);
         let channel = input.channel_of(source.index);
-        let wanted = self.use_known(lit, channel, pixels, s, |point| {
-            radiance * source.area.irradiance(point.si.p, point.n) as f32
-        });
+        let wanted = self.use_known(lit, channel, radiance, pixels, s);
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
@@ -287,7 +318,7 @@ impl Renderer<'_> {
         // A constant sky of radiance L sends the irradiance πL to an open surface.
         let irradiance = self.scene.sky.radiance * std::f32::consts::PI;
         let channel = input.sky_channel();
-        let wanted = self.use_known(lit, channel, pixels, s, |_| irradiance);
+        let wanted = self.use_known(lit, channel, self.scene.sky.radiance, pixels, s);
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
@@ -312,29 +343,30 @@ impl Renderer<'_> {
         s.wanted = wanted;
     }
 
-    /// Adds the light of `channel` where its ratio is known; `unshadowed` is the irradiance. Returns
+    /// Adds the light of `channel`, of a light with this `radiance`, where its ratio is known. Returns
     /// the points where it must be traced: all of them without a channel.
     fn use_known(
         &self,
         lit: &[LitPoint],
         channel: Option<(usize, usize)>,
+        radiance: Rgb,
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
-        unshadowed: impl Fn(&LitPoint) -> Rgb,
     ) -> Vec<u32> {
         let Some((channel, channels)) = channel else { return all_of(lit, s) };
         let mut wanted = std::mem::take(&mut s.wanted);
         wanted.clear();
         for (i, point) in lit.iter().enumerate() {
+            let exact = s.exact[i * channels + channel];
+            if exact == 0.0 {
+                continue;
+            }
+            s.groups.note_lit(i);
             let ratio = s.groups.known(i, channel, channels);
             if ratio.is_nan() {
                 wanted.push(i as u32);
-                continue;
-            }
-            let irradiance = unshadowed(point);
-            if irradiance != Rgb::ZERO {
-                s.groups.note_lit(i);
-                let light = point.weight * irradiance * ratio;
+            } else {
+                let light = point.weight * radiance * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
                 pixels.note_risk(point.place.pixel, point.weight * irradiance, ratio);
             }
@@ -385,7 +417,6 @@ impl Renderer<'_> {
                 open += if s.occluded[k] { 0.0 } else { s.weights[k] };
             }
             if let (Some((channel, channels)), true) = (channel, span.end > start) {
-                s.groups.note_lit(i as usize);
                 s.groups.add(i as usize, channel, channels, open, all);
             }
             start = span.end;

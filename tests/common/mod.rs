@@ -96,7 +96,7 @@ pub fn sphere_world(material: Material, tessellated: bool) -> World {
     world
 }
 
-fn uv_sphere(nu: u32, nv: u32) -> WorldMesh {
+pub fn uv_sphere(nu: u32, nv: u32) -> WorldMesh {
     use std::f64::consts::{PI, TAU};
     let mut positions = Vec::new();
     for j in 0..=nv {

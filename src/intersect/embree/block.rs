@@ -2,7 +2,7 @@
 
 use super::super::coarse::Bundle;
 use super::super::triangle::Pairs;
-use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn, nudged};
+use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn};
 use crate::embree::{Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
 use crate::ray::{Hit, PrimRef, Ray};
@@ -61,7 +61,7 @@ impl EmbreeIntersector<'_> {
             let missed = self.missed_near(cast, valid & !hit);
             let mut doubtful = missed | self.back_faces(cast, hit, &found);
             for turn in TURNS {
-                let nearer = self.try_again::<W>(cast, doubtful, turn, &mut found, counts);
+                let nearer = self.try_again::<W>(cast, &shifts, doubtful, turn, &mut found, counts);
                 hit |= nearer;
                 doubtful &= !nearer;
             }
@@ -130,6 +130,7 @@ impl EmbreeIntersector<'_> {
     fn try_again<const W: usize>(
         &self,
         rays: &[Ray],
+        shifts: &[f64; BLOCK],
         doubtful: Lanes,
         turn: Turn,
         found: &mut [PacketHit; BLOCK],
@@ -142,7 +143,7 @@ impl EmbreeIntersector<'_> {
         counts.retry += u64::from(tried);
         let mut again = [rays[0]; BLOCK];
         for (k, lane) in each(doubtful).enumerate() {
-            again[k] = nudged(&rays[lane], turn);
+            again[k] = self.nudged(&rays[lane], shifts[lane], turn);
         }
         let mut found_again = [NOTHING; BLOCK];
         let all = Lanes::MAX >> (BLOCK as u32 - tried);
