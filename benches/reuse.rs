@@ -134,11 +134,7 @@ fn main() {
                     self.0.infer(q);
                     for (i, p) in q.points.iter().enumerate() {
                         let c = self.0.rays.len();
-                        println!(
-                            "   {p:?} -> {:?} {:?}",
-                            &q.ratios[i * c..(i + 1) * c],
-                            q.origins[i]
-                        );
+                        println!("   {p:?} -> {:?} {:?}", &q.ratios[i * c..(i + 1) * c], q.origins[i]);
                     }
                 }
             }
@@ -147,17 +143,9 @@ fn main() {
             let reference = |f: u32| {
                 let camera = shot.camera(f, settings.width, settings.height).expect("camera");
                 let reuse = Some(tweenray::shade::Reuse { channels: &channels, inference: None });
-                let job =
-                    FrameJob { camera: &camera, stream: f, with_gbuffer: false, reuse, mask: None };
-                let made = pool
-                    .install(|| renderer(&settings).render_job(&job, &stop, &Quiet))
-                    .expect("x");
-                Reference::new(
-                    f,
-                    &camera.to_scene(&scene.recentring),
-                    &made.sources,
-                    channels.len(),
-                )
+                let job = FrameJob { camera: &camera, stream: f, with_gbuffer: false, reuse, mask: None };
+                let made = pool.install(|| renderer(&settings).render_job(&job, &stop, &Quiet)).expect("x");
+                Reference::new(f, &camera.to_scene(&scene.recentring), &made.sources, channels.len())
             };
             let (a, b) = (reference(1), reference(shot.frames));
             let refs = [&a, &b];
@@ -166,46 +154,26 @@ fn main() {
                 .collect();
             worst.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (error, i) in &worst[..12] {
-                println!(
-                    "pixel {},{}: {error} {:?} {:?}",
-                    i % settings.width as usize,
-                    i / settings.width as usize,
-                    made.film.rgb[*i],
-                    truth.rgb[*i]
-                );
+                println!("pixel {},{}: {error} {:?} {:?}", i % settings.width as usize, i / settings.width as usize, made.film.rgb[*i], truth.rgb[*i]);
                 let mut mask = vec![false; truth.rgb.len()];
                 mask[*i] = true;
-                let tell = Tell(Lookup {
-                    frame,
-                    references: &refs,
-                    rays: &rays,
-                    evidence: maker.evidence,
-                });
+                let tell = Tell(Lookup { frame, references: &refs, rays: &rays, evidence: maker.evidence });
                 for inference in [Some(&tell as &dyn Inference), None] {
                     let reuse = Some(tweenray::shade::Reuse { channels: &channels, inference });
-                    let job = FrameJob {
-                        camera: &camera,
-                        stream: frame,
-                        with_gbuffer: false,
-                        reuse,
-                        mask: Some(&mask),
-                    };
+                    let job = FrameJob { camera: &camera, stream: frame, with_gbuffer: false, reuse, mask: Some(&mask) };
                     let r = renderer(&settings).render_job(&job, &stop, &Quiet).expect("x");
                     let c = channels.len();
                     for (k, p) in r.sources.points.iter().enumerate() {
-                        println!(
-                            "     traced {:?} {:?}",
-                            p.point.p,
-                            &r.sources.ratios[k * c..(k + 1) * c]
-                        );
+                        println!("     traced {:?} {:?}", p.point.p, &r.sources.ratios[k * c..(k + 1) * c]);
                     }
                 }
             }
         }
         if std::env::var("SPLIT").is_ok() {
-            let plain: Film = pool.install(|| {
-                renderer(&flat).render(&camera, frame, false, &stop, &Quiet).expect("x").0
-            });
+            let plain: Film = pool
+                .install(|| {
+                    renderer(&flat).render(&camera, frame, false, &stop, &Quiet).expect("x").0
+                });
             let display = |x: f32| 255.0 * srgb_encode(f64::from(x.clamp(0.0, 1.0)));
             let mut sums = std::collections::BTreeMap::new();
             for i in 0..truth.rgb.len() {
@@ -215,18 +183,14 @@ fn main() {
                     let pairs = f.rgb[i].to_array().into_iter().zip(truth.rgb[i].to_array());
                     pairs.map(|(a, b)| (display(a) - display(b)).powi(2)).sum::<f64>() / 3.0
                 };
-                let entry =
-                    sums.entry((specular, provenance as u8)).or_insert((0, 0.0, 0.0, 0.0f64));
+                let entry = sums.entry((specular, provenance as u8)).or_insert((0, 0.0, 0.0, 0.0f64));
                 entry.0 += 1;
                 entry.1 += error(&made.film);
                 entry.2 += error(&traced);
                 entry.3 = entry.3.max(error(&made.film));
             }
             for ((specular, provenance), (n, a, b, most)) in sums {
-                println!(
-                    "    specular {specular:5} provenance {provenance}: {n:6} pixels, squared error {a:9.0} against {b:9.0}; worst {:.1}",
-                    most.sqrt()
-                );
+                println!("    specular {specular:5} provenance {provenance}: {n:6} pixels, squared error {a:9.0} against {b:9.0}; worst {:.1}", most.sqrt());
             }
         }
         if std::env::var("DUMP").is_ok() {
