@@ -368,7 +368,8 @@ impl Renderer<'_> {
             } else {
                 let light = point.weight * radiance * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
-                pixels.note_risk(point.place.pixel, point.weight * irradiance, ratio);
+                let unshadowed = point.weight * radiance * exact as f32;
+                pixels.note_risk(point.place.pixel, unshadowed, ratio);
             }
         }
         wanted
