@@ -114,7 +114,6 @@ fn main() {
             beyond_crop: false,
             reuse: None,
             mask: None,
-            
         };
         let truth =
             pool.install(|| renderer(&best).render_job(&job, &stop, &Quiet)).expect("x").film;
@@ -151,8 +150,14 @@ fn main() {
             let reference = |f: u32| {
                 let camera = shot.camera(f, settings.width, settings.height).expect("camera");
                 let reuse = Some(tweenray::shade::Reuse { channels: &channels, inference: None });
-                let job =
-                    FrameJob { camera: &camera, stream: f, with_gbuffer: false, beyond_crop: false, reuse, mask: None };
+                let job = FrameJob {
+                    camera: &camera,
+                    stream: f,
+                    with_gbuffer: false,
+                    beyond_crop: false,
+                    reuse,
+                    mask: None,
+                };
                 let made = pool
                     .install(|| renderer(&settings).render_job(&job, &stop, &Quiet))
                     .expect("x");

@@ -1,5 +1,9 @@
 //! Counts that travel upwards: rays by kind, and samples that are no radiance. Merging is order-free.
 
+mod audit;
+
+pub use audit::{AuditSums, DrawnSum};
+
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 

@@ -148,6 +148,7 @@ mod tests {
             bytes: 1,
             rays,
             reuse: Default::default(),
+            audit: None,
             bad: Default::default(),
         };
         assert_eq!(

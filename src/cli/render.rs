@@ -12,7 +12,7 @@ use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::{self, Intersector};
-use crate::output::manifest::beside;
+use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
@@ -227,6 +227,9 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
         duration(start.elapsed().as_secs_f64())
     ))?;
     reused(&stats::reuse_of(outcome)).map_or(Ok(()), result)?;
+    if let Some(line) = stats::audit_of(job.plan, outcome).and_then(|audit| audit_line(&audit)) {
+        result(line)?;
+    }
     match job.request.fps {
         Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
         _ => {}
@@ -241,6 +244,28 @@ fn reused(counts: &ReuseCounts) -> Option<String> {
         format!("; of those in mirrors and glass {}", percent(share, 1))
     });
     Some(format!("{all} of the lit surface points were reused{mirrored}"))
+}
+
+/// How good the inferred frames are, in words.
+fn audit_line(audit: &AuditRow) -> Option<String> {
+    let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
+    let tiles = match audit.sums.tiles_traced {
+        0 => String::new(),
+        1 => "; 1 tile exceeded --max-rmse and was traced".into(),
+        n => format!("; {n} tiles exceeded --max-rmse and were traced"),
+    };
+    Some(format!(
+        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255{tiles}",
+        steps(rmse),
+        steps(low),
+        steps(high),
+        steps(traced)
+    ))
+}
+
+/// Display steps in two digits or so.
+fn steps(x: f64) -> String {
+    if x < 0.095 { format!("{x:.2}") } else { format!("{x:.1}") }
 }
 
 /// Says which samples are no radiance; an exit code where that is a failure.

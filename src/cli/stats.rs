@@ -4,8 +4,8 @@ use super::machine::{Machine, peak_memory};
 use crate::cluster::Outcome;
 use crate::error::{Error, Result};
 use crate::output::atomic;
-use crate::output::manifest::Header;
-use crate::sequence::{FrameReport, Plan};
+use crate::output::manifest::{AuditRow, Header};
+use crate::sequence::{FrameReport, Plan, audit_row};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -54,6 +54,7 @@ struct Stats<'a> {
     rays: RayCounts,
     reuse: ReuseCounts,
     bad_samples: BadSamples,
+    audit: Option<AuditRow>,
     kept: &'a [u32],
     frames: Vec<Frame<'a>>,
     ranks: &'a [RankStats],
@@ -79,6 +80,16 @@ pub fn reuse_of(outcome: &Outcome) -> ReuseCounts {
     let mut sum = ReuseCounts::default();
     outcome.frames.iter().for_each(|(_, report)| sum += report.reuse);
     sum
+}
+
+/// What the audits of all frames asked for found together, rendered now or kept; `None` where none
+/// was audited.
+pub fn audit_of(plan: &Plan, outcome: &Outcome) -> Option<AuditRow> {
+    let rendered = outcome.frames.iter().filter_map(|(_, report)| Some(report.audit?.sums));
+    let mut all = plan.kept_audit.into_iter().chain(rendered);
+    let mut sums = all.next()?;
+    all.for_each(|more| sums += more);
+    Some(audit_row(&sums))
 }
 
 /// Writes the file at `path`, whole. `ranks` starts with rank 0, whose times the top level shows.
@@ -113,6 +124,7 @@ pub fn write(
         rays,
         reuse: reuse_of(outcome),
         bad_samples,
+        audit: audit_of(plan, outcome),
         kept: &plan.kept,
         frames: outcome.frames.iter().map(|(rank, report)| Frame { rank: *rank, report }).collect(),
         ranks,

@@ -21,7 +21,7 @@ pub struct Outcome {
 #[derive(Serialize, Deserialize)]
 enum Note {
     /// A frame is finished.
-    Done(FrameReport),
+    Done(Box<FrameReport>),
     /// Somebody was asked to stop.
     Stop,
 }
@@ -54,7 +54,7 @@ pub fn render(
         if world.is_root() {
             done(report);
         } else {
-            world.post(0, &Note::Done(report.clone()))?;
+            world.post(0, &Note::Done(Box::new(report.clone())))?;
         }
         hear()
     };

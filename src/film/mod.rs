@@ -22,6 +22,10 @@ pub struct Film {
     pub gbuffer: Option<GBuffer>,
     /// Where each pixel's light comes from; `None` where every frame is traced.
     pub sources: Option<Vec<PixelSource>>,
+    /// Where the audit looked, how far each pixel is from its mean of two traces, in display steps
+    /// of 255, the mean of the channels, positive where the pixel is brighter; NaN elsewhere. `None`
+    /// where nothing was audited. In no file of the frame: those do not depend on the audit.
+    pub audit: Option<Vec<f32>>,
     /// Camera samples in it that are no radiance.
     pub bad: BadSamples,
 }
@@ -78,6 +82,7 @@ impl Film {
             rgb: vec![Rgb::ZERO; n],
             gbuffer: with_gbuffer.then(|| GBuffer::new(n)),
             sources: None,
+            audit: None,
             bad: BadSamples::default(),
         }
     }

@@ -63,6 +63,81 @@ pub fn mean_interval(values: &[f64]) -> Option<Interval> {
     Some(Interval { estimate: mean, low: mean - half, high: mean + half })
 }
 
+/// How much more than the largest part that was drawn the largest one of all may be.
+///
+/// Squared errors of pixels have long tails: a few hold most of the sum, and a sample that missed
+/// them looks surer than it is. 1 is Fay and Feuer's own. In 1,200 draws of some 77 pixels from
+/// shots of `scenes/demo`, whose squared errors have a kurtosis of 30 to 230, the interval held the
+/// truth in 90 % with 1 and in 96 % with 2; in three other scenes in 96 % and more with either.
+const TAIL: f64 = 2.0;
+
+/// The total that parts drawn at random estimate, with its 95 % interval: `sum` of the parts, sum
+/// of their `squares`, the `largest` of them (Fay and Feuer, "Confidence intervals for directly
+/// standardized rates: a method based on the gamma distribution", 1997, with a longer tail).
+///
+/// The upper end is what the total may be were one more part as large to come. Parts may be
+/// negative; a total may not, and one below 0 counts as 0.
+pub fn drawn_sum_interval(sum: f64, squares: f64, largest: f64) -> Interval {
+    let tail = (1.0 - CONFIDENCE) / 2.0;
+    let estimate = sum.max(0.0);
+    let low = gamma_quantile(tail, estimate, squares);
+    let more = TAIL * largest.max(0.0);
+    let high = gamma_quantile(1.0 - tail, estimate + more, squares + more * more);
+    Interval { estimate, low: low.min(estimate), high: high.max(estimate) }
+}
+
+/// The number that a gamma variable of this mean and variance stays below with probability `p`.
+fn gamma_quantile(p: f64, mean: f64, variance: f64) -> f64 {
+    if mean <= 0.0 || variance <= 0.0 {
+        return mean.max(0.0);
+    }
+    let (shape, scale) = (mean * mean / variance, variance / mean);
+    let (mut low, mut high) = (0.0, shape + 20.0 * shape.sqrt() + 40.0);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if incomplete_gamma(shape, middle) < p { low = middle } else { high = middle }
+    }
+    0.5 * (low + high) * scale
+}
+
+/// The regularised lower incomplete gamma function `P(a, x)`: its series (DLMF 8.11.4) left of the
+/// mean, the continued fraction of its complement (DLMF 8.9.2) right of it.
+fn incomplete_gamma(a: f64, x: f64) -> f64 {
+    if x <= 0.0 {
+        return 0.0;
+    }
+    let front = libm::exp(a * libm::log(x) - x - libm::lgamma(a));
+    if x < a + 1.0 {
+        let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
+        while term > sum * 1e-16 {
+            n += 1.0;
+            term *= x / n;
+            sum += term;
+        }
+        return front * sum;
+    }
+    // Modified Lentz, as below; all numerators but the first are negative, no part is zero.
+    let mut b = x + 1.0 - a;
+    let (mut c, mut d) = (1e300, 1.0 / b);
+    let mut f = d;
+    for k in 1..1_000_000u32 {
+        let k = f64::from(k);
+        let numerator = k * (a - k);
+        b += 2.0;
+        d = 1.0 / (b + numerator * d);
+        c = b + numerator / c;
+        let step = c * d;
+        f *= step;
+        if (step - 1.0).abs() < 1e-15 {
+            break;
+        }
+    }
+    1.0 - front * f
+}
+
 /// The number that Student's t of `freedom` degrees exceeds in absolute value in 5 % of cases.
 fn student_t(freedom: f64) -> f64 {
     // P(|T| > t) = I_x(ν/2, 1/2) at x = ν / (ν + t²).
@@ -178,6 +253,35 @@ mod tests {
         {
             near(student_t(freedom), t, 6e-5);
         }
+    }
+
+    #[test]
+    fn gamma_quantiles_are_chi_squares() {
+        // Tables of chi-square: half the degrees of freedom are the shape, the scale is 2.
+        for (freedom, low, high) in
+            [(1.0, 0.000_982_1, 5.0239), (2.0, 0.0506, 7.3778), (10.0, 3.2470, 20.4832)]
+        {
+            near(gamma_quantile(0.025, freedom, 2.0 * freedom), low, 6e-5);
+            near(gamma_quantile(0.975, freedom, 2.0 * freedom), high, 6e-5);
+        }
+        // Nearly normal.
+        let wide = gamma_quantile(0.975, 1e8, 1e8);
+        near((wide - 1e8) / 1e4, 1.96, 1e-3);
+    }
+
+    #[test]
+    fn a_drawn_sum_is_never_below_zero_and_surer_with_more_parts() {
+        let none = drawn_sum_interval(0.0, 0.0, 3.0);
+        assert_eq!((none.estimate, none.low), (0.0, 0.0));
+        assert!(none.high > 6.0 && none.high.is_finite());
+        let negative = drawn_sum_interval(-2.0, 5.0, 1.0);
+        assert_eq!((negative.estimate, negative.low), (0.0, 0.0));
+        assert!(negative.high > 2.0);
+        let few = drawn_sum_interval(100.0, 1000.0, 10.0);
+        let many = drawn_sum_interval(100.0, 10.0, 0.1);
+        assert!(few.low < many.low && many.low < 100.0);
+        assert!(few.high > many.high && many.high > 100.0);
+        near(many.high - many.low, 2.0 * 1.96 * 10f64.sqrt(), 0.6);
     }
 
     #[test]

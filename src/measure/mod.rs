@@ -30,5 +30,7 @@ mod test_images;
 pub use compare::{Comparison, Exceeding, Space, Summary, compare, summarise};
 pub use error_metrics::{LargestError, largest_error, mse, psnr, share_exceeding};
 pub use flip::{PIXELS_PER_DEGREE, flip, flip_map};
-pub use intervals::{Interval, mean_interval, proportion_interval, proportion_upper_bound};
+pub use intervals::{
+    Interval, drawn_sum_interval, mean_interval, proportion_interval, proportion_upper_bound,
+};
 pub use ssim::{ssim, ssim_blocks};

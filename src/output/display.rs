@@ -1,7 +1,7 @@
 //! Linear radiance to display values: exposure, tone curve, transfer function, rounding.
 
 use super::quantise::{Quantiser, SRGB_8, SRGB_16};
-use crate::math::{Rgb, luminance};
+use crate::math::{Rgb, luminance, srgb_encode};
 use crate::scene::ToneCurve;
 use rayon::prelude::*;
 
@@ -28,6 +28,14 @@ impl Display {
             ToneCurve::Reinhard => (c / (1.0 + luminance(c))).min(Rgb::ONE),
             ToneCurve::Filmic => filmic(c),
         }
+    }
+
+    /// The code values in [0, 1] that a png file holds, before they are rounded.
+    pub fn code(&self, radiance: Rgb) -> [f64; 3] {
+        self.tone(radiance).to_array().map(|x| match self.tone {
+            ToneCurve::Linear => f64::from(x),
+            _ => srgb_encode(f64::from(x)),
+        })
     }
 
     /// 8-bit values, three bytes a pixel. `width` only splits the work.
@@ -74,7 +82,6 @@ fn filmic(c: Rgb) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::srgb_encode;
 
     const CURVES: [ToneCurve; 4] =
         [ToneCurve::Srgb, ToneCurve::Linear, ToneCurve::Reinhard, ToneCurve::Filmic];
@@ -103,8 +110,7 @@ mod tests {
             let display = Display { exposure: 0.9, tone };
             let (b8, b16) = (display.encode_8(&ramp, 50), display.encode_16(&ramp, 50));
             for (i, c) in ramp.iter().enumerate() {
-                let x = f64::from(display.tone(*c).y);
-                let code = if tone == ToneCurve::Linear { x } else { srgb_encode(x) };
+                let code = display.code(*c)[1];
                 assert_eq!(f64::from(b8[3 * i + 1]), (code * 255.0).round());
                 let wide = u16::from_be_bytes([b16[6 * i + 2], b16[6 * i + 3]]);
                 assert_eq!(f64::from(wide), (code * 65_535.0).round());

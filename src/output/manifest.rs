@@ -15,7 +15,7 @@
 use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
-use crate::stats::{BadSamples, RayCounts, ReuseCounts};
+use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -66,6 +66,9 @@ pub struct Row {
     /// How much of it was inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
+    /// How good the inferred part of it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub audit: Option<AuditRow>,
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
@@ -73,6 +76,20 @@ pub struct Row {
     /// replaced.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub other_settings: bool,
+}
+
+/// What the audit of a frame found, with its figures: root mean squared errors in display steps of
+/// 255, each with the ends of its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AuditRow {
+    /// Of the frame as it is.
+    pub rmse: Option<[f64; 3]>,
+    /// Of its inferred pixels.
+    pub rmse_inferred_pixels: Option<[f64; 3]>,
+    /// Of the frame, had it been traced.
+    pub rmse_traced: Option<[f64; 3]>,
+    /// What the figures are made of; frames are pooled by adding these.
+    pub sums: AuditSums,
 }
 
 /// A setting that keeps two headers apart.

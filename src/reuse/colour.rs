@@ -127,7 +127,7 @@ impl Inferred {
             return PixelSource::default();
         }
         let nearer = if frame - before <= after - frame { before } else { after };
-        PixelSource { provenance: Provenance::Both, frame: nearer, distance: 0.0 }
+        PixelSource { provenance: Provenance::Both, frame: nearer, ..PixelSource::default() }
     }
 }
 

@@ -4,8 +4,13 @@
 use crate::effects::EffectPlan;
 use crate::inference::{Channel, Channels};
 use crate::scene::{Light, Scene, Settings};
+use crate::stats::RayCounts;
 
-/// A shadow ray with its sample; the unit is a camera ray with the look at its surface.
+/// A camera ray with the look at its surface: the unit.
+const CAMERA_RAY: f64 = 1.0;
+/// A ray from a mirror or glass, traced alone.
+const SPECULAR_RAY: f64 = 2.0;
+/// A shadow ray with its sample.
 const SHADOW_RAY: f64 = 1.2;
 /// Looking one surface point up.
 const LOOKUP: f64 = 1.5;
@@ -86,4 +91,47 @@ fn why(rays: u32, spp: u32) -> String {
         true => format!("one lookup costs less than a pixel's {rays}"),
         false => format!("a lookup costs more than a pixel's {rays}"),
     }
+}
+
+/// What a frame costs that cast `rays` and looked `lookups` surface points up.
+pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
+    let shadow = rays.shadow_area + rays.shadow_delta + rays.shadow_sky;
+    CAMERA_RAY * rays.camera as f64
+        + SPECULAR_RAY * (rays.mirror + rays.glass) as f64
+        + SHADOW_RAY * shadow as f64
+        + LOOKUP * lookups as f64
+}
+
+/// What tracing one lit pixel costs in a frame that cast `rays`: its camera samples, as many
+/// specular rays as the frame has for each of its camera rays, and all shadow rays of each.
+pub fn of_traced_pixel(
+    rays: &RayCounts,
+    scene: &Scene,
+    plan: &EffectPlan,
+    settings: &Settings,
+) -> f64 {
+    let shadow: u64 = shadow_rays(scene, plan, settings);
+    let specular = (rays.mirror + rays.glass) as f64 / rays.camera.max(1) as f64;
+    let hit = SHADOW_RAY * shadow as f64;
+    f64::from(settings.spp) * (CAMERA_RAY + hit + specular * (SPECULAR_RAY + hit))
+}
+
+/// Shadow rays of one diffuse point, all lights together.
+fn shadow_rays(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> u64 {
+    let one = |light: &Light| match light {
+        Light::Quad(_) | Light::Sphere { .. } => u64::from(settings.shadow_samples),
+        _ => 1,
+    };
+    let sky = if plan.sky_light { u64::from(settings.sky_samples) } else { 0 };
+    scene.lights.iter().map(one).sum::<u64>() + sky
+}
+
+/// Whether every light whose shadow rays are drawn at random is among `channels`: then what none of
+/// these reaches has no noise.
+pub fn is_all_kept(channels: &Channels, scene: &Scene, plan: &EffectPlan) -> bool {
+    let sampled = Channels::of(scene, |channel| match channel {
+        Channel::Area(_) => plan.area_lights,
+        Channel::Sky => plan.sky_light,
+    });
+    channels.len() == sampled.len()
 }

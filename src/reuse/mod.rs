@@ -3,14 +3,18 @@
 //! A [`Reference`] holds a frame's camera and the surface points that were traced for it, with their
 //! ratios. A [`Lookup`] answers from several of them, with evidence: what it cannot vouch for it
 //! leaves unknown, and that is traced. Only traced points are sources, so nothing blurs or drifts
-//! however many frames are inferred. All in scene space.
+//! however many frames are inferred. [`audit`] judges inferred pixels by traces of a few of them.
+//! All in scene space.
 
+pub mod audit;
 pub mod colour;
 mod cost;
 mod index;
 mod lookup;
 mod reference;
 
-pub use cost::{LookupReason, channels, lookup_reasons, rays_of};
+pub use cost::{
+    LookupReason, channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of,
+};
 pub use lookup::{Evidence, Lookup};
 pub use reference::Reference;

@@ -115,7 +115,7 @@ impl<'a> ColourMaker<'a> {
         if !self.with_gbuffer {
             traced.film.gbuffer = None;
         }
-        Ok(Some((Made { film: traced.film, rays: traced.rays, reuse }, discoveries)))
+        Ok(Some((Made { film: traced.film, rays: traced.rays, reuse, audit: None }, discoveries)))
     }
 
     /// Traces what could not be inferred.

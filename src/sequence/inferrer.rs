@@ -31,7 +31,7 @@ pub struct Inferrer<'a> {
     /// What counts as evidence.
     pub evidence: Evidence,
     schedule: Schedule,
-    channels: Channels,
+    pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
     rays: Vec<u32>,
     state: Mutex<State>,
@@ -113,10 +113,10 @@ impl<'a> Inferrer<'a> {
             let reference = Reference::new(frame, &own, &sources, self.channels.len());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
         }
-        Ok(Some(Made { film, rays, reuse }))
+        Ok(Some(Made { film, rays, reuse, audit: None }))
     }
 
-    fn camera(&self, frame: u32) -> Result<Camera> {
+    pub(super) fn camera(&self, frame: u32) -> Result<Camera> {
         let settings = self.renderer.settings;
         self.shot.camera(frame, settings.width, settings.height)
     }
@@ -138,6 +138,11 @@ impl<'a> Inferrer<'a> {
         })
     }
 
+    fn hand_out(&self, original: u32, made: Made) -> Made {
+        self.with_state(|s| s.hand_out(&self.schedule, original, &made));
+        made
+    }
+
     fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
         act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -150,11 +155,8 @@ impl State {
         self.most_memory = self.most_memory.max(memory);
     }
 
-    /// An original that is finished already.
-    fn finished(&mut self, frame: u32) -> Option<Made> {
-        if let Some(made) = self.early.remove(&frame) {
-            return Some(made);
-        }
+    /// One more of an original that went out already.
+    fn copy_of(&self, frame: u32) -> Option<Made> {
         self.again.as_ref().filter(|(other, _)| *other == frame).map(|(_, made)| made.copy())
     }
 
@@ -177,17 +179,22 @@ impl FrameMaker for Inferrer<'_> {
             if s.references.asked(original) == 0 {
                 s.references.expect(&self.schedule, &[frame]);
             }
-            s.finished(original)
+            (s.early.remove(&original), s.copy_of(original))
         });
-        let made = match made {
-            Some(made) => made,
-            None => match self.frame(original)? {
+        let mut made = match made {
+            // Audited when it was new.
+            (_, Some(copy)) => return Ok(Some(self.hand_out(original, copy))),
+            (Some(made), None) => made,
+            (None, None) => match self.frame(original)? {
                 Some(made) => made,
                 None => return Ok(None),
             },
         };
-        self.with_state(|s| s.hand_out(&self.schedule, original, &made));
-        Ok(Some(made))
+        match self.audit(original, &mut made)? {
+            Some(audit) => made.audit = audit,
+            None => return Ok(None),
+        }
+        Ok(Some(self.hand_out(original, made)))
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {

@@ -7,6 +7,7 @@
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
+mod audit;
 mod colour;
 mod fingerprint;
 mod inferrer;
@@ -28,9 +29,10 @@ mod tests;
 
 use crate::error::Result;
 use crate::film::Film;
-use crate::output::manifest::{Journal, Row};
+use crate::output::manifest::{AuditRow, Journal, Row};
 use crate::output::{WriteOptions, write_image};
-use crate::stats::{BadSamples, RayCounts, ReuseCounts};
+use crate::reuse::audit::rmse;
+use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -63,6 +65,8 @@ pub struct Made {
     pub rays: RayCounts,
     /// How much of it was inferred.
     pub reuse: ReuseCounts,
+    /// How good the inferred part is, where that was looked at.
+    pub audit: Option<AuditSums>,
 }
 
 impl Made {
@@ -73,7 +77,7 @@ impl Made {
             specular_inferred: self.reuse.specular,
             ..self.reuse
         };
-        Self { film: self.film.clone(), rays: RayCounts::default(), reuse }
+        Self { film: self.film.clone(), rays: RayCounts::default(), reuse, audit: None }
     }
 }
 
@@ -93,6 +97,9 @@ pub struct FrameReport {
     /// How much was inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
+    /// How good the inferred part is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub audit: Option<AuditRow>,
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
@@ -117,18 +124,31 @@ pub fn render_frames(
         let start = Instant::now();
         let Some(made) = maker.make(frame)? else { break };
         let trace_seconds = start.elapsed().as_secs_f64();
-        let row = write_frame(target, frame, &made, start)?;
+        let audit = made.audit.map(|sums| audit_row(&sums));
+        let row = Row { audit, ..write_frame(target, frame, &made, start)? };
         journal.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
         let Row { bytes, bad, rays, reuse, .. } = row;
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, bad })?;
+        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })?;
     }
     Ok(())
 }
 
+/// What an audit found, with the figures that it amounts to.
+pub fn audit_row(sums: &AuditSums) -> AuditRow {
+    let of = |i: crate::measure::Interval| [i.estimate, i.low, i.high];
+    let rmse = rmse(sums);
+    AuditRow {
+        rmse: rmse.map(|r| of(r.shown)),
+        rmse_inferred_pixels: rmse.map(|r| of(r.inferred)),
+        rmse_traced: rmse.map(|r| of(r.traced)),
+        sums: *sums,
+    }
+}
+
 /// Writes the frame's file whole; gives its row.
 fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Result<Row> {
-    let Made { film, rays, reuse } = made;
+    let Made { film, rays, reuse, .. } = made;
     let path = target.pattern.path(frame);
     let options = WriteOptions { frame: Some(frame), ..target.write.clone() };
     let written = write_image(&path, film, &options)?;
@@ -141,6 +161,7 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         seconds: start.elapsed().as_secs_f64(),
         rays: *rays,
         reuse: *reuse,
+        audit: None,
         bad: film.bad,
         other_settings: false,
     })

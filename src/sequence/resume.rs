@@ -4,7 +4,7 @@ use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Header, Manifest, Row, manifest_path};
 use crate::output::{FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
-use crate::stats::BadSamples;
+use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -30,12 +30,14 @@ pub struct Target {
 }
 
 /// What there is to do.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Frames that exist whole, with the same settings.
     pub kept: Vec<u32>,
     /// Those of the kept frames that have samples which are no radiance.
     pub kept_bad: Vec<(u32, BadSamples)>,
+    /// What the audits of the kept frames found, if any was audited.
+    pub kept_audit: Option<AuditSums>,
     /// Frames to render.
     pub render: Vec<u32>,
     /// What the user should know: damaged frames.
@@ -82,7 +84,7 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
 
 /// How a frame stands on disk.
 enum State {
-    Whole(BadSamples),
+    Whole(BadSamples, Option<AuditSums>),
     Missing,
     Damaged(String),
 }
@@ -101,7 +103,11 @@ fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State
     };
     let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
     let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
-    Ok(if whole { State::Whole(row.bad) } else { State::Damaged(note()) })
+    Ok(if whole {
+        State::Whole(row.bad, row.audit.map(|a| a.sums))
+    } else {
+        State::Damaged(note())
+    })
 }
 
 /// Frames of another sequence that a job over `frames` does not replace.
@@ -142,7 +148,10 @@ impl Plan {
         let mut plan = Self::default();
         for (frame, state) in states {
             match state {
-                State::Whole(bad) => {
+                State::Whole(bad, audit) => {
+                    if let Some(sums) = audit {
+                        *plan.kept_audit.get_or_insert_default() += sums;
+                    }
                     plan.kept.push(frame);
                     if !bad.is_none() {
                         plan.kept_bad.push((frame, bad));

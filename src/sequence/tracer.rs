@@ -30,6 +30,6 @@ impl FrameMaker for Tracer<'_> {
         let render =
             || self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress);
         let made = self.pool.install(render);
-        Ok(made.map(|(film, rays)| Made { film, rays, reuse: ReuseCounts::default() }))
+        Ok(made.map(|(film, rays)| Made { film, rays, reuse: ReuseCounts::default(), audit: None }))
     }
 }

@@ -14,6 +14,7 @@ pub(crate) mod light;
 mod lighting;
 pub mod optics;
 mod pixels;
+mod scattered;
 mod surface;
 
 use crate::effects::EffectPlan;
@@ -172,21 +173,7 @@ impl Renderer<'_> {
         progress: &dyn Progress,
     ) -> Option<Rendered> {
         let camera = job.camera;
-        let own = camera.to_scene(&self.scene.recentring);
-        let around_eye = match self.plan.nested_glass {
-            true => Interior::at(self, own.eye, own.forward),
-            false => Interior::default(),
-        };
-        let input = FrameInput {
-            camera: own,
-            pixel_size: own.pixel_size(),
-            stream: job.stream,
-            filter: pixel_filter(self.settings.filter),
-            area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
-            around_eye,
-            reuse: job.reuse,
-            has_always_traced: self.scene.has_always_traced(),
-        };
+        let input = self.input(camera, job.stream, job.reuse);
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
         let traced = if job.beyond_crop { full } else { crop };
@@ -210,6 +197,24 @@ impl Renderer<'_> {
             tiles.par_iter().map_init(start, one).collect()
         };
         Some(assemble(job, done?))
+    }
+
+    fn input<'a>(&self, camera: &Camera, stream: u32, reuse: Option<Reuse<'a>>) -> FrameInput<'a> {
+        let own = camera.to_scene(&self.scene.recentring);
+        let around_eye = match self.plan.nested_glass {
+            true => Interior::at(self, own.eye, own.forward),
+            false => Interior::default(),
+        };
+        FrameInput {
+            camera: own,
+            pixel_size: own.pixel_size(),
+            stream,
+            filter: pixel_filter(self.settings.filter),
+            area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
+            around_eye,
+            reuse,
+            has_always_traced: self.scene.has_always_traced(),
+        }
     }
 
     fn tile(

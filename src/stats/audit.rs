@@ -1,0 +1,72 @@
+//! What an audit of inferred frames adds up: enough to pool frames, whoever rendered them.
+
+use super::RayCounts;
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// The total of a figure over many pixels, estimated from those that were drawn with known
+/// probabilities (Horvitz and Thompson, 1952). A drawn pixel's figure over its probability is its
+/// *part*.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct DrawnSum {
+    /// The parts' sum: the estimate.
+    pub sum: f64,
+    /// The sum of the parts' squares: how sure it is.
+    pub squares: f64,
+    /// The largest part that was drawn or, unseen, might have been.
+    pub largest: f64,
+}
+
+impl DrawnSum {
+    /// Takes in a drawn pixel: its figure, and one over the probability with which it was drawn.
+    /// `unseen` is a figure that could have gone unnoticed.
+    pub fn add(&mut self, figure: f64, weight: f64, unseen: f64) {
+        let part = figure * weight;
+        self.sum += part;
+        self.squares += part * part;
+        self.largest = self.largest.max(part).max(unseen * weight);
+    }
+}
+
+impl AddAssign for DrawnSum {
+    fn add_assign(&mut self, o: Self) {
+        self.sum += o.sum;
+        self.squares += o.squares;
+        self.largest = self.largest.max(o.largest);
+    }
+}
+
+/// What the audit of one or many frames found. Squared errors are in squares of a display step of
+/// 255, the mean of the channels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct AuditSums {
+    /// Pixels of the frames.
+    pub pixels: u64,
+    /// Those of them that were inferred.
+    pub inferred_pixels: u64,
+    /// Pixels that were drawn and traced twice.
+    pub drawn: u64,
+    /// Squared error of the inferred pixels.
+    pub inferred: DrawnSum,
+    /// Squared error of all pixels, some of which were traced.
+    pub shown: DrawnSum,
+    /// Squared error that the same pixels would have, had all been traced.
+    pub traced: DrawnSum,
+    /// Tiles that were traced because their error was too large.
+    pub tiles_traced: u64,
+    /// Rays cast to find all this out; no ray that the picture is made of.
+    pub rays: RayCounts,
+}
+
+impl AddAssign for AuditSums {
+    fn add_assign(&mut self, o: Self) {
+        self.pixels += o.pixels;
+        self.inferred_pixels += o.inferred_pixels;
+        self.drawn += o.drawn;
+        self.inferred += o.inferred;
+        self.shown += o.shown;
+        self.traced += o.traced;
+        self.tiles_traced += o.tiles_traced;
+        self.rays += o.rays;
+    }
+}

@@ -1,0 +1,170 @@
+//! Short shots of a scene, audited, beside their true errors over all pixels.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use tweenray::effects::EffectPlan;
+use tweenray::film::{Film, Provenance};
+use tweenray::import::{self, LoadOptions, Loaded};
+use tweenray::intersect::EmbreeIntersector;
+use tweenray::math::Rgb;
+use tweenray::output::Display;
+use tweenray::reuse::audit::{Rmse, rmse};
+use tweenray::scene::{Camera, CameraPath, ReuseSettings, Scene, Settings, Shot};
+use tweenray::sequence::{FrameMaker, Inferrer, Pyramid};
+use tweenray::shade::{FrameJob, Progress, Renderer};
+use tweenray::stats::{AuditSums, RayCounts};
+
+/// How the shots of a trial are rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Trial {
+    pub edge: u32,
+    pub frames: u32,
+    pub spp: u32,
+    /// Share of a frame's cost that its audit takes.
+    pub share: f32,
+    /// Shadow samples of each of the two converged renders.
+    pub best: u32,
+}
+
+/// Mean squared errors, squares of a display step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Truth {
+    pub inferred: f64,
+    pub shown: f64,
+    pub traced: f64,
+}
+
+/// What one shot's audit said, and what is true.
+pub struct Audited {
+    pub sums: AuditSums,
+    pub rmse: Rmse,
+    pub truth: Truth,
+}
+
+pub struct Quiet;
+impl Progress for Quiet {
+    fn tile_done(&self, _: f64, _: &RayCounts) {}
+}
+
+/// A scene of `scenes/`, read.
+pub struct Set {
+    pub loaded: Loaded,
+    pub scene: Scene,
+}
+
+/// The scene, ready to render.
+pub struct Stage<'s> {
+    pub set: &'s Set,
+    pub intersector: EmbreeIntersector<'s>,
+    pub pool: rayon::ThreadPool,
+}
+
+impl Set {
+    pub fn load(name: &str) -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}/scene.toml"));
+        let loaded = import::load(&file, &LoadOptions::default()).expect("the scene loads");
+        let scene = loaded.world.clone().into_scene(true).expect("a scene");
+        Self { loaded, scene }
+    }
+
+    pub fn stage(&self, threads: usize) -> Stage<'_> {
+        let rules = self.loaded.settings.rules;
+        let intersector = EmbreeIntersector::new(&self.scene, rules, None, threads).expect("a BVH");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        Stage { set: self, intersector, pool }
+    }
+}
+
+impl Stage<'_> {
+    /// Settings of shot `number`: 4, 8 or 16 shadow samples, and a seed of its own.
+    pub fn settings(&self, trial: &Trial, number: u32) -> Settings {
+        let samples = [4, 8, 16][number as usize % 3];
+        Settings {
+            width: trial.edge,
+            height: trial.edge,
+            spp: trial.spp,
+            shadow_samples: samples,
+            sky_samples: samples,
+            seed: 1000 + u64::from(number),
+            reuse: ReuseSettings { audit: trial.share, ..ReuseSettings::default() },
+            ..self.set.loaded.settings.clone()
+        }
+    }
+
+    /// The scene's move, shortened and turned a little differently for each number.
+    pub fn shot(&self, trial: &Trial, number: u32) -> Shot {
+        let mut shot = Shot { frames: trial.frames, ..self.set.loaded.shot.clone() };
+        let (part, turn) = (0.2 + 0.08 * f64::from(number % 11), 0.05 * f64::from(number % 7));
+        match &mut shot.path {
+            CameraPath::Pan { from, to, target, .. } => {
+                let middle = (*from + *to) * 0.5;
+                (*from, *to) = (middle + (*from - middle) * part, middle + (*to - middle) * part);
+                target.x += turn - 0.15;
+            }
+            CameraPath::BSpline { target, .. } => target.x += turn - 0.15,
+            _ => {}
+        }
+        shot
+    }
+
+    pub fn renderer<'a>(&'a self, settings: &'a Settings) -> Renderer<'a> {
+        let plan = EffectPlan::of(&self.set.scene, settings);
+        Renderer { scene: &self.set.scene, settings, plan, intersector: &self.intersector }
+    }
+
+    /// Renders and audits shot `number`, then renders its frames again, traced and converged.
+    pub fn audited(&self, trial: &Trial, number: u32) -> Audited {
+        let (settings, shot) = (self.settings(trial, number), self.shot(trial, number));
+        let best =
+            Settings { shadow_samples: trial.best, sky_samples: trial.best, ..settings.clone() };
+        let stop = AtomicBool::new(false);
+        let pyramid = Pyramid { segment: 64, frames: shot.frames };
+        let frames: Vec<u32> = pyramid.all().collect();
+        let maker =
+            Inferrer::new(self.renderer(&settings), &shot, &self.pool, &stop, &Quiet, pyramid);
+        maker.expect(&frames);
+        let (mut sums, mut truth) = (AuditSums::default(), Truth::default());
+        for frame in pyramid.order(&frames) {
+            let made = maker.make(frame).expect("made").expect("not stopped");
+            let Some(audit) = made.audit else { continue };
+            sums += audit;
+            let camera = shot.camera(frame, trial.edge, trial.edge).expect("a camera");
+            let render = |settings, stream| self.render(settings, &camera, stream);
+            let converged = [render(&best, frame | 5 << 27), render(&best, frame | 6 << 27)];
+            let traced = render(&settings, frame);
+            truth.add(&settings, &made.film, &traced, &converged);
+        }
+        truth.inferred /= sums.inferred_pixels as f64;
+        truth.shown /= sums.pixels as f64;
+        truth.traced /= sums.pixels as f64;
+        Audited { sums, rmse: rmse(&sums).expect("pixels were drawn"), truth }
+    }
+
+    pub fn render(&self, settings: &Settings, camera: &Camera, stream: u32) -> Film {
+        let job = FrameJob { camera, stream, with_gbuffer: false, reuse: None, mask: None };
+        let stop = AtomicBool::new(false);
+        let render = || self.renderer(settings).render_job(&job, &stop, &Quiet);
+        self.pool.install(render).expect("not stopped").film
+    }
+}
+
+impl Truth {
+    /// Adds the squared errors of a frame. With two converged renders the product of differences
+    /// is free of their own noise.
+    fn add(&mut self, settings: &Settings, shown: &Film, traced: &Film, converged: &[Film; 2]) {
+        let display = Display { exposure: settings.exposure, tone: settings.tone };
+        let [a, b] = converged;
+        for (i, source) in shown.sources.as_ref().expect("sources").iter().enumerate() {
+            let error = |c: Rgb| {
+                let [c, a, b] = [c, a.rgb[i], b.rgb[i]].map(|c| display.code(c));
+                (0..3).map(|k| (c[k] - a[k]) * (c[k] - b[k])).sum::<f64>() * 255.0 * 255.0 / 3.0
+            };
+            let own = error(shown.rgb[i]);
+            self.shown += own;
+            self.traced += error(traced.rgb[i]);
+            if !matches!(source.provenance, Provenance::Background | Provenance::Traced) {
+                self.inferred += own;
+            }
+        }
+    }
+}
