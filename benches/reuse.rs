@@ -47,6 +47,7 @@ fn main() {
         spp: var("SPP", 1),
         shadow_samples: samples,
         sky_samples: if loaded.settings.sky_samples > 0 { samples } else { 0 },
+        reuse: tweenray::scene::ReuseSettings { audit: 0.0, ..loaded.settings.reuse },
         ..loaded.settings.clone()
     };
     let flat = Settings { bounces: 0, ..settings.clone() };

@@ -122,6 +122,7 @@ impl Stage<'_> {
         let frames: Vec<u32> = pyramid.all().collect();
         let maker =
             Inferrer::new(self.renderer(&settings), &shot, &self.pool, &stop, &Quiet, pyramid);
+        let maker = maker.expect("cameras");
         maker.expect(&frames);
         let (mut sums, mut truth) = (AuditSums::default(), Truth::default());
         for frame in pyramid.order(&frames) {
@@ -141,7 +142,14 @@ impl Stage<'_> {
     }
 
     pub fn render(&self, settings: &Settings, camera: &Camera, stream: u32) -> Film {
-        let job = FrameJob { camera, stream, with_gbuffer: false, reuse: None, mask: None };
+        let job = FrameJob {
+            camera,
+            stream,
+            with_gbuffer: false,
+            reuse: None,
+            mask: None,
+            beyond_crop: false,
+        };
         let stop = AtomicBool::new(false);
         let render = || self.renderer(settings).render_job(&job, &stop, &Quiet);
         self.pool.install(render).expect("not stopped").film
