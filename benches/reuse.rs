@@ -76,8 +76,8 @@ fn main() {
     e.coarser = var("COARSER", e.coarser);
     e.tolerance = var("TOL", e.tolerance);
     e.noise = var("NOISE", e.noise);
-    e.alone = var("ALONE", e.alone);
-    e.alone_saturated = var("ALONES", e.alone_saturated);
+    e.offset = var("OFFSET", e.offset);
+    e.offset_saturated = var("OFFSATS", e.offset_saturated);
     e.grazing = var("GRAZING", e.grazing);
     let every: u32 = var("EVERY", 4);
     let order = pyramid.order(&frames);

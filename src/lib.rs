@@ -40,6 +40,3 @@ pub mod cluster;
 
 // Floor 7: the command line.
 pub mod cli;
-
-thread_local! { pub static KCAP: f32 = std::env::var("KCAP").ok().and_then(|v| v.parse().ok()).unwrap_or(1e9); }
-thread_local! { pub static NEEDN: usize = std::env::var("NEEDN").ok().and_then(|v| v.parse().ok()).unwrap_or(0); }

@@ -43,7 +43,8 @@ fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {
     let stop = AtomicBool::new(false);
     let pyramid = Pyramid { segment: 64, frames: shot.frames };
     let all: Vec<u32> = pyramid.all().collect();
-    let maker = Inferrer::new(stage.renderer(settings), &shot, &stage.pool, &stop, &Quiet, pyramid);
+    let maker = Inferrer::new(stage.renderer(settings), &shot, &stage.pool, &stop, &Quiet, pyramid)
+        .unwrap();
     maker.expect(&all);
     pyramid.order(&all).into_iter().map(|f| maker.make(f).unwrap().unwrap()).collect()
 }

@@ -8,7 +8,7 @@
 use super::index::{edge_of, level_of};
 use super::reference::{NONE, Reference, Sample};
 use crate::inference::{Inference, Origin, Questions, SurfacePoint};
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 
 /// Samples that one point's answer is made of, at most.
 const MOST_TAPS: usize = 24;
@@ -20,40 +20,45 @@ pub struct Evidence {
     pub least_weight: f64,
     /// With this sum of weights no further reference is asked.
     pub enough_weight: f64,
-    /// Least cosine between normals.
+    /// Least cosine between normals; samples count by the square of what is above it.
     pub least_cos: f32,
-    /// Height above the tangent plane, in footprints and as a slope.
+    /// Height above the tangent plane, footprints.
     pub height: f64,
-    /// See `height`.
+    /// Further height, of the distance along the plane.
     pub slope: f64,
     /// By how much a sample's area on the surface may exceed the point's.
     pub coarser: f64,
-    /// Deviation that is always allowed, display steps of 1/255.
-    pub tolerance: f32,
-    /// Grazing.
+    /// Samples lie within two footprints, and further where the reference looks along the surface: as
+    /// far as at this cosine.
     pub grazing: f64,
-    /// Alone.
-    pub alone: f32,
-    /// Alone saturated.
-    pub alone_saturated: f32,
+    /// Deviation of samples that is always allowed, display steps of 1/255.
+    pub tolerance: f32,
     /// Variance allowed on top, in that of independent shadow samples.
     pub noise: f32,
+    /// How far the samples' weighted mean may lie from the point, footprints: beside it they tell
+    /// about another place, however well they agree.
+    pub offset: f32,
+    /// A light that makes as many display steps may lie an `offset` further off; dimmer ones more.
+    pub offset_steps: f32,
+    /// The same as `offset` where all samples see the whole light, or none of it.
+    pub offset_saturated: f32,
 }
 
 impl Default for Evidence {
     fn default() -> Self {
         Self {
-            least_weight: 0.2,
+            least_weight: 0.1,
             enough_weight: 0.6,
             least_cos: 0.8,
             height: 0.7,
             slope: 0.35,
             coarser: 6.0,
-            tolerance: 0.5,
-            noise: 2.0,
-            grazing: 0.4,
-            alone: 0.35,
-            alone_saturated: 0.8,
+            grazing: 0.3,
+            tolerance: 1.0,
+            noise: 3.0,
+            offset: 1.0,
+            offset_steps: 30.0,
+            offset_saturated: 4.0,
         }
     }
 }
@@ -76,7 +81,8 @@ struct Tap {
     reference: u32,
     sample: u32,
     weight: f32,
-    distance: f32,
+    /// From the point to the sample, footprints.
+    apart: Vec3,
 }
 
 #[derive(Clone, Copy)]
@@ -88,7 +94,7 @@ struct Taps {
 
 impl Taps {
     const NONE: Self = Self {
-        list: [Tap { reference: 0, sample: 0, weight: 0.0, distance: 0.0 }; MOST_TAPS],
+        list: [Tap { reference: 0, sample: 0, weight: 0.0, apart: Vec3::ZERO }; MOST_TAPS],
         len: 0,
         weight: 0.0,
     };
@@ -118,7 +124,7 @@ impl Inference for Lookup<'_> {
             let taps = self.taps(point);
             if taps.weight >= self.evidence.least_weight {
                 self.answer(&taps, shown, ratios);
-                *origin = self.origin(&taps, point);
+                *origin = self.origin(&taps);
             }
         }
     }
@@ -133,16 +139,12 @@ impl Lookup<'_> {
             }
             self.screen_taps(number as u32, reference, point, &mut taps);
         }
-        if !point.direct && taps.weight < self.evidence.enough_weight {
-            let before = taps;
+        if !point.direct {
             for (number, reference) in self.references.iter().enumerate() {
                 if taps.weight >= self.evidence.enough_weight {
                     break;
                 }
                 self.index_taps(number as u32, reference, point, &mut taps);
-            }
-            if taps.len - before.len < crate::NEEDN.with(|k| *k) {
-                taps = before;
             }
         }
         taps
@@ -186,11 +188,13 @@ impl Lookup<'_> {
                 continue;
             }
             let s = &reference.samples[sample as usize];
-            let Some(distance) = self.on_surface(point, n, s, footprint, reach) else { continue };
+            let Some(apart) = self.on_surface(point, n, s, footprint, reach) else { continue };
             let wx = if dx > 0.0 { fx } else { 1.0 - fx };
             let wy = if dy > 0.0 { fy } else { 1.0 - fy };
-            let distance = (distance / footprint) as f32;
-            taps.push(Tap { reference: number, sample, weight: (wx * wy) as f32, distance });
+            let apart = (apart / footprint).as_vec3();
+            let alike = self.alikeness(point, s);
+            let weight = (wx * wy) as f32 * alike * alike;
+            taps.push(Tap { reference: number, sample, weight, apart });
         }
     }
 
@@ -209,10 +213,10 @@ impl Lookup<'_> {
             let reach = edge_of(level);
             reference.index.around(level, point.geom_id, point.p, |sample| {
                 let s = &reference.samples[sample as usize];
-                let Some(distance) = self.on_surface(point, n, s, footprint, reach) else { return };
-                let weight = 0.5 * (1.0 - distance / reach);
-                let distance = (distance / footprint) as f32;
-                taps.push(Tap { reference: number, sample, weight: weight as f32, distance });
+                let Some(apart) = self.on_surface(point, n, s, footprint, reach) else { return };
+                let weight = 0.5 * (1.0 - apart.length() / reach);
+                let apart = (apart / footprint).as_vec3();
+                taps.push(Tap { reference: number, sample, weight: weight as f32, apart });
             });
         }
     }
@@ -225,7 +229,7 @@ impl Lookup<'_> {
         s: &Sample,
         footprint: f64,
         reach: f64,
-    ) -> Option<f64> {
+    ) -> Option<DVec3> {
         if s.geom_id != point.geom_id || s.n.dot(point.n) < self.evidence.least_cos {
             return None;
         }
@@ -233,7 +237,7 @@ impl Lookup<'_> {
         let distance = apart.length();
         let height = apart.dot(n).abs();
         let allowed = self.evidence.height * footprint + self.evidence.slope * distance;
-        (distance <= reach && height <= allowed).then_some(distance)
+        (distance <= reach && height <= allowed).then_some(apart)
     }
 
     /// Weighted means of the ratios that agree. `shown` is what the pixel would show of each light
@@ -271,19 +275,17 @@ impl Lookup<'_> {
     /// Whether the taps of a channel lie no further from their `mean` than their sampling noise and
     /// an `allowed` deviation explain.
     fn agrees(&self, taps: &Taps, channel: usize, mean: f32, allowed: f32) -> bool {
-        let (mut weight, mut squares, mut rays, mut count) = (0.0, 0.0, 0.0, 0);
-        let mut nearest = f32::INFINITY;
+        let (mut weight, mut squares, mut rays) = (0.0, 0.0, 0.0);
+        let mut offset = Vec3::ZERO;
         for (tap, ratio) in self.known(taps, channel) {
             let sample = &self.references[tap.reference as usize].samples[tap.sample as usize];
             weight += tap.weight;
             squares += tap.weight * (ratio - mean) * (ratio - mean);
             rays += tap.weight * sample.samples as f32;
-            count += 1;
-            nearest = nearest.min(tap.distance);
+            offset += tap.apart * tap.weight;
         }
-        let Evidence { noise, alone, alone_saturated, .. } = self.evidence;
-        let saturated = mean == 0.0 || mean == 1.0;
-        if count == 1 && nearest > if saturated { alone_saturated } else { alone } {
+        let Evidence { noise, .. } = self.evidence;
+        if offset.length() / weight > self.most_offset(mean, allowed) {
             return false;
         }
         let rays = rays / weight * self.rays[channel] as f32;
@@ -291,7 +293,24 @@ impl Lookup<'_> {
         squares / weight <= allowed * allowed + noise
     }
 
-    fn origin(&self, taps: &Taps, _point: &SurfacePoint) -> Origin {
+    /// How far the samples' mean may lie from the point, footprints. `allowed` is the deviation of
+    /// a ratio that makes the tolerated display steps.
+    fn most_offset(&self, mean: f32, allowed: f32) -> f32 {
+        let Evidence { tolerance, offset, offset_steps, offset_saturated, .. } = self.evidence;
+        if mean == 0.0 || mean == 1.0 {
+            return offset_saturated;
+        }
+        let steps = tolerance / allowed;
+        offset * (offset_steps / steps).max(1.0)
+    }
+
+    /// 1 for a sample with the point's own normal, 0 where they are as far apart as can be.
+    fn alikeness(&self, point: &SurfacePoint, s: &Sample) -> f32 {
+        let least = self.evidence.least_cos;
+        ((s.n.dot(point.n) - least) / (1.0 - least)).clamp(0.0, 1.0)
+    }
+
+    fn origin(&self, taps: &Taps) -> Origin {
         let mut origin = Origin::default();
         let mut most = 0.0;
         let mut distance = 0.0;
@@ -301,7 +320,7 @@ impl Lookup<'_> {
             let frame = self.references[tap.reference as usize].frame;
             origin.earlier |= frame < self.frame;
             origin.later |= frame > self.frame;
-            distance += tap.weight * tap.distance;
+            distance += tap.weight * tap.apart.length();
             by_reference =
                 if last == tap.reference { by_reference + tap.weight } else { tap.weight };
             last = tap.reference;

@@ -59,6 +59,8 @@ impl<'a> Inferrer<'a> {
         progress: &'a dyn Progress,
         pyramid: Pyramid,
     ) -> Result<Self> {
+        let tolerance = renderer.settings.reuse.tolerance;
+        let evidence = Evidence { tolerance, ..Evidence::default() };
         let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
         let rays = channels.iter().map(|c| reuse::rays_of(c, renderer.settings)).collect();
         // Where nothing is worth a lookup every frame is a key frame.
@@ -70,7 +72,7 @@ impl<'a> Inferrer<'a> {
             with_gbuffer: false,
             stop,
             progress,
-            evidence: Evidence::default(),
+            evidence,
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,

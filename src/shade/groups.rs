@@ -15,6 +15,9 @@ use crate::stats::ReuseCounts;
 const PIXELS: usize = (BLOCK * BLOCK) as usize;
 /// No point.
 const NONE: u32 = u32::MAX;
+/// Behind mirrors and glass neighbours may end far from one another, where a shadow's edge is not
+/// told by samples that far away: a footprint counts as at most this many of a flat mirror's.
+const MOST_WIDER: f32 = 1.5;
 /// Samples of a pixel lie on one surface where their normals differ by less: cosine.
 const SAME_SURFACE: f64 = 0.9;
 
@@ -145,8 +148,7 @@ impl Groups {
                     .map(|other| other.p.distance(own.p) as f32)
                     .fold(f32::INFINITY, f32::min);
                 if nearest < f32::INFINITY {
-                    let most = own.footprint * crate::KCAP.with(|k| *k);
-                    points[*at as usize].footprint = nearest.min(most);
+                    points[*at as usize].footprint = nearest.min(MOST_WIDER * own.footprint);
                 }
             }
         }
