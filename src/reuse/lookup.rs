@@ -55,7 +55,7 @@ impl Default for Evidence {
             coarser: 6.0,
             grazing: 0.3,
             tolerance: 1.0,
-            noise: 3.0,
+            noise: 2.0,
             offset: 1.0,
             offset_steps: 30.0,
             offset_saturated: 4.0,
