@@ -3,8 +3,8 @@
 //!
 //! A film's channels are `R G B`; with AOVs also `Z` (distance along the view axis, infinity
 //! where nothing is hit), `P.X P.Y P.Z` (position), `N.X N.Y N.Z` (normal), `albedo.R albedo.G
-//! albedo.B`, all f32, and `mesh_id` (u32, 0 where nothing is hit). World units throughout. A
-//! later AOV is another [`Channel`] in the list.
+//! albedo.B`, `backward.u backward.v` (motion, pixels), all f32, and `mesh_id` (u32, 0 where nothing
+//! is hit). World units throughout. A later AOV is another [`Channel`] in the list.
 //!
 //! The files hold no attribute that the crate `exr` keeps in a hash map, whose order differs from
 //! run to run: the same film is the same bytes.
@@ -89,6 +89,10 @@ pub fn channels_of(film: &Film) -> Vec<Channel> {
         push_vectors(&mut channels, ["albedo.R", "albedo.G", "albedo.B"], &g.albedo);
         let ids = Samples::U32(g.mesh_id.clone());
         channels.push(Channel { name: "mesh_id".into(), samples: ids });
+        for (i, name) in ["backward.u", "backward.v"].into_iter().enumerate() {
+            let samples = Samples::F32(g.motion.iter().map(|m| m[i]).collect());
+            channels.push(Channel { name: name.into(), samples });
+        }
     }
     channels
 }
@@ -214,6 +218,7 @@ mod tests {
                 let albedo = Rgb::splat(x / 1000.0);
                 let mesh_id = 16_777_217 + i as u32;
                 gbuffer.set(i, &GPixel { depth: x / 3.0, position, normal, albedo, mesh_id });
+                gbuffer.motion[i] = crate::math::Vec2::new(-x, 0.25 * x);
             }
         }
         film.gbuffer = Some(gbuffer);
@@ -228,7 +233,7 @@ mod tests {
     #[test]
     fn every_channel_comes_back_bit_for_bit() {
         let channels = channels_of(&film());
-        assert_eq!(channels.len(), 3 + 1 + 3 + 3 + 3 + 1);
+        assert_eq!(channels.len(), 3 + 1 + 3 + 3 + 3 + 1 + 2);
         let bytes = encode(35, 19, &channels, "spp 4").expect("encoded");
         let back = decode(Path::new("x.exr"), Cursor::new(&bytes), LIMIT).expect("decoded");
         assert_eq!((back.width, back.height), (35, 19));
@@ -264,7 +269,7 @@ mod tests {
     #[test]
     fn too_large_for_the_limit() {
         let bytes = encode(35, 19, &channels_of(&film()), "").expect("encoded");
-        let error = decode(Path::new("x.exr"), Cursor::new(&bytes), 35 * 19 * 14 * 4 - 1);
+        let error = decode(Path::new("x.exr"), Cursor::new(&bytes), 35 * 19 * 16 * 4 - 1);
         assert!(matches!(error, Err(Error::Input(_))));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::pyramid::Pyramid;
 use super::schedule::{Schedule, Stock};
-use super::{FrameMaker, Made};
+use super::{FrameMaker, Made, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference};
 use crate::reuse::{self, Evidence, Lookup, Reference};
@@ -143,6 +143,15 @@ impl<'a> Inferrer<'a> {
         made
     }
 
+    /// With the motion of `frame`, which is not that of its original.
+    fn moved(&self, frame: u32, mut made: Made) -> Result<Made> {
+        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
+        let camera = self.camera(frame)?;
+        let film = &mut made.film;
+        self.pool.install(|| self.renderer.note_motion(&camera, previous.as_ref(), film));
+        Ok(made)
+    }
+
     fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
         act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -183,7 +192,7 @@ impl FrameMaker for Inferrer<'_> {
         });
         let mut made = match made {
             // Audited when it was new.
-            (_, Some(copy)) => return Ok(Some(self.hand_out(original, copy))),
+            (_, Some(copy)) => return self.moved(frame, self.hand_out(original, copy)).map(Some),
             (Some(made), None) => made,
             (None, None) => match self.frame(original)? {
                 Some(made) => made,
@@ -194,7 +203,7 @@ impl FrameMaker for Inferrer<'_> {
             Some(audit) => made.audit = audit,
             None => return Ok(None),
         }
-        Ok(Some(self.hand_out(original, made)))
+        self.moved(frame, self.hand_out(original, made)).map(Some)
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {

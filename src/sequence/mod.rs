@@ -32,6 +32,7 @@ use crate::film::Film;
 use crate::output::manifest::{AuditRow, Journal, Row};
 use crate::output::{WriteOptions, write_image};
 use crate::reuse::audit::rmse;
+use crate::scene::{Camera, Settings, Shot};
 use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -144,6 +145,14 @@ pub fn audit_row(sums: &AuditSums) -> AuditRow {
         rmse_traced: rmse.map(|r| of(r.traced)),
         sums: *sums,
     }
+}
+
+/// The camera of the frame before `frame`, world space; `None` where there is none.
+///
+/// Errors: the camera's.
+fn previous_camera(shot: &Shot, frame: u32, settings: &Settings) -> Result<Option<Camera>> {
+    let camera = |frame| shot.camera(frame, settings.width, settings.height);
+    (frame > 1).then(|| camera(frame - 1)).transpose()
 }
 
 /// Writes the frame's file whole; gives its row.
