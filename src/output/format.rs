@@ -1,6 +1,6 @@
 //! From a film to a file of the format that its name asks for.
 
-use super::{Display, Written, atomic, exr, png};
+use super::{Display, Written, atomic, exr, maps, png};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::scene::{Settings, ToneCurve};
@@ -49,12 +49,15 @@ pub struct WriteOptions {
     /// The settings as short text for the file's metadata; nothing that differs between runs of
     /// the same frame, since the same frame is to be the same bytes.
     pub settings: String,
+    /// Whether exr frames hold the maps of reuse as channels, and other frames have them beside them:
+    /// the distance to paint as the farthest, in the unit of the film's.
+    pub maps: Option<f32>,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        Self { display, png_bits: 8, frame: None, settings: String::new() }
+        Self { display, png_bits: 8, frame: None, settings: String::new(), maps: None }
     }
 }
 
@@ -76,7 +79,7 @@ impl WriteOptions {
             s.tone,
         );
         let display = Display { exposure: s.exposure, tone: s.tone };
-        Self { display, png_bits: s.png_bits, frame, settings: text }
+        Self { display, png_bits: s.png_bits, frame, settings: text, maps: None }
     }
 
     /// One line for formats with a single comment.
@@ -106,7 +109,10 @@ pub fn write_image(path: impl AsRef<Path>, film: &Film, options: &WriteOptions) 
     match format {
         Format::Png => png::write(path, film, options),
         Format::Exr => {
-            let channels = exr::channels_of(film);
+            let mut channels = exr::channels_of(film);
+            if options.maps.is_some() {
+                channels.extend(maps::channels_of(film));
+            }
             let bytes = exr::encode(film.width, film.height, &channels, &options.comment())?;
             atomic::write(path, |w| w.write_all(&bytes))
         }

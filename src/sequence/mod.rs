@@ -29,7 +29,8 @@ mod tests;
 
 use crate::error::Result;
 use crate::film::Film;
-use crate::output::manifest::{AuditRow, Journal, Row};
+use crate::output::manifest::{AuditRow, Journal, MapRow, Row};
+use crate::output::maps::Map;
 use crate::output::{WriteOptions, write_image};
 use crate::reuse::audit::rmse;
 use crate::scene::{Camera, Settings, Shot};
@@ -160,8 +161,16 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
     let Made { film, rays, reuse, .. } = made;
     let path = target.pattern.path(frame);
     let options = WriteOptions { frame: Some(frame), ..target.write.clone() };
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut maps = Vec::new();
+    if target.has_map_files() {
+        for map in Map::ALL {
+            let (path, written) = map.write(&path, film, &options)?;
+            maps.push(MapRow { file: name(&path), blake3: written.hash.to_hex().to_string() });
+        }
+    }
     let written = write_image(&path, film, &options)?;
-    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let file = name(&path);
     Ok(Row {
         frame,
         file,
@@ -172,6 +181,7 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         reuse: *reuse,
         audit: None,
         bad: film.bad,
+        maps,
         other_settings: false,
     })
 }
