@@ -239,6 +239,10 @@ pub struct OutputArgs {
     /// away, how far off; as pictures beside png and ppm frames, as channels of exr frames
     #[arg(long, help_heading = "Reuse")]
     pub maps: bool,
+    /// Surface policy: infer from the exr frames in this folder too, which an earlier job of the same
+    /// scene left; repeatable
+    #[arg(long, value_name = "DIR", help_heading = "Reuse")]
+    pub references: Vec<PathBuf>,
     /// Colour policy: take this picture (png, ppm, jpeg, exr) for frame FRAME, and infer others
     /// from it too; repeatable
     #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]

@@ -2,14 +2,16 @@
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::as_input;
+use super::references::{self, References};
 use super::{job, machine, values};
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
 use crate::output::manifest::{self, Header};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
+use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{Target, check_upload, fingerprint};
+use crate::sequence::{Target, check_upload, fingerprint, world_fingerprint};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -37,6 +39,10 @@ pub struct Request {
     pub stats: Option<PathBuf>,
     /// Whether frames get maps of reuse.
     pub maps: bool,
+    /// On which terms frames serve as references.
+    pub terms: Terms,
+    /// Frames of an earlier job.
+    pub references: References,
     /// Pictures that are taken for frames.
     pub uploads: Vec<(u32, Image)>,
     /// What import warns of, and what rounding lost.
@@ -62,10 +68,13 @@ impl Request {
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
         refuse_maps(output.maps, &settings)?;
+        let world_hash = world_fingerprint(&world);
         let scene_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));
+        let terms = references::terms(&world_hash, &scene, &settings);
+        let references = References::read(&output.references, &pattern, &scene, &settings, &terms)?;
         Ok(Self {
             scene,
             shot,
@@ -78,6 +87,8 @@ impl Request {
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
             maps: output.maps,
+            references,
+            terms,
             uploads,
             warnings,
             scene_name: path.display().to_string(),
@@ -108,6 +119,7 @@ impl Request {
         if self.pattern.format() == Format::Exr {
             settings["reuse"]["maps"] = self.maps.into();
         }
+        settings["reuse"]["references"] = self.references.hash.clone().into();
         if !self.uploads.is_empty() {
             let all: Vec<String> = self.uploads.iter().map(show).collect();
             settings["reuse"]["upload"] = all.join(" ").into();

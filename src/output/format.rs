@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::scene::{Settings, ToneCurve};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,12 +53,21 @@ pub struct WriteOptions {
     /// Whether exr frames hold the maps of reuse as channels, and other frames have them beside them:
     /// the distance to paint as the farthest, in the unit of the film's.
     pub maps: Option<f32>,
+    /// An attribute of exr frames: name and bytes.
+    pub attribute: Option<(&'static str, Arc<[u8]>)>,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        Self { display, png_bits: 8, frame: None, settings: String::new(), maps: None }
+        Self {
+            display,
+            png_bits: 8,
+            frame: None,
+            settings: String::new(),
+            maps: None,
+            attribute: None,
+        }
     }
 }
 
@@ -79,7 +89,7 @@ impl WriteOptions {
             s.tone,
         );
         let display = Display { exposure: s.exposure, tone: s.tone };
-        Self { display, png_bits: s.png_bits, frame, settings: text, maps: None }
+        Self { display, png_bits: s.png_bits, frame, settings: text, maps: None, attribute: None }
     }
 
     /// One line for formats with a single comment.
@@ -113,7 +123,10 @@ pub fn write_image(path: impl AsRef<Path>, film: &Film, options: &WriteOptions) 
             if options.maps.is_some() {
                 channels.extend(maps::channels_of(film));
             }
-            let bytes = exr::encode(film.width, film.height, &channels, &options.comment())?;
+            let (width, height) = (film.width, film.height);
+            let attribute = options.attribute.as_ref().map(|(name, bytes)| (*name, &**bytes));
+            let comment = options.comment();
+            let bytes = exr::encode_with(width, height, &channels, &comment, attribute)?;
             atomic::write(path, |w| w.write_all(&bytes))
         }
         Format::Ppm => {

@@ -17,10 +17,12 @@ const PINK: Rgb = Rgb::new(1.0, 0.13, 0.6);
 const RED: Rgb = Rgb::new(0.6, 0.0, 0.0);
 /// Inferred from later frames.
 const BLUE: Rgb = Rgb::new(0.0, 0.08, 0.7);
+/// Inferred from both.
+const BOTH: Rgb = Rgb::splat(0.3);
 /// Share of its grey that a painted pixel shows.
 const GREY: f32 = 0.25;
 /// The same of pixels with nothing to infer.
-const DARK: f32 = 0.12;
+const DARK: f32 = 0.05;
 /// Error that has the full colour, display steps of 255.
 const WORST: f32 = 16.0;
 /// Share of the golden ratio: hues of frames that follow one another lie far apart.
@@ -127,7 +129,7 @@ fn by_provenance(source: &PixelSource, grey: Rgb) -> Rgb {
         Provenance::Traced => painted(grey, PINK),
         Provenance::Earlier => painted(grey, RED),
         Provenance::Later => painted(grey, BLUE),
-        Provenance::Both => grey,
+        Provenance::Both => painted(grey, BOTH),
     }
 }
 

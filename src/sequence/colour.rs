@@ -117,7 +117,10 @@ impl<'a> ColourMaker<'a> {
         } else {
             traced.film.gbuffer = None;
         }
-        Ok(Some((Made { film: traced.film, rays: traced.rays, reuse, audit: None }, discoveries)))
+        Ok(Some((
+            Made { film: traced.film, rays: traced.rays, reuse, audit: None, reference: None },
+            discoveries,
+        )))
     }
 
     /// Fills in how the traced pixels moved; of the others no first hit is known.

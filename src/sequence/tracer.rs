@@ -33,6 +33,6 @@ impl FrameMaker for Tracer<'_> {
         let previous = previous_camera(self.shot, frame, settings)?;
         let note = || self.renderer.note_motion(&camera, previous.as_ref(), &mut film);
         self.pool.install(note);
-        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None }))
+        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
     }
 }
