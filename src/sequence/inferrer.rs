@@ -2,7 +2,7 @@
 
 use super::pyramid::Pyramid;
 use super::schedule::{Schedule, Stock};
-use super::supplied::nearest;
+use super::supplied::with_supplied;
 use super::{FrameMaker, Made, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
@@ -100,8 +100,8 @@ impl<'a> Inferrer<'a> {
         }
         let camera = self.camera(frame)?;
         let own = camera.to_scene(&self.renderer.scene.recentring);
-        let references = references.iter().map(|r| &**r).chain(nearest(&self.supplied, &own));
-        let references: Vec<&Reference> = references.filter(|r| !r.is_empty()).collect();
+        let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
+        let references = with_supplied(references, &self.supplied, &own);
         let (rays, evidence) = (&self.rays, self.evidence);
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);

@@ -8,11 +8,29 @@ use crate::scene::Camera;
 const DENSE: usize = 2;
 const OTHERS: usize = 6;
 
+/// A frame's `own` references, and behind them those of `supplied` that it is inferred from too. With
+/// any of these, references that know much come before those that do not: the first two are always
+/// asked, and key frames that were inferred themselves know little.
+pub(super) fn with_supplied<'r>(
+    own: Vec<&'r Reference>,
+    supplied: &'r [Reference],
+    camera: &Camera,
+) -> Vec<&'r Reference> {
+    if supplied.is_empty() {
+        return own;
+    }
+    let mut all = own;
+    all.extend(nearest(supplied, camera));
+    let most = all.iter().map(|r| r.len()).max().unwrap_or(0);
+    all.sort_by_key(|r| 2 * r.len() < most);
+    all
+}
+
 /// Those of `supplied` that a frame seen by `camera` (scene space) is inferred from: a function of
 /// these alone. Frames in between know only what they discovered, so the nearest ones alone would
 /// know little: the two nearest of those with at least half as many samples as the one with most come
 /// first, then the nearest of the others.
-pub(super) fn nearest<'r>(supplied: &'r [Reference], camera: &Camera) -> Vec<&'r Reference> {
+fn nearest<'r>(supplied: &'r [Reference], camera: &Camera) -> Vec<&'r Reference> {
     let most = supplied.iter().map(Reference::len).max().unwrap_or(0);
     let farthest = supplied.iter().map(|r| r.eye().distance(camera.eye)).fold(0.0, f64::max);
     let apart = |r: &Reference| {
@@ -56,6 +74,18 @@ mod tests {
         let points = (0..points).map(|i| TracedPoint { x: i % 64, y: i / 64, point }).collect();
         let traced = TracedPoints { ratios: vec![1.0; 4096], points };
         Reference::new(Reference::SUPPLIED, &camera(x), &traced, 1)
+    }
+
+    #[test]
+    fn what_knows_much_is_asked_first_and_nothing_changes_without_a_supply() {
+        let own = [reference(0.0, 3), reference(1.0, 900), reference(2.0, 4)];
+        let places = |supplied: &[Reference]| -> Vec<f64> {
+            let all = with_supplied(own.iter().collect(), supplied, &camera(0.0));
+            all.iter().map(|r| r.eye().x).collect()
+        };
+        assert_eq!(places(&[]), [0.0, 1.0, 2.0]);
+        let supplied = [reference(5.0, 6), reference(7.0, 1000)];
+        assert_eq!(places(&supplied), [1.0, 7.0, 0.0, 2.0, 5.0]);
     }
 
     #[test]
