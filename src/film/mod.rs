@@ -24,7 +24,8 @@ pub struct Film {
     pub sources: Option<Vec<PixelSource>>,
     /// Where the audit looked, how far each pixel is from its mean of two traces, in display steps
     /// of 255, the mean of the channels, positive where the pixel is brighter; NaN elsewhere. `None`
-    /// where nothing was audited. In no file of the frame: those do not depend on the audit.
+    /// where nothing was audited. Only maps show it: what else is in a frame's files does not depend on
+    /// the audit.
     pub audit: Option<Vec<f32>>,
     /// Camera samples in it that are no radiance.
     pub bad: BadSamples,
