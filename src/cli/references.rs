@@ -108,8 +108,7 @@ fn files(folders: &[PathBuf], pattern: &FramePattern) -> Result<Vec<PathBuf>> {
         let entries = fs::read_dir(folder).map_err(io)?;
         let paths = entries.map(|e| e.map(|e| e.path())).collect::<std::io::Result<Vec<_>>>();
         let is_exr = |p: &PathBuf| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        let is_shown =
-            |p: &PathBuf| !p.file_name().is_some_and(|n| n.as_encoded_bytes()[0] == b'.');
+        let is_shown = |p: &PathBuf| p.file_name().is_none_or(|n| n.as_encoded_bytes()[0] != b'.');
         let mut paths: Vec<_> =
             paths.map_err(io)?.into_iter().filter(|p| is_exr(p) && is_shown(p)).collect();
         if paths.is_empty() {

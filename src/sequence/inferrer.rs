@@ -34,7 +34,7 @@ pub struct Inferrer<'a> {
     /// What counts as evidence.
     pub evidence: Evidence,
     /// Frames of other shots that all frames, key frames too, are inferred from.
-    pub supplied: Vec<Reference>,
+    pub supplied: &'a [Reference],
     /// On which terms frames serve later jobs as references; `None` where none is kept.
     pub terms: Option<Terms>,
     schedule: Schedule,
@@ -78,7 +78,7 @@ impl<'a> Inferrer<'a> {
             stop,
             progress,
             evidence: Evidence::default(),
-            supplied: Vec::new(),
+            supplied: &[],
             terms: None,
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
@@ -101,7 +101,7 @@ impl<'a> Inferrer<'a> {
         let camera = self.camera(frame)?;
         let own = camera.to_scene(&self.renderer.scene.recentring);
         let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
-        let references = with_supplied(references, &self.supplied, &own);
+        let references = with_supplied(references, self.supplied, &own);
         let (rays, evidence) = (&self.rays, self.evidence);
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
