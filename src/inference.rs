@@ -29,7 +29,8 @@ pub struct SurfacePoint {
 /// Where an inferred point's light comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Origin {
-    /// Number of the reference frame that gave most; 0 where nothing was found.
+    /// Number of the reference frame that gave most; 0 where nothing was found, and for a frame of
+    /// another shot.
     pub frame: u32,
     /// Whether an earlier frame gave some.
     pub earlier: bool,

@@ -235,6 +235,14 @@ pub struct OutputArgs {
     /// Frames per second of the video [default: 24]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
     pub fps: Option<f64>,
+    /// Map where each frame's light comes from: traced or inferred, from which frame, from how far
+    /// away, how far off; as pictures beside png and ppm frames, as channels of exr frames
+    #[arg(long, help_heading = "Reuse")]
+    pub maps: bool,
+    /// Surface policy: infer from the exr frames in this folder too, which an earlier job of the same
+    /// scene left; repeatable
+    #[arg(long, value_name = "DIR", help_heading = "Reuse")]
+    pub references: Vec<PathBuf>,
     /// Colour policy: take this picture (png, ppm, jpeg, exr) for frame FRAME, and infer others
     /// from it too; repeatable
     #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]

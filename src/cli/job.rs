@@ -100,12 +100,12 @@ fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
     }
 }
 
-/// Bytes that a frame takes at most: colour (12 a pixel) and first-hit records (44), twice, since
+/// Bytes that a frame takes at most: colour (12 a pixel) and first-hit records (52), twice, since
 /// encoding holds a copy.
 pub fn frame_bytes(settings: &Settings) -> u64 {
     // A cropped film has the full size, black outside.
     let pixels = u64::from(settings.width) * u64::from(settings.height);
-    pixels * 2 * (12 + 44)
+    pixels * 2 * (12 + 52)
 }
 
 #[cfg(test)]
@@ -117,7 +117,7 @@ mod tests {
     fn sizes_and_crops_beyond_reason_are_refused_with_the_figure() {
         let large = Settings { width: 30_000, height: 30_000, ..Settings::default() };
         let error = check_memory(&large, Some(8 << 30)).expect_err("too large").to_string();
-        assert!(error.contains("100.8 GB") && error.contains("8.6 GB"), "{error}");
+        assert!(error.contains("115.2 GB") && error.contains("8.6 GB"), "{error}");
         assert!(check(&Settings { width: 70_000, ..Settings::default() }).is_err());
         let crop = |x1, y1| Settings {
             crop: Some(Rect { x0: 600, y0: 0, x1, y1 }),

@@ -12,6 +12,7 @@ mod inspect;
 mod job;
 mod machine;
 mod progress;
+mod references;
 mod render;
 mod request;
 mod say;

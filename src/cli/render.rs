@@ -169,6 +169,8 @@ impl Frames<'_> {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
+                maker.supplied = &self.request.references.list;
+                maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
             Policy::Colour => {

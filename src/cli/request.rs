@@ -2,14 +2,16 @@
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::as_input;
+use super::references::{self, References};
 use super::{job, machine, values};
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
 use crate::output::manifest::{self, Header};
-use crate::output::{FramePattern, WriteOptions, read_image};
+use crate::output::{Format, FramePattern, WriteOptions, read_image};
+use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{Target, check_upload, fingerprint};
+use crate::sequence::{Target, check_upload, fingerprint, world_fingerprint};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -35,6 +37,12 @@ pub struct Request {
     pub threads: Option<usize>,
     /// Where the statistics go, if anywhere.
     pub stats: Option<PathBuf>,
+    /// Whether frames get maps of reuse.
+    pub maps: bool,
+    /// On which terms frames serve as references.
+    pub terms: Terms,
+    /// Frames of an earlier job.
+    pub references: References,
     /// Pictures that are taken for frames.
     pub uploads: Vec<(u32, Image)>,
     /// What import warns of, and what rounding lost.
@@ -59,10 +67,14 @@ impl Request {
         refuse_input(stats.as_deref(), &loaded.files)?;
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
+        refuse_maps(output.maps, &settings)?;
+        let world_hash = world_fingerprint(&world);
         let scene_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));
+        let terms = references::terms(&world_hash, &scene, &settings);
+        let references = References::read(&output.references, &pattern, &scene, &settings, &terms)?;
         Ok(Self {
             scene,
             shot,
@@ -74,6 +86,9 @@ impl Request {
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
+            maps: output.maps,
+            references,
+            terms,
             uploads,
             warnings,
             scene_name: path.display().to_string(),
@@ -101,6 +116,10 @@ impl Request {
             let hash = blake3::hash(bytemuck::cast_slice(&image.rgb)).to_hex();
             format!("{frame}={}", &hash[..16])
         };
+        if self.pattern.format() == Format::Exr {
+            settings["reuse"]["maps"] = self.maps.into();
+        }
+        settings["reuse"]["references"] = self.references.hash.clone().into();
         if !self.uploads.is_empty() {
             let all: Vec<String> = self.uploads.iter().map(show).collect();
             settings["reuse"]["upload"] = all.join(" ").into();
@@ -123,9 +142,29 @@ impl Request {
         Target {
             pattern: self.pattern.clone(),
             header,
-            write: WriteOptions::of(&self.settings, None),
+            write: WriteOptions {
+                maps: self.maps.then(|| farthest(&self.settings)),
+                ..WriteOptions::of(&self.settings, None)
+            },
             overwrite: self.overwrite,
         }
+    }
+}
+
+/// The distance that maps paint as the farthest: in footprints under policy surface, else as a share.
+fn farthest(settings: &Settings) -> f32 {
+    match settings.reuse.policy {
+        Policy::Colour => settings.reuse.distance_epsilon.max(1e-6),
+        Policy::Surface | Policy::Off => 2.0,
+    }
+}
+
+fn refuse_maps(maps: bool, settings: &Settings) -> Result<()> {
+    match settings.reuse.policy {
+        Policy::Off if maps => Err(Error::Usage(
+            "--maps shows what is inferred; with --policy off every frame is traced".into(),
+        )),
+        _ => Ok(()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Images and what else a pixel records: plain data, no behaviour beyond indexing.
 
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec2, Vec3};
 use crate::stats::BadSamples;
 
 mod image;
@@ -24,7 +24,8 @@ pub struct Film {
     pub sources: Option<Vec<PixelSource>>,
     /// Where the audit looked, how far each pixel is from its mean of two traces, in display steps
     /// of 255, the mean of the channels, positive where the pixel is brighter; NaN elsewhere. `None`
-    /// where nothing was audited. In no file of the frame: those do not depend on the audit.
+    /// where nothing was audited. Only maps show it: what else is in a frame's files does not depend on
+    /// the audit.
     pub audit: Option<Vec<f32>>,
     /// Camera samples in it that are no radiance.
     pub bad: BadSamples,
@@ -44,6 +45,10 @@ pub struct GBuffer {
     pub albedo: Vec<Rgb>,
     /// Mesh index + 1 (analytic spheres follow the meshes); 0 where nothing is hit.
     pub mesh_id: Vec<u32>,
+    /// Motion backward: where the surface, or where nothing is hit the direction, stood in the image
+    /// of the shot's previous frame, less where it stands in this one. Pixels, x to the right, y up.
+    /// Zero in the first frame and where it was not in front of that camera.
+    pub motion: Vec<Vec2>,
 }
 
 /// One pixel's record.
@@ -102,10 +107,11 @@ impl GBuffer {
             normal: vec![Vec3::ZERO; n],
             albedo: vec![Rgb::ZERO; n],
             mesh_id: vec![0; n],
+            motion: vec![Vec2::ZERO; n],
         }
     }
 
-    /// Writes one pixel's record.
+    /// Writes one pixel's record, which tells no motion.
     pub fn set(&mut self, index: usize, p: &GPixel) {
         self.depth[index] = p.depth;
         self.position[index] = p.position;

@@ -22,9 +22,11 @@ pub enum Provenance {
 pub struct PixelSource {
     /// How it came about.
     pub provenance: Provenance,
-    /// The reference frame that gave most; 0 where nothing was inferred.
+    /// The reference frame that gave most; 0 where nothing was inferred, and for a frame of another
+    /// shot, which counts as earlier.
     pub frame: u32,
-    /// Weighted mean distance to the samples that gave it, in footprints of a pixel.
+    /// Weighted mean distance to the samples that gave it, in footprints of a pixel. Under policy
+    /// colour by how much the distances of the two entries differ, a share.
     pub distance: f32,
     /// How far its radiance may be off: over its lights, the sum of √(r(1 - r)) times the radiance
     /// that a light would give unshadowed, where r is the ratio of it that arrives. 0 in full light

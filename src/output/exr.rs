@@ -3,11 +3,11 @@
 //!
 //! A film's channels are `R G B`; with AOVs also `Z` (distance along the view axis, infinity
 //! where nothing is hit), `P.X P.Y P.Z` (position), `N.X N.Y N.Z` (normal), `albedo.R albedo.G
-//! albedo.B`, all f32, and `mesh_id` (u32, 0 where nothing is hit). World units throughout. A
-//! later AOV is another [`Channel`] in the list.
+//! albedo.B`, `backward.u backward.v` (motion, pixels), all f32, and `mesh_id` (u32, 0 where nothing
+//! is hit). World units throughout. A later AOV is another [`Channel`] in the list.
 //!
-//! The files hold no attribute that the crate `exr` keeps in a hash map, whose order differs from
-//! run to run: the same film is the same bytes.
+//! The files hold at most one attribute that the crate `exr` keeps in a hash map, whose order differs
+//! from run to run: the same film is the same bytes.
 
 use super::format::SOFTWARE;
 use crate::error::{Error, Result};
@@ -16,13 +16,19 @@ use crate::math::Vec3;
 use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::image::write::layers::{LayersWriter, WritableLayers};
+use exr::meta::MetaData;
+use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer,
     LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2,
 };
 use rayon::prelude::*;
-use std::io::{BufRead, Cursor, Seek};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
+
+/// Type of the program's own attribute, which other programs pass by.
+const OPAQUE: &str = "tweenray";
 
 /// One channel of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,6 +95,10 @@ pub fn channels_of(film: &Film) -> Vec<Channel> {
         push_vectors(&mut channels, ["albedo.R", "albedo.G", "albedo.B"], &g.albedo);
         let ids = Samples::U32(g.mesh_id.clone());
         channels.push(Channel { name: "mesh_id".into(), samples: ids });
+        for (i, name) in ["backward.u", "backward.v"].into_iter().enumerate() {
+            let samples = Samples::F32(g.motion.iter().map(|m| m[i]).collect());
+            channels.push(Channel { name: name.into(), samples });
+        }
     }
     channels
 }
@@ -107,6 +117,20 @@ pub fn push_vectors(channels: &mut Vec<Channel>, names: [&str; 3], vectors: &[Ve
 /// [`Error::Usage`] when a channel has not `width · height` samples; [`Error::Failed`] when the
 /// format cannot hold them (no channel, two of one name).
 pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> Result<Vec<u8>> {
+    encode_with(width, height, channels, comment, None)
+}
+
+/// As [`encode()`], with one attribute of the program's own: name and bytes.
+///
+/// # Errors
+/// Those of [`encode()`].
+pub fn encode_with(
+    width: u32,
+    height: u32,
+    channels: &[Channel],
+    comment: &str,
+    attribute: Option<(&str, &[u8])>,
+) -> Result<Vec<u8>> {
     let pixels = width as usize * height as usize;
     if let Some(c) = channels.iter().find(|c| c.samples.len() != pixels) {
         let (name, n) = (&c.name, c.samples.len());
@@ -122,6 +146,7 @@ pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> R
     let attributes = LayerAttributes {
         software_name: Some(Text::from(SOFTWARE)),
         comments: (!comment.is_empty()).then(|| Text::new_or_none(comment)).flatten(),
+        other: attribute.map(own_attribute).into_iter().collect(),
         ..LayerAttributes::default()
     };
     let list = AnyChannels::sort(channels.iter().map(to_exr).collect());
@@ -129,6 +154,35 @@ pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> R
     let layer = Layer::new(size, attributes, encoding, list);
     compress(&Image::from_layer(layer))
         .map_err(|e| Error::Failed(format!("cannot encode exr: {e}")))
+}
+
+fn own_attribute((name, bytes): (&str, &[u8])) -> (Text, AttributeValue) {
+    let (name, kind) = (Text::from(name), Text::from(OPAQUE));
+    (name, AttributeValue::Custom { kind, bytes: bytes.into() })
+}
+
+/// The bytes of the attribute `name` that [`encode_with`] wrote into the file at `path`, if it has it.
+///
+/// # Errors
+/// [`Error::Io`] when the file cannot be read; [`Error::Input`] when it is no exr file or larger than
+/// `limit` bytes.
+pub fn read_attribute(path: &Path, name: &str, limit: u64) -> Result<Option<Vec<u8>>> {
+    let io = |e| Error::io("read", path, e);
+    // Before it is opened: opening a pipe waits for a writer.
+    let about = std::fs::metadata(path).map_err(io)?;
+    if !about.is_file() {
+        return Err(Error::input(path, "not a regular file"));
+    }
+    super::read::check_memory(path, about.len(), limit)?;
+    let source = BufReader::new(File::open(path).map_err(io)?);
+    let meta = MetaData::read_from_buffered(source, false);
+    let meta = meta.map_err(|e| Error::input(path, format!("not a readable exr file: {e}")))?;
+    let all = meta.headers.into_iter().flat_map(|header| header.own_attributes.other);
+    let found = all.filter_map(|(own, value)| match value {
+        AttributeValue::Custom { bytes, .. } if own.eq(name) => Some(bytes.into_vec()),
+        _ => None,
+    });
+    Ok({ found }.next())
 }
 
 /// Compresses the blocks on this thread's rayon pool and writes them in order. (The crate's own
@@ -214,6 +268,7 @@ mod tests {
                 let albedo = Rgb::splat(x / 1000.0);
                 let mesh_id = 16_777_217 + i as u32;
                 gbuffer.set(i, &GPixel { depth: x / 3.0, position, normal, albedo, mesh_id });
+                gbuffer.motion[i] = crate::math::Vec2::new(-x, 0.25 * x);
             }
         }
         film.gbuffer = Some(gbuffer);
@@ -228,7 +283,7 @@ mod tests {
     #[test]
     fn every_channel_comes_back_bit_for_bit() {
         let channels = channels_of(&film());
-        assert_eq!(channels.len(), 3 + 1 + 3 + 3 + 3 + 1);
+        assert_eq!(channels.len(), 3 + 1 + 3 + 3 + 3 + 1 + 2);
         let bytes = encode(35, 19, &channels, "spp 4").expect("encoded");
         let back = decode(Path::new("x.exr"), Cursor::new(&bytes), LIMIT).expect("decoded");
         assert_eq!((back.width, back.height), (35, 19));
@@ -264,7 +319,7 @@ mod tests {
     #[test]
     fn too_large_for_the_limit() {
         let bytes = encode(35, 19, &channels_of(&film()), "").expect("encoded");
-        let error = decode(Path::new("x.exr"), Cursor::new(&bytes), 35 * 19 * 14 * 4 - 1);
+        let error = decode(Path::new("x.exr"), Cursor::new(&bytes), 35 * 19 * 16 * 4 - 1);
         assert!(matches!(error, Err(Error::Input(_))));
     }
 }

@@ -1,10 +1,11 @@
 //! From a film to a file of the format that its name asks for.
 
-use super::{Display, Written, atomic, exr, png};
+use super::{Display, Written, atomic, exr, maps, png};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::scene::{Settings, ToneCurve};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,12 +50,24 @@ pub struct WriteOptions {
     /// The settings as short text for the file's metadata; nothing that differs between runs of
     /// the same frame, since the same frame is to be the same bytes.
     pub settings: String,
+    /// Whether exr frames hold the maps of reuse as channels, and other frames have them beside them:
+    /// the distance to paint as the farthest, in the unit of the film's.
+    pub maps: Option<f32>,
+    /// An attribute of exr frames: name and bytes.
+    pub attribute: Option<(&'static str, Arc<[u8]>)>,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        Self { display, png_bits: 8, frame: None, settings: String::new() }
+        Self {
+            display,
+            png_bits: 8,
+            frame: None,
+            settings: String::new(),
+            maps: None,
+            attribute: None,
+        }
     }
 }
 
@@ -76,7 +89,7 @@ impl WriteOptions {
             s.tone,
         );
         let display = Display { exposure: s.exposure, tone: s.tone };
-        Self { display, png_bits: s.png_bits, frame, settings: text }
+        Self { display, png_bits: s.png_bits, frame, settings: text, maps: None, attribute: None }
     }
 
     /// One line for formats with a single comment.
@@ -106,8 +119,14 @@ pub fn write_image(path: impl AsRef<Path>, film: &Film, options: &WriteOptions) 
     match format {
         Format::Png => png::write(path, film, options),
         Format::Exr => {
-            let channels = exr::channels_of(film);
-            let bytes = exr::encode(film.width, film.height, &channels, &options.comment())?;
+            let mut channels = exr::channels_of(film);
+            if options.maps.is_some() {
+                channels.extend(maps::channels_of(film));
+            }
+            let (width, height) = (film.width, film.height);
+            let attribute = options.attribute.as_ref().map(|(name, bytes)| (*name, &**bytes));
+            let comment = options.comment();
+            let bytes = exr::encode_with(width, height, &channels, &comment, attribute)?;
             atomic::write(path, |w| w.write_all(&bytes))
         }
         Format::Ppm => {

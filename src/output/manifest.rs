@@ -72,10 +72,22 @@ pub struct Row {
     /// Camera samples that are no radiance.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
+    /// Files of its maps of reuse.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub maps: Vec<MapRow>,
     /// Whether the frame is left from a sequence of other settings, of which only a part was
     /// replaced.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub other_settings: bool,
+}
+
+/// A file beside a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MapRow {
+    /// Its name, without a folder.
+    pub file: String,
+    /// BLAKE3 of it, hexadecimal.
+    pub blake3: String,
 }
 
 /// What the audit of a frame found, with its figures: root mean squared errors in display steps of

@@ -8,6 +8,7 @@
 //! * [`read_image`] reads png, ppm, jpeg, hdr and exr within a memory limit; [`exr`] reads and
 //!   writes any channels.
 //! * [`manifest`] lists the finished frames of a sequence.
+//! * [`maps`] paints where a frame's light comes from.
 //! * [`video`] has ffmpeg make an mp4 of a sequence.
 //!
 //! png and ppm hold display values: exposure, tone curve, then 8 or 16 bits. exr holds linear
@@ -21,6 +22,7 @@ mod display;
 pub mod exr;
 mod format;
 pub mod manifest;
+pub mod maps;
 mod pattern;
 mod png;
 mod quantise;

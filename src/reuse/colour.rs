@@ -60,6 +60,8 @@ pub struct Inferred {
     pub before: u32,
     /// Frame of the entry after; the frame itself where that is known.
     pub after: u32,
+    /// By how much their distances differ, a share of the nearer one; 0 where either is unknown.
+    pub distance: f32,
 }
 
 impl Rule {
@@ -94,7 +96,9 @@ impl Rule {
         let step = (frame - before) as f32 / (after - before).max(1) as f32;
         // Equal colours stay what they are to the last bit.
         let rgb = a.rgb + (b.rgb - a.rgb) * step;
-        self.agree(a, b).then_some(Inferred { rgb, before, after })
+        // Not a number where a distance is unknown.
+        let distance = distance_difference(a.distance, b.distance).max(0.0);
+        self.agree(a, b).then_some(Inferred { rgb, before, after, distance })
     }
 }
 
@@ -122,12 +126,12 @@ impl Inferred {
     /// Where the pixel comes from, as `frame` sees it. A pixel of a frame that was known from the
     /// start is neither traced nor inferred.
     pub fn source(&self, frame: u32) -> PixelSource {
-        let Self { before, after, .. } = *self;
+        let Self { before, after, distance, .. } = *self;
         if before == frame {
             return PixelSource::default();
         }
         let nearer = if frame - before <= after - frame { before } else { after };
-        PixelSource { provenance: Provenance::Both, frame: nearer, ..PixelSource::default() }
+        PixelSource { provenance: Provenance::Both, frame: nearer, distance, risk: 0.0 }
     }
 }
 
@@ -216,7 +220,7 @@ mod tests {
 
     #[test]
     fn the_nearer_frame_is_named() {
-        let inferred = Inferred { rgb: Rgb::ZERO, before: 1, after: 9 };
+        let inferred = Inferred { rgb: Rgb::ZERO, before: 1, after: 9, distance: 0.0 };
         let source = |frame| inferred.source(frame);
         assert_eq!((source(3).frame, source(7).frame), (1, 9));
         assert_eq!(source(3).provenance, Provenance::Both);

@@ -3,7 +3,8 @@
 //! A [`Reference`] holds a frame's camera and the surface points that were traced for it, with their
 //! ratios. A [`Lookup`] answers from several of them, with evidence: what it cannot vouch for it
 //! leaves unknown, and that is traced. Only traced points are sources, so nothing blurs or drifts
-//! however many frames are inferred. [`audit`] judges inferred pixels by traces of a few of them.
+//! however many frames are inferred. [`store`] keeps a reference in a file.
+//! [`audit`] judges inferred pixels by traces of a few of them.
 //! All in scene space.
 
 pub mod audit;
@@ -12,6 +13,7 @@ mod cost;
 mod index;
 mod lookup;
 mod reference;
+pub mod store;
 
 pub use cost::{
     LookupReason, channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of,

@@ -25,7 +25,7 @@ pub(super) struct Sample {
 /// What one frame knows.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// Its number.
+    /// Its number; [`Reference::SUPPLIED`] for one of another shot.
     pub frame: u32,
     /// Scene space.
     pub(super) camera: Camera,
@@ -74,6 +74,24 @@ impl Reference {
         let index = Index::new(&samples, others);
         let pixel_size = camera.pixel_size();
         Self { frame, camera: *camera, pixel_size, slots, samples, ratios, channels, index }
+    }
+
+    /// Number of references that are frames of another shot: they count as earlier than all.
+    pub const SUPPLIED: u32 = 0;
+
+    /// Its camera's eye, scene space.
+    pub fn eye(&self) -> DVec3 {
+        self.camera.eye
+    }
+
+    /// Its camera's view direction.
+    pub fn forward(&self) -> DVec3 {
+        self.camera.forward
+    }
+
+    /// How many samples it has.
+    pub fn len(&self) -> usize {
+        self.samples.len()
     }
 
     /// Whether it knows nothing.

@@ -97,7 +97,11 @@ impl Camera {
     /// Image point in pixels and depth along `forward` of `p`; `None` behind the eye, and where
     /// the image point is not a finite number.
     pub fn project(&self, p: DVec3) -> Option<(f64, f64, f64)> {
-        let to = p - self.eye;
+        self.project_from_eye(p - self.eye)
+    }
+
+    /// As [`project`](Self::project), of what lies at `to` from the eye; also of a direction.
+    pub fn project_from_eye(&self, to: DVec3) -> Option<(f64, f64, f64)> {
         let depth = to.dot(self.forward);
         let sx = to.dot(self.half_right) / (depth * self.half_right.length_squared());
         let sy = to.dot(self.half_up) / (depth * self.half_up.length_squared());

@@ -13,10 +13,10 @@
 //! as always traced may be inferred: an inferred pixel does not know what it shows.
 
 use super::pyramid::Pyramid;
-use super::{FrameMaker, Made};
+use super::{FrameMaker, Made, previous_camera};
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Film, Image, PixelSource, Provenance};
-use crate::math::{Rgb, srgb_decode};
+use crate::math::{Rgb, Vec2, srgb_decode};
 use crate::reuse::colour::{Entry, Inferred, Known, Rule};
 use crate::scene::{Camera, Rect, Settings, Shot, ToneCurve};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer};
@@ -112,10 +112,30 @@ impl<'a> ColourMaker<'a> {
         let Some(mut traced) = self.trace(frame, &camera, &inferred) else { return Ok(None) };
         let discoveries = discoveries(frame, &traced.film, &inferred, &camera, settings);
         let reuse = fill(&mut traced.film, frame, &inferred, settings);
-        if !self.with_gbuffer {
+        if self.with_gbuffer {
+            self.note_motion(frame, &camera, &mut traced.film, &inferred)?;
+        } else {
             traced.film.gbuffer = None;
         }
-        Ok(Some((Made { film: traced.film, rays: traced.rays, reuse, audit: None }, discoveries)))
+        Ok(Some((
+            Made { film: traced.film, rays: traced.rays, reuse, audit: None, reference: None },
+            discoveries,
+        )))
+    }
+
+    /// Fills in how the traced pixels moved; of the others no first hit is known.
+    fn note_motion(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        film: &mut Film,
+        inferred: &[Option<Inferred>],
+    ) -> Result<()> {
+        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
+        self.pool.install(|| self.renderer.note_motion(camera, previous.as_ref(), film));
+        let motion = film.gbuffer.iter_mut().flat_map(|g| &mut g.motion);
+        motion.zip(inferred).filter(|(_, i)| i.is_some()).for_each(|(m, _)| *m = Vec2::ZERO);
+        Ok(())
     }
 
     /// Traces what could not be inferred.

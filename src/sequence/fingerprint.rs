@@ -9,6 +9,13 @@ use std::fmt::Debug;
 /// BLAKE3 of everything in `world` and `shot` that reaches a pixel, hexadecimal.
 pub fn fingerprint(world: &World, shot: &Shot) -> String {
     let mut hash = Hash(blake3::Hasher::new());
+    hash.text(&(world_fingerprint(world), shot));
+    hash.0.finalize().to_hex().to_string()
+}
+
+/// BLAKE3 of everything in `world` that reaches a pixel, hexadecimal.
+pub fn world_fingerprint(world: &World) -> String {
+    let mut hash = Hash(blake3::Hasher::new());
     hash.text(&world.meshes.len());
     world.meshes.iter().for_each(|mesh| hash.mesh(mesh));
     world.textures.iter().for_each(|texture| hash.texture(texture));
@@ -19,7 +26,7 @@ pub fn fingerprint(world: &World, shot: &Shot) -> String {
         // Names are for people.
         hash.text(&crate::scene::Material { name: String::new(), ..material.clone() });
     }
-    hash.text(&(&world.lights, &world.sky, &world.traced_regions, shot));
+    hash.text(&(&world.lights, &world.sky, &world.traced_regions));
     hash.0.finalize().to_hex().to_string()
 }
 

@@ -2,9 +2,12 @@
 
 use super::pyramid::Pyramid;
 use super::schedule::{Schedule, Stock};
-use super::{FrameMaker, Made};
+use super::supplied::with_supplied;
+use super::{FrameMaker, Made, previous_camera};
 use crate::error::{Error, Result};
-use crate::inference::{Channels, Inference};
+use crate::inference::{Channels, Inference, TracedPoints};
+use crate::output::WriteOptions;
+use crate::reuse::store::{Kept, Terms};
 use crate::reuse::{self, Evidence, Lookup, Reference};
 use crate::scene::{Camera, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
@@ -30,6 +33,10 @@ pub struct Inferrer<'a> {
     pub pyramid: Pyramid,
     /// What counts as evidence.
     pub evidence: Evidence,
+    /// Frames of other shots that all frames, key frames too, are inferred from.
+    pub supplied: &'a [Reference],
+    /// On which terms frames serve later jobs as references; `None` where none is kept.
+    pub terms: Option<Terms>,
     schedule: Schedule,
     pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
@@ -73,6 +80,8 @@ impl<'a> Inferrer<'a> {
             stop,
             progress,
             evidence,
+            supplied: &[],
+            terms: None,
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -92,8 +101,9 @@ impl<'a> Inferrer<'a> {
             }
         }
         let camera = self.camera(frame)?;
-        let references: Vec<&Reference> =
-            references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
+        let own = camera.to_scene(&self.renderer.scene.recentring);
+        let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
+        let references = with_supplied(references, self.supplied, &own);
         let (rays, evidence) = (&self.rays, self.evidence);
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
@@ -110,12 +120,21 @@ impl<'a> Inferrer<'a> {
         let render = || self.renderer.render_job(&job, self.stop, self.progress);
         let Some(rendered) = self.pool.install(render) else { return Ok(None) };
         let Rendered { film, rays, reuse, sources } = rendered;
+        let kept = self.kept(frame, &camera, &sources);
         if is_due {
-            let own = camera.to_scene(&self.renderer.scene.recentring);
             let reference = Reference::new(frame, &own, &sources, self.channels.len());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
         }
-        Ok(Some(Made { film, rays, reuse, audit: None }))
+        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+    }
+
+    /// What the file of `frame` keeps for later jobs.
+    fn kept(&self, frame: u32, camera: &Camera, traced: &TracedPoints) -> Option<Arc<[u8]>> {
+        let terms = self.terms.as_ref()?;
+        let settings = self.renderer.settings;
+        let text = WriteOptions::of(settings, None).settings;
+        let kept = Kept { terms, frame, camera, crop: settings.crop, traced, settings: &text };
+        self.pool.install(|| kept.encode()).map(Into::into)
     }
 
     pub(super) fn camera(&self, frame: u32) -> Result<Camera> {
@@ -143,6 +162,19 @@ impl<'a> Inferrer<'a> {
     fn hand_out(&self, original: u32, made: Made) -> Made {
         self.with_state(|s| s.hand_out(&self.schedule, original, &made));
         made
+    }
+
+    /// With what `frame` does not share with its original: its motion, and its record, which is the
+    /// original's to keep.
+    fn finished(&self, frame: u32, mut made: Made) -> Result<Made> {
+        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
+        let camera = self.camera(frame)?;
+        if self.schedule.original(frame) != frame {
+            made.reference = self.kept(frame, &camera, &TracedPoints::default());
+        }
+        let film = &mut made.film;
+        self.pool.install(|| self.renderer.note_motion(&camera, previous.as_ref(), film));
+        Ok(made)
     }
 
     fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
@@ -185,7 +217,9 @@ impl FrameMaker for Inferrer<'_> {
         });
         let mut made = match made {
             // Audited when it was new.
-            (_, Some(copy)) => return Ok(Some(self.hand_out(original, copy))),
+            (_, Some(copy)) => {
+                return self.finished(frame, self.hand_out(original, copy)).map(Some);
+            }
             (Some(made), None) => made,
             (None, None) => match self.frame(original)? {
                 Some(made) => made,
@@ -196,7 +230,7 @@ impl FrameMaker for Inferrer<'_> {
             Some(audit) => made.audit = audit,
             None => return Ok(None),
         }
-        Ok(Some(self.hand_out(original, made)))
+        self.finished(frame, self.hand_out(original, made)).map(Some)
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
@@ -208,6 +242,7 @@ impl FrameMaker for Inferrer<'_> {
     }
 
     fn reference_memory(&self) -> u64 {
-        self.with_state(|s| s.most_memory)
+        let supplied: u64 = self.supplied.iter().map(Reference::memory).sum();
+        supplied + self.with_state(|s| s.most_memory)
     }
 }

@@ -14,10 +14,11 @@ mod inferrer;
 mod pyramid;
 mod resume;
 mod schedule;
+mod supplied;
 mod tracer;
 
 pub use colour::{ColourMaker, check_upload};
-pub use fingerprint::fingerprint;
+pub use fingerprint::{fingerprint, world_fingerprint};
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use resume::{Plan, Target, prepare};
@@ -29,12 +30,16 @@ mod tests;
 
 use crate::error::Result;
 use crate::film::Film;
-use crate::output::manifest::{AuditRow, Journal, Row};
+use crate::output::manifest::{AuditRow, Journal, MapRow, Row};
+use crate::output::maps::Map;
 use crate::output::{WriteOptions, write_image};
 use crate::reuse::audit::rmse;
+use crate::reuse::store::ATTRIBUTE;
+use crate::scene::{Camera, Settings, Shot};
 use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Makes the film of a frame.
@@ -67,6 +72,8 @@ pub struct Made {
     pub reuse: ReuseCounts,
     /// How good the inferred part is, where that was looked at.
     pub audit: Option<AuditSums>,
+    /// What its exr file keeps for later jobs, see [`crate::reuse::store`].
+    pub reference: Option<Arc<[u8]>>,
 }
 
 impl Made {
@@ -77,7 +84,13 @@ impl Made {
             specular_inferred: self.reuse.specular,
             ..self.reuse
         };
-        Self { film: self.film.clone(), rays: RayCounts::default(), reuse, audit: None }
+        Self {
+            film: self.film.clone(),
+            rays: RayCounts::default(),
+            reuse,
+            audit: None,
+            reference: None,
+        }
     }
 }
 
@@ -146,13 +159,30 @@ pub fn audit_row(sums: &AuditSums) -> AuditRow {
     }
 }
 
+/// The camera of the frame before `frame`, world space; `None` where there is none.
+///
+/// Errors: the camera's.
+fn previous_camera(shot: &Shot, frame: u32, settings: &Settings) -> Result<Option<Camera>> {
+    let camera = |frame| shot.camera(frame, settings.width, settings.height);
+    (frame > 1).then(|| camera(frame - 1)).transpose()
+}
+
 /// Writes the frame's file whole; gives its row.
 fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Result<Row> {
     let Made { film, rays, reuse, .. } = made;
     let path = target.pattern.path(frame);
-    let options = WriteOptions { frame: Some(frame), ..target.write.clone() };
+    let attribute = made.reference.as_ref().map(|bytes| (ATTRIBUTE, bytes.clone()));
+    let options = WriteOptions { frame: Some(frame), attribute, ..target.write.clone() };
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut maps = Vec::new();
+    if target.has_map_files() {
+        for map in Map::ALL {
+            let (path, written) = map.write(&path, film, &options)?;
+            maps.push(MapRow { file: name(&path), blake3: written.hash.to_hex().to_string() });
+        }
+    }
     let written = write_image(&path, film, &options)?;
-    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let file = name(&path);
     Ok(Row {
         frame,
         file,
@@ -163,6 +193,7 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         reuse: *reuse,
         audit: None,
         bad: film.bad,
+        maps,
         other_settings: false,
     })
 }

@@ -1,15 +1,16 @@
 //! What a sequence already holds on disk, and what that leaves to render.
 
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{Header, Manifest, Row, manifest_path};
-use crate::output::{FramePattern, WriteOptions, atomic};
+use crate::output::manifest::{Header, Manifest, MapRow, Row, manifest_path};
+use crate::output::maps::Map;
+use crate::output::{Format, FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
@@ -27,6 +28,21 @@ pub struct Target {
     pub write: WriteOptions,
     /// Whether frames that exist are replaced.
     pub overwrite: bool,
+}
+
+impl Target {
+    /// Whether frames have maps in files of their own.
+    pub fn has_map_files(&self) -> bool {
+        self.write.maps.is_some() && self.pattern.format() != Format::Exr
+    }
+
+    /// Every file that frame `frame` has.
+    fn paths(&self, frame: u32) -> Vec<PathBuf> {
+        let frame = self.pattern.path(frame);
+        let maps = Map::ALL.iter().filter(|_| self.has_map_files());
+        let maps: Vec<PathBuf> = maps.map(|map| map.path(&frame)).collect();
+        std::iter::once(frame).chain(maps).collect()
+    }
 }
 
 /// What there is to do.
@@ -103,11 +119,23 @@ fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State
     };
     let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
     let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
+    if whole && target.has_map_files() && !has_maps(target, row) {
+        return Ok(State::Damaged(format!("{name} lacks its maps; rendered again")));
+    }
     Ok(if whole {
         State::Whole(row.bad, row.audit.map(|a| a.sums))
     } else {
         State::Damaged(note())
     })
+}
+
+/// Whether all maps of a frame are there, as they were written.
+fn has_maps(target: &Target, row: &Row) -> bool {
+    let is_whole = |map: &MapRow| {
+        let bytes = fs::read(target.pattern.folder().join(&map.file));
+        bytes.is_ok_and(|b| blake3::hash(&b).to_hex().as_str() == map.blake3)
+    };
+    row.maps.len() == Map::ALL.len() && row.maps.iter().all(is_whole)
 }
 
 /// Frames of another sequence that a job over `frames` does not replace.
@@ -170,8 +198,8 @@ impl Plan {
 
 /// Refuses frames that no manifest vouches for: they may be somebody's work.
 fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
-    let in_the_way = (frames.first..=frames.last).map(|f| target.pattern.path(f));
-    match in_the_way.into_iter().find(|path| path.exists()) {
+    let mut in_the_way = (frames.first..=frames.last).flat_map(|f| target.paths(f));
+    match in_the_way.find(|path| path.exists()) {
         Some(path) if !target.overwrite => Err(Error::Usage(format!(
             "{} exists, and no manifest beside it says how it was made\n  \
              help: choose another output with -o, or replace it with --overwrite",

@@ -1,6 +1,6 @@
 //! The maker that traces every frame on its own.
 
-use super::{FrameMaker, Made};
+use super::{FrameMaker, Made, previous_camera};
 use crate::error::Result;
 use crate::scene::Shot;
 use crate::shade::{Progress, Renderer};
@@ -29,7 +29,10 @@ impl FrameMaker for Tracer<'_> {
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render =
             || self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress);
-        let made = self.pool.install(render);
-        Ok(made.map(|(film, rays)| Made { film, rays, reuse: ReuseCounts::default(), audit: None }))
+        let Some((mut film, rays)) = self.pool.install(render) else { return Ok(None) };
+        let previous = previous_camera(self.shot, frame, settings)?;
+        let note = || self.renderer.note_motion(&camera, previous.as_ref(), &mut film);
+        self.pool.install(note);
+        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
     }
 }

@@ -12,6 +12,7 @@ mod irradiance;
 mod kernel;
 pub(crate) mod light;
 mod lighting;
+mod motion;
 pub mod optics;
 mod pixels;
 mod scattered;

@@ -4,7 +4,7 @@ use super::{FrameInput, Renderer};
 use crate::film::{GPixel, PixelSource, Provenance};
 use crate::inference::Origin;
 use crate::math::Rgb;
-use crate::sampling::PixelSampler;
+use crate::sampling::{PixelFilter, PixelSampler};
 use crate::scene::Rect;
 use crate::stats::Fault;
 
@@ -45,6 +45,25 @@ pub(super) struct FinishedPixel {
     pub record: Option<GPixel>,
     /// Where its light comes from.
     pub source: PixelSource,
+}
+
+/// The sampler of the camera samples' places in a pixel. They do not depend on the frame: frame 0 is
+/// no frame's number.
+pub(super) fn film_sampler(seed: u64, x: u32, y: u32) -> PixelSampler {
+    PixelSampler::new(seed, 0, x, y)
+}
+
+/// Where a camera sample lies from its pixel's middle, pixels.
+pub(super) fn offset_of(
+    spp: u32,
+    filter: &PixelFilter,
+    sampler: &PixelSampler,
+    sample: u32,
+) -> [f64; 2] {
+    if spp == 1 {
+        return [0.0; 2];
+    }
+    filter.offset2(sampler.get2(sample, FILM_DIMENSION))
 }
 
 #[derive(Clone, Copy)]
@@ -95,8 +114,7 @@ impl BlockPixels {
         self.film_samplers.clear();
         self.samplers.clear();
         for (x, y) in &self.places {
-            // Camera samples do not depend on the frame: frame 0 is no frame's number.
-            self.film_samplers.push(PixelSampler::new(seed, 0, *x, *y));
+            self.film_samplers.push(film_sampler(seed, *x, *y));
             self.samplers.push(PixelSampler::new(seed, frame, *x, *y));
         }
         self.sums.clear();
@@ -234,10 +252,7 @@ impl BlockPixels {
         pixel: usize,
         sample: u32,
     ) -> [f64; 2] {
-        if renderer.settings.spp == 1 {
-            return [0.0; 2];
-        }
-        input.filter.offset2(self.film_samplers[pixel].get2(sample, FILM_DIMENSION))
+        offset_of(renderer.settings.spp, &input.filter, &self.film_samplers[pixel], sample)
     }
 
     /// Whether first-hit records are kept.

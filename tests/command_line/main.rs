@@ -4,6 +4,7 @@ mod comparing;
 mod interrupted;
 mod job;
 mod ranks;
+mod references;
 mod rendering;
 mod reuse;
 mod verify;

@@ -1,0 +1,263 @@
+//! Maps of reuse: where a frame's light comes from, painted over the frame.
+//!
+//! Each is a png beside its frame, `frame_0001_provenance.png`; in an exr frame they are channels of
+//! its own. Linear colours below.
+
+use super::exr::{Channel, Samples};
+use super::{Display, WriteOptions, Written, write_image};
+use crate::error::Result;
+use crate::film::{Film, PixelSource, Provenance};
+use crate::math::{Rgb, luminance};
+use crate::scene::ToneCurve;
+use std::path::{Path, PathBuf};
+
+/// Traced: the source paper's pink.
+const PINK: Rgb = Rgb::new(1.0, 0.13, 0.6);
+/// Inferred from earlier frames: its red.
+const RED: Rgb = Rgb::new(0.6, 0.0, 0.0);
+/// Inferred from later frames.
+const BLUE: Rgb = Rgb::new(0.0, 0.08, 0.7);
+/// Inferred from both.
+const BOTH: Rgb = Rgb::splat(0.3);
+/// Share of its grey that a painted pixel shows.
+const GREY: f32 = 0.25;
+/// The same of pixels with nothing to infer.
+const DARK: f32 = 0.05;
+/// Error that has the full colour, display steps of 255.
+const WORST: f32 = 16.0;
+/// Share of the golden ratio: hues of frames that follow one another lie far apart.
+const HUE_STEP: f64 = 0.618_033_988_749_895;
+
+/// One of the maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Map {
+    /// Traced, inferred from earlier or later frames or both, or nothing to infer.
+    Provenance,
+    /// Which reference frame gave most.
+    Frame,
+    /// How far away from the pixel's own point the light was found.
+    Distance,
+    /// Where the audit looked, how far the pixel is off.
+    Audit,
+}
+
+impl Map {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Provenance, Self::Frame, Self::Distance, Self::Audit];
+
+    /// What its files' names end in, and its channel's.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Provenance => "provenance",
+            Self::Frame => "frame",
+            Self::Distance => "distance",
+            Self::Audit => "audit",
+        }
+    }
+
+    /// Where it lies for the frame at `path`: `out/f_0001_audit.png` for `out/f_0001.ppm`.
+    pub fn path(self, path: &Path) -> PathBuf {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.with_file_name(format!("{stem}_{}.png", self.name()))
+    }
+
+    /// The film in grey under this map's paint, linear display values. The distance `farthest`, in
+    /// the unit of [`PixelSource::distance`], has the hottest colour.
+    pub fn paint(self, film: &Film, display: &Display, farthest: f32) -> Film {
+        let mut out = Film::new(film.width, film.height, false);
+        for (i, c) in out.rgb.iter_mut().enumerate() {
+            let grey = Rgb::splat(luminance(display.tone(film.rgb[i])));
+            let source = film.sources.as_ref().map_or(PixelSource::default(), |s| s[i]);
+            *c = match self {
+                Self::Provenance => by_provenance(&source, grey),
+                Self::Frame => inferred(&source, grey, || by_frame(source.frame)),
+                Self::Distance => inferred(&source, grey, || heat(source.distance / farthest)),
+                Self::Audit => grey * DARK,
+            };
+        }
+        if self == Self::Audit {
+            paint_audit(film, &mut out);
+        }
+        out
+    }
+
+    /// Writes it for the frame at `path`.
+    ///
+    /// # Errors
+    /// [`write_image`]'s.
+    pub fn write(
+        self,
+        path: &Path,
+        film: &Film,
+        options: &WriteOptions,
+    ) -> Result<(PathBuf, Written)> {
+        let path = self.path(path);
+        // The paint is display values already.
+        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
+        let farthest = options.maps.unwrap_or(1.0);
+        let painted = self.paint(film, &options.display, farthest);
+        let options = WriteOptions { display, png_bits: 8, ..options.clone() };
+        write_image(&path, &painted, &options).map(|written| (path, written))
+    }
+
+    /// It as a channel of an exr frame, `reuse.provenance`.
+    fn channel(self, film: &Film) -> Channel {
+        let n = film.rgb.len();
+        let source = |i: usize| film.sources.as_ref().map_or(PixelSource::default(), |s| s[i]);
+        let samples = match self {
+            Self::Provenance => Samples::U32((0..n).map(|i| source(i).provenance as u32).collect()),
+            Self::Frame => Samples::U32((0..n).map(|i| source(i).frame).collect()),
+            Self::Distance => Samples::F32((0..n).map(|i| source(i).distance).collect()),
+            Self::Audit => Samples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
+        };
+        Channel { name: format!("reuse.{}", self.name()), samples }
+    }
+}
+
+/// All maps as channels of an exr frame.
+pub fn channels_of(film: &Film) -> Vec<Channel> {
+    Map::ALL.map(|map| map.channel(film)).into()
+}
+
+fn painted(grey: Rgb, paint: Rgb) -> Rgb {
+    grey * GREY + paint * (1.0 - GREY)
+}
+
+fn by_provenance(source: &PixelSource, grey: Rgb) -> Rgb {
+    match source.provenance {
+        Provenance::Background => grey * DARK,
+        Provenance::Traced => painted(grey, PINK),
+        Provenance::Earlier => painted(grey, RED),
+        Provenance::Later => painted(grey, BLUE),
+        Provenance::Both => painted(grey, BOTH),
+    }
+}
+
+fn inferred(source: &PixelSource, grey: Rgb, paint: impl FnOnce() -> Rgb) -> Rgb {
+    match source.provenance {
+        Provenance::Background | Provenance::Traced => grey * DARK,
+        _ => painted(grey, paint()),
+    }
+}
+
+/// A colour for each frame; white for what is no frame of the shot.
+fn by_frame(frame: u32) -> Rgb {
+    if frame == 0 {
+        return Rgb::ONE;
+    }
+    let hue = (f64::from(frame) * HUE_STEP).fract() as f32 * 6.0;
+    let wave = |shift: f32| ((hue + shift).rem_euclid(6.0) - 3.0).abs() - 1.0;
+    let full = Rgb::new(wave(0.0), wave(4.0), wave(2.0)).clamp(Rgb::ZERO, Rgb::ONE);
+    // Squared, so that the steps between hues look even.
+    full * full
+}
+
+/// Black through violet and orange to white, for 0 to 1.
+fn heat(share: f32) -> Rgb {
+    const STOPS: [Rgb; 5] = [
+        Rgb::ZERO,
+        Rgb::new(0.1, 0.0, 0.35),
+        Rgb::new(0.7, 0.03, 0.15),
+        Rgb::new(1.0, 0.4, 0.0),
+        Rgb::new(1.0, 1.0, 0.6),
+    ];
+    let at = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) } * (STOPS.len() - 1) as f32;
+    let low = (at as usize).min(STOPS.len() - 2);
+    STOPS[low].lerp(STOPS[low + 1], at - low as f32)
+}
+
+/// Audited pixels as dots of 3 x 3 pixels, since single ones would not be seen; red where the pixel
+/// is too bright, blue where too dark, white where it is right.
+fn paint_audit(film: &Film, out: &mut Film) {
+    let Some(audit) = &film.audit else { return };
+    let (width, height) = (film.width as usize, film.height as usize);
+    let dot = |error: f32| {
+        let share = (error.abs() / WORST).min(1.0).sqrt();
+        Rgb::ONE.lerp(if error > 0.0 { Rgb::X } else { Rgb::Z }, share)
+    };
+    // The worse of two dots that overlap is seen whole.
+    let mut shown = vec![f32::NAN; audit.len()];
+    for (i, error) in audit.iter().enumerate().filter(|(_, error)| !error.is_nan()) {
+        let (x, y) = (i % width, i / width);
+        for row in y.saturating_sub(1)..(y + 2).min(height) {
+            for column in x.saturating_sub(1)..(x + 2).min(width) {
+                let at = row * width + column;
+                if shown[at].is_nan() || shown[at].abs() < error.abs() {
+                    shown[at] = *error;
+                    out.rgb[at] = dot(*error);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film() -> Film {
+        let mut film = Film::new(6, 5, false);
+        film.rgb.fill(Rgb::splat(0.5));
+        let mut sources = vec![PixelSource::default(); 30];
+        let kinds = [Provenance::Traced, Provenance::Earlier, Provenance::Later, Provenance::Both];
+        for (i, provenance) in kinds.into_iter().enumerate() {
+            sources[i] =
+                PixelSource { provenance, frame: i as u32, distance: 0.5 * i as f32, risk: 0.0 };
+        }
+        film.sources = Some(sources);
+        film
+    }
+
+    #[test]
+    fn each_provenance_has_its_colour() {
+        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
+        let map = Map::Provenance.paint(&film(), &display, 1.0);
+        let [traced, earlier, later, both, background] = [0, 1, 2, 3, 4].map(|i| map.rgb[i]);
+        assert!(traced.x > traced.z && traced.z > traced.y, "pink: {traced}");
+        assert!(earlier.x > 2.0 * earlier.y.max(earlier.z), "red: {earlier}");
+        assert!(later.z > 2.0 * later.x.max(later.y), "blue: {later}");
+        assert_eq!(both, Rgb::splat(both.x));
+        assert!(background.x < 0.3 * both.x && background == Rgb::splat(background.x));
+    }
+
+    #[test]
+    fn frames_that_follow_one_another_look_unlike_and_traced_pixels_have_no_frame() {
+        for frame in 1..200 {
+            let apart = (by_frame(frame) - by_frame(frame + 1)).abs().max_element();
+            assert!(apart > 0.5, "{frame}: {apart}");
+        }
+        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
+        let map = Map::Frame.paint(&film(), &display, 1.0);
+        assert_eq!(map.rgb[0], map.rgb[4]);
+        assert_ne!(map.rgb[2], map.rgb[3]);
+    }
+
+    #[test]
+    fn heat_gets_lighter_all_the_way() {
+        let light: Vec<f32> = (0..=20).map(|k| luminance(heat(k as f32 / 20.0))).collect();
+        assert!(light.windows(2).all(|w| w[0] < w[1]), "{light:?}");
+        assert_eq!((heat(f32::NAN), heat(9.0)), (heat(0.0), heat(1.0)));
+    }
+
+    #[test]
+    fn errors_have_signs_and_the_worse_covers_the_better() {
+        let mut film = film();
+        let mut audit = vec![f32::NAN; 30];
+        (audit[8], audit[9]) = (-12.0, 1.0);
+        film.audit = Some(audit);
+        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
+        let map = Map::Audit.paint(&film, &display, 1.0);
+        assert!(map.rgb[9].z > map.rgb[9].x, "the worse, too dark, is blue: {}", map.rgb[9]);
+        assert!(map.rgb[10].x > map.rgb[10].z && map.rgb[29] == map.rgb[23]);
+    }
+
+    #[test]
+    fn an_exr_frame_holds_them_as_channels() {
+        let channels = channels_of(&film());
+        let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["reuse.provenance", "reuse.frame", "reuse.distance", "reuse.audit"]);
+        let Samples::U32(provenance) = &channels[0].samples else { panic!("numbers") };
+        assert_eq!(provenance[..5], [1, 2, 3, 4, 0]);
+        assert_eq!(Map::Audit.path(Path::new("o/f_01.ppm")), Path::new("o/f_01_audit.png"));
+    }
+}

@@ -1,0 +1,475 @@
+//! A frame's traced points as bytes, so that a later job of the same scene can take them as a
+//! [`Reference`].
+//!
+//! The bytes stand in an attribute of the frame's exr file. Not in channels: a pixel may have several
+//! points, seen in mirrors or on two surfaces, and a file that is opened in a compositor should not
+//! show twenty channels that mean nothing there. The layout: [`MAGIC`], the BLAKE3 of all that
+//! follows, the length of a JSON [`Head`] and the head, the camera (world space, f64), then the
+//! points' words column by column in byte planes, cut into parts that are deflated each. Little
+//! endian throughout.
+//!
+//! Whoever reads takes nothing on trust: lengths are held against what is there, memory grows with
+//! what was really read, and every number must be one that tracing could have left.
+
+use super::Reference;
+use crate::error::{Error, Result};
+use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
+use crate::math::{DVec3, Vec3};
+use crate::scene::limits::MAX_EDGE;
+use crate::scene::{Camera, Recentring, Rect, Settings};
+use flate2::Compression;
+use flate2::read::{DeflateDecoder, DeflateEncoder};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::io::Read;
+use std::path::Path;
+
+/// The attribute of an exr file that holds it.
+pub const ATTRIBUTE: &str = "tweenrayReference";
+/// How the bytes begin: the last letter is the layout's version.
+const MAGIC: &[u8; 8] = b"twrayrf1";
+/// Words of a point beside its ratios.
+const WORDS: usize = 12;
+/// Bytes deflated together.
+const PART: usize = 1 << 20;
+/// Most bytes of points that are written or read.
+const MOST_BYTES: usize = 1 << 30;
+/// Most bytes of a head.
+const MOST_HEAD: usize = 1 << 20;
+/// Bytes of a camera.
+const CAMERA: usize = 12 * 8 + 2 * 4;
+/// Bit that marks points seen directly, above their number of samples.
+const DIRECT: u32 = 1 << 31;
+/// Cells of a footprint's size along an edge of the scene, at most.
+const MOST_CELLS: f32 = 1e12;
+
+/// What a reference and a job must have in common.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Terms {
+    /// Hash of the world, the shot left aside.
+    pub world: String,
+    /// Whether the scene is traced about its own centre.
+    pub recentre: bool,
+    /// The lights whose ratios are kept.
+    pub lights: Vec<String>,
+    /// For each light the shadow rays of a pixel: camera samples times shadow samples.
+    pub rays: Vec<u32>,
+}
+
+/// What the bytes say of themselves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Head {
+    terms: Terms,
+    /// The frame's number in its own shot; told, never used.
+    frame: u32,
+    /// Settings as text; told, never used.
+    settings: String,
+    points: usize,
+}
+
+impl Terms {
+    /// Those of a job of the world with the hash `world` that keeps `channels`.
+    pub fn of(world: &str, channels: &Channels, settings: &Settings) -> Self {
+        let name = |channel| match channel {
+            Channel::Area(index) => format!("light {}", index + 1),
+            Channel::Sky => "sky".into(),
+        };
+        let rays = |c| super::rays_of(c, settings).saturating_mul(settings.spp);
+        Self {
+            world: world.into(),
+            recentre: settings.rules.recentre,
+            lights: channels.iter().map(name).collect(),
+            rays: channels.iter().map(rays).collect(),
+        }
+    }
+
+    /// Why references made on the terms `other` cannot serve here.
+    fn refusal(&self, other: &Self) -> Option<String> {
+        if self.world != other.world {
+            return Some("it shows another scene".into());
+        }
+        if self.recentre != other.recentre {
+            return Some("it was rendered with another --recentre".into());
+        }
+        if self.lights != other.lights {
+            let list = |lights: &[String]| match lights {
+                [] => "none".to_string(),
+                lights => lights.join(", "),
+            };
+            let (theirs, ours) = (list(&other.lights), list(&self.lights));
+            return Some(format!("it keeps the shadowing of {theirs}, this job that of {ours}"));
+        }
+        let pairs = self.rays.iter().zip(&other.rays).zip(&self.lights);
+        let few = { pairs }.find(|((own, theirs), _)| theirs < own);
+        few.map(|((own, theirs), light)| {
+            format!(
+                "it was rendered with {theirs} shadow rays a pixel to {light}, fewer than the {own} \
+                 of this job: frames would be noisier than traced ones"
+            )
+        })
+    }
+}
+
+/// A frame's points with what they belong to.
+pub struct Kept<'a> {
+    /// What other jobs must have in common.
+    pub terms: &'a Terms,
+    /// Number of the frame.
+    pub frame: u32,
+    /// World space.
+    pub camera: &'a Camera,
+    /// What is left out lies outside of it.
+    pub crop: Option<Rect>,
+    /// Scene space.
+    pub traced: &'a TracedPoints,
+    /// Settings in words.
+    pub settings: &'a str,
+}
+
+impl Kept<'_> {
+    /// The bytes: the same whatever else was traced at the same time. `None` where they would be too
+    /// many.
+    pub fn encode(&self) -> Option<Vec<u8>> {
+        let channels = self.terms.lights.len();
+        let order = self.order();
+        let head = Head {
+            terms: self.terms.clone(),
+            frame: self.frame,
+            settings: self.settings.into(),
+            points: order.len(),
+        };
+        let columns = WORDS + channels;
+        if order.len().checked_mul(4 * columns).is_none_or(|n| n > MOST_BYTES) {
+            return None;
+        }
+        let words: Vec<Vec<u32>> = order.par_iter().map(|i| self.words(*i, channels)).collect();
+        let mut raw = Vec::with_capacity(4 * columns * order.len());
+        for (column, byte) in (0..columns).flat_map(|c| (0..4).map(move |b| (c, b))) {
+            raw.extend(words.iter().map(|point| point[column].to_le_bytes()[byte]));
+        }
+        let json = serde_json::to_vec(&head).ok()?;
+        let mut body = (json.len() as u32).to_le_bytes().to_vec();
+        body.extend(json);
+        body.extend(camera_bytes(self.camera));
+        let parts: Vec<Vec<u8>> = raw.par_chunks(PART).map(deflated).collect::<Option<_>>()?;
+        for part in parts {
+            body.extend((part.len() as u32).to_le_bytes());
+            body.extend(part);
+        }
+        Some([MAGIC.as_slice(), blake3::hash(&body).as_bytes(), &body].concat())
+    }
+
+    /// Points in the crop, row by row: tiles come in another order where more was traced.
+    fn order(&self) -> Vec<usize> {
+        let points = &self.traced.points;
+        let is_in = |p: &TracedPoint| {
+            let inside = |c: &Rect| (c.x0..c.x1).contains(&p.x) && (c.y0..c.y1).contains(&p.y);
+            self.crop.as_ref().is_none_or(inside)
+        };
+        let mut order: Vec<usize> = (0..points.len()).filter(|i| is_in(&points[*i])).collect();
+        order.sort_by_key(|i| (points[*i].y, points[*i].x));
+        order
+    }
+
+    fn words(&self, i: usize, channels: usize) -> Vec<u32> {
+        let TracedPoint { x, y, point } = &self.traced.points[i];
+        let p = point.p.as_vec3();
+        let floats = [p.x, p.y, p.z, point.n.x, point.n.y, point.n.z, point.footprint, point.cos];
+        let flag = if point.direct { DIRECT } else { 0 };
+        let mut words = vec![*x, *y, point.geom_id, point.samples.min(DIRECT - 1) | flag];
+        words.extend(floats.map(f32::to_bits));
+        let ratios = &self.traced.ratios[i * channels..(i + 1) * channels];
+        // One NaN, whatever its bits were.
+        let bits = |r: &f32| if r.is_nan() { f32::NAN.to_bits() } else { r.to_bits() };
+        words.extend(ratios.iter().map(bits));
+        words
+    }
+}
+
+/// Reads what [`Kept::encode`] wrote, for a job on `terms` of a scene with `recentring`: a reference
+/// and a hash that tells it apart. `path` is for messages.
+///
+/// # Errors
+/// [`Error::Input`] where the bytes are damaged or no such bytes, or made on other terms.
+pub fn decode(
+    path: &Path,
+    bytes: &[u8],
+    terms: &Terms,
+    recentring: &Recentring,
+) -> Result<(Reference, [u8; 32])> {
+    let refuse = |why: String| Error::input(path, format!("cannot serve as a reference: {why}"));
+    let damaged = || refuse("its record of traced points is damaged".into());
+    let Some(rest) = bytes.strip_prefix(MAGIC) else {
+        return Err(refuse("its record is of another version of tweenray".into()));
+    };
+    let (hash, mut body) = rest.split_first_chunk::<32>().ok_or_else(damaged)?;
+    if blake3::hash(body).as_bytes() != hash {
+        return Err(damaged());
+    }
+    let length = take_u32(&mut body).ok_or_else(damaged)?;
+    let json = take(&mut body, length).filter(|j| j.len() <= MOST_HEAD).ok_or_else(damaged)?;
+    let head: Head = serde_json::from_slice(json).map_err(|_| damaged())?;
+    if let Some(why) = terms.refusal(&head.terms) {
+        return Err(refuse(why));
+    }
+    let camera = take(&mut body, CAMERA).and_then(camera_of).ok_or_else(damaged)?;
+    let traced = points_of(body, head.points, terms.lights.len(), &camera).ok_or_else(damaged)?;
+    let camera = camera.to_scene(recentring);
+    let reference = Reference::new(Reference::SUPPLIED, &camera, &traced, terms.lights.len());
+    Ok((reference, *hash))
+}
+
+fn points_of(body: &[u8], count: usize, channels: usize, camera: &Camera) -> Option<TracedPoints> {
+    let columns = WORDS + channels;
+    let expected = count.checked_mul(4 * columns).filter(|n| *n <= MOST_BYTES)?;
+    let raw = inflated(body, expected)?;
+    let word = |i: usize, column: usize| {
+        let byte = |b: usize| raw[(4 * column + b) * count + i];
+        u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])
+    };
+    let mut traced = TracedPoints::default();
+    for i in 0..count {
+        let float = |column: usize| f32::from_bits(word(i, column));
+        let vector = |first: usize| Vec3::new(float(first), float(first + 1), float(first + 2));
+        let flags = word(i, 3);
+        let point = SurfacePoint {
+            p: vector(4).as_dvec3(),
+            n: vector(7),
+            geom_id: word(i, 2),
+            footprint: float(10),
+            cos: float(11),
+            direct: flags & DIRECT != 0,
+            samples: flags & !DIRECT,
+        };
+        let (x, y) = (word(i, 0), word(i, 1));
+        let ratios = (WORDS..columns).map(float);
+        let is_sound = x < camera.width
+            && y < camera.height
+            && is_point(&point)
+            && ratios.clone().all(|r| r.is_nan() || (0.0..=1.0).contains(&r));
+        if !is_sound {
+            return None;
+        }
+        traced.points.push(TracedPoint { x, y, point });
+        traced.ratios.extend(ratios);
+    }
+    Some(traced)
+}
+
+/// Whether tracing can have left such a point.
+fn is_point(point: &SurfacePoint) -> bool {
+    let SurfacePoint { n, footprint, cos, samples, .. } = *point;
+    let p = point.p.as_vec3();
+    p.is_finite()
+        && (n.length() - 1.0).abs() < 1e-3
+        && footprint.is_finite()
+        && footprint > 0.0
+        && p.abs().max_element() / footprint < MOST_CELLS
+        && (-1.0..=1.001).contains(&cos)
+        && samples > 0
+}
+
+fn deflated(raw: &[u8]) -> Option<Vec<u8>> {
+    let mut out = Vec::new();
+    DeflateEncoder::new(raw, Compression::fast()).read_to_end(&mut out).ok()?;
+    Some(out)
+}
+
+/// Exactly `expected` bytes from all parts of `body`.
+fn inflated(mut body: &[u8], expected: usize) -> Option<Vec<u8>> {
+    let mut raw = Vec::new();
+    while raw.len() < expected {
+        let length = take_u32(&mut body)?;
+        let part = take(&mut body, length)?;
+        let wanted = PART.min(expected - raw.len());
+        let before = raw.len();
+        DeflateDecoder::new(part).take(wanted as u64).read_to_end(&mut raw).ok()?;
+        if raw.len() - before != wanted {
+            return None;
+        }
+    }
+    body.is_empty().then_some(raw)
+}
+
+fn take<'b>(bytes: &mut &'b [u8], length: usize) -> Option<&'b [u8]> {
+    let (head, rest) = bytes.split_at_checked(length)?;
+    *bytes = rest;
+    Some(head)
+}
+
+fn take_u32(bytes: &mut &[u8]) -> Option<usize> {
+    let word = take(bytes, 4)?;
+    Some(u32::from_le_bytes(word.try_into().ok()?) as usize)
+}
+
+fn camera_bytes(camera: &Camera) -> Vec<u8> {
+    let vectors = [camera.eye, camera.forward, camera.half_right, camera.half_up];
+    let numbers = vectors.iter().flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes);
+    let edges = [camera.width, camera.height].into_iter().flat_map(u32::to_le_bytes);
+    numbers.chain(edges).collect()
+}
+
+fn camera_of(bytes: &[u8]) -> Option<Camera> {
+    let (vectors, edges) = bytes.split_at_checked(12 * 8)?;
+    let numbers = vectors.chunks_exact(8).map(|b| b.try_into().map(f64::from_le_bytes));
+    let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>().ok()?;
+    let vector = |i: usize| DVec3::new(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
+    let mut edges = edges;
+    let edge = |edges: &mut &[u8]| take_u32(edges).map(|n| n as u32);
+    let (width, height) = (edge(&mut edges)?, edge(&mut edges)?);
+    let camera = Camera {
+        eye: vector(0),
+        forward: vector(1),
+        half_right: vector(2),
+        half_up: vector(3),
+        width,
+        height,
+    };
+    let is_edge = |n: u32| (1..=MAX_EDGE).contains(&n);
+    let is_length = |v: DVec3| v.length_squared().is_normal();
+    let is_sound = is_edge(width)
+        && is_edge(height)
+        && numbers.iter().all(|x| x.is_finite())
+        && (camera.forward.length() - 1.0).abs() < 1e-6
+        && is_length(camera.half_right)
+        && is_length(camera.half_up);
+    is_sound.then_some(camera)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Pose;
+
+    fn terms() -> Terms {
+        let lights = vec!["light 1".to_string(), "sky".into()];
+        Terms { world: "w".into(), recentre: true, lights, rays: vec![16, 64] }
+    }
+
+    fn camera() -> Camera {
+        let eye = DVec3::new(0.1, 0.2, 5.0 / 3.0);
+        let pose = Pose { eye, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
+        Camera::new(&pose, 40.0, 8, 6).expect("a camera")
+    }
+
+    fn traced() -> TracedPoints {
+        let point = |x: u32, y: u32| SurfacePoint {
+            p: DVec3::new(f64::from(x) / 8.0, f64::from(y) / 8.0, 0.25),
+            n: Vec3::Z,
+            geom_id: 3,
+            footprint: 0.125,
+            cos: 0.5,
+            direct: (x + y) % 3 > 0,
+            samples: 1 + x,
+        };
+        let places = (0..6).flat_map(|y| (0..8).map(move |x| (x, y)));
+        let points: Vec<_> =
+            places.map(|(x, y)| TracedPoint { x, y, point: point(x, y) }).collect();
+        let ratio = |i: usize| if i % 5 == 0 { f32::NAN } else { i as f32 / 100.0 };
+        TracedPoints { points, ratios: (0..96).map(ratio).collect() }
+    }
+
+    fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
+        let (terms, camera) = (terms(), camera());
+        let kept =
+            Kept { terms: &terms, frame: 7, camera: &camera, crop, traced, settings: "spp 1" };
+        kept.encode().expect("small enough")
+    }
+
+    fn read(bytes: &[u8], terms: &Terms) -> Result<Reference> {
+        decode(Path::new("f.exr"), bytes, terms, &Recentring::IDENTITY).map(|(r, _)| r)
+    }
+
+    #[test]
+    fn a_reference_comes_back_as_it_was() {
+        let back = read(&encoded(&traced(), None), &terms()).expect("whole");
+        let own = Reference::new(Reference::SUPPLIED, &camera(), &traced(), 2);
+        // By text, since NaN does not equal itself.
+        assert_eq!(format!("{back:?}"), format!("{own:?}"));
+    }
+
+    #[test]
+    fn the_bytes_do_not_depend_on_what_was_traced_beside() {
+        let crop = Rect { x0: 2, y0: 1, x1: 7, y1: 4 };
+        let (all, mut some) = (traced(), TracedPoints::default());
+        for (i, t) in all.points.iter().enumerate().rev() {
+            if t.x >= 2 && t.y < 4 {
+                some.points.push(*t);
+                some.ratios.extend(&all.ratios[2 * i..2 * i + 2]);
+            }
+        }
+        assert_eq!(encoded(&all, Some(crop)), encoded(&some, Some(crop)));
+    }
+
+    #[test]
+    fn every_damaged_byte_and_every_cut_is_refused() {
+        let bytes = encoded(&traced(), None);
+        for i in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[i] ^= 0x10;
+            assert!(read(&damaged, &terms()).is_err(), "byte {i}");
+            assert!(read(&bytes[..i], &terms()).is_err(), "cut at {i}");
+        }
+    }
+
+    /// Bytes whose hash is right, whatever is in them: made by hand.
+    fn forged(change: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
+        let mut body = encoded(&traced(), None)[40..].to_vec();
+        change(&mut body);
+        [MAGIC.as_slice(), blake3::hash(&body).as_bytes(), &body].concat()
+    }
+
+    #[test]
+    fn forged_lengths_counts_and_numbers_are_refused() {
+        let json_at = 4;
+        let replace = |body: &mut Vec<u8>, from: &str, to: &str| {
+            let length = u32::from_le_bytes(body[..4].try_into().expect("four")) as usize;
+            let json = String::from_utf8(body[json_at..json_at + length].to_vec()).expect("text");
+            assert!(json.contains(from));
+            let json = json.replace(from, to);
+            body.splice(json_at..json_at + length, json.bytes());
+            body[..4].copy_from_slice(&(json.len() as u32).to_le_bytes());
+        };
+        for count in ["0", "47", "49", "99999999", "18446744073709551615"] {
+            let to = format!("\"points\":{count}");
+            let bytes = forged(|b| replace(b, "\"points\":48", &to));
+            assert!(read(&bytes, &terms()).is_err(), "{count}");
+        }
+        assert!(read(&forged(|b| b[..4].fill(0xff)), &terms()).is_err());
+        assert!(read(&forged(|b| b.clear()), &terms()).is_err());
+        assert!(read(&forged(|_| ()), &terms()).is_ok());
+        let changes: [fn(&mut TracedPoints); 8] = [
+            |t| t.points[5].point.p.x = f64::NAN,
+            |t| t.points[5].point.n = Vec3::ZERO,
+            |t| t.points[5].point.footprint = 0.0,
+            |t| t.points[5].point.footprint = f32::INFINITY,
+            |t| t.points[5].point.p.x = 1e30,
+            |t| t.points[5].x = 8,
+            |t| t.points[5].point.samples = 0,
+            |t| t.ratios[6] = 1.5,
+        ];
+        for (i, change) in changes.iter().enumerate() {
+            let mut wrong = traced();
+            change(&mut wrong);
+            assert!(read(&encoded(&wrong, None), &terms()).is_err(), "change {i}");
+        }
+    }
+
+    #[test]
+    fn other_terms_are_refused_by_name() {
+        let bytes = encoded(&traced(), None);
+        let says = |change: fn(&mut Terms)| {
+            let mut other = terms();
+            change(&mut other);
+            read(&bytes, &other).expect_err("refused").to_string()
+        };
+        assert!(says(|t| t.world = "v".into()).contains("f.exr"));
+        assert!(says(|t| t.world = "v".into()).contains("another scene"));
+        assert!(says(|t| t.recentre = false).contains("--recentre"));
+        assert!(says(|t| drop(t.lights.pop())).contains("light 1, sky, this job that of light 1"));
+        assert!(says(|t| t.rays[1] = 65).contains("64 shadow rays a pixel to sky"));
+        let mut fewer = terms();
+        fewer.rays[0] = 4;
+        assert!(read(&bytes, &fewer).is_ok());
+    }
+}

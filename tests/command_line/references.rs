@@ -1,0 +1,214 @@
+//! What exr frames keep beside the picture: motion, maps, and references for later jobs.
+
+use super::job::Job;
+use serde_json::Value;
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+use tweenray::math::DVec3;
+use tweenray::output::exr::{self, Channels, Samples};
+use tweenray::scene::{Camera, Pose};
+
+/// A cube on a floor under a lamp and a sky, in a mirror.
+fn scene(job: &Job, name: &str, camera: &str) {
+    let text = format!(
+        "[camera]\n{camera}\n[settings]\nsize = [64, 36]\nspp = 1\nvideo = false\n\
+         sky_samples = 4\n[sky]\nradiance = 0.3\n[reuse]\nsegment = 8\n\
+         [material.mirror]\nmirror = 0.9\n\
+         [[light]]\nquad = {{ centre = [2, 5, 3], normal = '-y', size = [2, 2], radiance = 20 }}\n\
+         [[mesh]]\nquad = {{ centre = [0, -1, 0], normal = 'y', size = [20, 20] }}\n\
+         [[mesh]]\nquad = {{ centre = [0, 0, -3], normal = 'z', size = [8, 4] }}\n\
+         material = 'mirror'\n[[mesh]]\nfile = 'cube.obj'\n"
+    );
+    fs::write(job.path(name), text).expect("written");
+}
+
+fn pan(frames: u32, far: f64) -> String {
+    format!(
+        "frames = {frames}\n\
+         pan = {{ from = [-1, 1.5, 7], to = [{far}, 1.5, 7], target = [0, 0, 0] }}"
+    )
+}
+
+fn channels(job: &Job, name: &str) -> Channels {
+    let file = fs::File::open(job.path(name)).expect("there");
+    exr::decode(Path::new(name), BufReader::new(file), 1 << 26).expect("an exr file")
+}
+
+fn f32s<'c>(channels: &'c Channels, name: &str) -> &'c [f32] {
+    channels.f32(name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+/// Shadow rays of a job, by its statistics.
+fn shadow_rays(job: &Job, stats: &str) -> u64 {
+    let stats: Value = serde_json::from_slice(&job.read(stats)).expect("JSON");
+    let of = |kind: &str| stats["rays"][kind].as_u64().expect("a count");
+    of("shadow_area") + of("shadow_sky")
+}
+
+#[test]
+fn motion_is_zero_at_rest_also_where_frames_share_a_tracing() {
+    let job = Job::new();
+    let keys = "frames = 9\nkeys = [\n\
+                { at = 0, eye = [-1, 1.5, 7], target = [0, 0, 0] },\n\
+                { at = 0.5, eye = [1, 1.5, 7], target = [0, 0, 0] }]\n";
+    scene(&job, "scene.toml", keys);
+    for policy in ["surface", "off", "colour"] {
+        job.done(&format!("render scene.toml -o {policy}/f_#.exr --policy {policy}"));
+        let most = |frame: u32| {
+            let channels = channels(&job, &format!("{policy}/f_{frame}.exr"));
+            let all = ["backward.u", "backward.v"].map(|name| f32s(&channels, name).to_vec());
+            all.concat().into_iter().map(f32::abs).fold(0.0, f32::max)
+        };
+        assert_eq!(most(1), 0.0, "{policy}: nothing came before");
+        assert!(most(5) > 0.5, "{policy}: the camera moves until frame 5");
+        assert!((6..=9).all(|frame| most(frame) == 0.0), "{policy}: then it rests");
+    }
+}
+
+#[test]
+fn motion_leads_to_where_the_surface_was() {
+    let job = Job::new();
+    scene(&job, "scene.toml", &pan(2, -0.6).replace("frames", "fov = 40\nframes"));
+    job.done("render scene.toml -o o/f_#.exr --policy off --spp 4");
+    let camera = |x: f64| {
+        let (eye, target) = (DVec3::new(x, 1.5, 7.0), DVec3::ZERO);
+        let pose = Pose { eye, target, up: DVec3::Y, roll_degrees: 0.0 };
+        Camera::new(&pose, 40.0, 64, 36).expect("a camera")
+    };
+    let (before, now) = (camera(-1.0), camera(-0.6));
+    let held = channels(&job, "o/f_2.exr");
+    let [u, v, z] = ["backward.u", "backward.v", "Z"].map(|name| f32s(&held, name));
+    let [px, py, pz] = ["P.X", "P.Y", "P.Z"].map(|name| f32s(&held, name));
+    let (mut most, mut found) = (0f64, 0);
+    for i in (0..64 * 36).filter(|i| z[*i].is_finite()) {
+        let p = DVec3::new(px[i].into(), py[i].into(), pz[i].into());
+        let (Some(then), Some(now)) = (before.project(p), now.project(p)) else { continue };
+        let (x, y) = (then.0 - now.0, now.1 - then.1);
+        let apart = (x - f64::from(u[i])).abs().max((y - f64::from(v[i])).abs());
+        assert!(apart < 1e-3, "pixel {i}: {x} {y}, not {} {}", u[i], v[i]);
+        most = most.max(x.abs().min(y.abs()));
+        found += 1;
+    }
+    assert!(found > 1000 && most > 0.05, "{found} pixels, the least of x and y at most {most}");
+}
+
+#[test]
+fn maps_lie_beside_their_frames_and_come_back_when_lost() {
+    let job = Job::new();
+    scene(&job, "scene.toml", &pan(9, 1.0));
+    job.refused("render scene.toml --maps --policy off", "--policy off every frame is traced");
+    job.done("render scene.toml -o o/f_#.png --frames 1..3 --maps");
+    assert_eq!(job.names("o").len(), 3 * 5 + 1);
+    let map = job.read("o/f_2_provenance.png");
+    // As if they were not there: nothing is rendered, nothing refused, the frames are the same.
+    let again = job.done("render scene.toml -o o/f_#.png --frames 1..3");
+    assert!(again.out.contains("0 rendered, 3 kept"), "{}", again.out);
+    job.done("render scene.toml -o plain/f_#.png --frames 1..3");
+    assert!(job.read("plain/f_2.png") == job.read("o/f_2.png"));
+    fs::remove_file(job.path("o/f_2_provenance.png")).expect("removed");
+    fs::write(job.path("o/f_3_audit.png"), "torn").expect("written");
+    let again = job.done("render scene.toml -o o/f_#.png --frames 1..3 --maps");
+    assert!(again.out.contains("2 rendered, 1 kept") && again.err.contains("lacks its maps"));
+    assert!(job.read("o/f_2_provenance.png") == map);
+    // Somebody's own picture is in the way.
+    fs::create_dir(job.path("p")).expect("made");
+    fs::write(job.path("p/f_1_audit.png"), "mine").expect("written");
+    job.refused("render scene.toml -o p/f_#.png --maps", "f_1_audit.png exists");
+}
+
+#[test]
+fn exr_frames_hold_their_maps() {
+    let job = Job::new();
+    scene(&job, "scene.toml", &pan(9, 1.0));
+    job.done("render scene.toml -o o/f_#.exr --frames 5 --maps");
+    assert_eq!(job.names("o"), ["f.manifest.jsonl", "f_5.exr"]);
+    let held = channels(&job, "o/f_5.exr");
+    let u32s = |name: &str| match &held.list.iter().find(|c| c.name == name).expect(name).samples {
+        Samples::U32(v) => v.clone(),
+        Samples::F32(_) => panic!("{name} are numbers"),
+    };
+    let (provenance, frame) = (u32s("reuse.provenance"), u32s("reuse.frame"));
+    assert!((0..=4).all(|kind| kind == 3 || provenance.contains(&kind)));
+    for (kind, frame) in provenance.iter().zip(&frame) {
+        assert!(if *kind < 2 { *frame == 0 } else { [1, 9].contains(frame) }, "{kind} {frame}");
+    }
+    assert!(f32s(&held, "reuse.distance").iter().any(|d| *d > 0.0));
+    let audited = f32s(&held, "reuse.audit").iter().filter(|e| !e.is_nan()).count();
+    assert!((1..64 * 36 / 2).contains(&audited), "{audited}");
+    job.refused("render scene.toml -o o/f_#.exr --frames 5", "maps was true, now it is false");
+}
+
+#[test]
+fn a_denser_and_longer_move_starts_warm() {
+    let job = Job::new();
+    scene(&job, "short.toml", &pan(9, 1.0));
+    scene(&job, "long.toml", &pan(21, 1.5));
+    job.done("render short.toml -o base/f_#.exr");
+    job.done("render long.toml -o cold/f_##.exr --stats cold.json");
+    let warm = "render long.toml --references base";
+    job.done(&format!("{warm} -o warm/f_##.exr --stats warm.json --maps"));
+    let (cold, warm_rays) = (shadow_rays(&job, "cold.json"), shadow_rays(&job, "warm.json"));
+    assert!(3 * warm_rays < cold, "{warm_rays} shadow rays warm, {cold} cold");
+    // Any part of it is the same.
+    job.done(&format!("{warm} -o part/f_##.exr --frames 6..7 --maps --threads 1"));
+    assert!((6..=7).all(|n| {
+        job.read(&format!("part/f_0{n}.exr")) == job.read(&format!("warm/f_0{n}.exr"))
+    }));
+    // A key frame is inferred too, from frames that are none of its own shot.
+    let first = channels(&job, "warm/f_01.exr");
+    let kinds = first.list.iter().find(|c| c.name == "reuse.provenance").expect("the map");
+    let Samples::U32(kinds) = &kinds.samples else { panic!("numbers") };
+    let inferred = kinds.iter().filter(|kind| **kind == 2).count();
+    let traced = kinds.iter().filter(|kind| **kind == 1).count();
+    assert!(inferred > 10 * traced && !kinds.contains(&3), "{inferred} inferred, {traced} traced");
+    // As near to the truth as tracing is.
+    let line = "render long.toml --policy off --frames 8";
+    job.done(&format!("{line} -o off/f_##.exr"));
+    job.done(&format!("{line} -o ref/f_##.exr --shadow-samples 512 --sky-samples 512 --seed 9"));
+    let truth = channels(&job, "ref/f_08.exr");
+    let error = |folder: &str| -> f64 {
+        let own = channels(&job, &format!("{folder}/f_08.exr"));
+        let (own, truth) = (f32s(&own, "G").to_vec(), f32s(&truth, "G"));
+        own.iter().zip(truth).map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    };
+    let (warm_error, off) = (error("warm"), error("off"));
+    assert!(warm_error < off, "{warm_error} warm, {off} traced");
+}
+
+#[test]
+fn references_that_cannot_serve_are_refused_by_name() {
+    let job = Job::new();
+    scene(&job, "scene.toml", &pan(3, 1.0));
+    job.done("render scene.toml -o base/f_#.exr --frames 1");
+    let line = "render scene.toml -o o/f_#.exr --frames 1 --references";
+    job.refused(&format!("{line} nowhere"), "nowhere");
+    fs::create_dir(job.path("empty")).expect("made");
+    job.refused(&format!("{line} empty"), "no exr frame is in there");
+    job.refused(&format!("{line} base --policy off"), "--references needs --policy surface");
+    job.refused(&format!("{line} base --shadow-samples 64"), "16 shadow rays a pixel to light 1");
+    job.refused(&format!("{line} base --sky-samples 0"), "keeps the shadowing of light 1, sky");
+    job.refused(&format!("{line} o"), "o: ");
+    job.refused("render scene.toml -o base/g_#.exr --references base", "own frames go");
+    // Another camera move is the same scene, another lamp is not.
+    scene(&job, "other.toml", &pan(5, 2.0));
+    job.done("render other.toml -o other/f_#.exr --frames 2 --references base");
+    let text = fs::read_to_string(job.path("scene.toml")).expect("there");
+    fs::write(job.path("lamp.toml"), text.replace("radiance = 20", "radiance = 21")).expect("ok");
+    job.refused("render lamp.toml -o l/f_#.exr --references base", "f_1.exr: cannot serve");
+    job.done("render scene.toml -o off/f_#.exr --frames 1 --policy off");
+    job.refused(&format!("{line} off"), "off/f_1.exr: cannot serve as a reference");
+    let whole = job.read("base/f_1.exr");
+    fs::create_dir(job.path("bad")).expect("made");
+    for at in (0..whole.len().min(4000)).step_by(97) {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x5a;
+        fs::write(job.path("bad/f_1.exr"), &bytes).expect("written");
+        let ran = job.run(&format!("{line} bad --overwrite"));
+        assert!(!ran.err.contains("panic"), "byte {at}: {}", ran.err);
+        assert!([Some(0), Some(2)].contains(&ran.code), "byte {at}: {:?}", ran.code);
+        assert!(ran.code == Some(0) || ran.err.contains("bad/f_1.exr"), "byte {at}: {}", ran.err);
+    }
+    fs::write(job.path("bad/f_1.exr"), &whole[..whole.len() / 3]).expect("written");
+    job.refused(&format!("{line} bad"), "bad/f_1.exr");
+}
