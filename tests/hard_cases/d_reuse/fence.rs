@@ -1,0 +1,163 @@
+//! Holes behind thin things, and what reuse saves where nothing is wrong.
+
+use crate::common;
+use crate::moves::{self, Set, Stage};
+use crate::suite::{Outcome, Size};
+use tweenray::film::Film;
+use tweenray::math::{DVec3, Rgb};
+use tweenray::scene::{
+    CameraPath, Easing, Light, Material, QuadLight, ReuseSettings, Settings, Shot, World,
+};
+use tweenray::sequence::Made;
+
+/// Traces of a frame that tell how far its pixels scatter.
+const TRACES: u32 = 8;
+/// Added to their frame's number, one after another.
+const STREAM: u32 = 1 << 24;
+/// What every pixel may be off by, two of 255 display steps: rounding, and noise of the reference.
+const ALWAYS: f64 = 2.0 / 255.0;
+
+/// A fence of pickets, one pixel wide in a picture of `rows` rows, before a wall of coloured strips,
+/// on which it throws shadows; the camera slides past.
+fn fence(rows: u32) -> Set {
+    let p = DVec3::new;
+    let mut world = World::default();
+    let strips = [[0.8, 0.1, 0.1], [0.1, 0.7, 0.1], [0.1, 0.2, 0.8], [0.8, 0.8, 0.2]];
+    for (k, colour) in strips.iter().enumerate() {
+        world.materials.push(Material::diffuse(format!("strip {k}"), Rgb::from_array(*colour)));
+    }
+    world.materials.push(Material::diffuse("picket", Rgb::splat(0.9)));
+    let pixel = 2.0 * 8.0 * 20f64.to_radians().tan() / f64::from(rows);
+    let wide = 5.0 * pixel;
+    for k in -60..60 {
+        let (x0, x1) = (f64::from(k) * wide, f64::from(k + 1) * wide);
+        let strip = [p(x0, -3.0, -1.0), p(x1, -3.0, -1.0), p(x1, 4.0, -1.0), p(x0, 4.0, -1.0)];
+        world.meshes.push(common::quad(strip, (k + 60) as u32 % 4));
+    }
+    for k in -30..30 {
+        let x = f64::from(k) * 4.0 * pixel;
+        world.meshes.push(block(p(x, -3.0, 0.0), p(x + pixel, 1.5, pixel), 4));
+    }
+    let corners = [p(-0.5, 3.0, 4.0), p(0.5, 3.0, 4.0), p(0.5, 4.0, 4.0), p(-0.5, 4.0, 4.0)];
+    let radiance = Rgb::splat(30.0);
+    world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: true }));
+    let path = CameraPath::Pan {
+        from: p(-0.5, 0.3, 8.0),
+        to: p(0.6, 0.3, 8.0),
+        target: p(0.0, 0.2, 0.0),
+        up: DVec3::Y,
+        roll_degrees: 0.0,
+    };
+    Set::of(world, Shot { path, easing: Easing::Linear, frames: 9, vfov_degrees: 40.0 })
+}
+
+/// The box between two corners, faces outwards.
+fn block(min: DVec3, max: DVec3, material: u32) -> tweenray::scene::WorldMesh {
+    let mut mesh = common::cube(DVec3::splat(0.5), 0.5, material);
+    mesh.positions.iter_mut().for_each(|q| *q = min + *q * (max - min));
+    mesh
+}
+
+/// Indices of pixels of `film` further from `truth` than any trace is in the pixels around.
+fn bad_pixels(settings: &Settings, film: &Film, truth: &Film, traces: &[Film]) -> Vec<usize> {
+    let truth_codes = moves::codes(settings, truth);
+    let off = |film: &Film| -> Vec<f64> {
+        let pairs = moves::codes(settings, film).into_iter().zip(&truth_codes);
+        pairs.map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)).collect()
+    };
+    let scatter: Vec<Vec<f64>> = traces.iter().map(off).collect();
+    let (width, height) = (film.width as usize, film.height as usize);
+    let around = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let columns = x.saturating_sub(1)..(x + 2).min(width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        let near = rows.flat_map(|y| columns.clone().map(move |x| y * width + x));
+        near.map(|j| scatter.iter().map(|s| s[j]).fold(0.0, f64::max)).fold(0.0, f64::max)
+    };
+    let own = off(film);
+    let mut v:Vec<_>=(0..own.len()).map(|i| (255.0*own[i], 255.0*around(i))).collect(); v.sort_by(|a,b| (b.0-b.1).total_cmp(&(a.0-a.1))); println!("{:?} mean {:.2} {:.2}", &v[..12], v.iter().map(|x|x.0).sum::<f64>()/v.len() as f64, v.iter().map(|x|x.1).sum::<f64>()/v.len() as f64);
+    (0..own.len()).filter(|i| own[*i] > ALWAYS + around(*i)).collect()
+}
+
+/// What is bad in a made frame and in one more trace of it.
+fn judge(
+    stage: &Stage,
+    settings: &Settings,
+    shot: &Shot,
+    frame: u32,
+    made: &Made,
+) -> [Vec<usize>; 2] {
+    let truth = stage.converged(settings, shot, frame, 1024);
+    let trace = |k: u32| stage.traced(settings, shot, frame, k * STREAM + frame);
+    let traces: Vec<Film> = (1..=TRACES).map(trace).collect();
+    let another = trace(TRACES + 1);
+    [&made.film, &another].map(|film| bad_pixels(settings, film, &truth, &traces))
+}
+
+fn without_audit(settings: Settings) -> Settings {
+    let reuse = ReuseSettings { segment: 64, audit: 0.0, ..settings.reuse };
+    Settings { reuse, ..settings }
+}
+
+/// No pixel behind a picket shows what another frame had there.
+pub fn disocclusion(size: Size) -> Outcome {
+    let mut outcome = Outcome::default();
+    let (width, height) = size.of((64, 48), (256, 192));
+    let set = fence(height);
+    let stage = set.stage(common::threads());
+    let settings = without_audit(set.settings((width, height), 1, 16));
+    let made = stage.frames(&settings, &set.shot, &(1..=9).collect::<Vec<_>>());
+    let (mut control, mut inferred, mut points) = (0, 0, 0);
+    for frame in size.of(&[5, 2][..], &[2, 3, 4, 5, 6, 7, 8]) {
+        let made = &made[*frame as usize - 1];
+        let [bad, traced] = judge(&stage, &settings, &set.shot, *frame, made);
+        outcome.count(u64::from(width * height), bad.len() as u64);
+        for i in bad {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            let source = made.film.sources.as_ref().unwrap()[i];
+            outcome.example(format!("frame {frame}, pixel {x},{y}: {source:?}"));
+        }
+        control += traced.len();
+        (inferred, points) = (inferred + made.reuse.direct_inferred, points + made.reuse.direct);
+    }
+    outcome.show(format!("as far off in one more trace: {control} pixels"));
+    outcome.at_least("share inferred", inferred as f64 / points as f64, 0.2);
+    outcome
+}
+
+/// Rays that in-between frames cast, of those that tracing them would, where no pixel is wrong.
+pub fn exactness_and_savings(size: Size) -> Outcome {
+    let mut outcome = Outcome::default();
+    let pixels = size.of((64, 64), (320, 240));
+    for (scene, most) in [("cornell", 0.08), ("reflective_spheres", f64::INFINITY)] {
+        let set = Set::load(scene, |world| {
+            if scene == "cornell" {
+                // Diffuse throughout.
+                world.materials.iter_mut().for_each(|m| m.mirror = Rgb::ZERO);
+            }
+        });
+        let stage = set.stage(common::threads());
+        let shot = set.shot(33);
+        let settings = without_audit(set.settings(pixels, 1, 100));
+        let frames = [1, 17, 9, 5, 3, 33];
+        let made = stage.frames(&settings, &shot, &{
+            let mut f = frames;
+            f.sort();
+            f
+        });
+        let cast = made[1].rays.total() as f64;
+        let all = made[0].rays.total() as f64;
+        outcome.show(format!("{scene}: {:.2} % of the rays", 100.0 * cast / all));
+        let [bad, traced] = judge(&stage, &settings, &shot, 3, &made[1]);
+        outcome.count(u64::from(pixels.0 * pixels.1), bad.len() as u64);
+        outcome.show(format!(
+            "{scene}: {} bad pixels; in one more trace {}",
+            bad.len(),
+            traced.len()
+        ));
+        if most.is_finite() {
+            outcome.at_most("share of rays", cast / all, most);
+        }
+    }
+    outcome
+}
