@@ -192,3 +192,6 @@ pub fn flicker(settings: &Settings, films: &[&Film], truths: &[&Film]) -> Vec<f6
         .collect();
     errors.windows(2).map(|pair| mean_square(&pair[0], &pair[1])).collect()
 }
+
+/// A made frame with its number.
+pub type Numbered = (u32, Made);

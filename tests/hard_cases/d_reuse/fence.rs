@@ -21,6 +21,11 @@ const ALWAYS: f64 = 2.0 / 255.0;
 /// and then the furthest, but not by so much.
 const SCATTER: f64 = 2.0;
 
+/// Edge of a pixel at the fence in a picture of `rows` rows.
+fn pixel(rows: u32) -> f64 {
+    2.0 * 8.0 * 20f64.to_radians().tan() / f64::from(rows)
+}
+
 /// A fence of pickets, one pixel wide in a picture of `rows` rows, before a wall of coloured strips,
 /// on which it throws the shadows of a lamp `lamp` wide; the camera slides past.
 fn fence(rows: u32, lamp: f64) -> Set {
@@ -31,7 +36,7 @@ fn fence(rows: u32, lamp: f64) -> Set {
         world.materials.push(Material::diffuse(format!("strip {k}"), Rgb::from_array(*colour)));
     }
     world.materials.push(Material::diffuse("picket", Rgb::splat(0.9)));
-    let pixel = 2.0 * 8.0 * 20f64.to_radians().tan() / f64::from(rows);
+    let pixel = pixel(rows);
     let wide = 5.0 * pixel;
     for k in -60..60 {
         let (x0, x1) = (f64::from(k) * wide, f64::from(k + 1) * wide);
@@ -106,14 +111,15 @@ fn without_audit(settings: Settings) -> Settings {
 /// Width of a lamp in whose light the fence's shadows melt together: only a ratio of another
 /// surface would be wrong.
 const WIDE: f64 = 4.0;
-/// Width of one in whose light they are as fine as the pickets are in the picture.
-const NARROW: f64 = 1.0;
+/// Width, in pickets, of one in whose light they are nearly as fine as the pickets: penumbras of two
+/// pixels.
+const NARROW: f64 = 8.0;
 
 /// No pixel behind a picket shows what another frame had there.
 pub fn disocclusion(size: Size) -> Outcome {
     let mut outcome = behind_pickets(size, WIDE);
     if size == Size::Full {
-        outcome.merge(behind_pickets(size, NARROW));
+        outcome.merge(behind_pickets(size, NARROW * pixel(192)));
     }
     outcome
 }
@@ -133,14 +139,14 @@ fn behind_pickets(size: Size, lamp: f64) -> Outcome {
         for i in bad {
             let (x, y) = (i as u32 % width, i as u32 / width);
             let source = made.film.sources.as_ref().unwrap()[i];
-            outcome.example(format!("lamp {lamp}, frame {frame}, pixel {x},{y}: {source:?}"));
+            outcome.example(format!("lamp {lamp:.2}, frame {frame}, pixel {x},{y}: {source:?}"));
         }
         control += traced.len();
         (inferred, points) = (inferred + made.reuse.direct_inferred, points + made.reuse.direct);
     }
     let (failed, tried) = (outcome.failures, outcome.trials);
     outcome.show(format!(
-        "lamp {lamp} wide: {failed} of {tried} pixels off; as far off in one more trace {control}"
+        "lamp {lamp:.2} wide: {failed} of {tried} pixels off; as far off in one more trace {control}"
     ));
     outcome.at_least("share inferred", inferred as f64 / points as f64, 0.2);
     outcome
