@@ -9,14 +9,12 @@
 mod accuracy;
 #[path = "inbetween/cost.rs"]
 mod cost;
-#[allow(dead_code, missing_docs, reason = "the tests use all of it")]
 #[path = "../tests/common/moves.rs"]
 mod moves;
 #[path = "inbetween/pan.rs"]
 mod pan;
 #[path = "inbetween/parts.rs"]
 mod parts;
-#[allow(dead_code, missing_docs, reason = "the tests use all of it")]
 #[path = "../tests/common/sharpness.rs"]
 mod sharpness;
 mod support;

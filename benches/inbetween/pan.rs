@@ -71,8 +71,8 @@ pub fn effects(choice: &Choice) {
     let orders = makers.each_ref().map(|maker| maker.batches(&all).concat());
     let mut seconds = [0.0; PAPER.len()];
     for turn in 0..all.len() {
-        for (k, maker) in makers.iter().enumerate() {
-            seconds[k] += support::seconds(|| moves::make(&**maker, orders[k][turn]));
+        for ((maker, order), seconds) in makers.iter().zip(&orders).zip(&mut seconds) {
+            *seconds += support::seconds(|| moves::make(&**maker, order[turn]));
         }
     }
     let off = with(&set, size, 100, 8, Policy::Off);

@@ -6,7 +6,7 @@ use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, QuadLight, ReuseSettings, Settings, Shot, World,
+    CameraPath, Easing, Light, Material, QuadLight, ReuseSettings, Settings, Shot, World, WorldMesh,
 };
 use tweenray::sequence::Made;
 
@@ -35,18 +35,21 @@ fn fence(rows: u32, lamp: f64) -> Set {
     for (k, colour) in strips.iter().enumerate() {
         world.materials.push(Material::diffuse(format!("strip {k}"), Rgb::from_array(*colour)));
     }
-    world.materials.push(Material::diffuse("picket", Rgb::splat(0.9)));
     let pixel = pixel(rows);
     let wide = 5.0 * pixel;
+    // One mesh of each colour; the pickets are of the first, so that only place and normal tell
+    // them from its strips.
+    let mut meshes: [Vec<WorldMesh>; 4] = Default::default();
     for k in -60..60 {
         let (x0, x1) = (f64::from(k) * wide, f64::from(k + 1) * wide);
         let strip = [p(x0, -3.0, -1.0), p(x1, -3.0, -1.0), p(x1, 4.0, -1.0), p(x0, 4.0, -1.0)];
-        world.meshes.push(common::quad(strip, (k + 60) as u32 % 4));
+        meshes[(k + 60) as usize % 4].push(common::quad(strip, 0));
     }
     for k in -30..30 {
         let x = f64::from(k) * 4.0 * pixel;
-        world.meshes.push(block(p(x, -3.0, 0.0), p(x + pixel, 1.5, pixel), 4));
+        meshes[0].push(block(p(x, -3.0, 0.0), p(x + pixel, 1.5, pixel)));
     }
+    world.meshes.extend(meshes.iter().zip(0..).map(|(parts, material)| joined(parts, material)));
     let a = 0.5 * lamp;
     let corners = [p(-a, 3.0, 4.0), p(a, 3.0, 4.0), p(a, 4.0, 4.0), p(-a, 4.0, 4.0)];
     let radiance = Rgb::splat((100.0 / lamp) as f32);
@@ -62,10 +65,21 @@ fn fence(rows: u32, lamp: f64) -> Set {
 }
 
 /// The box between two corners, faces outwards.
-fn block(min: DVec3, max: DVec3, material: u32) -> tweenray::scene::WorldMesh {
-    let mut mesh = common::cube(DVec3::splat(0.5), 0.5, material);
+fn block(min: DVec3, max: DVec3) -> WorldMesh {
+    let mut mesh = common::cube(DVec3::splat(0.5), 0.5, 0);
     mesh.positions.iter_mut().for_each(|q| *q = min + *q * (max - min));
     mesh
+}
+
+/// One mesh of several.
+fn joined(parts: &[WorldMesh], material: u32) -> WorldMesh {
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for part in parts {
+        let first = positions.len() as u32;
+        positions.extend(&part.positions);
+        triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    common::mesh(positions, triangles, material)
 }
 
 /// Indices of pixels of `film` much further from `truth` than any trace is in the pixels around.

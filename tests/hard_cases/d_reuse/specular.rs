@@ -58,7 +58,7 @@ pub fn moving_highlight(size: Size) -> Outcome {
     let reuse = ReuseSettings { segment: 64, ..ReuseSettings::default() };
     let settings = Settings { reuse, ..set.settings(size.of((96, 72), (384, 288)), 4, 16) };
     let made = stage.frames(&settings, &set.shot, &(1..=FRAMES).collect::<Vec<_>>());
-    let (mut furthest, mut least_step, mut last) = (0.0f64, f64::INFINITY, None);
+    let (mut furthest, mut least_step, mut last) = (0.0f64, f64::INFINITY, None::<(f64, f64)>);
     for (frame, made) in (1..).zip(&made) {
         let truth = stage.traced(&settings, &set.shot, frame, frame);
         let ((x, y), weight) = highlight(&made.film);
@@ -66,7 +66,7 @@ pub fn moving_highlight(size: Size) -> Outcome {
         outcome.check(weight > 0.0, || format!("frame {frame}: no highlight"));
         furthest = furthest.max((x - tx).hypot(y - ty));
         if let Some((lx, ly)) = last.replace((tx, ty)) {
-            least_step = least_step.min((tx - lx as f64).hypot(ty - ly as f64));
+            least_step = least_step.min((tx - lx).hypot(ty - ly));
         }
     }
     outcome.at_most("centroid off by, pixels", furthest, 0.1);
