@@ -4,7 +4,7 @@
 //! Still cameras, fences, sharpness and independence of the order are hard cases (letter d); the
 //! audit has `tests/audit.rs`, ranks and stopped jobs `tests/command_line`.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shows what it measured")]
 
 mod common;
 #[path = "common/moves.rs"]
