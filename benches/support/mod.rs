@@ -73,7 +73,8 @@ impl Times {
     }
 }
 
-fn quantile(values: &[f64], q: f64) -> f64 {
+/// The value below which the share `q` of `values` lies.
+pub fn quantile(values: &[f64], q: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let at = q * (sorted.len() - 1) as f64;

@@ -115,13 +115,17 @@ impl Stage<'_> {
     /// Renders and audits shot `number`, then renders its frames again, traced and converged.
     pub fn audited(&self, trial: &Trial, number: u32) -> Audited {
         let (settings, shot) = (self.settings(trial, number), self.shot(trial, number));
-        let best =
-            Settings { shadow_samples: trial.best, sky_samples: trial.best, ..settings.clone() };
+        self.audited_shot(&settings, &shot, trial.best)
+    }
+
+    /// The same for a shot of one's own; `best` shadow samples converge.
+    pub fn audited_shot(&self, settings: &Settings, shot: &Shot, best: u32) -> Audited {
+        let best = Settings { shadow_samples: best, sky_samples: best, ..settings.clone() };
         let stop = AtomicBool::new(false);
         let pyramid = Pyramid { segment: 64, frames: shot.frames };
         let frames: Vec<u32> = pyramid.all().collect();
         let maker =
-            Inferrer::new(self.renderer(&settings), &shot, &self.pool, &stop, &Quiet, pyramid);
+            Inferrer::new(self.renderer(settings), shot, &self.pool, &stop, &Quiet, pyramid);
         let maker = maker.expect("cameras");
         maker.expect(&frames);
         let (mut sums, mut truth) = (AuditSums::default(), Truth::default());
@@ -129,11 +133,11 @@ impl Stage<'_> {
             let made = maker.make(frame).expect("made").expect("not stopped");
             let Some(audit) = made.audit else { continue };
             sums += audit;
-            let camera = shot.camera(frame, trial.edge, trial.edge).expect("a camera");
+            let camera = shot.camera(frame, settings.width, settings.height).expect("a camera");
             let render = |settings, stream| self.render(settings, &camera, stream);
             let converged = [render(&best, frame | 5 << 27), render(&best, frame | 6 << 27)];
-            let traced = render(&settings, frame);
-            truth.add(&settings, &made.film, &traced, &converged);
+            let traced = render(settings, frame);
+            truth.add(settings, &made.film, &traced, &converged);
         }
         truth.inferred /= sums.inferred_pixels as f64;
         truth.shown /= sums.pixels as f64;

@@ -15,8 +15,16 @@ mod c_shading;
 #[path = "../common/mod.rs"]
 mod common;
 mod costs;
+mod d_reuse;
 mod f_statistics;
+#[path = "../common/moves.rs"]
+mod moves;
 mod shapes;
+#[path = "../common/sharpness.rs"]
+mod sharpness;
+#[allow(dead_code, missing_docs, reason = "the audit's tests use all of it")]
+#[path = "../audit/shots.rs"]
+mod shots;
 mod suite;
 #[path = "../../benches/support/mod.rs"]
 mod support;
@@ -25,10 +33,11 @@ use std::io::Write;
 use suite::{Case, Outcome, Size};
 
 /// Letter, what it is about, its cases.
-const LETTERS: [(&str, &str, &[Case]); 4] = [
+const LETTERS: [(&str, &str, &[Case]); 5] = [
     ("a", "intersection", a_intersection::CASES),
     ("b", "spawned rays", b_spawned_rays::CASES),
     ("c", "shading, normals, glass", c_shading::CASES),
+    ("d", "reuse between frames", d_reuse::CASES),
     ("f", "statistics and effects", f_statistics::CASES),
 ];
 
