@@ -40,6 +40,9 @@ pub struct Evidence {
     pub offset: f32,
     /// A light that makes as many display steps may lie an `offset` further off; dimmer ones more.
     pub offset_steps: f32,
+    /// Where tracing's noise (standard deviation of a ratio) times this exceeds 1, by so much
+    /// further.
+    pub offset_noise: f32,
     /// The same as `offset` where all samples see the whole light, or none of it.
     pub offset_saturated: f32,
 }
@@ -58,6 +61,7 @@ impl Default for Evidence {
             noise: 2.0,
             offset: 1.0,
             offset_steps: 30.0,
+            offset_noise: 14.0,
             offset_saturated: 4.0,
         }
     }
@@ -284,24 +288,23 @@ impl Lookup<'_> {
             rays += tap.weight * sample.samples as f32;
             offset += tap.apart * tap.weight;
         }
-        let Evidence { noise, .. } = self.evidence;
-        if offset.length() / weight > self.most_offset(mean, allowed) {
-            return false;
-        }
         let rays = rays / weight * self.rays[channel] as f32;
-        let noise = noise * (mean * (1.0 - mean)).max(0.0) / rays;
+        let noise = self.evidence.noise * (mean * (1.0 - mean)).max(0.0) / rays;
         squares / weight <= allowed * allowed + noise
+            && offset.length() / weight <= self.most_offset(mean, allowed, noise)
     }
 
-    /// How far the samples' mean may lie from the point, footprints. `allowed` is the deviation of
-    /// a ratio that makes the tolerated display steps.
-    fn most_offset(&self, mean: f32, allowed: f32) -> f32 {
-        let Evidence { tolerance, offset, offset_steps, offset_saturated, .. } = self.evidence;
+    /// How far the samples' mean may lie from the point, footprints: the further, the less of an
+    /// error there shows. `allowed` is the deviation of a ratio that makes the tolerated display
+    /// steps, `noise` the variance that tracing has.
+    fn most_offset(&self, mean: f32, allowed: f32, noise: f32) -> f32 {
+        let Evidence { tolerance, offset, offset_steps, offset_noise, .. } = self.evidence;
         if mean == 0.0 || mean == 1.0 {
-            return offset_saturated;
+            return self.evidence.offset_saturated;
         }
-        let steps = tolerance / allowed;
-        offset * (offset_steps / steps).max(1.0)
+        let dim = offset_steps * allowed / tolerance;
+        let noisy = offset_noise * noise.sqrt();
+        offset * dim.max(noisy).max(1.0)
     }
 
     /// 1 for a sample with the point's own normal, 0 where they are as far apart as can be.

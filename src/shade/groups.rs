@@ -17,7 +17,7 @@ const PIXELS: usize = (BLOCK * BLOCK) as usize;
 const NONE: u32 = u32::MAX;
 /// Behind mirrors and glass neighbours may end far from one another, where a shadow's edge is not
 /// told by samples that far away: a footprint counts as at most this many of a flat mirror's.
-const MOST_WIDER: f32 = 1.5;
+const MOST_WIDER: f32 = 3.0;
 /// Samples of a pixel lie on one surface where their normals differ by less: cosine.
 const SAME_SURFACE: f64 = 0.9;
 
