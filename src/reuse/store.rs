@@ -3,8 +3,8 @@
 //!
 //! The bytes stand in an attribute of the frame's exr file. Not in channels: a pixel may have several
 //! points, seen in mirrors or on two surfaces, and a file that is opened in a compositor should not
-//! show twenty channels that mean nothing there. The layout: [`MAGIC`], the BLAKE3 of all that
-//! follows, the length of a JSON [`Head`] and the head, the camera (world space, f64), then the
+//! show twenty channels that mean nothing there. The layout: `MAGIC`, the BLAKE3 of all that
+//! follows, the length of a JSON `Head` and the head, the camera (world space, f64), then the
 //! points' words column by column in byte planes, cut into parts that are deflated each. Little
 //! endian throughout.
 //!

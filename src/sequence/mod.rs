@@ -172,7 +172,8 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
     let Made { film, rays, reuse, .. } = made;
     let path = target.pattern.path(frame);
     let attribute = made.reference.as_ref().map(|bytes| (ATTRIBUTE, bytes.clone()));
-    let options = WriteOptions { frame: Some(frame), attribute, ..target.write.clone() };
+    // No frame number: a still camera is to give the same bytes in every frame.
+    let options = WriteOptions { attribute, ..target.write.clone() };
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut maps = Vec::new();
     if target.has_map_files() {
