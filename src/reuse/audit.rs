@@ -18,6 +18,7 @@ use crate::film::{PixelSource, Provenance};
 use crate::math::Rgb;
 use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
+use crate::sampling::mix;
 use crate::stats::{AuditSums, DrawnSum};
 use rayon::prelude::*;
 
@@ -145,14 +146,7 @@ pub fn draw(
 /// A place in [0, 1).
 fn place(lot: Lot, unit: u32) -> f64 {
     let words = [lot.seed, u64::from(lot.frame) << 32 | u64::from(lot.number), u64::from(unit)];
-    let mut v = 0u64;
-    for word in words {
-        // SplitMix64's finaliser (Steele, Lea and Flood, 2014).
-        v = (v ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        v = (v ^ (v >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        v ^= v >> 31;
-    }
+    let v = words.into_iter().fold(0, |v, word| mix(v ^ word));
     (v >> 11) as f64 / (1u64 << 53) as f64
 }
 

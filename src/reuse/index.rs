@@ -2,6 +2,7 @@
 
 use super::reference::Sample;
 use crate::math::DVec3;
+use crate::sampling::mix;
 
 /// Cells of a level that a query looks at: those whose middles surround it.
 pub(super) const CELLS: usize = 8;
@@ -92,17 +93,8 @@ fn cell_of(p: DVec3, edge: f64) -> [i64; 3] {
 }
 
 fn key_of(level: i32, geom_id: u32, cell: [i64; 3]) -> Key {
-    let mut key = 0;
-    for c in
-        [i64::from(geom_id) << 32 | i64::from(level as u32 & 0xffff), cell[0], cell[1], cell[2]]
-    {
-        // SplitMix64's finaliser (Steele, Lea and Flood, 2014).
-        key = (key ^ c as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        key = (key ^ (key >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        key = (key ^ (key >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        key ^= key >> 31;
-    }
-    key
+    let of_mesh = u64::from(geom_id) << 32 | u64::from(level as u32 & 0xffff);
+    cell.into_iter().fold(mix(of_mesh), |key, c| mix(key ^ c as u64))
 }
 
 #[cfg(test)]

@@ -225,7 +225,7 @@ impl Lookup<'_> {
         }
     }
 
-    /// Distance to a sample on the point's own surface; `None` where it is on another.
+    /// From the point to a sample on its own surface; `None` where it is on another.
     fn on_surface(
         &self,
         point: &SurfacePoint,

@@ -52,22 +52,20 @@ impl Reference {
             let own = &traced.ratios[i * channels..(i + 1) * channels];
             let sample = Sample::of(&t.point);
             let slot = &mut slots[t.y as usize * camera.width as usize + t.x as usize];
-            let mut at = samples.len();
             if t.point.direct && *slot != NONE && samples[*slot as usize].is_one_surface(&sample) {
-                at = *slot as usize;
+                let at = *slot as usize;
                 samples[at].join(&sample, &mut ratios[at * channels..(at + 1) * channels], own);
                 continue;
             }
             let is_own = t.point.direct
                 && (*slot == NONE || samples[*slot as usize].samples < sample.samples);
+            let at = samples.len() as u32;
             if is_own {
-                let displaced = std::mem::replace(slot, at as u32);
+                let displaced = std::mem::replace(slot, at);
                 others.extend((displaced != NONE).then_some(displaced));
             } else {
-                others.push(at as u32);
+                others.push(at);
             }
-            at += 1;
-            debug_assert_eq!(at, samples.len() + 1);
             samples.push(sample);
             ratios.extend_from_slice(own);
         }

@@ -10,6 +10,7 @@
 
 mod disk;
 mod filter;
+mod mix;
 mod pixel;
 mod quad;
 mod sobol;
@@ -17,6 +18,7 @@ mod sphere;
 
 pub use disk::{concentric_disk, cosine_hemisphere, to_world};
 pub use filter::PixelFilter;
+pub use mix::mix;
 pub use pixel::PixelSampler;
 pub use quad::QuadWarp;
 pub use sphere::SphereCone;

@@ -3,6 +3,7 @@
 use super::Check;
 use crate::intersect::{Hit, PrimRef, Ray, SurfaceInteraction};
 use crate::math::DVec3;
+use crate::sampling::mix;
 use crate::scene::Light;
 use crate::shade::ShadowStarts;
 use crate::shade::light::{self, AreaLight};
@@ -270,12 +271,4 @@ fn direction(rng: &mut Pcg64) -> DVec3 {
 fn random(seed: u64, id: RayId) -> Pcg64 {
     let mixed = mix(mix(mix(seed) ^ (id.kind as u64 + 1)) ^ id.index);
     Pcg64::seed_from_u64(mixed)
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea and Flood, 2014).
-fn mix(x: u64) -> u64 {
-    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }
