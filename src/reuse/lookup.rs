@@ -5,13 +5,14 @@
 //! sampled no more coarsely than the point itself. Their weights are renormalised; in each channel
 //! they must carry enough weight together and agree as well as their sampling noise allows.
 
-use super::index::{edge_of, level_of};
-use super::reference::{NONE, Reference, Sample};
-use crate::inference::{Inference, Origin, Questions, SurfacePoint};
-use crate::math::{DVec3, Vec3};
+use super::reference::{NONE, Reference};
+use super::taps::{ALWAYS, Images, Tap, Taps};
+use crate::inference::{Inference, Origin, Questions};
+use crate::math::Vec3;
 
-/// Samples that one point's answer is made of, at most.
-const MOST_TAPS: usize = 24;
+/// Points that are looked up together: the memory that all of them need is asked for before any of it
+/// is waited for.
+const TOGETHER: usize = 16;
 
 /// What counts as evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,171 +80,32 @@ pub struct Lookup<'a> {
     pub evidence: Evidence,
 }
 
-/// A sample that lies on the point's surface.
-#[derive(Clone, Copy)]
-struct Tap {
-    reference: u32,
-    sample: u32,
-    weight: f32,
-    /// From the point to the sample, footprints.
-    apart: Vec3,
-}
-
-#[derive(Clone, Copy)]
-struct Taps {
-    list: [Tap; MOST_TAPS],
-    len: usize,
-    weight: f64,
-}
-
-impl Taps {
-    const NONE: Self = Self {
-        list: [Tap { reference: 0, sample: 0, weight: 0.0, apart: Vec3::ZERO }; MOST_TAPS],
-        len: 0,
-        weight: 0.0,
-    };
-
-    fn push(&mut self, tap: Tap) {
-        if self.len < MOST_TAPS && tap.weight > 0.0 {
-            self.list[self.len] = tap;
-            self.len += 1;
-            self.weight += f64::from(tap.weight);
-        }
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &Tap> {
-        self.list[..self.len].iter()
-    }
-}
-
 impl Inference for Lookup<'_> {
     fn infer(&self, questions: &mut Questions) {
         let Questions { points, unshadowed, ratios, origins } = questions;
         let channels = self.rays.len();
-        let lights = unshadowed.chunks_exact(channels).zip(ratios.chunks_exact_mut(channels));
-        for ((point, (shown, ratios)), origin) in points.iter().zip(lights).zip(origins) {
-            if shown.iter().all(|s| *s == 0.0) {
-                continue;
-            }
-            let taps = self.taps(point);
-            if taps.weight >= self.evidence.least_weight {
-                self.answer(&taps, shown, ratios);
-                *origin = self.origin(&taps);
+        let each = points
+            .chunks(TOGETHER)
+            .zip(unshadowed.chunks(TOGETHER * channels))
+            .zip(ratios.chunks_mut(TOGETHER * channels))
+            .zip(origins.chunks_mut(TOGETHER));
+        for (((points, unshadowed), ratios), origins) in each {
+            let is_lit = |i: usize| unshadowed[i * channels..][..channels].iter().any(|s| *s != 0.0);
+            let mut images: [Images; TOGETHER] = [[None; ALWAYS]; TOGETHER];
+            self.find_images(points, is_lit, &mut images);
+            for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
+                let taps = self.taps(point, &images[i]);
+                if taps.weight >= self.evidence.least_weight {
+                    let shown = &unshadowed[i * channels..][..channels];
+                    self.answer(&taps, shown, &mut ratios[i * channels..][..channels]);
+                    origins[i] = self.origin(&taps);
+                }
             }
         }
     }
 }
 
 impl Lookup<'_> {
-    fn taps(&self, point: &SurfacePoint) -> Taps {
-        let mut taps = Taps::NONE;
-        for (number, reference) in self.references.iter().enumerate() {
-            if number >= 2 && taps.weight >= self.evidence.enough_weight {
-                break;
-            }
-            self.screen_taps(number as u32, reference, point, &mut taps);
-        }
-        if !point.direct {
-            for (number, reference) in self.references.iter().enumerate() {
-                if taps.weight >= self.evidence.enough_weight {
-                    break;
-                }
-                self.index_taps(number as u32, reference, point, &mut taps);
-            }
-        }
-        taps
-    }
-
-    /// The four samples around the point's image in the reference.
-    fn screen_taps(
-        &self,
-        number: u32,
-        reference: &Reference,
-        point: &SurfacePoint,
-        taps: &mut Taps,
-    ) {
-        let camera = &reference.camera;
-        let Some((x, y, depth)) = camera.project(point.p) else { return };
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-        if !(left >= -1.0 && top >= -1.0 && left < width && top < height) {
-            return;
-        }
-        let n = point.n.as_dvec3();
-        let to_eye = camera.eye - point.p;
-        let cos = (n.dot(to_eye) / to_eye.length()).max(0.02);
-        let footprint = depth * reference.pixel_size;
-        let own = f64::from(point.footprint);
-        let own_area = own * own / if point.direct { f64::from(point.cos).max(0.02) } else { 1.0 };
-        if footprint * footprint / cos > self.evidence.coarser * own_area {
-            return;
-        }
-        let (fx, fy) = (x - left, y - top);
-        let reach = 2.0 * footprint / cos.max(self.evidence.grazing);
-        for k in 0..4 {
-            let (dx, dy) = (f64::from(k & 1), f64::from(k >> 1));
-            let (tx, ty) = (left + dx, top + dy);
-            if tx < 0.0 || ty < 0.0 || tx >= width || ty >= height {
-                continue;
-            }
-            let sample = reference.slots[ty as usize * camera.width as usize + tx as usize];
-            if sample == NONE {
-                continue;
-            }
-            let s = &reference.samples[sample as usize];
-            let Some(apart) = self.on_surface(point, n, s, footprint, reach) else { continue };
-            let wx = if dx > 0.0 { fx } else { 1.0 - fx };
-            let wy = if dy > 0.0 { fy } else { 1.0 - fy };
-            let apart = (apart / footprint).as_vec3();
-            let alike = self.alikeness(point, s);
-            let weight = (wx * wy) as f32 * alike * alike;
-            taps.push(Tap { reference: number, sample, weight, apart });
-        }
-    }
-
-    /// Samples near the point, by place.
-    fn index_taps(
-        &self,
-        number: u32,
-        reference: &Reference,
-        point: &SurfacePoint,
-        taps: &mut Taps,
-    ) {
-        let n = point.n.as_dvec3();
-        let footprint = f64::from(point.footprint);
-        let own = level_of(point.footprint);
-        for level in [own, own - 1] {
-            let reach = edge_of(level);
-            reference.index.around(level, point.geom_id, point.p, |sample| {
-                let s = &reference.samples[sample as usize];
-                let Some(apart) = self.on_surface(point, n, s, footprint, reach) else { return };
-                let weight = 0.5 * (1.0 - apart.length() / reach);
-                let apart = (apart / footprint).as_vec3();
-                taps.push(Tap { reference: number, sample, weight: weight as f32, apart });
-            });
-        }
-    }
-
-    /// From the point to a sample on its own surface; `None` where it is on another.
-    fn on_surface(
-        &self,
-        point: &SurfacePoint,
-        n: DVec3,
-        s: &Sample,
-        footprint: f64,
-        reach: f64,
-    ) -> Option<DVec3> {
-        if s.geom_id != point.geom_id || s.n.dot(point.n) < self.evidence.least_cos {
-            return None;
-        }
-        let apart = s.position() - point.p;
-        let distance = apart.length();
-        let height = apart.dot(n).abs();
-        let allowed = self.evidence.height * footprint + self.evidence.slope * distance;
-        (distance <= reach && height <= allowed).then_some(apart)
-    }
-
     /// Weighted means of the ratios that agree. `shown` is what the pixel would show of each light
     /// without shadows.
     fn answer(&self, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
@@ -305,12 +167,6 @@ impl Lookup<'_> {
         let dim = offset_steps * allowed / tolerance;
         let noisy = offset_noise * noise.sqrt();
         offset * dim.max(noisy).max(1.0)
-    }
-
-    /// 1 for a sample with the point's own normal, 0 where they are as far apart as can be.
-    fn alikeness(&self, point: &SurfacePoint, s: &Sample) -> f32 {
-        let least = self.evidence.least_cos;
-        ((s.n.dot(point.n) - least) / (1.0 - least)).clamp(0.0, 1.0)
     }
 
     fn origin(&self, taps: &Taps) -> Origin {
