@@ -39,14 +39,15 @@ impl Cells {
 }
 
 impl Index {
-    /// Indexes those of `samples` whose numbers are `members`.
-    pub fn new(samples: &[Sample], members: Vec<u32>) -> Self {
+    /// Indexes those of `samples`, which lie as far from their neighbours as `footprints` say, whose
+    /// numbers are `members`.
+    pub fn new(samples: &[Sample], footprints: &[f32], members: Vec<u32>) -> Self {
         if members.is_empty() {
             return Self::default();
         }
         let key = |i: &u32| {
             let s = &samples[*i as usize];
-            let level = level_of(s.footprint);
+            let level = level_of(footprints[*i as usize]);
             key_of(level, s.geom_id, cell_of(s.position(), edge_of(level)))
         };
         let mut keyed: Vec<(Key, u32)> = members.iter().map(|i| (key(i), *i)).collect();
@@ -132,8 +133,8 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
 
-    fn sample(p: Vec3, footprint: f32) -> Sample {
-        Sample { p, n: Vec3::Y, geom_id: 3, samples: 1, footprint }
+    fn sample(p: Vec3) -> Sample {
+        Sample { p, n: Vec3::Y, geom_id: 3, samples: 1 }
     }
 
     #[test]
@@ -148,8 +149,8 @@ mod tests {
     fn everything_within_half_a_cell_is_found_and_nothing_of_another_mesh() {
         let place = |i: usize| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32);
         let samples: Vec<Sample> =
-            (0..1000).map(|i| sample(place(i) * 0.1 - Vec3::splat(0.45), 0.12)).collect();
-        let index = Index::new(&samples, (0..1000).collect());
+            (0..1000).map(|i| sample(place(i) * 0.1 - Vec3::splat(0.45))).collect();
+        let index = Index::new(&samples, &[0.12; 1000], (0..1000).collect());
         let level = level_of(0.12);
         for p in [DVec3::ZERO, DVec3::new(0.11, -0.32, 0.4), DVec3::splat(-0.449)] {
             let found_in = |level, mesh| -> Vec<u32> {

@@ -6,7 +6,7 @@
 //! they must carry enough weight together and agree as well as their sampling noise allows.
 
 use super::reference::{NONE, Reference};
-use super::taps::{ALWAYS, Images, Tap, Taps};
+use super::taps::{ALWAYS, Images, Taps};
 use crate::inference::{Inference, Origin, Questions};
 use crate::math::Vec3;
 
@@ -24,9 +24,9 @@ pub struct Evidence {
     /// Least cosine between normals; samples count by the square of what is above it.
     pub least_cos: f32,
     /// Height above the tangent plane, footprints.
-    pub height: f64,
+    pub height: f32,
     /// Further height, of the distance along the plane.
-    pub slope: f64,
+    pub slope: f32,
     /// By how much a sample's area on the surface may exceed the point's.
     pub coarser: f64,
     /// Samples lie within two footprints, and further where the reference looks along the surface: as
@@ -89,15 +89,16 @@ impl Inference for Lookup<'_> {
             .zip(unshadowed.chunks(TOGETHER * channels))
             .zip(ratios.chunks_mut(TOGETHER * channels))
             .zip(origins.chunks_mut(TOGETHER));
+        let mut taps = Taps::new();
         for (((points, unshadowed), ratios), origins) in each {
-            let is_lit = |i: usize| unshadowed[i * channels..][..channels].iter().any(|s| *s != 0.0);
+            let shown = |i: usize| &unshadowed[i * channels..][..channels];
+            let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
             let mut images: [Images; TOGETHER] = [[None; ALWAYS]; TOGETHER];
             self.find_images(points, is_lit, &mut images);
             for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
-                let taps = self.taps(point, &images[i]);
+                self.gather(point, &images[i], &mut taps);
                 if taps.weight >= self.evidence.least_weight {
-                    let shown = &unshadowed[i * channels..][..channels];
-                    self.answer(&taps, shown, &mut ratios[i * channels..][..channels]);
+                    self.answer(&taps, shown(i), &mut ratios[i * channels..][..channels]);
                     origins[i] = self.origin(&taps);
                 }
             }
@@ -105,55 +106,92 @@ impl Inference for Lookup<'_> {
     }
 }
 
+/// What the taps tell of one light.
+#[derive(Clone, Copy, Default)]
+struct Told {
+    /// Sum of the weights of the taps that know it.
+    weight: f32,
+    /// Weighted mean of their ratios.
+    mean: f32,
+    /// Weighted mean of the squared distances from that.
+    variance: f32,
+    /// Weighted mean of their camera samples.
+    samples: f32,
+    /// How far their weighted mean lies from the point, footprints.
+    offset: f32,
+}
+
 impl Lookup<'_> {
     /// Weighted means of the ratios that agree. `shown` is what the pixel would show of each light
     /// without shadows.
     fn answer(&self, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
+        // Of many lights the last are told twice.
+        let mut told = [Told::default(); 8];
         let mut seen = 0.0;
-        for (channel, out) in ratios.iter_mut().enumerate() {
-            let (mut weight, mut sum) = (0.0, 0.0);
-            for (tap, ratio) in self.known(taps, channel) {
-                weight += tap.weight;
-                sum += tap.weight * ratio;
+        for (channel, shown) in shown.iter().enumerate() {
+            let own = self.told(taps, channel);
+            if f64::from(own.weight) >= self.evidence.least_weight {
+                seen += shown * own.mean;
             }
-            if f64::from(weight) >= self.evidence.least_weight {
-                *out = sum / weight;
-                seen += shown[channel] * *out;
+            if let Some(kept) = told.get_mut(channel) {
+                *kept = own;
             }
         }
         let steps = steps_per_radiance(seen);
-        for (channel, out) in ratios.iter_mut().enumerate().filter(|(_, out)| !out.is_nan()) {
-            let allowed = self.evidence.tolerance / (steps * shown[channel]).max(1e-6);
-            if !self.agrees(taps, channel, *out, allowed) {
-                *out = f32::NAN;
+        for (channel, (out, shown)) in ratios.iter_mut().zip(shown).enumerate() {
+            let kept = told.get(channel).copied();
+            let own = kept.unwrap_or_else(|| self.told(taps, channel));
+            let allowed = self.evidence.tolerance / (steps * shown).max(1e-6);
+            if self.agrees(&own, channel, allowed) {
+                *out = own.mean;
             }
         }
     }
 
-    /// The taps whose ratio is known.
-    fn known<'t>(&'t self, taps: &'t Taps, channel: usize) -> impl Iterator<Item = (&'t Tap, f32)> {
-        taps.iter().filter_map(move |tap| {
-            let ratio = self.references[tap.reference as usize].ratio(tap.sample, channel);
-            (!ratio.is_nan()).then_some((tap, ratio))
-        })
+    fn told(&self, taps: &Taps, channel: usize) -> Told {
+        let mut first = f32::NAN;
+        let (mut weight, mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0, 0.0);
+        let mut apart = Vec3::ZERO;
+        for tap in taps.iter() {
+            let reference = self.references[tap.reference as usize];
+            let ratio = reference.ratio(tap.sample, channel);
+            if ratio.is_nan() {
+                continue;
+            }
+            if first.is_nan() {
+                first = ratio;
+            }
+            // From the first, so that equal ones give just that, and no variance.
+            let further = ratio - first;
+            weight += tap.weight;
+            sum += tap.weight * further;
+            squares += tap.weight * further * further;
+            samples += tap.weight * reference.samples[tap.sample as usize].samples as f32;
+            apart += tap.apart * tap.weight;
+        }
+        if weight == 0.0 {
+            return Told::default();
+        }
+        let (share, mean) = (1.0 / weight, sum / weight);
+        Told {
+            weight,
+            mean: first + mean,
+            variance: (squares * share - mean * mean).max(0.0),
+            samples: samples * share,
+            offset: apart.length() * share,
+        }
     }
 
-    /// Whether the taps of a channel lie no further from their `mean` than their sampling noise and
-    /// an `allowed` deviation explain.
-    fn agrees(&self, taps: &Taps, channel: usize, mean: f32, allowed: f32) -> bool {
-        let (mut weight, mut squares, mut rays) = (0.0, 0.0, 0.0);
-        let mut offset = Vec3::ZERO;
-        for (tap, ratio) in self.known(taps, channel) {
-            let sample = &self.references[tap.reference as usize].samples[tap.sample as usize];
-            weight += tap.weight;
-            squares += tap.weight * (ratio - mean) * (ratio - mean);
-            rays += tap.weight * sample.samples as f32;
-            offset += tap.apart * tap.weight;
+    /// Whether the ratios of a channel lie no further from their mean than their sampling noise and
+    /// an `allowed` deviation explain, and are enough.
+    fn agrees(&self, told: &Told, channel: usize, allowed: f32) -> bool {
+        let Told { weight, mean, variance, samples, offset } = *told;
+        if f64::from(weight) < self.evidence.least_weight {
+            return false;
         }
-        let rays = rays / weight * self.rays[channel] as f32;
+        let rays = samples * self.rays[channel] as f32;
         let noise = self.evidence.noise * (mean * (1.0 - mean)).max(0.0) / rays;
-        squares / weight <= allowed * allowed + noise
-            && offset.length() / weight <= self.most_offset(mean, allowed, noise)
+        variance <= allowed * allowed + noise && offset <= self.most_offset(mean, allowed, noise)
     }
 
     /// How far the samples' mean may lie from the point, footprints: the further, the less of an

@@ -4,7 +4,7 @@ use super::index::{Cells, level_of};
 use super::lookup::Lookup;
 use super::reference::{NONE, Reference, Sample};
 use crate::inference::SurfacePoint;
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 
 /// Samples that one point's answer is made of, at most.
 const MOST_TAPS: usize = 24;
@@ -21,7 +21,7 @@ pub(super) struct Tap {
     pub apart: Vec3,
 }
 
-#[derive(Clone, Copy)]
+/// The samples about a point.
 pub(super) struct Taps {
     list: [Tap; MOST_TAPS],
     len: usize,
@@ -29,11 +29,16 @@ pub(super) struct Taps {
 }
 
 impl Taps {
-    const NONE: Self = Self {
-        list: [Tap { reference: 0, sample: 0, weight: 0.0, apart: Vec3::ZERO }; MOST_TAPS],
-        len: 0,
-        weight: 0.0,
-    };
+    /// None yet.
+    pub fn new() -> Self {
+        let none = Tap { reference: 0, sample: 0, weight: 0.0, apart: Vec3::ZERO };
+        Self { list: [none; MOST_TAPS], len: 0, weight: 0.0 }
+    }
+
+    fn clear(&mut self) {
+        self.len = 0;
+        self.weight = 0.0;
+    }
 
     fn push(&mut self, tap: Tap) {
         if self.len < MOST_TAPS && tap.weight > 0.0 {
@@ -52,12 +57,12 @@ impl Taps {
 #[derive(Clone, Copy)]
 pub(super) struct Image {
     /// Between the middles of the four pixels around it, pixels.
-    fx: f64,
-    fy: f64,
+    fx: f32,
+    fy: f32,
     /// A pixel's edge there, scene units.
-    footprint: f64,
-    /// How far away samples count, scene units.
-    reach: f64,
+    footprint: f32,
+    /// How far away samples count, footprints.
+    reach: f32,
     /// The samples of the four pixels; [`NONE`] where there is none, or one of another mesh.
     samples: [u32; 4],
 }
@@ -89,9 +94,9 @@ impl Lookup<'_> {
         }
     }
 
-    /// The samples about `point`, whose `images` are found.
-    pub(super) fn taps(&self, point: &SurfacePoint, images: &Images) -> Taps {
-        let mut taps = Taps::NONE;
+    /// Gathers the samples about `point`, whose `images` are found, in `taps`.
+    pub(super) fn gather(&self, point: &SurfacePoint, images: &Images, taps: &mut Taps) {
+        taps.clear();
         for (number, reference) in self.references.iter().enumerate() {
             let image = match images.get(number) {
                 Some(image) => *image,
@@ -99,7 +104,7 @@ impl Lookup<'_> {
                 None => self.image(reference, point),
             };
             if let Some(image) = image {
-                self.screen_taps((number as u32, reference), point, &image, &mut taps);
+                self.screen_taps((number as u32, reference), point, &image, taps);
             }
         }
         if !point.direct && taps.weight < self.evidence.enough_weight {
@@ -109,10 +114,9 @@ impl Lookup<'_> {
                 if taps.weight >= self.evidence.enough_weight {
                     break;
                 }
-                self.index_taps((number as u32, reference), point, &cells, &mut taps);
+                self.index_taps((number as u32, reference), point, &cells, taps);
             }
         }
-        taps
     }
 
     /// Where the point is seen in the reference, if that samples finely enough there.
@@ -140,8 +144,9 @@ impl Lookup<'_> {
                 *sample = reference.slots[ty as usize * camera.width as usize + tx as usize];
             }
         }
-        let reach = 2.0 * footprint / cos.max(self.evidence.grazing);
-        Some(Image { fx: x - left, fy: y - top, footprint, reach, samples })
+        let reach = (2.0 / cos.max(self.evidence.grazing)) as f32;
+        let (fx, fy) = ((x - left) as f32, (y - top) as f32);
+        Some(Image { fx, fy, footprint: footprint as f32, reach, samples })
     }
 
     /// The four samples around the point's image in the reference.
@@ -155,13 +160,11 @@ impl Lookup<'_> {
         let Image { fx, fy, footprint, reach, samples } = *image;
         for (k, sample) in samples.into_iter().enumerate().filter(|(_, sample)| *sample != NONE) {
             let s = &reference.samples[sample as usize];
-            let Some(apart) = self.on_surface(point, s, footprint, reach) else { continue };
+            let Some(near) = self.on_surface(point, s, footprint, reach) else { continue };
             let wx = if k & 1 == 1 { fx } else { 1.0 - fx };
             let wy = if k >> 1 == 1 { fy } else { 1.0 - fy };
-            let apart = (apart / footprint).as_vec3();
-            let alike = self.alikeness(point, s);
-            let weight = (wx * wy) as f32 * alike * alike;
-            taps.push(Tap { reference: number, sample, weight, apart });
+            let weight = wx * wy * near.alike * near.alike;
+            taps.push(Tap { reference: number, sample, weight, apart: near.apart });
         }
     }
 
@@ -173,42 +176,47 @@ impl Lookup<'_> {
         cells: &[Cells; 2],
         taps: &mut Taps,
     ) {
-        let footprint = f64::from(point.footprint);
         for cells in cells {
-            let reach = cells.edge;
+            let reach = cells.edge as f32 / point.footprint;
             for sample in reference.index.members(cells) {
                 let s = &reference.samples[sample as usize];
-                let Some(apart) = self.on_surface(point, s, footprint, reach) else { continue };
-                let weight = 0.5 * (1.0 - apart.length() / reach);
-                let apart = (apart / footprint).as_vec3();
-                taps.push(Tap { reference: number, sample, weight: weight as f32, apart });
+                let Some(near) = self.on_surface(point, s, point.footprint, reach) else { continue };
+                let weight = 0.5 * (1.0 - near.distance / reach);
+                taps.push(Tap { reference: number, sample, weight, apart: near.apart });
             }
         }
     }
 
-    /// From the point to a sample on its own surface; `None` where it is on another.
+    /// Where a sample lies, if on the point's own surface and within `reach` footprints.
     fn on_surface(
         &self,
         point: &SurfacePoint,
         s: &Sample,
-        footprint: f64,
-        reach: f64,
-    ) -> Option<DVec3> {
-        if s.geom_id != point.geom_id || s.n.dot(point.n) < self.evidence.least_cos {
+        footprint: f32,
+        reach: f32,
+    ) -> Option<Near> {
+        let least = self.evidence.least_cos;
+        let cos = s.n.dot(point.n);
+        if s.geom_id != point.geom_id || cos < least {
             return None;
         }
-        let apart = s.position() - point.p;
+        let apart = (s.position() - point.p).as_vec3() / footprint;
         let distance = apart.length();
-        let height = apart.dot(point.n.as_dvec3()).abs();
-        let allowed = self.evidence.height * footprint + self.evidence.slope * distance;
-        (distance <= reach && height <= allowed).then_some(apart)
+        let height = apart.dot(point.n).abs();
+        let allowed = self.evidence.height + self.evidence.slope * distance;
+        let alike = ((cos - least) / (1.0 - least)).min(1.0);
+        (distance <= reach && height <= allowed).then_some(Near { apart, distance, alike })
     }
+}
 
-    /// 1 for a sample with the point's own normal, 0 where they are as far apart as can be.
-    fn alikeness(&self, point: &SurfacePoint, s: &Sample) -> f32 {
-        let least = self.evidence.least_cos;
-        ((s.n.dot(point.n) - least) / (1.0 - least)).clamp(0.0, 1.0)
-    }}
+/// A sample on the point's surface.
+struct Near {
+    /// From the point, footprints.
+    apart: Vec3,
+    distance: f32,
+    /// 1 with the point's own normal, 0 where they are as far apart as can be.
+    alike: f32,
+}
 
 impl Image {
     fn keep_mesh(&mut self, reference: &Reference, geom_id: u32) {
