@@ -69,8 +69,8 @@ impl Default for Evidence {
             offset_steps: 30.0,
             offset_noise: 14.0,
             offset_saturated: 4.0,
-            change: 2.0,
-            change_noise: 4.0,
+            change: 3.0,
+            change_noise: 5.0,
         }
     }
 }

@@ -129,7 +129,7 @@ fn samples_to_one_side_tell_only_what_does_not_change_on_the_way() {
     let beside = on_wall(32.2, 20.5);
     assert_eq!(told(&known(|_| 1.0), beside, Evidence::default()), 1.0);
     assert_eq!(told(&known(|_| 0.5), beside, Evidence::default()), 0.5);
-    let steep = known(|x| 0.5 + 0.12 * (31 - x.min(31)).min(4) as f32);
+    let steep = known(|x| 0.1 + 0.2 * (31 - x.min(31)).min(4) as f32);
     refused(&steep, beside, |e| e.change_noise = 100.0);
     // All that is asked sees the whole light, but a shadow is one sample further.
     let rim = known(|x| if x < 31 { 0.0 } else { 1.0 });
