@@ -19,6 +19,7 @@ mod say;
 mod schema;
 mod signals;
 mod stats;
+mod status;
 mod values;
 mod verify;
 
@@ -34,6 +35,7 @@ use std::process::ExitCode;
 Examples:
   tweenray render bunny.obj
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16
+  tweenray status out/
   tweenray inspect scene.toml
   tweenray compare out/frame_0001.png other.png
 
@@ -46,6 +48,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
+    Status(status::StatusArgs),
     Inspect(Box<inspect::InspectArgs>),
     Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
@@ -84,6 +87,7 @@ pub fn run() -> ExitCode {
 fn dispatch(command: &Command) -> Exit {
     let result = match command {
         Command::Render(args) => return render::run(args),
+        Command::Status(args) => status::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),

@@ -17,6 +17,7 @@ use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
+use crate::sequence::checkpoint::{self, Checkpoints};
 use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
@@ -31,6 +32,9 @@ use std::time::Instant;
 Every option can also stand in the scene file; the command line wins.
 Frames that exist with the same settings are kept, so the same command goes on where it stopped.
 
+`tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
+
+SIGINT, SIGTERM and SIGUSR1 stop the job; a second SIGINT or SIGTERM ends it at once.
 Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed.
 
 Examples:
@@ -66,6 +70,7 @@ pub fn run(args: &RenderArgs) -> Exit {
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
+    interrupt.limit(args.output.time_limit);
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
     let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
@@ -106,9 +111,10 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
     }
     if outcome.unfinished > 0 {
-        say_stopped(&job, &outcome);
+        say_stopped(&job, &outcome, &interrupt.reason());
         return Ok(Exit::Stopped);
     }
+    checkpoint::clear(&target);
     let done = finish(&job, &outcome, start, quiet)?;
     Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
 }
@@ -163,6 +169,7 @@ impl Frames<'_> {
         let effects = EffectPlan::of(scene, settings);
         let renderer = Renderer { scene, settings, plan: effects, intersector };
         let with_gbuffer = pattern.format() == Format::Exr;
+        let checkpoints = self.checkpoints();
         let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
         let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
             Policy::Surface => {
@@ -170,6 +177,7 @@ impl Frames<'_> {
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 maker.supplied = &self.request.references.list;
+                maker.checkpoints = Some(&checkpoints);
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
@@ -191,6 +199,7 @@ impl Frames<'_> {
         let outcome =
             interrupt.watched(|| cluster::render(world, target, plan, &*maker, stop, &done));
         watch.finish();
+        tell(quiet, &maker.notes(), |n| say::note(n));
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.
             say::error(error);
@@ -199,17 +208,23 @@ impl Frames<'_> {
         Ok((outcome?, maker.reference_memory()))
     }
 
+    fn checkpoints(&self) -> Checkpoints<'_> {
+        let Request { scene, settings, terms, checkpoint, .. } = self.request;
+        let whole = settings.crop.is_none();
+        Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
+    }
+
     fn total(&self) -> usize {
         self.plan.kept.len() + self.plan.render.len()
     }
 }
 
 /// Says how to go on.
-fn say_stopped(job: &Frames, outcome: &Outcome) {
+fn say_stopped(job: &Frames, outcome: &Outcome, reason: &str) {
     let finished = job.total() - outcome.unfinished;
     let again = if job.request.overwrite { " without --overwrite" } else { "" };
     say::aside(format_args!(
-        "stopped: {finished} of {} frames are finished in {}; the same command{again} goes on \
+        "stopped{reason}: {finished} of {} frames are finished in {}; the same command{again} goes on \
          from here",
         job.total(),
         job.target.pattern

@@ -11,9 +11,13 @@ use crate::output::manifest::{self, Header};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{Target, check_upload, fingerprint, world_fingerprint};
+use crate::sequence::{Recipes, Target, check_upload, fingerprint, world_fingerprint};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How much time of tracing a killed job may lose: docs/resume.md has the measurement.
+const CHECKPOINT: Duration = Duration::from_secs(30);
 
 /// Everything that rendering takes.
 pub struct Request {
@@ -37,6 +41,8 @@ pub struct Request {
     pub threads: Option<usize>,
     /// Where the statistics go, if anywhere.
     pub stats: Option<PathBuf>,
+    /// How much time of tracing a killed job may lose; `None` for any.
+    pub checkpoint: Option<Duration>,
     /// Whether frames get maps of reuse.
     pub maps: bool,
     /// On which terms frames serve as references.
@@ -49,6 +55,8 @@ pub struct Request {
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     scene_hash: String,
+    shot_hash: String,
+    recipes: Recipes,
 }
 
 impl Request {
@@ -68,12 +76,14 @@ impl Request {
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
         refuse_maps(output.maps, &settings)?;
-        let world_hash = world_fingerprint(&world);
-        let scene_hash = fingerprint(&world, &shot);
+        let scene_hash = world_fingerprint(&world);
+        let shot_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));
-        let terms = references::terms(&world_hash, &scene, &settings);
+        let terms = references::terms(&scene_hash, &scene, &settings);
+        let with_motion = pattern.format() == Format::Exr;
+        let recipes = Recipes::new(&shot, &settings, !terms.lights.is_empty(), with_motion)?;
         let references = References::read(&output.references, &pattern, &scene, &settings, &terms)?;
         Ok(Self {
             scene,
@@ -86,6 +96,7 @@ impl Request {
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
+            checkpoint: output.checkpoint.map_or(Some(CHECKPOINT), |interval| interval.0),
             maps: output.maps,
             references,
             terms,
@@ -93,6 +104,8 @@ impl Request {
             warnings,
             scene_name: path.display().to_string(),
             scene_hash,
+            shot_hash,
+            recipes,
         })
     }
 
@@ -134,6 +147,7 @@ impl Request {
             tweenray: env!("CARGO_PKG_VERSION").into(),
             scene: self.scene_name.clone(),
             scene_hash: self.scene_hash.clone(),
+            shot_hash: self.shot_hash.clone(),
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
@@ -142,6 +156,7 @@ impl Request {
         Target {
             pattern: self.pattern.clone(),
             header,
+            recipes: self.recipes.clone(),
             write: WriteOptions {
                 maps: self.maps.then(|| farthest(&self.settings)),
                 ..WriteOptions::of(&self.settings, None)

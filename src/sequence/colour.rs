@@ -88,7 +88,7 @@ impl<'a> ColourMaker<'a> {
             stop,
             progress,
             rule,
-            pyramid: Pyramid { segment: (shot.frames - 1).max(1), frames: shot.frames },
+            pyramid: Pyramid::whole(shot.frames),
             uploads: known,
             state: Mutex::default(),
         })

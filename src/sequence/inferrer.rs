@@ -1,5 +1,6 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
+use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
 use super::schedule::{Schedule, Stock};
 use super::supplied::with_supplied;
@@ -9,11 +10,15 @@ use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::store::{Kept, Terms};
 use crate::reuse::{self, Evidence, Lookup, Reference};
-use crate::scene::{Camera, Shot};
+use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Longest that a job which shall stop goes on writing references.
+const LONGEST_FAREWELL: Duration = Duration::from_secs(5);
 
 /// Infers in-between frames.
 pub struct Inferrer<'a> {
@@ -37,6 +42,8 @@ pub struct Inferrer<'a> {
     pub supplied: &'a [Reference],
     /// On which terms frames serve later jobs as references; `None` where none is kept.
     pub terms: Option<Terms>,
+    /// Where references are kept for a job that goes on after this one; `None` for nowhere.
+    pub checkpoints: Option<&'a Checkpoints<'a>>,
     schedule: Schedule,
     pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
@@ -51,6 +58,12 @@ struct State {
     early: BTreeMap<u32, Made>,
     /// The last original that is asked for again, as its copies are.
     again: Option<(u32, Made)>,
+    /// References as bytes that are not on disk.
+    pending: BTreeMap<u32, Arc<[u8]>>,
+    /// References that are on disk.
+    on_disk: BTreeSet<u32>,
+    /// When references were last put on disk, or the first was made.
+    put: Option<Instant>,
     most_memory: u64,
 }
 
@@ -82,6 +95,7 @@ impl<'a> Inferrer<'a> {
             evidence,
             supplied: &[],
             terms: None,
+            checkpoints: None,
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -120,20 +134,32 @@ impl<'a> Inferrer<'a> {
         let render = || self.renderer.render_job(&job, self.stop, self.progress);
         let Some(rendered) = self.pool.install(render) else { return Ok(None) };
         let Rendered { film, rays, reuse, sources } = rendered;
+        // In the order in which they would come back from a file.
+        let sources = self.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources);
         if is_due {
             let reference = Reference::new(frame, &own, &sources, self.channels.len());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
+            self.save(frame, &camera, &sources, kept.as_ref())?;
         }
         Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
     }
 
     /// What the file of `frame` keeps for later jobs.
     fn kept(&self, frame: u32, camera: &Camera, traced: &TracedPoints) -> Option<Arc<[u8]>> {
-        let terms = self.terms.as_ref()?;
-        let settings = self.renderer.settings;
-        let text = WriteOptions::of(settings, None).settings;
-        let kept = Kept { terms, frame, camera, crop: settings.crop, traced, settings: &text };
+        self.encode(self.terms.as_ref()?, frame, camera, self.renderer.settings.crop, traced)
+    }
+
+    fn encode(
+        &self,
+        terms: &Terms,
+        frame: u32,
+        camera: &Camera,
+        crop: Option<Rect>,
+        traced: &TracedPoints,
+    ) -> Option<Arc<[u8]>> {
+        let settings = &WriteOptions::of(self.renderer.settings, None).settings;
+        let kept = Kept { terms, frame, camera, crop, traced, settings };
         self.pool.install(|| kept.encode()).map(Into::into)
     }
 
@@ -145,6 +171,9 @@ impl<'a> Inferrer<'a> {
     /// The reference of an original, which is in use.
     fn reference(&self, frame: u32) -> Result<Option<Arc<Reference>>> {
         if let Some(found) = self.with_state(|s| s.references.get(frame).cloned()) {
+            return Ok(Some(found));
+        }
+        if let Some(found) = self.from_disk(frame) {
             return Ok(Some(found));
         }
         let Some(made) = self.frame(frame)? else { return Ok(None) };
@@ -159,9 +188,69 @@ impl<'a> Inferrer<'a> {
         })
     }
 
-    fn hand_out(&self, original: u32, made: Made) -> Made {
+    /// The reference of an original that an earlier run left. Not where the original itself is asked
+    /// for: then it is made anyway.
+    fn from_disk(&self, frame: u32) -> Option<Arc<Reference>> {
+        let checkpoints = self.checkpoints?;
+        if self.with_state(|s| s.references.asked(frame)) > 0 {
+            return None;
+        }
+        let reference = self.pool.install(|| checkpoints.read(frame))?;
+        self.with_state(|s| {
+            s.on_disk.insert(frame);
+            s.keep(&self.schedule, frame, reference);
+            s.references.get(frame).cloned()
+        })
+    }
+
+    /// Keeps a new reference as bytes, and puts it on disk with others once too much would be lost
+    /// without. `kept` is what the frame's file will hold.
+    fn save(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        traced: &TracedPoints,
+        kept: Option<&Arc<[u8]>>,
+    ) -> Result<()> {
+        let Some(checkpoints) = self.checkpoints.filter(|c| c.every.is_some()) else {
+            return Ok(());
+        };
+        let bytes = match kept.filter(|_| checkpoints.frames_hold_all) {
+            Some(bytes) => Some(bytes.clone()),
+            None => self.encode(checkpoints.terms, frame, camera, None, traced),
+        };
+        if let Some(bytes) = bytes {
+            self.with_state(|s| s.pending.insert(frame, bytes));
+        }
+        self.tend(false)
+    }
+
+    /// Puts references on disk where that is due, all of them where the job shall stop, and removes
+    /// those that no frame to come needs.
+    fn tend(&self, stopping: bool) -> Result<()> {
+        let Some((checkpoints, every)) = self.checkpoints.and_then(|c| Some((c, c.every?))) else {
+            return Ok(());
+        };
+        let start = Instant::now();
+        let put = self
+            .with_state(|s| s.due_on_disk(start, if stopping { Duration::ZERO } else { every }));
+        for (frame, bytes) in put {
+            if stopping && start.elapsed() > LONGEST_FAREWELL {
+                break;
+            }
+            checkpoints.write(frame, &bytes)?;
+            self.with_state(|s| s.on_disk.insert(frame));
+        }
+        self.with_state(State::over_on_disk)
+            .into_iter()
+            .for_each(|frame| checkpoints.remove(frame));
+        Ok(())
+    }
+
+    fn hand_out(&self, original: u32, made: Made) -> Result<Made> {
         self.with_state(|s| s.hand_out(&self.schedule, original, &made));
-        made
+        self.tend(false)?;
+        Ok(made)
     }
 
     /// With what `frame` does not share with its original: its motion, and its record, which is the
@@ -185,8 +274,32 @@ impl<'a> Inferrer<'a> {
 impl State {
     fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
         self.references.keep(schedule, frame, || Arc::new(reference));
-        let memory = self.references.held().map(|r| r.memory()).sum();
-        self.most_memory = self.most_memory.max(memory);
+        let held: u64 = self.references.held().map(|r| r.memory()).sum();
+        let pending: u64 = self.pending.values().map(|bytes| bytes.len() as u64).sum();
+        self.most_memory = self.most_memory.max(held + pending);
+    }
+
+    /// What is to be put on disk, the dearest first, if the last time is `every` ago.
+    fn due_on_disk(&mut self, now: Instant, every: Duration) -> Vec<(u32, Arc<[u8]>)> {
+        let (references, pending) = (&self.references, &mut self.pending);
+        pending.retain(|frame, _| references.get(*frame).is_some());
+        let last = *self.put.get_or_insert(now);
+        if now.duration_since(last) < every {
+            return Vec::new();
+        }
+        self.put = Some(now);
+        let mut all: Vec<_> = std::mem::take(pending).into_iter().collect();
+        all.sort_by_key(|(_, bytes)| std::cmp::Reverse(bytes.len()));
+        all
+    }
+
+    /// What is on disk and not needed any more.
+    fn over_on_disk(&mut self) -> Vec<u32> {
+        let references = &self.references;
+        let is_over = |frame: &u32| references.get(*frame).is_none();
+        let over: Vec<u32> = self.on_disk.iter().copied().filter(is_over).collect();
+        over.iter().for_each(|frame| _ = self.on_disk.remove(frame));
+        over
     }
 
     /// One more of an original that went out already.
@@ -218,19 +331,23 @@ impl FrameMaker for Inferrer<'_> {
         let mut made = match made {
             // Audited when it was new.
             (_, Some(copy)) => {
-                return self.finished(frame, self.hand_out(original, copy)).map(Some);
+                return self.finished(frame, self.hand_out(original, copy)?).map(Some);
             }
             (Some(made), None) => made,
             (None, None) => match self.frame(original)? {
                 Some(made) => made,
-                None => return Ok(None),
+                None => return self.tend(true).map(|()| None),
             },
         };
         match self.audit(original, &mut made)? {
             Some(audit) => made.audit = audit,
-            None => return Ok(None),
+            None => return self.tend(true).map(|()| None),
         }
-        self.finished(frame, self.hand_out(original, made)).map(Some)
+        if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
+            // Its own file is about to hold it.
+            self.with_state(|s| s.pending.remove(&original));
+        }
+        self.finished(frame, self.hand_out(original, made)?).map(Some)
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
@@ -239,6 +356,10 @@ impl FrameMaker for Inferrer<'_> {
 
     fn expect(&self, frames: &[u32]) {
         self.with_state(|s| s.references.expect(&self.schedule, frames));
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.checkpoints.map(Checkpoints::notes).unwrap_or_default()
     }
 
     fn reference_memory(&self) -> u64 {

@@ -2,25 +2,30 @@
 //!
 //! [`prepare`] looks at what is on disk and decides which frames are kept and which rendered;
 //! [`render_frames`] renders some of these, in order. What makes a film is a parameter
-//! ([`FrameMaker`]); [`Tracer`] is the maker that traces every frame. A row follows the rename of
+//! ([`FrameMaker`]); [`Tracer`] is the maker that traces every frame. [`checkpoint`] keeps what frames
+//! to come need on disk; [`survey`] says how a sequence stands. A row follows the rename of
 //! its frame, so whatever moment the job ends at, rows name whole frames only.
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
 mod audit;
+pub mod checkpoint;
 mod colour;
 mod fingerprint;
 mod inferrer;
 mod pyramid;
+mod recipe;
 mod resume;
 mod schedule;
 mod supplied;
+pub mod survey;
 mod tracer;
 
 pub use colour::{ColourMaker, check_upload};
 pub use fingerprint::{fingerprint, world_fingerprint};
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
+pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{Plan, Target, prepare};
 pub use schedule::Schedule;
 pub use tracer::Tracer;
@@ -55,6 +60,11 @@ pub trait FrameMaker {
 
     /// Hears which frames it will be asked for, before the first of them.
     fn expect(&self, _frames: &[u32]) {}
+
+    /// What there is to tell about the frames made so far; each is told once.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// The most memory that references took at a time so far, bytes.
     fn reference_memory(&self) -> u64 {
@@ -184,7 +194,10 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
     }
     let written = write_image(&path, film, &options)?;
     let file = name(&path);
+    let recipe = target.recipes.get(frame).copied().unwrap_or_default();
     Ok(Row {
+        view: recipe.view.to_string(),
+        recipe: recipe.whole.to_string(),
         frame,
         file,
         blake3: written.hash.to_hex().to_string(),
@@ -195,6 +208,6 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         audit: None,
         bad: film.bad,
         maps,
-        other_settings: false,
+        stray: None,
     })
 }

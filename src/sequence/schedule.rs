@@ -34,6 +34,16 @@ impl Schedule {
         Ok(Self { pyramid, copies })
     }
 
+    /// That of frames each of which is made for itself, cut as `pyramid` says.
+    pub fn without_copies(pyramid: Pyramid) -> Self {
+        Self { pyramid, copies: BTreeMap::new() }
+    }
+
+    /// All frames, each after those that it is inferred from.
+    pub fn by_need(&self) -> Vec<u32> {
+        self.pyramid.by_need()
+    }
+
     /// The frame that `frame` is: itself unless another has its camera.
     pub fn original(&self, frame: u32) -> u32 {
         self.copies.get(&frame).copied().unwrap_or(frame)
@@ -86,7 +96,7 @@ impl Schedule {
 }
 
 /// What tells cameras of a shot apart.
-fn bits(camera: &Camera) -> [u64; 12] {
+pub(super) fn bits(camera: &Camera) -> [u64; 12] {
     let vectors = [camera.eye, camera.forward, camera.half_right, camera.half_up];
     let mut bits = [0; 12];
     let numbers = vectors.iter().flat_map(|v| v.to_array());
@@ -176,6 +186,10 @@ impl<T> Stock<T> {
             if *uses == 0 {
                 self.uses.remove(&other);
                 self.held.remove(&other);
+                if self.due.remove(&other) {
+                    // All that would be made of it came from elsewhere, so it never was.
+                    self.release(schedule, other);
+                }
             }
         }
     }
