@@ -177,6 +177,7 @@ fn folder(pattern: &FramePattern) -> PathBuf {
 pub fn clear(target: &Target) {
     let folder = folder(&target.pattern);
     files(&folder).iter().for_each(|(_, path)| _ = fs::remove_file(path));
+    let _ = atomic::clean_temporaries(&folder, Duration::ZERO);
     // Where a reader holds it open on a network file system, it stays until the next job.
     let _ = fs::remove_dir(folder);
 }

@@ -3,9 +3,11 @@
 mod comparing;
 mod interrupted;
 mod job;
+mod killed;
 mod ranks;
 mod references;
 mod rendering;
+mod resumed;
 mod reuse;
 mod verify;
 mod words;
