@@ -191,3 +191,19 @@ fn a_frame_of_another_size_or_missing_is_an_error() {
     assert!(matches!(make(&clip(&pattern), &out), Err(Error::Io { .. })));
     assert!(!out.exists());
 }
+
+#[test]
+fn a_gap_makes_no_video() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    shoot(folder.path(), "f_####.png", (8, 8), DISPLAY);
+    std::fs::remove_file(folder.path().join("out.mp4")).expect("made");
+    std::fs::remove_file(folder.path().join("f_0005.png")).expect("there");
+    let text = folder.path().join("f_####.png");
+    let pattern = FramePattern::parse(&text.to_string_lossy(), 5).expect("a pattern");
+    let error = make(&clip(&pattern), &folder.path().join("out.mp4")).expect_err("a gap");
+    assert!(error.to_string().contains("f_0005.png is missing"), "{error}");
+    assert!(!folder.path().join("out.mp4").exists());
+}
