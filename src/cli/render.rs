@@ -18,7 +18,9 @@ use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
+use crate::sequence::{
+    self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, SaveCost, Target, Tracer,
+};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
 use clap::Args;
@@ -91,7 +93,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
     let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
-    let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
+    let (outcome, reference_bytes, saved) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,
         load_seconds: (loaded - start).as_secs_f64(),
@@ -99,6 +101,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         render_seconds: built.elapsed().as_secs_f64(),
         intersector_bytes: intersector.memory(),
         reference_bytes,
+        checkpoint_seconds: saved.seconds,
+        checkpoint_bytes: saved.bytes,
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
@@ -156,14 +160,15 @@ struct Frames<'a> {
 }
 
 impl Frames<'_> {
-    /// What became of the frames, and the most memory that references took, bytes.
+    /// What became of the frames, the most memory that references took, bytes, and what it took to
+    /// put them on disk.
     fn render(
         &self,
         world: &World,
         intersector: &dyn Intersector,
         interrupt: &Interrupt,
         quiet: bool,
-    ) -> Result<(Outcome, u64)> {
+    ) -> Result<(Outcome, u64, SaveCost)> {
         let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
@@ -205,7 +210,7 @@ impl Frames<'_> {
             say::error(error);
             world.abort(Exit::of(error).code());
         }
-        Ok((outcome?, maker.reference_memory()))
+        Ok((outcome?, maker.reference_memory(), maker.save_cost()))
     }
 
     fn checkpoints(&self) -> Checkpoints<'_> {

@@ -25,6 +25,10 @@ pub struct RankStats {
     pub intersector_bytes: u64,
     /// Most memory that reference frames took at a time.
     pub reference_bytes: u64,
+    /// Seconds to put references on disk.
+    pub checkpoint_seconds: f64,
+    /// Bytes of references put there.
+    pub checkpoint_bytes: u64,
     /// Most memory held at once, where the system tells.
     pub peak_memory_bytes: Option<u64>,
 }

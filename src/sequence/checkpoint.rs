@@ -1,6 +1,6 @@
 //! References on disk, so that a job that was killed need not trace them again.
 //!
-//! A job needs few references at a time, and the key frames among them are dear. They lie in a hidden
+//! A job needs few references at a time, and those of key frames are dear. These lie in a hidden
 //! folder beside the frames (`.frame.references` for `frame_####.png`), one file each: a line of JSON
 //! that says what job and frame it belongs to, then the bytes of [`crate::reuse::store`]. A file is
 //! removed when no frame of its job needs it any more, and the folder when the job is complete. An exr

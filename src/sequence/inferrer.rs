@@ -2,9 +2,10 @@
 
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
+use super::saved::Saved;
 use super::schedule::{Schedule, Stock};
 use super::supplied::with_supplied;
-use super::{FrameMaker, Made, previous_camera};
+use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
@@ -12,13 +13,9 @@ use crate::reuse::store::{Kept, Terms};
 use crate::reuse::{self, Evidence, Lookup, Reference};
 use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
-
-/// Longest that a job which shall stop goes on writing references.
-const LONGEST_FAREWELL: Duration = Duration::from_secs(5);
 
 /// Infers in-between frames.
 pub struct Inferrer<'a> {
@@ -44,7 +41,7 @@ pub struct Inferrer<'a> {
     pub terms: Option<Terms>,
     /// Where references are kept for a job that goes on after this one; `None` for nowhere.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
-    schedule: Schedule,
+    pub(super) schedule: Schedule,
     pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
     rays: Vec<u32>,
@@ -52,18 +49,13 @@ pub struct Inferrer<'a> {
 }
 
 #[derive(Default)]
-struct State {
-    references: Stock<Arc<Reference>>,
+pub(super) struct State {
+    pub(super) references: Stock<Arc<Reference>>,
     /// Originals that were made as references before they were asked for.
     early: BTreeMap<u32, Made>,
     /// The last original that is asked for again, as its copies are.
     again: Option<(u32, Made)>,
-    /// References as bytes that are not on disk.
-    pending: BTreeMap<u32, Arc<[u8]>>,
-    /// References that are on disk.
-    on_disk: BTreeSet<u32>,
-    /// When references were last put on disk, or the first was made.
-    put: Option<Instant>,
+    pub(super) saved: Saved,
     most_memory: u64,
 }
 
@@ -140,7 +132,9 @@ impl<'a> Inferrer<'a> {
         if is_due {
             let reference = Reference::new(frame, &own, &sources, self.channels.len());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
-            self.save(frame, &camera, &sources, kept.as_ref())?;
+            if self.pyramid.is_key(frame) {
+                self.save(frame, &camera, &sources, kept.as_ref())?;
+            }
         }
         Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
     }
@@ -150,7 +144,7 @@ impl<'a> Inferrer<'a> {
         self.encode(self.terms.as_ref()?, frame, camera, self.renderer.settings.crop, traced)
     }
 
-    fn encode(
+    pub(super) fn encode(
         &self,
         terms: &Terms,
         frame: u32,
@@ -188,65 +182,6 @@ impl<'a> Inferrer<'a> {
         })
     }
 
-    /// The reference of an original that an earlier run left. Not where the original itself is asked
-    /// for: then it is made anyway.
-    fn from_disk(&self, frame: u32) -> Option<Arc<Reference>> {
-        let checkpoints = self.checkpoints?;
-        if self.with_state(|s| s.references.asked(frame)) > 0 {
-            return None;
-        }
-        let reference = self.pool.install(|| checkpoints.read(frame))?;
-        self.with_state(|s| {
-            s.on_disk.insert(frame);
-            s.keep(&self.schedule, frame, reference);
-            s.references.get(frame).cloned()
-        })
-    }
-
-    /// Keeps a new reference as bytes, and puts it on disk with others once too much would be lost
-    /// without. `kept` is what the frame's file will hold.
-    fn save(
-        &self,
-        frame: u32,
-        camera: &Camera,
-        traced: &TracedPoints,
-        kept: Option<&Arc<[u8]>>,
-    ) -> Result<()> {
-        let Some(checkpoints) = self.checkpoints.filter(|c| c.every.is_some()) else {
-            return Ok(());
-        };
-        let bytes = match kept.filter(|_| checkpoints.frames_hold_all) {
-            Some(bytes) => Some(bytes.clone()),
-            None => self.encode(checkpoints.terms, frame, camera, None, traced),
-        };
-        if let Some(bytes) = bytes {
-            self.with_state(|s| s.pending.insert(frame, bytes));
-        }
-        self.tend(false)
-    }
-
-    /// Puts references on disk where that is due, all of them where the job shall stop, and removes
-    /// those that no frame to come needs.
-    fn tend(&self, stopping: bool) -> Result<()> {
-        let Some((checkpoints, every)) = self.checkpoints.and_then(|c| Some((c, c.every?))) else {
-            return Ok(());
-        };
-        let start = Instant::now();
-        let put = self
-            .with_state(|s| s.due_on_disk(start, if stopping { Duration::ZERO } else { every }));
-        for (frame, bytes) in put {
-            if stopping && start.elapsed() > LONGEST_FAREWELL {
-                break;
-            }
-            checkpoints.write(frame, &bytes)?;
-            self.with_state(|s| s.on_disk.insert(frame));
-        }
-        self.with_state(State::over_on_disk)
-            .into_iter()
-            .for_each(|frame| checkpoints.remove(frame));
-        Ok(())
-    }
-
     fn hand_out(&self, original: u32, made: Made) -> Result<Made> {
         self.with_state(|s| s.hand_out(&self.schedule, original, &made));
         self.tend(false)?;
@@ -266,40 +201,17 @@ impl<'a> Inferrer<'a> {
         Ok(made)
     }
 
-    fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
+    pub(super) fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
         act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 impl State {
-    fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
+    pub(super) fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
         self.references.keep(schedule, frame, || Arc::new(reference));
         let held: u64 = self.references.held().map(|r| r.memory()).sum();
-        let pending: u64 = self.pending.values().map(|bytes| bytes.len() as u64).sum();
+        let pending = self.saved.memory();
         self.most_memory = self.most_memory.max(held + pending);
-    }
-
-    /// What is to be put on disk, the dearest first, if the last time is `every` ago.
-    fn due_on_disk(&mut self, now: Instant, every: Duration) -> Vec<(u32, Arc<[u8]>)> {
-        let (references, pending) = (&self.references, &mut self.pending);
-        pending.retain(|frame, _| references.get(*frame).is_some());
-        let last = *self.put.get_or_insert(now);
-        if now.duration_since(last) < every {
-            return Vec::new();
-        }
-        self.put = Some(now);
-        let mut all: Vec<_> = std::mem::take(pending).into_iter().collect();
-        all.sort_by_key(|(_, bytes)| std::cmp::Reverse(bytes.len()));
-        all
-    }
-
-    /// What is on disk and not needed any more.
-    fn over_on_disk(&mut self) -> Vec<u32> {
-        let references = &self.references;
-        let is_over = |frame: &u32| references.get(*frame).is_none();
-        let over: Vec<u32> = self.on_disk.iter().copied().filter(is_over).collect();
-        over.iter().for_each(|frame| _ = self.on_disk.remove(frame));
-        over
     }
 
     /// One more of an original that went out already.
@@ -345,7 +257,7 @@ impl FrameMaker for Inferrer<'_> {
         }
         if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
             // Its own file is about to hold it.
-            self.with_state(|s| s.pending.remove(&original));
+            self.with_state(|s| s.saved.has_file(original));
         }
         self.finished(frame, self.hand_out(original, made)?).map(Some)
     }
@@ -360,6 +272,10 @@ impl FrameMaker for Inferrer<'_> {
 
     fn notes(&self) -> Vec<String> {
         self.checkpoints.map(Checkpoints::notes).unwrap_or_default()
+    }
+
+    fn save_cost(&self) -> SaveCost {
+        self.with_state(|s| s.saved.cost)
     }
 
     fn reference_memory(&self) -> u64 {

@@ -16,6 +16,7 @@ mod inferrer;
 mod pyramid;
 mod recipe;
 mod resume;
+mod saved;
 mod schedule;
 mod supplied;
 pub mod survey;
@@ -66,10 +67,24 @@ pub trait FrameMaker {
         Vec::new()
     }
 
+    /// What it took to put references on disk so far.
+    fn save_cost(&self) -> SaveCost {
+        SaveCost::default()
+    }
+
     /// The most memory that references took at a time so far, bytes.
     fn reference_memory(&self) -> u64 {
         0
     }
+}
+
+/// What putting references on disk takes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SaveCost {
+    /// Wall seconds to encode, write and sync them.
+    pub seconds: f64,
+    /// Bytes written.
+    pub bytes: u64,
 }
 
 /// A frame as it was made.
