@@ -25,13 +25,12 @@ use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Render the frames of a camera move
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every option can also stand in the scene file; the command line wins.
+Most options can also stand in the scene file; the command line wins.
 Frames that exist with the same settings are kept, so the same command goes on where it stopped.
 
 `tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
@@ -106,15 +105,16 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
+    // A rank that was asked to stop when all its frames were finished has not stopped the job.
+    let unfinished = world.from_root(|| Ok(outcome.unfinished))?;
     if !world.is_root() {
-        let stopped = interrupt.stop.load(Ordering::Relaxed);
-        return Ok(if stopped { Exit::Stopped } else { Exit::Done });
+        return Ok(if unfinished > 0 { Exit::Stopped } else { Exit::Done });
     }
     if let Some(path) = &request.stats {
         let seconds = start.elapsed().as_secs_f64();
         stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
     }
-    if outcome.unfinished > 0 {
+    if unfinished > 0 {
         say_stopped(&job, &outcome, &interrupt.reason());
         return Ok(Exit::Stopped);
     }

@@ -54,7 +54,7 @@ pub enum Video {
 /// Makes `out` from the clip's frames.
 ///
 /// # Errors
-/// [`Error::Usage`] for a clip without frames or a frame rate that is none; [`Error::Failed`] where a
+/// [`Error::Usage`] for a clip without frames or a frame rate that is none; [`Error::Io`] where a
 /// frame is missing; [`Error::Io`] and
 /// [`Error::Input`] when an exr frame cannot be read or the video cannot be put in its place.
 pub fn make(clip: &Clip, out: &Path) -> Result<Video> {
@@ -78,10 +78,7 @@ fn make_with(program: &OsStr, clip: &Clip, out: &Path) -> Result<Video> {
     // ffmpeg ends at a gap as if that were the end.
     let mut frames = (clip.first..clip.first + clip.count).map(|frame| clip.pattern.path(frame));
     if let Some(missing) = frames.find(|path| !path.is_file()) {
-        return Err(Error::Failed(format!(
-            "no video was made: {} is missing\n  help: the same command renders it again",
-            missing.display()
-        )));
+        return Err(Error::io("make a video without", missing, io::ErrorKind::NotFound.into()));
     }
     let (temporary, _) = Temporary::create(out)?;
     let run = match clip.pattern.format() {
