@@ -82,12 +82,12 @@ impl<'a> Checkpoints<'a> {
 
     /// The reference of an original frame, if it is on disk, whole and this job's.
     pub fn read(&self, frame: u32) -> Option<Reference> {
-        let mut found = self.from_frame(frame).or_else(|| self.from_file(frame))?;
+        let mut found = self.in_frame(frame).or_else(|| self.in_file(frame))?;
         found.frame = frame;
         Some(found)
     }
 
-    fn from_frame(&self, frame: u32) -> Option<Reference> {
+    fn in_frame(&self, frame: u32) -> Option<Reference> {
         let row = self.rows().get(&frame).filter(|_| self.frames_hold_all)?;
         let recipe = self.target.recipes.get(frame)?.whole.to_string();
         if row.stray.is_some() || row.recipe != recipe {
@@ -105,7 +105,7 @@ impl<'a> Checkpoints<'a> {
         self.rows.get_or_init(|| read().map(|manifest| manifest.rows).unwrap_or_default())
     }
 
-    fn from_file(&self, frame: u32) -> Option<Reference> {
+    fn in_file(&self, frame: u32) -> Option<Reference> {
         let path = self.path(frame);
         let file = fs::File::open(&path).ok()?;
         let mut source = BufReader::new(file);

@@ -167,7 +167,7 @@ impl<'a> Inferrer<'a> {
         if let Some(found) = self.with_state(|s| s.references.get(frame).cloned()) {
             return Ok(Some(found));
         }
-        if let Some(found) = self.from_disk(frame) {
+        if let Some(found) = self.left_on_disk(frame) {
             return Ok(Some(found));
         }
         let Some(made) = self.frame(frame)? else { return Ok(None) };

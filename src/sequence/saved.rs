@@ -31,7 +31,7 @@ pub(super) struct Saved {
 impl Inferrer<'_> {
     /// The reference of an original that an earlier run left. Not where the original itself is asked
     /// for: then it is made anyway.
-    pub(super) fn from_disk(&self, frame: u32) -> Option<Arc<Reference>> {
+    pub(super) fn left_on_disk(&self, frame: u32) -> Option<Arc<Reference>> {
         let checkpoints = self.checkpoints?;
         if self.with_state(|s| s.references.asked(frame)) > 0 {
             return None;
