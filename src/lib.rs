@@ -26,6 +26,7 @@ pub mod inference;
 pub mod intersect;
 pub mod measure;
 pub mod output;
+pub mod page;
 
 // Floor 4: radiance along a ray; what earlier rays already told.
 pub mod reuse;

@@ -14,6 +14,7 @@ mod machine;
 mod progress;
 mod references;
 mod render;
+mod report;
 mod request;
 mod say;
 mod schema;
@@ -36,6 +37,7 @@ Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16
   tweenray inspect scene.toml
   tweenray compare out/frame_0001.png other.png
+  tweenray report out/scene
 
 `tweenray COMMAND --help` says more.")]
 struct Arguments {
@@ -50,6 +52,7 @@ enum Command {
     Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
     Convert(convert::ConvertArgs),
+    Report(report::ReportArgs),
     Schema(schema::SchemaArgs),
 }
 
@@ -88,6 +91,7 @@ fn dispatch(command: &Command) -> Exit {
         Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Report(args) => report::run(args),
         Command::Schema(args) => schema::run(args),
     };
     ended(result)

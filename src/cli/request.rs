@@ -137,25 +137,18 @@ impl Request {
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
+            command: command(),
             settings: self.header_settings(),
         };
         Target {
             pattern: self.pattern.clone(),
             header,
             write: WriteOptions {
-                maps: self.maps.then(|| farthest(&self.settings)),
+                maps: self.maps.then(|| self.settings.reuse.farthest()),
                 ..WriteOptions::of(&self.settings, None)
             },
             overwrite: self.overwrite,
         }
-    }
-}
-
-/// The distance that maps paint as the farthest: in footprints under policy surface, else as a share.
-fn farthest(settings: &Settings) -> f32 {
-    match settings.reuse.policy {
-        Policy::Colour => settings.reuse.distance_epsilon.max(1e-6),
-        Policy::Surface | Policy::Off => 2.0,
     }
 }
 
@@ -197,6 +190,16 @@ fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
         }
     };
     range.map_err(Error::Usage)
+}
+
+/// The words that started this process, the program by its name alone.
+fn command() -> Vec<String> {
+    let mut words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = words.first_mut() {
+        *program = "tweenray".into();
+    }
+    words
 }
 
 /// `out/<scene name>/frame_####.png`.

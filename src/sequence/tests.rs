@@ -73,7 +73,7 @@ impl Folder {
         let made = RefCell::default();
         let maker = Plain { settings: settings.clone(), stop_before, made };
         let journal = manifest_path(&target.pattern);
-        render_frames(&target, &plan.render, &journal, &maker, &mut |_| Ok(()))?;
+        render_frames(&target, &plan.render, (0, &journal), &maker, &mut |_| Ok(()))?;
         Ok((maker.made.into_inner(), plan))
     }
 
@@ -170,8 +170,8 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     let manifest = manifest_path(&target.pattern);
     let part = crate::output::manifest::part_path(&manifest, 1);
     let quiet = &mut |_: &FrameReport| Ok(());
-    render_frames(&target, &plan.render[..2], &manifest, &maker, quiet).expect("runs");
-    render_frames(&target, &plan.render[2..3], &part, &maker, quiet).expect("runs");
+    render_frames(&target, &plan.render[..2], (0, &manifest), &maker, quiet).expect("runs");
+    render_frames(&target, &plan.render[2..3], (1, &part), &maker, quiet).expect("runs");
     // Both ranks were killed here.
     assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, [4]);
     assert!(!part.exists());
