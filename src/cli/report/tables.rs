@@ -39,9 +39,13 @@ pub fn effects(job: &Job) -> Table {
     let share = |n: u64| n as f64 / all_rays.max(1) as f64;
     let mut table = Table::new("Rays by effect", &["", "rays", "share of rays", "share of cost"]);
     for (name, part) in parts.iter().filter(|(_, part)| part.total() > 0) {
-        // Second tries count with the rays that they repeat.
         let n = part.total();
-        table.rows.push(row(name, count(n), share(n), of_frame(part, 0)));
+        let mut cells = row(name, count(n), share(n), of_frame(part, 0));
+        // The table of costs has no entry for them.
+        if part.retry > 0 {
+            cells[3] = "not weighed".into();
+        }
+        table.rows.push(cells);
     }
     if lookups > 0 {
         let looked_up =
