@@ -36,7 +36,8 @@ pub mod shade;
 pub mod sequence;
 pub mod verify;
 
-// Floor 6: who renders which frames.
+// Floor 6: who renders which frames; settings side by side.
+pub mod accuracy;
 pub mod cluster;
 
 // Floor 7: the command line.

@@ -3,6 +3,7 @@
 //! Only this room talks to people; nothing below it knows of arguments or prints. Results go to
 //! stdout; progress, warnings and errors to stderr.
 
+mod accuracy;
 mod args;
 mod compare;
 mod convert;
@@ -37,6 +38,7 @@ Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16
   tweenray inspect scene.toml
   tweenray compare out/frame_0001.png other.png
+  tweenray accuracy scene.toml -o accuracy
   tweenray report out/scene
 
 `tweenray COMMAND --help` says more.")]
@@ -52,6 +54,7 @@ enum Command {
     Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
     Convert(convert::ConvertArgs),
+    Accuracy(Box<accuracy::AccuracyArgs>),
     Report(report::ReportArgs),
     Schema(schema::SchemaArgs),
 }
@@ -91,6 +94,7 @@ fn dispatch(command: &Command) -> Exit {
         Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Accuracy(args) => accuracy::run(args),
         Command::Report(args) => report::run(args),
         Command::Schema(args) => schema::run(args),
     };
@@ -103,6 +107,16 @@ fn ended(result: Result<Exit>) -> Exit {
         say::error(&error);
         Exit::of(&error)
     })
+}
+
+/// The words that started this process, the program by its name alone.
+fn words() -> Vec<String> {
+    let mut words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = words.first_mut() {
+        *program = "tweenray".into();
+    }
+    words
 }
 
 #[cfg(test)]

@@ -137,7 +137,7 @@ impl Request {
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
-            command: command(),
+            command: super::words(),
             settings: self.header_settings(),
         };
         Target {
@@ -190,16 +190,6 @@ fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
         }
     };
     range.map_err(Error::Usage)
-}
-
-/// The words that started this process, the program by its name alone.
-fn command() -> Vec<String> {
-    let mut words: Vec<String> =
-        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
-    if let Some(program) = words.first_mut() {
-        *program = "tweenray".into();
-    }
-    words
 }
 
 /// `out/<scene name>/frame_####.png`.

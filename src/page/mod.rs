@@ -10,6 +10,7 @@
 //!
 //! Text in plots is HTML over the drawing, placed in per cent: it keeps its size on a narrow screen.
 
+pub mod accuracy;
 mod axis;
 mod chart;
 pub mod job;
@@ -21,7 +22,7 @@ mod timeline;
 pub mod words;
 
 pub use chart::{Chart, Series};
-pub use picture::{Picture, heat_map};
+pub use picture::Picture;
 pub use plot::Plot;
 pub use scatter::{Point, Scatter};
 pub use table::Table;

@@ -2,7 +2,6 @@
 
 use crate::error::{Error, Result};
 use crate::film::Image;
-use crate::math::Rgb;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::jpeg::JpegEncoder;
@@ -75,36 +74,11 @@ fn to_8_bit(image: &Image) -> RgbImage {
     })
 }
 
-/// Where `image` is off from `reference` (both sRGB values, of one size), by the largest channel:
-/// black 0, full at `most` steps of 1/255.
-///
-/// # Panics
-/// When the sizes differ.
-pub fn heat_map(reference: &Image, image: &Image, most: f32) -> Image {
-    assert_eq!((reference.width, reference.height), (image.width, image.height), "of one size");
-    let off = |(a, b): (&Rgb, &Rgb)| heat((*a - *b).abs().max_element() * 255.0 / most);
-    let rgb = reference.rgb.iter().zip(&image.rgb).map(off).collect();
-    Image { rgb, ..*reference }
-}
-
-/// Black through violet and orange to white, for 0 to 1; sRGB values.
-fn heat(share: f32) -> Rgb {
-    const STOPS: [Rgb; 5] = [
-        Rgb::ZERO,
-        Rgb::new(0.35, 0.05, 0.6),
-        Rgb::new(0.85, 0.2, 0.4),
-        Rgb::new(1.0, 0.65, 0.1),
-        Rgb::new(1.0, 1.0, 0.8),
-    ];
-    let at = if share.is_nan() { 1.0 } else { share.clamp(0.0, 1.0) } * 4.0;
-    let low = (at as usize).min(3);
-    STOPS[low].lerp(STOPS[low + 1], at - low as f32)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::Encoding;
+    use crate::math::Rgb;
 
     fn ramp(width: u32, height: u32) -> Image {
         let pixel = |i: u32| Rgb::splat((i % width) as f32 / width as f32);
@@ -128,17 +102,5 @@ mod tests {
         let small = decoded(&small);
         assert!(small.get_pixel(30, 5).0[0].abs_diff(240) < 8, "{:?}", small.get_pixel(30, 5));
         assert_eq!(Picture::jpeg(&image, 640).expect("encoded").width, 64);
-    }
-
-    #[test]
-    fn the_heat_map_is_black_where_nothing_is_off_and_brighter_where_more_is() {
-        let a = ramp(16, 4);
-        let mut b = a.clone();
-        b.rgb[3].y += 2.0 / 255.0;
-        b.rgb[9].z += 8.0 / 255.0;
-        let map = heat_map(&a, &b, 8.0);
-        let light = |i: usize| map.rgb[i].element_sum();
-        assert_eq!(light(0), 0.0);
-        assert!(light(3) > 0.5 && light(9) > 2.0 * light(3));
     }
 }

@@ -20,4 +20,8 @@ impl Table {
         let head = head.iter().map(ToString::to_string).collect();
         Self { caption: caption.into(), head, rows: Vec::new() }
     }
+
+    fn has_head(&self) -> bool {
+        self.head.iter().any(|name| !name.is_empty())
+    }
 }
