@@ -15,10 +15,10 @@ use std::collections::BTreeMap;
 pub type Frames = BTreeMap<u32, Image>;
 
 /// The film as it is displayed.
-pub fn displayed(rgb: &[Rgb], film: &Film, settings: &Settings) -> Image {
+pub fn displayed(film: &Film, settings: &Settings) -> Image {
     let display = Display { exposure: settings.exposure, tone: settings.tone };
     let code = |c: &Rgb| Rgb::from_array(display.code(*c).map(|v| v as f32));
-    let rgb = rgb.par_iter().map(code).collect();
+    let rgb = film.rgb.par_iter().map(code).collect();
     Image { width: film.width, height: film.height, rgb, encoding: Encoding::Srgb }
 }
 

@@ -30,7 +30,7 @@ pub use errors::Errors;
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob, candidates};
 pub use oracle::{OracleCrop, on_a_crop};
-pub use reference::{Truth, converge, pass_settings};
+pub use reference::{Truth, converge, truth_settings};
 pub use sentences::{about_knob, about_oracle};
 pub use stage::Stage;
 pub use sweep::{Heard, Picture, Sweep};

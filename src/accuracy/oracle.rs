@@ -89,6 +89,6 @@ fn render(
     let render = || renderer.render(&camera, frame, false, stage.stop, &Unheard);
     let (film, rays) = stage.pool.install(render).ok_or(Error::Stopped)?;
     let seconds = start.elapsed().as_secs_f64();
-    let image = stage.pool.install(|| displayed(&film.rgb, &film, settings));
+    let image = stage.pool.install(|| displayed(&film, settings));
     Ok((Frames::from([(frame, image)]), rays.total(), seconds))
 }

@@ -1,44 +1,44 @@
-//! The truth that candidates are held against: traced frames, averaged until they no longer change.
+//! The truth that candidates are held against: traced frames, with twice the samples until they no
+//! longer change.
 
 use super::errors::{Frames, displayed, rms_between};
 use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
-use crate::film::Film;
-use crate::math::Rgb;
+use crate::film::Image;
 use crate::scene::limits::MAX_SEED;
 use crate::scene::{Policy, Settings};
 use crate::shade::{Progress, Renderer};
 use crate::stats::RayCounts;
-use std::collections::BTreeMap;
 
 /// The converged frames.
 pub struct Truth {
     /// As displayed.
     pub frames: Frames,
-    /// Passes that were averaged.
-    pub passes: u32,
-    /// By how much the last doubling changed them: root mean square, display steps. Nearly the error
-    /// that is left.
+    /// By how much the last doubling of the samples changed them: root mean square, display steps.
+    /// More than the error that is left.
     pub change: f64,
     /// What the change was to fall below, display steps.
     pub wanted: f64,
-    /// The settings of a pass.
+    /// The settings of the last doubling.
     pub settings: Settings,
 }
 
-/// The settings of a pass: everything traced, with many samples. More bounces and a lower cut-off
-/// than any candidate has; as many shadow samples as the bias of their ratio calls for
-/// (`docs/accuracy.md`).
-pub fn pass_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
+/// Camera samples to begin with.
+const FIRST: u32 = 32;
+
+/// The settings of the truth but for its camera samples: everything traced. More bounces and a lower
+/// cut-off than any candidate has; as many shadow samples as the candidate with the most, since the
+/// bias of their ratio falls with these alone (`docs/accuracy.md`).
+pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     let most = |of: fn(&Settings) -> u32, least: u32| {
         candidates.iter().map(|s| of(s)).max().unwrap_or(0).max(of(base)).max(least)
     };
     let cutoff = candidates.iter().map(|s| s.cutoff).fold(base.cutoff, f32::min);
     let mut settings = base.clone();
-    settings.spp = 4;
-    settings.shadow_samples = most(|s| s.shadow_samples, 64);
-    settings.sky_samples = most(|s| s.sky_samples, 64);
+    settings.spp = most(|s| s.spp, FIRST);
+    settings.shadow_samples = most(|s| s.shadow_samples, 16);
+    settings.sky_samples = most(|s| s.sky_samples, 16);
     settings.bounces = most(|s| s.bounces, 16);
     settings.cutoff = cutoff.min(1e-5);
     settings.reuse.policy = Policy::Off;
@@ -46,10 +46,10 @@ pub fn pass_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     settings
 }
 
-/// The seed of a pass: half of all seeds away from the candidates', which are the base's and the next
-/// few.
-fn seed_of_pass(base: u64, pass: u32) -> u64 {
-    (base + MAX_SEED / 2 + 1 + u64::from(pass)) % (MAX_SEED + 1)
+/// The seed of a doubling: half of all seeds away from the candidates', which are the base's and the
+/// next few.
+fn seed_of_doubling(base: u64, doubling: u32) -> u64 {
+    (base + MAX_SEED / 2 + 1 + u64::from(doubling)) % (MAX_SEED + 1)
 }
 
 /// The seed of a turn of any candidate.
@@ -57,70 +57,40 @@ pub fn seed_of_turn(base: u64, turn: u32) -> u64 {
     (base + u64::from(turn)) % (MAX_SEED + 1)
 }
 
-/// Averages passes over `frames`, twice as many each time, until a doubling changes less than
-/// `wanted` display steps, or `most` passes are made. `heard` hears of every doubling: passes, and by
-/// how much it changed the frames.
+/// Renders `frames` with twice as many camera samples each time, until a doubling changes them by less
+/// than `wanted` display steps, or more than `most` samples would be needed. Each time all samples are
+/// new: a doubling that only added to the ones before would seem to change less. Their mean is no
+/// better: many samples that were laid out together are worth more than as many that were not.
+/// `heard` hears of every doubling: samples, and by how much it changed the frames.
 ///
 /// # Errors
 /// [`Error::Stopped`]; those of cameras.
 pub fn converge(
     stage: &Stage,
-    settings: Settings,
+    mut settings: Settings,
     frames: &[u32],
     wanted: f64,
     most: u32,
     heard: &dyn Fn(u32, Option<f64>),
 ) -> Result<Truth> {
-    let mut sums: BTreeMap<u32, Sum> = BTreeMap::new();
-    let mut passes = 0;
     let mut last: Option<Frames> = None;
-    let mut change = f64::INFINITY;
+    let mut doubling = 0;
     loop {
-        let goal = (2 * passes).max(1);
-        for pass in passes..goal {
-            for frame in frames {
-                let film = trace(stage, &settings, *frame, pass)?;
-                sums.entry(*frame).or_insert_with(|| Sum::new(&film)).add(&film);
-            }
+        settings.seed = seed_of_doubling(stage.base.seed, doubling);
+        let mut now = Frames::new();
+        for frame in frames {
+            now.insert(*frame, trace(stage, &settings, *frame)?);
         }
-        passes = goal;
-        let mean = |(frame, sum): (&u32, &Sum)| (*frame, sum.displayed(passes, &settings));
-        let now: Frames = stage.pool.install(|| sums.iter().map(mean).collect());
-        if let Some(last) = &last {
-            change = rms_between(&now, last);
+        let change = last.as_ref().map(|last| rms_between(&now, last));
+        heard(settings.spp, change);
+        let is_done = change.is_some_and(|change| change <= wanted);
+        if is_done || settings.spp.saturating_mul(2) > most {
+            let change = change.unwrap_or(f64::INFINITY);
+            return Ok(Truth { frames: now, change, wanted, settings });
         }
-        heard(passes, last.as_ref().map(|_| change));
-        if change <= wanted || 2 * passes > most {
-            return Ok(Truth { frames: now, passes, change, wanted, settings });
-        }
+        settings.spp *= 2;
+        doubling += 1;
         last = Some(now);
-    }
-}
-
-/// Light added up over passes, f64.
-struct Sum {
-    rgb: Vec<[f64; 3]>,
-    film: Film,
-}
-
-impl Sum {
-    fn new(film: &Film) -> Self {
-        let film = Film::new(film.width, film.height, false);
-        Self { rgb: vec![[0.0; 3]; film.rgb.len()], film }
-    }
-
-    fn add(&mut self, film: &Film) {
-        for (sum, c) in self.rgb.iter_mut().zip(&film.rgb) {
-            for (sum, x) in sum.iter_mut().zip(c.to_array()) {
-                *sum += f64::from(x);
-            }
-        }
-    }
-
-    fn displayed(&self, passes: u32, settings: &Settings) -> crate::film::Image {
-        let mean = |sum: &[f64; 3]| Rgb::from_array(sum.map(|x| (x / f64::from(passes)) as f32));
-        let rgb: Vec<Rgb> = self.rgb.iter().map(mean).collect();
-        displayed(&rgb, &self.film, settings)
     }
 }
 
@@ -130,15 +100,16 @@ impl Progress for Unheard {
     fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
-fn trace(stage: &Stage, settings: &Settings, frame: u32, pass: u32) -> Result<Film> {
-    let seed = seed_of_pass(stage.base.seed, pass);
-    let settings = Settings { seed, ..settings.clone() };
-    let plan = EffectPlan::of(stage.scene, &settings);
+fn trace(stage: &Stage, settings: &Settings, frame: u32) -> Result<Image> {
+    let plan = EffectPlan::of(stage.scene, settings);
     let intersector = stage.intersector;
-    let renderer = Renderer { scene: stage.scene, settings: &settings, plan, intersector };
+    let renderer = Renderer { scene: stage.scene, settings, plan, intersector };
     let camera = stage.shot.camera(frame, settings.width, settings.height)?;
-    let render = || renderer.render(&camera, frame, false, stage.stop, &Unheard);
-    stage.pool.install(render).map(|(film, _)| film).ok_or(Error::Stopped)
+    let render = || {
+        let (film, _) = renderer.render(&camera, frame, false, stage.stop, &Unheard)?;
+        Some(displayed(&film, settings))
+    };
+    stage.pool.install(render).ok_or(Error::Stopped)
 }
 
 #[cfg(test)]
@@ -146,12 +117,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn seeds_of_passes_are_no_candidates() {
+    fn seeds_of_the_truth_are_no_candidates() {
         for base in [0, 7, 1 << 40, MAX_SEED / 2, MAX_SEED] {
             let candidates: Vec<u64> = (0..100).map(|turn| seed_of_turn(base, turn)).collect();
-            for pass in 0..4096 {
-                let seed = seed_of_pass(base, pass);
-                assert!(seed <= MAX_SEED && !candidates.contains(&seed), "{base} {pass}");
+            for doubling in 0..64 {
+                let seed = seed_of_doubling(base, doubling);
+                assert!(seed <= MAX_SEED && !candidates.contains(&seed), "{base} {doubling}");
             }
         }
     }

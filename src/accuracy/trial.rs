@@ -62,7 +62,7 @@ pub fn run(
         rays.push((frame, cast.total() as f64));
         all_rays += cast;
         if chosen.contains(&frame) {
-            let image = stage.pool.install(|| displayed(&made.film.rgb, &made.film, settings));
+            let image = stage.pool.install(|| displayed(&made.film, settings));
             frames.insert(frame, image);
         }
     }

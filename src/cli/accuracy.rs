@@ -17,7 +17,7 @@ use crate::error::{Error, Result, counted};
 use crate::import::Loaded;
 use crate::intersect;
 use crate::output::atomic;
-use crate::scene::limits::MAX_THREADS;
+use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
 use crate::scene::{Scene, Settings};
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -45,7 +45,7 @@ pub struct AccuracyArgs {
     /// Folder for the page and the figures
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Frames to look at, as in 1,8,9 [default: the first, and two pairs of neighbours]
+    /// Frames to look at, as in 1,8,9 [default: the first, and two neighbours]
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..))]
     frames: Vec<u32>,
@@ -53,10 +53,10 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", default_value_t = 6, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=1000))]
     turns: u32,
-    /// Most passes that the reference is averaged from, of 4 camera samples each
-    #[arg(long, value_name = "N", default_value_t = 256, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(2..=1_048_576))]
-    passes: u32,
+    /// Most camera samples of the reference, which doubles them until it no longer changes
+    #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(64..=i64::from(MAX_SAMPLES)))]
+    reference_spp: u32,
     /// What is turned: reuse, samples, specular, intersection, oracle, combinations [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',',
         value_parser = values::choice::<Group>(&["reuse", "samples", "specular", "intersection", "oracle", "combinations"]))]
@@ -186,17 +186,21 @@ fn measure(args: &AccuracyArgs, sweep: &Sweep) -> Result<(Truth, Measured, Vec<P
     ));
     let wanted = sweep.least_noise()? / 4.0;
     let settings: Vec<&Settings> = sweep.candidates.iter().map(|c| &c.settings).collect();
-    let settings = accuracy::pass_settings(sweep.stage.base, &settings);
-    let heard = |passes: u32, change: Option<f64>| {
-        if let Some(change) = change {
-            tell(format!(
-                "reference: {passes} passes; the last doubling changed it by {change:.3}/255, wanted \
-                 {wanted:.3}"
-            ));
-        }
+    let settings = accuracy::truth_settings(sweep.stage.base, &settings);
+    let heard = |spp: u32, change: Option<f64>| {
+        let change = change.map_or(String::new(), |change| {
+            format!(", {change:.3}/255 away from half as many; wanted {wanted:.3}")
+        });
+        tell(format!("reference: {spp} camera samples{change}"));
     };
-    let truth =
-        accuracy::converge(sweep.stage, settings, sweep.frames, wanted, args.passes, &heard)?;
+    let truth = accuracy::converge(
+        sweep.stage,
+        settings,
+        sweep.frames,
+        wanted,
+        args.reference_spp,
+        &heard,
+    )?;
     let start = Instant::now();
     let mut heard = |h: Heard| {
         let Heard { done, of, turn, candidate } = h;

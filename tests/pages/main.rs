@@ -5,6 +5,7 @@
 //! environment variable `TWEENRAY_CHROMIUM`. With `TWEENRAY_SCREENSHOTS=FOLDER` the pages are left
 //! there as pictures, 400 and 1400 pixels wide.
 
+mod accuracy;
 mod browser;
 mod job;
 

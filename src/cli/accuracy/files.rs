@@ -33,7 +33,6 @@ struct Document<'a> {
 #[derive(Serialize)]
 struct Reference {
     settings: Value,
-    passes: u32,
     /// What the last doubling changed, and what it was to fall below; display steps.
     change: f64,
     wanted: f64,
@@ -61,7 +60,6 @@ pub fn write(
         default: Header::settings(&outcome.base),
         reference: Reference {
             settings: Header::settings(&truth.settings),
-            passes: truth.passes,
             change: truth.change,
             wanted: truth.wanted,
         },

@@ -92,8 +92,7 @@ fn facts(args: &AccuracyArgs, outcome: &Outcome) -> Vec<(String, String)> {
         fact(
             "Reference",
             format!(
-                "{} passes of {} camera and {} shadow samples; the last doubling changed {}/255",
-                outcome.truth.passes,
+                "{} camera and {} shadow samples, {}/255 away from half as many",
                 outcome.truth.settings.spp,
                 outcome.truth.settings.shadow_samples,
                 short(outcome.truth.change)
@@ -115,7 +114,7 @@ fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
         warnings.push(format!(
             "The reference is not far enough ahead: its last doubling changed {}/255, more than a \
              quarter of the best setting's error, {}/255. Errors near that are too large here. \
-             --passes raises how long it may converge.",
+             --reference-spp lets it converge longer.",
             short(change),
             short(best)
         ));
