@@ -130,9 +130,15 @@ pub struct Candidate {
 }
 
 /// The default first, then each knob of `groups` alone, then combinations. What `plan` says has no
-/// part in the scene is left out, and so is what equals something before it.
-pub fn candidates(base: &Settings, plan: &EffectPlan, groups: &[Group]) -> Vec<Candidate> {
-    let mut list = List { base, all: Vec::new() };
+/// part in the scene is left out, and so is what equals something before it, and what makes no
+/// difference in a move of `frames` frames.
+pub fn candidates(
+    base: &Settings,
+    plan: &EffectPlan,
+    frames: u32,
+    groups: &[Group],
+) -> Vec<Candidate> {
+    let mut list = List { base, frames, all: Vec::new() };
     list.add(Knob::Default, String::new(), |_| ());
     let takes = |group| groups.contains(&group);
     if takes(Group::Reuse) {
@@ -155,6 +161,7 @@ pub fn candidates(base: &Settings, plan: &EffectPlan, groups: &[Group]) -> Vec<C
 
 struct List<'a> {
     base: &'a Settings,
+    frames: u32,
     all: Vec<Candidate>,
 }
 
@@ -180,7 +187,10 @@ impl List<'_> {
             let options = format!("--tolerance {tolerance}");
             self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = tolerance);
         }
-        for segment in [16, 256] {
+        // A segment longer than the move is one as long as it.
+        let cut = |segment: u32| segment.min(self.frames);
+        let others = [16, 256].into_iter().filter(|s| cut(*s) != cut(self.base.reuse.segment));
+        for segment in others.collect::<Vec<u32>>() {
             let options = format!("--segment {segment}");
             self.add(Knob::Segment, options, |s| s.reuse.segment = segment);
         }
@@ -278,7 +288,7 @@ mod tests {
     #[test]
     fn no_candidate_twice_and_none_for_effects_that_are_not_there() {
         let base = Settings::default();
-        let all = candidates(&base, &EffectPlan::EVERYTHING, &Group::ALL);
+        let all = candidates(&base, &EffectPlan::EVERYTHING, 100, &Group::ALL);
         assert_eq!((all[0].knob, &all[0].settings), (Knob::Default, &base));
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| a.settings != b.settings), "{}", a.options);
@@ -290,11 +300,13 @@ mod tests {
             sky_light: false,
             ..EffectPlan::EVERYTHING
         };
-        let few = candidates(&base, &nothing, &Group::ALL);
+        let few = candidates(&base, &nothing, 10, &Group::ALL);
         let has = |knob| few.iter().any(|c| c.knob == knob);
         assert!(!has(Knob::Bounces) && !has(Knob::ShadowSamples) && !has(Knob::SkySamples));
         assert!(has(Knob::CameraSamples) && has(Knob::Policy) && has(Knob::Retry));
         assert!(few.len() < all.len());
-        assert_eq!(candidates(&base, &nothing, &[]).len(), 1);
+        let segments = |list: &[Candidate]| list.iter().filter(|c| c.knob == Knob::Segment).count();
+        assert_eq!((segments(&all), segments(&few)), (2, 0));
+        assert_eq!(candidates(&base, &nothing, 10, &[]).len(), 1);
     }
 }

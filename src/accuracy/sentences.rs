@@ -23,6 +23,9 @@ fn sentence(default: &Row, row: &Row) -> String {
 fn time(ratio: Option<Median>) -> String {
     let Some(ratio) = ratio else { return "not timed".into() };
     let ends = [ratio.interval.low, ratio.interval.high].map(change);
+    if !ratio.is_sure() {
+        return format!("too few turns to tell the time ({} to {})", ends[0], ends[1]);
+    }
     match ratio.differs_from(1.0) {
         true => format!("{} time ({} to {})", change(ratio.interval.estimate), ends[0], ends[1]),
         false => format!("no more than noise in time ({} to {})", ends[0], ends[1]),
@@ -34,7 +37,13 @@ fn error(default: &Row, row: &Row) -> String {
         return "the same pixels".into();
     }
     let [was, is] = [default, row].map(|r| short(r.errors.rmse_steps));
+    if was == is {
+        return format!("the same error to three digits ({is}/255)");
+    }
     match row.error_ratio {
+        Some(ratio) if !ratio.is_sure() => {
+            format!("too few turns to tell the error ({is}/255 against {was})")
+        }
         Some(ratio) if ratio.differs_from(1.0) => {
             format!("error {is}/255 instead of {was} ({})", change(ratio.interval.estimate))
         }

@@ -49,7 +49,8 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..))]
     frames: Vec<u32>,
-    /// How often each setting is timed; at least 6 give intervals of 95 %
+    /// How often each setting is timed; 6 and more give intervals of 95 %, fewer than 5 say nothing
+    /// about small differences
     #[arg(long, value_name = "N", default_value_t = 6, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=1000))]
     turns: u32,
@@ -105,7 +106,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let otherwise = groups.contains(&Group::Intersection).then(|| world.clone());
     let scene = world.into_scene(base.rules.recentre)?;
     let otherwise = otherwise.and_then(|world| world.into_scene(!base.rules.recentre).ok());
-    let candidates = candidates(&scene, &base, &groups, otherwise.is_some());
+    let candidates = candidates(&scene, &base, shot.frames, &groups, otherwise.is_some());
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);
     let pool = thread_pool(threads)?;
     let intersector = pool.install(|| intersect::build(&scene, &base, threads))?;
@@ -165,8 +166,14 @@ fn frames(args: &AccuracyArgs, count: u32) -> Result<Vec<u32>> {
 
 /// Without the other rounding of the scene, the candidate that needs it is left out: some scenes
 /// cannot be rounded where they stand.
-fn candidates(scene: &Scene, base: &Settings, groups: &[Group], otherwise: bool) -> Vec<Candidate> {
-    let mut all = accuracy::candidates(base, &EffectPlan::of(scene, base), groups);
+fn candidates(
+    scene: &Scene,
+    base: &Settings,
+    frames: u32,
+    groups: &[Group],
+    otherwise: bool,
+) -> Vec<Candidate> {
+    let mut all = accuracy::candidates(base, &EffectPlan::of(scene, base), frames, groups);
     all.retain(|c| otherwise || c.settings.rules.recentre == base.rules.recentre);
     all
 }

@@ -15,9 +15,14 @@ pub struct Median {
 }
 
 impl Median {
-    /// Whether the interval leaves `value` out.
+    /// Whether there are values enough to say anything: an interval of 90 % takes five.
+    pub fn is_sure(&self) -> bool {
+        self.confidence >= 0.9
+    }
+
+    /// Whether the interval, if it is a sure one, leaves `value` out.
     pub fn differs_from(&self, value: f64) -> bool {
-        self.confidence > 0.0 && !(self.interval.low..=self.interval.high).contains(&value)
+        self.is_sure() && !(self.interval.low..=self.interval.high).contains(&value)
     }
 }
 
@@ -80,5 +85,7 @@ mod tests {
     fn a_difference_within_the_noise_is_none() {
         let m = median(&[0.97, 1.02, 1.01, 0.99, 1.03, 0.98]).expect("values");
         assert!(!m.differs_from(1.0) && m.differs_from(1.1));
+        let few = median(&[2.0, 2.1, 2.2, 2.3]).expect("values");
+        assert!(!few.is_sure() && !few.differs_from(1.0), "four values are too few");
     }
 }

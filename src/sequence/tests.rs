@@ -45,6 +45,7 @@ impl Folder {
         let name = self.path("frame_##.png").display().to_string();
         let header = Header {
             manifest: 1,
+            command: Vec::new(),
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),
@@ -172,6 +173,11 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     let quiet = &mut |_: &FrameReport| Ok(());
     render_frames(&target, &plan.render[..2], (0, &manifest), &maker, quiet).expect("runs");
     render_frames(&target, &plan.render[2..3], (1, &part), &maker, quiet).expect("runs");
+    // Whoever looks while they run sees the rows of both, and moves none.
+    let now = Manifest::as_of_now(&manifest).expect("read").expect("there");
+    let ranks: Vec<(u32, u32)> = now.rows.values().map(|row| (row.frame, row.rank)).collect();
+    assert_eq!(ranks, [(1, 0), (2, 0), (3, 1)]);
+    assert!(now.rows.values().all(|row| row.ended.is_some_and(|t| t > 1e9)) && part.exists());
     // Both ranks were killed here.
     assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, [4]);
     assert!(!part.exists());

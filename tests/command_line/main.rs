@@ -3,6 +3,7 @@
 mod comparing;
 mod interrupted;
 mod job;
+mod pages;
 mod ranks;
 mod references;
 mod rendering;

@@ -1,7 +1,7 @@
 //! The pages in a real browser: they work by mouse and by keyboard, complain of nothing and ask for
 //! nothing.
 //!
-//! Chromium is Debian's package of that name (`./x setup` installs it); another one is named by the
+//! Chromium is Debian's package of that name (`./x test` installs it); another one is named by the
 //! environment variable `TWEENRAY_CHROMIUM`. With `TWEENRAY_SCREENSHOTS=FOLDER` the pages are left
 //! there as pictures, 400 and 1400 pixels wide.
 
@@ -17,8 +17,8 @@ use std::process::Command;
 fn browser() -> Option<Browser> {
     let Some(name) = browser::installed() else {
         eprintln!(
-            "SKIPPED: no Chromium here; install Debian's package `chromium` (./x setup does), or name \
-             one in TWEENRAY_CHROMIUM"
+            "SKIPPED: no Chromium here; install Debian's package `chromium` (./x test does), or name one \
+             in TWEENRAY_CHROMIUM"
         );
         return None;
     };

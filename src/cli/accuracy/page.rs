@@ -1,15 +1,16 @@
 //! The figures as a page.
 
+mod plots;
+mod tables;
+
 use super::{AccuracyArgs, Outcome};
-use crate::accuracy::{
-    Errors, Goal, Group, Knob, Row, about_knob, about_oracle, best_within, fastest_reaching,
-};
+use crate::accuracy::{Goal, Knob, Row, about_knob, about_oracle, best_within, fastest_reaching};
 use crate::error::Result;
 use crate::measure::Median;
 use crate::output::video::shell_line;
+use crate::page::Picture;
 use crate::page::accuracy::{AccuracyPage, Detail, KnobText, Named};
 use crate::page::words::{bytes, change, count, date, percent, seconds, short};
-use crate::page::{Picture, Point, Scatter, Table};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Most pictures in the page.
@@ -24,13 +25,16 @@ pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resul
         summary: summary(outcome),
         facts: facts(args, outcome),
         warnings: warnings(args, outcome),
-        scatters: METRICS.iter().filter_map(|metric| scatter(outcome, metric)).collect(),
+        scatters: plots::METRICS
+            .iter()
+            .filter_map(|metric| plots::scatter(outcome, metric))
+            .collect(),
         details: details(outcome, &scene),
-        goals: goals(outcome),
+        goals: tables::goals(outcome),
         knobs: knobs(outcome),
         pictures: pictures(outcome)?,
         pictured: format!("Frame {}, as a display shows it in 8 bits.", outcome.shown_frame),
-        tables: vec![figures(outcome), times(outcome)],
+        tables: vec![tables::figures(outcome), tables::times(outcome)],
         command: shell_line(command),
         version: env!("CARGO_PKG_VERSION").into(),
         made: date(now),
@@ -128,98 +132,12 @@ fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
     }
     if args.turns < 6 {
         warnings.push(format!(
-            "With {} timed turns the intervals hold the truth in {} of cases, not in 95 %.",
+            "With --turns {} the intervals hold the truth in {} of cases, not in 95 %.",
             args.turns,
             percent(outcome.measured.default_row().seconds.median.confidence)
         ));
     }
     warnings
-}
-
-/// A measure of error: what it is called, its unit, its figure.
-struct Metric {
-    name: &'static str,
-    hint: &'static str,
-    unit: &'static str,
-    of: fn(&Errors) -> Option<f64>,
-}
-
-const METRICS: [Metric; 5] = [
-    Metric {
-        name: "RMSE",
-        hint: "root mean squared error, display steps of 1/255",
-        unit: "",
-        of: |e| Some(e.rmse_steps),
-    },
-    Metric { name: "1 − SSIM", hint: "1 less SSIM", unit: "", of: |e| Some(1.0 - e.ssim) },
-    Metric { name: "FLIP", hint: "mean FLIP", unit: "", of: |e| Some(e.flip) },
-    Metric {
-        name: "Pixels off",
-        hint: "share of pixels off by more than 2/255",
-        unit: " %",
-        of: |e| Some(100.0 * e.share_over_2),
-    },
-    Metric {
-        name: "Flicker",
-        hint: "change of the error from frame to frame, display steps of 1/255",
-        unit: "",
-        of: |e| e.flicker,
-    },
-];
-
-/// Class and name of a group's colour.
-fn colour_of(knob: Knob) -> (&'static str, &'static str) {
-    match knob.group() {
-        None => ("c0", "default"),
-        Some(Group::Combinations) => ("c5", "combinations"),
-        Some(Group::Reuse) => ("c1", "reuse"),
-        Some(Group::Samples) => ("c2", "samples"),
-        Some(Group::Specular) => ("c3", "bounces, cut-off"),
-        Some(Group::Intersection | Group::Oracle) => ("c4", "rules of intersection"),
-    }
-}
-
-fn scatter(outcome: &Outcome, metric: &Metric) -> Option<Scatter> {
-    let rows = &outcome.measured.rows;
-    let point = |(id, row): (usize, &Row)| {
-        let interval = row.seconds.median.interval;
-        let y = (metric.of)(&row.errors)?;
-        Some(Point {
-            id,
-            name: name_of(&row.options),
-            text: format!(
-                "{}, {} {}{}",
-                seconds(interval.estimate),
-                metric.name,
-                short(y),
-                metric.unit
-            ),
-            x: interval.estimate,
-            x_ends: [interval.low, interval.high],
-            y,
-            class: colour_of(row.knob).0.into(),
-            is_default: row.knob == Knob::Default,
-            is_front: row.on_front,
-        })
-    };
-    let points: Vec<Point> = rows.iter().enumerate().filter_map(point).collect();
-    if points.is_empty() {
-        return None;
-    }
-    let mut legend: Vec<(String, String)> = Vec::new();
-    for (class, name) in rows.iter().map(|row| colour_of(row.knob)) {
-        if legend.iter().all(|(c, _)| c != class) {
-            legend.push((class.into(), name.into()));
-        }
-    }
-    Some(Scatter {
-        caption: metric.name.into(),
-        hint: format!("upwards: {}; to the right: seconds a frame", metric.hint),
-        units: [" s".into(), metric.unit.into()],
-        points,
-        legend,
-        metric: metric.name.into(),
-    })
 }
 
 fn with_ends(m: &Median, word: fn(f64) -> String) -> String {
@@ -235,7 +153,11 @@ fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
             ("CPU seconds", short(row.cpu_seconds.median.interval.estimate)),
         ];
         if let Some(ratio) = &row.time_ratio {
-            let word = if ratio.differs_from(1.0) { "" } else { ", within noise" };
+            let word = match ratio.differs_from(1.0) {
+                true => "",
+                false if ratio.is_sure() => ", within noise",
+                false => ", too few turns to tell",
+            };
             let i = ratio.interval;
             let [is, low, high] = [i.estimate, i.low, i.high].map(change);
             figures.push(("Time against default", format!("{is} ({low} to {high}){word}")));
@@ -255,39 +177,6 @@ fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
         Detail { id, name: name_of(&row.options), figures, command }
     };
     outcome.measured.rows.iter().enumerate().map(detail).collect()
-}
-
-fn goals(outcome: &Outcome) -> Table {
-    let head = ["wanted", "fastest setting measured", "seconds a frame", "comes to"];
-    let mut table = Table::new("The fastest setting for an error", &head);
-    let psnr = |db: f64| (format!("PSNR {db} dB"), Goal::Psnr(db));
-    let goals = [
-        psnr(30.0),
-        psnr(35.0),
-        psnr(40.0),
-        psnr(45.0),
-        psnr(50.0),
-        ("SSIM 0.99".into(), Goal::Ssim(0.99)),
-        ("FLIP 0.01".into(), Goal::Flip(0.01)),
-        ("0.1 % of pixels off by more than 2/255".into(), Goal::MaxShare(0.001)),
-    ];
-    for (wanted, goal) in goals {
-        let cells = match fastest_reaching(&outcome.measured, goal) {
-            None => [wanted, "none of them".into(), "–".into(), "–".into()],
-            Some(row) => {
-                let e = &row.errors;
-                let reached = match goal {
-                    Goal::Psnr(_) => format!("{} dB", short(e.psnr)),
-                    Goal::Ssim(_) => format!("{:.4}", e.ssim),
-                    Goal::Flip(_) => short(e.flip),
-                    Goal::MaxShare(_) => percent(e.share_over_2),
-                };
-                [wanted, name_of(&row.options), short(median_of(row)), reached]
-            }
-        };
-        table.rows.push(cells.into());
-    }
-    table
 }
 
 fn knobs(outcome: &Outcome) -> Vec<KnobText> {
@@ -327,64 +216,4 @@ fn pictures(outcome: &Outcome) -> Result<Vec<Named>> {
     let truth = Picture::png(&outcome.truth.frames[&outcome.shown_frame])?;
     all.insert(1.min(all.len()), Named { name: "reference".into(), id: None, picture: truth });
     Ok(all)
-}
-
-fn figures(outcome: &Outcome) -> Table {
-    let head = [
-        "",
-        "seconds",
-        "RMSE /255",
-        "PSNR dB",
-        "SSIM",
-        "FLIP",
-        "off > 2/255",
-        "flicker /255",
-        "rays a frame",
-        "memory",
-        "front",
-    ];
-    let mut table = Table::new("Errors", &head);
-    for row in &outcome.measured.rows {
-        let e = &row.errors;
-        table.rows.push(vec![
-            name_of(&row.options),
-            short(median_of(row)),
-            short(e.rmse_steps),
-            short(e.psnr),
-            format!("{:.5}", e.ssim),
-            short(e.flip),
-            percent(e.share_over_2),
-            e.flicker.map_or("–".into(), short),
-            count(row.rays_per_frame.round() as u64),
-            bytes(row.memory_bytes),
-            if row.on_front { "yes" } else { "" }.into(),
-        ]);
-    }
-    table
-}
-
-fn times(outcome: &Outcome) -> Table {
-    let head = ["", "wall seconds", "CPU seconds", "against default", "beyond noise"];
-    let mut table = Table::new("Times, with their intervals", &head);
-    for row in &outcome.measured.rows {
-        let ratio = row.time_ratio.as_ref();
-        let against = ratio.map_or("–".into(), |r| {
-            let [is, low, high] =
-                [r.interval.estimate, r.interval.low, r.interval.high].map(change);
-            format!("{is} ({low} to {high})")
-        });
-        let beyond = match ratio {
-            None => "–",
-            Some(r) if r.differs_from(1.0) => "yes",
-            Some(_) => "no",
-        };
-        table.rows.push(vec![
-            name_of(&row.options),
-            with_ends(&row.seconds.median, short),
-            with_ends(&row.cpu_seconds.median, short),
-            against,
-            beyond.into(),
-        ]);
-    }
-    table
 }
