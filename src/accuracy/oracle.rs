@@ -1,14 +1,11 @@
 //! Embree against the oracle on a small crop: what trusting Embree is worth.
 
-use super::errors::{Frames, displayed};
+use super::errors::Frames;
 use super::stage::Stage;
 use super::table::Change;
-use crate::effects::EffectPlan;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::intersect::{Intersector, Oracle};
 use crate::scene::{Policy, Rect, Settings};
-use crate::shade::{Progress, Renderer};
-use crate::stats::RayCounts;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -44,7 +41,7 @@ pub struct OracleCrop {
 /// would take the oracle minutes, or where the default is the oracle.
 ///
 /// # Errors
-/// [`Error::Stopped`]; those of cameras.
+/// Those of [`Stage::trace`].
 pub fn on_a_crop(stage: &Stage, frame: u32) -> Result<Option<OracleCrop>> {
     let triangles = stage.scene.triangle_count();
     let threads = stage.pool.current_num_threads() as f64;
@@ -62,33 +59,22 @@ pub fn on_a_crop(stage: &Stage, frame: u32) -> Result<Option<OracleCrop>> {
     settings.crop = Some(crop);
     settings.reuse.policy = Policy::Off;
     let oracle = Oracle::new(stage.scene);
-    let (embree, rays, embree_seconds) = render(stage, &settings, stage.intersector, frame)?;
-    let (truth, _, oracle_seconds) = render(stage, &settings, &oracle, frame)?;
+    let (embree, rays, embree_seconds) = timed(stage, &settings, stage.intersector, frame)?;
+    let (truth, _, oracle_seconds) = timed(stage, &settings, &oracle, frame)?;
     let change =
         Change { pixels: u64::from(width) * u64::from(height), ..Change::between(&truth, &embree) };
     let size = [width, height];
     Ok(Some(OracleCrop { size, frame, triangles, rays, embree_seconds, oracle_seconds, change }))
 }
 
-struct Unheard;
-
-impl Progress for Unheard {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
-}
-
-fn render(
+/// The frame by `intersector`; rays, and wall seconds.
+fn timed(
     stage: &Stage,
     settings: &Settings,
     intersector: &dyn Intersector,
     frame: u32,
 ) -> Result<(Frames, u64, f64)> {
-    let plan = EffectPlan::of(stage.scene, settings);
-    let renderer = Renderer { scene: stage.scene, settings, plan, intersector };
-    let camera = stage.shot.camera(frame, settings.width, settings.height)?;
     let start = Instant::now();
-    let render = || renderer.render(&camera, frame, false, stage.stop, &Unheard);
-    let (film, rays) = stage.pool.install(render).ok_or(Error::Stopped)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let image = stage.pool.install(|| displayed(&film, settings));
-    Ok((Frames::from([(frame, image)]), rays.total(), seconds))
+    let (image, rays) = stage.trace(settings, intersector, frame)?;
+    Ok((Frames::from([(frame, image)]), rays.total(), start.elapsed().as_secs_f64()))
 }

@@ -1,15 +1,11 @@
 //! The truth that candidates are held against: traced frames, with twice the samples until they no
 //! longer change.
 
-use super::errors::{Frames, displayed, rms_between};
+use super::errors::{Frames, rms_between};
 use super::stage::Stage;
-use crate::effects::EffectPlan;
-use crate::error::{Error, Result};
-use crate::film::Image;
+use crate::error::Result;
 use crate::scene::limits::MAX_SEED;
 use crate::scene::{Policy, Settings};
-use crate::shade::{Progress, Renderer};
-use crate::stats::RayCounts;
 
 /// The converged frames.
 pub struct Truth {
@@ -64,7 +60,7 @@ pub fn seed_of_turn(base: u64, turn: u32) -> u64 {
 /// `heard` hears of every doubling: samples, and by how much it changed the frames.
 ///
 /// # Errors
-/// [`Error::Stopped`]; those of cameras.
+/// Those of [`Stage::trace`].
 pub fn converge(
     stage: &Stage,
     mut settings: Settings,
@@ -79,7 +75,8 @@ pub fn converge(
         settings.seed = seed_of_doubling(stage.base.seed, doubling);
         let mut now = Frames::new();
         for frame in frames {
-            now.insert(*frame, trace(stage, &settings, *frame)?);
+            let (image, _) = stage.trace(&settings, stage.intersector, *frame)?;
+            now.insert(*frame, image);
         }
         let change = last.as_ref().map(|last| rms_between(&now, last));
         heard(settings.spp, change);
@@ -92,24 +89,6 @@ pub fn converge(
         doubling += 1;
         last = Some(now);
     }
-}
-
-struct Unheard;
-
-impl Progress for Unheard {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
-}
-
-fn trace(stage: &Stage, settings: &Settings, frame: u32) -> Result<Image> {
-    let plan = EffectPlan::of(stage.scene, settings);
-    let intersector = stage.intersector;
-    let renderer = Renderer { scene: stage.scene, settings, plan, intersector };
-    let camera = stage.shot.camera(frame, settings.width, settings.height)?;
-    let render = || {
-        let (film, _) = renderer.render(&camera, frame, false, stage.stop, &Unheard)?;
-        Some(displayed(&film, settings))
-    };
-    stage.pool.install(render).ok_or(Error::Stopped)
 }
 
 #[cfg(test)]

@@ -1,9 +1,14 @@
 //! What every trial shares: the scene, its move, the threads; and which scene and intersector a
 //! setting is traced with.
 
-use crate::error::Result;
+use super::errors::displayed;
+use crate::effects::EffectPlan;
+use crate::error::{Error, Result};
+use crate::film::Image;
 use crate::intersect::{self, Intersector};
 use crate::scene::{Scene, Settings, Shot};
+use crate::shade::{Progress, Renderer};
+use crate::stats::RayCounts;
 use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
 
@@ -49,4 +54,31 @@ impl<'a> Stage<'a> {
         let (scene, threads) = (self.scene_of(settings), self.pool.current_num_threads());
         self.pool.install(|| intersect::build(scene, settings, threads)).map(Some)
     }
+
+    /// Frame `frame` traced whole on the default's scene, as displayed; and the rays cast.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`]; those of cameras.
+    pub fn trace(
+        &self,
+        settings: &Settings,
+        intersector: &dyn Intersector,
+        frame: u32,
+    ) -> Result<(Image, RayCounts)> {
+        let plan = EffectPlan::of(self.scene, settings);
+        let renderer = Renderer { scene: self.scene, settings, plan, intersector };
+        let camera = self.shot.camera(frame, settings.width, settings.height)?;
+        let render = || {
+            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &Unheard)?;
+            Some((displayed(&film, settings), rays))
+        };
+        self.pool.install(render).ok_or(Error::Stopped)
+    }
+}
+
+/// Nobody watches the tiles of a trial.
+pub struct Unheard;
+
+impl Progress for Unheard {
+    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

@@ -2,7 +2,7 @@
 
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use super::stage::Stage;
+use super::stage::{Stage, Unheard};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::Intersector;
@@ -10,7 +10,7 @@ use crate::reuse;
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
 use crate::sequence::{ColourMaker, FrameMaker, Inferrer, Made, Pyramid, Tracer};
-use crate::shade::{Progress, Renderer};
+use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use std::time::Instant;
 
@@ -81,13 +81,6 @@ fn rays_of(made: &Made) -> RayCounts {
     let mut rays = made.rays;
     rays += made.audit.map_or(RayCounts::default(), |audit| audit.rays);
     rays
-}
-
-/// Nobody watches a trial.
-struct Unheard;
-
-impl Progress for Unheard {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 fn maker<'m>(

@@ -80,6 +80,7 @@ struct Outcome {
     measured: Measured,
     pictures: Vec<Picture>,
     oracle: Option<OracleCrop>,
+    oracle_was_wanted: bool,
     frames: Vec<u32>,
     shown_frame: u32,
     shot_frames: u32,
@@ -98,6 +99,11 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         job::load(&args.scene, &args.settings)?;
     if !args.quiet {
         warnings.iter().for_each(say::warning);
+    }
+    if base.crop.is_some() {
+        let message = "accuracy looks at whole frames: what a crop leaves black would count as right\n  \
+                       help: leave --crop out; a smaller --size is faster";
+        return Err(Error::Usage(message.into()));
     }
     atomic::make_room(args.output.join("report.html"))?;
     let frames = frames(args, shot.frames)?;
@@ -132,6 +138,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         measured,
         pictures,
         oracle,
+        oracle_was_wanted: groups.contains(&Group::Oracle),
         shown_frame: sweep.shown_frame(),
         frames: frames.clone(),
         shot_frames: shot.frames,

@@ -71,4 +71,5 @@ fn a_sweep_that_cannot_be_is_refused() {
     job.refused("accuracy cube.obj -o a --frames 1,999999", "lies outside the shot");
     job.refused("accuracy cube.obj -o a --knobs colour", "'colour'");
     job.refused("accuracy cube.obj -o a --turns 0", "1..=1000");
+    job.refused("accuracy cube.obj -o a --crop 0,0,8,8", "whole frames");
 }

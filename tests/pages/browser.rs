@@ -214,6 +214,16 @@ fn listening_at(process: &mut Child) -> String {
 
 impl Drop for Browser {
     fn drop(&mut self) {
+        // Asked to close, it ends its own children; killed, it would leave them behind.
+        let close = json!({"id": self.next + 1, "method": "Browser.close"});
+        let asked = self.socket.send(Message::text(close.to_string())).is_ok();
+        let start = Instant::now();
+        while asked && start.elapsed() < Duration::from_secs(10) {
+            if matches!(self.process.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

@@ -194,6 +194,10 @@ fn knobs(outcome: &Outcome) -> Vec<KnobText> {
     let mut all: Vec<KnobText> = seen.into_iter().map(text).collect();
     if let Some(crop) = &outcome.oracle {
         all.push(KnobText { name: "Oracle".into(), sentences: vec![about_oracle(crop)] });
+    } else if outcome.oracle_was_wanted {
+        let why = "Left out: it holds every ray against every triangle, and even a few pixels of this \
+                   scene would take it minutes.";
+        all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
     }
     all
 }
