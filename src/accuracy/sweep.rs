@@ -59,7 +59,7 @@ impl Sweep<'_> {
     /// due to chance, below which the truth has to be known.
     ///
     /// # Errors
-    /// Those of [`trial::run`].
+    /// Those of building and rendering.
     pub fn least_noise(&self) -> Result<f64> {
         let samples = |s: &Settings| {
             let lights = u64::from(s.shadow_samples) + u64::from(s.sky_samples) + 1;

@@ -6,7 +6,7 @@ pub fn short(x: f64) -> String {
     match size {
         _ if !x.is_finite() => if x.is_nan() { "–" } else { "∞" }.into(),
         0.0 => "0".into(),
-        _ if size < 1e-3 || size >= 1e9 => trimmed(&format!("{x:.1e}"), 'e'),
+        _ if !(1e-3..1e9).contains(&size) => trimmed(&format!("{x:.1e}"), 'e'),
         _ if size >= 999.5 => thousands(x.round() as i64),
         _ => {
             let digits = (2 - size.log10().floor() as i32).clamp(0, 6) as usize;

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A browser, or a word about why there is none.
+#[allow(clippy::print_stderr, reason = "a test that skips says so")]
 fn browser() -> Option<Browser> {
     let Some(name) = browser::installed() else {
         eprintln!(
