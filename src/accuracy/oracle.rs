@@ -10,11 +10,11 @@ use serde::Serialize;
 use std::time::Instant;
 
 /// Seconds that the oracle may take, roughly.
-const SECONDS: f64 = 20.0;
-/// Seconds that it holds one ray against one triangle, on one thread: 3 to 6 ns on machines of today.
-const PER_TRIANGLE: f64 = 5e-9;
-/// Rays that a pixel casts with one sample of everything, roughly.
-const RAYS: f64 = 5.0;
+const SECONDS: f64 = 10.0;
+/// Seconds that it holds one ray against one triangle, on one thread, roughly.
+const PER_TRIANGLE: f64 = 1e-8;
+/// Rays that a pixel casts with one sample of everything, roughly: glass branches.
+const RAYS: f64 = 10.0;
 /// The least and the most edge of the crop, pixels.
 const EDGE: (f64, f64) = (8.0, 96.0);
 

@@ -130,7 +130,12 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         Sweep { stage: &stage, candidates: &candidates, frames: &frames, turns: args.turns };
     let (truth, measured, pictures) = interrupt.watched(|| measure(args, &sweep))?;
     let oracle = match groups.contains(&Group::Oracle) {
-        true => interrupt.watched(|| accuracy::on_a_crop(&stage, sweep.shown_frame()))?,
+        true => {
+            if !args.quiet {
+                say::aside("the oracle, on a crop");
+            }
+            interrupt.watched(|| accuracy::on_a_crop(&stage, sweep.shown_frame()))?
+        }
         false => None,
     };
     let outcome = Outcome {
