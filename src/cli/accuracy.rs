@@ -128,7 +128,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let load = super::machine::load();
     let sweep =
         Sweep { stage: &stage, candidates: &candidates, frames: &frames, turns: args.turns };
-    let (truth, measured, pictures) = interrupt.watched(|| measure(args, &sweep))?;
+    // First: whoever is out of patience loses no sweep.
     let oracle = match groups.contains(&Group::Oracle) {
         true => {
             if !args.quiet {
@@ -138,6 +138,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         }
         false => None,
     };
+    let (truth, measured, pictures) = interrupt.watched(|| measure(args, &sweep))?;
     let outcome = Outcome {
         truth,
         measured,
