@@ -3,6 +3,7 @@
 //! Only this room talks to people; nothing below it knows of arguments or prints. Results go to
 //! stdout; progress, warnings and errors to stderr.
 
+mod accuracy;
 mod args;
 mod compare;
 mod convert;
@@ -14,6 +15,7 @@ mod machine;
 mod progress;
 mod references;
 mod render;
+mod report;
 mod request;
 mod say;
 mod schema;
@@ -38,6 +40,8 @@ Examples:
   tweenray status out/
   tweenray inspect scene.toml
   tweenray compare out/frame_0001.png other.png
+  tweenray accuracy scene.toml -o accuracy
+  tweenray report out/scene
 
 `tweenray COMMAND --help` says more.")]
 struct Arguments {
@@ -53,6 +57,8 @@ enum Command {
     Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
     Convert(convert::ConvertArgs),
+    Accuracy(Box<accuracy::AccuracyArgs>),
+    Report(report::ReportArgs),
     Schema(schema::SchemaArgs),
 }
 
@@ -92,6 +98,8 @@ fn dispatch(command: &Command) -> Exit {
         Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Accuracy(args) => accuracy::run(args),
+        Command::Report(args) => report::run(args),
         Command::Schema(args) => schema::run(args),
     };
     ended(result)
@@ -103,6 +111,16 @@ fn ended(result: Result<Exit>) -> Exit {
         say::error(&error);
         Exit::of(&error)
     })
+}
+
+/// The words that started this process, the program by its name alone.
+fn words() -> Vec<String> {
+    let mut words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = words.first_mut() {
+        *program = "tweenray".into();
+    }
+    words
 }
 
 #[cfg(test)]

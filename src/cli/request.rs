@@ -151,6 +151,7 @@ impl Request {
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
+            command: super::words(),
             settings: self.header_settings(),
         };
         Target {
@@ -158,19 +159,11 @@ impl Request {
             header,
             recipes: self.recipes.clone(),
             write: WriteOptions {
-                maps: self.maps.then(|| farthest(&self.settings)),
+                maps: self.maps.then(|| self.settings.reuse.farthest()),
                 ..WriteOptions::of(&self.settings, None)
             },
             overwrite: self.overwrite,
         }
-    }
-}
-
-/// The distance that maps paint as the farthest: in footprints under policy surface, else as a share.
-fn farthest(settings: &Settings) -> f32 {
-    match settings.reuse.policy {
-        Policy::Colour => settings.reuse.distance_epsilon.max(1e-6),
-        Policy::Surface | Policy::Off => 2.0,
     }
 }
 

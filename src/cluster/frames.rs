@@ -58,7 +58,8 @@ pub fn render(
         }
         hear()
     };
-    sequence::render_frames(target, &mine, &journal, maker, &mut after_frame)?;
+    let place = (world.rank(), journal.as_path());
+    sequence::render_frames(target, &mine, place, maker, &mut after_frame)?;
     if finished.len() < mine.len() && !told.get() {
         let mut others = (0..world.size()).filter(|rank| *rank != world.rank());
         others.try_for_each(|rank| world.post(rank, &Note::Stop))?;

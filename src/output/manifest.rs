@@ -45,6 +45,9 @@ pub struct Header {
     pub files: String,
     /// What traces: intersector, its version and instruction set.
     pub tracer: String,
+    /// The words of the command that started the sequence, program first; told, never compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<String>,
     /// Every setting, by name. Kept as JSON, so that a manifest of another version can be read
     /// far enough to say what differs.
     pub settings: Value,
@@ -67,6 +70,12 @@ pub struct Row {
     pub bytes: u64,
     /// Wall seconds from the camera to the renamed file.
     pub seconds: f64,
+    /// When the file was in its place, seconds since 1970; unknown to older manifests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended: Option<f64>,
+    /// The rank that rendered it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rank: u32,
     /// Rays cast for it.
     pub rays: RayCounts,
     /// How much of it was inferred.
@@ -196,6 +205,11 @@ impl Header {
     }
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_zero(n: &u32) -> bool {
+    *n == 0
+}
+
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -232,13 +246,18 @@ impl Manifest {
         Ok(Some(Self { header, rows }))
     }
 
-    /// As [`Manifest::read`], with the rows of ranks that may still be at work.
-    pub fn read_with_parts(path: &Path) -> Result<Option<Self>> {
-        let Some(mut manifest) = Self::read(path)? else { return Ok(None) };
+    /// Reads the manifest at `path` with the rows that ranks of a running job still keep to
+    /// themselves; changes no file. `None` where there is no manifest.
+    ///
+    /// Errors: [`Self::read`]'s.
+    pub fn as_of_now(path: &Path) -> Result<Option<Self>> {
+        // Parts first: a job that ends in between moves rows from them into the manifest.
+        let mut pending = Vec::new();
         for part in parts(path)? {
-            let bytes = read_if_there(&part)?.unwrap_or_default();
-            manifest.rows.extend(rows_in(&bytes).map(|row| (row.frame, row)));
+            pending.extend(rows_in(&read_if_there(&part)?.unwrap_or_default()));
         }
+        let Some(mut manifest) = Self::read(path)? else { return Ok(None) };
+        manifest.rows.extend(pending.into_iter().map(|row| (row.frame, row)));
         Ok(Some(manifest))
     }
 

@@ -46,7 +46,7 @@ use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// Makes the film of a frame.
 pub trait FrameMaker {
@@ -143,14 +143,14 @@ pub struct FrameReport {
     pub bad: BadSamples,
 }
 
-/// Renders `frames` in order into `target`; rows go to the journal at `journal`. `done` hears of
-/// each finished frame. Ends early, without an error, when `maker` gives no film.
+/// Renders `frames` in order into `target` as rank `rank`; rows go to the journal at `journal`.
+/// `done` hears of each finished frame. Ends early, without an error, when `maker` gives no film.
 ///
 /// Errors: whatever making or writing a frame met; the frames before it are finished.
 pub fn render_frames(
     target: &Target,
     frames: &[u32],
-    journal: &Path,
+    (rank, journal): (u32, &Path),
     maker: &dyn FrameMaker,
     done: &mut dyn FnMut(&FrameReport) -> Result<()>,
 ) -> Result<()> {
@@ -163,7 +163,7 @@ pub fn render_frames(
         let Some(made) = maker.make(frame)? else { break };
         let trace_seconds = start.elapsed().as_secs_f64();
         let audit = made.audit.map(|sums| audit_row(&sums));
-        let row = Row { audit, ..write_frame(target, frame, &made, start)? };
+        let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
         journal.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
         let Row { bytes, bad, rays, reuse, .. } = row;
@@ -218,6 +218,9 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         blake3: written.hash.to_hex().to_string(),
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
+        // A clock before 1970 tells no time.
+        ended: SystemTime::now().duration_since(UNIX_EPOCH).ok().map(|t| t.as_secs_f64()),
+        rank: 0,
         rays: *rays,
         reuse: *reuse,
         audit: None,

@@ -39,7 +39,7 @@ pub struct Survey {
 /// Errors: there is no manifest, or none that can be read; `range`'s.
 pub fn survey(path: &Path, range: impl Fn(u32) -> Result<FrameRange>) -> Result<Survey> {
     let missing = || Error::Usage(format!("there is no manifest {}", path.display()));
-    let manifest = Manifest::read_with_parts(path)?.ok_or_else(missing)?;
+    let manifest = Manifest::as_of_now(path)?.ok_or_else(missing)?;
     let folder = folder_of(path);
     let FrameRange { first, last } = range(manifest.header.shot_frames)?;
     let files = folder.join(&manifest.header.files).display().to_string();

@@ -47,6 +47,7 @@ impl Folder {
         let name = self.path("frame_##.png").display().to_string();
         let header = Header {
             manifest: 2,
+            command: Vec::new(),
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),
@@ -77,7 +78,7 @@ impl Folder {
         let made = RefCell::default();
         let maker = Plain { settings: settings.clone(), stop_before, made };
         let journal = manifest_path(&target.pattern);
-        render_frames(&target, &plan.render, &journal, &maker, &mut |_| Ok(()))?;
+        render_frames(&target, &plan.render, (0, &journal), &maker, &mut |_| Ok(()))?;
         Ok((maker.made.into_inner(), plan))
     }
 
@@ -189,8 +190,13 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     let manifest = manifest_path(&target.pattern);
     let part = crate::output::manifest::part_path(&manifest, 1);
     let quiet = &mut |_: &FrameReport| Ok(());
-    render_frames(&target, &plan.render[..2], &manifest, &maker, quiet).expect("runs");
-    render_frames(&target, &plan.render[2..3], &part, &maker, quiet).expect("runs");
+    render_frames(&target, &plan.render[..2], (0, &manifest), &maker, quiet).expect("runs");
+    render_frames(&target, &plan.render[2..3], (1, &part), &maker, quiet).expect("runs");
+    // Whoever looks while they run sees the rows of both, and moves none.
+    let now = Manifest::as_of_now(&manifest).expect("read").expect("there");
+    let ranks: Vec<(u32, u32)> = now.rows.values().map(|row| (row.frame, row.rank)).collect();
+    assert_eq!(ranks, [(1, 0), (2, 0), (3, 1)]);
+    assert!(now.rows.values().all(|row| row.ended.is_some_and(|t| t > 1e9)) && part.exists());
     // Both ranks were killed here.
     assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, [4]);
     assert!(!part.exists());
@@ -256,7 +262,7 @@ fn a_survey_tells_done_missing_damaged_and_stray() {
     prepare(&target, FrameRange { first: 1, last: 3 }).expect("ready to replace three");
     let path = manifest_path(&target.pattern);
     let maker = Plain { settings: brighter, stop_before: 0, made: RefCell::default() };
-    render_frames(&target, &[1, 2], &path, &maker, &mut |_| Ok(())).expect("runs");
+    render_frames(&target, &[1, 2], (0, &path), &maker, &mut |_| Ok(())).expect("runs");
     fs::write(folder.path("frame_02.png"), b"torn").expect("written");
     fs::remove_file(folder.path("frame_03.png")).expect("removed");
     let all = |last| Ok(FrameRange { first: 1, last });

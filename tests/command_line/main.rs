@@ -4,6 +4,7 @@ mod comparing;
 mod interrupted;
 mod job;
 mod killed;
+mod pages;
 mod ranks;
 mod references;
 mod rendering;
