@@ -6,9 +6,10 @@
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Light, Scene};
+use serde::{Deserialize, Serialize};
 
 /// A surface point whose light is wanted: where one or more camera samples of a pixel end.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePoint {
     /// The point; the mean where there are several samples.
     pub p: DVec3,
@@ -55,7 +56,7 @@ pub struct Questions {
 }
 
 /// A point that was traced: a source for other frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TracedPoint {
     /// Pixel column.
     pub x: u32,
@@ -66,7 +67,7 @@ pub struct TracedPoint {
 }
 
 /// Traced points with their ratios.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TracedPoints {
     /// The points.
     pub points: Vec<TracedPoint>,
@@ -79,6 +80,18 @@ impl TracedPoints {
     pub fn append(&mut self, mut other: Self) {
         self.points.append(&mut other.points);
         self.ratios.append(&mut other.ratios);
+    }
+
+    /// The same points pixel by pixel, row by row; those of a pixel keep their order. So they stand in
+    /// one order however the frame was cut for tracing. `channels` is the number of ratios a point.
+    pub fn in_order(&self, channels: usize) -> Self {
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        order.sort_by_key(|i| (self.points[*i].y, self.points[*i].x));
+        let ratios = |i: &usize| &self.ratios[i * channels..(i + 1) * channels];
+        Self {
+            points: order.iter().map(|i| self.points[*i]).collect(),
+            ratios: order.iter().flat_map(ratios).copied().collect(),
+        }
     }
 }
 

@@ -17,7 +17,7 @@ use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
+use crate::sequence::{self, ColourMaker, Inferrer, Plan, Pyramid, Shared, Target, Tracer};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
 use clap::Args;
@@ -71,6 +71,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
+    let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
@@ -85,7 +86,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     };
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
-    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
+    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool, order: &order };
     let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,
@@ -94,6 +95,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         render_seconds: built.elapsed().as_secs_f64(),
         intersector_bytes: intersector.memory(),
         reference_bytes,
+        duty: outcome.own,
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
@@ -147,6 +149,8 @@ struct Frames<'a> {
     target: &'a Target,
     plan: &'a Plan,
     pool: &'a ThreadPool,
+    /// The ranks, node by node.
+    order: &'a [u32],
 }
 
 impl Frames<'_> {
@@ -164,12 +168,13 @@ impl Frames<'_> {
         let renderer = Renderer { scene, settings, plan: effects, intersector };
         let with_gbuffer = pattern.format() == Format::Exr;
         let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
-        let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
+        let maker: Box<dyn Shared> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 maker.supplied = &self.request.references.list;
+                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
@@ -184,12 +189,13 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Off => {
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress: &watch })
+                let (progress, laid) = (&watch, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
             }
         };
         let done = |report: &_| watch.frame_done(report);
-        let outcome =
-            interrupt.watched(|| cluster::render(world, target, plan, &*maker, stop, &done));
+        let work = || cluster::render(world, self.order, target, plan, &*maker, stop, &done);
+        let outcome = interrupt.watched(work);
         watch.finish();
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.

@@ -1,7 +1,10 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
+mod exchange;
+
 use super::pyramid::Pyramid;
 use super::schedule::{Schedule, Stock};
+use super::shared::Laid;
 use super::supplied::with_supplied;
 use super::{FrameMaker, Made, previous_camera};
 use crate::error::{Error, Result};
@@ -37,6 +40,10 @@ pub struct Inferrer<'a> {
     pub supplied: &'a [Reference],
     /// On which terms frames serve later jobs as references; `None` where none is kept.
     pub terms: Option<Terms>,
+    /// On which terms frames serve other ranks as references; `None` where there are none.
+    pub exchange: Option<Terms>,
+    /// Frames that came as strips.
+    laid: Laid,
     schedule: Schedule,
     pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
@@ -52,6 +59,8 @@ struct State {
     /// The last original that is asked for again, as its copies are.
     again: Option<(u32, Made)>,
     most_memory: u64,
+    /// References for other ranks, until they are fetched.
+    exports: BTreeMap<u32, Arc<[u8]>>,
 }
 
 impl<'a> Inferrer<'a> {
@@ -82,6 +91,8 @@ impl<'a> Inferrer<'a> {
             evidence,
             supplied: &[],
             terms: None,
+            exchange: None,
+            laid: Laid::default(),
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -93,6 +104,36 @@ impl<'a> Inferrer<'a> {
     /// Renders an original from the references that it depends on, which are made first where they
     /// are not at hand; leaves a reference where one is needed.
     fn frame(&self, frame: u32) -> Result<Option<Made>> {
+        let camera = self.camera(frame)?;
+        let is_due = self.with_state(|s| s.references.is_due(frame));
+        let rendered = match self.laid.take(frame) {
+            Some(rendered) => Some(rendered),
+            None => self.rendered(frame, is_due, None, self.progress)?,
+        };
+        let Some(Rendered { film, rays, reuse, sources }) = rendered else { return Ok(None) };
+        let kept = self.kept(frame, &camera, &sources);
+        if is_due {
+            let channels = self.channels.len();
+            let sources = sources.in_order(channels);
+            let own = camera.to_scene(&self.renderer.scene.recentring);
+            let reference = Reference::new(frame, &own, &sources, channels);
+            let export = self.exported(frame, &camera, &sources, kept.as_ref());
+            self.with_state(|s| {
+                s.keep(&self.schedule, frame, reference);
+                s.exports.extend(export.map(|bytes| (frame, bytes)));
+            });
+        }
+        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+    }
+
+    /// Renders the pixels of an original that `mask` names, or all.
+    fn rendered(
+        &self,
+        frame: u32,
+        is_due: bool,
+        mask: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Rendered>> {
         let mut references = Vec::new();
         for other in self.schedule.ancestors(frame) {
             match self.reference(other)? {
@@ -108,24 +149,15 @@ impl<'a> Inferrer<'a> {
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
         let reuse = Reuse { channels: &self.channels, inference };
-        let is_due = self.with_state(|s| s.references.is_due(frame));
         let job = FrameJob {
             camera: &camera,
             stream: frame,
             with_gbuffer: self.with_gbuffer,
             reuse: (!self.channels.is_empty()).then_some(reuse),
-            mask: None,
+            mask,
             beyond_crop: is_due,
         };
-        let render = || self.renderer.render_job(&job, self.stop, self.progress);
-        let Some(rendered) = self.pool.install(render) else { return Ok(None) };
-        let Rendered { film, rays, reuse, sources } = rendered;
-        let kept = self.kept(frame, &camera, &sources);
-        if is_due {
-            let reference = Reference::new(frame, &own, &sources, self.channels.len());
-            self.with_state(|s| s.keep(&self.schedule, frame, reference));
-        }
-        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+        Ok(self.pool.install(|| self.renderer.render_job(&job, self.stop, progress)))
     }
 
     /// What the file of `frame` keeps for later jobs.
@@ -185,6 +217,13 @@ impl<'a> Inferrer<'a> {
 impl State {
     fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
         self.references.keep(schedule, frame, || Arc::new(reference));
+        let memory = self.references.held().map(|r| r.memory()).sum();
+        self.most_memory = self.most_memory.max(memory);
+    }
+
+    /// Takes in a reference that another rank made.
+    fn take(&mut self, frame: u32, reference: Reference) {
+        self.references.take(frame, Arc::new(reference));
         let memory = self.references.held().map(|r| r.memory()).sum();
         self.most_memory = self.most_memory.max(memory);
     }

@@ -14,6 +14,8 @@ mod inferrer;
 mod pyramid;
 mod resume;
 mod schedule;
+mod shared;
+mod strips;
 mod supplied;
 mod tracer;
 
@@ -23,6 +25,7 @@ pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use resume::{Plan, Target, prepare};
 pub use schedule::Schedule;
+pub use shared::{Laid, Shared, Strip};
 pub use tracer::Tracer;
 
 #[cfg(test)]
@@ -126,7 +129,7 @@ pub fn render_frames(
     target: &Target,
     frames: &[u32],
     journal: &Path,
-    maker: &dyn FrameMaker,
+    maker: &(impl FrameMaker + ?Sized),
     done: &mut dyn FnMut(&FrameReport) -> Result<()>,
 ) -> Result<()> {
     if frames.is_empty() {
@@ -134,17 +137,33 @@ pub fn render_frames(
     }
     let mut journal = Journal::open(journal)?;
     for &frame in frames {
-        let start = Instant::now();
-        let Some(made) = maker.make(frame)? else { break };
-        let trace_seconds = start.elapsed().as_secs_f64();
-        let audit = made.audit.map(|sums| audit_row(&sums));
-        let row = Row { audit, ..write_frame(target, frame, &made, start)? };
-        journal.append(&row)?;
-        let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-        let Row { bytes, bad, rays, reuse, .. } = row;
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })?;
+        let Some(report) = render_frame(target, frame, &mut journal, maker)? else { break };
+        done(&report)?;
     }
     Ok(())
+}
+
+/// Renders `frame` into `target`, its row into `journal`; `None` when `maker` gives no film.
+///
+/// # Errors
+/// Whatever making or writing the frame met.
+pub fn render_frame(
+    target: &Target,
+    frame: u32,
+    journal: &mut Journal,
+    maker: &(impl FrameMaker + ?Sized),
+) -> Result<Option<FrameReport>> {
+    let start = Instant::now();
+    let Some(made) = maker.make(frame)? else { return Ok(None) };
+    let trace_seconds = start.elapsed().as_secs_f64();
+    let audit = made.audit.map(|sums| audit_row(&sums));
+    let row = Row { audit, ..write_frame(target, frame, &made, start)? };
+    journal.append(&row)?;
+    let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
+    let Row { bytes, bad, rays, reuse, .. } = row;
+    let report =
+        FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad };
+    Ok(Some(report))
 }
 
 /// What an audit found, with the figures that it amounts to.
