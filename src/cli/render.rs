@@ -86,7 +86,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     };
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
-    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool, order: &order };
+    let job =
+        Frames { request: &request, target: &target, plan: &plan, pool: &pool, order: &order };
     let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,

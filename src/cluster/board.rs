@@ -31,8 +31,6 @@ pub struct Board {
     idle: BTreeSet<u32>,
     /// Members whose hands changed since work was last given out.
     touched: BTreeSet<u32>,
-    /// Tasks that nobody was given.
-    waiting: usize,
     /// Tasks that are not made.
     left: usize,
     most_strips: u32,
@@ -155,7 +153,6 @@ impl Board {
             to_join: Vec::new(),
             idle: order.iter().copied().collect(),
             touched: BTreeSet::new(),
-            waiting: originals.len(),
             left: originals.len(),
             most_strips: maker.most_strips(),
             tells_all: maker.tells_all(),

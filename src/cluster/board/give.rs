@@ -2,9 +2,6 @@
 
 use super::{Board, Cut, Errand, Order, State, Step, What};
 
-/// A rank gets a second errand ahead of time while there are so many waiting tasks a rank: then
-/// nobody waits for messages. Near the end it would only keep work from those who have none.
-const PLENTY: usize = 4;
 /// Strips for each rank that a frame is cut for, so that a slow rank does not hold the others.
 const STRIPS_A_RANK: usize = 2;
 
@@ -27,7 +24,9 @@ impl Board {
             next = self.idle.range(rank + 1..).next().copied();
         }
         for rank in std::mem::take(&mut self.touched) {
-            if self.waiting >= PLENTY * self.members.len() {
+            // So nobody waits for messages. Where little is ready it would only keep work from those
+            // who have none.
+            if self.ready.len() >= self.members.len() {
                 self.give_ahead(rank, &mut steps);
             }
         }
@@ -68,7 +67,9 @@ impl Board {
         // Of a batch that waits for another rank's reference no task is at hand: it is not searched
         // for long.
         let mut own = member.own.iter().take(2 * super::take::FEW);
-        let next = own.find(|t| self.tasks[**t].needs.iter().all(at_hand)).copied();
+        let fits =
+            |t: &&usize| self.tasks[**t].needs.iter().all(at_hand) && self.strips_of(**t) == 1;
+        let next = own.find(fits).copied();
         if let Some(t) = next {
             self.give_whole(rank, t, steps);
         }
@@ -85,16 +86,32 @@ impl Board {
         self.cut.iter().copied().min_by_key(lack)
     }
 
-    /// Into how many strips a task is cut: one where there are tasks for all that are idle. A frame
-    /// that nothing is made of is not worth sending its references about.
+    /// Into how many strips a task is cut: one where there are ready tasks for all. A key frame is
+    /// dear and takes no references to help with; another frame is cut where so many wait for it that
+    /// sending references about pays.
     fn strips_of(&self, t: usize) -> u32 {
         let task = &self.tasks[t];
-        let (idle, ready) = (self.idle.len(), self.ready.len().max(1));
-        if idle <= ready || (task.users.is_empty() && !task.needs.is_empty()) {
+        let ready = self.ready.len().max(1);
+        let helpers = match task.needs.is_empty() {
+            // Whoever has frames of its own to come back to stays with them.
+            true => 1 + self.members.iter().filter(|m| m.own.is_empty()).count(),
+            false => self.idle.len(),
+        };
+        if helpers <= ready {
             return 1;
         }
-        let ranks = idle.div_ceil(ready);
+        let ranks = helpers.div_ceil(ready);
+        if self.lacking(t, ranks) >= self.tree(t, task.owner).len() && !task.needs.is_empty() {
+            return 1;
+        }
         self.most_strips.min((STRIPS_A_RANK * ranks) as u32).max(1)
+    }
+
+    /// How many references `ranks` idle ranks lack together to make a task.
+    fn lacking(&self, t: usize, ranks: usize) -> usize {
+        let needs = || self.tasks[t].needs.iter();
+        let lack = |rank: &u32| needs().filter(|n| !self.tasks[**n].at.contains(rank)).count();
+        self.idle.iter().take(ranks).map(lack).sum()
     }
 
     fn give_whole(&mut self, rank: u32, t: usize, steps: &mut Vec<Step>) {
@@ -122,7 +139,6 @@ impl Board {
     }
 
     fn no_longer_waits(&mut self, t: usize) {
-        self.waiting -= 1;
         self.ready.remove(&t);
         self.members[self.tasks[t].owner as usize].own.remove(&t);
     }

@@ -57,19 +57,25 @@ impl Board {
         })
     }
 
-    /// Takes the ready task of `victim` that most of its batch depends on, with all that does.
+    /// Takes the ready task of `victim` that most of its batch depends on, with all that does: where
+    /// it is worth sending the references about that the rank lacks.
     fn take_tree(&mut self, victim: u32, rank: u32) -> Option<usize> {
         let own = self.members[victim as usize].own.iter().take(2 * FEW);
         let ready: Vec<usize> = own.copied().filter(|t| self.ready.contains(t)).collect();
         let trees = ready.into_iter().map(|t| (self.tree(t, victim), t));
         // Of equals the later one: the victim goes on from the front.
         let (tree, t) = trees.max_by_key(|(tree, t)| (tree.len(), *t))?;
+        let lacks = |need: &&usize| !self.tasks[**need].at.contains(&rank);
+        let lacking = self.tasks[t].needs.iter().filter(lacks).count();
+        if lacking > 2 * tree.len() {
+            return None;
+        }
         self.change_hands(&tree, victim, rank);
         Some(t)
     }
 
     /// `t` and what waits in its batch for it, as far as it is the victim's.
-    fn tree(&self, t: usize, victim: u32) -> Vec<usize> {
+    pub fn tree(&self, t: usize, victim: u32) -> Vec<usize> {
         let mut found = BTreeSet::from([t]);
         let mut next = vec![t];
         while let Some(task) = next.pop() {
