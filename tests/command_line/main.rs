@@ -3,9 +3,13 @@
 mod comparing;
 mod interrupted;
 mod job;
+#[cfg(feature = "mpi")]
+mod launch;
 mod ranks;
 mod references;
 mod rendering;
 mod reuse;
+#[cfg(feature = "mpi")]
+mod together;
 mod verify;
 mod words;
