@@ -67,7 +67,7 @@ impl Board {
         let (tree, t) = trees.max_by_key(|(tree, t)| (tree.len(), *t))?;
         let lacks = |need: &&usize| !self.tasks[**need].at.contains(&rank);
         let lacking = self.tasks[t].needs.iter().filter(lacks).count();
-        if lacking > 2 * tree.len() {
+        if lacking > tree.len() + 1 {
             return None;
         }
         self.change_hands(&tree, victim, rank);
