@@ -17,17 +17,37 @@ pub(super) struct Index {
     members: Vec<u32>,
     /// Open addressing: cell, first member, one past the last.
     table: Vec<(Key, u32, u32)>,
+    /// A bit for each cell, by its key; eight for each slot of the table.
+    present: Vec<u64>,
+}
+
+/// The cells of one level around a point.
+pub(super) struct Cells {
+    /// Their edge, scene units.
+    pub edge: f64,
+    keys: [Key; CELLS],
+}
+
+impl Cells {
+    /// Those of `level` that surround `p`, of mesh `geom_id`.
+    pub fn around(level: i32, geom_id: u32, p: DVec3) -> Self {
+        let edge = edge_of(level);
+        let [x, y, z] = cell_of(p - DVec3::splat(0.5 * edge), edge);
+        let cell = |k: i64| [x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)];
+        Self { edge, keys: std::array::from_fn(|k| key_of(level, geom_id, cell(k as i64))) }
+    }
 }
 
 impl Index {
-    /// Indexes those of `samples` whose numbers are `members`.
-    pub fn new(samples: &[Sample], members: Vec<u32>) -> Self {
+    /// Indexes those of `samples`, which lie as far from their neighbours as `footprints` say, whose
+    /// numbers are `members`.
+    pub fn new(samples: &[Sample], footprints: &[f32], members: Vec<u32>) -> Self {
         if members.is_empty() {
             return Self::default();
         }
         let key = |i: &u32| {
             let s = &samples[*i as usize];
-            let level = level_of(s.footprint);
+            let level = level_of(footprints[*i as usize]);
             key_of(level, s.geom_id, cell_of(s.position(), edge_of(level)))
         };
         let mut keyed: Vec<(Key, u32)> = members.iter().map(|i| (key(i), *i)).collect();
@@ -35,6 +55,7 @@ impl Index {
         let runs = keyed.chunk_by(|a, b| a.0 == b.0);
         let cells = runs.clone().count();
         let mut table = vec![(0, 0, 0); (2 * cells).next_power_of_two()];
+        let mut present = vec![0; table.len().div_ceil(8)];
         let mut first = 0;
         for run in runs {
             let mut at = run[0].0 as usize & (table.len() - 1);
@@ -43,37 +64,47 @@ impl Index {
             }
             table[at] = (run[0].0, first, first + run.len() as u32);
             first += run.len() as u32;
+            let bit = bit_of(run[0].0, &present);
+            present[bit / 64] |= 1 << (bit % 64);
         }
-        Self { members: keyed.into_iter().map(|(_, i)| i).collect(), table }
+        Self { members: keyed.into_iter().map(|(_, i)| i).collect(), table, present }
     }
 
-    /// Calls `found` with the samples of mesh `geom_id` in the cells of `level` around `p`.
-    pub fn around(&self, level: i32, geom_id: u32, p: DVec3, mut found: impl FnMut(u32)) {
-        if self.table.is_empty() {
-            return;
-        }
-        let edge = edge_of(level);
-        let corner = cell_of(p - DVec3::splat(0.5 * edge), edge);
-        for k in 0..CELLS as i64 {
-            let cell = [corner[0] + (k & 1), corner[1] + (k >> 1 & 1), corner[2] + (k >> 2)];
-            let key = key_of(level, geom_id, cell);
-            let mut at = key as usize & (self.table.len() - 1);
-            while self.table[at].2 != 0 {
-                let (there, first, end) = self.table[at];
-                if there == key {
-                    let members = &self.members[first as usize..end as usize];
-                    members.iter().for_each(|i| found(*i));
-                    break;
-                }
-                at = (at + 1) & (self.table.len() - 1);
+    /// The samples in `cells`.
+    pub fn members<'i>(&'i self, cells: &'i Cells) -> impl Iterator<Item = u32> + 'i {
+        let keys = cells.keys.iter().filter(|key| self.may_hold(**key));
+        keys.flat_map(|key| self.cell(*key)).copied()
+    }
+
+    /// Whether the cell is there, or another with the same bits: told by memory that stays in the
+    /// cache, since of the cells around a point most hold nothing.
+    fn may_hold(&self, key: Key) -> bool {
+        let bit = bit_of(key, &self.present);
+        self.present.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1)
+    }
+
+    fn cell(&self, key: Key) -> &[u32] {
+        let mut at = key as usize & (self.table.len() - 1);
+        while self.table[at].2 != 0 {
+            let (there, first, end) = self.table[at];
+            if there == key {
+                return &self.members[first as usize..end as usize];
             }
+            at = (at + 1) & (self.table.len() - 1);
         }
+        &[]
     }
 
     /// Bytes that it holds.
     pub fn memory(&self) -> u64 {
-        (4 * self.members.len() + size_of::<(Key, u32, u32)>() * self.table.len()) as u64
+        let table = size_of::<(Key, u32, u32)>() * self.table.len();
+        (4 * self.members.len() + table + 8 * self.present.len()) as u64
     }
+}
+
+/// The bit of a cell among those of `present`, whose length is a power of two, or 0.
+fn bit_of(key: Key, present: &[u64]) -> usize {
+    (key >> 32) as usize & (64 * present.len()).wrapping_sub(1)
 }
 
 /// The level whose cells are at least a footprint wide, and less than two.
@@ -102,8 +133,8 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
 
-    fn sample(p: Vec3, footprint: f32) -> Sample {
-        Sample { p, n: Vec3::Y, geom_id: 3, samples: 1, footprint }
+    fn sample(p: Vec3) -> Sample {
+        Sample { p, n: Vec3::Y, geom_id: 3, samples: 1 }
     }
 
     #[test]
@@ -118,12 +149,14 @@ mod tests {
     fn everything_within_half_a_cell_is_found_and_nothing_of_another_mesh() {
         let place = |i: usize| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32);
         let samples: Vec<Sample> =
-            (0..1000).map(|i| sample(place(i) * 0.1 - Vec3::splat(0.45), 0.12)).collect();
-        let index = Index::new(&samples, (0..1000).collect());
+            (0..1000).map(|i| sample(place(i) * 0.1 - Vec3::splat(0.45))).collect();
+        let index = Index::new(&samples, &[0.12; 1000], (0..1000).collect());
         let level = level_of(0.12);
         for p in [DVec3::ZERO, DVec3::new(0.11, -0.32, 0.4), DVec3::splat(-0.449)] {
-            let mut found = Vec::new();
-            index.around(level, 3, p, |i| found.push(i));
+            let found_in = |level, mesh| -> Vec<u32> {
+                index.members(&Cells::around(level, mesh, p)).collect()
+            };
+            let mut found = found_in(level, 3);
             let reach = 0.5 * edge_of(level);
             for (i, s) in samples.iter().enumerate() {
                 let near = (s.position() - p).abs().max_element() <= reach;
@@ -132,8 +165,8 @@ mod tests {
             found.sort_unstable();
             found.dedup();
             assert!(found.len() < 64 * 2, "{}", found.len());
-            index.around(level, 4, p, |_| panic!("another mesh"));
-            index.around(level + 1, 3, p, |_| panic!("another level"));
+            assert!(found_in(level, 4).is_empty(), "another mesh");
+            assert!(found_in(level + 1, 3).is_empty(), "another level");
         }
     }
 }

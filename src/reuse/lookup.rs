@@ -5,13 +5,14 @@
 //! sampled no more coarsely than the point itself. Their weights are renormalised; in each channel
 //! they must carry enough weight together and agree as well as their sampling noise allows.
 
-use super::index::{edge_of, level_of};
-use super::reference::{NONE, Reference, Sample};
-use crate::inference::{Inference, Origin, Questions, SurfacePoint};
-use crate::math::{DVec3, Vec3};
+use super::reference::{NONE, Reference};
+use super::taps::{ALWAYS, Images, Taps};
+use crate::inference::{Inference, Origin, Questions};
+use crate::math::Vec3;
 
-/// Samples that one point's answer is made of, at most.
-const MOST_TAPS: usize = 24;
+/// Points that are looked up together: the memory that all of them need is asked for before any of it
+/// is waited for.
+const TOGETHER: usize = 16;
 
 /// What counts as evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,9 +24,9 @@ pub struct Evidence {
     /// Least cosine between normals; samples count by the square of what is above it.
     pub least_cos: f32,
     /// Height above the tangent plane, footprints.
-    pub height: f64,
+    pub height: f32,
     /// Further height, of the distance along the plane.
-    pub slope: f64,
+    pub slope: f32,
     /// By how much a sample's area on the surface may exceed the point's.
     pub coarser: f64,
     /// Samples lie within two footprints, and further where the reference looks along the surface: as
@@ -79,219 +80,118 @@ pub struct Lookup<'a> {
     pub evidence: Evidence,
 }
 
-/// A sample that lies on the point's surface.
-#[derive(Clone, Copy)]
-struct Tap {
-    reference: u32,
-    sample: u32,
-    weight: f32,
-    /// From the point to the sample, footprints.
-    apart: Vec3,
-}
-
-#[derive(Clone, Copy)]
-struct Taps {
-    list: [Tap; MOST_TAPS],
-    len: usize,
-    weight: f64,
-}
-
-impl Taps {
-    const NONE: Self = Self {
-        list: [Tap { reference: 0, sample: 0, weight: 0.0, apart: Vec3::ZERO }; MOST_TAPS],
-        len: 0,
-        weight: 0.0,
-    };
-
-    fn push(&mut self, tap: Tap) {
-        if self.len < MOST_TAPS && tap.weight > 0.0 {
-            self.list[self.len] = tap;
-            self.len += 1;
-            self.weight += f64::from(tap.weight);
-        }
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &Tap> {
-        self.list[..self.len].iter()
-    }
-}
-
 impl Inference for Lookup<'_> {
     fn infer(&self, questions: &mut Questions) {
         let Questions { points, unshadowed, ratios, origins } = questions;
         let channels = self.rays.len();
-        let lights = unshadowed.chunks_exact(channels).zip(ratios.chunks_exact_mut(channels));
-        for ((point, (shown, ratios)), origin) in points.iter().zip(lights).zip(origins) {
-            if shown.iter().all(|s| *s == 0.0) {
-                continue;
-            }
-            let taps = self.taps(point);
-            if taps.weight >= self.evidence.least_weight {
-                self.answer(&taps, shown, ratios);
-                *origin = self.origin(&taps);
+        let each = points
+            .chunks(TOGETHER)
+            .zip(unshadowed.chunks(TOGETHER * channels))
+            .zip(ratios.chunks_mut(TOGETHER * channels))
+            .zip(origins.chunks_mut(TOGETHER));
+        let mut taps = Taps::new();
+        for (((points, unshadowed), ratios), origins) in each {
+            let shown = |i: usize| &unshadowed[i * channels..][..channels];
+            let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
+            let mut images: [Images; TOGETHER] = [[None; ALWAYS]; TOGETHER];
+            self.find_images(points, is_lit, &mut images);
+            for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
+                self.gather(point, &images[i], &mut taps);
+                if taps.weight >= self.evidence.least_weight {
+                    self.answer(&taps, shown(i), &mut ratios[i * channels..][..channels]);
+                    origins[i] = self.origin(&taps);
+                }
             }
         }
     }
 }
 
+/// What the taps tell of one light.
+#[derive(Clone, Copy, Default)]
+struct Told {
+    /// Sum of the weights of the taps that know it.
+    weight: f32,
+    /// Weighted mean of their ratios.
+    mean: f32,
+    /// Weighted mean of the squared distances from that.
+    variance: f32,
+    /// Weighted mean of their camera samples.
+    samples: f32,
+    /// How far their weighted mean lies from the point, footprints.
+    offset: f32,
+}
+
 impl Lookup<'_> {
-    fn taps(&self, point: &SurfacePoint) -> Taps {
-        let mut taps = Taps::NONE;
-        for (number, reference) in self.references.iter().enumerate() {
-            if number >= 2 && taps.weight >= self.evidence.enough_weight {
-                break;
-            }
-            self.screen_taps(number as u32, reference, point, &mut taps);
-        }
-        if !point.direct {
-            for (number, reference) in self.references.iter().enumerate() {
-                if taps.weight >= self.evidence.enough_weight {
-                    break;
-                }
-                self.index_taps(number as u32, reference, point, &mut taps);
-            }
-        }
-        taps
-    }
-
-    /// The four samples around the point's image in the reference.
-    fn screen_taps(
-        &self,
-        number: u32,
-        reference: &Reference,
-        point: &SurfacePoint,
-        taps: &mut Taps,
-    ) {
-        let camera = &reference.camera;
-        let Some((x, y, depth)) = camera.project(point.p) else { return };
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-        if !(left >= -1.0 && top >= -1.0 && left < width && top < height) {
-            return;
-        }
-        let n = point.n.as_dvec3();
-        let to_eye = camera.eye - point.p;
-        let cos = (n.dot(to_eye) / to_eye.length()).max(0.02);
-        let footprint = depth * reference.pixel_size;
-        let own = f64::from(point.footprint);
-        let own_area = own * own / if point.direct { f64::from(point.cos).max(0.02) } else { 1.0 };
-        if footprint * footprint / cos > self.evidence.coarser * own_area {
-            return;
-        }
-        let (fx, fy) = (x - left, y - top);
-        let reach = 2.0 * footprint / cos.max(self.evidence.grazing);
-        for k in 0..4 {
-            let (dx, dy) = (f64::from(k & 1), f64::from(k >> 1));
-            let (tx, ty) = (left + dx, top + dy);
-            if tx < 0.0 || ty < 0.0 || tx >= width || ty >= height {
-                continue;
-            }
-            let sample = reference.slots[ty as usize * camera.width as usize + tx as usize];
-            if sample == NONE {
-                continue;
-            }
-            let s = &reference.samples[sample as usize];
-            let Some(apart) = self.on_surface(point, n, s, footprint, reach) else { continue };
-            let wx = if dx > 0.0 { fx } else { 1.0 - fx };
-            let wy = if dy > 0.0 { fy } else { 1.0 - fy };
-            let apart = (apart / footprint).as_vec3();
-            let alike = self.alikeness(point, s);
-            let weight = (wx * wy) as f32 * alike * alike;
-            taps.push(Tap { reference: number, sample, weight, apart });
-        }
-    }
-
-    /// Samples near the point, by place.
-    fn index_taps(
-        &self,
-        number: u32,
-        reference: &Reference,
-        point: &SurfacePoint,
-        taps: &mut Taps,
-    ) {
-        let n = point.n.as_dvec3();
-        let footprint = f64::from(point.footprint);
-        let own = level_of(point.footprint);
-        for level in [own, own - 1] {
-            let reach = edge_of(level);
-            reference.index.around(level, point.geom_id, point.p, |sample| {
-                let s = &reference.samples[sample as usize];
-                let Some(apart) = self.on_surface(point, n, s, footprint, reach) else { return };
-                let weight = 0.5 * (1.0 - apart.length() / reach);
-                let apart = (apart / footprint).as_vec3();
-                taps.push(Tap { reference: number, sample, weight: weight as f32, apart });
-            });
-        }
-    }
-
-    /// From the point to a sample on its own surface; `None` where it is on another.
-    fn on_surface(
-        &self,
-        point: &SurfacePoint,
-        n: DVec3,
-        s: &Sample,
-        footprint: f64,
-        reach: f64,
-    ) -> Option<DVec3> {
-        if s.geom_id != point.geom_id || s.n.dot(point.n) < self.evidence.least_cos {
-            return None;
-        }
-        let apart = s.position() - point.p;
-        let distance = apart.length();
-        let height = apart.dot(n).abs();
-        let allowed = self.evidence.height * footprint + self.evidence.slope * distance;
-        (distance <= reach && height <= allowed).then_some(apart)
-    }
-
     /// Weighted means of the ratios that agree. `shown` is what the pixel would show of each light
     /// without shadows.
     fn answer(&self, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
+        // Of many lights the last are told twice.
+        let mut told = [Told::default(); 8];
         let mut seen = 0.0;
-        for (channel, out) in ratios.iter_mut().enumerate() {
-            let (mut weight, mut sum) = (0.0, 0.0);
-            for (tap, ratio) in self.known(taps, channel) {
-                weight += tap.weight;
-                sum += tap.weight * ratio;
+        for (channel, shown) in shown.iter().enumerate() {
+            let own = self.told(taps, channel);
+            if f64::from(own.weight) >= self.evidence.least_weight {
+                seen += shown * own.mean;
             }
-            if f64::from(weight) >= self.evidence.least_weight {
-                *out = sum / weight;
-                seen += shown[channel] * *out;
+            if let Some(kept) = told.get_mut(channel) {
+                *kept = own;
             }
         }
         let steps = steps_per_radiance(seen);
-        for (channel, out) in ratios.iter_mut().enumerate().filter(|(_, out)| !out.is_nan()) {
-            let allowed = self.evidence.tolerance / (steps * shown[channel]).max(1e-6);
-            if !self.agrees(taps, channel, *out, allowed) {
-                *out = f32::NAN;
+        for (channel, (out, shown)) in ratios.iter_mut().zip(shown).enumerate() {
+            let kept = told.get(channel).copied();
+            let own = kept.unwrap_or_else(|| self.told(taps, channel));
+            let allowed = self.evidence.tolerance / (steps * shown).max(1e-6);
+            if self.agrees(&own, channel, allowed) {
+                *out = own.mean;
             }
         }
     }
 
-    /// The taps whose ratio is known.
-    fn known<'t>(&'t self, taps: &'t Taps, channel: usize) -> impl Iterator<Item = (&'t Tap, f32)> {
-        taps.iter().filter_map(move |tap| {
-            let ratio = self.references[tap.reference as usize].ratio(tap.sample, channel);
-            (!ratio.is_nan()).then_some((tap, ratio))
-        })
+    fn told(&self, taps: &Taps, channel: usize) -> Told {
+        let mut first = f32::NAN;
+        let (mut weight, mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0, 0.0);
+        let mut apart = Vec3::ZERO;
+        for tap in taps.iter() {
+            let reference = self.references[tap.reference as usize];
+            let ratio = reference.ratio(tap.sample, channel);
+            if ratio.is_nan() {
+                continue;
+            }
+            if first.is_nan() {
+                first = ratio;
+            }
+            // From the first, so that equal ones give just that, and no variance.
+            let further = ratio - first;
+            weight += tap.weight;
+            sum += tap.weight * further;
+            squares += tap.weight * further * further;
+            samples += tap.weight * reference.samples[tap.sample as usize].samples as f32;
+            apart += tap.apart * tap.weight;
+        }
+        if weight == 0.0 {
+            return Told::default();
+        }
+        let (share, mean) = (1.0 / weight, sum / weight);
+        Told {
+            weight,
+            mean: first + mean,
+            variance: (squares * share - mean * mean).max(0.0),
+            samples: samples * share,
+            offset: apart.length() * share,
+        }
     }
 
-    /// Whether the taps of a channel lie no further from their `mean` than their sampling noise and
-    /// an `allowed` deviation explain.
-    fn agrees(&self, taps: &Taps, channel: usize, mean: f32, allowed: f32) -> bool {
-        let (mut weight, mut squares, mut rays) = (0.0, 0.0, 0.0);
-        let mut offset = Vec3::ZERO;
-        for (tap, ratio) in self.known(taps, channel) {
-            let sample = &self.references[tap.reference as usize].samples[tap.sample as usize];
-            weight += tap.weight;
-            squares += tap.weight * (ratio - mean) * (ratio - mean);
-            rays += tap.weight * sample.samples as f32;
-            offset += tap.apart * tap.weight;
+    /// Whether the ratios of a channel lie no further from their mean than their sampling noise and
+    /// an `allowed` deviation explain, and are enough.
+    fn agrees(&self, told: &Told, channel: usize, allowed: f32) -> bool {
+        let Told { weight, mean, variance, samples, offset } = *told;
+        if f64::from(weight) < self.evidence.least_weight {
+            return false;
         }
-        let rays = rays / weight * self.rays[channel] as f32;
+        let rays = samples * self.rays[channel] as f32;
         let noise = self.evidence.noise * (mean * (1.0 - mean)).max(0.0) / rays;
-        squares / weight <= allowed * allowed + noise
-            && offset.length() / weight <= self.most_offset(mean, allowed, noise)
+        variance <= allowed * allowed + noise && offset <= self.most_offset(mean, allowed, noise)
     }
 
     /// How far the samples' mean may lie from the point, footprints: the further, the less of an
@@ -305,12 +205,6 @@ impl Lookup<'_> {
         let dim = offset_steps * allowed / tolerance;
         let noisy = offset_noise * noise.sqrt();
         offset * dim.max(noisy).max(1.0)
-    }
-
-    /// 1 for a sample with the point's own normal, 0 where they are as far apart as can be.
-    fn alikeness(&self, point: &SurfacePoint, s: &Sample) -> f32 {
-        let least = self.evidence.least_cos;
-        ((s.n.dot(point.n) - least) / (1.0 - least)).clamp(0.0, 1.0)
     }
 
     fn origin(&self, taps: &Taps) -> Origin {

@@ -13,6 +13,7 @@ mod cost;
 mod index;
 mod lookup;
 mod reference;
+mod taps;
 pub mod store;
 
 pub use cost::{

@@ -2,8 +2,8 @@
 //!
 //! A block is 8 x 8 pixels at a fixed place of the image. Every batch of rays is made of one
 //! block's rays only, so that a pixel's bytes depend neither on the crop nor on the threads.
-//! Per block: camera rays in packets, specular rays one by one until none is left, then shadow
-//! rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
+//! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
+//! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
 use super::interior::{self, Interior};
 use super::lighting::{LitPoint, ShadowScratch};
@@ -47,8 +47,34 @@ pub(super) struct Scratch {
     next_rays: Vec<Ray>,
     next_states: Vec<PathState>,
     next_interiors: Vec<Interior>,
+    /// Branch of each next ray, and which it is.
+    order: Vec<(u32, u32)>,
     lit: Vec<LitPoint>,
     shadow: ShadowScratch,
+}
+
+impl Scratch {
+    /// Makes the next generation of rays the present one, branch by branch: what neighbouring pixels
+    /// reflect is coherent, what one of them reflects and refracts is not.
+    fn advance(&mut self) {
+        self.order.clear();
+        self.order.extend(self.next_states.iter().zip(0..).map(|(state, i)| (state.branch, i)));
+        self.order.sort_unstable();
+        gather(&self.order, &self.next_rays, &mut self.rays);
+        gather(&self.order, &self.next_states, &mut self.states);
+        gather(&self.order, &self.next_interiors, &mut self.interiors);
+        self.next_rays.clear();
+        self.next_states.clear();
+        self.next_interiors.clear();
+    }
+}
+
+/// Puts what `from` holds, if anything, into `to`, in `order`.
+fn gather<T: Copy>(order: &[(u32, u32)], from: &[T], to: &mut Vec<T>) {
+    to.clear();
+    if !from.is_empty() {
+        to.extend(order.iter().map(|(_, i)| from[*i as usize]));
+    }
 }
 
 /// Renders one block into `pixels`, which holds its radiance sums and records.
@@ -116,25 +142,16 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     scratch: &mut Scratch,
     counts: &mut RayCounts,
 ) {
-    let Scratch { rays, states, interiors, hits, lit, .. } = scratch;
-    let Scratch { next_rays, next_states, next_interiors, .. } = scratch;
-    lit.clear();
+    scratch.lit.clear();
     for depth in 0..=renderer.settings.bounces {
+        let Scratch { rays, states, interiors, hits, lit, .. } = scratch;
+        let Scratch { next_rays, next_states, next_interiors, .. } = scratch;
         hits.clear();
         hits.resize(rays.len(), None);
-        if depth == 0 {
-            renderer.intersector.intersect_batch(rays, hits, counts);
-            if pixels.wants_records() {
-                record(renderer, input, pixels, rays, hits, states);
-            }
-        } else {
-            for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
-                *hit = renderer.intersector.intersect(ray, counts);
-            }
+        renderer.intersector.intersect_batch(rays, hits, counts);
+        if depth == 0 && pixels.wants_records() {
+            record(renderer, input, pixels, rays, hits, states);
         }
-        next_rays.clear();
-        next_states.clear();
-        next_interiors.clear();
         let mut vertex =
             Vertex { renderer, pixels, lit, next_rays, next_states, next_interiors, counts };
         let may_bounce = depth < renderer.settings.bounces;
@@ -152,12 +169,10 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
                 }
             }
         }
-        if !(MIRROR || GLASS) || next_rays.is_empty() {
+        if !(MIRROR || GLASS) || scratch.next_rays.is_empty() {
             break;
         }
-        std::mem::swap(rays, next_rays);
-        std::mem::swap(states, next_states);
-        std::mem::swap(interiors, next_interiors);
+        scratch.advance();
     }
 }
 

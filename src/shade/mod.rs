@@ -19,9 +19,10 @@ mod scattered;
 mod surface;
 
 use crate::effects::EffectPlan;
-use crate::film::{Film, PixelSource};
+use crate::film::{Film, GPixel, PixelSource};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::intersect::Intersector;
+use crate::math::Rgb;
 use crate::sampling::PixelFilter;
 use crate::scene::{Camera, Filter, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
@@ -30,11 +31,11 @@ use kernel::Scratch;
 use light::AreaLight;
 pub(crate) use lighting::ShadowStarts;
 use pixels::{BLOCK, BlockPixels, FinishedPixel};
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's.
-const TILE: u32 = 32;
+/// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's. Larger ones leave
+/// threads idle at a frame's end: glass makes a tile cost twenty times its neighbour.
+const TILE: u32 = 16;
 /// Frames with fewer camera samples than this are cut into single blocks: a few tiles would not
 /// keep the threads equally busy.
 const SMALL: u64 = 8192;
@@ -135,13 +136,27 @@ struct Left {
     reuse: ReuseCounts,
 }
 
-/// One finished tile.
+/// One finished tile: its pixels in one order in all lists.
 #[derive(Default)]
 struct TileDone {
-    pixels: Vec<FinishedPixel>,
+    /// Where each pixel lies in the film.
+    places: Vec<u32>,
+    rgb: Vec<Rgb>,
+    /// Empty where none are asked for, as `sources`.
+    records: Vec<GPixel>,
+    sources: Vec<PixelSource>,
     rays: RayCounts,
     bad: BadSamples,
     left: Left,
+}
+
+impl TileDone {
+    fn push(&mut self, place: u32, pixel: &FinishedPixel, with_source: bool) {
+        self.places.push(place);
+        self.rgb.push(pixel.rgb);
+        self.records.extend(pixel.record);
+        self.sources.extend(with_source.then_some(pixel.source));
+    }
 }
 
 type BlockKernel =
@@ -195,7 +210,7 @@ impl Renderer<'_> {
             let mut state = start();
             tiles.iter().map(|tile| one(&mut state, tile)).collect()
         } else {
-            tiles.par_iter().map_init(start, one).collect()
+            take_turns(&tiles, start, one)
         };
         Some(assemble(job, done?))
     }
@@ -239,7 +254,9 @@ impl Renderer<'_> {
             }
             out.rays += kernel(self, input, pixels, scratch, &mut out.left);
             let finished = pixels.finished(self.settings.spp, self.settings.flag_bad);
-            out.pixels.extend(finished.filter(|p| part.is_in_crop(p.x, p.y)));
+            for pixel in finished.filter(|p| part.is_in_crop(p.x, p.y)) {
+                out.push(pixel.y * part.width + pixel.x, &pixel, input.reuse.is_some());
+            }
             let bad = pixels.bad().filter(|(x, y, _)| part.is_in_crop(*x, *y));
             bad.for_each(|(x, y, fault)| out.bad.count(fault, x, y));
         }
@@ -304,6 +321,30 @@ impl Part<'_> {
     }
 }
 
+/// Does `one` with all of `tiles` on the threads of the current rayon pool: each takes the next tile
+/// when it is done with one, so that none is left with a share that turns out dear. In the order of
+/// `tiles`; `None` as soon as `one` gives that.
+fn take_turns<S, T: Send>(
+    tiles: &[Rect],
+    start: impl Fn() -> S + Sync,
+    one: impl Fn(&mut S, &Rect) -> Option<T> + Sync,
+) -> Option<Vec<T>> {
+    let next = AtomicUsize::new(0);
+    let by_thread = rayon::broadcast(|_| {
+        let mut state = start();
+        let mut done = Vec::new();
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            let Some(tile) = tiles.get(i) else { return Some(done) };
+            done.push((i, one(&mut state, tile)?));
+        }
+    });
+    let by_thread: Option<Vec<Vec<(usize, T)>>> = by_thread.into_iter().collect();
+    let mut done: Vec<(usize, T)> = by_thread?.into_iter().flatten().collect();
+    done.sort_unstable_by_key(|(i, _)| *i);
+    Some(done.into_iter().map(|(_, tile)| tile).collect())
+}
+
 fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
     let mut film = Film::new(job.camera.width, job.camera.height, job.with_gbuffer);
     film.sources = job.reuse.map(|_| vec![PixelSource::default(); film.rgb.len()]);
@@ -314,15 +355,13 @@ fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
         film.bad += tile.bad;
         left.reuse += tile.left.reuse;
         left.sources.append(tile.left.sources);
-        for pixel in tile.pixels {
-            let index = film.index(pixel.x, pixel.y);
-            film.rgb[index] = pixel.rgb;
-            if let (Some(gbuffer), Some(record)) = (&mut film.gbuffer, pixel.record) {
-                gbuffer.set(index, &record);
-            }
-            if let Some(sources) = &mut film.sources {
-                sources[index] = pixel.source;
-            }
+        let places = || tile.places.iter().map(|place| *place as usize);
+        places().zip(&tile.rgb).for_each(|(at, rgb)| film.rgb[at] = *rgb);
+        if let Some(gbuffer) = &mut film.gbuffer {
+            places().zip(&tile.records).for_each(|(at, record)| gbuffer.set(at, record));
+        }
+        if let Some(sources) = &mut film.sources {
+            places().zip(&tile.sources).for_each(|(at, source)| sources[at] = *source);
         }
     }
     Rendered { film, rays, sources: left.sources, reuse: left.reuse }

@@ -59,7 +59,7 @@ impl EmbreeIntersector<'_> {
         let mut hit = self.trace::<W>(cast, valid, &mut found);
         if self.retries() {
             let missed = self.missed_near(cast, valid & !hit);
-            let mut doubtful = missed | self.back_faces(cast, hit, &found);
+            let mut doubtful = missed | self.doubtful_lanes(cast, hit, &found);
             for turn in TURNS {
                 let nearer = self.try_again::<W>(cast, &shifts, doubtful, turn, &mut found, counts);
                 hit |= nearer;
@@ -82,9 +82,10 @@ impl EmbreeIntersector<'_> {
         let mut packet = Packet::<W>::new();
         let mut hit = 0;
         for (k, rays) in rays.chunks(W).enumerate() {
-            let (mask, exclude) = fill(&mut packet, rays, valid >> (k * W));
-            let flags = QueryFlags { coherent: true, exclude, passed: &[] };
+            let (mask, _) = fill(&mut packet, rays, valid >> (k * W));
+            let flags = QueryFlags { coherent: true, exclude: false, passed: &[] };
             self.committed.intersect(&mask, &mut packet, rays, flags);
+            self.trace_past_own(rays, &mut packet);
             for lane in 0..rays.len() {
                 if let Some(candidate) = packet.hit(lane) {
                     found[k * W + lane] = candidate;
@@ -93,6 +94,23 @@ impl EmbreeIntersector<'_> {
             }
         }
         hit
+    }
+
+    /// Traces those rays again that met the triangle which they leave. Few do, since they start off
+    /// it, and a filter on every ray's candidates costs more.
+    fn trace_past_own<const W: usize>(&self, rays: &[Ray], packet: &mut Packet<W>) {
+        let mut mask = [0; W];
+        for (lane, ray) in rays.iter().enumerate() {
+            let is_triangle = (ray.exclude.geom_id as usize) < self.meshes.len();
+            if is_triangle && packet.hit(lane).is_some_and(|hit| hit.prim == ray.exclude) {
+                packet.set(lane, ray);
+                mask[lane] = -1;
+            }
+        }
+        if mask != [0; W] {
+            let flags = QueryFlags { coherent: false, exclude: true, passed: &[] };
+            self.committed.intersect(&mask, packet, rays, flags);
+        }
     }
 
     /// The lanes of `missed` that may all the same have met a triangle.
@@ -109,13 +127,14 @@ impl EmbreeIntersector<'_> {
         parts.filter(|part| come_near(*part)).fold(0, |near, part| near | part)
     }
 
-    /// The lanes of `hit` that met the back of a surface, unless all did: a ray from outside of a closed
-    /// surface meets its front first, if it did not slip through at a vertex. A camera inside of one
-    /// sees backs only, and they are no sign of anything.
-    fn back_faces(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
-        let back = each(hit).filter(|lane| self.is_back(&rays[*lane], &found[*lane]));
-        let back: Lanes = back.fold(0, |lanes, lane| lanes | 1 << lane);
-        if back == hit { 0 } else { back }
+    /// The lanes of `hit` that must have met something before. Of camera rays these are the ones that
+    /// met a back, unless all did: a camera inside of a surface sees backs only, and they are no sign
+    /// of anything.
+    fn doubtful_lanes(&self, rays: &[Ray], hit: Lanes, found: &[PacketHit; BLOCK]) -> Lanes {
+        let doubtful = each(hit).filter(|lane| self.is_doubtful(&rays[*lane], &found[*lane]));
+        let doubtful: Lanes = doubtful.fold(0, |lanes, lane| lanes | 1 << lane);
+        let from_camera = each(hit).all(|lane| rays[lane].exclude == PrimRef::NONE);
+        if doubtful == hit && from_camera { 0 } else { doubtful }
     }
 
     /// Whether the ray met a surface from inside.
