@@ -34,7 +34,7 @@ pub struct Duty {
     pub sent: Traffic,
 }
 
-/// Renders `plan.render`, on as many ranks as there are: rank 0 deals frames out, see [`Board`]; each
+/// Renders `plan.render`, on as many ranks as there are: rank 0 deals frames out, see `board.rs`; each
 /// rank writes the frames that it made, and rows in its own journal; rank 0 joins the journals.
 /// `order` lists the ranks, those of a node side by side. `done` hears on rank 0 of every finished
 /// frame of any rank. A rank on which `stop` was set tells the others, which stop after the blocks in

@@ -4,8 +4,8 @@
 //! initialised only when a launcher started the process and the feature `mpi` is compiled in. The
 //! bytes of a frame do not depend on who renders it.
 //!
-//! On every rank one thread, the [`worker`], renders, and the main thread, the [`clerk`], talks to
-//! other ranks meanwhile. Rank 0's clerk keeps the [`board`], which says who makes what and who sends
+//! On every rank one thread, the `worker`, renders, and the main thread, the `clerk`, talks to
+//! other ranks meanwhile. Rank 0's clerk keeps the `board`, which says who makes what and who sends
 //! which reference to whom; references travel from the rank that has them to the one that needs them
 //! (`docs/decisions/019-ranks.md`).
 
