@@ -7,9 +7,10 @@
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Light, Scene};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// A surface point whose light is wanted: where one or more camera samples of a pixel end.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePoint {
     /// The point; the mean where there are several samples.
     pub p: DVec3,
@@ -56,7 +57,7 @@ pub struct Questions {
 }
 
 /// A point that was traced: a source for other frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TracedPoint {
     /// Pixel column.
     pub x: u32,
@@ -67,7 +68,7 @@ pub struct TracedPoint {
 }
 
 /// Traced points with their ratios.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TracedPoints {
     /// The points.
     pub points: Vec<TracedPoint>,

@@ -76,6 +76,7 @@ impl Bed {
         let with_motion = pattern.format() == Format::Exr;
         let header = Header {
             manifest: FORMAT,
+            command: Vec::new(),
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),
@@ -117,7 +118,7 @@ impl Bed {
         maker.checkpoints = Some(&checkpoints);
         maker.expect(frames);
         let journal = manifest_path(&target.pattern);
-        render_frames(&target, &frames[..count], &journal, &maker, &mut |_| Ok(()))
+        render_frames(&target, &frames[..count], (0, &journal), &maker, &mut |_| Ok(()))
             .expect("renders");
         notes.extend(maker.notes());
         let frames = *traced.0.lock().expect("whole");

@@ -262,6 +262,10 @@ pub struct OutputArgs {
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_THREADS))]
     pub threads: Option<u32>,
+    /// Which ranks of an MPI job share a node: a file with a line `RANK NODE` for each; neighbouring
+    /// segments stay on one node [default: as the ranks share memory]
+    #[arg(long, value_name = "FILE")]
+    pub rank_map: Option<PathBuf>,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,

@@ -19,7 +19,7 @@ use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
 use crate::sequence::checkpoint::{self, Checkpoints};
 use crate::sequence::{
-    self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, SaveCost, Target, Tracer,
+    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
 };
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
@@ -77,6 +77,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
+    let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
@@ -91,7 +92,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     };
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
-    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
+    let job =
+        Frames { request: &request, target: &target, plan: &plan, pool: &pool, order: &order };
     let (outcome, reference_bytes, saved) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,
@@ -102,9 +104,12 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         reference_bytes,
         checkpoint_seconds: saved.seconds,
         checkpoint_bytes: saved.bytes,
+        duty: outcome.own,
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
+    // Whichever rank was asked to stop knows why.
+    let reasons = world.gather(&interrupt.reason())?;
     // A rank that was asked to stop when all its frames were finished has not stopped the job.
     let unfinished = world.from_root(|| Ok(outcome.unfinished))?;
     if !world.is_root() {
@@ -115,7 +120,8 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
     }
     if unfinished > 0 {
-        say_stopped(&job, &outcome, &interrupt.reason());
+        let reason = reasons.into_iter().find(|reason| !reason.is_empty());
+        say_stopped(&job, &outcome, &reason.unwrap_or_default());
         return Ok(Exit::Stopped);
     }
     checkpoint::clear(&target);
@@ -157,6 +163,8 @@ struct Frames<'a> {
     target: &'a Target,
     plan: &'a Plan,
     pool: &'a ThreadPool,
+    /// The ranks, node by node.
+    order: &'a [u32],
 }
 
 impl Frames<'_> {
@@ -176,13 +184,14 @@ impl Frames<'_> {
         let with_gbuffer = pattern.format() == Format::Exr;
         let checkpoints = self.checkpoints();
         let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
-        let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
+        let maker: Box<dyn Shared> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 maker.supplied = &self.request.references.list;
                 maker.checkpoints = Some(&checkpoints);
+                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
@@ -197,12 +206,13 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Off => {
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress: &watch })
+                let (progress, laid) = (&watch, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
             }
         };
         let done = |report: &_| watch.frame_done(report);
-        let outcome =
-            interrupt.watched(|| cluster::render(world, target, plan, &*maker, stop, &done));
+        let work = || cluster::render(world, self.order, target, plan, &*maker, stop, &done);
+        let outcome = interrupt.watched(work);
         watch.finish();
         tell(quiet, &maker.notes(), |n| say::note(n));
         if let (Err(error), true) = (&outcome, world.size() > 1) {

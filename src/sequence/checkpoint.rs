@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Version of the files.
@@ -81,22 +81,31 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// The reference of an original frame, if it is on disk, whole and this job's.
-    pub fn read(&self, frame: u32) -> Option<Reference> {
-        let mut found = self.in_frame(frame).or_else(|| self.in_file(frame))?;
+    /// Its bytes come with it.
+    pub fn read(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+        let (mut found, bytes) = self.in_frame(frame).or_else(|| self.in_file(frame))?;
         found.frame = frame;
-        Some(found)
+        Some((found, bytes))
     }
 
-    fn in_frame(&self, frame: u32) -> Option<Reference> {
-        let row = self.rows().get(&frame).filter(|_| self.frames_hold_all)?;
-        let recipe = self.target.recipes.get(frame)?.whole.to_string();
-        if row.stray.is_some() || row.recipe != recipe {
-            return None;
-        }
+    /// Whether there is such a file; it is not looked into.
+    pub fn has(&self, frame: u32) -> bool {
+        self.row(frame).is_some() || self.path(frame).exists()
+    }
+
+    fn in_frame(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+        let row = self.row(frame)?;
         let path = self.target.pattern.folder().join(&row.file);
         let whole = blake3::hash(&fs::read(&path).ok()?).to_hex().as_str() == row.blake3;
         let bytes = whole.then(|| exr::read_attribute(&path, ATTRIBUTE, LARGEST_FRAME))?;
-        self.decode(&path, &bytes.ok()??)
+        self.decode(&path, bytes.ok()??.into())
+    }
+
+    /// The row of a frame whose file holds its reference.
+    fn row(&self, frame: u32) -> Option<&Row> {
+        let row = self.rows().get(&frame).filter(|_| self.frames_hold_all)?;
+        let recipe = self.target.recipes.get(frame)?.whole.to_string();
+        (row.stray.is_none() && row.recipe == recipe).then_some(row)
     }
 
     /// What the manifest says. Ranks read it themselves, and only where a reference is missing.
@@ -105,7 +114,7 @@ impl<'a> Checkpoints<'a> {
         self.rows.get_or_init(|| read().map(|manifest| manifest.rows).unwrap_or_default())
     }
 
-    fn in_file(&self, frame: u32) -> Option<Reference> {
+    fn in_file(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
         let path = self.path(frame);
         let file = fs::File::open(&path).ok()?;
         let mut source = BufReader::new(file);
@@ -116,12 +125,12 @@ impl<'a> Checkpoints<'a> {
         }
         let mut bytes = Vec::new();
         source.read_to_end(&mut bytes).ok()?;
-        self.decode(&path, &bytes)
+        self.decode(&path, bytes.into())
     }
 
-    fn decode(&self, path: &Path, bytes: &[u8]) -> Option<Reference> {
-        match decode(path, bytes, self.terms, &self.recentring) {
-            Ok((reference, _)) => Some(reference),
+    fn decode(&self, path: &Path, bytes: Arc<[u8]>) -> Option<(Reference, Arc<[u8]>)> {
+        match decode(path, &bytes, self.terms, &self.recentring) {
+            Ok((reference, _)) => Some((reference, bytes)),
             Err(why) => {
                 self.note(format!("{why}; its frame is traced again"));
                 None

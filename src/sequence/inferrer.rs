@@ -1,9 +1,12 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
+mod exchange;
+
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
 use super::saved::Saved;
 use super::schedule::{Schedule, Stock};
+use super::shared::Laid;
 use super::supplied::with_supplied;
 use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
@@ -41,6 +44,10 @@ pub struct Inferrer<'a> {
     pub terms: Option<Terms>,
     /// Where references are kept for a job that goes on after this one; `None` for nowhere.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
+    /// On which terms frames serve other ranks as references; `None` where there are none.
+    pub exchange: Option<Terms>,
+    /// Frames that came as strips.
+    laid: Laid,
     pub(super) schedule: Schedule,
     pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
@@ -57,6 +64,8 @@ pub(super) struct State {
     again: Option<(u32, Made)>,
     pub(super) saved: Saved,
     most_memory: u64,
+    /// References for other ranks, until they are fetched.
+    pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
 }
 
 impl<'a> Inferrer<'a> {
@@ -88,6 +97,8 @@ impl<'a> Inferrer<'a> {
             supplied: &[],
             terms: None,
             checkpoints: None,
+            exchange: None,
+            laid: Laid::default(),
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -99,6 +110,33 @@ impl<'a> Inferrer<'a> {
     /// Renders an original from the references that it depends on, which are made first where they
     /// are not at hand; leaves a reference where one is needed.
     fn frame(&self, frame: u32) -> Result<Option<Made>> {
+        let camera = self.camera(frame)?;
+        let is_due = self.with_state(|s| s.references.is_due(frame));
+        let rendered = match self.laid.take(frame) {
+            Some(rendered) => Some(rendered),
+            None => self.rendered(frame, is_due, None, self.progress)?,
+        };
+        let Some(Rendered { film, rays, reuse, sources }) = rendered else { return Ok(None) };
+        // In one order, however the frame was cut for tracing, and as they come back from a file.
+        let sources = self.pool.install(|| sources.in_rows());
+        let kept = self.kept(frame, &camera, &sources);
+        if is_due {
+            let own = camera.to_scene(&self.renderer.scene.recentring);
+            let reference = Reference::new(frame, &own, &sources, self.channels.len());
+            self.with_state(|s| s.keep(&self.schedule, frame, reference));
+            self.leave(frame, &camera, &sources, kept.as_ref())?;
+        }
+        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+    }
+
+    /// Renders the pixels of an original that `mask` names, or all.
+    fn rendered(
+        &self,
+        frame: u32,
+        is_due: bool,
+        mask: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Rendered>> {
         let mut references = Vec::new();
         for other in self.schedule.ancestors(frame) {
             match self.reference(other)? {
@@ -114,29 +152,15 @@ impl<'a> Inferrer<'a> {
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
         let reuse = Reuse { channels: &self.channels, inference };
-        let is_due = self.with_state(|s| s.references.is_due(frame));
         let job = FrameJob {
             camera: &camera,
             stream: frame,
             with_gbuffer: self.with_gbuffer,
             reuse: (!self.channels.is_empty()).then_some(reuse),
-            mask: None,
+            mask,
             beyond_crop: is_due,
         };
-        let render = || self.renderer.render_job(&job, self.stop, self.progress);
-        let Some(rendered) = self.pool.install(render) else { return Ok(None) };
-        let Rendered { film, rays, reuse, sources } = rendered;
-        // In the order in which they would come back from a file.
-        let sources = self.pool.install(|| sources.in_rows());
-        let kept = self.kept(frame, &camera, &sources);
-        if is_due {
-            let reference = Reference::new(frame, &own, &sources, self.channels.len());
-            self.with_state(|s| s.keep(&self.schedule, frame, reference));
-            if self.pyramid.is_key(frame) {
-                self.save(frame, &camera, &sources, kept.as_ref())?;
-            }
-        }
-        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+        Ok(self.pool.install(|| self.renderer.render_job(&job, self.stop, progress)))
     }
 
     /// What the file of `frame` keeps for later jobs.
@@ -209,9 +233,18 @@ impl<'a> Inferrer<'a> {
 impl State {
     pub(super) fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
         self.references.keep(schedule, frame, || Arc::new(reference));
+        self.note_memory();
+    }
+
+    /// Takes in a reference that another rank made.
+    fn take(&mut self, frame: u32, reference: Reference) {
+        self.references.take(frame, Arc::new(reference));
+        self.note_memory();
+    }
+
+    fn note_memory(&mut self) {
         let held: u64 = self.references.held().map(|r| r.memory()).sum();
-        let pending = self.saved.memory();
-        self.most_memory = self.most_memory.max(held + pending);
+        self.most_memory = self.most_memory.max(held + self.saved.memory());
     }
 
     /// One more of an original that went out already.
@@ -248,12 +281,12 @@ impl FrameMaker for Inferrer<'_> {
             (Some(made), None) => made,
             (None, None) => match self.frame(original)? {
                 Some(made) => made,
-                None => return self.tend(true).map(|()| None),
+                None => return Ok(None),
             },
         };
         match self.audit(original, &mut made)? {
             Some(audit) => made.audit = audit,
-            None => return self.tend(true).map(|()| None),
+            None => return Ok(None),
         }
         if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
             // Its own file is about to hold it.
@@ -268,6 +301,10 @@ impl FrameMaker for Inferrer<'_> {
 
     fn expect(&self, frames: &[u32]) {
         self.with_state(|s| s.references.expect(&self.schedule, frames));
+    }
+
+    fn stopped(&self) -> Result<()> {
+        self.tend(true)
     }
 
     fn notes(&self) -> Vec<String> {

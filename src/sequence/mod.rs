@@ -18,6 +18,8 @@ mod recipe;
 mod resume;
 mod saved;
 mod schedule;
+mod shared;
+mod strips;
 mod supplied;
 pub mod survey;
 mod tracer;
@@ -29,6 +31,7 @@ pub use pyramid::Pyramid;
 pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{Plan, Target, prepare};
 pub use schedule::Schedule;
+pub use shared::{Laid, Shared, Strip};
 pub use tracer::Tracer;
 
 #[cfg(test)]
@@ -61,6 +64,15 @@ pub trait FrameMaker {
 
     /// Hears which frames it will be asked for, before the first of them.
     fn expect(&self, _frames: &[u32]) {}
+
+    /// Hears that no more frames will be asked for although some are not made: puts away what it
+    /// takes to go on later.
+    ///
+    /// # Errors
+    /// That cannot be written.
+    fn stopped(&self) -> Result<()> {
+        Ok(())
+    }
 
     /// What there is to tell about the frames made so far; each is told once.
     fn notes(&self) -> Vec<String> {
@@ -151,7 +163,7 @@ pub fn render_frames(
     target: &Target,
     frames: &[u32],
     (rank, journal): (u32, &Path),
-    maker: &dyn FrameMaker,
+    maker: &(impl FrameMaker + ?Sized),
     done: &mut dyn FnMut(&FrameReport) -> Result<()>,
 ) -> Result<()> {
     if frames.is_empty() {
@@ -159,17 +171,35 @@ pub fn render_frames(
     }
     let mut journal = Journal::open(journal)?;
     for &frame in frames {
-        let start = Instant::now();
-        let Some(made) = maker.make(frame)? else { break };
-        let trace_seconds = start.elapsed().as_secs_f64();
-        let audit = made.audit.map(|sums| audit_row(&sums));
-        let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
-        journal.append(&row)?;
-        let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-        let Row { bytes, bad, rays, reuse, .. } = row;
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })?;
+        let Some(report) = render_frame(target, frame, (rank, &mut journal), maker)? else {
+            return maker.stopped();
+        };
+        done(&report)?;
     }
     Ok(())
+}
+
+/// Renders `frame` into `target`, its row, as one of rank `rank`, into `journal`; `None` when `maker` gives no film.
+///
+/// # Errors
+/// Whatever making or writing the frame met.
+pub fn render_frame(
+    target: &Target,
+    frame: u32,
+    (rank, journal): (u32, &mut Journal),
+    maker: &(impl FrameMaker + ?Sized),
+) -> Result<Option<FrameReport>> {
+    let start = Instant::now();
+    let Some(made) = maker.make(frame)? else { return Ok(None) };
+    let trace_seconds = start.elapsed().as_secs_f64();
+    let audit = made.audit.map(|sums| audit_row(&sums));
+    let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
+    journal.append(&row)?;
+    let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
+    let Row { bytes, bad, rays, reuse, .. } = row;
+    let report =
+        FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad };
+    Ok(Some(report))
 }
 
 /// What an audit found, with the figures that it amounts to.

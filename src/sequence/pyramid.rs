@@ -121,6 +121,15 @@ impl Pyramid {
         segments.map(<[u32]>::to_vec).collect()
     }
 
+    /// The same, but a key frame lies in the list of the segment that it starts, in front. So where
+    /// each list is made by another rank, nobody waits for what another makes last.
+    pub fn shares(&self, frames: &[u32]) -> Vec<Vec<u32>> {
+        let started = |frame: &u32| (frame - 1) / self.segment;
+        let mut ordered = self.order(frames);
+        ordered.sort_by_key(|frame| (started(frame), !self.is_key(*frame)));
+        ordered.chunk_by(|a, b| started(a) == started(b)).map(<[u32]>::to_vec).collect()
+    }
+
     /// All frames of the shot.
     pub fn all(&self) -> RangeInclusive<u32> {
         1..=self.frames
@@ -208,5 +217,7 @@ mod tests {
         let pyramid = Pyramid { segment: 4, frames: 11 };
         let batches = pyramid.batches(&[2, 3, 7, 11, 5]);
         assert_eq!(batches, [vec![5, 3, 2], vec![7], vec![11]]);
+        let shares = pyramid.shares(&[2, 3, 7, 11, 5]);
+        assert_eq!(shares, [vec![3, 2], vec![5, 7], vec![11]]);
     }
 }

@@ -3,6 +3,7 @@
 //! Only those of key frames: they are dear, and serve long. The others would take more time to put on
 //! disk, one after every other frame, than the few of them that are lost take to be made again.
 
+use super::checkpoint::Checkpoints;
 use super::schedule::Stock;
 use super::{Inferrer, SaveCost};
 use crate::error::Result;
@@ -36,35 +37,48 @@ impl Inferrer<'_> {
         if self.with_state(|s| s.references.asked(frame)) > 0 {
             return None;
         }
-        let reference = self.pool.install(|| checkpoints.read(frame))?;
+        let (reference, bytes) = self.pool.install(|| checkpoints.read(frame))?;
         self.with_state(|s| {
+            if self.exchange.is_some() {
+                s.exports.insert(frame, bytes);
+            }
             s.saved.on_disk.insert(frame);
             s.keep(&self.schedule, frame, reference);
             s.references.get(frame).cloned()
         })
     }
 
-    /// Keeps the new reference of a key frame as bytes, and puts it on disk with others once too much would be lost
-    /// without. `kept` is what the frame's file will hold.
-    pub(super) fn save(
+    /// Keeps the new reference of a frame as bytes where they may be wanted: for other ranks, and a key
+    /// frame's for a job that goes on after this one. `kept` is what the frame's file will hold.
+    pub(super) fn leave(
         &self,
         frame: u32,
         camera: &Camera,
         traced: &TracedPoints,
         kept: Option<&Arc<[u8]>>,
     ) -> Result<()> {
-        let Some(checkpoints) = self.checkpoints.filter(|c| c.every.is_some()) else {
+        let saves = |c: &&Checkpoints| c.every.is_some() && self.pyramid.is_key(frame);
+        let saved = self.checkpoints.filter(saves);
+        let Some(terms) = self.exchange.as_ref().or(saved.map(|c| c.terms)) else {
             return Ok(());
         };
         let start = Instant::now();
-        let bytes = match kept.filter(|_| checkpoints.frames_hold_all) {
-            Some(bytes) => Some(bytes.clone()),
-            None => self.encode(checkpoints.terms, frame, camera, None, traced),
+        // A cropped frame's file holds less.
+        let bytes = match kept.filter(|_| self.renderer.settings.crop.is_none()) {
+            Some(bytes) => Some(Arc::clone(bytes)),
+            None => self.encode(terms, frame, camera, None, traced),
         };
-        if let Some(bytes) = bytes {
-            self.with_state(|s| s.saved.pending.insert(frame, bytes));
+        let Some(bytes) = bytes else { return Ok(()) };
+        if self.exchange.is_some() {
+            self.with_state(|s| s.exports.insert(frame, Arc::clone(&bytes)));
         }
-        self.with_state(|s| s.saved.cost.seconds += start.elapsed().as_secs_f64());
+        if saved.is_none() {
+            return Ok(());
+        }
+        self.with_state(|s| {
+            s.saved.pending.insert(frame, bytes);
+            s.saved.cost.seconds += start.elapsed().as_secs_f64();
+        });
         self.tend(false)
     }
 
