@@ -15,7 +15,9 @@ use tweenray::reuse;
 use tweenray::reuse::store::Terms;
 use tweenray::scene::{FrameRange, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
-use tweenray::sequence::{FrameMaker, Inferrer, Pyramid, Recipes, Target, prepare, render_frames};
+use tweenray::sequence::{
+    FrameMaker, Inferrer, Pyramid, Recipes, Shared, Target, prepare, render_frames,
+};
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
 
@@ -97,6 +99,15 @@ impl Bed {
 
     /// A process as it were, that expects `frames` and makes the first `count` of them.
     fn run(&self, frames: &[u32], count: usize) -> Run {
+        self.process(|maker, target, _| {
+            maker.expect(frames);
+            let journal = manifest_path(&target.pattern);
+            render_frames(target, &frames[..count], (0, &journal), maker, &mut |_| Ok(()))
+                .expect("renders");
+        })
+    }
+
+    fn process(&self, act: impl FnOnce(&mut Inferrer, &Target, &Terms)) -> Run {
         let target = self.target();
         let settings = &self.settings;
         let mut notes = prepare(&target, ALL).expect("ready").notes;
@@ -116,10 +127,7 @@ impl Bed {
         maker.with_gbuffer = self.ending == "exr";
         maker.terms = maker.with_gbuffer.then(|| terms.clone());
         maker.checkpoints = Some(&checkpoints);
-        maker.expect(frames);
-        let journal = manifest_path(&target.pattern);
-        render_frames(&target, &frames[..count], (0, &journal), &maker, &mut |_| Ok(()))
-            .expect("renders");
+        act(&mut maker, &target, &terms);
         notes.extend(maker.notes());
         let frames = *traced.0.lock().expect("whole");
         Run { frames: frames.round(), notes }
@@ -164,6 +172,29 @@ fn references_are_read_and_the_frame_is_the_same() {
         let run = bed.run(&[2], 1);
         assert_eq!((run.frames, &run.notes[..]), (frames, &[][..]), "{ending}");
         assert!(bed.frame(2) == undisturbed(ending, crop), "{ending}");
+    }
+}
+
+#[test]
+fn references_go_from_disk_to_other_ranks_without_a_ray() {
+    for (ending, on_disk) in [("png", &[1, 9][..]), ("exr", &[1, 9, 5, 3])] {
+        let bed = killed(ending, None);
+        let run = bed.process(|maker, _, terms| {
+            maker.exchange = Some(terms.clone());
+            let found: Vec<u32> = (1..=17).filter(|f| maker.lies_on_disk(*f)).collect();
+            let mut expected = on_disk.to_vec();
+            expected.sort_unstable();
+            assert_eq!(found, expected);
+            for frame in on_disk {
+                maker.hold(*frame);
+                assert!(maker.make_source(*frame).expect("read"));
+                let sent = maker.export(*frame).expect("bytes");
+                let file = fs::read(bed.reference(1)).unwrap_or_default();
+                assert!(*frame != 1 || file.is_empty() || file.ends_with(&sent));
+                maker.import(*frame, &sent);
+            }
+        });
+        assert_eq!(run.frames, 0.0, "{ending}");
     }
 }
 

@@ -10,6 +10,7 @@ struct Frames {
     pyramid: Pyramid,
     is_lone: bool,
     strips: u32,
+    on_disk: Vec<u32>,
 }
 
 impl FrameMaker for Frames {
@@ -28,6 +29,14 @@ impl FrameMaker for Frames {
 impl Shared for Frames {
     fn needs(&self, original: u32) -> Vec<u32> {
         if self.is_lone { Vec::new() } else { self.pyramid.ancestors(original) }
+    }
+
+    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+        if self.is_lone { self.batches(originals) } else { self.pyramid.shares(originals) }
+    }
+
+    fn lies_on_disk(&self, original: u32) -> bool {
+        self.on_disk.contains(&original)
     }
 
     fn most_strips(&self) -> u32 {
@@ -106,7 +115,7 @@ fn play(frames: &Frames, wanted: &[u32], pace: &[f64]) -> Played {
 }
 
 fn segments(segment: u32, frames: u32) -> Frames {
-    Frames { pyramid: Pyramid { segment, frames }, is_lone: false, strips: 16 }
+    Frames { pyramid: Pyramid { segment, frames }, is_lone: false, strips: 16, on_disk: Vec::new() }
 }
 
 #[test]
@@ -152,6 +161,21 @@ fn ranks_without_a_segment_help_with_those_of_others() {
     assert!(play(&lone, &[1, 2, 3], &[1.0; 8]).seconds < 0.5);
     let whole = Frames { strips: 1, ..lone };
     assert!((play(&whole, &[1, 2, 3], &[1.0; 8]).seconds - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_lies_on_disk_is_neither_cut_nor_made_of_anything() {
+    let made_anew = play(&segments(64, 65), &[2], &[1.0; 4]);
+    assert!(made_anew.strips > 0);
+    let on_disk = vec![1, 65, 33, 17, 9, 5, 3];
+    let frames = Frames { on_disk, ..segments(64, 65) };
+    let played = play(&frames, &[2], &[1.0; 4]);
+    assert_eq!((played.made, played.strips), (vec![2], 0));
+    // All but those that the rank read itself.
+    assert!(played.sends < 7, "{}", played.sends);
+    // What is rendered anyway is not read.
+    let again = play(&frames, &[1, 2], &[1.0; 4]);
+    assert_eq!(again.made, [1, 2]);
 }
 
 #[test]
