@@ -23,7 +23,7 @@ use crate::sequence::{
 };
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
-use clap::Args;
+use clap::{Args, Command, FromArgMatches};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::time::Instant;
 
@@ -44,11 +44,25 @@ Examples:
   mpirun -n 4 tweenray render scene.toml")]
 pub struct RenderArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub scene: SceneArgs,
     #[command(flatten)]
-    output: OutputArgs,
+    pub output: OutputArgs,
     #[command(flatten)]
-    settings: SettingArgs,
+    pub settings: SettingArgs,
+}
+
+/// The arguments of this command for `scene`, with the options in `words`.
+///
+/// Errors: `Error::Usage`: these are no options of the command.
+pub fn parse(scene: &str, words: &[String]) -> Result<RenderArgs> {
+    let command = RenderArgs::augment_args(Command::new("tweenray render"));
+    let words = ["tweenray render", scene].into_iter().chain(words.iter().map(String::as_str));
+    let parsed = command.try_get_matches_from(words);
+    let parsed = parsed.and_then(|found| RenderArgs::from_arg_matches(&found));
+    parsed.map_err(|wrong| {
+        let text = wrong.to_string();
+        Error::Usage(text.trim().trim_start_matches("error: ").into())
+    })
 }
 
 /// Runs the command.

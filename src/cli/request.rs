@@ -66,10 +66,7 @@ impl Request {
         machine::best_isa()?;
         let loaded = job::load(scene, settings)?;
         let frames = frames(output, &loaded)?;
-        let name =
-            output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
-        let name = name.unwrap_or_else(|| default_output(&scene.scene));
-        let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
+        let pattern = pattern(scene, output, &loaded, frames)?;
         let video = output.video || (loaded.video && !output.no_video);
         let stats = output.stats.clone().or(loaded.stats);
         refuse_input(stats.as_deref(), &loaded.files)?;
@@ -193,8 +190,20 @@ fn uploads(
     files.iter().map(read).collect()
 }
 
+/// Where `frames` go: by option, else by scene file, else a folder named after the scene.
+pub fn pattern(
+    scene: &SceneArgs,
+    output: &OutputArgs,
+    loaded: &Loaded,
+    frames: FrameRange,
+) -> Result<FramePattern> {
+    let name = output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
+    let name = name.unwrap_or_else(|| default_output(&scene.scene));
+    FramePattern::parse(&name, frames.last - frames.first + 1)
+}
+
 /// The frames asked for: by option, else by scene file, else all.
-fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
+pub fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
     let count = loaded.shot.frames;
     let all = FrameRange { first: 1, last: count };
     let range = match output.frames {

@@ -176,7 +176,7 @@ impl<'a> Checkpoints<'a> {
 }
 
 /// The folder of a sequence's references.
-fn folder(pattern: &FramePattern) -> PathBuf {
+pub fn folder(pattern: &FramePattern) -> PathBuf {
     let shown = manifest::beside(pattern, ".references");
     let name = shown.file_name().unwrap_or_default().to_string_lossy();
     shown.with_file_name(format!(".{name}"))
