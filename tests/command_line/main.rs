@@ -14,6 +14,7 @@ mod regrouped;
 mod rendering;
 mod resumed;
 mod reuse;
+mod slurm;
 #[cfg(feature = "mpi")]
 mod together;
 mod verify;
