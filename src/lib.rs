@@ -26,6 +26,7 @@ pub mod inference;
 pub mod intersect;
 pub mod measure;
 pub mod output;
+pub mod page;
 
 // Floor 4: radiance along a ray; what earlier rays already told.
 pub mod reuse;
@@ -35,7 +36,8 @@ pub mod shade;
 pub mod sequence;
 pub mod verify;
 
-// Floor 6: who renders which frames.
+// Floor 6: who renders which frames; settings side by side.
+pub mod accuracy;
 pub mod cluster;
 
 // Floor 7: the command line.

@@ -94,6 +94,11 @@ pub fn memory() -> Option<u64> {
     kilobytes("/proc/meminfo", "MemTotal:")
 }
 
+/// Processes that wanted a core over the last minute, on the mean.
+pub fn load() -> Option<f64> {
+    fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.parse().ok()
+}
+
 /// Most memory that this process held at once, bytes.
 pub fn peak_memory() -> Option<u64> {
     // Some kernels (gVisor) answer 0.

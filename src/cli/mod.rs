@@ -3,6 +3,7 @@
 //! Only this room talks to people; nothing below it knows of arguments or prints. Results go to
 //! stdout; progress, warnings and errors to stderr.
 
+mod accuracy;
 mod args;
 mod compare;
 mod convert;
@@ -14,11 +15,14 @@ mod machine;
 mod progress;
 mod references;
 mod render;
+mod report;
 mod request;
 mod say;
 mod schema;
 mod signals;
+mod slurm;
 mod stats;
+mod status;
 mod values;
 mod verify;
 
@@ -34,8 +38,12 @@ use std::process::ExitCode;
 Examples:
   tweenray render bunny.obj
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16
+  tweenray status out/
+  tweenray slurm scene.toml --nodes 4 --time 30m | sbatch
   tweenray inspect scene.toml
   tweenray compare out/frame_0001.png other.png
+  tweenray accuracy scene.toml -o accuracy
+  tweenray report out/scene
 
 `tweenray COMMAND --help` says more.")]
 struct Arguments {
@@ -46,10 +54,14 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
+    Status(status::StatusArgs),
+    Slurm(slurm::SlurmArgs),
     Inspect(Box<inspect::InspectArgs>),
     Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
     Convert(convert::ConvertArgs),
+    Accuracy(Box<accuracy::AccuracyArgs>),
+    Report(report::ReportArgs),
     Schema(schema::SchemaArgs),
 }
 
@@ -84,10 +96,14 @@ pub fn run() -> ExitCode {
 fn dispatch(command: &Command) -> Exit {
     let result = match command {
         Command::Render(args) => return render::run(args),
+        Command::Status(args) => status::run(args),
+        Command::Slurm(args) => slurm::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Accuracy(args) => accuracy::run(args),
+        Command::Report(args) => report::run(args),
         Command::Schema(args) => schema::run(args),
     };
     ended(result)
@@ -99,6 +115,16 @@ fn ended(result: Result<Exit>) -> Exit {
         say::error(&error);
         Exit::of(&error)
     })
+}
+
+/// The words that started this process, the program by its name alone.
+fn words() -> Vec<String> {
+    let mut words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = words.first_mut() {
+        *program = "tweenray".into();
+    }
+    words
 }
 
 #[cfg(test)]

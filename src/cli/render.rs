@@ -17,20 +17,25 @@ use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
+use crate::sequence::checkpoint::{self, Checkpoints};
+use crate::sequence::{
+    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
+};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
-use clap::Args;
+use clap::{Args, Command, FromArgMatches};
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Render the frames of a camera move
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every option can also stand in the scene file; the command line wins.
+Most options can also stand in the scene file; the command line wins.
 Frames that exist with the same settings are kept, so the same command goes on where it stopped.
 
+`tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
+
+SIGINT, SIGTERM and SIGUSR1 stop the job; a second SIGINT or SIGTERM ends it at once.
 Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed.
 
 Examples:
@@ -39,11 +44,25 @@ Examples:
   mpirun -n 4 tweenray render scene.toml")]
 pub struct RenderArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub scene: SceneArgs,
     #[command(flatten)]
-    output: OutputArgs,
+    pub output: OutputArgs,
     #[command(flatten)]
-    settings: SettingArgs,
+    pub settings: SettingArgs,
+}
+
+/// The arguments of this command for `scene`, with the options in `words`.
+///
+/// Errors: `Error::Usage`: these are no options of the command.
+pub fn parse(scene: &str, words: &[String]) -> Result<RenderArgs> {
+    let command = RenderArgs::augment_args(Command::new("tweenray render"));
+    let words = ["tweenray render", scene].into_iter().chain(words.iter().map(String::as_str));
+    let parsed = command.try_get_matches_from(words);
+    let parsed = parsed.and_then(|found| RenderArgs::from_arg_matches(&found));
+    parsed.map_err(|wrong| {
+        let text = wrong.to_string();
+        Error::Usage(text.trim().trim_start_matches("error: ").into())
+    })
 }
 
 /// Runs the command.
@@ -66,11 +85,13 @@ pub fn run(args: &RenderArgs) -> Exit {
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
+    interrupt.limit(args.output.time_limit);
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
     let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
+    let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
@@ -85,8 +106,9 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     };
     let plan = world.from_root(prepare)?;
     tell(quiet, &plan.notes, |n| say::note(n));
-    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
-    let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
+    let job =
+        Frames { request: &request, target: &target, plan: &plan, pool: &pool, order: &order };
+    let (outcome, reference_bytes, saved) = job.render(world, &*intersector, &interrupt, quiet)?;
     let rank = RankStats {
         threads,
         load_seconds: (loaded - start).as_secs_f64(),
@@ -94,21 +116,29 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         render_seconds: built.elapsed().as_secs_f64(),
         intersector_bytes: intersector.memory(),
         reference_bytes,
+        checkpoint_seconds: saved.seconds,
+        checkpoint_bytes: saved.bytes,
+        duty: outcome.own,
         peak_memory_bytes: None,
     };
     let ranks = world.gather(&rank.with_peak())?;
+    // Whichever rank was asked to stop knows why.
+    let reasons = world.gather(&interrupt.reason())?;
+    // A rank that was asked to stop when all its frames were finished has not stopped the job.
+    let unfinished = world.from_root(|| Ok(outcome.unfinished))?;
     if !world.is_root() {
-        let stopped = interrupt.stop.load(Ordering::Relaxed);
-        return Ok(if stopped { Exit::Stopped } else { Exit::Done });
+        return Ok(if unfinished > 0 { Exit::Stopped } else { Exit::Done });
     }
     if let Some(path) = &request.stats {
         let seconds = start.elapsed().as_secs_f64();
         stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
     }
-    if outcome.unfinished > 0 {
-        say_stopped(&job, &outcome);
+    if unfinished > 0 {
+        let reason = reasons.into_iter().find(|reason| !reason.is_empty());
+        say_stopped(&job, &outcome, &reason.unwrap_or_default());
         return Ok(Exit::Stopped);
     }
+    checkpoint::clear(&target);
     let done = finish(&job, &outcome, start, quiet)?;
     Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
 }
@@ -147,29 +177,35 @@ struct Frames<'a> {
     target: &'a Target,
     plan: &'a Plan,
     pool: &'a ThreadPool,
+    /// The ranks, node by node.
+    order: &'a [u32],
 }
 
 impl Frames<'_> {
-    /// What became of the frames, and the most memory that references took, bytes.
+    /// What became of the frames, the most memory that references took, bytes, and what it took to
+    /// put them on disk.
     fn render(
         &self,
         world: &World,
         intersector: &dyn Intersector,
         interrupt: &Interrupt,
         quiet: bool,
-    ) -> Result<(Outcome, u64)> {
+    ) -> Result<(Outcome, u64, SaveCost)> {
         let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
         let renderer = Renderer { scene, settings, plan: effects, intersector };
         let with_gbuffer = pattern.format() == Format::Exr;
+        let checkpoints = self.checkpoints();
         let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
-        let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
+        let maker: Box<dyn Shared> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 maker.supplied = &self.request.references.list;
+                maker.checkpoints = Some(&checkpoints);
+                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
@@ -184,19 +220,27 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Off => {
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress: &watch })
+                let (progress, laid) = (&watch, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
             }
         };
         let done = |report: &_| watch.frame_done(report);
-        let outcome =
-            interrupt.watched(|| cluster::render(world, target, plan, &*maker, stop, &done));
+        let work = || cluster::render(world, self.order, target, plan, &*maker, stop, &done);
+        let outcome = interrupt.watched(work);
         watch.finish();
+        tell(quiet, &maker.notes(), |n| say::note(n));
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.
             say::error(error);
             world.abort(Exit::of(error).code());
         }
-        Ok((outcome?, maker.reference_memory()))
+        Ok((outcome?, maker.reference_memory(), maker.save_cost()))
+    }
+
+    fn checkpoints(&self) -> Checkpoints<'_> {
+        let Request { scene, settings, terms, checkpoint, .. } = self.request;
+        let whole = settings.crop.is_none();
+        Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
     }
 
     fn total(&self) -> usize {
@@ -205,11 +249,11 @@ impl Frames<'_> {
 }
 
 /// Says how to go on.
-fn say_stopped(job: &Frames, outcome: &Outcome) {
+fn say_stopped(job: &Frames, outcome: &Outcome, reason: &str) {
     let finished = job.total() - outcome.unfinished;
     let again = if job.request.overwrite { " without --overwrite" } else { "" };
     say::aside(format_args!(
-        "stopped: {finished} of {} frames are finished in {}; the same command{again} goes on \
+        "stopped{reason}: {finished} of {} frames are finished in {}; the same command{again} goes on \
          from here",
         job.total(),
         job.target.pattern

@@ -11,9 +11,13 @@ use crate::output::manifest::{self, Header};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{Target, check_upload, fingerprint, world_fingerprint};
+use crate::sequence::{Recipes, Target, check_upload, fingerprint, world_fingerprint};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How much time of tracing a killed job may lose: docs/resume.md has the measurement.
+const CHECKPOINT: Duration = Duration::from_secs(30);
 
 /// Everything that rendering takes.
 pub struct Request {
@@ -37,6 +41,8 @@ pub struct Request {
     pub threads: Option<usize>,
     /// Where the statistics go, if anywhere.
     pub stats: Option<PathBuf>,
+    /// How much time of tracing a killed job may lose; `None` for any.
+    pub checkpoint: Option<Duration>,
     /// Whether frames get maps of reuse.
     pub maps: bool,
     /// On which terms frames serve as references.
@@ -49,6 +55,8 @@ pub struct Request {
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     scene_hash: String,
+    shot_hash: String,
+    recipes: Recipes,
 }
 
 impl Request {
@@ -58,22 +66,21 @@ impl Request {
         machine::best_isa()?;
         let loaded = job::load(scene, settings)?;
         let frames = frames(output, &loaded)?;
-        let name =
-            output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
-        let name = name.unwrap_or_else(|| default_output(&scene.scene));
-        let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
+        let pattern = pattern(scene, output, &loaded, frames)?;
         let video = output.video || (loaded.video && !output.no_video);
         let stats = output.stats.clone().or(loaded.stats);
         refuse_input(stats.as_deref(), &loaded.files)?;
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
         refuse_maps(output.maps, &settings)?;
-        let world_hash = world_fingerprint(&world);
-        let scene_hash = fingerprint(&world, &shot);
+        let scene_hash = world_fingerprint(&world);
+        let shot_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));
-        let terms = references::terms(&world_hash, &scene, &settings);
+        let terms = references::terms(&scene_hash, &scene, &settings);
+        let with_motion = pattern.format() == Format::Exr;
+        let recipes = Recipes::new(&shot, &settings, !terms.lights.is_empty(), with_motion)?;
         let references = References::read(&output.references, &pattern, &scene, &settings, &terms)?;
         Ok(Self {
             scene,
@@ -86,6 +93,7 @@ impl Request {
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
+            checkpoint: output.checkpoint.map_or(Some(CHECKPOINT), |interval| interval.0),
             maps: output.maps,
             references,
             terms,
@@ -93,6 +101,8 @@ impl Request {
             warnings,
             scene_name: path.display().to_string(),
             scene_hash,
+            shot_hash,
+            recipes,
         })
     }
 
@@ -134,28 +144,23 @@ impl Request {
             tweenray: env!("CARGO_PKG_VERSION").into(),
             scene: self.scene_name.clone(),
             scene_hash: self.scene_hash.clone(),
+            shot_hash: self.shot_hash.clone(),
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
+            command: super::words(),
             settings: self.header_settings(),
         };
         Target {
             pattern: self.pattern.clone(),
             header,
+            recipes: self.recipes.clone(),
             write: WriteOptions {
-                maps: self.maps.then(|| farthest(&self.settings)),
+                maps: self.maps.then(|| self.settings.reuse.farthest()),
                 ..WriteOptions::of(&self.settings, None)
             },
             overwrite: self.overwrite,
         }
-    }
-}
-
-/// The distance that maps paint as the farthest: in footprints under policy surface, else as a share.
-fn farthest(settings: &Settings) -> f32 {
-    match settings.reuse.policy {
-        Policy::Colour => settings.reuse.distance_epsilon.max(1e-6),
-        Policy::Surface | Policy::Off => 2.0,
     }
 }
 
@@ -185,8 +190,20 @@ fn uploads(
     files.iter().map(read).collect()
 }
 
+/// Where `frames` go: by option, else by scene file, else a folder named after the scene.
+pub fn pattern(
+    scene: &SceneArgs,
+    output: &OutputArgs,
+    loaded: &Loaded,
+    frames: FrameRange,
+) -> Result<FramePattern> {
+    let name = output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
+    let name = name.unwrap_or_else(|| default_output(&scene.scene));
+    FramePattern::parse(&name, frames.last - frames.first + 1)
+}
+
 /// The frames asked for: by option, else by scene file, else all.
-fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
+pub fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
     let count = loaded.shot.frames;
     let all = FrameRange { first: 1, last: count };
     let range = match output.frames {

@@ -4,7 +4,7 @@
 //! * [`compare`] takes two [`Image`](crate::film::Image)s and gives a [`Comparison`]:
 //!   [`mse`], RMSE, [`psnr`], [`largest_error`], [`ssim`], [`ssim_blocks`] and [`flip`].
 //! * [`proportion_interval`], [`proportion_upper_bound`] and [`mean_interval`] bound shares and
-//!   means at 95 % confidence.
+//!   means at 95 % confidence; [`median`] does so for the middle of a few times.
 //!
 //! **Which numbers are compared.** Two display-encoded files (png, ppm, jpeg) are compared as
 //! they are, in sRGB code values. Two linear files (exr, hdr) are compared in linear radiance
@@ -23,6 +23,7 @@ mod error_metrics;
 mod filter;
 mod flip;
 mod intervals;
+mod median;
 mod ssim;
 #[cfg(test)]
 mod test_images;
@@ -33,4 +34,5 @@ pub use flip::{PIXELS_PER_DEGREE, flip, flip_map};
 pub use intervals::{
     Interval, drawn_sum_interval, mean_interval, proportion_interval, proportion_upper_bound,
 };
+pub use median::{Median, median};
 pub use ssim::{ssim, ssim_blocks};

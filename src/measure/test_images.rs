@@ -48,7 +48,8 @@ pub fn scene(width: u32, height: u32) -> Image {
     })
 }
 
-/// Pairs of very different kinds: noise, shift, blur, colour cast, inversion, black and white.
+/// Ten pairs of very different kinds: noise, shift, blur, colour cast, inversion, black and white,
+/// and what renderers do: lone bright pixels, and errors that a display hardly shows.
 pub fn pairs() -> Vec<(&'static str, Image, Image)> {
     let base = scene(97, 64);
     let at = |x: u32, y: u32| base.rgb[(y * 97 + x) as usize];
@@ -60,6 +61,14 @@ pub fn pairs() -> Vec<(&'static str, Image, Image)> {
     let blurred = from_fn(97, 64, |x, y| {
         (at(x.saturating_sub(1), y) + at(x, y) + at((x + 1).min(96), y)) / 3.0
     });
+    let fireflies = from_fn(97, 64, |x, y| match noise(x, y, 7) {
+        n if n > 0.99 => Rgb::ONE,
+        _ => at(x, y),
+    });
+    let hardly = from_fn(97, 64, |x, y| {
+        let step = if noise(x, y, 3) > 0.5 { 1.0 } else { -1.0 };
+        (at(x, y) + Rgb::splat(step / 255.0)).clamp(Rgb::ZERO, Rgb::ONE)
+    });
     let cast = from_fn(97, 64, |x, y| at(x, y) * Rgb::new(1.0, 0.9, 0.8));
     let inverted = from_fn(97, 64, |x, y| Rgb::ONE - at(x, y));
     vec![
@@ -67,6 +76,8 @@ pub fn pairs() -> Vec<(&'static str, Image, Image)> {
         ("shift", base.clone(), shifted),
         ("blur", base.clone(), blurred),
         ("cast", base.clone(), cast),
+        ("fireflies", base.clone(), fireflies),
+        ("a display step", base.clone(), hardly),
         ("inversion", base, inverted),
         ("black and white", constant(40, 33, 0.0), constant(40, 33, 1.0)),
         ("green and blue", from_fn(23, 19, |_, _| Rgb::Y), from_fn(23, 19, |_, _| Rgb::Z)),

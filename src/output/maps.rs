@@ -3,6 +3,10 @@
 //! Each is a png beside its frame, `frame_0001_provenance.png`; in an exr frame they are channels of
 //! its own. Linear colours below.
 
+mod read;
+
+pub use read::of_exr;
+
 use super::exr::{Channel, Samples};
 use super::{Display, WriteOptions, Written, write_image};
 use crate::error::Result;
@@ -52,6 +56,26 @@ impl Map {
             Self::Frame => "frame",
             Self::Distance => "distance",
             Self::Audit => "audit",
+        }
+    }
+
+    /// What it shows, in a line.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Provenance => {
+                "Pink: traced. Red: inferred from earlier frames, blue: from later ones, grey: from \
+                 both. Dark: nothing to infer."
+            }
+            Self::Frame => {
+                "A colour for each reference frame that light comes from; white: another move's."
+            }
+            Self::Distance => {
+                "How far from the pixel's own point its light was found: black 0, white the farthest."
+            }
+            Self::Audit => {
+                "Where the audit looked: white right, red too bright, blue too dark, full at 16 \
+                 display steps."
+            }
         }
     }
 

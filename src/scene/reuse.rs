@@ -38,6 +38,17 @@ impl Default for ReuseSettings {
     }
 }
 
+impl ReuseSettings {
+    /// The distance that maps paint as the farthest: footprints of a pixel under policy surface, a
+    /// share of the distance under policy colour.
+    pub fn farthest(&self) -> f32 {
+        match self.policy {
+            Policy::Colour => self.distance_epsilon.max(1e-6),
+            Policy::Surface | Policy::Off => 2.0,
+        }
+    }
+}
+
 /// What frames take over from one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]

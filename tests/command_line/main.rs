@@ -3,9 +3,19 @@
 mod comparing;
 mod interrupted;
 mod job;
+mod killed;
+#[cfg(feature = "mpi")]
+mod launch;
+mod pages;
 mod ranks;
 mod references;
+#[cfg(feature = "mpi")]
+mod regrouped;
 mod rendering;
+mod resumed;
 mod reuse;
+mod slurm;
+#[cfg(feature = "mpi")]
+mod together;
 mod verify;
 mod words;

@@ -1,0 +1,77 @@
+//! The measured table asked the other way round: which setting for this error, for this time.
+
+use super::errors::Errors;
+use super::table::{Measured, Row};
+
+/// An error that is to be reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Goal {
+    /// At least this PSNR, dB.
+    Psnr(f64),
+    /// At least this SSIM.
+    Ssim(f64),
+    /// At most this FLIP.
+    Flip(f64),
+    /// At most this share of pixels off by more than 2 display steps.
+    MaxShare(f64),
+}
+
+impl Goal {
+    /// Whether `errors` reach it.
+    pub fn is_met(self, errors: &Errors) -> bool {
+        match self {
+            Self::Psnr(least) => errors.psnr >= least,
+            Self::Ssim(least) => errors.ssim >= least,
+            Self::Flip(most) => errors.flip <= most,
+            Self::MaxShare(most) => errors.share_over_2 <= most,
+        }
+    }
+}
+
+/// The fastest setting that reached `goal`, among those that may be recommended.
+pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
+    let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
+    reach.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
+}
+
+/// The setting nearest to the truth that took at most `most` seconds a frame, among those that may be
+/// recommended.
+pub fn best_within(measured: &Measured, most: f64) -> Option<&Row> {
+    let within = recommendable(measured).filter(|row| seconds(row) <= most);
+    within.min_by(|a, b| a.errors.mse.total_cmp(&b.errors.mse))
+}
+
+fn recommendable(measured: &Measured) -> impl Iterator<Item = &Row> {
+    measured.rows.iter().filter(|row| row.knob.is_ranked())
+}
+
+fn seconds(row: &Row) -> f64 {
+    row.seconds.median.interval.estimate
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::knobs::Knob;
+    use super::super::table::tests::measured;
+    use super::*;
+
+    #[test]
+    fn the_fastest_that_is_good_enough_and_the_best_that_is_fast_enough() {
+        let measured = measured(&[
+            (Knob::Default, "", 1.0, 2.0),
+            (Knob::CameraSamples, "--spp 16", 4.0, 0.5),
+            (Knob::Tolerance, "--tolerance 0.5", 1.3, 1.2),
+            (Knob::Retry, "--retry off", 0.1, 0.1),
+        ]);
+        let options = |row: Option<&Row>| row.map(|row| row.options.clone());
+        let psnr = |steps: f64| crate::measure::psnr((steps / 255.0) * (steps / 255.0)) - 1e-9;
+        let fastest = |goal| options(fastest_reaching(&measured, goal));
+        assert_eq!(fastest(Goal::Psnr(psnr(2.0))), Some(String::new()));
+        assert_eq!(fastest(Goal::Psnr(psnr(1.2))), Some("--tolerance 0.5".into()));
+        assert_eq!(fastest(Goal::Flip(0.5 / 255.0 + 1e-9)), Some("--spp 16".into()));
+        assert_eq!(fastest(Goal::Psnr(99.0)), None);
+        assert_eq!(fastest(Goal::MaxShare(0.0)), Some(String::new()));
+        assert_eq!(options(best_within(&measured, 1.3)), Some("--tolerance 0.5".into()));
+        assert_eq!(options(best_within(&measured, 0.5)), None);
+    }
+}

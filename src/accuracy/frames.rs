@@ -1,0 +1,93 @@
+//! Which frames are looked at, and how the frames of the move weigh.
+
+use crate::scene::{Policy, Settings};
+use crate::sequence::Pyramid;
+use std::collections::BTreeSet;
+
+/// Frames of a move of `count` that stand for all: the first, which is always traced whole, and two
+/// neighbours, so that flicker shows. All frames of a short move.
+pub fn chosen_frames(count: u32) -> Vec<u32> {
+    if count <= 4 {
+        return (1..=count).collect();
+    }
+    let third = (count / 3).max(2);
+    vec![1, third, third + 1]
+}
+
+/// How a setting cuts the move: into key frames and frames between.
+#[derive(Debug, Clone, Copy)]
+pub struct Cut(Option<Pyramid>, u32);
+
+impl Cut {
+    /// As `settings` cut a move of `frames` frames. `looks_up` says whether any light is looked up.
+    pub fn of(settings: &Settings, frames: u32, looks_up: bool) -> Self {
+        let segment = match settings.reuse.policy {
+            Policy::Off => None,
+            Policy::Surface => looks_up.then_some(settings.reuse.segment),
+            Policy::Colour => Some((frames - 1).max(1)),
+        };
+        Self(segment.map(|segment| Pyramid { segment, frames }), frames)
+    }
+
+    /// Whether `frame` is traced whole.
+    pub fn is_key(&self, frame: u32) -> bool {
+        self.0.is_none_or(|pyramid| pyramid.is_key(frame))
+    }
+
+    /// `frames` with all that they are inferred from.
+    pub fn with_ancestors(&self, frames: &[u32]) -> Vec<u32> {
+        let ancestors = |f: &u32| self.0.map_or(Vec::new(), |pyramid| pyramid.ancestors(*f));
+        let mut all: BTreeSet<u32> = frames.iter().flat_map(ancestors).collect();
+        all.extend(frames);
+        all.into_iter().collect()
+    }
+
+    /// The mean over the move of what was measured on some frames: the mean of each kind of frame,
+    /// weighed by how many of it the move has. A kind that was not measured is left out.
+    pub fn mean(&self, measured: impl Iterator<Item = (u32, f64)>) -> f64 {
+        let mut sums = [(0.0, 0.0); 2];
+        for (frame, value) in measured {
+            let (sum, count) = &mut sums[usize::from(self.is_key(frame))];
+            *sum += value;
+            *count += 1.0;
+        }
+        let keys = self.0.map_or(self.1, |pyramid| pyramid.keys());
+        let weights = [f64::from(self.1 - keys), f64::from(keys)];
+        let kinds = || sums.iter().zip(weights).filter(|((_, count), _)| *count > 0.0);
+        let total: f64 = kinds().map(|((sum, count), weight)| weight * sum / count).sum();
+        total / kinds().map(|(_, weight)| weight).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chosen_frames_hold_the_first_and_neighbours() {
+        assert_eq!(chosen_frames(3), [1, 2, 3]);
+        assert_eq!(chosen_frames(24), [1, 8, 9]);
+        for count in 1..200 {
+            let frames = chosen_frames(count);
+            assert!(
+                frames[0] == 1 && frames.windows(2).all(|w| w[0] < w[1]),
+                "{count}: {frames:?}"
+            );
+            assert!(frames.iter().all(|f| *f <= count));
+        }
+    }
+
+    #[test]
+    fn key_frames_weigh_by_their_number() {
+        let settings = Settings::default();
+        let cut = Cut::of(&settings, 65, true);
+        // Two key frames of 65.
+        let mean = cut.mean([(1, 10.0), (2, 1.0), (3, 3.0)].into_iter());
+        assert!((mean - (2.0 * 10.0 + 63.0 * 2.0) / 65.0).abs() < 1e-12);
+        assert_eq!(cut.mean([(2, 1.0)].into_iter()), 1.0);
+        assert_eq!(cut.with_ancestors(&[1, 17]), [1, 17, 33, 65]);
+        let off = Cut::of(&settings, 65, false);
+        assert_eq!(off.mean([(1, 1.0), (2, 3.0)].into_iter()), 2.0);
+        assert_eq!(off.with_ancestors(&[17]), [17]);
+    }
+}

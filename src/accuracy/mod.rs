@@ -1,0 +1,37 @@
+//! What accuracy costs in time, on the user's own scene.
+//!
+//! [`Sweep`] renders some frames at a converged reference and at every [`Candidate`], in turns, and
+//! gives [`Measured`]: errors against times, from which the program can also be asked for the fastest
+//! setting that reaches an error, or the best one within a time.
+//!
+//! Errors are those of display values: what is seen on a screen, in steps of 1/255. Times are seconds
+//! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
+//! and weighed by how many of it the move has.
+//!
+//! Nothing here is decided by a clock: times are only measured.
+//!
+//! Not done: knobs that the program does not have yet (adaptive sampling, texture filters, Embree's
+//! build quality).
+
+mod choice;
+mod errors;
+mod frames;
+mod knobs;
+mod oracle;
+mod reference;
+mod sentences;
+mod stage;
+mod sweep;
+mod table;
+mod trial;
+
+pub use choice::{Goal, best_within, fastest_reaching};
+pub use errors::Errors;
+pub use frames::chosen_frames;
+pub use knobs::{Candidate, Group, Knob, candidates};
+pub use oracle::{OracleCrop, on_a_crop};
+pub use reference::{Truth, converge, truth_settings};
+pub use sentences::{about_knob, about_oracle};
+pub use stage::Stage;
+pub use sweep::{Heard, Picture, Sweep};
+pub use table::{Measured, Row, Spread};

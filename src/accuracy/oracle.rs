@@ -1,0 +1,80 @@
+//! Embree against the oracle on a small crop: what trusting Embree is worth.
+
+use super::errors::Frames;
+use super::stage::Stage;
+use super::table::Change;
+use crate::error::Result;
+use crate::intersect::{Intersector, Oracle};
+use crate::scene::{Policy, Rect, Settings};
+use serde::Serialize;
+use std::time::Instant;
+
+/// Seconds that the oracle may take, roughly.
+const SECONDS: f64 = 10.0;
+/// Seconds that it holds one ray against one triangle, on one thread, roughly.
+const PER_TRIANGLE: f64 = 1e-8;
+/// Rays that a pixel casts with one sample of everything, roughly: glass branches.
+const RAYS: f64 = 10.0;
+/// The least and the most edge of the crop, pixels.
+const EDGE: (f64, f64) = (8.0, 96.0);
+
+/// How the crop came out.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct OracleCrop {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// The frame.
+    pub frame: u32,
+    /// Triangles of the scene.
+    pub triangles: usize,
+    /// Rays that Embree cast.
+    pub rays: u64,
+    /// Wall seconds of Embree.
+    pub embree_seconds: f64,
+    /// Wall seconds of the oracle.
+    pub oracle_seconds: f64,
+    /// How the pixels differ.
+    pub change: Change,
+}
+
+/// Renders the middle of `frame` with both, one sample of everything; `None` where even a few pixels
+/// would take the oracle minutes, or where the default is the oracle.
+///
+/// # Errors
+/// Those of [`Stage::trace`].
+pub fn on_a_crop(stage: &Stage, frame: u32) -> Result<Option<OracleCrop>> {
+    let triangles = stage.scene.triangle_count();
+    let threads = stage.pool.current_num_threads() as f64;
+    let pixels = SECONDS * threads / (PER_TRIANGLE * RAYS * triangles.max(1) as f64);
+    let is_oracle = stage.base.intersector == crate::scene::IntersectorKind::Oracle;
+    if pixels.sqrt() < EDGE.0 || is_oracle {
+        return Ok(None);
+    }
+    let edge = pixels.sqrt().min(EDGE.1) as u32;
+    let (width, height) = (stage.base.width.min(edge), stage.base.height.min(edge));
+    let (x0, y0) = ((stage.base.width - width) / 2, (stage.base.height - height) / 2);
+    let crop = Rect { x0, y0, x1: x0 + width, y1: y0 + height };
+    let mut settings = stage.base.clone();
+    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+    settings.crop = Some(crop);
+    settings.reuse.policy = Policy::Off;
+    let oracle = Oracle::new(stage.scene);
+    let (embree, rays, embree_seconds) = timed(stage, &settings, stage.intersector, frame)?;
+    let (truth, _, oracle_seconds) = timed(stage, &settings, &oracle, frame)?;
+    let change =
+        Change { pixels: u64::from(width) * u64::from(height), ..Change::between(&truth, &embree) };
+    let size = [width, height];
+    Ok(Some(OracleCrop { size, frame, triangles, rays, embree_seconds, oracle_seconds, change }))
+}
+
+/// The frame by `intersector`; rays, and wall seconds.
+fn timed(
+    stage: &Stage,
+    settings: &Settings,
+    intersector: &dyn Intersector,
+    frame: u32,
+) -> Result<(Frames, u64, f64)> {
+    let start = Instant::now();
+    let (image, rays) = stage.trace(settings, intersector, frame)?;
+    Ok((Frames::from([(frame, image)]), rays.total(), start.elapsed().as_secs_f64()))
+}

@@ -1,0 +1,111 @@
+//! A sentence per knob.
+
+use super::knobs::{Group, Knob};
+use super::oracle::OracleCrop;
+use super::table::{Change, Measured, Row};
+use crate::measure::Median;
+use crate::page::words::{change, count, percent, seconds, short};
+
+/// What turning `knob` does, one sentence for each of its settings; empty where it was not turned.
+pub fn about_knob(measured: &Measured, knob: Knob) -> Vec<String> {
+    let rows = measured.rows.iter().filter(|row| row.knob == knob);
+    rows.map(|row| sentence(measured.default_row(), row)).collect()
+}
+
+fn sentence(default: &Row, row: &Row) -> String {
+    let what = match row.knob.group() {
+        Some(Group::Intersection) => row.change.map_or(String::new(), |c| pixels(&c)),
+        _ => error(default, row),
+    };
+    format!("{}: {}, {what}.", row.options, time(row.time_ratio))
+}
+
+fn time(ratio: Option<Median>) -> String {
+    let Some(ratio) = ratio else { return "not timed".into() };
+    let ends = [ratio.interval.low, ratio.interval.high].map(change);
+    if !ratio.is_sure() {
+        return format!("too few turns to tell the time ({} to {})", ends[0], ends[1]);
+    }
+    match ratio.differs_from(1.0) {
+        true => format!("{} time ({} to {})", change(ratio.interval.estimate), ends[0], ends[1]),
+        false => format!("no more than noise in time ({} to {})", ends[0], ends[1]),
+    }
+}
+
+fn error(default: &Row, row: &Row) -> String {
+    if row.change.is_some_and(|c| c.differing == 0) {
+        return "the same pixels".into();
+    }
+    let [was, is] = [default, row].map(|r| short(r.errors.rmse_steps));
+    if was == is {
+        return format!("the same error to three digits ({is}/255)");
+    }
+    match row.error_ratio {
+        Some(ratio) if !ratio.is_sure() => {
+            format!("too few turns to tell the error ({is}/255 against {was})")
+        }
+        Some(ratio) if ratio.differs_from(1.0) => {
+            format!("error {is}/255 instead of {was} ({})", change(ratio.interval.estimate))
+        }
+        _ => format!("no more than noise in error ({is}/255 against {was})"),
+    }
+}
+
+/// How many pixels another rule changes.
+fn pixels(c: &Change) -> String {
+    if c.differing == 0 {
+        return format!("the same {} pixels", count(c.pixels));
+    }
+    format!(
+        "{} of {} pixels differ by more than 2/255, the furthest by {}",
+        count(c.over_2),
+        count(c.pixels),
+        short(c.largest)
+    )
+}
+
+/// What the oracle says.
+pub fn about_oracle(crop: &OracleCrop) -> String {
+    let [width, height] = crop.size;
+    format!(
+        "The oracle on {width} × {height} pixels of frame {}, one sample of everything: {} instead of \
+         Embree's {}; {}{}.",
+        crop.frame,
+        seconds(crop.oracle_seconds),
+        seconds(crop.embree_seconds),
+        pixels(&crop.change),
+        match crop.change.over_2 {
+            0 => String::new(),
+            n => format!(" ({})", percent(n as f64 / crop.change.pixels.max(1) as f64)),
+        }
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::tests::measured;
+    use super::*;
+
+    #[test]
+    fn differences_within_noise_are_called_that() {
+        let mut m = measured(&[
+            (Knob::Default, "", 1.0, 2.0),
+            (Knob::Tolerance, "--tolerance 4", 0.8, 2.5),
+            (Knob::Audit, "--audit 0", 1.0, 2.0),
+            (Knob::Retry, "--retry off", 1.0, 2.0),
+        ]);
+        for row in &mut m.rows[1..] {
+            row.change = Some(Change { pixels: 9000, differing: 7, over_2: 3, largest: 90.0 });
+        }
+        assert_eq!(
+            about_knob(&m, Knob::Tolerance),
+            ["--tolerance 4: −20 % time (−20 % to −20 %), error 2.5/255 instead of 2 (+25 %)."]
+        );
+        let retry = about_knob(&m, Knob::Retry).concat();
+        assert!(retry.contains("no more than noise in time (+0 % to +0 %)"), "{retry}");
+        assert!(retry.contains("3 of 9,000 pixels differ by more than 2/255, the furthest by 90"));
+        m.rows[2].change = Some(Change { pixels: 9000, ..Change::default() });
+        assert!(about_knob(&m, Knob::Audit).concat().contains("the same pixels"));
+        assert!(about_knob(&m, Knob::Segment).is_empty());
+    }
+}

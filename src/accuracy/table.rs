@@ -1,0 +1,243 @@
+//! What was measured, a row a candidate.
+
+use super::errors::{Errors, Frames};
+use super::knobs::{Candidate, Knob};
+use super::trial::Trial;
+use crate::measure::{Median, largest_error, median, share_exceeding};
+use crate::stats::RayCounts;
+use serde::Serialize;
+use std::ops::AddAssign;
+
+/// All rows, the default's first.
+#[derive(Debug, Clone, Serialize)]
+pub struct Measured {
+    /// One a candidate.
+    pub rows: Vec<Row>,
+}
+
+/// A candidate's figures. Seconds, rays: per frame, the mean over the move.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// What it turns.
+    pub knob: Knob,
+    /// The options that turn it; empty for the default.
+    pub options: String,
+    /// The mean of the turns.
+    pub errors: Errors,
+    /// Root mean squared error of each turn, display steps.
+    pub rmse_of_turns: Vec<f64>,
+    /// Wall seconds.
+    pub seconds: Spread,
+    /// CPU seconds, all threads together.
+    pub cpu_seconds: Spread,
+    /// Seconds over the default's of the same turn; `None` for the default.
+    pub time_ratio: Option<Median>,
+    /// Root mean squared error over the default's of the same turn.
+    pub error_ratio: Option<Median>,
+    /// How its pixels differ from the default's with the same seed.
+    pub change: Option<Change>,
+    /// Rays a frame.
+    pub rays_per_frame: f64,
+    /// Rays by kind, of all frames made in a turn.
+    pub rays: RayCounts,
+    /// Intersector and references, bytes.
+    pub memory_bytes: u64,
+    /// Whether no other candidate that may be recommended is both faster and nearer to the truth.
+    pub on_front: bool,
+}
+
+/// A median, and what it is the median of.
+#[derive(Debug, Clone, Serialize)]
+pub struct Spread {
+    /// The middle.
+    #[serde(flatten)]
+    pub median: Median,
+    /// One value a turn.
+    pub turns: Vec<f64>,
+}
+
+/// How pixels differ from the default's.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Change {
+    /// Pixels compared.
+    pub pixels: u64,
+    /// Pixels that differ at all.
+    pub differing: u64,
+    /// Pixels of which some channel differs by more than 2 display steps.
+    pub over_2: u64,
+    /// The largest difference, display steps.
+    pub largest: f64,
+}
+
+impl Change {
+    /// Between the same frames of two candidates.
+    pub fn between(default: &Frames, other: &Frames) -> Self {
+        let mut change = Self::default();
+        for (frame, image) in other {
+            let reference = &default[frame];
+            let pixels = image.rgb.len() as f64;
+            let differing = image.rgb.iter().zip(&reference.rgb).filter(|(a, b)| a != b).count();
+            change += Self {
+                pixels: pixels as u64,
+                differing: differing as u64,
+                over_2: (share_exceeding(reference, image, 2) * pixels).round() as u64,
+                largest: 255.0 * f64::from(largest_error(reference, image).value),
+            };
+        }
+        change
+    }
+}
+
+impl AddAssign for Change {
+    fn add_assign(&mut self, o: Self) {
+        self.pixels += o.pixels;
+        self.differing += o.differing;
+        self.over_2 += o.over_2;
+        self.largest = self.largest.max(o.largest);
+    }
+}
+
+/// What a candidate's turns gave so far.
+#[derive(Default)]
+pub struct Taken {
+    /// Against the default, all turns.
+    pub change: Change,
+    errors: Vec<Errors>,
+    seconds: Vec<f64>,
+    cpu_seconds: Vec<f64>,
+    rays_per_frame: f64,
+    rays: RayCounts,
+    memory: u64,
+}
+
+impl Taken {
+    /// Takes a turn in. The first one's time is no figure.
+    pub fn add(&mut self, turn: u32, errors: Errors, trial: &Trial) {
+        self.errors.push(errors);
+        if turn == 0 {
+            self.rays = trial.rays;
+            self.rays_per_frame = trial.rays_per_frame;
+        } else {
+            self.seconds.push(trial.seconds);
+            self.cpu_seconds.push(trial.cpu_seconds);
+        }
+        self.memory = self.memory.max(trial.memory);
+    }
+
+    fn rmse(&self) -> Vec<f64> {
+        self.errors.iter().map(|e| e.rmse_steps).collect()
+    }
+}
+
+impl Measured {
+    /// Of `candidates` and what each gave, the default first.
+    pub fn of(candidates: &[Candidate], taken: &[Taken]) -> Self {
+        let rows = candidates.iter().zip(taken).enumerate();
+        let rows =
+            rows.map(|(k, (candidate, own))| row(candidate, own, (k > 0).then(|| &taken[0])));
+        let mut measured = Self { rows: rows.collect() };
+        for k in 0..measured.rows.len() {
+            measured.rows[k].on_front = measured.is_on_front(k);
+        }
+        measured
+    }
+
+    /// The default's.
+    pub fn default_row(&self) -> &Row {
+        &self.rows[0]
+    }
+
+    fn is_on_front(&self, k: usize) -> bool {
+        let place = |row: &Row| (row.seconds.median.interval.estimate, row.errors.mse);
+        let (seconds, mse) = place(&self.rows[k]);
+        let beats = |(i, other): (usize, &Row)| {
+            let (s, e) = place(other);
+            // Of two that are equal the first stays.
+            let better = s < seconds || e < mse || i < k;
+            i != k && other.knob.is_ranked() && s <= seconds && e <= mse && better
+        };
+        self.rows[k].knob.is_ranked() && !self.rows.iter().enumerate().any(beats)
+    }
+}
+
+fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> Row {
+    let ratio = |own: &[f64], other: &[f64]| {
+        let ratios: Vec<f64> = own.iter().zip(other).map(|(a, b)| a / b).collect();
+        median(&ratios).filter(|m| m.interval.estimate.is_finite())
+    };
+    Row {
+        knob: candidate.knob,
+        options: candidate.options.clone(),
+        errors: Errors::mean(&own.errors),
+        rmse_of_turns: own.rmse(),
+        seconds: spread(&own.seconds),
+        cpu_seconds: spread(&own.cpu_seconds),
+        time_ratio: default.and_then(|d| ratio(&own.seconds, &d.seconds)),
+        error_ratio: default.and_then(|d| ratio(&own.rmse(), &d.rmse())),
+        change: default.map(|_| own.change),
+        rays_per_frame: own.rays_per_frame,
+        rays: own.rays,
+        memory_bytes: own.memory,
+        on_front: false,
+    }
+}
+
+fn spread(turns: &[f64]) -> Spread {
+    const NOTHING: Median = Median {
+        interval: crate::measure::Interval { estimate: f64::NAN, low: f64::NAN, high: f64::NAN },
+        confidence: 0.0,
+    };
+    Spread { median: median(turns).unwrap_or(NOTHING), turns: turns.to_vec() }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::scene::Settings;
+
+    pub fn measured(list: &[(Knob, &str, f64, f64)]) -> Measured {
+        let candidate = |(knob, options, ..): &(Knob, &str, f64, f64)| Candidate {
+            knob: *knob,
+            options: (*options).into(),
+            settings: Settings::default(),
+        };
+        let taken = |(.., seconds, rmse): &(Knob, &str, f64, f64)| {
+            let mse = (rmse / 255.0) * (rmse / 255.0);
+            let errors = Errors {
+                mse,
+                rmse_steps: *rmse,
+                psnr: crate::measure::psnr(mse),
+                ssim: 1.0 - mse,
+                flip: mse.sqrt(),
+                share_over_2: 0.0,
+                flicker: None,
+            };
+            Taken {
+                errors: vec![errors; 7],
+                seconds: vec![*seconds; 6],
+                cpu_seconds: vec![*seconds; 6],
+                ..Taken::default()
+            }
+        };
+        let candidates: Vec<Candidate> = list.iter().map(candidate).collect();
+        let taken: Vec<Taken> = list.iter().map(taken).collect();
+        Measured::of(&candidates, &taken)
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_recommendable_beats() {
+        let measured = measured(&[
+            (Knob::Default, "", 1.0, 2.0),
+            (Knob::CameraSamples, "--spp 16", 4.0, 1.0),
+            (Knob::ShadowSamples, "--shadow-samples 64", 4.0, 1.5),
+            (Knob::Retry, "--retry off", 0.9, 2.0),
+            (Knob::Policy, "--policy off", 3.0, 1.0),
+            (Knob::Tolerance, "--tolerance 2", 1.0, 2.0),
+        ]);
+        let front: Vec<bool> = measured.rows.iter().map(|row| row.on_front).collect();
+        assert_eq!(front, [true, false, false, false, true, false]);
+        let ratio = measured.rows[1].time_ratio.expect("timed");
+        assert!(ratio.interval.estimate == 4.0 && ratio.differs_from(1.0));
+        assert!(measured.default_row().time_ratio.is_none());
+    }
+}

@@ -1,0 +1,121 @@
+//! One candidate, one turn: its frames, made and timed.
+
+use super::errors::{Frames, displayed};
+use super::frames::Cut;
+use super::stage::{Stage, Unheard};
+use crate::effects::EffectPlan;
+use crate::error::{Error, Result};
+use crate::intersect::Intersector;
+use crate::reuse;
+use crate::reuse::colour::Rule;
+use crate::scene::{Policy, Settings};
+use crate::sequence::{ColourMaker, FrameMaker, Inferrer, Made, Pyramid, Tracer};
+use crate::shade::Renderer;
+use crate::stats::RayCounts;
+use std::time::Instant;
+
+/// What came of a trial: means over the move, per frame.
+pub struct Trial {
+    /// The frames asked for, as displayed.
+    pub frames: Frames,
+    /// How the setting cuts the move.
+    pub cut: Cut,
+    /// Wall seconds.
+    pub seconds: f64,
+    /// CPU seconds of this process, all threads together.
+    pub cpu_seconds: f64,
+    /// Rays by kind, the audit's among them, of all frames that were made.
+    pub rays: RayCounts,
+    /// Rays per frame.
+    pub rays_per_frame: f64,
+    /// Memory of the intersector and of the references, bytes.
+    pub memory: u64,
+}
+
+/// Makes `chosen` frames under `settings`, and what they are inferred from.
+///
+/// # Errors
+/// [`Error::Stopped`]; those of cameras.
+pub fn run(
+    stage: &Stage,
+    settings: &Settings,
+    intersector: &dyn Intersector,
+    chosen: &[u32],
+) -> Result<Trial> {
+    let scene = stage.scene_of(settings);
+    let plan = EffectPlan::of(scene, settings);
+    let renderer = Renderer { scene, settings, plan, intersector };
+    let looks_up = !reuse::channels(scene, &plan, settings).is_empty();
+    let cut = Cut::of(settings, stage.shot.frames, looks_up);
+    let maker = maker(stage, renderer, settings)?;
+    let order = maker.batches(&cut.with_ancestors(chosen)).concat();
+    maker.expect(&order);
+    let mut frames = Frames::new();
+    let (mut seconds, mut cpu, mut rays) = (Vec::new(), Vec::new(), Vec::new());
+    let mut all_rays = RayCounts::default();
+    for frame in order {
+        let (start, cpu_start) = (Instant::now(), cpu_now());
+        let made = maker.make(frame)?.ok_or(Error::Stopped)?;
+        seconds.push((frame, start.elapsed().as_secs_f64()));
+        cpu.push((frame, cpu_now() - cpu_start));
+        let cast = rays_of(&made);
+        rays.push((frame, cast.total() as f64));
+        all_rays += cast;
+        if chosen.contains(&frame) {
+            let image = stage.pool.install(|| displayed(&made.film, settings));
+            frames.insert(frame, image);
+        }
+    }
+    Ok(Trial {
+        frames,
+        seconds: cut.mean(seconds.into_iter()),
+        cpu_seconds: cut.mean(cpu.into_iter()),
+        rays: all_rays,
+        rays_per_frame: cut.mean(rays.into_iter()),
+        memory: intersector.memory() + maker.reference_memory(),
+        cut,
+    })
+}
+
+fn rays_of(made: &Made) -> RayCounts {
+    let mut rays = made.rays;
+    rays += made.audit.map_or(RayCounts::default(), |audit| audit.rays);
+    rays
+}
+
+fn maker<'m>(
+    stage: &Stage<'m>,
+    renderer: Renderer<'m>,
+    settings: &Settings,
+) -> Result<Box<dyn FrameMaker + 'm>> {
+    let Stage { shot, pool, stop, .. } = *stage;
+    let frames = shot.frames;
+    Ok(match settings.reuse.policy {
+        Policy::Surface => {
+            let pyramid = Pyramid { segment: settings.reuse.segment, frames };
+            Box::new(Inferrer::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
+        }
+        Policy::Colour => {
+            let rule = Rule {
+                colour_epsilon: settings.reuse.colour_epsilon,
+                distance_epsilon: settings.reuse.distance_epsilon,
+            };
+            Box::new(ColourMaker::new(renderer, shot, pool, stop, &Unheard, rule, &[])?)
+        }
+        Policy::Off => Box::new(Tracer {
+            renderer,
+            shot,
+            pool,
+            with_gbuffer: false,
+            stop,
+            progress: &Unheard,
+            laid: Default::default(),
+        }),
+    })
+}
+
+/// CPU seconds of this process so far.
+pub fn cpu_now() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}

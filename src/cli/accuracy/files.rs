@@ -1,0 +1,107 @@
+//! The figures for other programs: JSON and CSV.
+
+use super::{AccuracyArgs, Outcome};
+use crate::accuracy::{OracleCrop, Row};
+use crate::cli::machine::Machine;
+use crate::error::{Error, Result};
+use crate::measure::Median;
+use crate::output::atomic;
+use crate::output::manifest::Header;
+use serde::Serialize;
+use serde_json::Value;
+use std::path::Path;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    tweenray: &'a str,
+    command: &'a [String],
+    scene: String,
+    tracer: &'a str,
+    machine: Machine,
+    threads: usize,
+    /// Load of the machine over a minute, before and after.
+    load: [Option<f64>; 2],
+    frames: &'a [u32],
+    shot_frames: u32,
+    turns: u32,
+    default: Value,
+    reference: Reference,
+    rows: &'a [Row],
+    oracle: Option<OracleCrop>,
+}
+
+#[derive(Serialize)]
+struct Reference {
+    settings: Value,
+    /// What the last doubling changed, and what it was to fall below; display steps.
+    change: f64,
+    wanted: f64,
+}
+
+/// Writes `accuracy.json` and `accuracy.csv` into `folder`.
+pub fn write(
+    folder: &Path,
+    args: &AccuracyArgs,
+    outcome: &Outcome,
+    command: &[String],
+) -> Result<()> {
+    let truth = &outcome.truth;
+    let document = Document {
+        tweenray: env!("CARGO_PKG_VERSION"),
+        command,
+        scene: args.scene.scene.display().to_string(),
+        tracer: &outcome.tracer,
+        machine: Machine::here(),
+        threads: outcome.threads,
+        load: outcome.load,
+        frames: &outcome.frames,
+        shot_frames: outcome.shot_frames,
+        turns: args.turns,
+        default: Header::settings(&outcome.base),
+        reference: Reference {
+            settings: Header::settings(&truth.settings),
+            change: truth.change,
+            wanted: truth.wanted,
+        },
+        rows: &outcome.measured.rows,
+        oracle: outcome.oracle,
+    };
+    let path = folder.join("accuracy.json");
+    let mut text =
+        serde_json::to_vec_pretty(&document).map_err(|e| Error::io("write", &path, e.into()))?;
+    text.push(b'\n');
+    atomic::write(&path, |w| w.write_all(&text))?;
+    let csv = csv(&outcome.measured.rows);
+    atomic::write(folder.join("accuracy.csv"), |w| w.write_all(csv.as_bytes())).map(drop)
+}
+
+const HEAD: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,time_ratio,\
+    time_ratio_low,time_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
+    error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame,\
+    memory_bytes,on_front\n";
+
+fn csv(rows: &[Row]) -> String {
+    HEAD.to_string() + &rows.iter().map(line).collect::<String>()
+}
+
+fn line(row: &Row) -> String {
+    // No option holds a comma or a quote.
+    let number = |x: f64| if x.is_finite() { x.to_string() } else { String::new() };
+    let ends = |m: &Median| [m.interval.estimate, m.interval.low, m.interval.high].map(number);
+    let ratio = |m: &Option<Median>| m.as_ref().map_or_else(Default::default, ends);
+    let knob = serde_json::to_value(row.knob).unwrap_or_default();
+    let mut cells = vec![knob.as_str().unwrap_or_default().to_string(), row.options.clone()];
+    cells.extend(ends(&row.seconds.median));
+    cells.push(number(row.cpu_seconds.median.interval.estimate));
+    cells.extend(ratio(&row.time_ratio));
+    cells.push(number(row.seconds.median.confidence));
+    let e = &row.errors;
+    cells.extend([e.mse, e.rmse_steps, e.psnr, e.ssim, e.flip, e.share_over_2].map(number));
+    cells.push(e.flicker.map_or(String::new(), number));
+    cells.extend(ratio(&row.error_ratio));
+    cells.push(row.change.map_or(String::new(), |c| c.over_2.to_string()));
+    cells.push(number(row.rays_per_frame));
+    cells.push(row.memory_bytes.to_string());
+    cells.push(row.on_front.to_string());
+    cells.join(",") + "\n"
+}

@@ -1,0 +1,223 @@
+//! The figures as a page.
+
+mod plots;
+mod tables;
+
+use super::{AccuracyArgs, Outcome};
+use crate::accuracy::{Goal, Knob, Row, about_knob, about_oracle, best_within, fastest_reaching};
+use crate::error::Result;
+use crate::measure::Median;
+use crate::output::video::shell_line;
+use crate::page::Picture;
+use crate::page::accuracy::{AccuracyPage, Detail, KnobText, Named};
+use crate::page::words::{bytes, change, count, date, percent, seconds, short};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Most pictures in the page.
+const MOST_PICTURES: usize = 14;
+
+/// The page of `outcome`, measured by `command`.
+pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Result<AccuracyPage> {
+    let scene = args.scene.scene.display().to_string();
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64());
+    Ok(AccuracyPage {
+        title: scene.clone(),
+        summary: summary(outcome),
+        facts: facts(args, outcome),
+        warnings: warnings(args, outcome),
+        scatters: plots::METRICS
+            .iter()
+            .filter_map(|metric| plots::scatter(outcome, metric))
+            .collect(),
+        details: details(outcome, &scene),
+        goals: tables::goals(outcome),
+        knobs: knobs(outcome),
+        pictures: pictures(outcome)?,
+        pictured: format!("Frame {}, as a display shows it in 8 bits.", outcome.shown_frame),
+        tables: vec![tables::figures(outcome), tables::times(outcome)],
+        command: shell_line(command),
+        version: env!("CARGO_PKG_VERSION").into(),
+        made: date(now),
+    })
+}
+
+/// A candidate's name.
+pub fn name_of(options: &str) -> String {
+    if options.is_empty() { "default".into() } else { options.into() }
+}
+
+fn median_of(row: &Row) -> f64 {
+    row.seconds.median.interval.estimate
+}
+
+fn summary(outcome: &Outcome) -> Vec<String> {
+    let default = outcome.measured.default_row();
+    let (time, e) = (median_of(default), &default.errors);
+    let mut lines = vec![format!(
+        "By default a frame takes {} and is {}/255 off (RMSE; PSNR {} dB, FLIP {}), mean over the \
+         move.",
+        seconds(time),
+        short(e.rmse_steps),
+        short(e.psnr),
+        short(e.flip)
+    )];
+    let half = best_within(&outcome.measured, time * 1.02).filter(|row| row.knob != Knob::Default);
+    if let Some(row) = half.filter(|row| row.errors.mse < 0.9 * e.mse) {
+        lines.push(format!(
+            "In the same time {} comes nearer: {}/255.",
+            row.options,
+            short(row.errors.rmse_steps)
+        ));
+    }
+    let same = fastest_reaching(&outcome.measured, Goal::Psnr(e.psnr));
+    if let Some(row) = same.filter(|row| row.knob != Knob::Default && median_of(row) < 0.95 * time)
+    {
+        lines.push(format!(
+            "{} is as near in {} of the time.",
+            row.options,
+            percent(median_of(row) / time)
+        ));
+    }
+    lines
+}
+
+fn facts(args: &AccuracyArgs, outcome: &Outcome) -> Vec<(String, String)> {
+    let frames: Vec<String> = outcome.frames.iter().map(u32::to_string).collect();
+    let confidence = outcome.measured.default_row().seconds.median.confidence;
+    let load = outcome.load.map(|l| l.map_or("?".into(), short));
+    let base = &outcome.base;
+    let fact = |name: &str, value: String| (name.to_string(), value);
+    vec![
+        fact("Size", format!("{} × {}", base.width, base.height)),
+        fact("Frames looked at", format!("{} of {}", frames.join(", "), outcome.shot_frames)),
+        fact("Settings compared", count(outcome.measured.rows.len() as u64)),
+        fact("Timed", format!("{} times each, after a warm-up", args.turns)),
+        fact("Intervals", format!("of {}", percent(confidence))),
+        fact(
+            "Reference",
+            format!(
+                "{} camera and {} shadow samples, {}/255 away from half as many",
+                outcome.truth.settings.spp,
+                outcome.truth.settings.shadow_samples,
+                short(outcome.truth.change)
+            ),
+        ),
+        fact("Threads", outcome.threads.to_string()),
+        fact("Machine's load", format!("{} before, {} after", load[0], load[1])),
+        fact("Tracer", outcome.tracer.clone()),
+        fact("Whole sweep", seconds(outcome.seconds)),
+    ]
+}
+
+fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let rows = &outcome.measured.rows;
+    let best = rows.iter().map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
+    let change = outcome.truth.change;
+    if change > best / 4.0 {
+        warnings.push(format!(
+            "The reference is not far enough ahead: its last doubling changed {}/255, more than a \
+             quarter of the best setting's error, {}/255. Errors near that are too large here. \
+             --reference-spp lets it converge longer.",
+            short(change),
+            short(best)
+        ));
+    }
+    let before = outcome.load[0].unwrap_or(0.0);
+    if before > 0.5 {
+        warnings.push(format!(
+            "The machine was busy when this began (load {}): times are less sure than they could be.",
+            short(before)
+        ));
+    }
+    if args.turns < 6 {
+        warnings.push(format!(
+            "With --turns {} the intervals hold the truth in {} of cases, not in 95 %.",
+            args.turns,
+            percent(outcome.measured.default_row().seconds.median.confidence)
+        ));
+    }
+    warnings
+}
+
+fn with_ends(m: &Median, word: fn(f64) -> String) -> String {
+    let i = m.interval;
+    format!("{} ({}–{})", word(i.estimate), word(i.low), word(i.high))
+}
+
+fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
+    let detail = |(id, row): (usize, &Row)| {
+        let e = &row.errors;
+        let mut figures = vec![
+            ("Seconds a frame", with_ends(&row.seconds.median, short)),
+            ("CPU seconds", short(row.cpu_seconds.median.interval.estimate)),
+        ];
+        if let Some(ratio) = &row.time_ratio {
+            let word = match ratio.differs_from(1.0) {
+                true => "",
+                false if ratio.is_sure() => ", within noise",
+                false => ", too few turns to tell",
+            };
+            let i = ratio.interval;
+            let [is, low, high] = [i.estimate, i.low, i.high].map(change);
+            figures.push(("Time against default", format!("{is} ({low} to {high}){word}")));
+        }
+        figures.extend([
+            ("RMSE", format!("{}/255", short(e.rmse_steps))),
+            ("PSNR", format!("{} dB", short(e.psnr))),
+            ("SSIM", format!("{:.5}", e.ssim)),
+            ("FLIP", short(e.flip)),
+            ("Off by more than 2/255", percent(e.share_over_2)),
+            ("Rays a frame", count(row.rays_per_frame.round() as u64)),
+            ("Memory", bytes(row.memory_bytes)),
+        ]);
+        let figures = figures.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
+        let options = if row.options.is_empty() { "" } else { " " };
+        let command = format!("tweenray render {scene}{options}{}", row.options);
+        Detail { id, name: name_of(&row.options), figures, command }
+    };
+    outcome.measured.rows.iter().enumerate().map(detail).collect()
+}
+
+fn knobs(outcome: &Outcome) -> Vec<KnobText> {
+    let mut seen: Vec<Knob> = Vec::new();
+    for row in &outcome.measured.rows {
+        let alone = !matches!(row.knob, Knob::Default | Knob::Combination);
+        if alone && !seen.contains(&row.knob) {
+            seen.push(row.knob);
+        }
+    }
+    let text = |knob: Knob| KnobText {
+        name: knob.name().into(),
+        sentences: about_knob(&outcome.measured, knob),
+    };
+    let mut all: Vec<KnobText> = seen.into_iter().map(text).collect();
+    if let Some(crop) = &outcome.oracle {
+        all.push(KnobText { name: "Oracle".into(), sentences: vec![about_oracle(crop)] });
+    } else if outcome.oracle_was_wanted {
+        let why = "Left out: it holds every ray against every triangle, and even a few pixels of this \
+                   scene would take it minutes.";
+        all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
+    }
+    all
+}
+
+/// The default, the reference, then what is on the front, then the rest, as many as there is room for.
+fn pictures(outcome: &Outcome) -> Result<Vec<Named>> {
+    let rows = &outcome.measured.rows;
+    let named = |candidate: usize| {
+        let found = outcome.pictures.iter().find(|p| p.candidate == candidate);
+        found.map(|p| Named {
+            name: name_of(&rows[candidate].options),
+            id: Some(candidate),
+            picture: p.picture.clone(),
+        })
+    };
+    let front = (1..rows.len()).filter(|k| rows[*k].on_front);
+    let rest = (1..rows.len()).filter(|k| !rows[*k].on_front && rows[*k].knob != Knob::Combination);
+    let order: Vec<usize> = std::iter::once(0).chain(front).chain(rest).collect();
+    let mut all: Vec<Named> = order.into_iter().filter_map(named).take(MOST_PICTURES - 1).collect();
+    let truth = Picture::png(&outcome.truth.frames[&outcome.shown_frame])?;
+    all.insert(1.min(all.len()), Named { name: "reference".into(), id: None, picture: truth });
+    Ok(all)
+}

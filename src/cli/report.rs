@@ -1,0 +1,191 @@
+//! `tweenray report`: the page of a render.
+
+mod charts;
+mod film;
+mod find;
+mod tables;
+
+use super::exit::Exit;
+use super::say;
+use crate::error::{Error, Result};
+use crate::output::atomic;
+use crate::output::manifest::{Manifest, Row};
+use crate::output::video::shell_line;
+use crate::page::job::JobPage;
+use crate::page::words;
+use crate::sequence::audit_row;
+use crate::stats::{AuditSums, RayCounts, ReuseCounts};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Make the page of a finished or running render: player, maps, charts, audit
+///
+/// One HTML file that opens from disk and needs no network. It is made from the manifest and the
+/// frames that are there, so it can be made while the job runs.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Maps need a render with --maps. The page is put beside the frames: out/frame.report.html for
+out/frame_####.png.
+
+Examples:
+  tweenray report out/demo
+  tweenray report out/demo/frame.manifest.jsonl -o report.html --width 960")]
+pub struct ReportArgs {
+    /// Folder of the frames, or one of the manifests (.manifest.jsonl) in it
+    #[arg(value_name = "DIR")]
+    place: PathBuf,
+    /// Where the page goes [default: beside the frames]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Widest that pictures in the page are, pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 640, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(16..=8192))]
+    width: u32,
+    /// Show every Nth frame in the player [default: so that there are at most 300]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Frames in the player unless told otherwise: some 15 MB of pictures.
+const MOST_SHOWN: usize = 300;
+
+/// A job as its manifest tells.
+struct Job {
+    manifest: Manifest,
+    folder: PathBuf,
+    /// Rows of these settings, by frame.
+    rows: Vec<Row>,
+}
+
+/// Runs the command.
+pub fn run(args: &ReportArgs) -> Result<Exit> {
+    let path = find::manifest(&args.place)?;
+    let manifest =
+        Manifest::as_of_now(&path)?.ok_or_else(|| Error::input(&path, "is there no longer"))?;
+    let out = args.output.clone().unwrap_or_else(|| find::page_beside(&path));
+    if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("html")) {
+        let message = format!("the page's name {} does not end in .html", out.display());
+        return Err(Error::Usage(message));
+    }
+    atomic::make_room(&out)?;
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let rows = manifest.rows.values().filter(|row| row.stray.is_none()).cloned().collect();
+    let job = Job { manifest, folder, rows };
+    let html = job.page(args)?.to_html()?;
+    atomic::write(&out, |w| w.write_all(html.as_bytes()))?;
+    if !args.quiet {
+        say::result(format!(
+            "{} ({} of {} frames, {})",
+            out.display(),
+            job.rows.len(),
+            job.manifest.header.shot_frames,
+            words::bytes(html.len() as u64)
+        ))?;
+    }
+    Ok(Exit::Done)
+}
+
+impl Job {
+    fn page(&self, args: &ReportArgs) -> Result<JobPage> {
+        let header = &self.manifest.header;
+        let every = args.every.map_or(self.rows.len().div_ceil(MOST_SHOWN).max(1), |n| n as usize);
+        let film = film::pictures(self, every, args.width)?;
+        let shown = match every {
+            1 => String::new(),
+            n => format!("The player has one frame in {n} (--every)."),
+        };
+        Ok(JobPage {
+            title: header.scene.clone(),
+            state: self.state(),
+            facts: self.facts(),
+            maps: film::maps_of(&film),
+            film,
+            shown,
+            charts: charts::all(self),
+            effects: tables::effects(self),
+            effects_note: tables::EFFECTS_NOTE.into(),
+            audit: tables::audit(self),
+            timeline: charts::timeline(self),
+            ranks: tables::ranks(self),
+            command: shell_line(&header.command),
+            manifest: tables::manifest(self),
+            settings: tables::settings(self),
+            frames: tables::frames(self),
+            version: env!("CARGO_PKG_VERSION").into(),
+            made: words::date(now()),
+        })
+    }
+
+    fn state(&self) -> String {
+        let all = self.manifest.header.shot_frames;
+        let there = self.rows.len() as u32;
+        let other = self.manifest.rows.len() - self.rows.len();
+        let left = match other {
+            0 => String::new(),
+            n => format!(" {n} more are left from a job of other settings and not shown."),
+        };
+        if there == all {
+            return format!("All {all} frames of the move are there.{left}");
+        }
+        let last = self.rows.iter().filter_map(|row| row.ended).fold(0.0, f64::max);
+        let ago = match now() - last {
+            _ if last == 0.0 => String::new(),
+            s => format!("; the last one is {} old", words::seconds(s.max(0.0))),
+        };
+        format!(
+            "{there} of the move's {all} frames are there{ago}: the job still runs, was stopped, or \
+             was not asked for more.{left}"
+        )
+    }
+
+    fn facts(&self) -> Vec<(String, String)> {
+        let settings = &self.manifest.header.settings;
+        let seconds: f64 = self.rows.iter().map(|row| row.seconds).sum();
+        let bytes = self.rows.iter().map(|row| row.bytes).sum();
+        let mut facts = vec![
+            ("Size".to_string(), format!("{} × {}", settings["width"], settings["height"])),
+            ("Time in frames".into(), words::seconds(seconds)),
+            ("A frame".into(), words::seconds(seconds / self.rows.len().max(1) as f64)),
+            ("Rays".into(), words::short(self.rays().total() as f64)),
+            ("Files".into(), words::bytes(bytes)),
+        ];
+        if let Some(share) = self.reuse().share() {
+            facts.push(("Surface points inferred".into(), words::percent(share)));
+        }
+        if let Some([rmse, low, high]) = self.audited().and_then(|sums| audit_row(&sums).rmse) {
+            let [rmse, low, high] = [rmse, low, high].map(words::short);
+            facts.push(("Error of inferred frames".into(), format!("{rmse}/255 ({low}–{high})")));
+        }
+        facts
+    }
+
+    fn rays(&self) -> RayCounts {
+        let mut sum = RayCounts::default();
+        self.rows.iter().for_each(|row| sum += row.rays);
+        sum
+    }
+
+    fn reuse(&self) -> ReuseCounts {
+        let mut sum = ReuseCounts::default();
+        self.rows.iter().for_each(|row| sum += row.reuse);
+        sum
+    }
+
+    /// All audits together.
+    fn audited(&self) -> Option<AuditSums> {
+        let mut audits = self.rows.iter().filter_map(|row| Some(row.audit?.sums));
+        let mut sums = audits.next()?;
+        audits.for_each(|more| sums += more);
+        Some(sums)
+    }
+}
+
+/// Seconds since 1970; 0 before.
+fn now() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64())
+}

@@ -1,0 +1,177 @@
+//! What the manifest holds, as tables.
+
+use super::Job;
+use crate::output::manifest::{AuditRow, Header, Row};
+use crate::page::Table;
+use crate::page::words::{bytes, count, date, percent, seconds, short};
+use crate::reuse::of_frame;
+use crate::sequence::audit_row;
+use crate::stats::RayCounts;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// How to read the table of effects.
+pub const EFFECTS_NOTE: &str = "Cost is weighed by the fixed table that also decides what is worth a \
+    lookup (a camera ray with the look at its surface is 1, a mirror or glass ray 2, a shadow ray 1.2, \
+    a lookup 1.5). It is an estimate: effects run interleaved, so their seconds cannot be told apart.";
+
+/// Rays by the effect that cast them, with their shares.
+pub fn effects(job: &Job) -> Table {
+    let rays = job.rays();
+    let reuse = job.reuse();
+    let lookups = reuse.direct + reuse.specular;
+    let none = RayCounts::default();
+    let parts = [
+        ("Camera rays", RayCounts { camera: rays.camera, ..none }),
+        ("Mirrors", RayCounts { mirror: rays.mirror, ..none }),
+        ("Glass", RayCounts { glass: rays.glass, ..none }),
+        ("Soft shadows of area lights", RayCounts { shadow_area: rays.shadow_area, ..none }),
+        ("Hard shadows", RayCounts { shadow_delta: rays.shadow_delta, ..none }),
+        ("Light of the sky", RayCounts { shadow_sky: rays.shadow_sky, ..none }),
+        ("Second tries", RayCounts { retry: rays.retry, ..none }),
+    ];
+    let audit = job.audited().map_or(none, |sums| sums.rays);
+    let all_cost = of_frame(&rays, lookups) + of_frame(&audit, 0);
+    let all_rays = rays.total() + audit.total();
+    let row = |name: &str, rays: String, share: f64, cost: f64| {
+        vec![name.to_string(), rays, percent(share), percent(cost / all_cost.max(1.0))]
+    };
+    let share = |n: u64| n as f64 / all_rays.max(1) as f64;
+    let mut table = Table::new("Rays by effect", &["", "rays", "share of rays", "share of cost"]);
+    for (name, part) in parts.iter().filter(|(_, part)| part.total() > 0) {
+        let n = part.total();
+        let mut cells = row(name, count(n), share(n), of_frame(part, 0));
+        // The table of costs has no entry for them.
+        if part.retry > 0 {
+            cells[3] = "not weighed".into();
+        }
+        table.rows.push(cells);
+    }
+    if lookups > 0 {
+        let looked_up =
+            row("Lookups in other frames", String::new(), 0.0, of_frame(&none, lookups));
+        table.rows.push([&looked_up[..1], &["–".into(), "–".into()], &looked_up[3..]].concat());
+    }
+    if audit.total() > 0 {
+        let n = audit.total();
+        table.rows.push(row("Audit", count(n), share(n), of_frame(&audit, 0)));
+    }
+    table.rows.push(row("All", count(all_rays), 1.0, all_cost));
+    table
+}
+
+/// The audits: all frames together, then the worst frames.
+pub fn audit(job: &Job) -> Table {
+    let head = ["", "as shown", "inferred pixels alone", "traced", "pixels drawn", "tiles traced"];
+    let mut table = Table::new("What the audits found", &head);
+    let Some(all) = job.audited() else { return table };
+    table.rows.push(audit_cells("All frames", &audit_row(&all)));
+    let mut audited: Vec<(&Row, AuditRow)> =
+        job.rows.iter().filter_map(|row| Some((row, row.audit?))).collect();
+    let error = |audit: &AuditRow| audit.rmse.map_or(0.0, |[rmse, ..]| rmse);
+    audited.sort_by(|(_, a), (_, b)| error(b).total_cmp(&error(a)));
+    for (k, (row, audit)) in audited.iter().take(5).enumerate() {
+        let worst = if k == 0 { ", the worst" } else { "" };
+        table.rows.push(audit_cells(&format!("Frame {}{worst}", row.frame), audit));
+    }
+    table
+}
+
+fn audit_cells(name: &str, audit: &AuditRow) -> Vec<String> {
+    let figure = |rmse: Option<[f64; 3]>| {
+        rmse.map_or("–".into(), |r| {
+            let [rmse, low, high] = r.map(short);
+            format!("{rmse} ({low}–{high})")
+        })
+    };
+    vec![
+        name.into(),
+        figure(audit.rmse),
+        figure(audit.rmse_inferred_pixels),
+        figure(audit.rmse_traced),
+        count(audit.sums.drawn),
+        count(audit.sums.tiles_traced),
+    ]
+}
+
+/// What each rank did.
+pub fn ranks(job: &Job) -> Table {
+    let mut table =
+        Table::new("Ranks", &["", "frames", "seconds in frames", "rays", "rays a second"]);
+    let mut ranks: BTreeMap<u32, (u64, f64, u64)> = BTreeMap::new();
+    for row in &job.rows {
+        let (frames, busy, rays) = ranks.entry(row.rank).or_default();
+        *frames += 1;
+        *busy += row.seconds;
+        *rays += row.rays.total();
+    }
+    for (rank, (frames, busy, rays)) in ranks {
+        let speed = format!("{} M", short(rays as f64 * 1e-6 / busy.max(1e-9)));
+        let name = format!("Rank {rank}");
+        table.rows.push(vec![name, count(frames), seconds(busy), count(rays), speed]);
+    }
+    table
+}
+
+/// The manifest's head.
+pub fn manifest(job: &Job) -> Table {
+    let Header { tweenray, scene, scene_hash, shot_frames, files, tracer, .. } =
+        &job.manifest.header;
+    let mut table = Table::new("What the frames share", &["", ""]);
+    let ended: Vec<f64> = job.rows.iter().filter_map(|row| row.ended).collect();
+    let first = ended.iter().copied().reduce(f64::min).map_or("unknown".into(), date);
+    let last = ended.iter().copied().reduce(f64::max).map_or("unknown".into(), date);
+    for (name, value) in [
+        ("Version of tweenray", tweenray.clone()),
+        ("Scene", scene.clone()),
+        ("Scene's hash (BLAKE3)", scene_hash.clone()),
+        ("Frames of the move", count(u64::from(*shot_frames))),
+        ("Files", files.clone()),
+        ("Tracer", tracer.clone()),
+        ("First frame finished", first),
+        ("Last frame finished", last),
+    ] {
+        table.rows.push(vec![name.into(), value]);
+    }
+    table
+}
+
+/// Every setting, groups one after another.
+pub fn settings(job: &Job) -> Table {
+    let mut table = Table::new("Settings", &["setting", "value"]);
+    let settings = &job.manifest.header.settings;
+    flatten(&mut table, "", settings);
+    table
+}
+
+fn flatten(table: &mut Table, group: &str, value: &Value) {
+    for (key, value) in value.as_object().into_iter().flatten() {
+        let name = format!("{group}{key}").replace('_', "-");
+        match value {
+            Value::Object(_) => flatten(table, &format!("{name}: "), value),
+            Value::Null => table.rows.push(vec![name, "–".into()]),
+            Value::String(text) => table.rows.push(vec![name, text.clone()]),
+            other => table.rows.push(vec![name, other.to_string()]),
+        }
+    }
+}
+
+/// Every frame.
+pub fn frames(job: &Job) -> Table {
+    let head = ["frame", "file", "size", "seconds", "rays", "inferred", "error (1/255)", "rank"];
+    let mut table = Table::new("Frames", &head);
+    for row in &job.rows {
+        let error = row.audit.and_then(|audit| audit.rmse).map_or("–".into(), |[e, ..]| short(e));
+        table.rows.push(vec![
+            row.frame.to_string(),
+            row.file.clone(),
+            bytes(row.bytes),
+            short(row.seconds),
+            count(row.rays.total()),
+            row.reuse.share().map_or("–".into(), percent),
+            error,
+            row.rank.to_string(),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,85 @@
+//! Maps back from an exr frame that holds them as channels.
+
+use super::{Display, Film, Map, PixelSource, Provenance, Rgb};
+use crate::error::{Error, Result};
+use crate::output::DEFAULT_MEMORY_LIMIT;
+use crate::output::exr::{self, Channels, Samples};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// The maps of the exr frame at `path` as they would be painted beside a png frame: linear display
+/// values. None where the frame holds none. `farthest` is [`Map::paint`]'s.
+///
+/// # Errors
+/// [`Error::Io`] and [`Error::Input`] when the file cannot be read.
+pub fn of_exr(path: &Path, display: &Display, farthest: f32) -> Result<Vec<(Map, Film)>> {
+    let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
+    let channels = exr::decode(path, BufReader::new(file), DEFAULT_MEMORY_LIMIT)?;
+    let Some(film) = film_of(&channels) else { return Ok(Vec::new()) };
+    Ok(Map::ALL.map(|map| (map, map.paint(&film, display, farthest))).into())
+}
+
+/// What maps show of a film; `None` where a channel is missing.
+fn film_of(channels: &Channels) -> Option<Film> {
+    let numbers = |name: &str| {
+        let found = channels.list.iter().find(|c| c.name == name)?;
+        match &found.samples {
+            Samples::U32(numbers) => Some(numbers),
+            Samples::F32(_) => None,
+        }
+    };
+    let [r, g, b] = [channels.f32("R")?, channels.f32("G")?, channels.f32("B")?];
+    let provenance = numbers("reuse.provenance")?;
+    let (frame, distance) = (numbers("reuse.frame")?, channels.f32("reuse.distance")?);
+    let mut film = Film::new(channels.width, channels.height, false);
+    film.rgb = (0..r.len()).map(|i| Rgb::new(r[i], g[i], b[i])).collect();
+    let source = |i: usize| PixelSource {
+        provenance: known(provenance[i]),
+        frame: frame[i],
+        distance: distance[i],
+        risk: 0.0,
+    };
+    film.sources = Some((0..r.len()).map(source).collect());
+    film.audit = channels.f32("reuse.audit").map(<[f32]>::to_vec);
+    Some(film)
+}
+
+fn known(number: u32) -> Provenance {
+    let all = [Provenance::Traced, Provenance::Earlier, Provenance::Later, Provenance::Both];
+    all.into_iter().find(|p| *p as u32 == number).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{WriteOptions, write_image};
+    use crate::scene::ToneCurve;
+
+    #[test]
+    fn an_exr_frame_gives_the_maps_that_a_png_frame_has_beside_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut film = Film::new(3, 2, false);
+        film.rgb.fill(Rgb::splat(0.5));
+        let source = |i: u32| PixelSource {
+            provenance: known(i % 5),
+            frame: i,
+            distance: i as f32 / 4.0,
+            risk: 0.0,
+        };
+        film.sources = Some((0..6).map(source).collect());
+        film.audit = Some(vec![f32::NAN, 3.0, f32::NAN, -8.0, f32::NAN, f32::NAN]);
+        let options = WriteOptions { maps: Some(2.0), ..WriteOptions::default() };
+        let path = folder.path().join("a.exr");
+        write_image(&path, &film, &options).expect("written");
+        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
+        let maps = of_exr(&path, &display, 2.0).expect("read");
+        assert_eq!(maps.len(), Map::ALL.len());
+        for (map, painted) in maps {
+            assert_eq!(painted.rgb, map.paint(&film, &display, 2.0).rgb, "{}", map.name());
+        }
+        let plain = folder.path().join("b.exr");
+        write_image(&plain, &film, &WriteOptions::default()).expect("written");
+        assert!(of_exr(&plain, &display, 2.0).expect("read").is_empty());
+    }
+}

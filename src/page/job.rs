@@ -1,0 +1,147 @@
+//! The page of a render.
+
+use super::{Chart, Picture, Plot, SCRIPT, STYLE, Table, Timeline, json_for_script, set};
+use crate::error::Result;
+use askama::Template;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A frame in the player.
+#[derive(Debug, Clone, Serialize)]
+pub struct Shown {
+    /// Its number.
+    pub number: u32,
+    /// What is said of it.
+    pub text: String,
+    /// The frame.
+    pub picture: Picture,
+    /// Its maps by name.
+    pub maps: BTreeMap<String, Picture>,
+}
+
+/// Everything on the page, ready to be read.
+#[derive(Debug, Clone, Default)]
+pub struct JobPage {
+    /// What was rendered.
+    pub title: String,
+    /// How far it is.
+    pub state: String,
+    /// What one wants to know first: name and value.
+    pub facts: Vec<(String, String)>,
+    /// Frames in the player.
+    pub film: Vec<Shown>,
+    /// Which frames are in the player, where not all are.
+    pub shown: String,
+    /// Maps by name, and what each shows.
+    pub maps: Vec<(String, String)>,
+    /// Charts over the frames.
+    pub charts: Vec<Chart>,
+    /// Rays by kind.
+    pub effects: Table,
+    /// How to read them.
+    pub effects_note: String,
+    /// What the audits found.
+    pub audit: Table,
+    /// When each rank rendered what, where the manifest tells.
+    pub timeline: Option<Timeline>,
+    /// What each rank did.
+    pub ranks: Table,
+    /// The command that gives the same frames; empty where unknown.
+    pub command: String,
+    /// The manifest's head.
+    pub manifest: Table,
+    /// All settings.
+    pub settings: Table,
+    /// All frames.
+    pub frames: Table,
+    /// Version of the program.
+    pub version: String,
+    /// When the page was made.
+    pub made: String,
+}
+
+#[derive(Template)]
+#[template(path = "job.html")]
+struct Html<'a> {
+    style: &'static str,
+    script: &'static str,
+    own_script: &'static str,
+    film: String,
+    has_pictures: bool,
+    last: usize,
+    rates: [u32; 6],
+    charts: Vec<Plot>,
+    timeline: Option<Plot>,
+    title: &'a str,
+    state: &'a str,
+    facts: &'a [(String, String)],
+    shown: &'a str,
+    maps: &'a [(String, String)],
+    effects: &'a Table,
+    effects_note: &'a str,
+    audit: &'a Table,
+    ranks: &'a Table,
+    command: &'a str,
+    manifest: &'a Table,
+    settings: &'a Table,
+    frames: &'a Table,
+    version: &'a str,
+    made: &'a str,
+}
+
+impl JobPage {
+    /// The page as one HTML document.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Failed`] when it cannot be set.
+    pub fn to_html(&self) -> Result<String> {
+        set(&Html {
+            style: STYLE,
+            script: SCRIPT,
+            own_script: include_str!("../../templates/job.js"),
+            film: json_for_script(&self.film)?,
+            has_pictures: !self.film.is_empty(),
+            last: self.film.len().saturating_sub(1),
+            rates: [1, 6, 12, 24, 30, 60],
+            charts: self.charts.iter().map(Chart::plot).collect(),
+            timeline: self.timeline.as_ref().map(Timeline::plot),
+            title: &self.title,
+            state: &self.state,
+            facts: &self.facts,
+            shown: &self.shown,
+            maps: &self.maps,
+            effects: &self.effects,
+            effects_note: &self.effects_note,
+            audit: &self.audit,
+            ranks: &self.ranks,
+            command: &self.command,
+            manifest: &self.manifest,
+            settings: &self.settings,
+            frames: &self.frames,
+            version: &self.version,
+            made: &self.made,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_without_a_frame_stands_and_text_is_escaped() {
+        let page = JobPage { title: "<b>&".into(), ..JobPage::default() };
+        let html = page.to_html().expect("set");
+        assert!(html.contains("There is no frame to show yet") && !html.contains("<b>&"));
+        assert!(html.contains("No frame was audited"));
+    }
+
+    #[test]
+    fn nothing_on_the_page_names_another_place() {
+        let html = JobPage::default().to_html().expect("set");
+        for word in ["http:", "https:", "//cdn", "@import", "src=\"/"] {
+            assert!(!html.contains(word), "{word}");
+        }
+        assert!(html.contains("default-src 'none'"));
+    }
+}

@@ -1,0 +1,75 @@
+//! `report` and `accuracy`, as far as no browser is needed (`tests/pages`).
+
+use super::job::Job;
+use serde_json::Value;
+
+fn text(job: &Job, name: &str) -> String {
+    String::from_utf8(job.read(name)).expect("UTF-8")
+}
+
+#[test]
+fn a_report_names_the_command_and_follows_the_job() {
+    let job = Job::new();
+    let line = "render cube.obj --size 24x16 --spp 1 --no-video -o o/f_##.png --frames";
+    job.done(&format!("{line} 1..2"));
+    let said = job.done("report o").out;
+    assert!(said.starts_with("o/f.report.html (2 of "), "{said}");
+    let page = text(&job, "o/f.report.html");
+    assert!(page.contains("-o &#39;o/f_##.png&#39; --frames 1..2"), "the command stands there");
+    assert!(page.contains("2 of the move&#39;s"), "and how far it is");
+    job.done(&format!("{line} 1..3"));
+    assert!(job.done("report o/f.manifest.jsonl -o p.html").out.starts_with("p.html (3 of "));
+    assert!(text(&job, "p.html").contains("f_03.png"));
+    assert!(job.done("report o -q").out.is_empty());
+    // The frames of the job are no less kept for it.
+    assert!(job.done(&format!("{line} 1..3")).out.contains("3 kept"));
+}
+
+#[test]
+fn a_report_of_nothing_is_refused_with_what_was_meant() {
+    let job = Job::new();
+    job.refused("report .", "holds no manifest");
+    job.refused("report cube.obj", "is no manifest");
+    job.refused("report nowhere", "cannot read the folder");
+    let line = "render cube.obj --size 8x8 --spp 1 --frames 1 --no-video";
+    job.done(&format!("{line} -o o/a_##.png"));
+    job.done(&format!("{line} -o o/b_##.png"));
+    job.refused("report o", "several sequences: a.manifest.jsonl, b.manifest.jsonl");
+    job.refused("report o/a.manifest.jsonl -o page.png", "does not end in .html");
+    job.refused("report o/a.manifest.jsonl --every 0", "0 is not in 1..");
+}
+
+#[test]
+fn errors_are_the_same_on_any_number_of_threads_and_less_with_more_samples() {
+    let job = Job::new();
+    let line = "accuracy cube.obj --size 32x24 --frames 1,2 --turns 1 --reference-spp 64 \
+                --shadow-samples 2 --knobs samples,reuse -q";
+    for threads in [1, 3] {
+        job.done(&format!("{line} --threads {threads} -o t{threads}"));
+    }
+    let rows = |folder: &str| -> Vec<Value> {
+        let json: Value =
+            serde_json::from_slice(&job.read(&format!("{folder}/accuracy.json"))).expect("JSON");
+        json["rows"].as_array().expect("rows").clone()
+    };
+    let (one, three) = (rows("t1"), rows("t3"));
+    let measured =
+        |row: &Value| (row["options"].clone(), row["errors"].clone(), row["rays"].clone());
+    assert!(one.len() > 5 && one.iter().map(measured).eq(three.iter().map(measured)));
+    let error = |options: &str| {
+        let row = one.iter().find(|row| row["options"] == options).expect("a row");
+        row["errors"]["mse"].as_f64().expect("a figure")
+    };
+    assert!(error("--spp 16") < error("") && error("") < error("--spp 1"));
+    assert_eq!(job.names("t1"), ["accuracy.csv", "accuracy.json", "report.html"]);
+}
+
+#[test]
+fn a_sweep_that_cannot_be_is_refused() {
+    let job = Job::new();
+    job.refused("accuracy cube.obj", "--output <DIR>");
+    job.refused("accuracy cube.obj -o a --frames 1,999999", "lies outside the shot");
+    job.refused("accuracy cube.obj -o a --knobs colour", "'colour'");
+    job.refused("accuracy cube.obj -o a --turns 0", "1..=1000");
+    job.refused("accuracy cube.obj -o a --crop 0,0,8,8", "whole frames");
+}
