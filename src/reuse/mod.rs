@@ -13,8 +13,8 @@ mod cost;
 mod index;
 mod lookup;
 mod reference;
-mod taps;
 pub mod store;
+mod taps;
 
 pub use cost::{
     LookupReason, channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of,

@@ -111,12 +111,7 @@ impl Reference {
 
 impl Sample {
     fn of(point: &SurfacePoint) -> Self {
-        Self {
-            p: point.p.as_vec3(),
-            n: point.n,
-            geom_id: point.geom_id,
-            samples: point.samples,
-        }
+        Self { p: point.p.as_vec3(), n: point.n, geom_id: point.geom_id, samples: point.samples }
     }
 
     fn is_one_surface(&self, other: &Self) -> bool {

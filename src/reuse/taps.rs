@@ -180,7 +180,9 @@ impl Lookup<'_> {
             let reach = cells.edge as f32 / point.footprint;
             for sample in reference.index.members(cells) {
                 let s = &reference.samples[sample as usize];
-                let Some(near) = self.on_surface(point, s, point.footprint, reach) else { continue };
+                let Some(near) = self.on_surface(point, s, point.footprint, reach) else {
+                    continue;
+                };
                 let weight = 0.5 * (1.0 - near.distance / reach);
                 taps.push(Tap { reference: number, sample, weight, apart: near.apart });
             }
