@@ -25,6 +25,8 @@ pub struct Costs {
     pub discovery_bytes: u64,
     pub strips_bytes: u64,
     pub note_bytes: u64,
+    /// Share of its core that a rank spends on looking for messages.
+    pub clerk_share: f64,
 }
 
 impl Costs {
@@ -57,6 +59,7 @@ impl Costs {
             discovery_bytes: 0,
             strips_bytes: 0,
             note_bytes: 400,
+            clerk_share: 0.0,
         }
     }
 
@@ -109,6 +112,7 @@ impl Costs {
             bandwidth: BANDWIDTH,
             nap: NAP,
             note_seconds: NOTE_SECONDS,
+            clerk_share: self.clerk_share,
             table: Table::Measured,
             cores: None,
         }

@@ -30,8 +30,9 @@ fn main() {
     .into_iter()
     .map(|(name, change)| (name, curve(&costs, name, &[MOST], change)))
     .collect();
-    let small = curve(&fit.costs, "frames of 400x300", &[64, 256, 1024, MOST], NONE);
-    let paper = paper::tables(&stage, &fit.costs);
+    let small_costs = costs::Costs { clerk_share: costs.clerk_share, ..fit.costs.clone() };
+    let small = curve(&small_costs, "frames of 400x300", &[64, 256, 1024, MOST], NONE);
+    let paper = paper::tables(&stage, &small_costs);
     let to_all = Change { tells_all: true, ..NONE };
     let all =
         curve(&costs, "every discovery to every rank", &[1, 4, 16, 64, 256, 1024, MOST], to_all);

@@ -13,6 +13,8 @@ const SEGMENT: u32 = 64;
 const MEASURED: Pyramid = Pyramid { segment: SEGMENT, frames: SEGMENT + 1 };
 /// A frame of a film.
 pub const WORDS: &str = "--size 1280x720 --spp 4 --shadow-samples 16";
+/// A job of some 10 to 20 seconds.
+const CLERK_WORDS: &str = "--size 640x360 --spp 4 --shadow-samples 16 --segment 16";
 const HEIGHT: u32 = 720;
 
 /// A way of doing the job.
@@ -33,6 +35,9 @@ pub fn measure(stage: &Stage, fit: &Fit) -> Costs {
     let larger = costs.reference_bytes as f64 / fit.costs.reference_bytes.max(1) as f64;
     costs.pack_seconds = fit.costs.pack_seconds * larger;
     costs.note_bytes = fit.costs.note_bytes;
+    let line = Line { ranks: 2, frames: 65, words: CLERK_WORDS.into() };
+    costs.clerk_share = stage.clerk_share(&line);
+    println!("  clerks take {:.2} % of a core", 100.0 * costs.clerk_share);
     costs
 }
 

@@ -1,8 +1,10 @@
 //! Jobs that are really run, and what they took.
 
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// The paper's scene with so many frames, in a folder of its own, which goes with it.
 pub struct Stage {
@@ -48,6 +50,46 @@ impl Stage {
     }
 
     fn run_on(&self, line: &Line) -> Ran {
+        let mut command = self.command(line);
+        let before = children_seconds();
+        let status = command.status().unwrap_or_else(|e| panic!("{command:?}: {e}"));
+        assert!(status.success(), "{command:?}: {status}");
+        let text = std::fs::read_to_string(self.folder.path().join("stats.json")).unwrap();
+        Ran { cpu: children_seconds() - before, stats: serde_json::from_str(&text).unwrap() }
+    }
+
+    /// Share of a core that a rank's main thread takes while another renders, all in all.
+    pub fn clerk_share(&self, line: &Line) -> f64 {
+        _ = std::fs::remove_dir_all(self.folder.path().join("out"));
+        let mut launched = self.command(line).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs(2));
+        let (start, before) = (Instant::now(), self.main_thread_seconds());
+        std::thread::sleep(Duration::from_secs(4));
+        let (seconds, after) = (start.elapsed().as_secs_f64(), self.main_thread_seconds());
+        assert!(launched.wait().unwrap().success());
+        let took = after.iter().filter_map(|(pid, at)| Some(at - before.get(pid)?));
+        let took: Vec<f64> = took.collect();
+        took.iter().sum::<f64>() / seconds / took.len().max(1) as f64
+    }
+
+    /// Seconds of a core that the main threads of the running ranks had so far.
+    fn main_thread_seconds(&self) -> BTreeMap<String, f64> {
+        let processes = std::fs::read_dir("/proc").unwrap().flatten().map(|entry| entry.path());
+        let is_rank = |path: &PathBuf| {
+            let name = std::fs::read_to_string(path.join("comm")).unwrap_or_default();
+            let at = std::fs::read_link(path.join("cwd"));
+            name.trim() == "tweenray" && at.is_ok_and(|at| at == self.folder.path())
+        };
+        let seconds = |path: PathBuf| {
+            // Of a process's folder this file is that of its main thread.
+            let text = std::fs::read_to_string(path.join("schedstat")).ok()?;
+            let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
+            Some((path.display().to_string(), 1e-9 * nanoseconds))
+        };
+        processes.filter(is_rank).filter_map(seconds).collect()
+    }
+
+    fn command(&self, line: &Line) -> Command {
         let folder = self.folder.path();
         let scene = Path::new(env!("CARGO_MANIFEST_DIR"));
         let scene = scene.join("scenes/reflective_spheres/scene.toml");
@@ -62,11 +104,7 @@ impl Stage {
         command.args(["--threads", "1", "--stats", "stats.json"]);
         command.args(line.words.split_whitespace());
         command.current_dir(folder).stdout(Stdio::null());
-        let before = children_seconds();
-        let status = command.status().unwrap_or_else(|e| panic!("{command:?}: {e}"));
-        assert!(status.success(), "{command:?}: {status}");
-        let text = std::fs::read_to_string(folder.join("stats.json")).unwrap();
-        Ran { cpu: children_seconds() - before, stats: serde_json::from_str(&text).unwrap() }
+        command
     }
 
     fn launcher(&self, ranks: u32) -> Command {

@@ -50,6 +50,8 @@ pub struct Model<'a> {
     pub nap: f64,
     /// Seconds of rank 0's clerk to write or read a note.
     pub note_seconds: f64,
+    /// Share of its core that each of several ranks spends on looking for messages.
+    pub clerk_share: f64,
     /// What the table itself takes.
     pub table: Table,
     /// Cores that all ranks share evenly; each has one of its own without.

@@ -4,7 +4,7 @@ use super::super::board::{Board, Errand, Order, Step, What};
 use super::super::note::Kind;
 use super::{Job, Model, Played, Table};
 use std::cmp::{Ordering, Reverse};
-use std::collections::{BinaryHeap, HashMap, HashSet, VecDeque};
+use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
 use std::time::Instant;
 
 /// A job half-way.
@@ -39,9 +39,9 @@ pub struct Play<'a> {
 pub(super) struct Desk {
     errands: VecDeque<Errand>,
     is_busy: bool,
-    has: HashSet<u32>,
+    has: BTreeSet<u32>,
     /// References that came and were not taken in.
-    arrived: HashSet<u32>,
+    arrived: BTreeSet<u32>,
     /// Strips that came, by frame.
     strips: HashMap<u32, u32>,
     /// When the last of what it sends is sent, and of what it gets received.
@@ -146,7 +146,9 @@ impl<'a> Play<'a> {
     /// Seconds of a core that a busy rank gets a second.
     fn pace(&self) -> f64 {
         let busy = self.in_hand.len().max(1) as f64;
-        self.model.cores.map_or(1.0, |cores| (cores / busy).min(1.0))
+        let core = self.model.cores.map_or(1.0, |cores| (cores / busy).min(1.0));
+        let clerk = if self.ranks > 1 { self.model.clerk_share } else { 0.0 };
+        core * (1.0 - clerk)
     }
 
     fn hear(&mut self, mail: Mail) {

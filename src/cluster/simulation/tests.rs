@@ -20,6 +20,7 @@ fn with(seconds: &dyn Fn(u32) -> f64) -> Model<'_> {
         bandwidth: 1e9,
         nap: 1e-3,
         note_seconds: 1e-5,
+        clerk_share: 0.0,
         table: Table::Seconds(1e-5),
         cores: None,
     }
@@ -99,6 +100,17 @@ fn ranks_that_share_cores_get_no_more_than_these() {
     }
     let apart = job.play(8, &with(&seconds));
     assert!(apart.seconds < 0.4 * eight.seconds);
+}
+
+#[test]
+fn clerks_that_take_a_tenth_leave_nine() {
+    let job = job(16, 257);
+    let seconds = of(&job);
+    let seconds_with =
+        |ranks, clerk_share| job.play(ranks, &Model { clerk_share, ..with(&seconds) }).seconds;
+    let ratio = seconds_with(4, 0.1) / seconds_with(4, 0.0);
+    assert!((ratio - 1.0 / 0.9).abs() < 0.03, "{ratio}");
+    assert!((seconds_with(1, 0.1) - seconds_with(1, 0.0)).abs() < 1e-9);
 }
 
 #[test]
