@@ -74,10 +74,10 @@ fn line(out: &mut String, curve: &Curve, colour: &str) {
         .iter()
         .map(|(ranks, efficiency, _)| format!("{:.1},{:.1}", x(*ranks), y(*efficiency)))
         .collect();
-    let places = places.join(" ");
+    let places = places.join("L");
     _ = writeln!(
         out,
-        "<polyline points=\"{places}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
+        "<path d=\"M{places}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
     );
     for (ranks, efficiency, _) in &curve.points {
         let (x, y) = (x(*ranks), y(*efficiency));

@@ -28,7 +28,8 @@ impl Board {
         steps
     }
 
-    /// What of others' work there is to take, few ranks in vain are told by; the others' turn comes
+    /// An idle rank gets a strip of a frame that others wait for, else a task of its own, else somebody
+    /// else's. Where few look for these in vain, the others need not: their turn comes
     /// with the next note.
     fn give_all_idle(&mut self, steps: &mut Vec<Step>) {
         let mut busiest = None;
