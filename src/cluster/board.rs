@@ -29,11 +29,15 @@ pub struct Board {
     to_join: Vec<usize>,
     /// Members with nothing in hand.
     idle: BTreeSet<u32>,
+    /// The member that is next to look for work of others.
+    turn: u32,
     /// Members whose hands changed since work was last given out.
     touched: BTreeSet<u32>,
     /// Tasks that are not made.
     left: usize,
     most_strips: u32,
+    /// Members of whose own tasks none is left.
+    without_own: usize,
     tells_all: bool,
     is_stopped: bool,
 }
@@ -159,9 +163,11 @@ impl Board {
             cut: BTreeSet::new(),
             to_join: Vec::new(),
             idle: order.iter().copied().collect(),
+            turn: 0,
             touched: BTreeSet::new(),
             left: originals.len(),
             most_strips: maker.most_strips(),
+            without_own: order.len(),
             tells_all: maker.tells_all(),
             is_stopped: false,
         };
@@ -182,7 +188,7 @@ impl Board {
     }
 
     fn add(&mut self, original: u32, frames: Vec<u32>, batch: usize, owner: u32) {
-        self.members[owner as usize].own.insert(self.tasks.len());
+        self.give_to(owner, self.tasks.len());
         self.tasks.push(Task {
             original,
             frames,
@@ -197,6 +203,20 @@ impl Board {
             at: BTreeSet::new(),
             holders: BTreeMap::new(),
         });
+    }
+
+    /// `rank` is the one to make `t`, as it looks.
+    fn give_to(&mut self, rank: u32, t: usize) {
+        let own = &mut self.members[rank as usize].own;
+        self.without_own -= usize::from(own.is_empty());
+        own.insert(t);
+    }
+
+    fn take_from(&mut self, rank: u32, t: usize) {
+        let own = &mut self.members[rank as usize].own;
+        if own.remove(&t) {
+            self.without_own += usize::from(own.is_empty());
+        }
     }
 
     fn connect(&mut self, needs: impl Fn(u32) -> Vec<u32>) {

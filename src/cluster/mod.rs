@@ -17,6 +17,7 @@ mod launcher;
 mod mpi;
 mod nodes;
 mod note;
+pub mod simulation;
 mod traffic;
 mod worker;
 

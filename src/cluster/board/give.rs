@@ -4,6 +4,8 @@ use super::{Board, Cut, Errand, Order, State, Step, What};
 
 /// Strips for each rank that a frame is cut for, so that a slow rank does not hold the others.
 const STRIPS_A_RANK: usize = 2;
+/// Ranks that look for work of others at a time and find none.
+const IN_VAIN: usize = 8;
 
 impl Board {
     /// Everything that can be given out now.
@@ -15,14 +17,7 @@ impl Board {
         for t in std::mem::take(&mut self.to_join) {
             self.give_joined(t, &mut steps);
         }
-        let mut next = self.idle.first().copied();
-        while let Some(rank) = next {
-            if self.ready.is_empty() && self.cut.is_empty() {
-                break;
-            }
-            self.give_idle(rank, &mut steps);
-            next = self.idle.range(rank + 1..).next().copied();
-        }
+        self.give_all_idle(&mut steps);
         for rank in std::mem::take(&mut self.touched) {
             // So nobody waits for messages. Where little is ready it would only keep work from those
             // who have none.
@@ -33,14 +28,38 @@ impl Board {
         steps
     }
 
-    /// A strip of a frame that others wait for, else a task of its own, else somebody else's.
-    fn give_idle(&mut self, rank: u32, steps: &mut Vec<Step>) {
-        if let Some(t) = self.cut_for(rank) {
-            return self.give_strip(rank, t, steps);
+    /// An idle rank gets a strip of a frame that others wait for, else a task of its own, else somebody
+    /// else's. Where few look for these in vain, the others need not: their turn comes
+    /// with the next note.
+    fn give_all_idle(&mut self, steps: &mut Vec<Step>) {
+        let mut busiest = None;
+        let mut in_vain = 0;
+        let turn = self.turn.min(self.members.len() as u32);
+        let idle: Vec<u32> =
+            self.idle.range(turn..).chain(self.idle.range(..turn)).copied().collect();
+        for rank in idle {
+            if self.ready.is_empty() && self.cut.is_empty() {
+                break;
+            }
+            if let Some(t) = self.cut_for(rank) {
+                self.give_strip(rank, t, steps);
+                continue;
+            }
+            let own = |t: &&usize| self.tasks[**t].unmet == 0;
+            let mut found = self.members[rank as usize].own.iter().find(own).copied();
+            if found.is_none() && in_vain < IN_VAIN {
+                let busiest = busiest.get_or_insert_with(|| self.busiest());
+                found = self.take_for(rank, busiest);
+                in_vain += usize::from(found.is_none());
+                self.turn = rank + 1;
+            }
+            if let Some(t) = found {
+                self.give_found(rank, t, steps);
+            }
         }
-        let own = |t: &&usize| self.tasks[**t].unmet == 0;
-        let own = self.members[rank as usize].own.iter().find(own).copied();
-        let Some(t) = own.or_else(|| self.take_for(rank)) else { return };
+    }
+
+    fn give_found(&mut self, rank: u32, t: usize, steps: &mut Vec<Step>) {
         match self.strips_of(t) {
             1 => self.give_whole(rank, t, steps),
             of => {
@@ -97,7 +116,7 @@ impl Board {
         let ready = self.ready.len().max(1);
         let helpers = match task.needs.is_empty() {
             // Whoever has frames of its own to come back to stays with them.
-            true => 1 + self.members.iter().filter(|m| m.own.is_empty()).count(),
+            true => 1 + self.without_own,
             false => self.idle.len(),
         };
         if helpers <= ready {
@@ -143,7 +162,7 @@ impl Board {
 
     fn no_longer_waits(&mut self, t: usize) {
         self.ready.remove(&t);
-        self.members[self.tasks[t].owner as usize].own.remove(&t);
+        self.take_from(self.tasks[t].owner, t);
     }
 
     fn hand_over(&mut self, rank: u32, t: usize, what: What, steps: &mut Vec<Step>) {

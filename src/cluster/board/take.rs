@@ -5,20 +5,30 @@ use std::collections::BTreeSet;
 
 /// Frames of a batch, as far as a search goes that need not find anything.
 pub const FEW: usize = 64;
+/// Members from whom work is taken at a time.
+const VICTIMS: usize = 32;
 
 impl Board {
     /// A task for a rank that has none of its own that is ready: with it come the second half of the
-    /// untouched batches of the slowest rank, or else what depends on it.
-    pub fn take_for(&mut self, rank: u32) -> Option<usize> {
-        let mut victims: Vec<u32> = (0..self.members.len() as u32)
-            .filter(|r| *r != rank && !self.members[*r as usize].own.is_empty())
-            .collect();
-        let mean = self.mean_seconds();
-        let left = |r: &u32| self.members[*r as usize].seconds_left(mean);
-        victims.sort_by(|a, b| left(b).total_cmp(&left(a)).then(a.cmp(b)));
-        victims.into_iter().find_map(|victim| {
-            self.take_batches(victim, rank).or_else(|| self.take_tree(victim, rank))
+    /// untouched batches of the first of `victims` that has any, or else what depends on it.
+    pub fn take_for(&mut self, rank: u32, victims: &[u32]) -> Option<usize> {
+        victims.iter().filter(|victim| **victim != rank).find_map(|victim| {
+            self.take_batches(*victim, rank).or_else(|| self.take_tree(*victim, rank))
         })
+    }
+
+    /// The few members that will be busy longest, the slowest first.
+    pub fn busiest(&self) -> Vec<u32> {
+        let mean = self.mean_seconds();
+        let members = (0..).zip(&self.members).filter(|(_, m)| !m.own.is_empty());
+        let mut left: Vec<(f64, u32)> = members.map(|(r, m)| (m.seconds_left(mean), r)).collect();
+        let by_left = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        if left.len() > VICTIMS {
+            left.select_nth_unstable_by(VICTIMS, by_left);
+            left.truncate(VICTIMS);
+        }
+        left.sort_by(by_left);
+        left.into_iter().map(|(_, rank)| rank).collect()
     }
 
     fn mean_seconds(&self) -> f64 {
@@ -93,8 +103,8 @@ impl Board {
     fn change_hands(&mut self, tasks: &[usize], from: u32, to: u32) {
         for t in tasks {
             self.tasks[*t].owner = to;
-            self.members[from as usize].own.remove(t);
-            self.members[to as usize].own.insert(*t);
+            self.take_from(from, *t);
+            self.give_to(to, *t);
         }
     }
 }
