@@ -38,7 +38,7 @@ options=(--size 320x180 --segment 8 --no-video)
 # seconds COMMAND...: how long it takes.
 seconds() {
   local start=$EPOCHREALTIME
-  "$@" >&2
+  "$@" >&2 || return
   awk -v a="$start" -v b="$EPOCHREALTIME" 'BEGIN { print b - a }'
 }
 
