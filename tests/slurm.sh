@@ -136,7 +136,7 @@ wrong_mpi() {
   local status=0
   srun --nodes=2 --ntasks-per-node=1 --mpi=pmi2 "$tweenray" render scene.toml "${options[@]}" \
     -o 'wrong/f_##.png' >wrong.log 2>&1 || status=$?
-  [[ $status == 2 ]] && grep -q 'MPI knows of one only' wrong.log || { cat wrong.log >&2; die "wrong --mpi ended with $status"; }
+  [[ $status == 2 ]] && grep -q 'srun --mpi=pmi2 started 2 processes, but MPI knows of one only' wrong.log || { cat wrong.log >&2; die "wrong --mpi ended with $status"; }
   [[ ! -e wrong ]] || die "wrong --mpi: frames were rendered"
   say "wrong --mpi: refused"
 }
