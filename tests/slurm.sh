@@ -42,16 +42,23 @@ seconds() {
   awk -v a="$start" -v b="$EPOCHREALTIME" 'BEGIN { print b - a }'
 }
 
-# An undisturbed run, as large as two and a half limits take on the nodes: measured there, since they
-# may be quicker than this machine, or share it.
-make_yardstick() {
+# trial SPP: how long the sequence takes on the nodes, seconds.
+trial() {
   local line=(srun --nodes="$nodes" --ntasks-per-node=1 --cpus-per-task=1 --mpi=pmix "$tweenray" render)
-  line+=(scene.toml "${options[@]}" --quiet --threads 1 --spp 4 -o 'trial/f_##.png')
-  local took
-  took=$(seconds bash -c "$setup"$'\n''exec "$@"' bash "${line[@]}") || die "srun --mpi=pmix does not run here"
-  spp=$(awk -v took="$took" -v all="$((usable * 5 / 2))" 'BEGIN { print int(4 * all / took) + 1 }')
+  line+=(scene.toml "${options[@]}" --quiet --threads 1 --spp "$1" -o "trial$1/f_##.png")
+  seconds bash -c "$setup"$'\n''exec "$@"' bash "${line[@]}" || die "srun --mpi=pmix does not run here"
+}
+
+# An undisturbed run, as large as two and a half limits take on the nodes: measured there, since they
+# may be quicker than this machine, or share it. Two trials, so that the start does not count.
+make_yardstick() {
+  local few many spp
+  few=$(trial 4)
+  many=$(trial 16)
+  spp=$(awk -v few="$few" -v many="$many" -v all="$((usable * 5 / 2))" \
+    'BEGIN { print int(12 * all / (many > few ? many - few : few)) + 1 }')
   options+=(--spp "$spp")
-  say "4 samples a pixel took $took s on $nodes nodes: $spp for two and a half limits"
+  say "4 and 16 samples a pixel took $few s and $many s on $nodes nodes: $spp for two and a half limits"
   "$tweenray" render scene.toml "${options[@]}" --quiet -o 'whole/f_##.png'
 }
 
