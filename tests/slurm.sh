@@ -75,16 +75,19 @@ state() { scontrol show job "$1" 2>/dev/null | grep -oE 'JobState=\w+' | cut -d=
 
 # wait_for JOB NAME: until it is done; a requeued job need not wait for its turn.
 wait_for() {
-  local deadline=$((SECONDS + 1200)) now last=
+  local deadline=$((SECONDS + 1200)) now last='' since=$SECONDS
   while now=$(state "$1") && [[ $now != COMPLETED ]]; do
-    [[ $now == "$last" ]] || say "$2: ${now,,}"
-    last=$now
+    if [[ $now != "$last" ]]; then
+      say "$2: ${now,,}"
+      last=$now since=$SECONDS
+    fi
     case $now in
       FAILED | TIMEOUT | CANCELLED | NODE_FAIL | OUT_OF_MEMORY | BOOT_FAIL)
         cat "$2.log" >&2
         die "$2: the job ended as $now"
         ;;
-      PENDING) scontrol update JobId="$1" StartTime=now 2>/dev/null || true ;;
+      # Nodes need a moment to clear up, not two minutes.
+      PENDING) [[ $((SECONDS - since)) -lt 10 ]] || scontrol update JobId="$1" StartTime=now 2>/dev/null || true ;;
     esac
     if [[ $SECONDS -gt $deadline ]]; then
       cat "$2.log" >&2
