@@ -38,20 +38,27 @@ options=(--size 320x180 --segment 8 --no-video)
 # seconds COMMAND...: how long it takes.
 seconds() {
   local start=$EPOCHREALTIME
-  "$@" >&2
+  "$@" >&2 || return
   awk -v a="$start" -v b="$EPOCHREALTIME" 'BEGIN { print b - a }'
 }
 
-# An undisturbed run, as large as two and a half limits take on the nodes: measured there, since they
-# may be quicker than this machine, or share it.
-make_yardstick() {
+# trial SPP: how long the sequence takes on the nodes, seconds.
+trial() {
   local line=(srun --nodes="$nodes" --ntasks-per-node=1 --cpus-per-task=1 --mpi=pmix "$tweenray" render)
-  line+=(scene.toml "${options[@]}" --quiet --threads 1 --spp 4 -o 'trial/f_##.png')
-  local took
-  took=$(seconds bash -c "$setup"$'\n''exec "$@"' bash "${line[@]}") || die "srun --mpi=pmix does not run here"
-  spp=$(awk -v took="$took" -v all="$((usable * 5 / 2))" 'BEGIN { print int(4 * all / took) + 1 }')
+  line+=(scene.toml "${options[@]}" --quiet --threads 1 --spp "$1" -o "trial$1/f_##.png")
+  seconds bash -c "$setup"$'\n''exec "$@"' bash "${line[@]}" || die "srun --mpi=pmix does not run here"
+}
+
+# An undisturbed run, as large as two and a half limits take on the nodes: measured there, since they
+# may be quicker than this machine, or share it. Two trials, so that the start does not count.
+make_yardstick() {
+  local few many spp
+  few=$(trial 4)
+  many=$(trial 16)
+  spp=$(awk -v few="$few" -v many="$many" -v all="$((usable * 5 / 2))" \
+    'BEGIN { print int(12 * all / (many > few ? many - few : few)) + 1 }')
   options+=(--spp "$spp")
-  say "4 samples a pixel took $took s on $nodes nodes: $spp for two and a half limits"
+  say "4 and 16 samples a pixel took $few s and $many s on $nodes nodes: $spp for two and a half limits"
   "$tweenray" render scene.toml "${options[@]}" --quiet -o 'whole/f_##.png'
 }
 
@@ -68,16 +75,19 @@ state() { scontrol show job "$1" 2>/dev/null | grep -oE 'JobState=\w+' | cut -d=
 
 # wait_for JOB NAME: until it is done; a requeued job need not wait for its turn.
 wait_for() {
-  local deadline=$((SECONDS + 1200)) now last=
+  local deadline=$((SECONDS + 1200)) now last='' since=$SECONDS
   while now=$(state "$1") && [[ $now != COMPLETED ]]; do
-    [[ $now == "$last" ]] || say "$2: ${now,,}"
-    last=$now
+    if [[ $now != "$last" ]]; then
+      say "$2: ${now,,}"
+      last=$now since=$SECONDS
+    fi
     case $now in
       FAILED | TIMEOUT | CANCELLED | NODE_FAIL | OUT_OF_MEMORY | BOOT_FAIL)
         cat "$2.log" >&2
         die "$2: the job ended as $now"
         ;;
-      PENDING) scontrol update JobId="$1" StartTime=now 2>/dev/null || true ;;
+      # Nodes need a moment to clear up, not two minutes.
+      PENDING) [[ $((SECONDS - since)) -lt 10 ]] || scontrol update JobId="$1" StartTime=now 2>/dev/null || true ;;
     esac
     if [[ $SECONDS -gt $deadline ]]; then
       cat "$2.log" >&2
@@ -136,7 +146,7 @@ wrong_mpi() {
   local status=0
   srun --nodes=2 --ntasks-per-node=1 --mpi=pmi2 "$tweenray" render scene.toml "${options[@]}" \
     -o 'wrong/f_##.png' >wrong.log 2>&1 || status=$?
-  [[ $status == 2 ]] && grep -q 'MPI knows of one only' wrong.log || { cat wrong.log >&2; die "wrong --mpi ended with $status"; }
+  [[ $status == 2 ]] && grep -q 'srun --mpi=pmi2 started 2 processes, but MPI knows of one only' wrong.log || { cat wrong.log >&2; die "wrong --mpi ended with $status"; }
   [[ ! -e wrong ]] || die "wrong --mpi: frames were rendered"
   say "wrong --mpi: refused"
 }

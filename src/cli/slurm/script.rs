@@ -34,27 +34,30 @@ pub struct Script<'a> {
 /// reference more, so there is an end.
 const BODY: &str = r#"
 # What is there of the sequence; succeeds once that is all of it.
-so_far() {
-  ls "$references" 2>/dev/null
-  "$tweenray" "${status[@]}"
-}
+so_far() { "$tweenray" "${status[@]}" 2>&1; }
+kept() { ls "$references" 2>/dev/null; }
 
 echo "== $(date '+%F %T') job $SLURM_JOB_ID on $SLURM_JOB_NODELIST, run $((${SLURM_RESTART_COUNT:-0} + 1))"
-before=$(so_far 2>&1)
-srun --mpi=pmix --export=ALL --kill-on-bad-exit=1 "${srun[@]}" "$tweenray" "${render[@]}"
-code=$?
-if now=$(so_far 2>&1); then
+before=$(so_far)/$(kept)
+for pause in 5 30 0; do
+  srun --mpi=pmix --export=ALL --kill-on-bad-exit=1 "${srun[@]}" "$tweenray" "${render[@]}"
+  code=$?
+  if now=$(so_far); then
+    echo "$now"
+    exit "$code"
+  fi
   echo "$now"
-  exit "$code"
-fi
-echo "$now"
-if [ "$now" = "$before" ]; then
-  echo "this run got no further and ended with exit code $code: not requeued" >&2
-  exit $((code ? code : 1))
-fi
-scontrol requeue "$SLURM_JOB_ID" || exit $((code ? code : 1))
-echo "requeued after exit code $code"
-exit 75
+  if [ "$now/$(kept)" != "$before" ]; then
+    scontrol requeue "$SLURM_JOB_ID" || exit $((code ? code : 1))
+    echo "requeued after exit code $code"
+    exit 75
+  fi
+  # Processes that could not be started may be so a little later: nodes clear up after the run before.
+  if [ "$code" -ne 1 ] && [ "$code" -lt 128 ]; then break; fi
+  sleep "$pause"
+done
+echo "this run got no further and ended with exit code $code: not requeued" >&2
+exit $((code ? code : 1))
 "#;
 
 impl Script<'_> {
