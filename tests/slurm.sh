@@ -130,7 +130,8 @@ node_lost() {
     return
   fi
   sleep 5
-  scontrol update NodeName="$node" State=RESUME
+  # It may be back already.
+  scontrol update NodeName="$node" State=RESUME 2>/dev/null || true
   wait_for "$job" node
   same node
   [[ $(runs node) -ge 2 ]] || die "node: it was not requeued"
