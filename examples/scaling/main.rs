@@ -6,6 +6,8 @@
 
 mod costs;
 mod fit;
+#[path = "../../tests/common/mpirun.rs"]
+mod launcher;
 mod page;
 mod paper;
 mod plot;

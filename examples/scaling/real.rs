@@ -1,5 +1,6 @@
 //! Jobs that are really run, and what they took.
 
+use super::launcher;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -108,15 +109,7 @@ impl Stage {
     }
 
     fn launcher(&self, ranks: u32) -> Command {
-        let mut command = Command::new("mpirun");
-        for (name, value) in [
-            ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
-            ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
-            ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
-            ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
-        ] {
-            command.env(name, value);
-        }
+        let mut command = launcher::mpirun();
         command.args(["--bind-to", "none", "-n", &ranks.to_string()]).arg(&self.program);
         command
     }

@@ -1,6 +1,7 @@
 //! Jobs under mpirun.
 
 use super::job::{Job, Ran};
+use super::launcher;
 use std::process::Command;
 
 /// The job under mpirun; `None` where there is none: without it there is nothing to test.
@@ -18,17 +19,9 @@ pub fn launched(job: &Job, ranks: u32, line: &str) -> Command {
     command
 }
 
-/// mpirun, allowed to share cores and to run as root.
+/// mpirun in the job's folder.
 pub fn mpirun(job: &Job) -> Command {
-    let mut command = Command::new("mpirun");
+    let mut command = launcher::mpirun();
     command.current_dir(job.path("."));
-    for (name, value) in [
-        ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
-        ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
-        ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
-        ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
-    ] {
-        command.env(name, value);
-    }
     command
 }

@@ -6,6 +6,9 @@ mod job;
 mod killed;
 #[cfg(feature = "mpi")]
 mod launch;
+#[cfg(feature = "mpi")]
+#[path = "../common/mpirun.rs"]
+mod launcher;
 mod pages;
 mod ranks;
 mod references;
