@@ -3,9 +3,11 @@
 //! A point is projected into each reference. Of the four samples around it those count that lie on
 //! the same surface: same mesh, compatible normal, within the pixel's footprint on the surface, and
 //! sampled no more coarsely than the point itself. Their weights are renormalised; in each channel
-//! they must carry enough weight together and agree as well as their sampling noise allows.
+//! they must carry enough weight together and agree as well as their sampling noise allows, with one
+//! another or with a plane through them.
 
-use super::reference::{NONE, Reference};
+use super::plane::Plane;
+use super::reference::{Change, NONE, Reference};
 use super::taps::{ALWAYS, Images, Taps};
 use crate::inference::{Inference, Origin, Questions};
 use crate::math::Vec3;
@@ -13,6 +15,10 @@ use crate::math::Vec3;
 /// Points that are looked up together: the memory that all of them need is asked for before any of it
 /// is waited for.
 const TOGETHER: usize = 16;
+/// Fewer shadow rays do not excuse that samples lie off a plane.
+const PLANE_RAYS: f32 = 100.0;
+/// A bend, 1 - 2 + 1 ratios, has √6 times the noise of one: this is 1/√6.
+const BEND: f32 = 0.408_248_3;
 
 /// What counts as evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +42,14 @@ pub struct Evidence {
     pub tolerance: f32,
     /// Variance allowed on top, in that of independent shadow samples.
     pub noise: f32,
+    /// Both the same about a plane through the samples, where these do not agree by themselves: the
+    /// tolerance a share of the other one.
+    pub plane_tolerance: f32,
+    /// In the variance of so many independent shadow samples, at least a hundred: noise of fewer hides
+    /// whether they are a plane.
+    pub plane_noise: f32,
+    /// Variance that the plane's value may have, in that of one sample.
+    pub plane_leverage: f32,
     /// Where no slope is known, behind mirrors and glass: how far the samples' weighted mean may lie from
     /// the point, footprints. Beside it they tell about another place, however well they agree.
     pub offset: f32,
@@ -65,7 +79,10 @@ impl Default for Evidence {
             grazing: 0.3,
             tolerance: 1.0,
             noise: 2.0,
-            offset: 1.0,
+            plane_tolerance: 0.8,
+            plane_noise: 1.75,
+            plane_leverage: 0.6,
+            offset: 1.5,
             offset_steps: 30.0,
             offset_noise: 14.0,
             offset_saturated: 4.0,
@@ -105,7 +122,7 @@ impl Inference for Lookup<'_> {
             for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
                 self.gather(point, &images[i], &mut taps);
                 if taps.weight >= self.evidence.least_weight {
-                    self.answer(&taps, shown(i), &mut ratios[i * channels..][..channels]);
+                    self.answer(point.n, &taps, shown(i), &mut ratios[i * channels..][..channels]);
                     origins[i] = self.origin(&taps);
                 }
             }
@@ -114,7 +131,7 @@ impl Inference for Lookup<'_> {
 }
 
 /// What the taps tell of one light.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Told {
     /// Sum of the weights of the taps that know it.
     weight: f32,
@@ -126,16 +143,27 @@ struct Told {
     samples: f32,
     /// How far their weighted mean lies from the point, footprints.
     offset: f32,
-    /// Largest slope of them, per footprint; NaN where none is known.
-    slope: f32,
+    /// Largest changes around them.
+    change: Change,
+}
+
+impl Told {
+    const NOTHING: Self = Self {
+        weight: 0.0,
+        mean: 0.0,
+        variance: 0.0,
+        samples: 0.0,
+        offset: 0.0,
+        change: Change::UNKNOWN,
+    };
 }
 
 impl Lookup<'_> {
-    /// Weighted means of the ratios that agree. `shown` is what the pixel would show of each light
-    /// without shadows.
-    fn answer(&self, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
+    /// Means of the ratios that agree, about a point with the normal `n`. `shown` is what the pixel
+    /// would show of each light without shadows.
+    fn answer(&self, n: Vec3, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
         // Of many lights the last are told twice.
-        let mut told = [Told::default(); 8];
+        let mut told = [Told::NOTHING; 8];
         let mut seen = 0.0;
         for (channel, shown) in shown.iter().enumerate() {
             let own = self.told(taps, channel);
@@ -151,17 +179,24 @@ impl Lookup<'_> {
             let kept = told.get(channel).copied();
             let own = kept.unwrap_or_else(|| self.told(taps, channel));
             let allowed = self.evidence.tolerance / (steps * shown).max(1e-6);
-            if self.agrees(&own, channel, allowed) {
+            let rays = own.samples * self.rays[channel] as f32;
+            if f64::from(own.weight) < self.evidence.least_weight {
+                continue;
+            }
+            if self.agrees(&own, rays, allowed) {
                 *out = own.mean;
+            } else if let Some(ratio) = self.by_plane(n, taps, channel, (&own, rays, allowed)) {
+                *out = ratio;
             }
         }
     }
 
     fn told(&self, taps: &Taps, channel: usize) -> Told {
         let mut first = f32::NAN;
-        let (mut weight, mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0, 0.0);
+        let (mut weight, mut share) = (0.0, 0.0);
+        let (mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0);
         let mut apart = Vec3::ZERO;
-        let mut slope = f32::NAN;
+        let mut change = Change::UNKNOWN;
         for tap in taps.iter() {
             let reference = self.references[tap.reference as usize];
             let ratio = reference.ratio(tap.sample, channel);
@@ -174,45 +209,74 @@ impl Lookup<'_> {
             // From the first, so that equal ones give just that, and no variance.
             let further = ratio - first;
             weight += tap.weight;
-            sum += tap.weight * further;
-            squares += tap.weight * further * further;
-            samples += tap.weight * reference.samples[tap.sample as usize].samples as f32;
-            apart += tap.apart * tap.weight;
-            slope = slope.max(reference.slope(tap.sample, channel));
+            share += tap.share;
+            sum += tap.share * further;
+            squares += tap.share * further * further;
+            samples += tap.share * reference.samples[tap.sample as usize].samples as f32;
+            apart += tap.apart * tap.share;
+            change = change.max(reference.change(tap.sample, channel));
         }
         if weight == 0.0 {
-            return Told::default();
+            return Told::NOTHING;
         }
-        let (share, mean) = (1.0 / weight, sum / weight);
+        let (share, mean) = (1.0 / share, sum / share);
         Told {
             weight,
             mean: first + mean,
             variance: (squares * share - mean * mean).max(0.0),
             samples: samples * share,
             offset: apart.length() * share,
-            slope,
+            change,
         }
     }
 
-    /// Whether the ratios of a channel lie no further from their mean than their sampling noise and
-    /// an `allowed` deviation explain, and are enough.
-    fn agrees(&self, told: &Told, channel: usize, allowed: f32) -> bool {
-        let Told { weight, mean, variance, samples, offset, slope } = *told;
-        if f64::from(weight) < self.evidence.least_weight {
-            return false;
-        }
-        let rays = samples * self.rays[channel] as f32;
-        let noise = self.evidence.noise * (mean * (1.0 - mean)).max(0.0) / rays;
+    /// Whether ratios of `rays` shadow rays each lie no further from their mean than their sampling noise
+    /// and an `allowed` deviation explain, and about the point.
+    fn agrees(&self, told: &Told, rays: f32, allowed: f32) -> bool {
+        let Told { mean, variance, offset, change, .. } = *told;
+        let noise = self.evidence.noise * variance_of_one(mean) / rays;
         if variance > allowed * allowed + noise {
             return false;
         }
-        if slope.is_nan() {
+        if change.slope.is_nan() {
             return offset <= self.most_offset(mean, allowed, noise);
         }
+        change.slope * offset <= self.most_change(mean, rays, allowed)
+    }
+
+    /// The ratio at the point where the taps lie on a plane, and so do the samples beside them: three in a
+    /// row tell a slope from a step, which four about a point cannot.
+    fn by_plane(
+        &self,
+        n: Vec3,
+        taps: &Taps,
+        channel: usize,
+        (told, rays, allowed): (&Told, f32, f32),
+    ) -> Option<f32> {
+        let Evidence { plane_tolerance, plane_noise, plane_leverage, .. } = self.evidence;
+        let known = taps.iter().filter_map(|tap| {
+            let ratio = self.references[tap.reference as usize].ratio(tap.sample, channel);
+            (!ratio.is_nan()).then_some((tap, ratio))
+        });
+        let plane = Plane::fit(n, known)?;
+        let ratio = plane.value.clamp(0.0, 1.0);
+        let allowed = plane_tolerance * allowed;
+        let noise = plane_noise * variance_of_one(ratio) / rays.max(PLANE_RAYS);
+        let is_plane = plane.residual <= allowed * allowed + noise
+            && plane.leverage <= plane_leverage
+            && match (told.change.slope.is_nan(), told.change.bend.is_nan()) {
+                (true, _) => told.offset <= self.most_offset(ratio, allowed, noise),
+                (false, true) => false,
+                _ => told.change.bend * BEND <= self.most_change(ratio, rays, allowed),
+            };
+        is_plane.then_some(ratio)
+    }
+
+    /// By how much a ratio may change unseen.
+    fn most_change(&self, mean: f32, rays: f32, allowed: f32) -> f32 {
         // Stratified: a shadow's edge crosses the cells of about the root of n of n samples.
-        let traced = (mean * (1.0 - mean)).max(0.0) / (rays * rays.sqrt());
-        let Evidence { change, change_noise, .. } = self.evidence;
-        slope * offset <= change * allowed + change_noise * traced.sqrt()
+        let traced = variance_of_one(mean) / (rays * rays.sqrt());
+        self.evidence.change * allowed + self.evidence.change_noise * traced.sqrt()
     }
 
     /// How far the samples' mean may lie from the point, footprints: the further, the less of an
@@ -250,6 +314,11 @@ impl Lookup<'_> {
         origin.distance = distance / taps.weight as f32;
         origin
     }
+}
+
+/// Variance of a single shadow ray where the ratio is `mean`.
+fn variance_of_one(mean: f32) -> f32 {
+    (mean * (1.0 - mean)).max(0.0)
 }
 
 /// How many display steps of 1/255 a unit of radiance makes where `radiance` is shown: the slope of

@@ -12,6 +12,7 @@ pub mod colour;
 mod cost;
 mod index;
 mod lookup;
+mod plane;
 mod reference;
 pub mod store;
 mod taps;

@@ -24,6 +24,24 @@ pub(super) struct Sample {
     pub samples: u32,
 }
 
+/// How a ratio changes around a sample; NaN where too few samples beside it are known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Change {
+    /// By how much at most towards one beside it, per footprint.
+    pub slope: f32,
+    /// By how much that differs at most on opposite sides: nothing on a plane, however steep.
+    pub bend: f32,
+}
+
+impl Change {
+    pub const UNKNOWN: Self = Self { slope: f32::NAN, bend: f32::NAN };
+
+    /// The larger of both; of NaN and a number the number.
+    pub fn max(self, other: Self) -> Self {
+        Self { slope: self.slope.max(other.slope), bend: self.bend.max(other.bend) }
+    }
+}
+
 /// What one frame knows.
 #[derive(Debug, Clone)]
 pub struct Reference {
@@ -38,9 +56,8 @@ pub struct Reference {
     pub(super) samples: Vec<Sample>,
     /// For each sample the ratio in each channel; NaN where unknown.
     pub(super) ratios: Vec<f32>,
-    /// For each of them by how much it changes from the sample to those beside it, per footprint; NaN
-    /// where none beside it is known.
-    slopes: Vec<f32>,
+    /// How each of them changes from the sample to those beside it.
+    changes: Vec<Change>,
     pub(super) channels: usize,
     /// Samples that are no pixel's own: seen in mirrors, through glass, beside another surface.
     pub(super) index: Index,
@@ -78,7 +95,7 @@ impl Reference {
         }
         let pixel_size = camera.pixel_size();
         let index = Index::new(&samples, &footprints, others);
-        let slopes = Vec::new();
+        let changes = Vec::new();
         let mut reference = Self {
             frame,
             camera: *camera,
@@ -86,69 +103,73 @@ impl Reference {
             slots,
             samples,
             ratios,
-            slopes,
+            changes,
             channels,
             index,
         };
-        reference.slopes = reference.measure_slopes();
+        reference.changes = reference.measure_changes();
         reference
     }
 
-    /// How much the ratios change around each sample: towards the nearest sample of its surface to the
-    /// left, the right, above and below, if that is no further than a few pixels.
-    fn measure_slopes(&self) -> Vec<f32> {
+    /// How the ratios change around each sample: towards the nearest sample of its surface to the left,
+    /// the right, above and below, if that is no further than a few pixels.
+    fn measure_changes(&self) -> Vec<Change> {
         let (channels, width) = (self.channels, self.camera.width as usize);
         let rows = self.slots.par_chunks(width).enumerate().map(|(y, row)| {
-            let mut slopes = Vec::new();
+            let mut changes = Vec::new();
             for (x, own) in row.iter().enumerate().filter(|(_, own)| **own != NONE) {
+                let axes = [(1, 0), (0, 1)]
+                    .map(|(dx, dy)| [self.beside(x, y, (dx, dy)), self.beside(x, y, (-dx, -dy))]);
                 let own = *own as usize;
-                let at = slopes.len();
-                slopes.resize(at + channels, f32::NAN);
-                for other in self.beside(x, y) {
-                    self.steepen(&mut slopes[at..], own, other);
-                }
+                changes.extend((0..channels).map(|channel| self.change_along(&axes, own, channel)));
             }
-            slopes
+            changes
         });
-        let rows: Vec<Vec<f32>> = rows.collect();
-        let mut slopes = vec![f32::NAN; self.ratios.len()];
+        let rows: Vec<Vec<Change>> = rows.collect();
+        let mut changes = vec![Change::UNKNOWN; self.ratios.len()];
         for (row, found) in self.slots.chunks(width).zip(rows) {
             let own = row.iter().filter(|own| **own != NONE);
             for (own, found) in own.zip(found.chunks(channels.max(1))) {
-                slopes[*own as usize * channels..][..channels].copy_from_slice(found);
+                changes[*own as usize * channels..][..channels].copy_from_slice(found);
             }
         }
-        slopes
+        changes
     }
 
-    /// The nearest samples of the surface seen at (`x`, `y`) in the four directions.
-    fn beside(&self, x: usize, y: usize) -> impl Iterator<Item = usize> {
+    /// The nearest sample of the surface seen at (`x`, `y`) in a direction.
+    fn beside(&self, x: usize, y: usize, (dx, dy): (isize, isize)) -> Option<usize> {
         let (width, height) = (self.camera.width as usize, self.camera.height as usize);
-        let own = self.slots[y * width + x] as usize;
-        let towards = move |(dx, dy): (isize, isize)| {
-            (1..=BESIDE).find_map(|k| {
-                let x = x.checked_add_signed(dx * k).filter(|x| *x < width)?;
-                let y = y.checked_add_signed(dy * k).filter(|y| *y < height)?;
-                let other = self.slots[y * width + x];
-                let is_one = other != NONE
-                    && self.samples[other as usize].is_one_surface(&self.samples[own]);
-                is_one.then_some(other as usize)
-            })
-        };
-        [(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(towards)
+        let own = &self.samples[self.slots[y * width + x] as usize];
+        (1..=BESIDE).find_map(|k| {
+            let x = x.checked_add_signed(dx * k).filter(|x| *x < width)?;
+            let y = y.checked_add_signed(dy * k).filter(|y| *y < height)?;
+            let other = self.slots[y * width + x];
+            let is_one = other != NONE && self.samples[other as usize].is_one_surface(own);
+            is_one.then_some(other as usize)
+        })
     }
 
-    /// Raises the slopes of sample `own` to those towards sample `other`.
-    fn steepen(&self, slopes: &mut [f32], own: usize, other: usize) {
-        let (a, b) = (&self.samples[own], &self.samples[other]);
+    /// How a ratio changes from sample `own` to those on both sides of it along two
+    /// axes.
+    fn change_along(&self, axes: &[[Option<usize>; 2]; 2], own: usize, channel: usize) -> Change {
+        let mut change = Change::UNKNOWN;
+        for axis in axes {
+            let [there, back] =
+                axis.map(|other| other.map_or(f32::NAN, |other| self.rise(own, other, channel)));
+            let slope = there.abs().max(back.abs());
+            change = change.max(Change { slope, bend: (there + back).abs() });
+        }
+        change
+    }
+
+    /// By how much a ratio rises from one sample to another, per footprint.
+    fn rise(&self, from: usize, to: usize, channel: usize) -> f32 {
+        let (a, b) = (&self.samples[from], &self.samples[to]);
         let depth = (a.position() - self.camera.eye).dot(self.camera.forward);
         let footprint = (depth * self.pixel_size) as f32;
         let per_footprint = footprint / a.p.distance(b.p).max(footprint);
-        for (channel, slope) in slopes.iter_mut().enumerate() {
-            let [a, b] = [own, other].map(|i| self.ratios[i * self.channels + channel]);
-            // Of NaN and a number the number.
-            *slope = slope.max((a - b).abs() * per_footprint);
-        }
+        let [a, b] = [from, to].map(|i| self.ratios[i * self.channels + channel]);
+        (b - a) * per_footprint
     }
 
     /// Number of references that are frames of another shot: they count as earlier than all.
@@ -176,12 +197,13 @@ impl Reference {
 
     /// Bytes that it holds.
     pub fn memory(&self) -> u64 {
-        let sample = size_of::<Sample>() + 8 * self.channels;
+        let ratio = size_of::<f32>() + size_of::<Change>();
+        let sample = size_of::<Sample>() + ratio * self.channels;
         (self.samples.len() * sample + 4 * self.slots.len()) as u64 + self.index.memory()
     }
 
-    pub(super) fn slope(&self, sample: u32, channel: usize) -> f32 {
-        self.slopes[sample as usize * self.channels + channel]
+    pub(super) fn change(&self, sample: u32, channel: usize) -> Change {
+        self.changes[sample as usize * self.channels + channel]
     }
 
     pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {

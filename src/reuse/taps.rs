@@ -8,6 +8,8 @@ use crate::math::Vec3;
 
 /// Samples that one point's answer is made of, at most.
 const MOST_TAPS: usize = 24;
+/// Levels of the index that are asked: a point's own, the finer and the coarser one.
+const LEVELS: usize = 3;
 /// References that are asked about every point.
 pub(super) const ALWAYS: usize = 2;
 
@@ -16,7 +18,10 @@ pub(super) const ALWAYS: usize = 2;
 pub(super) struct Tap {
     pub reference: u32,
     pub sample: u32,
+    /// Of 1 that a whole reference gives.
     pub weight: f32,
+    /// Weight in means: more alike than the weights, since that averages more of tracing's noise.
+    pub share: f32,
     /// From the point to the sample, footprints.
     pub apart: Vec3,
 }
@@ -31,7 +36,7 @@ pub(super) struct Taps {
 impl Taps {
     /// None yet.
     pub fn new() -> Self {
-        let none = Tap { reference: 0, sample: 0, weight: 0.0, apart: Vec3::ZERO };
+        let none = Tap { reference: 0, sample: 0, weight: 0.0, share: 0.0, apart: Vec3::ZERO };
         Self { list: [none; MOST_TAPS], len: 0, weight: 0.0 }
     }
 
@@ -40,11 +45,13 @@ impl Taps {
         self.weight = 0.0;
     }
 
-    fn push(&mut self, tap: Tap) {
-        if self.len < MOST_TAPS && tap.weight > 0.0 {
-            self.list[self.len] = tap;
+    fn push(&mut self, reference: u32, sample: u32, weight: f32, apart: Vec3) {
+        if self.len < MOST_TAPS && weight > 0.0 {
+            // To the power of 3/4.
+            let share = weight.sqrt() * weight.sqrt().sqrt();
+            self.list[self.len] = Tap { reference, sample, weight, share, apart };
             self.len += 1;
-            self.weight += f64::from(tap.weight);
+            self.weight += f64::from(weight);
         }
     }
 
@@ -109,7 +116,8 @@ impl Lookup<'_> {
         }
         if !point.direct && taps.weight < self.evidence.enough_weight {
             let own = level_of(point.footprint);
-            let cells = [own, own - 1].map(|level| Cells::around(level, point.geom_id, point.p));
+            let cells =
+                [own, own - 1, own + 1].map(|level| Cells::around(level, point.geom_id, point.p));
             for (number, reference) in self.references.iter().enumerate() {
                 if taps.weight >= self.evidence.enough_weight {
                     break;
@@ -164,7 +172,7 @@ impl Lookup<'_> {
             let wx = if k & 1 == 1 { fx } else { 1.0 - fx };
             let wy = if k >> 1 == 1 { fy } else { 1.0 - fy };
             let weight = wx * wy * near.alike * near.alike;
-            taps.push(Tap { reference: number, sample, weight, apart: near.apart });
+            taps.push(number, sample, weight, near.apart);
         }
     }
 
@@ -173,7 +181,7 @@ impl Lookup<'_> {
         &self,
         (number, reference): (u32, &Reference),
         point: &SurfacePoint,
-        cells: &[Cells; 2],
+        cells: &[Cells; LEVELS],
         taps: &mut Taps,
     ) {
         for cells in cells {
@@ -184,7 +192,7 @@ impl Lookup<'_> {
                     continue;
                 };
                 let weight = 0.5 * (1.0 - near.distance / reach);
-                taps.push(Tap { reference: number, sample, weight, apart: near.apart });
+                taps.push(number, sample, weight, near.apart);
             }
         }
     }

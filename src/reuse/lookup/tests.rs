@@ -117,9 +117,22 @@ fn a_coarser_sampling_is_refused() {
 #[test]
 fn samples_that_disagree_are_refused_at_the_edge_and_nowhere_else() {
     let reference = wall(|x| if x < 32 { 1.0 } else { 0.0 });
-    assert_eq!(told(&reference, on_wall(31.4, 20.0), Evidence::default()), 1.0);
-    assert_eq!(told(&reference, on_wall(32.6, 20.0), Evidence::default()), 0.0);
+    assert_eq!(told(&reference, on_wall(30.5, 20.0), Evidence::default()), 1.0);
+    assert_eq!(told(&reference, on_wall(33.5, 20.0), Evidence::default()), 0.0);
     refused(&reference, on_wall(32.0, 20.0), |e| e.tolerance = 255.0);
+}
+
+#[test]
+fn a_steady_change_is_told_and_a_kink_is_not() {
+    let point = on_wall(31.3, 20.2);
+    let steady = wall(|x| (0.5 + 0.2 * (x as f32 + 0.5 - 31.3)).clamp(0.0, 1.0));
+    let ratio = told(&steady, point, Evidence::default());
+    assert!((ratio - 0.5).abs() < 1e-4, "{ratio}");
+    let no_plane = Evidence { plane_leverage: 0.0, ..Evidence::default() };
+    assert!(told(&steady, point, no_plane).is_nan());
+    // The four samples about the point lie on a plane too, those beside them do not.
+    let step = wall(|x| if x < 32 { 0.5 } else { 0.9 });
+    refused(&step, on_wall(32.0, 20.0), |e| e.change_noise = 100.0);
 }
 
 #[test]
