@@ -47,8 +47,13 @@ fn assert_same(job: &Job, folder: &str, ending: &str, all: bool) {
 
 #[test]
 fn a_killed_job_goes_on_with_any_number_of_ranks() {
-    for (ending, more) in [("png", ""), ("exr", ""), ("exr", "--crop 8,4,50,30"), ("png", "--maps")]
-    {
+    for (ending, more) in [
+        ("png", ""),
+        ("exr", ""),
+        ("exr", "--crop 8,4,50,30"),
+        ("png", "--maps"),
+        ("png", "--policy colour"),
+    ] {
         let job = Job::new();
         let line = |out: &str| format!("{LINE} {more} -o {out}/f_##.{ending}");
         job.done(&line("whole"));
