@@ -1,7 +1,7 @@
-//! A rank that panics ends the whole job, with its words. Nothing in the program is known to panic, so
+//! A rank that panics, or fails alone, ends the whole job, with its words. Nothing in the program is known to panic, so
 //! this starts itself under mpirun, with a maker of frames that does: on the thread that renders, on one
 //! that it traces with, or on the main one.
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(not(feature = "mpi"), allow(dead_code, unused_imports))]
 
 #[path = "common/mpirun.rs"]
@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use tweenray::cluster::{self, World};
-use tweenray::error::Result;
+use tweenray::error::{Error, Result};
 use tweenray::film::Film;
 use tweenray::output::manifest::{FORMAT, Header};
 use tweenray::output::{FramePattern, WriteOptions};
@@ -77,6 +77,9 @@ fn target(folder: &Path) -> Target {
 /// One rank of a job that will not end well.
 fn be_a_rank(place: &str, folder: &Path) {
     let world = World::join().expect("a job");
+    if place == "agreeing" {
+        return fail_while_others_are_busy(&world);
+    }
     let target = target(folder);
     let frames = FrameRange { first: 1, last: FRAMES };
     let plan = world.from_root(|| sequence::prepare(&target, frames)).expect("a plan");
@@ -86,6 +89,22 @@ fn be_a_rank(place: &str, folder: &Path) {
     let done = |_: &_| assert!(place != "main", "the main thread met a lemon");
     let outcome = cluster::render(&world, &order, &target, &plan, &maker, &stop, &done);
     assert!(outcome.is_ok_and(|outcome| outcome.unfinished == 0));
+}
+
+/// Rank 1 fails, and the others do not come to hear of it.
+fn fail_while_others_are_busy(world: &World) {
+    let outcome = match world.rank() {
+        1 => Err(Error::Failed("rank 1 met a lemon".into())),
+        _ => {
+            std::thread::sleep(Duration::from_secs(60));
+            Ok(())
+        }
+    };
+    if let Err(error) = world.agree(outcome) {
+        assert!(world.is_stranded());
+        eprintln!("{error}");
+        world.abort(1);
+    }
 }
 
 /// Whether there is an mpirun to try it with.
@@ -132,12 +151,13 @@ fn main() {
         ("rendering", "the rendering thread met a lemon"),
         ("pool", "the pool met a lemon"),
         ("main", "the main thread met a lemon"),
+        ("agreeing", "rank 1 met a lemon"),
         ("nowhere", ""),
     ] {
         if !a_panic_ends_the_job(place, says) {
             println!("no mpirun: nothing to test");
             return;
         }
-        println!("a panic: {place} ... ok");
+        println!("ends the job: {place} ... ok");
     }
 }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// How long a rank that failed waits for the others to hear of it.
-const PATIENCE: Duration = Duration::from_secs(3);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 impl World {
     /// `outcome`, if no rank failed; else the error of the lowest rank that did, on every rank.
     /// All ranks call it. Where others are busy with something long, a rank that failed soon
     /// comes back with its own error, and [`is_stranded`](Self::is_stranded).
     pub fn agree<T>(&self, outcome: Result<T>) -> Result<T> {
-        if self.size() == 1 {
+        if self.size() == 1 || self.is_stranded() {
             return outcome;
         }
         if !self.assemble(outcome.is_err().then_some(PATIENCE)) {
