@@ -1,6 +1,6 @@
-//! Discoveries on disk, for a job that goes on after this one: of all frames that frames to come need,
-//! which are few, since every frame's depend on some twice as many as the shot's length has binary
-//! digits. A rank puts there what it made itself.
+//! Discoveries on disk, for a job that goes on after this one: of all frames that frames to come need.
+//! These are few, about as many as the shot's length has binary digits. A rank puts there what it made
+//! itself.
 
 use super::{ColourMaker, State, exchange};
 use crate::error::Result;
