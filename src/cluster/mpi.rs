@@ -13,6 +13,7 @@ use ::mpi::point_to_point::MatchedReceiveVec;
 use ::mpi::topology::SimpleCommunicator;
 use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::RefCell;
+use std::ffi::{c_char, c_void};
 use std::mem::MaybeUninit;
 use std::time::{Duration, Instant};
 
@@ -55,6 +56,7 @@ impl Session {
             // and MPI is not used by this process again.
             unsafe { ffi::MPI_Abort(ffi::RSMPI_COMM_WORLD, 1) };
         }));
+        wait_for_all_to_start();
         let world = universe.world();
         let node = world.split_shared(world.rank());
         Ok(Self { outbox: RefCell::default(), world, node, _universe: universe })
@@ -207,6 +209,32 @@ impl Session {
         outbox.is_empty()
     }
 }
+
+/// Waits until every rank has left `MPI_Init`, by the launcher's own barrier where it has one. In Open
+/// MPI 5 a rank that is still in there crashes where a message of a quicker one reaches it
+/// (`mca_pml_ob1_recv_frag_callback_match` in 5.0.7, over TCP, on busy cores).
+#[cfg(target_os = "linux")]
+fn wait_for_all_to_start() {
+    type Fence =
+        unsafe extern "C" fn(*const c_void, usize, *const c_void, usize) -> std::ffi::c_int;
+    unsafe extern "C" {
+        fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
+    }
+    // SAFETY: the name is a C string; on Linux the null library is `RTLD_DEFAULT`, all that the
+    // program was linked with and what that needs. Open MPI 5 needs PMIx, others may not.
+    let found = unsafe { dlsym(std::ptr::null_mut(), c"PMIx_Fence".as_ptr()) };
+    if found.is_null() {
+        return;
+    }
+    // SAFETY: `pmix_status_t PMIx_Fence(const pmix_proc_t[], size_t, const pmix_info_t[], size_t)` by
+    // the PMIx Standard since 2.0, in which no processes are all of the job. MPI has initialised PMIx.
+    let fence = unsafe { std::mem::transmute::<*mut c_void, Fence>(found) };
+    // SAFETY: as above; every rank calls it once, here. Where it fails there is nothing to wait for.
+    unsafe { fence(std::ptr::null(), 0, std::ptr::null(), 0) };
+}
+
+#[cfg(not(target_os = "linux"))]
+fn wait_for_all_to_start() {}
 
 /// The `bytes` of the first of some ranks, on all of them.
 fn from_first(ranks: &SimpleCommunicator, mut bytes: Vec<u8>) -> Vec<u8> {
