@@ -212,7 +212,7 @@ impl Session {
 
 /// Waits until every rank has left `MPI_Init`, by the launcher's own barrier where it has one. In Open
 /// MPI 5 a rank that is still in there crashes where a message of a quicker one reaches it
-/// (`mca_pml_ob1_recv_frag_callback_match` in 5.0.7, over TCP, on busy cores).
+/// (open-mpi/ompi#12495; met with 5.0.7 over TCP on busy cores).
 #[cfg(target_os = "linux")]
 fn wait_for_all_to_start() {
     type Fence =
