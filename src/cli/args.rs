@@ -3,7 +3,8 @@
 use super::values::{self, FrameRequest};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
-    Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings, ToneCurve, limits,
+    Filter, IntersectorKind, Interval, Policy, Recheck, Rect, ReuseSettings, Settings, ToneCurve,
+    limits,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -248,14 +249,14 @@ pub struct OutputArgs {
     /// from it too; repeatable
     #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]
     pub upload: Vec<(u32, PathBuf)>,
-    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s. In a Slurm job at the latest 30 s
-    /// before its end
+    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s; counted from the program's start. In
+    /// a Slurm job at the latest 30 s before its end
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     pub time_limit: Option<Duration>,
     /// Put what frames to come need on disk every so often, so that a killed job need not trace it
     /// again: 30s, 5m, off [default: 30s]
     #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
-    pub checkpoint: Option<values::Interval>,
+    pub checkpoint: Option<Interval>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,

@@ -75,8 +75,11 @@ pub fn run(args: &RenderArgs) -> Exit {
         }
     };
     render(&world, args).unwrap_or_else(|error| {
-        if world.is_root() {
+        if world.is_root() || world.is_stranded() {
             say::error(&error);
+        }
+        if world.is_stranded() {
+            world.abort(Exit::of(&error).code());
         }
         Exit::of(&error)
     })
@@ -85,10 +88,14 @@ pub fn run(args: &RenderArgs) -> Exit {
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
-    interrupt.limit(args.output.time_limit);
+    interrupt.before_slurm_ends();
+    interrupt.limit(start, args.output.time_limit);
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
-    let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
+    let mut request = Request::load(world, args)?;
+    if args.output.time_limit.is_none() {
+        interrupt.limit(start, request.time_limit);
+    }
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
     let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
@@ -203,7 +210,7 @@ impl Frames<'_> {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
-                maker.supplied = &self.request.references.list;
+                maker.supplied = self.request.references.supply.as_ref();
                 maker.checkpoints = Some(&checkpoints);
                 maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
@@ -217,6 +224,7 @@ impl Frames<'_> {
                 let mut maker =
                     ColourMaker::new(renderer, shot, pool, stop, &watch, rule, uploads)?;
                 maker.with_gbuffer = with_gbuffer;
+                maker.checkpoints = Some(&checkpoints);
                 Box::new(maker)
             }
             Policy::Off => {
@@ -239,7 +247,8 @@ impl Frames<'_> {
 
     fn checkpoints(&self) -> Checkpoints<'_> {
         let Request { scene, settings, terms, checkpoint, .. } = self.request;
-        let whole = settings.crop.is_none();
+        // Frame files hold references of policy `surface` only.
+        let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
         Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
     }
 

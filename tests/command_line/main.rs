@@ -11,6 +11,8 @@ mod launch;
 mod launcher;
 mod pages;
 mod ranks;
+#[cfg(feature = "mpi")]
+mod read_once;
 mod references;
 #[cfg(feature = "mpi")]
 mod regrouped;

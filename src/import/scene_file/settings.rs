@@ -5,6 +5,7 @@ mod switches;
 use super::at::At;
 use super::number::{FrameRate, Int, Positive, Share};
 use super::report::Source;
+use super::time::{Time, TimeOrOff};
 use super::vector::List;
 use crate::error::Result;
 use crate::import::{Loaded, OutputName};
@@ -83,6 +84,12 @@ pub(super) struct Settings {
     threads: Option<Int<1, { limits::MAX_THREADS as i64 }>>,
     /// File for what the job took, as JSON, relative to the current folder. Absent: none.
     stats: Option<PathBuf>,
+    /// Stop after this long, counted from the program's start, to go on later: "25m", "1h30m", "90s".
+    /// Absent: only a Slurm job stops, 30 s before its end.
+    time_limit: Option<Time>,
+    /// Put what frames to come need on disk every so often, so that a killed job need not trace it
+    /// again: "30s", "5m", "off". Absent: every 30 s.
+    checkpoint: Option<TimeOrOff>,
 }
 
 impl Default for Settings {
@@ -114,6 +121,8 @@ impl Default for Settings {
             overwrite: false,
             threads: None,
             stats: None,
+            time_limit: None,
+            checkpoint: None,
         }
     }
 }
@@ -183,6 +192,8 @@ impl Settings {
         loaded.overwrite = self.overwrite;
         loaded.threads = self.threads.map(Int::u32);
         loaded.stats.clone_from(&self.stats);
+        loaded.time_limit = self.time_limit.map(|limit| limit.0);
+        loaded.checkpoint = self.checkpoint.map(|interval| interval.0);
         Ok(())
     }
 }

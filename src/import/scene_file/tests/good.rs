@@ -4,8 +4,9 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    CameraPath, Light as SceneLight, Policy, ReuseSettings, Settings as SceneSettings,
+    CameraPath, Interval, Light as SceneLight, Policy, ReuseSettings, Settings as SceneSettings,
 };
+use std::time::Duration;
 
 #[test]
 fn an_empty_file_is_an_empty_scene_with_all_defaults() {
@@ -29,7 +30,7 @@ fn every_setting_reaches_its_place() {
          rules = { robust = false, retry = false, recheck = 'always', spawn_offset = false, \
          recentre = false }\ncrop = [1, 2, 30, 40]\nframes = [2, 3]\n\
          output = 'out/f_####.exr'\nfps = 30\nvideo = false\noverwrite = true\nthreads = 2\n\
-         stats = 's.json'\n[camera]\nframes = 5\n",
+         stats = 's.json'\ntime_limit = '1h30m'\ncheckpoint = 'off'\n[camera]\nframes = 5\n",
     );
     let s = &loaded.settings;
     assert_eq!((s.width, s.height, s.spp, s.seed), (320, 200, 7, 11));
@@ -49,6 +50,8 @@ fn every_setting_reaches_its_place() {
     assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
     assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
     assert!(loaded.overwrite && !loaded.video);
+    assert_eq!(loaded.time_limit, Some(Duration::from_secs(5400)));
+    assert_eq!(loaded.checkpoint, Some(Interval(None)));
 }
 
 #[test]
