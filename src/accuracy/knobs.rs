@@ -2,7 +2,7 @@
 //! time.
 
 use crate::effects::EffectPlan;
-use crate::scene::{Policy, Recheck, Settings};
+use crate::scene::{BuildQuality, IntersectorKind, Policy, Recheck, Settings};
 use serde::{Deserialize, Serialize};
 
 /// Knobs that belong together.
@@ -17,20 +17,26 @@ pub enum Group {
     Specular,
     /// The rules that make hits trustworthy.
     Intersection,
+    /// How Embree builds its tree.
+    Tree,
     /// Embree against the oracle, on a crop.
     Oracle,
+    /// Frames and checkpoints on disk.
+    Writing,
     /// Samples and reuse together.
     Combinations,
 }
 
 impl Group {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Reuse,
         Self::Samples,
         Self::Specular,
         Self::Intersection,
+        Self::Tree,
         Self::Oracle,
+        Self::Writing,
         Self::Combinations,
     ];
 }
@@ -69,6 +75,10 @@ pub enum Knob {
     SpawnOffset,
     /// The scene about its own centre.
     Recentre,
+    /// Work put into Embree's tree.
+    BuildQuality,
+    /// A smaller tree.
+    Compact,
     /// Several at once.
     Combination,
 }
@@ -84,6 +94,7 @@ impl Knob {
             Self::Recheck | Self::Retry | Self::Robust | Self::SpawnOffset | Self::Recentre => {
                 Group::Intersection
             }
+            Self::BuildQuality | Self::Compact => Group::Tree,
             Self::Combination => Group::Combinations,
         })
     }
@@ -106,15 +117,17 @@ impl Knob {
             Self::Robust => "Embree's robust mode",
             Self::SpawnOffset => "Offset of new rays",
             Self::Recentre => "Recentring",
+            Self::BuildQuality => "Quality of Embree's tree",
+            Self::Compact => "Compact tree",
             Self::Combination => "Combinations",
         }
     }
 
     /// Whether it trades error for time, so that its settings may be recommended. Rules of
-    /// intersection guard against rare wrong pixels, which no mean error shows, and an audit changes
-    /// no pixel.
+    /// intersection guard against rare wrong pixels, which no mean error shows; an audit changes no
+    /// pixel, and another tree next to none.
     pub fn is_ranked(self) -> bool {
-        self.group() != Some(Group::Intersection) && self != Self::Audit
+        !matches!(self.group(), Some(Group::Intersection | Group::Tree)) && self != Self::Audit
     }
 }
 
@@ -152,6 +165,9 @@ pub fn candidates(
     }
     if takes(Group::Intersection) {
         list.intersection();
+    }
+    if takes(Group::Tree) && base.intersector == IntersectorKind::Embree {
+        list.tree();
     }
     if takes(Group::Combinations) {
         list.combinations(plan);
@@ -242,6 +258,20 @@ impl List<'_> {
         self.add(Knob::SpawnOffset, options, |s| s.rules.spawn_offset ^= true);
         let options = format!("--recentre {}", word(rules.recentre));
         self.add(Knob::Recentre, options, |s| s.rules.recentre ^= true);
+    }
+
+    fn tree(&mut self) {
+        let qualities = [
+            ("low", BuildQuality::Low),
+            ("medium", BuildQuality::Medium),
+            ("high", BuildQuality::High),
+        ];
+        for (name, quality) in qualities {
+            let options = format!("--build-quality {name}");
+            self.add(Knob::BuildQuality, options, |s| s.build_quality = quality);
+        }
+        let options = format!("--compact {}", if self.base.compact { "off" } else { "on" });
+        self.add(Knob::Compact, options, |s| s.compact ^= true);
     }
 
     fn combinations(&mut self, plan: &EffectPlan) {

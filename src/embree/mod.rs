@@ -140,6 +140,22 @@ pub struct BuildOptions<'a> {
     pub isa: Option<&'a str>,
     /// ROBUST traversal.
     pub robust: bool,
+    /// Work put into the tree.
+    pub quality: Quality,
+    /// A smaller tree, slower to trace.
+    pub compact: bool,
+}
+
+/// How much work goes into the tree (Embree's `RTCBuildQuality`).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// Morton order.
+    Low,
+    /// Surface area heuristic.
+    #[default]
+    Medium,
+    /// Surface area heuristic with spatial splits.
+    High,
 }
 
 /// A scene that takes geometry; `commit` makes it traceable. Borrows the geometry for `'g`.
@@ -178,10 +194,20 @@ impl<'g> SceneBuilder<'g> {
         // SAFETY: the device is live; the scene is owned by the handle.
         let scene = SceneHandle(unsafe { sys::rtcNewScene(device.raw) });
         device.check("make a scene")?;
-        if options.robust {
-            // SAFETY: the scene is live and not committed yet.
-            unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
+        let quality = match options.quality {
+            Quality::Low => sys::RTC_BUILD_QUALITY_LOW,
+            Quality::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
+            Quality::High => sys::RTC_BUILD_QUALITY_HIGH,
+        };
+        let flag = |is_set, flag| if is_set { flag } else { sys::RTC_SCENE_FLAG_NONE };
+        let flags = flag(options.robust, sys::RTC_SCENE_FLAG_ROBUST)
+            | flag(options.compact, sys::RTC_SCENE_FLAG_COMPACT);
+        // SAFETY: the scene is live and not committed yet.
+        unsafe {
+            sys::rtcSetSceneFlags(scene.0, flags);
+            sys::rtcSetSceneBuildQuality(scene.0, quality);
         }
+        device.check("set how the scene is built")?;
         Ok(Self {
             scene,
             device,

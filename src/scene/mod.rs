@@ -31,7 +31,7 @@ pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentre::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
-    Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
+    BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
 pub(crate) use weld::weld;
 pub(crate) use winding::closed_volume;

@@ -4,7 +4,9 @@ mod plots;
 mod tables;
 
 use super::{AccuracyArgs, Outcome};
-use crate::accuracy::{Goal, Knob, Row, about_knob, about_oracle, best_within, fastest_reaching};
+use crate::accuracy::{
+    Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching,
+};
 use crate::error::Result;
 use crate::measure::Median;
 use crate::output::video::shell_line;
@@ -62,7 +64,8 @@ fn summary(outcome: &Outcome) -> Vec<String> {
         short(e.flip)
     )];
     let half = best_within(&outcome.measured, time * 1.02).filter(|row| row.knob != Knob::Default);
-    if let Some(row) = half.filter(|row| row.errors.mse < 0.9 * e.mse) {
+    let beyond_noise = |ratio: &Option<Median>| ratio.is_some_and(|r| r.differs_from(1.0));
+    if let Some(row) = half.filter(|row| beyond_noise(&row.error_ratio)) {
         lines.push(format!(
             "In the same time {} comes nearer: {}/255.",
             row.options,
@@ -70,8 +73,8 @@ fn summary(outcome: &Outcome) -> Vec<String> {
         ));
     }
     let same = fastest_reaching(&outcome.measured, Goal::Psnr(e.psnr));
-    if let Some(row) = same.filter(|row| row.knob != Knob::Default && median_of(row) < 0.95 * time)
-    {
+    let other = same.filter(|row| row.knob != Knob::Default);
+    if let Some(row) = other.filter(|row| beyond_noise(&row.time_ratio)) {
         lines.push(format!(
             "{} is as near in {} of the time.",
             row.options,
@@ -85,7 +88,7 @@ fn facts(args: &AccuracyArgs, outcome: &Outcome) -> Vec<(String, String)> {
     let frames: Vec<String> = outcome.frames.iter().map(u32::to_string).collect();
     let confidence = outcome.measured.default_row().seconds.median.confidence;
     let load = outcome.load.map(|l| l.map_or("?".into(), short));
-    let base = &outcome.base;
+    let base = outcome.base;
     let fact = |name: &str, value: String| (name.to_string(), value);
     vec![
         fact("Size", format!("{} × {}", base.width, base.height)),
@@ -105,12 +108,29 @@ fn facts(args: &AccuracyArgs, outcome: &Outcome) -> Vec<(String, String)> {
         fact("Threads", outcome.threads.to_string()),
         fact("Machine's load", format!("{} before, {} after", load[0], load[1])),
         fact("Tracer", outcome.tracer.clone()),
-        fact("Whole sweep", seconds(outcome.seconds)),
+        fact("Whole sweep", whole(outcome)),
     ]
+}
+
+/// How long it took, as far as that is known.
+fn whole(outcome: &Outcome) -> String {
+    let own = seconds(outcome.seconds);
+    if outcome.runs > 1 { format!("{} runs, the last {own}", outcome.runs) } else { own }
 }
 
 fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
+    let [done, of] = outcome.trials;
+    if done < of {
+        warnings.push(format!(
+            "This is what there is of a sweep that is not complete: {} of {} trials, {} of {} settings. \
+             The same command goes on.",
+            count(done as u64),
+            count(of as u64),
+            count(outcome.measured.rows.len() as u64),
+            count(outcome.settings as u64)
+        ));
+    }
     let rows = &outcome.measured.rows;
     let best = rows.iter().map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
     let change = outcome.truth.change;
@@ -198,6 +218,10 @@ fn knobs(outcome: &Outcome) -> Vec<KnobText> {
         let why = "Left out: it holds every ray against every triangle, and even a few pixels of this \
                    scene would take it minutes.";
         all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
+    }
+    if let Some(writing) = &outcome.writing {
+        let sentences = about_writing(writing, median_of(outcome.measured.default_row()));
+        all.push(KnobText { name: "Writing to disk".into(), sentences });
     }
     all
 }
