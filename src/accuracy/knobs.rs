@@ -2,7 +2,7 @@
 //! time.
 
 use crate::effects::EffectPlan;
-use crate::scene::{BuildQuality, IntersectorKind, Policy, Recheck, Settings};
+use crate::scene::{BuildQuality, HitRules, IntersectorKind, Policy, Recheck, Settings};
 use serde::{Deserialize, Serialize};
 
 /// Knobs that belong together.
@@ -75,6 +75,8 @@ pub enum Knob {
     SpawnOffset,
     /// The scene about its own centre.
     Recentre,
+    /// All rules about single rays at once.
+    AllRules,
     /// Work put into Embree's tree.
     BuildQuality,
     /// A smaller tree.
@@ -91,9 +93,12 @@ impl Knob {
             Self::Policy | Self::Tolerance | Self::Segment | Self::Audit => Group::Reuse,
             Self::CameraSamples | Self::ShadowSamples | Self::SkySamples => Group::Samples,
             Self::Bounces | Self::CutOff => Group::Specular,
-            Self::Recheck | Self::Retry | Self::Robust | Self::SpawnOffset | Self::Recentre => {
-                Group::Intersection
-            }
+            Self::Recheck
+            | Self::Retry
+            | Self::Robust
+            | Self::SpawnOffset
+            | Self::Recentre
+            | Self::AllRules => Group::Intersection,
             Self::BuildQuality | Self::Compact => Group::Tree,
             Self::Combination => Group::Combinations,
         })
@@ -117,6 +122,7 @@ impl Knob {
             Self::Robust => "Embree's robust mode",
             Self::SpawnOffset => "Offset of new rays",
             Self::Recentre => "Recentring",
+            Self::AllRules => "All rules at once",
             Self::BuildQuality => "Quality of Embree's tree",
             Self::Compact => "Compact tree",
             Self::Combination => "Combinations",
@@ -199,7 +205,7 @@ impl List<'_> {
         if self.base.reuse.policy != Policy::Surface {
             return;
         }
-        for tolerance in [0.25, 0.5, 2.0, 4.0].map(|f| f * self.base.reuse.tolerance) {
+        for tolerance in [0.25, 0.5, 2.0, 4.0].map(|f| times(f, self.base.reuse.tolerance)) {
             let options = format!("--tolerance {tolerance}");
             self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = tolerance);
         }
@@ -238,7 +244,7 @@ impl List<'_> {
         for n in [1, bounces / 2, bounces * 2].into_iter().filter(|n| *n > 0) {
             self.add(Knob::Bounces, format!("--bounces {n}"), |s| s.bounces = n);
         }
-        for cutoff in [10.0, 0.1].map(|f| f * self.base.cutoff) {
+        for cutoff in [10.0, 0.1].map(|f| times(f, self.base.cutoff)) {
             self.add(Knob::CutOff, format!("--cutoff {cutoff}"), |s| s.cutoff = cutoff);
         }
     }
@@ -258,6 +264,13 @@ impl List<'_> {
         self.add(Knob::SpawnOffset, options, |s| s.rules.spawn_offset ^= true);
         let options = format!("--recentre {}", word(rules.recentre));
         self.add(Knob::Recentre, options, |s| s.rules.recentre ^= true);
+        let options = "--recheck off --retry off --robust off --spawn-offset off".to_string();
+        self.add(Knob::AllRules, options, |s| {
+            let recentre = s.rules.recentre;
+            let recheck = Recheck::Off;
+            s.rules =
+                HitRules { robust: false, retry: false, recheck, spawn_offset: false, recentre };
+        });
     }
 
     fn tree(&mut self) {
@@ -306,6 +319,11 @@ impl List<'_> {
     }
 }
 
+/// `x` times `factor` as people multiply: of 0.001 ten times is 0.01, not 0.010000001.
+fn times(factor: f64, x: f32) -> f32 {
+    (factor * x.to_string().parse::<f64>().unwrap_or(f64::from(x))) as f32
+}
+
 /// A quarter and four times as many, at least one.
 fn around(n: u32) -> [u32; 2] {
     [(n / 4).max(1), n.saturating_mul(4).clamp(1, crate::scene::limits::MAX_SAMPLES)]
@@ -334,9 +352,19 @@ mod tests {
         let has = |knob| few.iter().any(|c| c.knob == knob);
         assert!(!has(Knob::Bounces) && !has(Knob::ShadowSamples) && !has(Knob::SkySamples));
         assert!(has(Knob::CameraSamples) && has(Knob::Policy) && has(Knob::Retry));
+        // The tree of today's default is no candidate beside it.
+        let trees: Vec<&str> = few
+            .iter()
+            .filter(|c| c.knob.group() == Some(Group::Tree))
+            .map(|c| &*c.options)
+            .collect();
+        assert_eq!(trees, ["--build-quality low", "--build-quality high", "--compact on"]);
+        let all_rules = few.iter().find(|c| c.knob == Knob::AllRules).expect("there");
+        assert!(!all_rules.settings.rules.robust && all_rules.settings.rules.recentre);
         assert!(few.len() < all.len());
         let segments = |list: &[Candidate]| list.iter().filter(|c| c.knob == Knob::Segment).count();
         assert_eq!((segments(&all), segments(&few)), (2, 0));
         assert_eq!(candidates(&base, &nothing, 10, &[]).len(), 1);
+        assert_eq!((times(10.0, 0.001), times(0.1, 0.001)), (0.01, 0.0001));
     }
 }

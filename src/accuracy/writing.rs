@@ -18,8 +18,10 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// How often each thing is done.
-const TIMES: usize = 5;
+/// How often each thing is written.
+const TIMES: usize = 15;
+/// How often a key frame is made for its reference.
+const KEY_TIMES: usize = 5;
 
 /// What writing takes; medians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,15 +53,17 @@ pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
     };
     let path = folder.join("writing_0001.png");
     let options = WriteOptions::of(stage.base, Some(1));
-    let frame_seconds = timed(|| write_image(&path, &film, &options).map(drop))?;
+    let write = || write_image(&path, &film, &options).map(drop);
+    write()?;
     let bytes = fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
-    let synced = timed(|| atomic::write(&path, |w| w.write_all(&bytes)).map(drop))?;
-    let plain = timed(|| fs::write(&path, &bytes).map_err(|e| Error::io("write", &path, e)))?;
+    let synced = || atomic::write(&path, |w| w.write_all(&bytes)).map(drop);
+    let plain = || fs::write(&path, &bytes).map_err(|e| Error::io("write", &path, e));
+    let [frame_seconds, synced, plain] = in_turns([&write, &synced, &plain])?;
     fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
     let keys = Cut::of(stage.base, frames, checkpoint.is_some()).keys();
     Ok(Writing {
         frame_seconds,
-        sync_seconds: (synced - plain).max(0.0),
+        sync_seconds: (synced - plain).clamp(0.0, frame_seconds),
         frame_bytes: bytes.len() as u64,
         checkpoint,
         keys,
@@ -67,14 +71,17 @@ pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
     })
 }
 
-fn timed(mut work: impl FnMut() -> Result<()>) -> Result<f64> {
-    let mut seconds = Vec::new();
+/// The median seconds of each.
+fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[f64; 3]> {
+    let mut seconds = [const { Vec::new() }; 3];
     for _ in 0..TIMES {
-        let start = Instant::now();
-        work()?;
-        seconds.push(start.elapsed().as_secs_f64());
+        for (work, seconds) in works.iter().zip(&mut seconds) {
+            let start = Instant::now();
+            work()?;
+            seconds.push(start.elapsed().as_secs_f64());
+        }
     }
-    Ok(median(&seconds).map_or(0.0, |m| m.interval.estimate))
+    Ok(seconds.map(|s| median(&s).map_or(0.0, |m| m.interval.estimate)))
 }
 
 fn renderer<'a>(stage: &Stage<'a>) -> Renderer<'a> {
@@ -99,7 +106,7 @@ fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, 
         Checkpoints::new(&target, Some(Duration::ZERO), &terms, scene.recentring, true);
     let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
     let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
-    for _ in 0..TIMES {
+    for _ in 0..KEY_TIMES {
         let mut maker = Inferrer::new(renderer(stage), shot, pool, stop, &Unheard, pyramid)?;
         maker.checkpoints = Some(&checkpoints);
         let all: Vec<u32> = (1..=shot.frames).collect();

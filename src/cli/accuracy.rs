@@ -27,7 +27,7 @@ use measure::Job;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Measure what accuracy costs in time: error against seconds for every setting that matters
 ///
@@ -72,6 +72,10 @@ pub struct AccuracyArgs {
     /// Measure everything anew, whatever the folder holds
     #[arg(long)]
     overwrite: bool,
+    /// Stop after this long and exit with code 75, with the page of what there is: 25m, 1h30m. In a
+    /// Slurm job at the latest 30 s before its end
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    time_limit: Option<Duration>,
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
@@ -151,6 +155,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let terms = terms(args, &sweep, &hash);
     let ledger = Ledger::open(&args.output.join("sweep"), &terms, args.overwrite)?;
     let oracle_was_wanted = groups.contains(&Group::Oracle);
+    interrupt.limit(args.time_limit);
     let job = Job {
         args,
         sweep: &sweep,

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::measure::Median;
 use crate::output::atomic;
 use crate::output::manifest::Header;
+use crate::page::accuracy::KnobText;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -32,6 +33,8 @@ struct Document<'a> {
     rows: &'a [Row],
     oracle: Option<OracleCrop>,
     writing: Option<Writing>,
+    /// What the page says of each knob.
+    knobs: Vec<KnobText>,
 }
 
 #[derive(Serialize)]
@@ -67,6 +70,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
         rows: &outcome.measured.rows,
         oracle: outcome.oracle,
         writing: outcome.writing,
+        knobs: super::page::knobs(outcome),
     };
     let path = folder.join("accuracy.json");
     let mut text =

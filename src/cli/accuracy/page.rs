@@ -25,8 +25,8 @@ pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resul
     Ok(AccuracyPage {
         title: scene.clone(),
         summary: summary(outcome),
-        facts: facts(args, outcome),
-        warnings: warnings(args, outcome),
+        facts: facts(outcome),
+        warnings: warnings(outcome),
         scatters: plots::METRICS
             .iter()
             .filter_map(|metric| plots::scatter(outcome, metric))
@@ -84,32 +84,35 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     lines
 }
 
-fn facts(args: &AccuracyArgs, outcome: &Outcome) -> Vec<(String, String)> {
+fn facts(outcome: &Outcome) -> Vec<(String, String)> {
     let frames: Vec<String> = outcome.frames.iter().map(u32::to_string).collect();
     let confidence = outcome.measured.default_row().seconds.median.confidence;
     let load = outcome.load.map(|l| l.map_or("?".into(), short));
     let base = outcome.base;
+    let turns = outcome.measured.default_row().seconds.turns.len();
     let fact = |name: &str, value: String| (name.to_string(), value);
     vec![
         fact("Size", format!("{} × {}", base.width, base.height)),
         fact("Frames looked at", format!("{} of {}", frames.join(", "), outcome.shot_frames)),
         fact("Settings compared", count(outcome.measured.rows.len() as u64)),
-        fact("Timed", format!("{} times each, after a warm-up", args.turns)),
+        fact("Turns timed", format!("{turns}, after a warm-up")),
         fact("Intervals", format!("of {}", percent(confidence))),
-        fact(
-            "Reference",
-            format!(
-                "{} camera and {} shadow samples, {}/255 away from half as many",
-                outcome.truth.settings.spp,
-                outcome.truth.settings.shadow_samples,
-                short(outcome.truth.change)
-            ),
-        ),
+        fact("Reference", reference(outcome)),
         fact("Threads", outcome.threads.to_string()),
         fact("Machine's load", format!("{} before, {} after", load[0], load[1])),
         fact("Tracer", outcome.tracer.clone()),
         fact("Whole sweep", whole(outcome)),
     ]
+}
+
+fn reference(outcome: &Outcome) -> String {
+    let truth = outcome.truth;
+    let (spp, shadow) = (truth.settings.spp, truth.settings.shadow_samples);
+    let samples = format!("{spp} camera and {shadow} shadow samples");
+    match truth.change.is_finite() {
+        true => format!("{samples}, {}/255 away from half as many", short(truth.change)),
+        false => format!("{samples}, never doubled"),
+    }
 }
 
 /// How long it took, as far as that is known.
@@ -118,7 +121,7 @@ fn whole(outcome: &Outcome) -> String {
     if outcome.runs > 1 { format!("{} runs, the last {own}", outcome.runs) } else { own }
 }
 
-fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
+fn warnings(outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
     let [done, of] = outcome.trials;
     if done < of {
@@ -134,11 +137,17 @@ fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
     let rows = &outcome.measured.rows;
     let best = rows.iter().map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
     let change = outcome.truth.change;
-    if change > best / 4.0 {
+    let longer = "Errors near that are too large here. --reference-spp lets it converge longer.";
+    if !change.is_finite() {
+        let best = short(best);
+        warnings.push(format!(
+            "Nobody knows how far the reference itself is off: it was never doubled. The best setting's \
+             error is {best}/255. {longer}"
+        ));
+    } else if change > best / 4.0 {
         warnings.push(format!(
             "The reference is not far enough ahead: its last doubling changed {}/255, more than a \
-             quarter of the best setting's error, {}/255. Errors near that are too large here. \
-             --reference-spp lets it converge longer.",
+             quarter of the best setting's error, {}/255. {longer}",
             short(change),
             short(best)
         ));
@@ -150,11 +159,12 @@ fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
             short(before)
         ));
     }
-    if args.turns < 6 {
+    let seconds = &outcome.measured.default_row().seconds;
+    let turns = seconds.turns.len();
+    if turns < 6 {
         warnings.push(format!(
-            "With --turns {} the intervals hold the truth in {} of cases, not in 95 %.",
-            args.turns,
-            percent(outcome.measured.default_row().seconds.median.confidence)
+            "With --turns {turns} the intervals hold the truth in {} of cases, not in 95 %.",
+            percent(seconds.median.confidence)
         ));
     }
     warnings
@@ -199,7 +209,8 @@ fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
     outcome.measured.rows.iter().enumerate().map(detail).collect()
 }
 
-fn knobs(outcome: &Outcome) -> Vec<KnobText> {
+/// What turning each knob does.
+pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
     let mut seen: Vec<Knob> = Vec::new();
     for row in &outcome.measured.rows {
         let alone = !matches!(row.knob, Knob::Default | Knob::Combination);
