@@ -53,7 +53,11 @@ fn how(out: &mut String, sweeps: &[Sweep]) {
     });
     line(out, "a frame by default", sweeps, |s| {
         let m = s.default_row().seconds;
-        format!("{} ({}–{})", seconds(m.estimate), short(m.low), short(m.high))
+        format!("{} ({}–{})", seconds(m.estimate), seconds(m.low), seconds(m.high))
+    });
+    line(out, "its CPU time", sweeps, |s| {
+        let m = s.default_row().cpu_seconds;
+        format!("{} ({}–{})", seconds(m.estimate), seconds(m.low), seconds(m.high))
     });
     line(out, "its error", sweeps, |s| {
         format!("{}/255, {} dB", short(s.default_row().rmse), short(s.default_row().psnr))
@@ -142,11 +146,11 @@ fn reuse() -> [Turned; 5] {
 }
 
 fn time(ratio: Option<Measured>) -> String {
-    let Some(ratio) = ratio else { return "not timed".into() };
+    let Some(ratio) = ratio else { return "–".into() };
     let [is, low, high] = [ratio.estimate, ratio.low, ratio.high].map(change);
     match ratio.is_sure() {
-        true => format!("{is} time ({low} to {high})"),
-        false => format!("time: noise ({low} to {high})"),
+        true => format!("{is} ({low} to {high})"),
+        false => format!("noise ({low} to {high})"),
     }
 }
 
@@ -157,7 +161,7 @@ fn rules_cell(_: &Sweep, row: &Row) -> String {
         Some([over, all]) => format!("{} of {} pixels off", count(over), count(all)),
         None => String::new(),
     };
-    format!("{}; {pixels}", time(row.time_ratio))
+    format!("{}; {pixels}", time(row.cpu_ratio))
 }
 
 /// Time and error.
@@ -167,7 +171,7 @@ fn trade_cell(sweep: &Sweep, row: &Row) -> String {
         Some(ratio) if ratio.is_sure() => format!("error {}", change(ratio.estimate)),
         _ => "error: noise".into(),
     };
-    format!("{}; {error}", time(row.time_ratio))
+    format!("{}; {error}", time(row.cpu_ratio))
 }
 
 fn oracle_cell(sweep: &Sweep) -> String {

@@ -18,6 +18,7 @@
 mod choice;
 mod errors;
 mod frames;
+mod front;
 mod knobs;
 mod ledger;
 mod oracle;

@@ -20,7 +20,7 @@ fn sentence(default: &Row, row: &Row) -> String {
         Some(Group::Tree) => format!("{}; {}", changed(), tree(default, row)),
         _ => error(default, row),
     };
-    format!("{}: {}, {what}.", row.options, time(row.time_ratio))
+    format!("{}: {}, {what}.", row.options, time(row))
 }
 
 /// What its tree takes.
@@ -30,15 +30,27 @@ fn tree(default: &Row, row: &Row) -> String {
     format!("built in {is} instead of {was}, {} instead of {} of memory", memory[1], memory[0])
 }
 
-fn time(ratio: Option<Median>) -> String {
-    let Some(ratio) = ratio else { return "not timed".into() };
-    let ends = [ratio.interval.low, ratio.interval.high].map(change);
-    if !ratio.is_sure() {
-        return format!("too few turns to tell the time ({} to {})", ends[0], ends[1]);
+fn time(row: &Row) -> String {
+    let Some(wall) = row.time_ratio else { return "not timed".into() };
+    let told = |ratio: &Median| {
+        let [is, low, high] =
+            [ratio.interval.estimate, ratio.interval.low, ratio.interval.high].map(change);
+        (is, format!("({low} to {high})"))
+    };
+    let (is, ends) = told(&wall);
+    if !wall.is_sure() {
+        return format!("too few turns to tell the time {ends}");
     }
-    match ratio.differs_from(1.0) {
-        true => format!("{} time ({} to {})", change(ratio.interval.estimate), ends[0], ends[1]),
-        false => format!("no more than noise in time ({} to {})", ends[0], ends[1]),
+    if wall.differs_from(1.0) {
+        return format!("{is} time {ends}");
+    }
+    match row.cpu_ratio.filter(|cpu| cpu.differs_from(1.0)) {
+        // Waiting for a core is no work.
+        Some(cpu) => {
+            let (is, cpu_ends) = told(&cpu);
+            format!("no more than noise in time {ends}, but {is} CPU time {cpu_ends}")
+        }
+        None => format!("no more than noise in time {ends}"),
     }
 }
 

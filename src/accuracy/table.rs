@@ -1,6 +1,7 @@
 //! What was measured, a row a candidate.
 
 use super::errors::{Errors, Frames};
+use super::front;
 use super::knobs::{Candidate, Knob};
 use super::ledger::Entry;
 use crate::measure::{Median, largest_error, median, share_exceeding};
@@ -35,6 +36,8 @@ pub struct Row {
     pub build_seconds: Spread,
     /// Seconds over the default's of the same turn and run; `None` for the default.
     pub time_ratio: Option<Median>,
+    /// CPU seconds over the default's of the same turn: on a busy machine they tell more.
+    pub cpu_ratio: Option<Median>,
     /// Root mean squared error over the default's of the same turn.
     pub error_ratio: Option<Median>,
     /// How its pixels differ from the default's with the same seed.
@@ -45,7 +48,8 @@ pub struct Row {
     pub rays: RayCounts,
     /// Intersector and references, bytes.
     pub memory_bytes: u64,
-    /// Whether no other candidate that may be recommended is both faster and nearer to the truth.
+    /// Whether no other candidate that may be recommended is both faster and nearer to the truth, and
+    /// it is not there for noise alone.
     pub on_front: bool,
 }
 
@@ -130,13 +134,10 @@ impl Taken {
         sum
     }
 
-    /// Root mean squared errors over those of the same turns of `other`.
-    fn error_ratios(&self, other: &Self) -> Vec<f64> {
-        let ratio = |(turn, entry): (&u32, &Entry)| {
-            let rmse = |entry: &Entry| Errors::from(entry.errors).rmse_steps;
-            Some(rmse(entry) / rmse(other.0.get(turn)?))
-        };
-        self.0.iter().filter_map(ratio).collect()
+    /// `of` each turn from the `first` on over that of the same turn of `other`.
+    fn ratios(&self, other: &Self, first: u32, of: fn(&Entry) -> f64) -> Vec<f64> {
+        let ratio = |(turn, entry): (&u32, &Entry)| Some(of(entry) / of(other.0.get(turn)?));
+        self.0.range(first..).filter_map(ratio).collect()
     }
 }
 
@@ -147,27 +148,13 @@ impl Measured {
         let rows =
             rows.map(|(k, (candidate, own))| row(candidate, own, (k > 0).then(|| &taken[0])));
         let mut measured = Self { rows: rows.collect() };
-        for k in 0..measured.rows.len() {
-            measured.rows[k].on_front = measured.is_on_front(k);
-        }
+        front::mark(&mut measured.rows);
         measured
     }
 
     /// The default's.
     pub fn default_row(&self) -> &Row {
         &self.rows[0]
-    }
-
-    fn is_on_front(&self, k: usize) -> bool {
-        let place = |row: &Row| (row.seconds.median.interval.estimate, row.errors.mse);
-        let (seconds, mse) = place(&self.rows[k]);
-        let beats = |(i, other): (usize, &Row)| {
-            let (s, e) = place(other);
-            // Of two that are equal the first stays.
-            let better = s < seconds || e < mse || i < k;
-            i != k && other.knob.is_ranked() && s <= seconds && e <= mse && better
-        };
-        self.rows[k].knob.is_ranked() && !self.rows.iter().enumerate().any(beats)
     }
 }
 
@@ -184,7 +171,9 @@ fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> Row {
         cpu_seconds: spread(&own.timed(|e| e.cpu_seconds)),
         build_seconds: spread(&own.timed(|e| e.build_seconds)),
         time_ratio: default.and_then(|_| sure(&own.timed(|e| e.seconds / e.default_seconds))),
-        error_ratio: default.and_then(|d| sure(&own.error_ratios(d))),
+        cpu_ratio: default.and_then(|d| sure(&own.ratios(d, 1, |e| e.cpu_seconds))),
+        error_ratio: default
+            .and_then(|d| sure(&own.ratios(d, 0, |e| Errors::from(e.errors).rmse_steps))),
         change: default.map(|_| own.change()),
         rays_per_frame: first.rays_per_frame,
         rays: first.rays,

@@ -82,7 +82,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
 }
 
 const HEAD: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,time_ratio,\
-    time_ratio_low,time_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
+    time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
     error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame,\
     build_seconds,memory_bytes,on_front\n";
 
@@ -100,6 +100,7 @@ fn line(row: &Row) -> String {
     cells.extend(ends(&row.seconds.median));
     cells.push(number(row.cpu_seconds.median.interval.estimate));
     cells.extend(ratio(&row.time_ratio));
+    cells.extend(ratio(&row.cpu_ratio));
     cells.push(number(row.seconds.median.confidence));
     let e = &row.errors;
     cells.extend([e.mse, e.rmse_steps, e.psnr, e.ssim, e.flip, e.share_over_2].map(number));
