@@ -1,12 +1,14 @@
 //! The default's frame beside the map of its errors.
 
 use crate::sweep::{ROOT, Sweep};
-use image::RgbImage;
+use image::{RgbImage, imageops};
 use tweenray::film::Image;
 use tweenray::output::read_image;
 
 /// Display steps at which the map is white.
 pub const FULL: f32 = 16.0;
+/// The picture is enlarged up to about this width.
+const LEAST: u32 = 560;
 /// White pixels between the two.
 const GAP: u32 = 6;
 
@@ -32,6 +34,10 @@ pub fn write(sweep: &Sweep) {
         let off = 255.0 * (*a - *b).abs().max_element();
         out.put_pixel(x + frame.width + GAP, y, image::Rgb(heat(off / FULL)));
     }
+    // Small frames would hardly be seen; pixels stay pixels.
+    let times = (LEAST / out.width()).max(1);
+    let (width, height) = (out.width() * times, out.height() * times);
+    let out = imageops::resize(&out, width, height, imageops::FilterType::Nearest);
     out.save(format!("{ROOT}/docs/pictures/accuracy-{}.png", sweep.name)).unwrap();
 }
 

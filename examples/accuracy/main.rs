@@ -13,7 +13,7 @@ use sweep::Sweep;
 
 /// The scenes: name, and size of the frames.
 const SCENES: [(&str, &str); 3] =
-    [("cornell", "128x128"), ("reflective_spheres", "160x120"), ("spheres_on_terrain", "96x54")];
+    [("cornell", "128x128"), ("reflective_spheres", "160x120"), ("spheres_on_terrain", "64x36")];
 
 fn main() {
     let sweeps: Vec<Sweep> = SCENES.iter().map(|(name, size)| Sweep::run(name, size)).collect();

@@ -15,6 +15,7 @@
 //!
 //! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
+mod candidates;
 mod choice;
 mod errors;
 mod frames;
@@ -30,10 +31,11 @@ mod table;
 mod trial;
 mod writing;
 
+pub use candidates::candidates;
 pub use choice::{Goal, best_within, fastest_reaching};
 pub use errors::Errors;
 pub use frames::chosen_frames;
-pub use knobs::{Candidate, Group, Knob, candidates};
+pub use knobs::{Candidate, Group, Knob};
 pub use ledger::{Entry, Ledger};
 pub use oracle::{OracleCrop, on_a_crop};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};

@@ -4,9 +4,11 @@
 //! queries; knows nothing of materials, rules or retries. Only a committed scene can be traced,
 //! and it borrows the buffers that Embree shares.
 
+mod options;
 mod packet;
 mod yardstick;
 
+pub use options::{BuildOptions, Quality};
 use packet::Query;
 pub use packet::{Packet, PacketHit, QueryFlags};
 pub use yardstick::{BareCamera, BareTally};
@@ -131,33 +133,6 @@ unsafe extern "C" fn count_memory(counter: *mut c_void, bytes: isize, _post: boo
     true
 }
 
-/// How Embree builds its scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BuildOptions<'a> {
-    /// Threads for the build.
-    pub threads: usize,
-    /// Instruction set ("avx2"), or `None` for the machine's best.
-    pub isa: Option<&'a str>,
-    /// ROBUST traversal.
-    pub robust: bool,
-    /// Work put into the tree.
-    pub quality: Quality,
-    /// A smaller tree, slower to trace.
-    pub compact: bool,
-}
-
-/// How much work goes into the tree (Embree's `RTCBuildQuality`).
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Quality {
-    /// Morton order.
-    Low,
-    /// Surface area heuristic.
-    #[default]
-    Medium,
-    /// Surface area heuristic with spatial splits.
-    High,
-}
-
 /// A scene that takes geometry; `commit` makes it traceable. Borrows the geometry for `'g`.
 pub struct SceneBuilder<'g> {
     // Declared before the device, so dropped before it.
@@ -194,18 +169,10 @@ impl<'g> SceneBuilder<'g> {
         // SAFETY: the device is live; the scene is owned by the handle.
         let scene = SceneHandle(unsafe { sys::rtcNewScene(device.raw) });
         device.check("make a scene")?;
-        let quality = match options.quality {
-            Quality::Low => sys::RTC_BUILD_QUALITY_LOW,
-            Quality::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
-            Quality::High => sys::RTC_BUILD_QUALITY_HIGH,
-        };
-        let flag = |is_set, flag| if is_set { flag } else { sys::RTC_SCENE_FLAG_NONE };
-        let flags = flag(options.robust, sys::RTC_SCENE_FLAG_ROBUST)
-            | flag(options.compact, sys::RTC_SCENE_FLAG_COMPACT);
         // SAFETY: the scene is live and not committed yet.
         unsafe {
-            sys::rtcSetSceneFlags(scene.0, flags);
-            sys::rtcSetSceneBuildQuality(scene.0, quality);
+            sys::rtcSetSceneFlags(scene.0, options.flags());
+            sys::rtcSetSceneBuildQuality(scene.0, options.build_quality());
         }
         device.check("set how the scene is built")?;
         Ok(Self {

@@ -96,7 +96,7 @@ fn plot_points_slider_and_heat_map() {
     assert!(error("--spp 8") < error("") && error("") < error("--spp 1"), "{csv}");
     assert_eq!(json["oracle"]["change"]["over_2"], 0);
     let writing = &json["writing"];
-    assert!(writing["frame_seconds"].as_f64() > writing["sync_seconds"].as_f64(), "{writing}");
+    assert!(writing["frame_seconds"].as_f64() >= writing["sync_seconds"].as_f64(), "{writing}");
     assert!(writing["checkpoint"][1].as_u64() > Some(1000), "{writing}");
     let low = rows.iter().find(|row| row["options"] == "--build-quality low").expect("a row");
     assert!(low["build_seconds"]["estimate"].as_f64() > Some(0.0), "{low}");
