@@ -191,12 +191,12 @@ fn scene(out: &mut String, sweep: &Sweep) {
     _ = writeln!(
         out,
         "### {name}\n\n\
-         ![Error against time of {} settings](pictures/accuracy-{name}.svg)\n\n\
-         | | settings that nothing beats | seconds a frame | RMSE | PSNR |\n|---|---|---|---|---|",
+         ![Error against CPU time of {} settings](pictures/accuracy-{name}.svg)\n\n\
+         | | settings that nothing beats | CPU seconds a frame | RMSE | PSNR |\n|---|---|---|---|---|",
         sweep.rows.len()
     );
     for (number, row) in (1..).zip(sweep.front()) {
-        let m = row.seconds;
+        let m = row.cpu_seconds;
         let options =
             if row.options.is_empty() { "default".into() } else { format!("`{}`", row.options) };
         _ = writeln!(

@@ -1,4 +1,4 @@
-//! Error against time, as an SVG that reads on white and on black.
+//! Error against CPU time, as an SVG that reads on white and on black.
 
 use crate::sweep::{ROOT, Row, Sweep};
 use std::fmt::Write;
@@ -53,7 +53,7 @@ fn kind(row: &Row) -> (&'static str, &'static str) {
 
 /// Writes `docs/pictures/accuracy-NAME.svg`.
 pub fn write(sweep: &Sweep) {
-    let seconds = sweep.rows.iter().flat_map(|r| [r.seconds.low, r.seconds.high]);
+    let seconds = sweep.rows.iter().flat_map(|r| [r.cpu_seconds.low, r.cpu_seconds.high]);
     let x = Axis::about(seconds, LEFT, WIDTH - RIGHT);
     let y = Axis::about(sweep.rows.iter().map(|r| r.rmse), HEIGHT - BOTTOM, TOP);
     let mut out = format!(
@@ -96,7 +96,7 @@ fn grid(out: &mut String, x: &Axis, y: &Axis) {
     }
     _ = writeln!(
         out,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">seconds a frame</text>\n\
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">CPU seconds a frame</text>\n\
          <text transform=\"translate(15 {:.1}) rotate(-90)\" text-anchor=\"middle\">\
          RMSE, steps of 1/255</text>",
         f64::midpoint(LEFT, WIDTH - RIGHT),
@@ -109,7 +109,7 @@ fn grid(out: &mut String, x: &Axis, y: &Axis) {
 fn front(out: &mut String, sweep: &Sweep, x: &Axis, y: &Axis) {
     let mut path = String::new();
     for (k, row) in sweep.front().into_iter().enumerate() {
-        let (px, py) = (x.at(row.seconds.estimate), y.at(row.rmse));
+        let (px, py) = (x.at(row.cpu_seconds.estimate), y.at(row.rmse));
         _ = match k {
             0 => write!(path, "M{px:.1} {TOP}V{py:.1}"),
             _ => write!(path, "H{px:.1}V{py:.1}"),
@@ -123,8 +123,8 @@ fn front(out: &mut String, sweep: &Sweep, x: &Axis, y: &Axis) {
 }
 
 fn point(out: &mut String, row: &Row, x: &Axis, y: &Axis) {
-    let (px, py) = (x.at(row.seconds.estimate), y.at(row.rmse));
-    let [low, high] = [row.seconds.low, row.seconds.high].map(|s| x.at(s));
+    let (px, py) = (x.at(row.cpu_seconds.estimate), y.at(row.rmse));
+    let [low, high] = [row.cpu_seconds.low, row.cpu_seconds.high].map(|s| x.at(s));
     let (colour, _) = kind(row);
     let size = if row.on_front || row.options.is_empty() { 5.5 } else { 4.0 };
     _ = writeln!(
@@ -133,7 +133,7 @@ fn point(out: &mut String, row: &Row, x: &Axis, y: &Axis) {
          <circle cx=\"{px:.1}\" cy=\"{py:.1}\" r=\"{size}\" fill=\"{colour}\" stroke=\"#fff\">\
          <title>{}: {} s, {}/255</title></circle>",
         row.name(),
-        short(row.seconds.estimate),
+        short(row.cpu_seconds.estimate),
         short(row.rmse)
     );
 }
@@ -145,7 +145,7 @@ fn numbers(out: &mut String, sweep: &Sweep, x: &Axis, y: &Axis) {
             out,
             "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-weight=\"bold\" font-size=\"12\">\
              {number}</text>",
-            x.at(row.seconds.estimate) - 7.0,
+            x.at(row.cpu_seconds.estimate) - 7.0,
             y.at(row.rmse) + 13.0
         );
     }

@@ -34,6 +34,7 @@ pub struct Row {
     /// Pixels that differ from the default's by more than 2/255, and all.
     pub changed: Option<[u64; 2]>,
     pub memory: f64,
+    /// Whether nothing beats it in CPU time and error.
     pub on_front: bool,
 }
 
@@ -99,7 +100,7 @@ impl Sweep {
     /// The rows that nothing beats, the fastest first.
     pub fn front(&self) -> Vec<&Row> {
         let mut front: Vec<&Row> = self.rows.iter().filter(|row| row.on_front).collect();
-        front.sort_by(|a, b| a.seconds.estimate.total_cmp(&b.seconds.estimate));
+        front.sort_by(|a, b| a.cpu_seconds.estimate.total_cmp(&b.cpu_seconds.estimate));
         front
     }
 
@@ -125,7 +126,7 @@ impl Row {
             error_ratio: Measured::read(&value["error_ratio"]),
             changed: pixels("over_2").zip(pixels("pixels")).map(|(over, all)| [over, all]),
             memory: value["memory_bytes"].as_f64().unwrap(),
-            on_front: value["on_front"].as_bool().unwrap(),
+            on_front: value["on_cpu_front"].as_bool().unwrap(),
         }
     }
 

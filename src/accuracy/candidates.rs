@@ -166,8 +166,13 @@ impl List<'_> {
                     options += &format!(" --policy {name}");
                     self.add(Knob::Combination, options, |s| {
                         s.spp = spp;
-                        s.shadow_samples = shadow[k];
-                        s.sky_samples = sky[k];
+                        // Samples of what is not there would only make twins.
+                        if plan.area_lights {
+                            s.shadow_samples = shadow[k];
+                        }
+                        if plan.sky_light {
+                            s.sky_samples = sky[k];
+                        }
                         s.reuse.policy = policy;
                     });
                 }
@@ -197,6 +202,12 @@ mod tests {
         assert_eq!((all[0].knob, &all[0].settings), (Knob::Default, &base));
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| a.settings != b.settings), "{}", a.options);
+        }
+        let one = Settings { shadow_samples: 1, ..Settings::default() };
+        let no_sky = EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING };
+        let list = candidates(&one, &no_sky, 100, &Group::ALL);
+        for (i, a) in list.iter().enumerate() {
+            assert!(list[..i].iter().all(|b| a.options != b.options), "{}", a.options);
         }
         let nothing = EffectPlan {
             mirror: false,

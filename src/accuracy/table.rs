@@ -51,6 +51,8 @@ pub struct Row {
     /// Whether no other candidate that may be recommended is both faster and nearer to the truth, and
     /// it is not there for noise alone.
     pub on_front: bool,
+    /// The same by CPU seconds.
+    pub on_cpu_front: bool,
 }
 
 /// A median, and what it is the median of.
@@ -148,7 +150,10 @@ impl Measured {
         let rows =
             rows.map(|(k, (candidate, own))| row(candidate, own, (k > 0).then(|| &taken[0])));
         let mut measured = Self { rows: rows.collect() };
-        front::mark(&mut measured.rows);
+        let rows = &mut measured.rows;
+        front::of(rows, |row| &row.seconds).into_iter().for_each(|k| rows[k].on_front = true);
+        let by_cpu = front::of(rows, |row| &row.cpu_seconds);
+        by_cpu.into_iter().for_each(|k| rows[k].on_cpu_front = true);
         measured
     }
 
@@ -179,6 +184,7 @@ fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> Row {
         rays: first.rays,
         memory_bytes: own.0.values().map(|entry| entry.memory).max().unwrap_or(0),
         on_front: false,
+        on_cpu_front: false,
     }
 }
 
