@@ -16,7 +16,14 @@ const SCENES: [(&str, &str); 3] =
     [("cornell", "128x128"), ("reflective_spheres", "160x120"), ("spheres_on_terrain", "64x36")];
 
 fn main() {
-    let sweeps: Vec<Sweep> = SCENES.iter().map(|(name, size)| Sweep::run(name, size)).collect();
+    let named: Vec<String> = std::env::args().skip(1).collect();
+    let is_meant = |name: &str| named.is_empty() || named.iter().any(|n| n == name);
+    let sweeps: Vec<Sweep> = SCENES
+        .iter()
+        .filter(|(name, _)| is_meant(name))
+        .map(|(name, size)| Sweep::run(name, size))
+        .collect();
+    assert!(!sweeps.is_empty(), "no such scene: {}", named.join(" "));
     for sweep in &sweeps {
         plot::write(sweep);
         heat::write(sweep);
