@@ -168,6 +168,7 @@ fn rules_cell(_: &Sweep, row: &Row) -> String {
 fn trade_cell(sweep: &Sweep, row: &Row) -> String {
     let error = match row.error_ratio {
         _ if row.rmse == sweep.default_row().rmse => "same error".into(),
+        Some(ratio) if (ratio.estimate - 1.0).abs() < 5e-4 => "same error to three digits".into(),
         Some(ratio) if ratio.is_sure() => format!("error {}", change(ratio.estimate)),
         _ => "error: noise".into(),
     };
