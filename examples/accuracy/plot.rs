@@ -47,7 +47,7 @@ fn kind(row: &Row) -> (&'static str, &'static str) {
         "camera-samples" | "shadow-samples" | "sky-samples" => ("#2f9a78", "samples"),
         "bounces" | "cut-off" => ("#c2528a", "bounces, cut-off"),
         "combination" => ("#94853f", "samples and reuse"),
-        _ => ("#8468cc", "rules of intersection, tree"),
+        _ => ("#8468cc", "rules, tree"),
     }
 }
 
@@ -168,6 +168,6 @@ fn legend(out: &mut String, sweep: &Sweep) {
             left + 9.0,
             HEIGHT - 14.0
         );
-        left += 26.0 + 6.4 * name.len() as f64;
+        left += 24.0 + 6.1 * name.len() as f64;
     }
 }
