@@ -10,13 +10,18 @@
 //!
 //! Nothing here is decided by a clock: times are only measured.
 //!
-//! Not done: knobs that the program does not have yet (adaptive sampling, texture filters, Embree's
-//! build quality).
+//! A [`Ledger`] keeps what was measured on disk, trial by trial, so that a sweep that was stopped or
+//! killed goes on.
+//!
+//! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
+mod candidates;
 mod choice;
 mod errors;
 mod frames;
+mod front;
 mod knobs;
+mod ledger;
 mod oracle;
 mod reference;
 mod sentences;
@@ -24,14 +29,18 @@ mod stage;
 mod sweep;
 mod table;
 mod trial;
+mod writing;
 
+pub use candidates::candidates;
 pub use choice::{Goal, best_within, fastest_reaching};
 pub use errors::Errors;
 pub use frames::chosen_frames;
-pub use knobs::{Candidate, Group, Knob, candidates};
+pub use knobs::{Candidate, Group, Knob};
+pub use ledger::{Entry, Ledger};
 pub use oracle::{OracleCrop, on_a_crop};
-pub use reference::{Truth, converge, truth_settings};
-pub use sentences::{about_knob, about_oracle};
+pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
+pub use sentences::{about_knob, about_oracle, about_writing};
 pub use stage::Stage;
 pub use sweep::{Heard, Picture, Sweep};
 pub use table::{Measured, Row, Spread};
+pub use writing::{Writing, on_disk};

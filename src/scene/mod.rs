@@ -32,7 +32,7 @@ pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentre::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
-    Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
+    BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
 pub use time::{Interval, parse_time};
 pub(crate) use weld::weld;

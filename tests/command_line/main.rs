@@ -20,6 +20,7 @@ mod rendering;
 mod resumed;
 mod reuse;
 mod slurm;
+mod sweeps;
 #[cfg(feature = "mpi")]
 mod together;
 mod verify;

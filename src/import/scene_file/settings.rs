@@ -10,7 +10,8 @@ use super::vector::List;
 use crate::error::Result;
 use crate::import::{Loaded, OutputName};
 use crate::scene::{
-    self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ReuseSettings, ToneCurve, limits,
+    self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Rect, ReuseSettings,
+    ToneCurve, limits,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -60,6 +61,11 @@ pub(super) struct Settings {
     intersector: IntersectorKind,
     /// Embree's instruction set; frames differ in the last bits by it. Absent: the machine's best.
     isa: Option<Isa>,
+    /// How much work Embree puts into its tree: "low" is built fastest and traced slowest, "high" the
+    /// other way round.
+    build_quality: BuildQuality,
+    /// Whether Embree's tree takes less memory, and more time to trace.
+    compact: bool,
     /// The rules that make hits trustworthy.
     rules: Rules,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, as `[x0, y0, x1, y1]`; row 0 is the top.
@@ -110,6 +116,8 @@ impl Default for Settings {
             png_bits: PngBits(s.png_bits),
             intersector: s.intersector,
             isa: None,
+            build_quality: s.build_quality,
+            compact: s.compact,
             rules: Rules::default(),
             crop: None,
             flag_bad: s.flag_bad,
@@ -154,6 +162,8 @@ impl Settings {
             png_bits: self.png_bits.0,
             intersector: self.intersector,
             isa: self.isa.map(|isa| isa.name().to_owned()),
+            build_quality: self.build_quality,
+            compact: self.compact,
             rules: HitRules { robust, retry, recheck, spawn_offset, recentre },
             reuse,
             crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
