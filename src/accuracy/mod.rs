@@ -8,16 +8,25 @@
 //! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
 //! and weighed by how many of it the move has.
 //!
-//! Nothing here is decided by a clock: times are only measured.
+//! [`Probe`] takes a quick look instead, from which the error and the time of any setting are foretold
+//! ([`Foretelling`]), and the program chooses one; [`Check`] says afterwards what came out.
+//!
+//! Only that choice is decided by measured times; the sweep only tells them.
 //!
 //! Not done: knobs that the program does not have yet (adaptive sampling, texture filters, Embree's
 //! build quality).
 
+mod check;
 mod choice;
 mod errors;
+mod fit;
+mod foretell;
 mod frames;
 mod knobs;
+mod law;
 mod oracle;
+mod patches;
+mod probe;
 mod reference;
 mod sentences;
 mod stage;
@@ -25,11 +34,15 @@ mod sweep;
 mod table;
 mod trial;
 
+pub use check::{Check, Checked};
 pub use choice::{Goal, best_within, fastest_reaching};
 pub use errors::Errors;
+pub use foretell::{Foretelling, Foretold, Range};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob, candidates};
+pub use law::Samples;
 pub use oracle::{OracleCrop, on_a_crop};
+pub use probe::{Given, Probe};
 pub use reference::{Truth, converge, truth_settings};
 pub use sentences::{about_knob, about_oracle};
 pub use stage::Stage;

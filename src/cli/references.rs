@@ -66,6 +66,13 @@ impl References {
     }
 }
 
+impl References {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+}
+
 fn name_of(found: &[([u8; 32], Reference)]) -> String {
     if found.is_empty() {
         return "none".into();

@@ -1,6 +1,7 @@
 //! `tweenray render`: every frame of a shot, and a video of them.
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
+use super::choose::{Choice, ChoiceArgs, Chooser};
 use super::exit::Exit;
 use super::machine;
 use super::progress::{Watch, duration, percent};
@@ -8,6 +9,7 @@ use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
 use super::stats::{self, RankStats};
+use crate::accuracy::Stage;
 use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
@@ -36,12 +38,15 @@ Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resume
 Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16 --size 640x360 --spp 4
   tweenray render bunny.obj --up z
+  tweenray render scene.toml --target psnr=45
   mpirun -n 4 tweenray render scene.toml")]
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
     output: OutputArgs,
+    #[command(flatten)]
+    choice: ChoiceArgs,
     #[command(flatten)]
     settings: SettingArgs,
 }
@@ -69,6 +74,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
     let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
+    world.agree(args.choice.check(&request))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
@@ -78,39 +84,134 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let intersector = world.agree(pool.install(build))?;
     let built = Instant::now();
     let tracer = request.tracer(&intersector.describe())?;
-    let target = request.target(world.same_everywhere("traces with", tracer)?);
-    let prepare = || {
-        request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
-        pool.install(|| sequence::prepare(&target, request.frames))
-    };
-    let plan = world.from_root(prepare)?;
-    tell(quiet, &plan.notes, |n| say::note(n));
-    let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
-    let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
-    let rank = RankStats {
-        threads,
-        load_seconds: (loaded - start).as_secs_f64(),
-        build_seconds: (built - loaded).as_secs_f64(),
-        render_seconds: built.elapsed().as_secs_f64(),
-        intersector_bytes: intersector.memory(),
-        reference_bytes,
-        peak_memory_bytes: None,
-    };
-    let ranks = world.gather(&rank.with_peak())?;
-    if !world.is_root() {
-        let stopped = interrupt.stop.load(Ordering::Relaxed);
-        return Ok(if stopped { Exit::Stopped } else { Exit::Done });
+    let tracer = world.same_everywhere("traces with", tracer)?;
+    let base = request.settings.clone();
+    let choosing = Choosing { args, base: &base, pool: &pool, interrupt: &interrupt, quiet };
+    let mut choice = choosing.first(world, &request, &*intersector, start)?;
+    let mut is_again = false;
+    loop {
+        if let Some(choice) = &choice {
+            request.settings = choice.settings(&base);
+            request.terms = request.terms();
+        }
+        let mut target = request.target(tracer.clone());
+        target.header.chosen = choice.as_ref().map(Choice::value);
+        // Frames of this job's own choice before.
+        target.overwrite |= is_again;
+        let plan = world.from_root(|| {
+            request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
+            pool.install(|| sequence::prepare(&target, request.frames))
+        })?;
+        tell(quiet, &plan.notes, |n| say::note(n));
+        let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
+        let begun = Instant::now();
+        let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
+        let seconds = begun.elapsed().as_secs_f64();
+        let rank = RankStats {
+            threads,
+            load_seconds: (loaded - start).as_secs_f64(),
+            build_seconds: (built - loaded).as_secs_f64(),
+            render_seconds: built.elapsed().as_secs_f64(),
+            intersector_bytes: intersector.memory(),
+            reference_bytes,
+            peak_memory_bytes: None,
+        };
+        let ranks = world.gather(&rank.with_peak())?;
+        let tighter = choosing.next(world, &job, &*intersector, choice, (&outcome, seconds))?;
+        if tighter.is_some() {
+            (choice, is_again) = (tighter, true);
+            continue;
+        }
+        if !world.is_root() {
+            let stopped = interrupt.stop.load(Ordering::Relaxed);
+            return Ok(if stopped { Exit::Stopped } else { Exit::Done });
+        }
+        if let Some(path) = &request.stats {
+            let seconds = start.elapsed().as_secs_f64();
+            stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
+        }
+        if outcome.unfinished > 0 {
+            say_stopped(&job, &outcome);
+            return Ok(Exit::Stopped);
+        }
+        let done = finish(&job, &outcome, start, quiet)?;
+        return Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done));
     }
-    if let Some(path) = &request.stats {
-        let seconds = start.elapsed().as_secs_f64();
-        stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
+}
+
+/// Settings that the program chooses, and chooses again where they were not enough.
+struct Choosing<'a> {
+    args: &'a RenderArgs,
+    base: &'a Settings,
+    pool: &'a ThreadPool,
+    interrupt: &'a Interrupt,
+    quiet: bool,
+}
+
+impl Choosing<'_> {
+    /// The choice to begin with, rank 0's; `None` where nothing is to be chosen. All ranks call it.
+    fn first(
+        &self,
+        world: &World,
+        request: &Request,
+        intersector: &dyn Intersector,
+        start: Instant,
+    ) -> Result<Option<Choice>> {
+        if !self.args.choice.is_any() {
+            return Ok(None);
+        }
+        world.from_root(|| {
+            let choose = |chooser: &Chooser| chooser.choose(start);
+            self.interrupt.watched(|| self.ask(world, request, intersector, choose)).map(Some)
+        })
     }
-    if outcome.unfinished > 0 {
-        say_stopped(&job, &outcome);
-        return Ok(Exit::Stopped);
+
+    /// A tighter choice where `choice` was not enough. All ranks call it.
+    fn next(
+        &self,
+        world: &World,
+        job: &Frames,
+        intersector: &dyn Intersector,
+        choice: Option<Choice>,
+        (outcome, seconds): (&Outcome, f64),
+    ) -> Result<Option<Choice>> {
+        let Some(choice) = choice else { return Ok(None) };
+        world.from_root(|| {
+            if outcome.unfinished > 0 || job.plan.render.is_empty() {
+                return Ok(None);
+            }
+            let audit = stats::audit_of(job.plan, outcome);
+            let seconds = job.plan.kept.is_empty().then_some(seconds);
+            let judge = |chooser: &Chooser| chooser.judge(&choice, audit.as_ref(), seconds);
+            self.interrupt.watched(|| self.ask(world, job.request, intersector, judge))
+        })
     }
-    let done = finish(&job, &outcome, start, quiet)?;
-    Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
+
+    fn ask<T>(
+        &self,
+        world: &World,
+        request: &Request,
+        intersector: &dyn Intersector,
+        question: impl Fn(&Chooser) -> Result<T>,
+    ) -> Result<T> {
+        let stage = Stage {
+            scene: &request.scene,
+            otherwise: None,
+            shot: &request.shot,
+            base: self.base,
+            intersector,
+            pool: self.pool,
+            stop: &self.interrupt.stop,
+        };
+        question(&Chooser {
+            args: &self.args.choice,
+            options: &self.args.settings,
+            stage: &stage,
+            request,
+            ranks: world.size(),
+            quiet: self.quiet,
+        })
+    }
 }
 
 /// Holds every rank to the best instruction set that all their machines have, unless one was

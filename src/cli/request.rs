@@ -7,7 +7,7 @@ use super::{job, machine, values};
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
-use crate::output::manifest::{self, Header};
+use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
@@ -49,6 +49,7 @@ pub struct Request {
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     scene_hash: String,
+    world_hash: String,
 }
 
 impl Request {
@@ -93,6 +94,7 @@ impl Request {
             warnings,
             scene_name: path.display().to_string(),
             scene_hash,
+            world_hash,
         })
     }
 
@@ -127,6 +129,20 @@ impl Request {
         settings
     }
 
+    /// On which terms frames of the settings, as they are now, serve as references.
+    pub fn terms(&self) -> Terms {
+        references::terms(&self.world_hash, &self.scene, &self.settings)
+    }
+
+    /// How the settings of the frames that are there were chosen, where frames of this scene are to be
+    /// kept and the program chose.
+    pub fn chosen_before(&self) -> Option<Value> {
+        let path = manifest::manifest_path(&self.pattern);
+        let header = Manifest::read(&path).ok().flatten()?.header;
+        let is_same = header.scene_hash == self.scene_hash && !self.overwrite;
+        header.chosen.filter(|_| is_same)
+    }
+
     /// Where frames traced by `tracer` go, and what they share.
     pub fn target(&self, tracer: String) -> Target {
         let header = Header {
@@ -138,6 +154,7 @@ impl Request {
             files: manifest::file_name(&self.pattern),
             tracer,
             command: super::words(),
+            chosen: None,
             settings: self.header_settings(),
         };
         Target {
