@@ -44,15 +44,15 @@ impl Check {
         let count = frames.last - frames.first + 1;
         let chosen: Vec<u32> =
             spread(count, FRAMES, 0.1).into_iter().map(|f| f + frames.first - 1).collect();
-        let patches = probe.patches(CHECK, &chosen);
+        let patches = probe.patches(CHECK, &chosen)?;
         let seen = patches.of_images(image)?;
         let truth = patches.trace(probe.stage, &reference(probe.stage.base))?;
-        let errors = squares(&truth, &seen);
+        let errors = squares(&patches, &truth, &seen);
         let checked = |(frame, squared_error): (u32, f64)| Checked { frame, squared_error };
         Ok(Self {
             frames: chosen.into_iter().zip(errors).map(checked).collect(),
-            figure: probe.goal.map_or(Ok(0.0), |goal| figure(goal, &truth, &seen))?,
-            doubt: doubt(&truth, &seen),
+            figure: probe.goal.map_or(Ok(0.0), |goal| figure(goal, &patches, &truth, &seen))?,
+            doubt: doubt(&patches, &truth, &seen),
         })
     }
 

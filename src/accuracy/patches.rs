@@ -8,28 +8,80 @@ use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
+use crate::reuse::audit::{self, Lot};
 use crate::sampling::mix;
-use crate::scene::Settings;
+use crate::scene::{Policy, Settings};
 use crate::shade::Renderer;
+use rayon::prelude::*;
 
-/// Square patches, one in each cell of a grid over the frame.
+/// Square patches of some frames, with what each counts for.
 #[derive(Debug, Clone)]
 pub struct Patches {
     edge: u32,
-    frames: Vec<(u32, Vec<(u32, u32)>)>,
+    frames: Vec<Drawn>,
+}
+
+/// A frame's patches.
+#[derive(Debug, Clone)]
+struct Drawn {
+    frame: u32,
+    corners: Vec<(u32, u32)>,
+    /// What a patch counts for in the frame's mean.
+    weights: Vec<f64>,
 }
 
 /// The patches of each frame, as displayed: one image a patch.
 pub type Seen = Vec<Vec<Image>>;
 
 impl Patches {
-    /// About `pixels` pixels of each of `frames`, in patches of `edge` pixels at places that `lot`
-    /// draws.
-    pub fn new(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, lot: u64) -> Self {
+    /// Patches of `edge` pixels of each of `frames`, one in each cell of a grid, about `pixels` pixels
+    /// of a frame, at places that `lot` draws.
+    pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, lot: u64) -> Self {
         let edge = edge.min(settings.width).min(settings.height);
-        let places =
-            |frame: &u32| (*frame, places(settings, edge, pixels, mix(lot ^ u64::from(*frame))));
-        Self { edge, frames: frames.iter().map(places).collect() }
+        let draw = |frame: &u32| {
+            let corners = places(settings, edge, pixels, mix(lot ^ u64::from(*frame)));
+            let weights = vec![1.0 / corners.len() as f64; corners.len()];
+            Drawn { frame: *frame, corners, weights }
+        };
+        Self { edge, frames: frames.iter().map(draw).collect() }
+    }
+
+    /// Single pixels, about `count` of each of `frames`. Most of a frame's error lies in a few pixels at
+    /// the edges of what is bright, so pixels are drawn by their contrast in a frame of one sample.
+    ///
+    /// # Errors
+    /// Those of [`Stage::trace`].
+    pub fn by_contrast(stage: &Stage, frames: &[u32], count: u32, lot: u64) -> Result<Self> {
+        let mut settings = stage.base.clone();
+        (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+        settings.reuse.policy = Policy::Off;
+        let draw = |frame: &u32| {
+            let (image, _) = stage.trace(&settings, stage.intersector, *frame)?;
+            let foretold = contrast(&image);
+            let pixels = foretold.len() as u32;
+            let lot = Lot { seed: lot, frame: *frame, number: 0 };
+            let drawn = audit::draw(&foretold, 0..pixels, f64::from(count), lot);
+            let place = |d: &audit::Drawn| (d.index % image.width, d.index / image.width);
+            Ok(Drawn {
+                frame: *frame,
+                corners: drawn.iter().map(place).collect(),
+                weights: drawn.iter().map(|d| d.weight / f64::from(pixels)).collect(),
+            })
+        };
+        Ok(Self { edge: 1, frames: frames.iter().map(draw).collect::<Result<_>>()? })
+    }
+
+    /// The mean over each frame of a figure of its patches, and how far it may be off: its standard
+    /// error.
+    pub fn means(&self, seen: &[Vec<f64>]) -> Vec<(f64, f64)> {
+        let of = |(drawn, figures): (&Drawn, &Vec<f64>)| {
+            let parts: Vec<f64> = drawn.weights.iter().zip(figures).map(|(w, x)| w * x).collect();
+            let sum: f64 = parts.iter().sum();
+            let squares: f64 = parts.iter().map(|part| part * part).sum();
+            let variance = squares - sum * sum / parts.len().max(1) as f64;
+            (sum, variance.max(0.0).sqrt())
+        };
+        self.frames.iter().zip(seen).map(of).collect()
     }
 
     /// Traces the patches under `settings`.
@@ -40,7 +92,7 @@ impl Patches {
         let plan = EffectPlan::of(stage.scene, settings);
         let renderer =
             Renderer { scene: stage.scene, settings, plan, intersector: stage.intersector };
-        let one = |(frame, corners): &(u32, Vec<(u32, u32)>)| {
+        let one = |Drawn { frame, corners, .. }: &Drawn| {
             let camera = stage.shot.camera(*frame, settings.width, settings.height)?;
             let places: Vec<(u32, u32)> = corners.iter().flat_map(|c| self.pixels(*c)).collect();
             let trace = || renderer.render_scattered(&camera, *frame, &places, stage.stop);
@@ -55,7 +107,7 @@ impl Patches {
     /// # Errors
     /// Those of `image`.
     pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<Seen> {
-        let one = |(frame, corners): &(u32, Vec<(u32, u32)>)| {
+        let one = |Drawn { frame, corners, .. }: &Drawn| {
             let image = image(*frame)?;
             let at = |(x, y): (u32, u32)| image.rgb[(y * image.width + x) as usize];
             let rgb: Vec<Rgb> = corners.iter().flat_map(|c| self.pixels(*c)).map(at).collect();
@@ -75,6 +127,21 @@ impl Patches {
             |rgb: &[Rgb]| Image { width, height, rgb: rgb.to_vec(), encoding: Encoding::Srgb };
         rgb.chunks((self.edge * self.edge) as usize).map(image).collect()
     }
+}
+
+/// For each pixel how much it and its neighbours differ: the square of the largest difference of a
+/// channel.
+fn contrast(image: &Image) -> Vec<f32> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let of = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        let columns = x.saturating_sub(1)..(x + 2).min(width);
+        let near = rows.flat_map(|row| &image.rgb[row * width..][columns.clone()]);
+        let apart = near.map(|c| (*c - image.rgb[i]).abs().max_element()).fold(0.0, f32::max);
+        apart * apart
+    };
+    (0..image.rgb.len()).into_par_iter().map(of).collect()
 }
 
 fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u32)> {
@@ -100,20 +167,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn contrast_is_at_an_edge_and_on_both_its_sides() {
+        let rgb = (0..20).map(|i| Rgb::splat(if i % 5 < 2 { 0.0 } else { 0.5 })).collect();
+        let image = Image { width: 5, height: 4, rgb, encoding: Encoding::Srgb };
+        for (i, contrast) in contrast(&image).into_iter().enumerate() {
+            assert_eq!(contrast, if [1, 2].contains(&(i % 5)) { 0.25 } else { 0.0 }, "{i}");
+        }
+    }
+
+    #[test]
     fn patches_lie_in_the_picture_apart_and_are_as_many_as_wanted() {
         for (width, height, edge, pixels) in
             [(640, 360, 1, 3000), (37, 91, 8, 2000), (16, 9, 1, 3000), (5, 7, 64, 100)]
         {
             let settings = Settings { width, height, ..Settings::default() };
-            let patches = Patches::new(&settings, &[1, 9], edge, pixels, 3);
-            let (_, corners) = &patches.frames[0];
+            let patches = Patches::grid(&settings, &[1, 9], edge, pixels, 3);
+            let Drawn { corners, weights, .. } = &patches.frames[0];
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
             let all = || corners.iter().flat_map(|c| patches.pixels(*c));
             assert!(all().all(|(x, y)| x < width && y < height), "{width}x{height}");
             let distinct: std::collections::BTreeSet<_> = all().collect();
             assert_eq!(distinct.len(), all().count(), "{width}x{height}");
             let most = f64::from(pixels.min(width * height));
             assert!(distinct.len() as f64 > 0.4 * most, "{} of {most}", distinct.len());
-            assert_ne!(patches.frames[0].1.len(), 0);
         }
     }
 }

@@ -15,6 +15,7 @@ use super::stage::Stage;
 use super::trial::{self, Trial};
 use crate::effects::EffectPlan;
 use crate::error::Result;
+use crate::film::Image;
 use crate::measure::{compare, mse, share_exceeding};
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
 use crate::scene::{Policy, ReuseSettings, Settings};
@@ -27,8 +28,8 @@ const PIXELS: u32 = 2500;
 /// Edge and pixels of patches in which neighbours count (SSIM, FLIP).
 const WIDE: (u32, u32) = (48, 12_000);
 /// Pixels of the small frames that are timed.
-const SMALL: f64 = 20_000.0;
-/// How often they are timed; the shortest time counts.
+const SMALL: f64 = 7_000.0;
+/// How often the likely choices are timed in turns; the shortest time counts.
 const TURNS: u32 = 2;
 /// Share of what the goal allows that bounces and cut-off may take.
 const BIAS: f64 = 0.1;
@@ -72,7 +73,7 @@ impl Probe<'_> {
     /// # Errors
     /// [`crate::error::Error::Stopped`]; those of rendering.
     pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Foretelling> {
-        let patches = self.patches(PROBE, &spread(self.stage.shot.frames, FRAMES, 0.5));
+        let patches = self.patches(PROBE, &spread(self.stage.shot.frames, FRAMES, 0.5))?;
         heard("a reference for some pixels");
         let truth = patches.trace(self.stage, &reference(self.stage.base))?;
         heard("errors of a short sweep");
@@ -80,10 +81,15 @@ impl Probe<'_> {
         for samples in self.design() {
             sweep.push((samples, self.traced(&patches, samples)?));
         }
-        let mut points: Vec<Point> =
-            sweep.iter().map(|(samples, seen)| (*samples, squares(&truth, seen))).collect();
+        let mut points: Vec<Point> = sweep
+            .iter()
+            .map(|(samples, seen)| (*samples, squares(&patches, &truth, seen)))
+            .collect();
         let figures = sweep.iter().zip(&points).map(|((_, seen), (_, errors))| {
-            Ok((mean(errors), self.goal.map_or(Ok(0.0), |goal| figure(goal, &truth, seen))?))
+            Ok((
+                mean(errors),
+                self.goal.map_or(Ok(0.0), |goal| figure(goal, &patches, &truth, seen))?,
+            ))
         });
         let figures = figures.collect::<Result<Vec<_>>>()?;
         let mut foretelling = Foretelling {
@@ -93,7 +99,7 @@ impl Probe<'_> {
             bounces: self.stage.base.bounces,
             modes: Vec::new(),
             line: Line::through(&figures),
-            doubt: sweep.last().map_or(0.0, |(_, seen)| doubt(&truth, seen)),
+            doubt: sweep.last().map_or(0.0, |(_, seen)| doubt(&patches, &truth, seen)),
         };
         let most = self.goal.map_or(f64::INFINITY, |goal| foretelling.allowed(goal));
         (foretelling.bounces, foretelling.bias) = self.bounces(&patches, BIAS * most)?;
@@ -106,7 +112,7 @@ impl Probe<'_> {
                 break;
             }
             let seen = self.traced(&patches, likely.samples)?;
-            points.push((likely.samples, squares(&truth, &seen)));
+            points.push((likely.samples, squares(&patches, &truth, &seen)));
             foretelling.law = Law::of(&points, REFERENCE);
         }
         Ok(foretelling)
@@ -166,12 +172,16 @@ impl Probe<'_> {
     }
 
     /// Patches of `frames` in which the goal's figure can be taken.
-    pub fn patches(&self, lot: u64, frames: &[u32]) -> Patches {
-        let (edge, pixels) = match self.goal {
-            Some(Goal::Ssim(_) | Goal::Flip(_)) => WIDE,
-            _ => (1, PIXELS),
-        };
-        Patches::new(self.stage.base, frames, edge, pixels, lot)
+    ///
+    /// # Errors
+    /// Those of [`Patches::by_contrast`].
+    pub fn patches(&self, lot: u64, frames: &[u32]) -> Result<Patches> {
+        match self.goal {
+            Some(Goal::Ssim(_) | Goal::Flip(_)) => {
+                Ok(Patches::grid(self.stage.base, frames, WIDE.0, WIDE.1, lot))
+            }
+            _ => Patches::by_contrast(self.stage, frames, PIXELS, lot),
+        }
     }
 
     fn likely(&self, foretelling: &Foretelling) -> Option<Foretold> {
@@ -240,7 +250,7 @@ impl Probe<'_> {
         let mut last = (base.bounces, Vec::new());
         for bounces in tried {
             settings.bounces = bounces;
-            let bias = squares(&truth, &patches.trace(self.stage, &settings)?);
+            let bias = squares(patches, &truth, &patches.trace(self.stage, &settings)?);
             let is_enough = bias.iter().all(|bias| *bias <= allowed);
             last = (bounces, bias);
             if is_enough {
@@ -285,16 +295,14 @@ impl Probe<'_> {
 
     fn seconds(&self, turned: &dyn Fn((u32, u32, u32)) -> Settings) -> Result<[f64; 4]> {
         let (mut rows, mut measured) = (Vec::new(), Vec::new());
-        for samples in [(1, 1, 1), (8, 1, 1), (4, 4, 4), (4, 16, 1), (4, 1, 16), (2, 16, 16)] {
-            let mut seconds = f64::INFINITY;
-            for _ in 0..TURNS {
-                seconds = seconds.min(self.small_trial(&turned(samples))?.seconds);
-            }
+        for samples in [(1, 1, 1), (6, 1, 1), (2, 4, 4), (2, 12, 1), (2, 1, 12)] {
             let (n, m, k) = (f64::from(samples.0), f64::from(samples.1), f64::from(samples.2));
             rows.push([1.0, n, n * m, n * k]);
-            measured.push(seconds * self.enlargement());
+            measured.push(self.small_trial(&turned(samples))?.seconds);
         }
-        Ok(fit(&rows, &measured).0)
+        let [each, by_spp, by_shadow, by_sky] = fit(&rows, &measured).0;
+        let larger = self.enlargement();
+        Ok([each, larger * by_spp, larger * by_shadow, larger * by_sky])
     }
 
     /// See [`Mode::kept`]: audits of few samples and of many.
@@ -356,40 +364,45 @@ pub fn reference(base: &Settings) -> Settings {
     settings
 }
 
-/// Mean squared error of each frame's patches, display steps.
-pub fn squares(truth: &Seen, seen: &Seen) -> Vec<f64> {
-    let of = |(truth, seen): (&Vec<_>, &Vec<_>)| {
-        let all: f64 = truth.iter().zip(seen).map(|(a, b)| mse(a, b)).sum();
-        255.0 * 255.0 * all / truth.len().max(1) as f64
-    };
-    truth.iter().zip(seen).map(of).collect()
+/// Mean squared error of each frame, display steps.
+pub fn squares(patches: &Patches, truth: &Seen, seen: &Seen) -> Vec<f64> {
+    let means = patches.means(&each(truth, seen, mse));
+    means.into_iter().map(|(mean, _)| 255.0 * 255.0 * mean).collect()
 }
 
 /// The standard error of the frames' squared errors, a share of them: the mean frame's.
-pub fn doubt(truth: &Seen, seen: &Seen) -> f64 {
-    let of = |(truth, seen): (&Vec<_>, &Vec<_>)| {
-        let all: Vec<f64> = truth.iter().zip(seen).map(|(a, b)| mse(a, b)).collect();
-        let n = all.len() as f64;
-        let middle = mean(&all);
-        let variance = all.iter().map(|x| (x - middle) * (x - middle)).sum::<f64>() / n;
-        if middle > 0.0 { (variance / n).sqrt() / middle } else { 0.0 }
-    };
-    let all: Vec<f64> = truth.iter().zip(seen).map(of).collect();
-    mean(&all)
+pub fn doubt(patches: &Patches, truth: &Seen, seen: &Seen) -> f64 {
+    let means = patches.means(&each(truth, seen, mse));
+    let share = |(mean, error): (f64, f64)| if mean > 0.0 { error / mean } else { 0.0 };
+    mean(&means.into_iter().map(share).collect::<Vec<_>>())
 }
 
-/// The figure of `goal` as it rises with the error, the mean over all patches.
-pub fn figure(goal: Goal, truth: &Seen, seen: &Seen) -> Result<f64> {
-    let mut all = Vec::new();
-    for (a, b) in truth.iter().flatten().zip(seen.iter().flatten()) {
-        all.push(match goal {
-            Goal::Psnr(_) => mse(a, b),
-            Goal::MaxShare(_) => share_exceeding(a, b, 2),
-            Goal::Ssim(_) => 1.0 - compare(a, b)?.ssim,
-            Goal::Flip(_) => compare(a, b)?.flip,
+/// The figure of `goal` as it rises with the error, the mean over all frames.
+///
+/// # Errors
+/// Those of [`compare`].
+pub fn figure(goal: Goal, patches: &Patches, truth: &Seen, seen: &Seen) -> Result<f64> {
+    let mut frames = Vec::new();
+    for (truth, seen) in truth.iter().zip(seen) {
+        let all = truth.iter().zip(seen).map(|(a, b)| {
+            Ok(match goal {
+                Goal::Psnr(_) => mse(a, b),
+                Goal::MaxShare(_) => share_exceeding(a, b, 2),
+                Goal::Ssim(_) => 1.0 - compare(a, b)?.ssim,
+                Goal::Flip(_) => compare(a, b)?.flip,
+            })
         });
+        frames.push(all.collect::<Result<Vec<f64>>>()?);
     }
-    Ok(mean(&all))
+    let means = patches.means(&frames);
+    Ok(mean(&means.into_iter().map(|(mean, _)| mean).collect::<Vec<_>>()))
+}
+
+fn each(truth: &Seen, seen: &Seen, of: fn(&Image, &Image) -> f64) -> Vec<Vec<f64>> {
+    let frame = |(truth, seen): (&Vec<Image>, &Vec<Image>)| {
+        truth.iter().zip(seen).map(|(a, b)| of(a, b)).collect()
+    };
+    truth.iter().zip(seen).map(frame).collect()
 }
 
 fn mean(all: &[f64]) -> f64 {
