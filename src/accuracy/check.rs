@@ -1,7 +1,8 @@
 //! What came out: some pixels of finished frames against many samples.
 
 use super::choice::Goal;
-use super::probe::{CHECK, Probe, doubt, figure, reference, spread, squares};
+use super::figures::{doubt, figure, squares};
+use super::probe::{CHECK, Probe, reference, spread};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;

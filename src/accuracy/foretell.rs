@@ -36,7 +36,7 @@ impl Line {
         let (xx, xy) = logs()
             .fold((0.0, 0.0), |(xx, xy), (a, b)| (xx + (a - x) * (a - x), xy + (a - x) * (b - y)));
         let rise = xy / xx;
-        (n >= 2.0 && rise > 0.0).then(|| Self { at_one: y - rise * x, rise })
+        (n >= 2.0 && rise > 0.0).then_some(Self { at_one: y - rise * x, rise })
     }
 
     /// The squared error at which the figure is `figure`.

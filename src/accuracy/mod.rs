@@ -19,11 +19,13 @@
 mod check;
 mod choice;
 mod errors;
+mod figures;
 mod fit;
 mod foretell;
 mod frames;
 mod knobs;
 mod law;
+mod modes;
 mod oracle;
 mod patches;
 mod probe;

@@ -5,8 +5,8 @@
 //! frames of a small size, where the audit says how far they are off.
 
 use super::choice::Goal;
-use super::fit::fit;
-use super::foretell::{Foretelling, Foretold, Line, Mode, Range};
+use super::figures::{doubt, figure, mean, squares};
+use super::foretell::{Foretelling, Foretold, Line, Range};
 use super::frames::chosen_frames;
 use super::law::{Law, Point, Samples};
 use super::patches::{Patches, Seen};
@@ -15,10 +15,8 @@ use super::stage::Stage;
 use super::trial::{self, Trial};
 use crate::effects::EffectPlan;
 use crate::error::Result;
-use crate::film::Image;
-use crate::measure::{compare, mse, share_exceeding};
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
-use crate::scene::{Policy, ReuseSettings, Settings};
+use crate::scene::{Policy, Settings};
 
 /// Samples of the probe's reference.
 const REFERENCE: Samples = Samples { spp: 128, shadow: 8, sky: 8 };
@@ -260,68 +258,7 @@ impl Probe<'_> {
         Ok(last)
     }
 
-    fn modes(&self, bounces: u32) -> Result<Vec<Mode>> {
-        let mut modes = Vec::new();
-        for reuse in self.kinds_of_reuse() {
-            let turned = |(spp, shadow, sky): (u32, u32, u32)| {
-                let mut settings = self.stage.base.clone();
-                (settings.spp, settings.shadow_samples, settings.sky_samples) = (spp, shadow, sky);
-                (settings.bounces, settings.reuse) = (bounces, reuse);
-                settings
-            };
-            let kept = match reuse.policy {
-                Policy::Off => [1.0, 0.0],
-                _ => self.kept(&turned)?,
-            };
-            modes.push(Mode { reuse, seconds: self.seconds(&turned)?, kept });
-        }
-        Ok(modes)
-    }
-
-    fn kinds_of_reuse(&self) -> Vec<ReuseSettings> {
-        let base = self.stage.base.reuse;
-        if self.given.policy && base.policy == Policy::Off {
-            return vec![base];
-        }
-        let mut kinds = vec![ReuseSettings { policy: Policy::Surface, ..base }];
-        if !self.given.tolerance {
-            kinds.push(ReuseSettings { tolerance: 4.0 * base.tolerance, ..kinds[0] });
-        }
-        if !self.given.policy {
-            kinds.push(ReuseSettings { policy: Policy::Off, ..base });
-        }
-        kinds
-    }
-
-    fn seconds(&self, turned: &dyn Fn((u32, u32, u32)) -> Settings) -> Result<[f64; 4]> {
-        let (mut rows, mut measured) = (Vec::new(), Vec::new());
-        for samples in [(1, 1, 1), (6, 1, 1), (2, 4, 4), (2, 12, 1), (2, 1, 12)] {
-            let (n, m, k) = (f64::from(samples.0), f64::from(samples.1), f64::from(samples.2));
-            rows.push([1.0, n, n * m, n * k]);
-            measured.push(self.small_trial(&turned(samples))?.seconds);
-        }
-        let [each, by_spp, by_shadow, by_sky] = fit(&rows, &measured).0;
-        let larger = self.enlargement();
-        Ok([each, larger * by_spp, larger * by_shadow, larger * by_sky])
-    }
-
-    /// See [`Mode::kept`]: audits of few samples and of many.
-    fn kept(&self, turned: &dyn Fn((u32, u32, u32)) -> Settings) -> Result<[f64; 2]> {
-        let (mut rows, mut measured) = (Vec::new(), Vec::new());
-        for samples in [(4, 1, 1), (4, 4, 4), (4, 16, 16)] {
-            let mut settings = turned(samples);
-            settings.reuse.audit = 0.3;
-            let sums = self.small_trial(&settings)?.audit;
-            if sums.drawn > 0 && sums.traced.sum > 0.0 {
-                let pixels = sums.pixels.max(1) as f64;
-                rows.push([sums.traced.sum / pixels, 1.0]);
-                measured.push((sums.shown.sum / pixels).max(1e-6));
-            }
-        }
-        Ok(if rows.is_empty() { [1.0, 0.0] } else { fit(&rows, &measured).0 })
-    }
-
-    fn small_trial(&self, settings: &Settings) -> Result<Trial> {
+    pub(super) fn small_trial(&self, settings: &Settings) -> Result<Trial> {
         let mut settings = settings.clone();
         (settings.width, settings.height) = self.small_size();
         let frames = chosen_frames(self.stage.shot.frames);
@@ -336,7 +273,7 @@ impl Probe<'_> {
     }
 
     /// Pixels of a frame over those of a small one.
-    fn enlargement(&self) -> f64 {
+    pub(super) fn enlargement(&self) -> f64 {
         let (width, height) = self.small_size();
         let base = self.stage.base;
         f64::from(base.width) * f64::from(base.height) / (f64::from(width) * f64::from(height))
@@ -362,51 +299,6 @@ pub fn reference(base: &Settings) -> Settings {
     settings.sky_samples = REFERENCE.sky;
     settings.seed = (base.seed + MAX_SEED / 4) % (MAX_SEED + 1);
     settings
-}
-
-/// Mean squared error of each frame, display steps.
-pub fn squares(patches: &Patches, truth: &Seen, seen: &Seen) -> Vec<f64> {
-    let means = patches.means(&each(truth, seen, mse));
-    means.into_iter().map(|(mean, _)| 255.0 * 255.0 * mean).collect()
-}
-
-/// The standard error of the frames' squared errors, a share of them: the mean frame's.
-pub fn doubt(patches: &Patches, truth: &Seen, seen: &Seen) -> f64 {
-    let means = patches.means(&each(truth, seen, mse));
-    let share = |(mean, error): (f64, f64)| if mean > 0.0 { error / mean } else { 0.0 };
-    mean(&means.into_iter().map(share).collect::<Vec<_>>())
-}
-
-/// The figure of `goal` as it rises with the error, the mean over all frames.
-///
-/// # Errors
-/// Those of [`compare`].
-pub fn figure(goal: Goal, patches: &Patches, truth: &Seen, seen: &Seen) -> Result<f64> {
-    let mut frames = Vec::new();
-    for (truth, seen) in truth.iter().zip(seen) {
-        let all = truth.iter().zip(seen).map(|(a, b)| {
-            Ok(match goal {
-                Goal::Psnr(_) => mse(a, b),
-                Goal::MaxShare(_) => share_exceeding(a, b, 2),
-                Goal::Ssim(_) => 1.0 - compare(a, b)?.ssim,
-                Goal::Flip(_) => compare(a, b)?.flip,
-            })
-        });
-        frames.push(all.collect::<Result<Vec<f64>>>()?);
-    }
-    let means = patches.means(&frames);
-    Ok(mean(&means.into_iter().map(|(mean, _)| mean).collect::<Vec<_>>()))
-}
-
-fn each(truth: &Seen, seen: &Seen, of: fn(&Image, &Image) -> f64) -> Vec<Vec<f64>> {
-    let frame = |(truth, seen): (&Vec<Image>, &Vec<Image>)| {
-        truth.iter().zip(seen).map(|(a, b)| of(a, b)).collect()
-    };
-    truth.iter().zip(seen).map(frame).collect()
-}
-
-fn mean(all: &[f64]) -> f64 {
-    all.iter().sum::<f64>() / all.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -94,7 +94,7 @@ impl ChoiceArgs {
     fn words(&self) -> String {
         match (self.target, self.budget) {
             (Some(goal), _) => goal.to_string(),
-            (_, Some(seconds)) => format!("{} s", seconds),
+            (_, Some(seconds)) => format!("{seconds} s"),
             _ => String::new(),
         }
     }

@@ -1,7 +1,9 @@
 //! `tweenray render`: every frame of a shot, and a video of them.
 
+mod choosing;
+
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
-use super::choose::{Choice, ChoiceArgs, Chooser};
+use super::choose::{Choice, ChoiceArgs};
 use super::exit::Exit;
 use super::machine;
 use super::progress::{Watch, duration, percent};
@@ -9,7 +11,6 @@ use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
 use super::stats::{self, RankStats};
-use crate::accuracy::Stage;
 use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
@@ -22,6 +23,7 @@ use crate::scene::{Policy, Settings};
 use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
+use choosing::Choosing;
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::atomic::Ordering;
@@ -136,81 +138,6 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         }
         let done = finish(&job, &outcome, start, quiet)?;
         return Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done));
-    }
-}
-
-/// Settings that the program chooses, and chooses again where they were not enough.
-struct Choosing<'a> {
-    args: &'a RenderArgs,
-    base: &'a Settings,
-    pool: &'a ThreadPool,
-    interrupt: &'a Interrupt,
-    quiet: bool,
-}
-
-impl Choosing<'_> {
-    /// The choice to begin with, rank 0's; `None` where nothing is to be chosen. All ranks call it.
-    fn first(
-        &self,
-        world: &World,
-        request: &Request,
-        intersector: &dyn Intersector,
-        start: Instant,
-    ) -> Result<Option<Choice>> {
-        if !self.args.choice.is_any() {
-            return Ok(None);
-        }
-        world.from_root(|| {
-            let choose = |chooser: &Chooser| chooser.choose(start);
-            self.interrupt.watched(|| self.ask(world, request, intersector, choose)).map(Some)
-        })
-    }
-
-    /// A tighter choice where `choice` was not enough. All ranks call it.
-    fn next(
-        &self,
-        world: &World,
-        job: &Frames,
-        intersector: &dyn Intersector,
-        choice: Option<Choice>,
-        (outcome, seconds): (&Outcome, f64),
-    ) -> Result<Option<Choice>> {
-        let Some(choice) = choice else { return Ok(None) };
-        world.from_root(|| {
-            if outcome.unfinished > 0 || job.plan.render.is_empty() {
-                return Ok(None);
-            }
-            let audit = stats::audit_of(job.plan, outcome);
-            let seconds = job.plan.kept.is_empty().then_some(seconds);
-            let judge = |chooser: &Chooser| chooser.judge(&choice, audit.as_ref(), seconds);
-            self.interrupt.watched(|| self.ask(world, job.request, intersector, judge))
-        })
-    }
-
-    fn ask<T>(
-        &self,
-        world: &World,
-        request: &Request,
-        intersector: &dyn Intersector,
-        question: impl Fn(&Chooser) -> Result<T>,
-    ) -> Result<T> {
-        let stage = Stage {
-            scene: &request.scene,
-            otherwise: None,
-            shot: &request.shot,
-            base: self.base,
-            intersector,
-            pool: self.pool,
-            stop: &self.interrupt.stop,
-        };
-        question(&Chooser {
-            args: &self.args.choice,
-            options: &self.args.settings,
-            stage: &stage,
-            request,
-            ranks: world.size(),
-            quiet: self.quiet,
-        })
     }
 }
 
