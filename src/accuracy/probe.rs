@@ -173,7 +173,7 @@ impl Probe<'_> {
     ///
     /// # Errors
     /// Those of [`Patches::by_contrast`].
-    pub fn patches(&self, lot: u64, frames: &[u32]) -> Result<Patches> {
+    pub(super) fn patches(&self, lot: u64, frames: &[u32]) -> Result<Patches> {
         match self.goal {
             Some(Goal::Ssim(_) | Goal::Flip(_)) => {
                 Ok(Patches::grid(self.stage.base, frames, WIDE.0, WIDE.1, lot))
