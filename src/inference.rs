@@ -6,9 +6,11 @@
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Light, Scene};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// A surface point whose light is wanted: where one or more camera samples of a pixel end.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePoint {
     /// The point; the mean where there are several samples.
     pub p: DVec3,
@@ -55,7 +57,7 @@ pub struct Questions {
 }
 
 /// A point that was traced: a source for other frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TracedPoint {
     /// Pixel column.
     pub x: u32,
@@ -66,7 +68,7 @@ pub struct TracedPoint {
 }
 
 /// Traced points with their ratios.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TracedPoints {
     /// The points.
     pub points: Vec<TracedPoint>,
@@ -79,6 +81,21 @@ impl TracedPoints {
     pub fn append(&mut self, mut other: Self) {
         self.points.append(&mut other.points);
         self.ratios.append(&mut other.ratios);
+    }
+
+    /// The same points row by row; those of a pixel stay in their order.
+    pub fn in_rows(self) -> Self {
+        let place = |t: &TracedPoint| (t.y, t.x);
+        if self.points.is_sorted_by_key(place) {
+            return self;
+        }
+        let channels = self.ratios.len() / self.points.len();
+        let mut order: Vec<u32> = (0..self.points.len() as u32).collect();
+        order.par_sort_by_key(|i| place(&self.points[*i as usize]));
+        let points = order.iter().map(|i| self.points[*i as usize]).collect();
+        let ratios = |i: &u32| *i as usize * channels..(*i as usize + 1) * channels;
+        let ratios = order.iter().flat_map(|i| &self.ratios[ratios(i)]).copied().collect();
+        Self { points, ratios }
     }
 }
 

@@ -110,6 +110,7 @@ impl Move {
             with_gbuffer: false,
             stop: &AtomicBool::new(false),
             progress: &Silent,
+            laid: Default::default(),
         };
         (1..=FRAMES).map(|frame| tracer.make(frame).unwrap().unwrap().film).collect()
     }

@@ -107,9 +107,15 @@ fn maker<'m>(
             };
             Box::new(ColourMaker::new(renderer, shot, pool, stop, &Unheard, rule, &[])?)
         }
-        Policy::Off => {
-            Box::new(Tracer { renderer, shot, pool, with_gbuffer: false, stop, progress: &Unheard })
-        }
+        Policy::Off => Box::new(Tracer {
+            renderer,
+            shot,
+            pool,
+            with_gbuffer: false,
+            stop,
+            progress: &Unheard,
+            laid: Default::default(),
+        }),
     })
 }
 

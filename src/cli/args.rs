@@ -7,6 +7,7 @@ use crate::scene::{
 };
 use clap::Args;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// The scene and how to read it.
 #[derive(Debug, Args)]
@@ -247,12 +248,24 @@ pub struct OutputArgs {
     /// from it too; repeatable
     #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]
     pub upload: Vec<(u32, PathBuf)>,
+    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s. In a Slurm job at the latest 30 s
+    /// before its end
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    pub time_limit: Option<Duration>,
+    /// Put what frames to come need on disk every so often, so that a killed job need not trace it
+    /// again: 30s, 5m, off [default: 30s]
+    #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
+    pub checkpoint: Option<values::Interval>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_THREADS))]
     pub threads: Option<u32>,
+    /// Which ranks of an MPI job share a node: a file with a line `RANK NODE` for each; neighbouring
+    /// segments stay on one node [default: as the ranks share memory]
+    #[arg(long, value_name = "FILE")]
+    pub rank_map: Option<PathBuf>,
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,

@@ -14,7 +14,7 @@ use crate::scene::{Policy, Settings};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// How often a target that was missed is tightened.
 const ROUNDS: u32 = 2;
@@ -31,7 +31,7 @@ pub struct ChoiceArgs {
     pub target: Option<Goal>,
     /// Choose the most accurate ones foretold to fit this time: 90s, 10m, 1h30m
     #[arg(long, value_name = "TIME", value_parser = values::time)]
-    pub budget: Option<f64>,
+    pub budget: Option<Duration>,
 }
 
 /// What was chosen and why; the manifest keeps it, so that a job that goes on chooses nothing anew.
@@ -94,7 +94,7 @@ impl ChoiceArgs {
     fn words(&self) -> String {
         match (self.target, self.budget) {
             (Some(goal), _) => goal.to_string(),
-            (_, Some(seconds)) => format!("{seconds} s"),
+            (_, Some(budget)) => format!("{} s", budget.as_secs()),
             _ => String::new(),
         }
     }
@@ -130,8 +130,8 @@ impl Chooser<'_> {
     ///
     /// # Errors
     /// Those of the probe; a target that nothing reaches is none: the best there is is chosen then.
-    pub fn choose(&self, started: Instant) -> Result<Choice> {
-        if let Some(before) = self.before() {
+    pub fn choose(&self, started: Instant, tracer: &str) -> Result<Choice> {
+        if let Some(before) = self.before(tracer) {
             self.tell(format!("for {}, as chosen before: {}", before.wanted, before.options()));
             return Ok(before);
         }
@@ -142,7 +142,8 @@ impl Chooser<'_> {
         let found = match allowed {
             Some(allowed) => probe.fastest(&foretelling, allowed)?,
             None => {
-                let left = self.args.budget.unwrap_or(0.0) - started.elapsed().as_secs_f64();
+                let left = self.args.budget.unwrap_or_default().as_secs_f64()
+                    - started.elapsed().as_secs_f64();
                 let each = (1.0 - RESERVE) * left.max(0.0) / self.frames();
                 probe.best_within(&foretelling, each)?
             }
@@ -162,8 +163,10 @@ impl Chooser<'_> {
         };
         self.say_choice(&choice);
         self.tell(format!("the probe took {}", duration(start.elapsed().as_secs_f64())));
-        let over =
-            self.args.budget.is_some_and(|b| choice.foretold.seconds * self.frames() > 1.1 * b);
+        let over = self
+            .args
+            .budget
+            .is_some_and(|b| choice.foretold.seconds * self.frames() > 1.1 * b.as_secs_f64());
         if !self.quiet && (!is_found || over) {
             say::warning("no setting is foretold to reach this; the nearest one is taken");
         }
@@ -233,8 +236,8 @@ impl Chooser<'_> {
         Ok(Some(tighter))
     }
 
-    fn before(&self) -> Option<Choice> {
-        let value = self.request.chosen_before()?;
+    fn before(&self, tracer: &str) -> Option<Choice> {
+        let value = self.request.header_before(tracer)?.chosen?;
         let before: Choice = serde_json::from_value(value).ok()?;
         let is_same =
             before.wanted == self.args.words() && before.base == Header::settings(self.stage.base);

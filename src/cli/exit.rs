@@ -12,6 +12,8 @@ pub enum Exit {
     Failed,
     /// The request or its input is wrong.
     Usage,
+    /// Frames of the sequence are missing.
+    Incomplete,
     /// Stopped cleanly; the same command goes on. (`EX_TEMPFAIL` of sysexits.h.)
     Stopped,
 }
@@ -32,6 +34,7 @@ impl Exit {
             Self::Done => 0,
             Self::Failed => 1,
             Self::Usage => 2,
+            Self::Incomplete => 3,
             Self::Stopped => 75,
         }
     }

@@ -21,7 +21,9 @@ mod request;
 mod say;
 mod schema;
 mod signals;
+mod slurm;
 mod stats;
+mod status;
 mod values;
 mod verify;
 
@@ -37,6 +39,8 @@ use std::process::ExitCode;
 Examples:
   tweenray render bunny.obj
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16
+  tweenray status out/
+  tweenray slurm scene.toml --nodes 4 --time 30m | sbatch
   tweenray inspect scene.toml
   tweenray compare out/frame_0001.png other.png
   tweenray accuracy scene.toml -o accuracy
@@ -51,6 +55,8 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(Box<render::RenderArgs>),
+    Status(status::StatusArgs),
+    Slurm(slurm::SlurmArgs),
     Inspect(Box<inspect::InspectArgs>),
     Verify(Box<verify::VerifyArgs>),
     Compare(compare::CompareArgs),
@@ -91,6 +97,8 @@ pub fn run() -> ExitCode {
 fn dispatch(command: &Command) -> Exit {
     let result = match command {
         Command::Render(args) => return render::run(args),
+        Command::Status(args) => status::run(args),
+        Command::Slurm(args) => slurm::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Compare(args) => compare::run(args),

@@ -20,21 +20,26 @@ use crate::output::video::{self, Clip, Video};
 use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{self, ColourMaker, FrameMaker, Inferrer, Plan, Pyramid, Target, Tracer};
+use crate::sequence::checkpoint::{self, Checkpoints};
+use crate::sequence::{
+    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
+};
 use crate::shade::Renderer;
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
-use clap::Args;
+use clap::{Args, Command, FromArgMatches};
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Render the frames of a camera move
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every option can also stand in the scene file; the command line wins.
+Most options can also stand in the scene file; the command line wins.
 Frames that exist with the same settings are kept, so the same command goes on where it stopped.
 
+`tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
+
+SIGINT, SIGTERM and SIGUSR1 stop the job; a second SIGINT or SIGTERM ends it at once.
 Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed.
 
 Examples:
@@ -44,13 +49,27 @@ Examples:
   mpirun -n 4 tweenray render scene.toml")]
 pub struct RenderArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub scene: SceneArgs,
     #[command(flatten)]
-    output: OutputArgs,
+    pub output: OutputArgs,
     #[command(flatten)]
-    choice: ChoiceArgs,
+    pub choice: ChoiceArgs,
     #[command(flatten)]
-    settings: SettingArgs,
+    pub settings: SettingArgs,
+}
+
+/// The arguments of this command for `scene`, with the options in `words`.
+///
+/// Errors: `Error::Usage`: these are no options of the command.
+pub fn parse(scene: &str, words: &[String]) -> Result<RenderArgs> {
+    let command = RenderArgs::augment_args(Command::new("tweenray render"));
+    let words = ["tweenray render", scene].into_iter().chain(words.iter().map(String::as_str));
+    let parsed = command.try_get_matches_from(words);
+    let parsed = parsed.and_then(|found| RenderArgs::from_arg_matches(&found));
+    parsed.map_err(|wrong| {
+        let text = wrong.to_string();
+        Error::Usage(text.trim().trim_start_matches("error: ").into())
+    })
 }
 
 /// Runs the command.
@@ -73,12 +92,14 @@ pub fn run(args: &RenderArgs) -> Exit {
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
+    interrupt.limit(args.output.time_limit);
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
     let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
     world.agree(args.choice.check(&request))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
+    let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
     let threads = request.threads.unwrap_or_else(cluster::default_threads);
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
@@ -87,58 +108,122 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let built = Instant::now();
     let tracer = request.tracer(&intersector.describe())?;
     let tracer = world.same_everywhere("traces with", tracer)?;
+    let clock = Clock { start, loaded, built };
+    let (intersector, pool, order) = (&*intersector, &pool, &order[..]);
+    let site = Site { world, intersector, pool, order, interrupt: &interrupt, clock, quiet };
     let base = request.settings.clone();
-    let choosing = Choosing { args, base: &base, pool: &pool, interrupt: &interrupt, quiet };
-    let mut choice = choosing.first(world, &request, &*intersector, start)?;
+    let choosing = Choosing { args, base: &base, site: &site };
+    let mut choice = choosing.first(&request, &tracer)?;
     let mut is_again = false;
     loop {
         if let Some(choice) = &choice {
             request.settings = choice.settings(&base);
-            request.terms = request.terms();
+            (request.terms, request.recipes) = request.terms_and_recipes(&request.settings)?;
         }
         let mut target = request.target(tracer.clone());
         target.header.chosen = choice.as_ref().map(Choice::value);
-        // Frames of this job's own choice before.
+        // What is replaced was this job's own.
         target.overwrite |= is_again;
-        let plan = world.from_root(|| {
+        let round = site.render(&request, &target)?;
+        let job = Frames { request: &request, target: &target, plan: &round.plan, site: &site };
+        let tighter = match round.unfinished {
+            0 => choosing.next(&job, &round, choice.take())?,
+            _ => None,
+        };
+        if tighter.is_none() {
+            return conclude(&job, &round);
+        }
+        (choice, is_again) = (tighter, true);
+    }
+}
+
+/// Where frames are rendered.
+struct Site<'a> {
+    world: &'a World,
+    intersector: &'a dyn Intersector,
+    pool: &'a ThreadPool,
+    /// The ranks, node by node.
+    order: &'a [u32],
+    interrupt: &'a Interrupt,
+    clock: Clock,
+    /// Whether nothing is said.
+    quiet: bool,
+}
+
+/// When the program started, and when it had loaded and built the scene.
+struct Clock {
+    start: Instant,
+    loaded: Instant,
+    built: Instant,
+}
+
+/// What came of rendering all frames once.
+struct Round {
+    plan: Plan,
+    outcome: Outcome,
+    /// Frames that no rank got to; every rank knows it.
+    unfinished: usize,
+    seconds: f64,
+    /// What each rank took, and why it was asked to stop; known on rank 0.
+    ranks: Vec<RankStats>,
+    reasons: Vec<String>,
+}
+
+impl Site<'_> {
+    /// Renders the frames of `request` that are not there yet. All ranks call it.
+    fn render(&self, request: &Request, target: &Target) -> Result<Round> {
+        let plan = self.world.from_root(|| {
             request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
-            pool.install(|| sequence::prepare(&target, request.frames))
+            self.pool.install(|| sequence::prepare(target, request.frames))
         })?;
-        tell(quiet, &plan.notes, |n| say::note(n));
-        let job = Frames { request: &request, target: &target, plan: &plan, pool: &pool };
+        tell(self.quiet, &plan.notes, |n| say::note(n));
+        let job = Frames { request, target, plan: &plan, site: self };
         let begun = Instant::now();
-        let (outcome, reference_bytes) = job.render(world, &*intersector, &interrupt, quiet)?;
+        let (outcome, reference_bytes, saved) = job.render()?;
         let seconds = begun.elapsed().as_secs_f64();
+        let Clock { start, loaded, built } = self.clock;
         let rank = RankStats {
-            threads,
+            threads: self.pool.current_num_threads(),
             load_seconds: (loaded - start).as_secs_f64(),
             build_seconds: (built - loaded).as_secs_f64(),
             render_seconds: built.elapsed().as_secs_f64(),
-            intersector_bytes: intersector.memory(),
+            intersector_bytes: self.intersector.memory(),
             reference_bytes,
+            checkpoint_seconds: saved.seconds,
+            checkpoint_bytes: saved.bytes,
+            duty: outcome.own,
             peak_memory_bytes: None,
         };
-        let ranks = world.gather(&rank.with_peak())?;
-        let tighter = choosing.next(world, &job, &*intersector, choice, (&outcome, seconds))?;
-        if tighter.is_some() {
-            (choice, is_again) = (tighter, true);
-            continue;
+        let ranks = self.world.gather(&rank.with_peak())?;
+        // Whichever rank was asked to stop knows why.
+        let reasons = self.world.gather(&self.interrupt.reason())?;
+        // A rank that was asked to stop when all its frames were finished has not stopped the job.
+        let unfinished = self.world.from_root(|| Ok(outcome.unfinished))?;
+        if unfinished == 0 && self.world.is_root() {
+            checkpoint::clear(target);
         }
-        if !world.is_root() {
-            let stopped = interrupt.stop.load(Ordering::Relaxed);
-            return Ok(if stopped { Exit::Stopped } else { Exit::Done });
-        }
-        if let Some(path) = &request.stats {
-            let seconds = start.elapsed().as_secs_f64();
-            stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
-        }
-        if outcome.unfinished > 0 {
-            say_stopped(&job, &outcome);
-            return Ok(Exit::Stopped);
-        }
-        let done = finish(&job, &outcome, start, quiet)?;
-        return Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done));
+        Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons })
     }
+}
+
+/// Tells what there is to tell of a job that renders no more frames.
+fn conclude(job: &Frames, round: &Round) -> Result<Exit> {
+    let Round { plan, outcome, unfinished, ranks, .. } = round;
+    let Site { world, clock: Clock { start, .. }, quiet, .. } = job.site;
+    if !world.is_root() {
+        return Ok(if *unfinished > 0 { Exit::Stopped } else { Exit::Done });
+    }
+    if let Some(path) = &job.request.stats {
+        let seconds = start.elapsed().as_secs_f64();
+        stats::write(path, &job.target.header, plan, outcome, ranks, seconds)?;
+    }
+    if *unfinished > 0 {
+        let reason = round.reasons.iter().find(|reason| !reason.is_empty());
+        say_stopped(job, outcome, reason.map_or("", |reason| reason));
+        return Ok(Exit::Stopped);
+    }
+    let done = finish(job, outcome, *start, *quiet)?;
+    Ok(judge_samples(job, outcome, *quiet).unwrap_or(done))
 }
 
 /// Holds every rank to the best instruction set that all their machines have, unless one was
@@ -174,30 +259,29 @@ struct Frames<'a> {
     request: &'a Request,
     target: &'a Target,
     plan: &'a Plan,
-    pool: &'a ThreadPool,
+    site: &'a Site<'a>,
 }
 
 impl Frames<'_> {
-    /// What became of the frames, and the most memory that references took, bytes.
-    fn render(
-        &self,
-        world: &World,
-        intersector: &dyn Intersector,
-        interrupt: &Interrupt,
-        quiet: bool,
-    ) -> Result<(Outcome, u64)> {
+    /// What became of the frames, the most memory that references took, bytes, and what it took to
+    /// put them on disk.
+    fn render(&self) -> Result<(Outcome, u64, SaveCost)> {
         let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
+        let Site { world, intersector, pool, order, interrupt, quiet, .. } = *self.site;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
         let renderer = Renderer { scene, settings, plan: effects, intersector };
         let with_gbuffer = pattern.format() == Format::Exr;
-        let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
-        let maker: Box<dyn FrameMaker> = match settings.reuse.policy {
+        let checkpoints = self.checkpoints();
+        let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
+        let maker: Box<dyn Shared> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
                 maker.supplied = &self.request.references.list;
+                maker.checkpoints = Some(&checkpoints);
+                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
@@ -212,19 +296,27 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Off => {
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress: &watch })
+                let (progress, laid) = (&watch, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
             }
         };
         let done = |report: &_| watch.frame_done(report);
-        let outcome =
-            interrupt.watched(|| cluster::render(world, target, plan, &*maker, stop, &done));
+        let work = || cluster::render(world, order, target, plan, &*maker, stop, &done);
+        let outcome = interrupt.watched(work);
         watch.finish();
+        tell(quiet, &maker.notes(), |n| say::note(n));
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.
             say::error(error);
             world.abort(Exit::of(error).code());
         }
-        Ok((outcome?, maker.reference_memory()))
+        Ok((outcome?, maker.reference_memory(), maker.save_cost()))
+    }
+
+    fn checkpoints(&self) -> Checkpoints<'_> {
+        let Request { scene, settings, terms, checkpoint, .. } = self.request;
+        let whole = settings.crop.is_none();
+        Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
     }
 
     fn total(&self) -> usize {
@@ -233,11 +325,11 @@ impl Frames<'_> {
 }
 
 /// Says how to go on.
-fn say_stopped(job: &Frames, outcome: &Outcome) {
+fn say_stopped(job: &Frames, outcome: &Outcome, reason: &str) {
     let finished = job.total() - outcome.unfinished;
     let again = if job.request.overwrite { " without --overwrite" } else { "" };
     say::aside(format_args!(
-        "stopped: {finished} of {} frames are finished in {}; the same command{again} goes on \
+        "stopped{reason}: {finished} of {} frames are finished in {}; the same command{again} goes on \
          from here",
         job.total(),
         job.target.pattern

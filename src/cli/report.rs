@@ -74,7 +74,7 @@ pub fn run(args: &ReportArgs) -> Result<Exit> {
     }
     atomic::make_room(&out)?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let rows = manifest.rows.values().filter(|row| !row.other_settings).cloned().collect();
+    let rows = manifest.rows.values().filter(|row| row.stray.is_none()).cloned().collect();
     let job = Job { manifest, folder, rows };
     let html = job.page(args)?.to_html()?;
     atomic::write(&out, |w| w.write_all(html.as_bytes()))?;

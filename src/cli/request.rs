@@ -11,9 +11,13 @@ use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{Target, check_upload, fingerprint, world_fingerprint};
+use crate::sequence::{Recipes, Target, check_upload, fingerprint, world_fingerprint};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// How much time of tracing a killed job may lose: docs/resume.md has the measurement.
+const CHECKPOINT: Duration = Duration::from_secs(30);
 
 /// Everything that rendering takes.
 pub struct Request {
@@ -37,10 +41,14 @@ pub struct Request {
     pub threads: Option<usize>,
     /// Where the statistics go, if anywhere.
     pub stats: Option<PathBuf>,
+    /// How much time of tracing a killed job may lose; `None` for any.
+    pub checkpoint: Option<Duration>,
     /// Whether frames get maps of reuse.
     pub maps: bool,
     /// On which terms frames serve as references.
     pub terms: Terms,
+    /// What each frame of the shot is made of.
+    pub recipes: Recipes,
     /// Frames of an earlier job.
     pub references: References,
     /// Pictures that are taken for frames.
@@ -49,7 +57,7 @@ pub struct Request {
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     scene_hash: String,
-    world_hash: String,
+    shot_hash: String,
 }
 
 impl Request {
@@ -59,22 +67,21 @@ impl Request {
         machine::best_isa()?;
         let loaded = job::load(scene, settings)?;
         let frames = frames(output, &loaded)?;
-        let name =
-            output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
-        let name = name.unwrap_or_else(|| default_output(&scene.scene));
-        let pattern = FramePattern::parse(&name, frames.last - frames.first + 1)?;
+        let pattern = pattern(scene, output, &loaded, frames)?;
         let video = output.video || (loaded.video && !output.no_video);
         let stats = output.stats.clone().or(loaded.stats);
         refuse_input(stats.as_deref(), &loaded.files)?;
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
         refuse_maps(output.maps, &settings)?;
-        let world_hash = world_fingerprint(&world);
-        let scene_hash = fingerprint(&world, &shot);
+        let scene_hash = world_fingerprint(&world);
+        let shot_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));
-        let terms = references::terms(&world_hash, &scene, &settings);
+        let terms = references::terms(&scene_hash, &scene, &settings);
+        let with_motion = pattern.format() == Format::Exr;
+        let recipes = Recipes::new(&shot, &settings, !terms.lights.is_empty(), with_motion)?;
         let references = References::read(&output.references, &pattern, &scene, &settings, &terms)?;
         Ok(Self {
             scene,
@@ -87,6 +94,7 @@ impl Request {
             fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
             threads: output.threads.or(loaded.threads).map(|n| n as usize),
             stats,
+            checkpoint: output.checkpoint.map_or(Some(CHECKPOINT), |interval| interval.0),
             maps: output.maps,
             references,
             terms,
@@ -94,7 +102,8 @@ impl Request {
             warnings,
             scene_name: path.display().to_string(),
             scene_hash,
-            world_hash,
+            shot_hash,
+            recipes,
         })
     }
 
@@ -129,18 +138,24 @@ impl Request {
         settings
     }
 
-    /// On which terms frames of the settings, as they are now, serve as references.
-    pub fn terms(&self) -> Terms {
-        references::terms(&self.world_hash, &self.scene, &self.settings)
+    /// What depends on the settings: on which terms frames serve as references, and their recipes.
+    ///
+    /// Errors: those of [`Recipes::new`].
+    pub fn terms_and_recipes(&self, settings: &Settings) -> Result<(Terms, Recipes)> {
+        let terms = references::terms(&self.scene_hash, &self.scene, settings);
+        let with_motion = self.pattern.format() == Format::Exr;
+        let recipes = Recipes::new(&self.shot, settings, !terms.lights.is_empty(), with_motion)?;
+        Ok((terms, recipes))
     }
 
-    /// How the settings of the frames that are there were chosen, where frames of this scene are to be
-    /// kept and the program chose.
-    pub fn chosen_before(&self) -> Option<Value> {
-        let path = manifest::manifest_path(&self.pattern);
-        let header = Manifest::read(&path).ok().flatten()?.header;
-        let is_same = header.scene_hash == self.scene_hash && !self.overwrite;
-        header.chosen.filter(|_| is_same)
+    /// The header of the frames that are there, where they are of this scene, version and `tracer`
+    /// and are to be kept.
+    pub fn header_before(&self, tracer: &str) -> Option<Header> {
+        let header = Manifest::read(&manifest::manifest_path(&self.pattern)).ok()??.header;
+        let is_same = header.scene_hash == self.scene_hash
+            && header.tweenray == env!("CARGO_PKG_VERSION")
+            && header.tracer == tracer;
+        (is_same && !self.overwrite).then_some(header)
     }
 
     /// Where frames traced by `tracer` go, and what they share.
@@ -150,6 +165,7 @@ impl Request {
             tweenray: env!("CARGO_PKG_VERSION").into(),
             scene: self.scene_name.clone(),
             scene_hash: self.scene_hash.clone(),
+            shot_hash: self.shot_hash.clone(),
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),
             tracer,
@@ -160,6 +176,7 @@ impl Request {
         Target {
             pattern: self.pattern.clone(),
             header,
+            recipes: self.recipes.clone(),
             write: WriteOptions {
                 maps: self.maps.then(|| self.settings.reuse.farthest()),
                 ..WriteOptions::of(&self.settings, None)
@@ -195,8 +212,20 @@ fn uploads(
     files.iter().map(read).collect()
 }
 
+/// Where `frames` go: by option, else by scene file, else a folder named after the scene.
+pub fn pattern(
+    scene: &SceneArgs,
+    output: &OutputArgs,
+    loaded: &Loaded,
+    frames: FrameRange,
+) -> Result<FramePattern> {
+    let name = output.output.clone().or_else(|| loaded.output.as_ref().map(|o| o.pattern.clone()));
+    let name = name.unwrap_or_else(|| default_output(&scene.scene));
+    FramePattern::parse(&name, frames.last - frames.first + 1)
+}
+
 /// The frames asked for: by option, else by scene file, else all.
-fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
+pub fn frames(output: &OutputArgs, loaded: &Loaded) -> Result<FrameRange> {
     let count = loaded.shot.frames;
     let all = FrameRange { first: 1, last: count };
     let range = match output.frames {

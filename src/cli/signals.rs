@@ -1,32 +1,65 @@
-//! Ctrl-C and SIGTERM: the first asks the job to stop, the second ends it at once.
+//! What ends a job early: Ctrl-C, SIGTERM, SIGUSR1 and time limits ask it to stop; a second Ctrl-C or
+//! SIGTERM ends it at once.
 
 use super::exit::Exit;
+use super::progress::duration;
 use super::say;
 use crate::error::{Error, Result};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// What signals have asked for.
+/// How long before the end of its Slurm allocation a job stops: it takes at most ten seconds, and the
+/// clocks of two machines differ.
+const BEFORE_SLURM_ENDS: Duration = Duration::from_secs(30);
+
+/// What signals and limits have asked for.
 #[derive(Debug, Clone)]
 pub struct Interrupt {
-    /// Set by the first signal.
+    /// Set by the first signal or limit.
     pub stop: Arc<AtomicBool>,
     /// Whether somebody watches `stop`, so that work in hand can be finished cleanly. While
     /// nobody does (loading, building), nothing is at risk and the first signal ends the program.
     watched: Arc<AtomicBool>,
+    /// Whether a person, or a system that waits no longer, has asked.
+    asked: Arc<AtomicBool>,
+    reason: Arc<OnceLock<String>>,
 }
 
 impl Interrupt {
     /// Starts to listen.
     pub fn listen() -> Result<Self> {
-        let interrupt = Self { stop: Arc::default(), watched: Arc::default() };
-        let mut signals = Signals::new([SIGINT, SIGTERM])
+        let interrupt = Self {
+            stop: Arc::default(),
+            watched: Arc::default(),
+            asked: Arc::default(),
+            reason: Arc::default(),
+        };
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGUSR1])
             .map_err(|e| Error::Failed(format!("cannot listen for signals: {e}")))?;
         let theirs = interrupt.clone();
         std::thread::spawn(move || signals.forever().for_each(|signal| theirs.on(signal)));
         Ok(interrupt)
+    }
+
+    /// Stops after `limit`, and shortly before the Slurm allocation ends that this process runs in.
+    pub fn limit(&self, limit: Option<Duration>) {
+        if let Some(limit) = limit {
+            let limit_text = duration(limit.as_secs_f64());
+            self.stop_after(limit, format!(" at the time limit of {limit_text}"));
+        }
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let end = std::env::var("SLURM_JOB_END_TIME").ok();
+        if let Some(left) = end.and_then(|end| until_slurm_ends(&end, now)) {
+            self.stop_after(left, " shortly before the Slurm job ends".into());
+        }
+    }
+
+    /// Why the job stops, to follow the word `stopped`.
+    pub fn reason(&self) -> String {
+        self.reason.get().cloned().unwrap_or_default()
     }
 
     /// Runs `work`, which watches `stop`.
@@ -37,14 +70,50 @@ impl Interrupt {
         result
     }
 
+    fn stop_after(&self, time: Duration, reason: String) {
+        let theirs = self.clone();
+        std::thread::spawn(move || {
+            std::thread::sleep(time);
+            theirs.stop(reason);
+        });
+    }
+
     fn on(&self, signal: i32) {
-        let again = self.stop.swap(true, Ordering::SeqCst);
-        if again {
+        // A system may send SIGUSR1 as a first warning, and more than once.
+        if signal != SIGUSR1 && self.asked.swap(true, Ordering::SeqCst) {
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
+        let name = signal_hook::low_level::signal_name(signal).unwrap_or("a signal");
+        self.stop(format!(" by {name}"));
+    }
+
+    fn stop(&self, reason: String) {
+        let _ = self.reason.set(reason);
+        self.stop.store(true, Ordering::SeqCst);
         if !self.watched.load(Ordering::SeqCst) {
             say::aside(Error::Stopped);
             std::process::exit(Exit::Stopped.code().into());
         }
+    }
+}
+
+/// How long a job of an allocation that ends at `end` (seconds since 1970) runs from `now` on; `None`
+/// for an end that is past, which is none of this process's.
+fn until_slurm_ends(end: &str, now: Duration) -> Option<Duration> {
+    let left = Duration::from_secs(end.trim().parse().ok()?).checked_sub(now)?;
+    Some(left.saturating_sub(BEFORE_SLURM_ENDS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slurm_job_stops_before_its_end() {
+        let left = |end, now| until_slurm_ends(end, Duration::from_secs(now)).map(|d| d.as_secs());
+        assert_eq!(left("1000", 700), Some(270));
+        assert_eq!(left("1000", 990), Some(0));
+        assert_eq!(left("1000", 1001), None);
+        assert_eq!(left("soon", 5), None);
     }
 }

@@ -1,7 +1,7 @@
 //! The file of `--stats`: what a job took, as JSON.
 
 use super::machine::{Machine, peak_memory};
-use crate::cluster::Outcome;
+use crate::cluster::{Duty, Outcome};
 use crate::error::{Error, Result};
 use crate::output::atomic;
 use crate::output::manifest::{AuditRow, Header};
@@ -25,6 +25,13 @@ pub struct RankStats {
     pub intersector_bytes: u64,
     /// Most memory that reference frames took at a time.
     pub reference_bytes: u64,
+    /// Seconds to put references on disk.
+    pub checkpoint_seconds: f64,
+    /// Bytes of references put there.
+    pub checkpoint_bytes: u64,
+    /// What it did from the first frame to the last.
+    #[serde(flatten)]
+    pub duty: Duty,
     /// Most memory held at once, where the system tells.
     pub peak_memory_bytes: Option<u64>,
 }
@@ -49,6 +56,9 @@ struct Stats<'a> {
     load_seconds: f64,
     build_seconds: f64,
     render_seconds: f64,
+    busy_seconds: f64,
+    waiting_seconds: f64,
+    balance: f64,
     peak_memory_bytes: Option<u64>,
     reference_bytes: u64,
     rays: RayCounts,
@@ -107,6 +117,8 @@ pub fn write(
     let mut bad_samples = bad_of(plan, outcome);
     bad_samples.first = None;
     let slowest = |of: fn(&RankStats) -> f64| ranks.iter().map(of).fold(0.0, f64::max);
+    let busy: f64 = ranks.iter().map(|r| r.duty.busy_seconds).sum();
+    let most = slowest(|r| r.duty.busy_seconds);
     let stats = Stats {
         tweenray: &header.tweenray,
         scene: &header.scene,
@@ -119,6 +131,9 @@ pub fn write(
         load_seconds: slowest(|r| r.load_seconds),
         build_seconds: slowest(|r| r.build_seconds),
         render_seconds: slowest(|r| r.render_seconds),
+        busy_seconds: busy,
+        waiting_seconds: ranks.iter().map(|r| r.duty.waiting_seconds).sum(),
+        balance: if most > 0.0 { busy / ranks.len() as f64 / most } else { 1.0 },
         peak_memory_bytes: ranks.iter().filter_map(|r| r.peak_memory_bytes).max(),
         reference_bytes: ranks.iter().map(|r| r.reference_bytes).max().unwrap_or(0),
         rays,

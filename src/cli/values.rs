@@ -6,6 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Frames as asked for; an open end is filled in by the shot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,28 +114,40 @@ pub fn goal(text: &str) -> Result<Goal, String> {
     }
 }
 
-/// Seconds of `90s`, `10m`, `1h30m`; without a unit, seconds.
-pub fn time(text: &str) -> Result<f64, String> {
-    let wrong = || "a time is written 90s, 10m or 1h30m".to_string();
-    let (mut seconds, mut rest) = (0.0, text.trim());
+/// `25m`, `1h30m`, `90s`, `2d`.
+pub fn time(text: &str) -> Result<Duration, String> {
+    let wrong = || "a time is written with its units, as in 90s, 25m or 1h30m".to_string();
+    let (mut rest, mut seconds) = (text.trim(), 0_u64);
     if rest.is_empty() {
         return Err(wrong());
     }
     while !rest.is_empty() {
-        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
-        let number: f64 = rest[..end].parse().map_err(|_| wrong())?;
-        let unit = rest[end..].chars().next();
-        seconds += number
-            * match unit {
-                Some('h') => 3600.0,
-                Some('m') => 60.0,
-                Some('s') | None => 1.0,
-                Some(_) => return Err(wrong()),
-            };
-        rest = &rest[end + unit.map_or(0, char::len_utf8)..];
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).ok_or_else(wrong)?;
+        let number: u32 = rest[..digits].parse().map_err(|_| wrong())?;
+        let unit = match rest.as_bytes()[digits] {
+            b's' => 1,
+            b'm' => 60,
+            b'h' => 3600,
+            b'd' => 86_400,
+            _ => return Err(wrong()),
+        };
+        seconds += u64::from(number) * unit;
+        rest = &rest[digits + 1..];
     }
-    if seconds > 0.0 && seconds.is_finite() { Ok(seconds) } else { Err(wrong()) }
+    Ok(Duration::from_secs(seconds))
 }
+
+/// A time, or `off`.
+pub fn time_or_off(text: &str) -> Result<Interval, String> {
+    match text.trim() {
+        "off" => Ok(Interval(None)),
+        text => time(text).map(|time| Interval(Some(time))),
+    }
+}
+
+/// How often something is done, if ever.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interval(pub Option<Duration>);
 
 /// A parser of numbers in `range`.
 pub fn within(
@@ -203,6 +216,20 @@ mod tests {
         for text in ["3,2,1,4", "1,2,3", "1,2,3,4,5", "a,b,c,d", "1,1,1,1"] {
             assert!(crop(text).is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn times_have_units() {
+        let seconds = |text| time(text).map(|t| t.as_secs());
+        assert_eq!(seconds("25m"), Ok(1500));
+        assert_eq!(seconds("1h30m"), Ok(5400));
+        assert_eq!(seconds("0s"), Ok(0));
+        assert_eq!(seconds("2d4h"), Ok(187_200));
+        for text in ["", "25", "m", "1.5h", "-3s", "5 m x", "99999999999s", "5é", "1h30"] {
+            assert!(time(text).is_err(), "{text}");
+        }
+        assert_eq!(time_or_off("off"), Ok(Interval(None)));
+        assert_eq!(time_or_off("30s"), Ok(Interval(Some(Duration::from_secs(30)))));
     }
 
     #[test]

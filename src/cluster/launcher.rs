@@ -6,7 +6,7 @@ use crate::error::Error;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launcher {
     /// Its usual name.
-    pub name: &'static str,
+    pub name: String,
     /// How many processes it started, where it says so.
     pub ranks: Option<u32>,
 }
@@ -15,16 +15,21 @@ pub struct Launcher {
 /// script, which runs once; `SLURM_STEP_NUM_TASKS` is set in the tasks of srun.
 pub fn detect(env: impl Fn(&str) -> Option<String>) -> Option<Launcher> {
     let number = |name: &str| env(name).and_then(|text| text.trim().parse::<u32>().ok());
+    let srun = env("SLURM_MPI_TYPE").map_or("srun".into(), |kind| format!("srun --mpi={kind}"));
+    // srun sets PMI_SIZE too where it plays MPICH's launcher. Where mpirun starts its helpers by srun,
+    // Slurm counts these, and not the ranks.
+    let plays_mpich = number("PMI_SIZE") == number("SLURM_STEP_NUM_TASKS");
+    let mpich = if plays_mpich { &srun } else { "mpiexec of MPICH or Intel MPI" };
     for (name, size) in [
         ("mpirun of Open MPI", "OMPI_COMM_WORLD_SIZE"),
-        ("mpiexec of MPICH or Intel MPI", "PMI_SIZE"),
-        ("srun", "SLURM_STEP_NUM_TASKS"),
+        (mpich, "PMI_SIZE"),
+        (&srun, "SLURM_STEP_NUM_TASKS"),
     ] {
         if let Some(ranks) = number(size) {
-            return Some(Launcher { name, ranks: Some(ranks) });
+            return Some(Launcher { name: name.into(), ranks: Some(ranks) });
         }
     }
-    env("PMIX_RANK").map(|_| Launcher { name: "a PMIx launcher", ranks: None })
+    env("PMIX_RANK").map(|_| Launcher { name: "a PMIx launcher".into(), ranks: None })
 }
 
 /// How many threads a rank uses unless told: the cores that this process may use, shared with
@@ -93,6 +98,10 @@ mod tests {
         assert_eq!(ranks(&[("OMPI_COMM_WORLD_SIZE", "3")]), Some(3));
         assert_eq!(ranks(&[("PMI_SIZE", "2")]), Some(2));
         assert_eq!(ranks(&[("SLURM_STEP_NUM_TASKS", "8"), ("PMIX_RANK", "1")]), Some(8));
+        let name = |pairs| detect(env(pairs)).map(|l| l.name).unwrap_or_default();
+        let pmi2 = [("PMI_SIZE", "2"), ("SLURM_STEP_NUM_TASKS", "2"), ("SLURM_MPI_TYPE", "pmi2")];
+        assert_eq!(name(&pmi2), "srun --mpi=pmi2");
+        assert_eq!(name(&[("PMI_SIZE", "8"), ("SLURM_STEP_NUM_TASKS", "2")])[..7], *"mpiexec");
         assert!(detect(env(&[("PMIX_RANK", "0")])).is_some_and(|l| l.ranks.is_none()));
     }
 

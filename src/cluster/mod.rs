@@ -1,26 +1,42 @@
 //! Who renders which frames: one process alone, or the ranks of an MPI job, by the same code.
 //!
-//! [`World`] is the process's place among the ranks; [`render`] divides the frames of a sequence
-//! into contiguous runs, one a rank. MPI is initialised only when a launcher started the process
-//! and the feature `mpi` is compiled in. The bytes of a frame do not depend on who renders it.
+//! [`World`] is the process's place among the ranks; [`render`] makes the frames of a sequence. MPI is
+//! initialised only when a launcher started the process and the feature `mpi` is compiled in. The
+//! bytes of a frame do not depend on who renders it.
 //!
-//! Not done: ranks do not take work from slower ones, and frames are not split among ranks.
+//! On every rank one thread, the `worker`, renders, and the main thread, the `clerk`, talks to
+//! other ranks meanwhile. Rank 0's clerk keeps the `board`, which says who makes what and who sends
+//! which reference to whom; references travel from the rank that has them to the one that needs them
+//! (`docs/decisions/019-ranks.md`).
 
+mod board;
+mod clerk;
 mod frames;
 mod launcher;
 #[cfg(feature = "mpi")]
 mod mpi;
+mod nodes;
+mod note;
+pub mod simulation;
+mod traffic;
+mod worker;
 
-pub use frames::{Outcome, render};
+pub use frames::{Duty, Outcome, render};
 pub use launcher::default_threads;
+pub use nodes::rank_order;
+pub use traffic::{Sent, Traffic};
 
 use crate::error::{Error, Result};
 use launcher::Launcher;
+use note::{Cargo, Kind};
 use serde::{Deserialize, Serialize};
+use std::cell::Cell;
 
 /// This process's place in the job.
 pub struct World {
     ranks: Ranks,
+    /// What this rank sent while rendering, so far.
+    sent: Cell<Traffic>,
 }
 
 enum Ranks {
@@ -31,8 +47,12 @@ enum Ranks {
 
 impl World {
     /// A world of one process.
-    pub const fn solo() -> Self {
-        Self { ranks: Ranks::Solo }
+    pub fn solo() -> Self {
+        Self::of(Ranks::Solo)
+    }
+
+    fn of(ranks: Ranks) -> Self {
+        Self { ranks, sent: Cell::default() }
     }
 
     /// Joins the ranks that a launcher started with this one; alone without a launcher.
@@ -52,7 +72,7 @@ impl World {
         if session.size() == 1 && launcher.ranks.is_some_and(|n| n > 1) {
             return Err(launcher.stranger());
         }
-        Ok(Self { ranks: Ranks::Mpi(session) })
+        Ok(Self::of(Ranks::Mpi(session)))
     }
 
     #[cfg(not(feature = "mpi"))]
@@ -162,26 +182,82 @@ impl World {
         }
     }
 
+    /// For each rank the number of its node: the lowest of the ranks that share memory with it. All
+    /// ranks call it.
+    fn nodes(&self) -> Result<Vec<u32>> {
+        let own = match &self.ranks {
+            Ranks::Solo => 0,
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => session.node(),
+        };
+        self.all(own)
+    }
+
     /// Sends a note to rank `to` without waiting for it to be read.
     fn post<T: Serialize>(&self, to: u32, note: &T) -> Result<()> {
         let bytes = encode(note)?;
-        match &self.ranks {
-            // There is nobody to send to.
-            Ranks::Solo => _ = (to, bytes),
-            #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.post(to, bytes),
-        }
-        Ok(())
+        self.count(|sent| sent.note(bytes.len()));
+        self.send(to, false, bytes)
     }
 
-    /// The notes that have arrived for this rank since it last asked.
-    fn notes<T: for<'de> Deserialize<'de>>(&self) -> Result<Vec<T>> {
-        let notes: Vec<Vec<u8>> = match &self.ranks {
+    /// Sends a cargo to rank `to` without waiting for it to be taken in.
+    fn ship(&self, to: u32, kind: Kind, original: u32, number: u32, bytes: &[u8]) -> Result<()> {
+        let bytes = Cargo::encode(kind, original, number, bytes);
+        self.count(|sent| sent.cargo(kind, bytes.len()));
+        self.send(to, true, bytes)
+    }
+
+    fn count(&self, count: impl FnOnce(&mut Traffic)) {
+        let mut sent = self.sent.get();
+        count(&mut sent);
+        self.sent.set(sent);
+    }
+
+    /// What this rank sent while rendering, so far.
+    fn sent(&self) -> Traffic {
+        self.sent.get()
+    }
+
+    fn send(&self, to: u32, is_cargo: bool, bytes: Vec<u8>) -> Result<()> {
+        match &self.ranks {
+            // There is nobody to send to.
+            Ranks::Solo => {
+                _ = (to, is_cargo, bytes);
+                Ok(())
+            }
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => session.post(to, is_cargo, bytes),
+        }
+    }
+
+    /// The notes that have arrived for this rank since it last asked, with their senders.
+    fn notes<T: for<'de> Deserialize<'de>>(&self) -> Result<Vec<(u32, T)>> {
+        let notes: Vec<(u32, Vec<u8>)> = match &self.ranks {
             Ranks::Solo => Vec::new(),
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.notes(),
+            Ranks::Mpi(session) => session.arrived(false),
         };
-        notes.iter().map(|bytes| decode(bytes)).collect()
+        notes.iter().map(|(from, bytes)| Ok((*from, decode(bytes)?))).collect()
+    }
+
+    /// The cargo that has arrived for this rank since it last asked.
+    fn cargo(&self) -> Vec<Vec<u8>> {
+        match &self.ranks {
+            Ranks::Solo => Vec::new(),
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => {
+                session.arrived(true).into_iter().map(|(_, bytes)| bytes).collect()
+            }
+        }
+    }
+
+    /// Whether something is still on its way to others.
+    fn is_sending(&self) -> bool {
+        match &self.ranks {
+            Ranks::Solo => false,
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => session.is_sending(),
+        }
     }
 
     /// Waits until every rank got here, asleep between looks; `meanwhile` runs at every look.

@@ -20,6 +20,10 @@ use std::time::Duration;
 const NAP: Duration = Duration::from_millis(5);
 /// Tag of notes.
 const NOTE: i32 = 1;
+/// Tag of what `gather` sends.
+const GATHERED: i32 = 2;
+/// Tag of cargo.
+const CARGO: i32 = 3;
 /// Largest broadcast or gather in one call; MPI counts in `int`.
 const PIECE: usize = 1 << 30;
 
@@ -77,53 +81,72 @@ impl Session {
     pub fn gather(&self, bytes: &[u8]) -> Vec<Vec<u8>> {
         if self.rank() != 0 {
             let root = self.world.process_at_rank(0);
-            root.send_with_tag(&(bytes.len() as u64), NOTE + 1);
-            bytes.chunks(PIECE).for_each(|piece| root.send_with_tag(piece, NOTE + 1));
+            root.send_with_tag(&(bytes.len() as u64), GATHERED);
+            bytes.chunks(PIECE).for_each(|piece| root.send_with_tag(piece, GATHERED));
             return Vec::new();
         }
         let mut all = vec![bytes.to_vec()];
         for rank in 1..self.world.size() {
             let from = self.world.process_at_rank(rank);
-            let (length, _) = from.receive_with_tag::<u64>(NOTE + 1);
+            let (length, _) = from.receive_with_tag::<u64>(GATHERED);
             let mut theirs = vec![0; length as usize];
             for piece in theirs.chunks_mut(PIECE) {
-                from.receive_into_with_tag(piece, NOTE + 1);
+                from.receive_into_with_tag(piece, GATHERED);
             }
             all.push(theirs);
         }
         all
     }
 
-    /// Starts sending a note and returns at once.
-    pub fn post(&self, to: u32, bytes: Vec<u8>) {
+    /// The lowest of the ranks that share memory with this one, itself included. All ranks call it.
+    pub fn node(&self) -> u32 {
+        let node = self.world.split_shared(self.world.rank());
+        let mut first = self.world.rank();
+        node.process_at_rank(0).broadcast_into(&mut first);
+        first as u32
+    }
+
+    /// Starts sending and returns at once.
+    pub fn post(&self, to: u32, is_cargo: bool, bytes: Vec<u8>) -> Result<()> {
         self.clear_outbox();
+        let length = i32::try_from(bytes.len())
+            .map_err(|_| Error::Failed(format!("{} bytes are too much to send", bytes.len())))?;
+        let tag = if is_cargo { CARGO } else { NOTE };
         let bytes = bytes.into_boxed_slice();
         let mut request = MaybeUninit::uninit();
         // SAFETY: `MPI_Isend` reads `bytes` until the request completes; the heap memory is kept
         // beside the request, is not moved or written, and is freed only in `clear_outbox`, after
-        // `MPI_Test` said that the request is complete. A note is far shorter than `int` can say.
+        // `MPI_Test` said that the request is complete.
         let request = unsafe {
             ffi::MPI_Isend(
                 bytes.as_ptr().cast(),
-                bytes.len() as i32,
+                length,
                 ffi::RSMPI_UINT8_T,
                 to as i32,
-                NOTE,
+                tag,
                 self.world.as_raw(),
                 request.as_mut_ptr(),
             );
             request.assume_init()
         };
         self.outbox.borrow_mut().push(Posted { request, _bytes: bytes });
+        Ok(())
     }
 
-    /// Notes that have arrived.
-    pub fn notes(&self) -> Vec<Vec<u8>> {
+    /// What has arrived, with its senders.
+    pub fn arrived(&self, is_cargo: bool) -> Vec<(u32, Vec<u8>)> {
         self.clear_outbox();
         let any = self.world.any_process();
-        std::iter::from_fn(|| any.immediate_matched_probe_with_tag(NOTE))
-            .map(|arrived| arrived.matched_receive_vec().0)
+        let tag = if is_cargo { CARGO } else { NOTE };
+        std::iter::from_fn(|| any.immediate_matched_probe_with_tag(tag))
+            .map(|arrived| arrived.matched_receive_vec())
+            .map(|(bytes, status)| (status.source_rank() as u32, bytes))
             .collect()
+    }
+
+    /// Whether something is still on its way.
+    pub fn is_sending(&self) -> bool {
+        !self.clear_outbox()
     }
 
     /// Waits, asleep, until every rank called this and every note of this rank is on its way.

@@ -2,6 +2,8 @@
 
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::stats::BadSamples;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 mod image;
 mod provenance;
@@ -33,7 +35,7 @@ pub struct Film {
 
 /// Per-pixel first-hit record, of the camera sample nearest the pixel's middle; AOVs are never
 /// averaged over samples, since an average of two surfaces is neither. World space.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GBuffer {
     /// Distance along the view axis, world units; infinity where nothing is hit.
     pub depth: Vec<f32>,
@@ -109,6 +111,28 @@ impl GBuffer {
             mesh_id: vec![0; n],
             motion: vec![Vec2::ZERO; n],
         }
+    }
+
+    /// The records of the pixels with the indices `of`.
+    pub fn part(&self, of: Range<usize>) -> Self {
+        Self {
+            depth: self.depth[of.clone()].to_vec(),
+            position: self.position[of.clone()].to_vec(),
+            normal: self.normal[of.clone()].to_vec(),
+            albedo: self.albedo[of.clone()].to_vec(),
+            mesh_id: self.mesh_id[of.clone()].to_vec(),
+            motion: self.motion[of].to_vec(),
+        }
+    }
+
+    /// Takes in the records of more pixels, behind its own.
+    pub fn append(&mut self, more: Self) {
+        self.depth.extend(more.depth);
+        self.position.extend(more.position);
+        self.normal.extend(more.normal);
+        self.albedo.extend(more.albedo);
+        self.mesh_id.extend(more.mesh_id);
+        self.motion.extend(more.motion);
     }
 
     /// Writes one pixel's record, which tells no motion.

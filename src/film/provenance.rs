@@ -1,7 +1,9 @@
 //! Where a pixel's light comes from.
 
+use serde::{Deserialize, Serialize};
+
 /// How the shadow part of a pixel's light came about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Provenance {
     /// There was nothing to infer: sky, emitters, surfaces that no kept light reaches.
@@ -18,7 +20,7 @@ pub enum Provenance {
 }
 
 /// A pixel's provenance, with what gave most.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PixelSource {
     /// How it came about.
     pub provenance: Provenance,

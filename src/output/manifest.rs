@@ -24,9 +24,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Version of the file format.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
-/// What every frame of a sequence shares: together with its number, all that its bytes depend on.
+/// What every frame of a sequence shares: together with its recipe, all that its bytes depend on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// [`FORMAT`].
@@ -35,9 +35,11 @@ pub struct Header {
     pub tweenray: String,
     /// The scene as the user named it; told, never compared.
     pub scene: String,
-    /// Hash of the resolved world and shot, hexadecimal.
+    /// Hash of the resolved world, the shot left aside, hexadecimal.
     pub scene_hash: String,
-    /// Frames of the whole shot; told, never compared (the shot is in the hash).
+    /// Hash of world and shot; no frame is refused by it, since every row has its own recipe.
+    pub shot_hash: String,
+    /// Frames of the whole shot; told, never compared.
     pub shot_frames: u32,
     /// File name pattern of the frames, without a folder.
     pub files: String,
@@ -61,6 +63,10 @@ pub struct Row {
     pub frame: u32,
     /// Its file, without a folder.
     pub file: String,
+    /// Hash of its camera, hexadecimal.
+    pub view: String,
+    /// Hash of all that it was made of: its camera, and those of the frames that it is inferred from.
+    pub recipe: String,
     /// BLAKE3 of the file, hexadecimal.
     pub blake3: String,
     /// Size of the file.
@@ -87,10 +93,19 @@ pub struct Row {
     /// Files of its maps of reuse.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub maps: Vec<MapRow>,
-    /// Whether the frame is left from a sequence of other settings, of which only a part was
-    /// replaced.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub other_settings: bool,
+    /// Why the frame, which is left from an earlier job, is none of this sequence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stray: Option<Stray>,
+}
+
+/// Why a frame is none of the sequence that its manifest is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stray {
+    /// It is left from a sequence of other settings, of which only a part was replaced.
+    OtherSettings,
+    /// It is left from another move through the same scene, or from a shorter or longer one.
+    OtherMove,
 }
 
 /// A file beside a frame.
@@ -223,7 +238,7 @@ impl Manifest {
     pub fn read(path: &Path) -> Result<Option<Self>> {
         let Some(bytes) = read_if_there(path)? else { return Ok(None) };
         let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
-        let header = serde_json::from_slice::<Header>(first).map_err(|why| {
+        let header = header_of(first).map_err(|why| {
             Error::Failed(format!(
                 "{} is not a manifest that this version of tweenray can read: {why}\n  \
                  help: choose another output, or replace the sequence with --overwrite",
@@ -250,16 +265,16 @@ impl Manifest {
     }
 
     /// Starts the manifest at `path` anew with `header`, in place of any older one and its parts.
-    /// `left` are frames of other settings that stay: nobody may take them for this sequence's.
-    pub fn create(path: &Path, header: &Header, left: &[Row]) -> Result<()> {
+    /// `rows` are frames that stay.
+    pub fn create(path: &Path, header: &Header, rows: &[Row]) -> Result<()> {
         // Parts go first: after a crash in between, frames without a row are rendered again,
         // while rows of the old settings under the new header would be wrong.
         for part in parts(path)? {
             remove(&part)?;
         }
         let mut lines = line_of(path, header)?;
-        for row in left {
-            lines.extend(line_of(path, &Row { other_settings: true, ..row.clone() })?);
+        for row in rows {
+            lines.extend(line_of(path, row)?);
         }
         atomic::write(path, |w| w.write_all(&lines)).map(drop)
     }
@@ -335,10 +350,7 @@ pub fn part_path(path: &Path, rank: u32) -> PathBuf {
 }
 
 fn parts(path: &Path) -> Result<Vec<PathBuf>> {
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned() + ".rank";
     let is_part = |name: &str| {
         let number = name.strip_prefix(&stem).and_then(|n| n.strip_suffix(".jsonl"));
@@ -354,10 +366,26 @@ fn parts(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(parts)
 }
 
+/// The header, or why it is none.
+fn header_of(line: &[u8]) -> std::result::Result<Header, String> {
+    let value: Value = serde_json::from_slice(line).map_err(|e| e.to_string())?;
+    match value["manifest"].as_u64() {
+        Some(version) if version != u64::from(FORMAT) => {
+            Err(format!("it has version {version} of the format, this one writes version {FORMAT}"))
+        }
+        _ => serde_json::from_value(value).map_err(|e| e.to_string()),
+    }
+}
+
 fn rows_in(bytes: &[u8]) -> impl Iterator<Item = Row> + '_ {
     // Without its line feed the last line is torn, even if it happens to parse.
     let lines = bytes.split_inclusive(|b| *b == b'\n').filter(|l| l.ends_with(b"\n"));
     lines.filter_map(|line| serde_json::from_slice(line).ok())
+}
+
+/// The folder that `path` lies in; `.` for the working folder.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }
 
 fn line_of(path: &Path, value: &impl Serialize) -> Result<Vec<u8>> {

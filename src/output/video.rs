@@ -54,7 +54,8 @@ pub enum Video {
 /// Makes `out` from the clip's frames.
 ///
 /// # Errors
-/// [`Error::Usage`] for a clip without frames or a frame rate that is none; [`Error::Io`] and
+/// [`Error::Usage`] for a clip without frames or a frame rate that is none; [`Error::Io`] where a
+/// frame is missing; [`Error::Io`] and
 /// [`Error::Input`] when an exr frame cannot be read or the video cannot be put in its place.
 pub fn make(clip: &Clip, out: &Path) -> Result<Video> {
     make_with(OsStr::new("ffmpeg"), clip, out)
@@ -73,6 +74,11 @@ fn make_with(program: &OsStr, clip: &Clip, out: &Path) -> Result<Video> {
             }
             _ => Err(Error::io("run", program, e)),
         };
+    }
+    // ffmpeg ends at a gap as if that were the end.
+    let mut frames = (clip.first..clip.first + clip.count).map(|frame| clip.pattern.path(frame));
+    if let Some(missing) = frames.find(|path| !path.is_file()) {
+        return Err(Error::io("make a video without", missing, io::ErrorKind::NotFound.into()));
     }
     let (temporary, _) = Temporary::create(out)?;
     let run = match clip.pattern.format() {

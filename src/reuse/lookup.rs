@@ -36,8 +36,8 @@ pub struct Evidence {
     pub tolerance: f32,
     /// Variance allowed on top, in that of independent shadow samples.
     pub noise: f32,
-    /// How far the samples' weighted mean may lie from the point, footprints: beside it they tell
-    /// about another place, however well they agree.
+    /// Where no slope is known, behind mirrors and glass: how far the samples' weighted mean may lie from
+    /// the point, footprints. Beside it they tell about another place, however well they agree.
     pub offset: f32,
     /// A light that makes as many display steps may lie an `offset` further off; dimmer ones more.
     pub offset_steps: f32,
@@ -46,6 +46,11 @@ pub struct Evidence {
     pub offset_noise: f32,
     /// The same as `offset` where all samples see the whole light, or none of it.
     pub offset_saturated: f32,
+    /// How much the ratio may change, by the samples' slopes, over the way from the point to their mean:
+    /// allowed deviations.
+    pub change: f32,
+    /// And standard deviations of tracing on top.
+    pub change_noise: f32,
 }
 
 impl Default for Evidence {
@@ -64,6 +69,8 @@ impl Default for Evidence {
             offset_steps: 30.0,
             offset_noise: 14.0,
             offset_saturated: 4.0,
+            change: 3.0,
+            change_noise: 5.0,
         }
     }
 }
@@ -119,6 +126,8 @@ struct Told {
     samples: f32,
     /// How far their weighted mean lies from the point, footprints.
     offset: f32,
+    /// Largest slope of them, per footprint; NaN where none is known.
+    slope: f32,
 }
 
 impl Lookup<'_> {
@@ -152,6 +161,7 @@ impl Lookup<'_> {
         let mut first = f32::NAN;
         let (mut weight, mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0, 0.0);
         let mut apart = Vec3::ZERO;
+        let mut slope = f32::NAN;
         for tap in taps.iter() {
             let reference = self.references[tap.reference as usize];
             let ratio = reference.ratio(tap.sample, channel);
@@ -168,6 +178,7 @@ impl Lookup<'_> {
             squares += tap.weight * further * further;
             samples += tap.weight * reference.samples[tap.sample as usize].samples as f32;
             apart += tap.apart * tap.weight;
+            slope = slope.max(reference.slope(tap.sample, channel));
         }
         if weight == 0.0 {
             return Told::default();
@@ -179,19 +190,29 @@ impl Lookup<'_> {
             variance: (squares * share - mean * mean).max(0.0),
             samples: samples * share,
             offset: apart.length() * share,
+            slope,
         }
     }
 
     /// Whether the ratios of a channel lie no further from their mean than their sampling noise and
     /// an `allowed` deviation explain, and are enough.
     fn agrees(&self, told: &Told, channel: usize, allowed: f32) -> bool {
-        let Told { weight, mean, variance, samples, offset } = *told;
+        let Told { weight, mean, variance, samples, offset, slope } = *told;
         if f64::from(weight) < self.evidence.least_weight {
             return false;
         }
         let rays = samples * self.rays[channel] as f32;
         let noise = self.evidence.noise * (mean * (1.0 - mean)).max(0.0) / rays;
-        variance <= allowed * allowed + noise && offset <= self.most_offset(mean, allowed, noise)
+        if variance > allowed * allowed + noise {
+            return false;
+        }
+        if slope.is_nan() {
+            return offset <= self.most_offset(mean, allowed, noise);
+        }
+        // Stratified: a shadow's edge crosses the cells of about the root of n of n samples.
+        let traced = (mean * (1.0 - mean)).max(0.0) / (rays * rays.sqrt());
+        let Evidence { change, change_noise, .. } = self.evidence;
+        slope * offset <= change * allowed + change_noise * traced.sqrt()
     }
 
     /// How far the samples' mean may lie from the point, footprints: the further, the less of an
@@ -239,3 +260,6 @@ fn steps_per_radiance(radiance: f32) -> f32 {
     let root = shown.sqrt();
     (255.0 * 1.055 / 2.4 / (root * root.sqrt().sqrt().sqrt())) as f32
 }
+
+#[cfg(test)]
+mod tests;

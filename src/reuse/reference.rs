@@ -4,9 +4,12 @@ use super::index::Index;
 use crate::inference::{SurfacePoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Camera;
+use rayon::prelude::*;
 
 /// No sample.
 pub(super) const NONE: u32 = u32::MAX;
+/// How far away samples lie beside one another at most, pixels.
+const BESIDE: isize = 3;
 /// Normals of one surface within a pixel: cosine.
 const SAME_SURFACE: f32 = 0.9;
 
@@ -35,6 +38,9 @@ pub struct Reference {
     pub(super) samples: Vec<Sample>,
     /// For each sample the ratio in each channel; NaN where unknown.
     pub(super) ratios: Vec<f32>,
+    /// For each of them by how much it changes from the sample to those beside it, per footprint; NaN
+    /// where none beside it is known.
+    slopes: Vec<f32>,
     pub(super) channels: usize,
     /// Samples that are no pixel's own: seen in mirrors, through glass, beside another surface.
     pub(super) index: Index,
@@ -70,9 +76,79 @@ impl Reference {
             footprints.push(t.point.footprint);
             ratios.extend_from_slice(own);
         }
-        let index = Index::new(&samples, &footprints, others);
         let pixel_size = camera.pixel_size();
-        Self { frame, camera: *camera, pixel_size, slots, samples, ratios, channels, index }
+        let index = Index::new(&samples, &footprints, others);
+        let slopes = Vec::new();
+        let mut reference = Self {
+            frame,
+            camera: *camera,
+            pixel_size,
+            slots,
+            samples,
+            ratios,
+            slopes,
+            channels,
+            index,
+        };
+        reference.slopes = reference.measure_slopes();
+        reference
+    }
+
+    /// How much the ratios change around each sample: towards the nearest sample of its surface to the
+    /// left, the right, above and below, if that is no further than a few pixels.
+    fn measure_slopes(&self) -> Vec<f32> {
+        let (channels, width) = (self.channels, self.camera.width as usize);
+        let rows = self.slots.par_chunks(width).enumerate().map(|(y, row)| {
+            let mut slopes = Vec::new();
+            for (x, own) in row.iter().enumerate().filter(|(_, own)| **own != NONE) {
+                let own = *own as usize;
+                let at = slopes.len();
+                slopes.resize(at + channels, f32::NAN);
+                for other in self.beside(x, y) {
+                    self.steepen(&mut slopes[at..], own, other);
+                }
+            }
+            slopes
+        });
+        let rows: Vec<Vec<f32>> = rows.collect();
+        let mut slopes = vec![f32::NAN; self.ratios.len()];
+        for (row, found) in self.slots.chunks(width).zip(rows) {
+            let own = row.iter().filter(|own| **own != NONE);
+            for (own, found) in own.zip(found.chunks(channels.max(1))) {
+                slopes[*own as usize * channels..][..channels].copy_from_slice(found);
+            }
+        }
+        slopes
+    }
+
+    /// The nearest samples of the surface seen at (`x`, `y`) in the four directions.
+    fn beside(&self, x: usize, y: usize) -> impl Iterator<Item = usize> {
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        let own = self.slots[y * width + x] as usize;
+        let towards = move |(dx, dy): (isize, isize)| {
+            (1..=BESIDE).find_map(|k| {
+                let x = x.checked_add_signed(dx * k).filter(|x| *x < width)?;
+                let y = y.checked_add_signed(dy * k).filter(|y| *y < height)?;
+                let other = self.slots[y * width + x];
+                let is_one = other != NONE
+                    && self.samples[other as usize].is_one_surface(&self.samples[own]);
+                is_one.then_some(other as usize)
+            })
+        };
+        [(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(towards)
+    }
+
+    /// Raises the slopes of sample `own` to those towards sample `other`.
+    fn steepen(&self, slopes: &mut [f32], own: usize, other: usize) {
+        let (a, b) = (&self.samples[own], &self.samples[other]);
+        let depth = (a.position() - self.camera.eye).dot(self.camera.forward);
+        let footprint = (depth * self.pixel_size) as f32;
+        let per_footprint = footprint / a.p.distance(b.p).max(footprint);
+        for (channel, slope) in slopes.iter_mut().enumerate() {
+            let [a, b] = [own, other].map(|i| self.ratios[i * self.channels + channel]);
+            // Of NaN and a number the number.
+            *slope = slope.max((a - b).abs() * per_footprint);
+        }
     }
 
     /// Number of references that are frames of another shot: they count as earlier than all.
@@ -100,8 +176,12 @@ impl Reference {
 
     /// Bytes that it holds.
     pub fn memory(&self) -> u64 {
-        let sample = size_of::<Sample>() + 4 * self.channels;
+        let sample = size_of::<Sample>() + 8 * self.channels;
         (self.samples.len() * sample + 4 * self.slots.len()) as u64 + self.index.memory()
+    }
+
+    pub(super) fn slope(&self, sample: u32, channel: usize) -> f32 {
+        self.slopes[sample as usize * self.channels + channel]
     }
 
     pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {

@@ -8,9 +8,13 @@
 //! frame depends on who was faster. Here it depends on its own ancestors and on nothing else, and a
 //! frame that is asked for alone has these made first.
 //!
-//! Not done: ranks do not send each other discoveries, each makes the ancestors that it needs. First
+//! Over several ranks every frame's discoveries go to all of them, as in the paper.
+//!
+//! Not done: first
 //! hits of inferred pixels are not known: their records say that nothing is hit. What a scene names
 //! as always traced may be inferred: an inferred pixel does not know what it shows.
+
+mod exchange;
 
 use super::pyramid::Pyramid;
 use super::{FrameMaker, Made, previous_camera};
@@ -50,6 +54,8 @@ pub struct ColourMaker<'a> {
 struct State {
     /// Frames that are still to come.
     to_come: BTreeSet<u32>,
+    /// Frames whose discoveries other ranks' frames, or later ones, need.
+    held: BTreeSet<u32>,
     /// What the frames so far discovered, as far as it is still needed.
     known: BTreeMap<u32, Arc<Known>>,
     /// The most that all of it took at a time, bytes.
@@ -88,7 +94,7 @@ impl<'a> ColourMaker<'a> {
             stop,
             progress,
             rule,
-            pyramid: Pyramid { segment: (shot.frames - 1).max(1), frames: shot.frames },
+            pyramid: Pyramid::whole(shot.frames),
             uploads: known,
             state: Mutex::default(),
         })
@@ -182,7 +188,8 @@ impl<'a> ColourMaker<'a> {
             s.to_come.remove(&done);
             let ancestors = |frame: &u32| self.pyramid.ancestors(*frame);
             let needed: BTreeSet<u32> = s.to_come.iter().flat_map(ancestors).collect();
-            s.known.retain(|frame, _| needed.contains(frame));
+            let State { known, held, .. } = s;
+            known.retain(|frame, _| needed.contains(frame) || held.contains(frame));
         });
     }
 

@@ -1,4 +1,4 @@
-//! What a sequence shows, as one hash: the resolved world and shot, not the files they came from.
+//! What a sequence shows, as hashes: the resolved world and shot, not the files they came from.
 //!
 //! So a comment, a renamed file or a setting that moves between scene file and command line keeps
 //! the frames, while a vertex, a light or a key pose that changes does not.

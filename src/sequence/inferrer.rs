@@ -1,15 +1,20 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
+mod exchange;
+
+use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
+use super::saved::Saved;
 use super::schedule::{Schedule, Stock};
+use super::shared::Laid;
 use super::supplied::with_supplied;
-use super::{FrameMaker, Made, previous_camera};
+use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::store::{Kept, Terms};
 use crate::reuse::{self, Evidence, Lookup, Reference};
-use crate::scene::{Camera, Shot};
+use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
@@ -37,7 +42,13 @@ pub struct Inferrer<'a> {
     pub supplied: &'a [Reference],
     /// On which terms frames serve later jobs as references; `None` where none is kept.
     pub terms: Option<Terms>,
-    schedule: Schedule,
+    /// Where references are kept for a job that goes on after this one; `None` for nowhere.
+    pub checkpoints: Option<&'a Checkpoints<'a>>,
+    /// On which terms frames serve other ranks as references; `None` where there are none.
+    pub exchange: Option<Terms>,
+    /// Frames that came as strips.
+    laid: Laid,
+    pub(super) schedule: Schedule,
     pub(super) channels: Channels,
     /// Shadow rays of a camera sample, by channel.
     rays: Vec<u32>,
@@ -45,13 +56,16 @@ pub struct Inferrer<'a> {
 }
 
 #[derive(Default)]
-struct State {
-    references: Stock<Arc<Reference>>,
+pub(super) struct State {
+    pub(super) references: Stock<Arc<Reference>>,
     /// Originals that were made as references before they were asked for.
     early: BTreeMap<u32, Made>,
     /// The last original that is asked for again, as its copies are.
     again: Option<(u32, Made)>,
+    pub(super) saved: Saved,
     most_memory: u64,
+    /// References for other ranks, until they are fetched.
+    pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
 }
 
 impl<'a> Inferrer<'a> {
@@ -82,6 +96,9 @@ impl<'a> Inferrer<'a> {
             evidence,
             supplied: &[],
             terms: None,
+            checkpoints: None,
+            exchange: None,
+            laid: Laid::default(),
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -93,6 +110,33 @@ impl<'a> Inferrer<'a> {
     /// Renders an original from the references that it depends on, which are made first where they
     /// are not at hand; leaves a reference where one is needed.
     fn frame(&self, frame: u32) -> Result<Option<Made>> {
+        let camera = self.camera(frame)?;
+        let is_due = self.with_state(|s| s.references.is_due(frame));
+        let rendered = match self.laid.take(frame) {
+            Some(rendered) => Some(rendered),
+            None => self.rendered(frame, is_due, None, self.progress)?,
+        };
+        let Some(Rendered { film, rays, reuse, sources }) = rendered else { return Ok(None) };
+        // In one order, however the frame was cut for tracing, and as they come back from a file.
+        let sources = self.pool.install(|| sources.in_rows());
+        let kept = self.kept(frame, &camera, &sources);
+        if is_due {
+            let own = camera.to_scene(&self.renderer.scene.recentring);
+            let reference = Reference::new(frame, &own, &sources, self.channels.len());
+            self.with_state(|s| s.keep(&self.schedule, frame, reference));
+            self.leave(frame, &camera, &sources, kept.as_ref())?;
+        }
+        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+    }
+
+    /// Renders the pixels of an original that `mask` names, or all.
+    fn rendered(
+        &self,
+        frame: u32,
+        is_due: bool,
+        mask: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Rendered>> {
         let mut references = Vec::new();
         for other in self.schedule.ancestors(frame) {
             match self.reference(other)? {
@@ -108,32 +152,32 @@ impl<'a> Inferrer<'a> {
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
         let reuse = Reuse { channels: &self.channels, inference };
-        let is_due = self.with_state(|s| s.references.is_due(frame));
         let job = FrameJob {
             camera: &camera,
             stream: frame,
             with_gbuffer: self.with_gbuffer,
             reuse: (!self.channels.is_empty()).then_some(reuse),
-            mask: None,
+            mask,
             beyond_crop: is_due,
         };
-        let render = || self.renderer.render_job(&job, self.stop, self.progress);
-        let Some(rendered) = self.pool.install(render) else { return Ok(None) };
-        let Rendered { film, rays, reuse, sources } = rendered;
-        let kept = self.kept(frame, &camera, &sources);
-        if is_due {
-            let reference = Reference::new(frame, &own, &sources, self.channels.len());
-            self.with_state(|s| s.keep(&self.schedule, frame, reference));
-        }
-        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+        Ok(self.pool.install(|| self.renderer.render_job(&job, self.stop, progress)))
     }
 
     /// What the file of `frame` keeps for later jobs.
     fn kept(&self, frame: u32, camera: &Camera, traced: &TracedPoints) -> Option<Arc<[u8]>> {
-        let terms = self.terms.as_ref()?;
-        let settings = self.renderer.settings;
-        let text = WriteOptions::of(settings, None).settings;
-        let kept = Kept { terms, frame, camera, crop: settings.crop, traced, settings: &text };
+        self.encode(self.terms.as_ref()?, frame, camera, self.renderer.settings.crop, traced)
+    }
+
+    pub(super) fn encode(
+        &self,
+        terms: &Terms,
+        frame: u32,
+        camera: &Camera,
+        crop: Option<Rect>,
+        traced: &TracedPoints,
+    ) -> Option<Arc<[u8]>> {
+        let settings = &WriteOptions::of(self.renderer.settings, None).settings;
+        let kept = Kept { terms, frame, camera, crop, traced, settings };
         self.pool.install(|| kept.encode()).map(Into::into)
     }
 
@@ -145,6 +189,9 @@ impl<'a> Inferrer<'a> {
     /// The reference of an original, which is in use.
     fn reference(&self, frame: u32) -> Result<Option<Arc<Reference>>> {
         if let Some(found) = self.with_state(|s| s.references.get(frame).cloned()) {
+            return Ok(Some(found));
+        }
+        if let Some(found) = self.left_on_disk(frame) {
             return Ok(Some(found));
         }
         let Some(made) = self.frame(frame)? else { return Ok(None) };
@@ -159,9 +206,10 @@ impl<'a> Inferrer<'a> {
         })
     }
 
-    fn hand_out(&self, original: u32, made: Made) -> Made {
+    fn hand_out(&self, original: u32, made: Made) -> Result<Made> {
         self.with_state(|s| s.hand_out(&self.schedule, original, &made));
-        made
+        self.tend(false)?;
+        Ok(made)
     }
 
     /// With what `frame` does not share with its original: its motion, and its record, which is the
@@ -177,16 +225,26 @@ impl<'a> Inferrer<'a> {
         Ok(made)
     }
 
-    fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
+    pub(super) fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
         act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 impl State {
-    fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
+    pub(super) fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
         self.references.keep(schedule, frame, || Arc::new(reference));
-        let memory = self.references.held().map(|r| r.memory()).sum();
-        self.most_memory = self.most_memory.max(memory);
+        self.note_memory();
+    }
+
+    /// Takes in a reference that another rank made.
+    fn take(&mut self, frame: u32, reference: Reference) {
+        self.references.take(frame, Arc::new(reference));
+        self.note_memory();
+    }
+
+    fn note_memory(&mut self) {
+        let held: u64 = self.references.held().map(|r| r.memory()).sum();
+        self.most_memory = self.most_memory.max(held + self.saved.memory());
     }
 
     /// One more of an original that went out already.
@@ -218,7 +276,7 @@ impl FrameMaker for Inferrer<'_> {
         let mut made = match made {
             // Audited when it was new.
             (_, Some(copy)) => {
-                return self.finished(frame, self.hand_out(original, copy)).map(Some);
+                return self.finished(frame, self.hand_out(original, copy)?).map(Some);
             }
             (Some(made), None) => made,
             (None, None) => match self.frame(original)? {
@@ -230,7 +288,11 @@ impl FrameMaker for Inferrer<'_> {
             Some(audit) => made.audit = audit,
             None => return Ok(None),
         }
-        self.finished(frame, self.hand_out(original, made)).map(Some)
+        if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
+            // Its own file is about to hold it.
+            self.with_state(|s| s.saved.has_file(original));
+        }
+        self.finished(frame, self.hand_out(original, made)?).map(Some)
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
@@ -239,6 +301,18 @@ impl FrameMaker for Inferrer<'_> {
 
     fn expect(&self, frames: &[u32]) {
         self.with_state(|s| s.references.expect(&self.schedule, frames));
+    }
+
+    fn stopped(&self) -> Result<()> {
+        self.tend(true)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.checkpoints.map(Checkpoints::notes).unwrap_or_default()
+    }
+
+    fn save_cost(&self) -> SaveCost {
+        self.with_state(|s| s.saved.cost)
     }
 
     fn reference_memory(&self) -> u64 {

@@ -2,27 +2,36 @@
 //!
 //! [`prepare`] looks at what is on disk and decides which frames are kept and which rendered;
 //! [`render_frames`] renders some of these, in order. What makes a film is a parameter
-//! ([`FrameMaker`]); [`Tracer`] is the maker that traces every frame. A row follows the rename of
+//! ([`FrameMaker`]); [`Tracer`] is the maker that traces every frame. [`checkpoint`] keeps what frames
+//! to come need on disk; [`survey`] says how a sequence stands. A row follows the rename of
 //! its frame, so whatever moment the job ends at, rows name whole frames only.
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
 mod audit;
+pub mod checkpoint;
 mod colour;
 mod fingerprint;
 mod inferrer;
 mod pyramid;
+mod recipe;
 mod resume;
+mod saved;
 mod schedule;
+mod shared;
+mod strips;
 mod supplied;
+pub mod survey;
 mod tracer;
 
 pub use colour::{ColourMaker, check_upload};
 pub use fingerprint::{fingerprint, world_fingerprint};
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
+pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{Plan, Target, prepare};
 pub use schedule::Schedule;
+pub use shared::{Laid, Shared, Strip};
 pub use tracer::Tracer;
 
 #[cfg(test)]
@@ -56,10 +65,38 @@ pub trait FrameMaker {
     /// Hears which frames it will be asked for, before the first of them.
     fn expect(&self, _frames: &[u32]) {}
 
+    /// Hears that no more frames will be asked for although some are not made: puts away what it
+    /// takes to go on later.
+    ///
+    /// # Errors
+    /// That cannot be written.
+    fn stopped(&self) -> Result<()> {
+        Ok(())
+    }
+
+    /// What there is to tell about the frames made so far; each is told once.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What it took to put references on disk so far.
+    fn save_cost(&self) -> SaveCost {
+        SaveCost::default()
+    }
+
     /// The most memory that references took at a time so far, bytes.
     fn reference_memory(&self) -> u64 {
         0
     }
+}
+
+/// What putting references on disk takes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SaveCost {
+    /// Wall seconds to encode, write and sync them.
+    pub seconds: f64,
+    /// Bytes written.
+    pub bytes: u64,
 }
 
 /// A frame as it was made.
@@ -126,7 +163,7 @@ pub fn render_frames(
     target: &Target,
     frames: &[u32],
     (rank, journal): (u32, &Path),
-    maker: &dyn FrameMaker,
+    maker: &(impl FrameMaker + ?Sized),
     done: &mut dyn FnMut(&FrameReport) -> Result<()>,
 ) -> Result<()> {
     if frames.is_empty() {
@@ -134,17 +171,35 @@ pub fn render_frames(
     }
     let mut journal = Journal::open(journal)?;
     for &frame in frames {
-        let start = Instant::now();
-        let Some(made) = maker.make(frame)? else { break };
-        let trace_seconds = start.elapsed().as_secs_f64();
-        let audit = made.audit.map(|sums| audit_row(&sums));
-        let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
-        journal.append(&row)?;
-        let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-        let Row { bytes, bad, rays, reuse, .. } = row;
-        done(&FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })?;
+        let Some(report) = render_frame(target, frame, (rank, &mut journal), maker)? else {
+            return maker.stopped();
+        };
+        done(&report)?;
     }
     Ok(())
+}
+
+/// Renders `frame` into `target`, its row, as one of rank `rank`, into `journal`; `None` when `maker` gives no film.
+///
+/// # Errors
+/// Whatever making or writing the frame met.
+pub fn render_frame(
+    target: &Target,
+    frame: u32,
+    (rank, journal): (u32, &mut Journal),
+    maker: &(impl FrameMaker + ?Sized),
+) -> Result<Option<FrameReport>> {
+    let start = Instant::now();
+    let Some(made) = maker.make(frame)? else { return Ok(None) };
+    let trace_seconds = start.elapsed().as_secs_f64();
+    let audit = made.audit.map(|sums| audit_row(&sums));
+    let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
+    journal.append(&row)?;
+    let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
+    let Row { bytes, bad, rays, reuse, .. } = row;
+    let report =
+        FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad };
+    Ok(Some(report))
 }
 
 /// What an audit found, with the figures that it amounts to.
@@ -184,7 +239,10 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
     }
     let written = write_image(&path, film, &options)?;
     let file = name(&path);
+    let recipe = target.recipes.get(frame).copied().unwrap_or_default();
     Ok(Row {
+        view: recipe.view.to_string(),
+        recipe: recipe.whole.to_string(),
         frame,
         file,
         blake3: written.hash.to_hex().to_string(),
@@ -198,6 +256,6 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         audit: None,
         bad: film.bad,
         maps,
-        other_settings: false,
+        stray: None,
     })
 }

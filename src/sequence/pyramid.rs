@@ -17,14 +17,20 @@ pub struct Pyramid {
 }
 
 impl Pyramid {
+    /// One segment of a whole shot of `frames` frames.
+    pub fn whole(frames: u32) -> Self {
+        Self { segment: frames.saturating_sub(1).max(1), frames }
+    }
+
     /// Whether `frame` is a key frame: a segment's end, or the shot's.
     pub fn is_key(&self, frame: u32) -> bool {
         (frame - 1) % self.segment == 0 || frame == self.frames
     }
 
-    /// Number of the segment that `frame` lies in; a key frame belongs to the one that it starts.
+    /// Number of the segment that `frame` lies in; a key frame belongs to the one that it ends, whose
+    /// frames need it first.
     pub fn segment_of(&self, frame: u32) -> u32 {
-        (frame - 1) / self.segment
+        frame.saturating_sub(2) / self.segment
     }
 
     /// First and last frame of the segment that `frame`, which is no key frame, lies in.
@@ -115,6 +121,15 @@ impl Pyramid {
         segments.map(<[u32]>::to_vec).collect()
     }
 
+    /// The same, but a key frame lies in the list of the segment that it starts, in front. So where
+    /// each list is made by another rank, nobody waits for what another makes last.
+    pub fn shares(&self, frames: &[u32]) -> Vec<Vec<u32>> {
+        let started = |frame: &u32| (frame - 1) / self.segment;
+        let mut ordered = self.order(frames);
+        ordered.sort_by_key(|frame| (started(frame), !self.is_key(*frame)));
+        ordered.chunk_by(|a, b| started(a) == started(b)).map(<[u32]>::to_vec).collect()
+    }
+
     /// All frames of the shot.
     pub fn all(&self) -> RangeInclusive<u32> {
         1..=self.frames
@@ -143,7 +158,7 @@ mod tests {
     #[test]
     fn the_textbook_order_of_nine_frames() {
         let pyramid = Pyramid { segment: 8, frames: 9 };
-        assert_eq!(pyramid.order(&(1..=9).collect::<Vec<_>>()), [1, 5, 3, 2, 4, 7, 6, 8, 9]);
+        assert_eq!(pyramid.order(&(1..=9).collect::<Vec<_>>()), [1, 9, 5, 3, 2, 4, 7, 6, 8]);
         assert_eq!(pyramid.ancestors(4), [1, 9, 3, 5]);
         assert_eq!(pyramid.ancestors(5), [1, 9]);
         assert!(pyramid.ancestors(9).is_empty());
@@ -161,7 +176,7 @@ mod tests {
                 let ancestors = pyramid.ancestors(frame);
                 assert!(ancestors.len() <= pyramid.depth() as usize, "{pyramid:?} {frame}");
                 for other in ancestors {
-                    assert!(pyramid.is_key(other) || place(other) < place(frame));
+                    assert!(place(other) < place(frame));
                     let further = pyramid.ancestors(other);
                     let known = pyramid.ancestors(frame);
                     assert!(further.iter().all(|f| known.contains(f)), "{frame} by {other}");
@@ -201,6 +216,8 @@ mod tests {
     fn batches_hold_every_frame_once() {
         let pyramid = Pyramid { segment: 4, frames: 11 };
         let batches = pyramid.batches(&[2, 3, 7, 11, 5]);
-        assert_eq!(batches, [vec![3, 2], vec![5, 7], vec![11]]);
+        assert_eq!(batches, [vec![5, 3, 2], vec![7], vec![11]]);
+        let shares = pyramid.shares(&[2, 3, 7, 11, 5]);
+        assert_eq!(shares, [vec![3, 2], vec![5, 7], vec![11]]);
     }
 }

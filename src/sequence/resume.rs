@@ -1,7 +1,9 @@
 //! What a sequence already holds on disk, and what that leaves to render.
 
+use super::checkpoint;
+use super::recipe::{Recipe, Recipes};
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{Header, Manifest, MapRow, Row, manifest_path};
+use crate::output::manifest::{Header, Manifest, MapRow, Row, Stray, manifest_path};
 use crate::output::maps::Map;
 use crate::output::{Format, FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
@@ -15,7 +17,7 @@ use std::time::Duration;
 
 /// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
 /// younger one may belong to a process on another machine.
-const LEFTOVER_AGE: Duration = Duration::from_secs(60);
+pub(super) const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// Where the frames of a job go, and what they all share.
 #[derive(Debug, Clone)]
@@ -24,6 +26,8 @@ pub struct Target {
     pub pattern: FramePattern,
     /// What the frames share.
     pub header: Header,
+    /// What each frame of the shot is made of.
+    pub recipes: Recipes,
     /// How films become files.
     pub write: WriteOptions,
     /// Whether frames that exist are replaced.
@@ -48,7 +52,7 @@ impl Target {
 /// What there is to do.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Frames that exist whole, with the same settings.
+    /// Frames that exist whole, with the same settings, made of the same.
     pub kept: Vec<u32>,
     /// Those of the kept frames that have samples which are no radiance.
     pub kept_bad: Vec<(u32, BadSamples)>,
@@ -56,18 +60,27 @@ pub struct Plan {
     pub kept_audit: Option<AuditSums>,
     /// Frames to render.
     pub render: Vec<u32>,
-    /// What the user should know: damaged frames.
+    /// What the user should know: damaged frames, and others that are rendered again.
     pub notes: Vec<String>,
 }
 
 /// Decides which of `frames` are rendered, and makes the manifest ready for their rows.
 ///
-/// Errors: `Error::Usage` where frames of other settings, or of unknown origin, are in the way
-/// and `target` does not say to replace them.
+/// A frame whose camera is the same, but not what it is inferred from, is rendered again: a longer
+/// shot goes on where a shorter one ended.
+///
+/// Errors: `Error::Usage` where frames of other settings, of another camera move, or of unknown
+/// origin, are in the way and `target` does not say to replace them.
 pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
-    let path = manifest_path(&target.pattern);
     atomic::create_folder(target.pattern.folder())?;
     atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE)?;
+    let mut plan = plan(target, frames)?;
+    plan.notes.extend(checkpoint::sweep(target)?);
+    Ok(plan)
+}
+
+fn plan(target: &Target, frames: FrameRange) -> Result<Plan> {
+    let path = manifest_path(&target.pattern);
     let found = match Manifest::read(&path) {
         Err(_) if target.overwrite => None,
         read => read?,
@@ -85,17 +98,48 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
         return Ok(Plan::all(frames));
     }
     Manifest::merge_parts(&path)?;
-    if target.overwrite {
-        return Ok(Plan::all(frames));
-    }
     let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
+    let plan = match target.overwrite {
+        true => Plan::all(frames),
+        false => Plan::of(states(target, frames, &rows)?),
+    };
+    mark_strays(target, &manifest.header, &rows)?;
+    Ok(plan)
+}
+
+/// Says in the manifest which of its frames are not of this shot, where that is new.
+fn mark_strays(target: &Target, before: &Header, rows: &BTreeMap<u32, Row>) -> Result<()> {
+    let same_shot = before.shot_hash == target.header.shot_hash;
+    let marked: Vec<Row> = rows.values().map(|row| marked(target, row)).collect();
+    if same_shot && marked.iter().eq(rows.values()) {
+        return Ok(());
+    }
+    Manifest::create(&manifest_path(&target.pattern), &target.header, &marked)
+}
+
+fn marked(target: &Target, row: &Row) -> Row {
+    let stray = match row.stray {
+        Some(Stray::OtherSettings) => row.stray,
+        _ => (!is_made_of(row, target.recipes.get(row.frame))).then_some(Stray::OtherMove),
+    };
+    Row { stray, ..row.clone() }
+}
+
+fn is_made_of(row: &Row, recipe: Option<&Recipe>) -> bool {
+    recipe.is_some_and(|recipe| recipe.whole.to_string() == row.recipe)
+}
+
+fn states(
+    target: &Target,
+    frames: FrameRange,
+    rows: &BTreeMap<u32, Row>,
+) -> Result<Vec<(u32, State)>> {
     let states: Vec<Result<(u32, State)>> = (frames.first..=frames.last)
         .into_par_iter()
-        .map(|frame| Ok((frame, state(target, frame, &rows)?)))
+        .map(|frame| Ok((frame, state(target, frame, rows)?)))
         .collect();
     // Of several refusals the first frame's is told, whichever thread was quicker.
-    let states = states.into_iter().collect::<Result<Vec<_>>>()?;
-    Ok(Plan::of(states))
+    states.into_iter().collect()
 }
 
 /// How a frame stands on disk.
@@ -103,6 +147,8 @@ enum State {
     Whole(BadSamples, Option<AuditSums>),
     Missing,
     Damaged(String),
+    /// Seen by the same camera, but inferred from other frames.
+    Outdated,
 }
 
 fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State> {
@@ -117,16 +163,31 @@ fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State
     let Some(row) = row else {
         return Ok(State::Damaged(format!("{name} is not in the manifest; rendered again")));
     };
+    let recipe = target.recipes.get(frame);
+    refuse_other_view(&path, row, recipe)?;
     let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
     let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
     if whole && target.has_map_files() && !has_maps(target, row) {
         return Ok(State::Damaged(format!("{name} lacks its maps; rendered again")));
     }
-    Ok(if whole {
-        State::Whole(row.bad, row.audit.map(|a| a.sums))
-    } else {
-        State::Damaged(note())
+    Ok(match whole {
+        false => State::Damaged(note()),
+        true if !is_made_of(row, recipe) => State::Outdated,
+        true => State::Whole(row.bad, row.audit.map(|a| a.sums)),
     })
+}
+
+/// Refuses to replace a frame that shows something else than this shot's frame of that number.
+fn refuse_other_view(path: &Path, row: &Row, recipe: Option<&Recipe>) -> Result<()> {
+    if recipe.is_some_and(|recipe| recipe.view.to_string() == row.view) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "{} is of another camera move: frame {} stands elsewhere there\n  \
+         help: choose another output with -o, or replace it with --overwrite",
+        path.display(),
+        row.frame
+    )))
 }
 
 /// Whether all maps of a frame are there, as they were written.
@@ -146,13 +207,15 @@ fn left_over(target: &Target, manifest: &Manifest, frames: FrameRange) -> Vec<Ro
             && target.pattern.path(row.frame) == folder.join(&row.file);
         !replaced && folder.join(&row.file).exists()
     };
-    manifest.rows.values().filter(stays).cloned().collect()
+    let mark = |row: &Row| Row { stray: Some(Stray::OtherSettings), ..row.clone() };
+    manifest.rows.values().filter(stays).map(mark).collect()
 }
 
 /// Refuses to replace a file that holds a frame of other settings, or another frame.
 fn refuse_taken(path: &Path, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<()> {
     let here = |row: &&Row| path.file_name().is_some_and(|name| name == row.file.as_str());
-    let holds = match rows.values().find(|row| here(row) && row.other_settings) {
+    let is_taken = |row: &&Row| here(row) && row.stray == Some(Stray::OtherSettings);
+    let holds = match rows.values().find(is_taken) {
         Some(_) => "a frame of other settings".to_string(),
         None if rows.contains_key(&frame) => return Ok(()),
         None => match rows.values().find(here) {
@@ -174,6 +237,7 @@ impl Plan {
 
     fn of(states: Vec<(u32, State)>) -> Self {
         let mut plan = Self::default();
+        let mut outdated = Vec::new();
         for (frame, state) in states {
             match state {
                 State::Whole(bad, audit) => {
@@ -186,11 +250,22 @@ impl Plan {
                     }
                 }
                 State::Missing => plan.render.push(frame),
+                State::Outdated => {
+                    plan.render.push(frame);
+                    outdated.push(frame);
+                }
                 State::Damaged(note) => {
                     plan.render.push(frame);
                     plan.notes.push(note);
                 }
             }
+        }
+        if let [first, ..] = outdated[..] {
+            plan.notes.push(format!(
+                "the camera move has changed: {} from frame {first} on, inferred from other frames \
+                 before, will be rendered again",
+                counted(outdated.len(), "frame")
+            ));
         }
         plan
     }

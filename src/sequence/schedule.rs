@@ -34,6 +34,16 @@ impl Schedule {
         Ok(Self { pyramid, copies })
     }
 
+    /// That of frames each of which is made for itself, cut as `pyramid` says.
+    pub fn without_copies(pyramid: Pyramid) -> Self {
+        Self { pyramid, copies: BTreeMap::new() }
+    }
+
+    /// All frames, each after those that it is inferred from.
+    pub fn by_need(&self) -> Vec<u32> {
+        self.pyramid.by_need()
+    }
+
     /// The frame that `frame` is: itself unless another has its camera.
     pub fn original(&self, frame: u32) -> u32 {
         self.copies.get(&frame).copied().unwrap_or(frame)
@@ -86,7 +96,7 @@ impl Schedule {
 }
 
 /// What tells cameras of a shot apart.
-fn bits(camera: &Camera) -> [u64; 12] {
+pub(super) fn bits(camera: &Camera) -> [u64; 12] {
     let vectors = [camera.eye, camera.forward, camera.half_right, camera.half_up];
     let mut bits = [0; 12];
     let numbers = vectors.iter().flat_map(|v| v.to_array());
@@ -117,17 +127,42 @@ impl<T> Stock<T> {
     /// `frames` will be asked for.
     pub fn expect(&mut self, schedule: &Schedule, frames: &[u32]) {
         for frame in frames {
-            let mut users = vec![schedule.original(*frame)];
-            *self.asked.entry(users[0]).or_default() += 1;
-            while let Some(user) = users.pop() {
-                for other in schedule.ancestors(user) {
-                    *self.uses.entry(other).or_default() += 1;
-                    if !self.held.contains_key(&other) && self.due.insert(other) {
-                        users.push(other);
-                    }
+            let original = schedule.original(*frame);
+            *self.asked.entry(original).or_default() += 1;
+            self.lean(schedule, original);
+        }
+    }
+
+    /// `user` will be made from its ancestors, and these, where they are not at hand, from theirs.
+    fn lean(&mut self, schedule: &Schedule, user: u32) {
+        let mut users = vec![user];
+        while let Some(user) = users.pop() {
+            for other in schedule.ancestors(user) {
+                *self.uses.entry(other).or_default() += 1;
+                if !self.held.contains_key(&other) && self.due.insert(other) {
+                    users.push(other);
                 }
             }
         }
+    }
+
+    /// An original's reference is wanted by frames that are not told of here, until it is let go.
+    pub fn hold(&mut self, schedule: &Schedule, original: u32) {
+        *self.uses.entry(original).or_default() += 1;
+        if !self.held.contains_key(&original) && self.due.insert(original) {
+            self.lean(schedule, original);
+        }
+    }
+
+    /// Takes in and holds a reference that was made elsewhere.
+    pub fn take(&mut self, original: u32, reference: T) {
+        *self.uses.entry(original).or_default() += 1;
+        self.held.entry(original).or_insert(reference);
+    }
+
+    /// Nobody wants what was held.
+    pub fn let_go(&mut self, schedule: &Schedule, original: u32) {
+        self.drop_use(schedule, original);
     }
 
     /// How often an original is still asked for.
@@ -171,11 +206,19 @@ impl<T> Stock<T> {
     /// What `original` was inferred from has one user less.
     fn release(&mut self, schedule: &Schedule, original: u32) {
         for other in schedule.ancestors(original) {
-            let Some(uses) = self.uses.get_mut(&other) else { continue };
-            *uses -= 1;
-            if *uses == 0 {
-                self.uses.remove(&other);
-                self.held.remove(&other);
+            self.drop_use(schedule, other);
+        }
+    }
+
+    fn drop_use(&mut self, schedule: &Schedule, original: u32) {
+        let Some(uses) = self.uses.get_mut(&original) else { return };
+        *uses -= 1;
+        if *uses == 0 {
+            self.uses.remove(&original);
+            self.held.remove(&original);
+            if self.due.remove(&original) {
+                // All that would be made of it came from elsewhere, so it never was.
+                self.release(schedule, original);
             }
         }
     }
@@ -268,5 +311,27 @@ mod tests {
         stock.done(&schedule, 4);
         assert_eq!(stock.held().count(), 0);
         assert!(stock.uses.is_empty() && stock.due.is_empty() && stock.asked.is_empty());
+    }
+
+    #[test]
+    fn what_is_held_for_others_stays_until_it_is_let_go() {
+        let pan = returning(9);
+        let schedule = schedule(4, &pan);
+        let frame = (1..=9).find(|f| !schedule.ancestors(*f).is_empty()).expect("an in-between");
+        let mut stock = Stock::default();
+        for other in schedule.ancestors(frame) {
+            stock.take(other, ());
+        }
+        stock.hold(&schedule, frame);
+        assert!(stock.is_due(frame));
+        stock.keep(&schedule, frame, || ());
+        stock.expect(&schedule, &[frame]);
+        stock.done(&schedule, frame);
+        assert!(stock.holds(frame) && schedule.ancestors(frame).iter().all(|f| stock.holds(*f)));
+        for other in schedule.ancestors(frame).into_iter().chain([frame]) {
+            stock.let_go(&schedule, other);
+        }
+        assert_eq!(stock.held().count(), 0);
+        assert!(stock.uses.is_empty() && stock.due.is_empty());
     }
 }

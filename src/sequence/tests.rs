@@ -1,9 +1,11 @@
 //! Sequences on disk, with a maker that needs no scene.
 
 use super::*;
+use crate::math::DVec3;
+use crate::output::manifest::Stray;
 use crate::output::manifest::{Header, Manifest, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
-use crate::scene::{FrameRange, Settings};
+use crate::scene::{CameraPath, Easing, FrameRange, KeyPose, Pose, Settings};
 use std::cell::RefCell;
 use std::fs;
 use std::path::PathBuf;
@@ -44,12 +46,13 @@ impl Folder {
     fn target(&self, settings: &Settings, overwrite: bool) -> Target {
         let name = self.path("frame_##.png").display().to_string();
         let header = Header {
-            manifest: 1,
+            manifest: 2,
             command: Vec::new(),
             chosen: None,
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),
+            shot_hash: "s".into(),
             shot_frames: 4,
             files: "frame_##.png".into(),
             tracer: "none".into(),
@@ -59,6 +62,7 @@ impl Folder {
             pattern: FramePattern::parse(&name, 4).expect("a pattern"),
             header,
             write: WriteOptions::of(settings, None),
+            recipes: recipes(&shot(4), settings),
             overwrite,
         }
     }
@@ -82,6 +86,21 @@ impl Folder {
     fn frames(&self) -> Vec<Vec<u8>> {
         (1..=4).map(|n| fs::read(self.path(&format!("frame_0{n}.png"))).expect("whole")).collect()
     }
+}
+
+/// A key pose a frame.
+fn shot(frames: u32) -> Shot {
+    let key = |i: u32| {
+        let eye = DVec3::new(f64::from(i), 2.0, 9.0);
+        let pose = Pose { eye, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
+        KeyPose { at: f64::from(i) / f64::from(frames - 1), pose }
+    };
+    let path = CameraPath::Keys((0..frames).map(key).collect());
+    Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+}
+
+fn recipes(shot: &Shot, settings: &Settings) -> Recipes {
+    Recipes::new(shot, settings, true, false).expect("good cameras")
 }
 
 fn settings() -> Settings {
@@ -182,4 +201,88 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     // Both ranks were killed here.
     assert_eq!(folder.run(&settings(), false, 0).expect("runs").0, [4]);
     assert!(!part.exists());
+}
+
+/// As `target`, for the shot given.
+fn target_of(folder: &Folder, shot: &Shot, settings: &Settings) -> Target {
+    let mut target = folder.target(settings, false);
+    target.recipes = recipes(shot, settings);
+    target.header.shot_frames = shot.frames;
+    target.header.shot_hash = format!("{shot:?}");
+    target
+}
+
+fn strays(target: &Target) -> Vec<u32> {
+    let manifest = Manifest::read(&manifest_path(&target.pattern)).expect("readable");
+    let rows = manifest.expect("there").rows.into_values();
+    rows.filter(|row| row.stray == Some(Stray::OtherMove)).map(|row| row.frame).collect()
+}
+
+#[test]
+fn a_longer_shot_keeps_what_is_made_of_the_same_and_renders_the_rest_again() {
+    let folder = Folder::new();
+    let mut settings = settings();
+    settings.reuse.segment = 2;
+    folder.run(&settings, false, 0).expect("runs");
+    let long = target_of(&folder, &shot(9), &settings);
+    let all = FrameRange { first: 1, last: 9 };
+    // 1, 2 and 3 are a whole segment; 4 was a key frame at the end and is one in between now.
+    let plan = prepare(&long, all).expect("a longer shot is no other scene");
+    assert_eq!((plan.kept, plan.render), (vec![1, 2, 3], vec![4, 5, 6, 7, 8, 9]));
+    assert!(plan.notes[0].contains("1 frame from frame 4 on"), "{:?}", plan.notes);
+    // The job was killed before frame 4: it is still the old one, and known as such.
+    assert_eq!(strays(&long), [4]);
+    assert_eq!(prepare(&long, all).expect("goes on").kept, [1, 2, 3]);
+    let four = target_of(&folder, &shot(4), &settings);
+    assert_eq!(prepare(&four, FOUR).expect("back again").kept, [1, 2, 3, 4]);
+    assert_eq!(strays(&four), Vec::<u32>::new());
+}
+
+#[test]
+fn another_move_is_refused_by_its_first_frame() {
+    let folder = Folder::new();
+    folder.run(&settings(), false, 0).expect("runs");
+    let mut moved = shot(4);
+    let CameraPath::Keys(keys) = &mut moved.path else { panic!("keys") };
+    keys[2].pose.eye.y = 2.5;
+    let mut target = target_of(&folder, &moved, &settings());
+    let error = prepare(&target, FOUR).expect_err("refused").to_string();
+    assert!(error.contains("frame_03.png is of another camera move"), "{error}");
+    assert_eq!(strays(&target), Vec::<u32>::new(), "nothing was touched");
+    target.overwrite = true;
+    assert_eq!(prepare(&target, FOUR).expect("replaces").render, [1, 2, 3, 4]);
+    assert_eq!(strays(&target), [3], "no other frame is made from frame 3");
+}
+
+#[test]
+fn a_survey_tells_done_missing_damaged_and_stray() {
+    let folder = Folder::new();
+    folder.run(&settings(), false, 0).expect("runs");
+    let brighter = Settings { exposure: 2.0, ..settings() };
+    let target = folder.target(&brighter, true);
+    prepare(&target, FrameRange { first: 1, last: 3 }).expect("ready to replace three");
+    let path = manifest_path(&target.pattern);
+    let maker = Plain { settings: brighter, stop_before: 0, made: RefCell::default() };
+    render_frames(&target, &[1, 2], (0, &path), &maker, &mut |_| Ok(())).expect("runs");
+    fs::write(folder.path("frame_02.png"), b"torn").expect("written");
+    fs::remove_file(folder.path("frame_03.png")).expect("removed");
+    let all = |last| Ok(FrameRange { first: 1, last });
+    let found = survey::survey(&path, all).expect("a sequence");
+    assert_eq!((found.done, found.missing, found.damaged), (vec![1], vec![3], vec![2]));
+    assert_eq!((found.other_settings, found.complete), (vec![4], false));
+    let one = |_| Ok(FrameRange { first: 1, last: 1 });
+    assert!(survey::survey(&path, one).expect("a sequence").complete);
+    assert!(survey::survey(&folder.path("no.jsonl"), all).is_err());
+}
+
+#[test]
+fn an_older_manifest_is_refused_with_its_version() {
+    let folder = Folder::new();
+    folder.run(&settings(), false, 0).expect("runs");
+    let manifest = folder.path("frame.manifest.jsonl");
+    let text = fs::read_to_string(&manifest).expect("there");
+    fs::write(&manifest, text.replacen("\"manifest\":2", "\"manifest\":1", 1)).expect("written");
+    let error = folder.run(&settings(), false, 0).expect_err("refused").to_string();
+    assert!(error.contains("version 1 of the format"), "{error}");
+    assert_eq!(folder.run(&settings(), true, 0).expect("runs").0, [1, 2, 3, 4]);
 }

@@ -1,10 +1,13 @@
 //! The maker that traces every frame on its own.
 
+use super::shared::{Laid, Shared, Strip};
+use super::strips::{self, Unheard};
 use super::{FrameMaker, Made, previous_camera};
 use crate::error::Result;
-use crate::scene::Shot;
-use crate::shade::{Progress, Renderer};
+use crate::scene::{Camera, Settings, Shot};
+use crate::shade::{FrameJob, Progress, Rendered, Renderer};
 use crate::stats::ReuseCounts;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Traces each frame through the shot's camera.
@@ -21,18 +24,63 @@ pub struct Tracer<'a> {
     pub stop: &'a AtomicBool,
     /// Hears of finished tiles.
     pub progress: &'a dyn Progress,
+    /// Frames that came as strips.
+    pub laid: Laid,
+}
+
+impl Tracer<'_> {
+    fn render(
+        &self,
+        camera: &Camera,
+        frame: u32,
+        mask: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Option<Rendered> {
+        let job = FrameJob {
+            camera,
+            stream: frame,
+            with_gbuffer: self.with_gbuffer,
+            reuse: None,
+            mask,
+            beyond_crop: false,
+        };
+        self.pool.install(|| self.renderer.render_job(&job, self.stop, progress))
+    }
+
+    fn camera(&self, frame: u32) -> Result<Camera> {
+        let settings = self.renderer.settings;
+        self.shot.camera(frame, settings.width, settings.height)
+    }
 }
 
 impl FrameMaker for Tracer<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
-        let settings = self.renderer.settings;
-        let camera = self.shot.camera(frame, settings.width, settings.height)?;
-        let render =
-            || self.renderer.render(&camera, frame, self.with_gbuffer, self.stop, self.progress);
-        let Some((mut film, rays)) = self.pool.install(render) else { return Ok(None) };
-        let previous = previous_camera(self.shot, frame, settings)?;
+        let camera = self.camera(frame)?;
+        let laid = self.laid.take(frame);
+        let rendered = laid.or_else(|| self.render(&camera, frame, None, self.progress));
+        let Some(Rendered { mut film, rays, .. }) = rendered else { return Ok(None) };
+        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
         let note = || self.renderer.note_motion(&camera, previous.as_ref(), &mut film);
         self.pool.install(note);
         Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
+    }
+}
+
+impl Shared for Tracer<'_> {
+    fn most_strips(&self) -> u32 {
+        strips::most(self.renderer.settings.height)
+    }
+
+    fn strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
+        let camera = self.camera(original)?;
+        let mask = strips::mask(strip, camera.width, camera.height);
+        let rendered = self.render(&camera, original, Some(&mask), &Unheard);
+        rendered.map(|rendered| strips::encode(rendered, strip)).transpose()
+    }
+
+    fn lay(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+        let Settings { width, height, .. } = *self.renderer.settings;
+        self.laid.put(original, strips::join(strips, width, height)?);
+        Ok(())
     }
 }

@@ -41,15 +41,20 @@ fn assert_same_frames(job: &Job, a: &str, b: &str) {
 #[test]
 fn a_signal_stops_within_a_second_and_the_same_command_goes_on() {
     let job = Job::new();
-    for signal in ["INT", "TERM"] {
+    for signal in ["INT", "TERM", "USR1"] {
         let (mut child, err) = after_first_frame(&job, signal);
         let asked = Instant::now();
         send(signal, &child);
+        if signal == "USR1" {
+            // A batch system may repeat its warning.
+            send(signal, &child);
+        }
         let code = child.wait().expect("it ends").code();
         assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());
         let words = rest(err);
         assert_eq!(code, Some(75), "{words}");
         assert!(words.contains("of 4 frames are finished"), "{words}");
+        assert!(words.contains(&format!("stopped by SIG{signal}")), "{words}");
         assert!(job.names(signal).iter().all(|name| !name.contains(".tmp")), "no torn file");
         let ran = job.done(&format!("{SLOW} -o {signal}/f_##.png"));
         assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
@@ -57,6 +62,7 @@ fn a_signal_stops_within_a_second_and_the_same_command_goes_on() {
     job.done(&format!("{SLOW} -o whole/f_##.png"));
     assert_same_frames(&job, "INT", "whole");
     assert_same_frames(&job, "TERM", "whole");
+    assert_same_frames(&job, "USR1", "whole");
 }
 
 #[test]
@@ -69,4 +75,30 @@ fn a_kill_loses_the_frame_in_flight_at_most() {
     assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
     job.done(&format!("{SLOW} -o whole/f_##.png"));
     assert_same_frames(&job, "k", "whole");
+}
+
+/// Runs a job of minutes under `limit` with `variables`; it must stop by itself.
+fn stops_in_time(limit: &str, variables: &[(&str, String)], reason: &str) {
+    let job = Job::new();
+    let line = format!("render cube.obj --spp 4096 --no-video -o o/f_##.png {limit}");
+    let start = Instant::now();
+    let output = job.command(&line).envs(variables.iter().cloned()).output().expect("it starts");
+    let ran = Ran::of(&output);
+    assert!(start.elapsed() < Duration::from_secs(11), "{:?}", start.elapsed());
+    assert_eq!(ran.code, Some(75), "{}", ran.err);
+    assert!(
+        ran.err.contains(reason) && ran.err.contains("the same command goes on"),
+        "{}",
+        ran.err
+    );
+}
+
+#[test]
+fn a_job_ends_by_its_time_limit_and_before_its_allocation() {
+    stops_in_time("--time-limit 1s", &[], "stopped at the time limit of 1.0 s: 0 of 48 frames");
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a clock");
+    let end = ("SLURM_JOB_END_TIME", (now.as_secs() + 31).to_string());
+    let reason = "stopped shortly before the Slurm job ends";
+    stops_in_time("--time-limit 1h", &[end], reason);
+    Job::new().refused("render cube.obj --time-limit 25", "a time is written with its units");
 }

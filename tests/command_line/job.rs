@@ -36,7 +36,13 @@ impl Job {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tweenray"));
         command.args(line.split_whitespace()).current_dir(self.0.path());
         // These tests may themselves run under a launcher.
-        for name in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS", "PMIX_RANK"] {
+        for name in [
+            "OMPI_COMM_WORLD_SIZE",
+            "PMI_SIZE",
+            "SLURM_STEP_NUM_TASKS",
+            "PMIX_RANK",
+            "SLURM_MPI_TYPE",
+        ] {
             command.env_remove(name);
         }
         command

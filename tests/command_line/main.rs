@@ -4,10 +4,22 @@ mod choosing;
 mod comparing;
 mod interrupted;
 mod job;
+mod killed;
+#[cfg(feature = "mpi")]
+mod launch;
+#[cfg(feature = "mpi")]
+#[path = "../common/mpirun.rs"]
+mod launcher;
 mod pages;
 mod ranks;
 mod references;
+#[cfg(feature = "mpi")]
+mod regrouped;
 mod rendering;
+mod resumed;
 mod reuse;
+mod slurm;
+#[cfg(feature = "mpi")]
+mod together;
 mod verify;
 mod words;

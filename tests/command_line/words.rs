@@ -7,9 +7,10 @@ use std::process::Stdio;
 fn every_command_has_help_with_an_example() {
     let job = Job::new();
     let help = job.done("--help").out;
-    for command in
-        ["render", "inspect", "verify", "compare", "convert", "accuracy", "report", "schema"]
-    {
+    for command in [
+        "render", "status", "slurm", "inspect", "verify", "compare", "convert", "accuracy",
+        "report", "schema",
+    ] {
         assert!(help.contains(&format!("  {command} ")), "{help}");
         let own = job.done(&format!("{command} --help")).out;
         assert!(own.contains("Examples:\n  tweenray"), "{own}");

@@ -114,7 +114,8 @@ impl Stage<'_> {
                 Box::new(maker.expect("cameras"))
             }
             Policy::Off => {
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer: false, stop, progress })
+                let (with_gbuffer, laid) = (false, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
             }
         };
         maker.expect(frames);

@@ -1,17 +1,12 @@
 //! Settings that the program chooses: by rank 0, for all.
 
-use super::{Frames, RenderArgs};
+use super::{Frames, RenderArgs, Round, Site};
 use crate::accuracy::Stage;
 use crate::cli::choose::{Choice, Chooser};
 use crate::cli::request::Request;
-use crate::cli::signals::Interrupt;
 use crate::cli::stats;
-use crate::cluster::{Outcome, World};
 use crate::error::Result;
-use crate::intersect::Intersector;
 use crate::scene::Settings;
-use rayon::ThreadPool;
-use std::time::Instant;
 
 /// Settings that the program chooses, and chooses again where they were not enough.
 pub(super) struct Choosing<'a> {
@@ -19,76 +14,58 @@ pub(super) struct Choosing<'a> {
     pub args: &'a RenderArgs,
     /// The settings before.
     pub base: &'a Settings,
-    /// The threads that render.
-    pub pool: &'a ThreadPool,
-    /// What signals have asked for.
-    pub interrupt: &'a Interrupt,
-    /// Whether nothing is said.
-    pub quiet: bool,
+    /// Where it looks and renders.
+    pub site: &'a Site<'a>,
 }
 
 impl Choosing<'_> {
     /// The choice to begin with, rank 0's; `None` where nothing is to be chosen. All ranks call it.
-    pub fn first(
-        &self,
-        world: &World,
-        request: &Request,
-        intersector: &dyn Intersector,
-        start: Instant,
-    ) -> Result<Option<Choice>> {
+    pub fn first(&self, request: &Request, tracer: &str) -> Result<Option<Choice>> {
         if !self.args.choice.is_any() {
             return Ok(None);
         }
-        world.from_root(|| {
-            let choose = |chooser: &Chooser| chooser.choose(start);
-            self.interrupt.watched(|| self.ask(world, request, intersector, choose)).map(Some)
-        })
+        let start = self.site.clock.start;
+        let choose = || self.ask(request, |chooser| chooser.choose(start, tracer));
+        // Ranks that wait for the choice hear from rank 0 that the job is to stop.
+        self.site.interrupt.watched(|| self.site.world.from_root(choose)).map(Some)
     }
 
     /// A tighter choice where `choice` was not enough. All ranks call it.
     pub fn next(
         &self,
-        world: &World,
         job: &Frames,
-        intersector: &dyn Intersector,
+        round: &Round,
         choice: Option<Choice>,
-        (outcome, seconds): (&Outcome, f64),
     ) -> Result<Option<Choice>> {
         let Some(choice) = choice else { return Ok(None) };
-        world.from_root(|| {
-            if outcome.unfinished > 0 || job.plan.render.is_empty() {
+        let judge = || {
+            if round.plan.render.is_empty() {
                 return Ok(None);
             }
-            let audit = stats::audit_of(job.plan, outcome);
-            let seconds = job.plan.kept.is_empty().then_some(seconds);
-            let judge = |chooser: &Chooser| chooser.judge(&choice, audit.as_ref(), seconds);
-            self.interrupt.watched(|| self.ask(world, job.request, intersector, judge))
-        })
+            let audit = stats::audit_of(&round.plan, &round.outcome);
+            let seconds = round.plan.kept.is_empty().then_some(round.seconds);
+            self.ask(job.request, |chooser| chooser.judge(&choice, audit.as_ref(), seconds))
+        };
+        self.site.interrupt.watched(|| self.site.world.from_root(judge))
     }
 
-    fn ask<T>(
-        &self,
-        world: &World,
-        request: &Request,
-        intersector: &dyn Intersector,
-        question: impl Fn(&Chooser) -> Result<T>,
-    ) -> Result<T> {
+    fn ask<T>(&self, request: &Request, question: impl Fn(&Chooser) -> Result<T>) -> Result<T> {
         let stage = Stage {
             scene: &request.scene,
             otherwise: None,
             shot: &request.shot,
             base: self.base,
-            intersector,
-            pool: self.pool,
-            stop: &self.interrupt.stop,
+            intersector: self.site.intersector,
+            pool: self.site.pool,
+            stop: &self.site.interrupt.stop,
         };
         question(&Chooser {
             args: &self.args.choice,
             options: &self.args.settings,
             stage: &stage,
             request,
-            ranks: world.size(),
-            quiet: self.quiet,
+            ranks: self.site.world.size(),
+            quiet: self.site.quiet,
         })
     }
 }

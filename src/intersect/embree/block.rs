@@ -82,7 +82,7 @@ impl EmbreeIntersector<'_> {
         let mut packet = Packet::<W>::new();
         let mut hit = 0;
         for (k, rays) in rays.chunks(W).enumerate() {
-            let (mask, _) = fill(&mut packet, rays, valid >> (k * W));
+            let mask = fill(&mut packet, rays, valid >> (k * W));
             let flags = QueryFlags { coherent: true, exclude: false, passed: &[] };
             self.committed.intersect(&mask, &mut packet, rays, flags);
             self.trace_past_own(rays, &mut packet);
@@ -188,7 +188,8 @@ impl EmbreeIntersector<'_> {
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
             let valid = valid_lanes(rays);
             counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
-            let (mask, exclude) = fill(&mut packet, rays, valid);
+            let mask = fill(&mut packet, rays, valid);
+            let exclude = rays.iter().any(|ray| ray.exclude != PrimRef::NONE);
             let flags = QueryFlags { coherent: false, exclude, passed: &[] };
             self.committed.occluded(&mask, &mut packet, rays, flags);
             for (lane, out) in occluded.iter_mut().enumerate() {
@@ -252,17 +253,15 @@ fn valid_lanes(rays: &[Ray]) -> Lanes {
     rays.iter().enumerate().fold(0, |lanes, (k, ray)| lanes | Lanes::from(ray.is_valid()) << k)
 }
 
-/// Puts `rays` into `packet`; gives Embree's mask of the `valid` ones, and whether any excludes a
-/// primitive.
+/// Puts `rays` into `packet`; gives Embree's mask of the `valid` ones.
 #[inline(always)]
-fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], valid: Lanes) -> ([i32; W], bool) {
-    let (mut mask, mut exclude) = ([0; W], false);
+fn fill<const W: usize>(packet: &mut Packet<W>, rays: &[Ray], valid: Lanes) -> [i32; W] {
+    let mut mask = [0; W];
     for (lane, ray) in rays.iter().enumerate() {
         packet.set(lane, ray);
         mask[lane] = -((valid >> lane & 1) as i32);
-        exclude |= ray.exclude != PrimRef::NONE;
     }
-    (mask, exclude)
+    mask
 }
 
 /// Whether `t` lies before `other` on `ray` by more than both may be off.

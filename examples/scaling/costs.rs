@@ -1,0 +1,126 @@
+//! What frames and messages take, as measured.
+
+use crate::real::{Line, Ran, Stage};
+use tweenray::cluster::simulation::{Model, Table};
+use tweenray::sequence::Pyramid;
+
+/// What is given, not measured: a cluster whose nodes have 64 ranks and 100 Gbit/s each.
+pub const LATENCY: f64 = 10e-6;
+pub const BANDWIDTH: f64 = 12.5e9 / 64.0;
+/// How long a clerk sleeps between looks, `src/cluster/clerk.rs`.
+const NAP: f64 = 1e-3;
+/// To write or read a note of some hundred bytes and hand it to MPI.
+const NOTE_SECONDS: f64 = 10e-6;
+
+/// What was measured of a job.
+#[derive(Clone)]
+pub struct Costs {
+    /// Seconds of a core by frame of the measured shot.
+    pub frames: Vec<f64>,
+    /// The measured shot.
+    pub pyramid: Pyramid,
+    pub write_seconds: f64,
+    pub pack_seconds: f64,
+    pub reference_bytes: u64,
+    pub discovery_bytes: u64,
+    pub strips_bytes: u64,
+    pub note_bytes: u64,
+    /// Share of its core that a rank spends on looking for messages.
+    pub clerk_share: f64,
+}
+
+impl Costs {
+    /// Those of a job that one rank made, `cpu` seconds of a core without its start.
+    pub fn of(ran: &Ran, pyramid: Pyramid, cpu: f64) -> Self {
+        let walls = ran.frames();
+        let mut frames: Vec<f64> = walls.iter().map(|(trace, write)| trace + write).collect();
+        // Alone, a rank makes the key frame at a segment's end with the first frame that needs it,
+        // the middle one, and what is reported of the key frame is its writing.
+        for end in (2..=pyramid.frames).filter(|f| pyramid.is_key(*f)) {
+            let start = (end - 2) / pyramid.segment * pyramid.segment + 1;
+            let middle = start + (end - start) / 2;
+            if middle > start {
+                let key = frames[0].min(frames[middle as usize - 1]);
+                frames[middle as usize - 1] -= key;
+                frames[end as usize - 1] += key;
+            }
+        }
+        // The machine is shared: wall times tell how frames compare, the core's seconds what they take.
+        let scale = cpu / frames.iter().sum::<f64>();
+        frames.iter_mut().for_each(|seconds| *seconds *= scale);
+        let writes = walls.iter().map(|(_, write)| write).sum::<f64>();
+        let write_seconds = scale * writes / walls.len() as f64;
+        Self {
+            frames,
+            pyramid,
+            write_seconds,
+            pack_seconds: 0.0,
+            reference_bytes: 0,
+            discovery_bytes: 0,
+            strips_bytes: 0,
+            note_bytes: 400,
+            clerk_share: 0.0,
+        }
+    }
+
+    /// Bytes of references and of the paper's discoveries, by two ranks that make a few frames.
+    pub fn weigh(&mut self, stage: &Stage, words: &str) {
+        let line = |words: String| Line { ranks: 2, frames: self.pyramid.frames, words };
+        let ran = stage.run(&line(format!("{words} --segment 2 --frames 1..5")));
+        self.reference_bytes = ran.size("references");
+        // A reference holds what was traced, so strips hold as much and the colours beside it.
+        self.strips_bytes = 2 * self.reference_bytes;
+        let ran = stage.run(&line(format!("{words} --policy colour --frames 1..9")));
+        self.discovery_bytes = ran.size("discoveries");
+    }
+
+    /// Seconds for a frame of another shot: those of some measured frame of its kind, drawn by its
+    /// number. `swing`: by how much stretches of the path are heavier and lighter than the mean.
+    pub fn seconds(&self, shot: Pyramid, swing: f64) -> impl Fn(u32) -> f64 + use<> {
+        let keys: Vec<f64> = self.pick(|p, f| p.is_key(f));
+        let others: Vec<f64> = self.pick(|p, f| !p.is_key(f));
+        move |frame| {
+            let kind = if shot.is_key(frame) { &keys } else { &others };
+            let seconds = kind[mixed(frame) as usize % kind.len()];
+            let along = f64::from(frame) / f64::from(shot.frames);
+            seconds * (1.0 + swing * (along * 40.0).sin())
+        }
+    }
+
+    fn pick(&self, of: impl Fn(&Pyramid, u32) -> bool) -> Vec<f64> {
+        let frames = (1..).zip(&self.frames).filter(|(f, _)| of(&self.pyramid, *f));
+        frames.map(|(_, seconds)| *seconds).collect()
+    }
+
+    /// The measured frames themselves.
+    pub fn as_measured(&self) -> impl Fn(u32) -> f64 + use<> {
+        let frames = self.frames.clone();
+        move |frame| frames[frame as usize - 1]
+    }
+
+    pub fn model<'a>(&self, seconds: &'a dyn Fn(u32) -> f64) -> Model<'a> {
+        Model {
+            seconds,
+            write_seconds: self.write_seconds,
+            pack_seconds: self.pack_seconds,
+            // Not told apart from packing by what was measured.
+            unpack_seconds: self.pack_seconds,
+            reference_bytes: self.reference_bytes,
+            strips_bytes: self.strips_bytes,
+            note_bytes: self.note_bytes,
+            latency: LATENCY,
+            bandwidth: BANDWIDTH,
+            nap: NAP,
+            note_seconds: NOTE_SECONDS,
+            clerk_share: self.clerk_share,
+            table: Table::Measured,
+            cores: None,
+        }
+    }
+}
+
+/// Numbers that look like chance and are the same every time.
+fn mixed(frame: u32) -> u32 {
+    let mixed = frame.wrapping_mul(0x9e37_79b1);
+    (mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca77) >> 8
+}

@@ -1,0 +1,51 @@
+//! `./x scaling`: what a job would take on 1 to 4,096 ranks. Frames, messages and a few real ranks are
+//! measured here, the program's own table of frames is played with what they take, and
+//! `docs/scaling.md` and its picture are written from that. Several minutes.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program for people")]
+
+mod costs;
+mod fit;
+#[path = "../../tests/common/mpirun.rs"]
+mod launcher;
+mod page;
+mod paper;
+mod plot;
+mod predict;
+mod real;
+
+use predict::{Change, MOST, NONE, curve};
+
+fn main() {
+    let stage = real::Stage::new();
+    println!("real ranks, oversubscribed");
+    let fit = fit::fit(&stage);
+    println!("frames of the large job");
+    let costs = predict::measure(&stage, &fit);
+    let ours = curve(&costs, "tweenray", &[1, 4, 16, 64, 256, 1024, 2048, MOST], NONE);
+    let others: Vec<(&str, predict::Curve)> = [
+        ("a hundred times the latency", Change { latency: 100.0, ..NONE }),
+        ("a tenth of the bandwidth", Change { bandwidth: 0.1, ..NONE }),
+        ("stretches of the path 30 % heavier and lighter", Change { swing: 0.3, ..NONE }),
+        ("a table that takes no time", Change { is_table_free: true, ..NONE }),
+    ]
+    .into_iter()
+    .map(|(name, change)| (name, curve(&costs, name, &[MOST], change)))
+    .collect();
+    let small_costs = costs::Costs { clerk_share: costs.clerk_share, ..fit.costs.clone() };
+    let small = curve(&small_costs, "frames of 400x300", &[64, 256, 1024, MOST], NONE);
+    let paper = paper::tables(&stage, &small_costs);
+    let to_all = Change { tells_all: true, ..NONE };
+    let all =
+        curve(&costs, "every discovery to every rank", &[1, 4, 16, 64, 256, 1024, MOST], to_all);
+    let page = page::Page {
+        fit: &fit,
+        costs: &costs,
+        ours: &ours,
+        all: &all,
+        others: &others,
+        small: &small,
+        paper: &paper,
+    };
+    page.write();
+}

@@ -1,0 +1,140 @@
+//! `tweenray slurm`: a batch script that renders a sequence on a cluster, however many time limits that
+//! takes.
+
+mod script;
+
+use super::args::SceneArgs;
+use super::exit::Exit;
+use super::render::{self, RenderArgs};
+use super::request::{frames, pattern};
+use super::{job, say, values};
+use crate::error::{Error, Result};
+use crate::sequence::checkpoint;
+use clap::Args;
+use script::Script;
+use std::path::Path;
+use std::time::Duration;
+
+/// How long before a limit ranks are asked to stop, unless told.
+const NOTICE: Duration = Duration::from_secs(60);
+
+/// Print a Slurm batch script that renders a sequence, over as many time limits as it takes
+///
+/// The job stops before its limit and is requeued until `tweenray status` says that the sequence is
+/// complete, or until a run gets no further. The scene is read now, so that a mistake is told before
+/// the job waits in a queue.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+What follows -- goes to `tweenray render`. Paths are taken from the current folder.
+The job sees none of your shell's variables: --setup says what it needs.
+
+Examples:
+  tweenray slurm scene.toml --nodes 4 --time 30m > job.sh && sbatch job.sh
+  tweenray slurm scene.toml --nodes 4 --time 30m --setup 'module load openmpi' -- --spp 64 | sbatch
+  tweenray slurm scene.toml --nodes 2 --cpus 16 --time 4h --sbatch partition=long | sbatch")]
+pub struct SlurmArgs {
+    /// Scene file (.toml), or a bare mesh (.obj, .ply)
+    #[arg(value_name = "SCENE")]
+    scene: String,
+    /// Nodes
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    nodes: u32,
+    /// Time limit of a run, as the queue allows: 30m, 4h, 2d
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    time: Duration,
+    /// Processes on each node; its cores are shared out among them
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=4096))]
+    tasks_per_node: u32,
+    /// Cores of each process [default: whole nodes, which nobody else uses meanwhile]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=4096))]
+    cpus: Option<u32>,
+    /// How long before the limit the processes are told to stop [default: 60s, or a quarter of the time]
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    notice: Option<Duration>,
+    /// One more option of sbatch, as in partition=long or account=physics; repeatable
+    #[arg(long, value_name = "OPTION", value_parser = one_line)]
+    sbatch: Vec<String>,
+    /// A line of shell before the first process starts, as in 'module load openmpi' or 'export A=B';
+    /// repeatable
+    #[arg(long, value_name = "LINE", value_parser = one_line)]
+    setup: Vec<String>,
+    /// Options of `tweenray render`
+    #[arg(last = true, value_name = "OPTIONS", value_parser = one_line)]
+    render: Vec<String>,
+}
+
+/// Runs the command.
+pub fn run(args: &SlurmArgs) -> Result<Exit> {
+    let notice = notice(args.time, args.notice)?;
+    let render = render::parse(&args.scene, &args.render)?;
+    one_line(&args.scene).map_err(Error::Usage)?;
+    let RenderArgs { scene, output, settings, .. } = &render;
+    let loaded = job::load(scene, settings)?;
+    refuse_overwrite(output.overwrite, loaded.overwrite, scene)?;
+    let frames = frames(output, &loaded)?;
+    let pattern = pattern(scene, output, &loaded, frames)?;
+    let references = checkpoint::folder(&pattern);
+    let whole = frames.first == 1 && frames.last == loaded.shot.frames;
+    let script = Script {
+        program: &text(&std::env::current_exe().map_err(|e| Error::Failed(e.to_string()))?)?,
+        folder: &text(&std::env::current_dir().map_err(|e| Error::Failed(e.to_string()))?)?,
+        words: &super::words(),
+        scene: &args.scene,
+        render: &args.render,
+        pattern: &pattern.to_string(),
+        frames: (!whole).then_some(frames),
+        references: &text(&references)?,
+        nodes: args.nodes,
+        tasks_per_node: args.tasks_per_node,
+        cpus: args.cpus,
+        minutes: args.time.as_secs().div_ceil(60),
+        notice: notice.as_secs(),
+        sbatch: &args.sbatch,
+        setup: &args.setup,
+    };
+    say::text(&script.text())?;
+    Ok(Exit::Done)
+}
+
+/// How long before the limit Slurm shall signal.
+fn notice(time: Duration, asked: Option<Duration>) -> Result<Duration> {
+    if time < Duration::from_secs(60) {
+        return Err(Error::Usage("--time: Slurm counts in minutes: at least 1m".into()));
+    }
+    let notice = asked.unwrap_or(NOTICE.min(time / 4));
+    match notice < time {
+        true => Ok(notice),
+        false => {
+            Err(Error::Usage("--notice is as long as --time: nothing would be rendered".into()))
+        }
+    }
+}
+
+/// A requeued job would begin anew again and again.
+fn refuse_overwrite(option: bool, in_scene: bool, scene: &SceneArgs) -> Result<()> {
+    let place = match (option, in_scene) {
+        (true, _) => "--overwrite".to_string(),
+        (_, true) => format!("`overwrite` in {}", scene.scene.display()),
+        _ => return Ok(()),
+    };
+    Err(Error::Usage(format!(
+        "with {place} every run of the job would begin anew, and none would get done\n  \
+         help: leave it out, and remove what is to be replaced or choose another output with -o"
+    )))
+}
+
+/// Words that become lines of the script.
+fn one_line(text: &str) -> std::result::Result<String, String> {
+    match text.chars().any(char::is_control) {
+        true => Err(format!("{text:?} holds a line break or the like, which a script cannot")),
+        false => Ok(text.into()),
+    }
+}
+
+fn text(path: &Path) -> Result<String> {
+    let wrong = || format!("{} cannot be written into a script", path.display());
+    path.to_str().and_then(|text| one_line(text).ok()).ok_or_else(|| Error::Usage(wrong()))
+}

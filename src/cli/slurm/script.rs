@@ -1,0 +1,213 @@
+//! The text of a batch script. Pure: nothing is read or written.
+
+use crate::scene::FrameRange;
+use std::borrow::Cow;
+
+/// What a script is made of.
+pub struct Script<'a> {
+    pub program: &'a str,
+    pub folder: &'a str,
+    /// The command line that asked for it.
+    pub words: &'a [String],
+    pub scene: &'a str,
+    /// Options of `tweenray render`.
+    pub render: &'a [String],
+    /// Where frames go.
+    pub pattern: &'a str,
+    /// `None` for all.
+    pub frames: Option<FrameRange>,
+    /// Folder of the references on disk.
+    pub references: &'a str,
+    pub nodes: u32,
+    pub tasks_per_node: u32,
+    /// Of each process; `None` for whole nodes.
+    pub cpus: Option<u32>,
+    pub minutes: u64,
+    /// Seconds before the limit.
+    pub notice: u64,
+    pub sbatch: &'a [String],
+    pub setup: &'a [String],
+}
+
+/// What the script does, after its own words are set. A run that ends early for whatever reason, a
+/// lost process too, is followed by another as long as it got further: each leaves at least one frame or
+/// reference more, so there is an end.
+const BODY: &str = r#"
+# What is there of the sequence; succeeds once that is all of it.
+so_far() { "$tweenray" "${status[@]}" 2>&1; }
+kept() { ls "$references" 2>/dev/null; }
+
+echo "== $(date '+%F %T') job $SLURM_JOB_ID on $SLURM_JOB_NODELIST, run $((${SLURM_RESTART_COUNT:-0} + 1))"
+before=$(so_far)/$(kept)
+for pause in 5 30 0; do
+  srun --mpi=pmix --export=ALL --kill-on-bad-exit=1 "${srun[@]}" "$tweenray" "${render[@]}"
+  code=$?
+  if now=$(so_far); then
+    echo "$now"
+    exit "$code"
+  fi
+  echo "$now"
+  if [ "$now/$(kept)" != "$before" ]; then
+    scontrol requeue "$SLURM_JOB_ID" || exit $((code ? code : 1))
+    echo "requeued after exit code $code"
+    exit 75
+  fi
+  # Processes that could not be started may be so a little later: nodes clear up after the run before.
+  if [ "$code" -ne 1 ] && [ "$code" -lt 128 ]; then break; fi
+  sleep "$pause"
+done
+echo "this run got no further and ended with exit code $code: not requeued" >&2
+exit $((code ? code : 1))
+"#;
+
+impl Script<'_> {
+    /// The script.
+    pub fn text(&self) -> String {
+        let mut text = self.head();
+        for option in self.options() {
+            text += &format!("#SBATCH --{option}\n");
+        }
+        text += "\n";
+        for line in self.setup {
+            text += &format!("{line}\n");
+        }
+        text += &format!("cd {} || exit 1\n", quoted(self.folder));
+        text += &format!("tweenray={}\n", quoted(self.program));
+        text += &array("render", &self.render_words());
+        text += &array("status", &self.status_words());
+        text += &array("srun", &self.srun_words());
+        text += &format!("references={}\n", quoted(self.references));
+        text + BODY
+    }
+
+    fn head(&self) -> String {
+        let words: Vec<Cow<str>> = self.words.iter().map(|word| quoted(word)).collect();
+        let (nodes, scene) = (crate::error::counted(self.nodes as usize, "node"), self.scene);
+        format!(
+            "#!/bin/bash\n\
+             # Renders {scene} on {nodes}, {} min at a time, until every frame is there.\n\
+             # Made by tweenray {} with: {}\n\
+             # Send it with sbatch. Sent again after a failure it goes on where it was.\n",
+            self.minutes,
+            env!("CARGO_PKG_VERSION"),
+            words.join(" ")
+        )
+    }
+
+    fn options(&self) -> Vec<String> {
+        let name = self.name();
+        let mut options = vec![
+            format!("job-name={name}"),
+            format!("nodes={}", self.nodes),
+            format!("ntasks-per-node={}", self.tasks_per_node),
+            match self.cpus {
+                Some(cpus) => format!("cpus-per-task={cpus}"),
+                None => "exclusive".into(),
+            },
+            format!("time={}", self.minutes),
+            // To the processes alone: the script waits for them.
+            format!("signal=USR1@{}", self.notice),
+            "requeue".into(),
+            "open-mode=append".into(),
+            format!("output={name}-%j.log"),
+            "export=NONE".into(),
+        ];
+        // Of an option that is given twice sbatch takes the last.
+        options.extend(self.sbatch.iter().map(|o| o.trim_start_matches('-').to_string()));
+        options
+    }
+
+    /// The scene's, as far as file names and Slurm's patterns take it.
+    fn name(&self) -> String {
+        let stem = std::path::Path::new(self.scene).file_stem().unwrap_or_default();
+        let fits = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        stem.to_string_lossy().chars().map(fits).collect()
+    }
+
+    fn render_words(&self) -> Vec<String> {
+        let mut words = vec!["render".to_string(), self.scene.to_string()];
+        words.extend(self.render.iter().cloned());
+        words
+    }
+
+    fn status_words(&self) -> Vec<String> {
+        let mut words = vec!["status".to_string(), self.pattern.to_string()];
+        if let Some(FrameRange { first, last }) = self.frames {
+            words.extend(["--frames".into(), format!("{first}..{last}")]);
+        }
+        words
+    }
+
+    /// srun takes over neither the cores of a process nor, where these are all, that it may use them.
+    fn srun_words(&self) -> Vec<String> {
+        match self.cpus {
+            Some(cpus) => vec![format!("--cpus-per-task={cpus}")],
+            None => vec!["--cpu-bind=none".into()],
+        }
+    }
+}
+
+fn array(name: &str, words: &[String]) -> String {
+    let words: Vec<Cow<str>> = words.iter().map(|word| quoted(word)).collect();
+    format!("{name}=({})\n", words.join(" "))
+}
+
+/// A word that a shell takes as it is.
+fn quoted(word: &str) -> Cow<'_, str> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    match !word.is_empty() && word.chars().all(plain) {
+        true => Cow::Borrowed(word),
+        false => Cow::Owned(format!("'{}'", word.replace('\'', r"'\''"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn script<'a>(scene: &'a str, render: &'a [String]) -> Script<'a> {
+        Script {
+            program: "/opt/tween ray/tweenray",
+            folder: "/home/me",
+            words: &[],
+            scene,
+            render,
+            pattern: "out/f_####.png",
+            frames: Some(FrameRange { first: 3, last: 9 }),
+            references: "out/.f.references",
+            nodes: 4,
+            tasks_per_node: 1,
+            cpus: None,
+            minutes: 30,
+            notice: 60,
+            sbatch: &[],
+            setup: &[],
+        }
+    }
+
+    #[test]
+    fn words_come_through_a_shell_as_they_are() {
+        let words = ["a'b c", "$(rm x)", "", "f_####.png", "`x`", "é"];
+        let render: Vec<String> = words.iter().map(ToString::to_string).collect();
+        let text = script("my scene.toml", &render).text();
+        let line = text.lines().find(|line| line.starts_with("render=")).expect("the words");
+        let print = format!("{line}\nprintf '%s\\n' \"${{render[@]}}\"");
+        let output = std::process::Command::new("bash").args(["-c", &print]).output();
+        let out = String::from_utf8(output.expect("a shell").stdout).expect("text");
+        let expected = format!("render\nmy scene.toml\n{}\n", words.join("\n"));
+        assert_eq!(out, expected);
+    }
+
+    #[test]
+    fn options_of_ones_own_come_last() {
+        let own = ["--time=5".to_string(), "account=physics".into()];
+        let text = Script { sbatch: &own, cpus: Some(8), ..script("a%b c.toml", &[]) }.text();
+        let options: Vec<&str> =
+            text.lines().filter_map(|line| line.strip_prefix("#SBATCH --")).collect();
+        assert_eq!(options[0], "job-name=a_b_c");
+        assert!(options.contains(&"cpus-per-task=8") && !options.contains(&"exclusive"));
+        assert_eq!(options[options.len() - 2..], ["time=5", "account=physics"]);
+        assert!(text.contains("srun=(--cpus-per-task=8)"), "{text}");
+        assert!(text.contains("status=(status 'out/f_####.png' --frames 3..9)"), "{text}");
+    }
+}

@@ -1,0 +1,242 @@
+//! References on disk, so that a job that was killed need not trace them again.
+//!
+//! A job needs few references at a time, and those of key frames are dear. These lie in a hidden
+//! folder beside the frames (`.frame.references` for `frame_####.png`), one file each: a line of JSON
+//! that says what job and frame it belongs to, then the bytes of [`crate::reuse::store`]. A file is
+//! removed when no frame of its job needs it any more, and the folder when the job is complete. An exr
+//! frame holds its own reference, and is read where there is one. What is damaged or belongs to another
+//! job is never read: its frame is traced again.
+
+use super::Target;
+use super::resume::LEFTOVER_AGE;
+use crate::error::{Error, Result, counted};
+use crate::output::manifest::{self, Header, Manifest, Row, manifest_path};
+use crate::output::{Format, FramePattern, atomic, exr};
+use crate::reuse::Reference;
+use crate::reuse::store::{ATTRIBUTE, Terms, decode};
+use crate::scene::Recentring;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+/// Version of the files.
+const FORMAT: u32 = 1;
+/// Ending of the files.
+const ENDING: &str = ".reference";
+/// Longest first line that is read, bytes.
+const LONGEST_HEAD: u64 = 1 << 20;
+/// Largest exr frame that is read, bytes.
+const LARGEST_FRAME: u64 = 4 << 30;
+
+/// The first line of a file.
+#[derive(Serialize, Deserialize)]
+struct Head {
+    /// [`FORMAT`].
+    checkpoint: u32,
+    frame: u32,
+    /// What the frame was made of.
+    recipe: String,
+    /// What the job's frames share.
+    header: Header,
+}
+
+/// The references of a job on disk.
+pub struct Checkpoints<'a> {
+    /// The job.
+    pub target: &'a Target,
+    /// How much time of tracing may be lost; `None` to write none and read those that are there.
+    pub every: Option<Duration>,
+    /// On which terms references serve.
+    pub terms: &'a Terms,
+    /// Where the scene was moved.
+    pub recentring: Recentring,
+    /// Whether the job's frame files hold all that was traced in their frames.
+    pub frames_hold_all: bool,
+    rows: OnceLock<BTreeMap<u32, Row>>,
+    notes: Mutex<Vec<String>>,
+}
+
+impl<'a> Checkpoints<'a> {
+    /// Those of the job at `target`. `whole` says whether its frames are traced without a crop.
+    pub fn new(
+        target: &'a Target,
+        every: Option<Duration>,
+        terms: &'a Terms,
+        recentring: Recentring,
+        whole: bool,
+    ) -> Self {
+        Self {
+            target,
+            every,
+            terms,
+            recentring,
+            frames_hold_all: whole && target.pattern.format() == Format::Exr,
+            rows: OnceLock::new(),
+            notes: Mutex::default(),
+        }
+    }
+
+    /// The reference of an original frame, if it is on disk, whole and this job's.
+    /// Its bytes come with it.
+    pub fn read(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+        let (mut found, bytes) = self.in_frame(frame).or_else(|| self.in_file(frame))?;
+        found.frame = frame;
+        Some((found, bytes))
+    }
+
+    /// Whether there is such a file; it is not looked into.
+    pub fn has(&self, frame: u32) -> bool {
+        self.row(frame).is_some() || self.path(frame).exists()
+    }
+
+    fn in_frame(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+        let row = self.row(frame)?;
+        let path = self.target.pattern.folder().join(&row.file);
+        let whole = blake3::hash(&fs::read(&path).ok()?).to_hex().as_str() == row.blake3;
+        let bytes = whole.then(|| exr::read_attribute(&path, ATTRIBUTE, LARGEST_FRAME))?;
+        self.decode(&path, bytes.ok()??.into())
+    }
+
+    /// The row of a frame whose file holds its reference.
+    fn row(&self, frame: u32) -> Option<&Row> {
+        let row = self.rows().get(&frame).filter(|_| self.frames_hold_all)?;
+        let recipe = self.target.recipes.get(frame)?.whole.to_string();
+        (row.stray.is_none() && row.recipe == recipe).then_some(row)
+    }
+
+    /// What the manifest says. Ranks read it themselves, and only where a reference is missing.
+    fn rows(&self) -> &BTreeMap<u32, Row> {
+        let read = || Manifest::read(&manifest_path(&self.target.pattern)).ok().flatten();
+        self.rows.get_or_init(|| read().map(|manifest| manifest.rows).unwrap_or_default())
+    }
+
+    fn in_file(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+        let path = self.path(frame);
+        let file = fs::File::open(&path).ok()?;
+        let mut source = BufReader::new(file);
+        let head = read_head(&mut source);
+        if let Some(why) = refusal(self.target, head.as_ref(), frame) {
+            self.note(format!("{} {why}; its frame is traced again", path.display()));
+            return None;
+        }
+        let mut bytes = Vec::new();
+        source.read_to_end(&mut bytes).ok()?;
+        self.decode(&path, bytes.into())
+    }
+
+    fn decode(&self, path: &Path, bytes: Arc<[u8]>) -> Option<(Reference, Arc<[u8]>)> {
+        match decode(path, &bytes, self.terms, &self.recentring) {
+            Ok((reference, _)) => Some((reference, bytes)),
+            Err(why) => {
+                self.note(format!("{why}; its frame is traced again"));
+                None
+            }
+        }
+    }
+
+    /// Puts the reference of an original frame on disk.
+    pub fn write(&self, frame: u32, bytes: &[u8]) -> Result<()> {
+        let path = self.path(frame);
+        let recipe = self.target.recipes.get(frame).copied().unwrap_or_default();
+        let header = self.target.header.clone();
+        let head = Head { checkpoint: FORMAT, frame, recipe: recipe.whole.to_string(), header };
+        let mut line =
+            serde_json::to_vec(&head).map_err(|e| Error::io("write", &path, e.into()))?;
+        line.push(b'\n');
+        let write = || {
+            atomic::create_folder(folder(&self.target.pattern))?;
+            atomic::write(&path, |w| w.write_all(&line).and_then(|()| w.write_all(bytes))).map(drop)
+        };
+        // A job of other frames of this shot may just have ended and taken the folder away.
+        write().or_else(|_| write())
+    }
+
+    /// Removes the reference of a frame that no frame to come needs.
+    pub fn remove(&self, frame: u32) {
+        // Whatever is left goes when the job is complete.
+        let _ = fs::remove_file(self.path(frame));
+    }
+
+    /// What there is to tell: why references were not taken.
+    pub fn notes(&self) -> Vec<String> {
+        std::mem::take(&mut *self.notes.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn note(&self, note: String) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
+    }
+
+    fn path(&self, frame: u32) -> PathBuf {
+        folder(&self.target.pattern).join(format!("{frame:07}{ENDING}"))
+    }
+}
+
+/// The folder of a sequence's references.
+pub fn folder(pattern: &FramePattern) -> PathBuf {
+    let shown = manifest::beside(pattern, ".references");
+    let name = shown.file_name().unwrap_or_default().to_string_lossy();
+    shown.with_file_name(format!(".{name}"))
+}
+
+/// Removes all references of a job that is complete.
+pub fn clear(target: &Target) {
+    let folder = folder(&target.pattern);
+    files(&folder).iter().for_each(|(_, path)| _ = fs::remove_file(path));
+    let _ = atomic::clean_temporaries(&folder, Duration::ZERO);
+    // Where a reader holds it open on a network file system, it stays until the next job.
+    let _ = fs::remove_dir(folder);
+}
+
+/// Removes references that cannot serve the job at `target`; says so.
+pub(super) fn sweep(target: &Target) -> Result<Vec<String>> {
+    let folder = folder(&target.pattern);
+    atomic::clean_temporaries(&folder, LEFTOVER_AGE)?;
+    let mut removed = Vec::new();
+    for (frame, path) in files(&folder) {
+        let head = fs::File::open(&path).ok().and_then(|f| read_head(&mut BufReader::new(f)));
+        if let Some(why) = refusal(target, head.as_ref(), frame) {
+            fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
+            removed.push(why);
+        }
+    }
+    let Some(why) = removed.first() else { return Ok(Vec::new()) };
+    let files = counted(removed.len(), "reference");
+    Ok(vec![format!("removed {files} from {}: the first {why}", folder.display())])
+}
+
+/// The references in a folder, by frame.
+fn files(folder: &Path) -> Vec<(u32, PathBuf)> {
+    let frame_of = |path: &Path| path.file_name()?.to_str()?.strip_suffix(ENDING)?.parse().ok();
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
+    let mut found: Vec<_> = entries.filter_map(|path| Some((frame_of(&path)?, path))).collect();
+    found.sort();
+    found
+}
+
+fn read_head(source: &mut impl BufRead) -> Option<Head> {
+    let mut line = Vec::new();
+    source.take(LONGEST_HEAD).read_until(b'\n', &mut line).ok()?;
+    serde_json::from_slice(&line).ok()
+}
+
+/// Why a file cannot be the reference of `frame` in the job at `target`.
+fn refusal(target: &Target, head: Option<&Head>, frame: u32) -> Option<String> {
+    let Some(head) = head.filter(|head| head.frame == frame) else {
+        return Some("is damaged".into());
+    };
+    if head.checkpoint != FORMAT {
+        return Some("is of another version of tweenray".into());
+    }
+    if let Some(d) = head.header.first_difference(&target.header) {
+        return Some(format!(
+            "is of other settings: {} was {}, now it is {}",
+            d.name, d.before, d.now
+        ));
+    }
+    let recipe = target.recipes.get(frame).map(|recipe| recipe.whole.to_string());
+    (recipe.as_deref() != Some(&head.recipe)).then(|| "is of another camera move".into())
+}

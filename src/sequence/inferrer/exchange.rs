@@ -1,0 +1,77 @@
+//! What the inferring maker gives to other ranks and takes from them: references, encoded as in exr
+//! files, and strips of frames.
+
+use super::Inferrer;
+use crate::error::Result;
+use crate::reuse::store;
+use crate::sequence::shared::{Shared, Strip};
+use crate::sequence::strips::{self, Unheard};
+use std::path::Path;
+use std::sync::Arc;
+
+impl Shared for Inferrer<'_> {
+    fn original(&self, frame: u32) -> u32 {
+        self.schedule.original(frame)
+    }
+
+    fn needs(&self, original: u32) -> Vec<u32> {
+        self.schedule.ancestors(original)
+    }
+
+    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+        self.pyramid.shares(originals)
+    }
+
+    fn lies_on_disk(&self, original: u32) -> bool {
+        self.checkpoints.is_some_and(|c| c.has(original))
+    }
+
+    fn most_strips(&self) -> u32 {
+        strips::most(self.renderer.settings.height)
+    }
+
+    fn hold(&self, original: u32) {
+        self.with_state(|s| s.references.hold(&self.schedule, original));
+    }
+
+    fn let_go(&self, original: u32) {
+        self.with_state(|s| {
+            s.exports.remove(&original);
+            s.references.let_go(&self.schedule, original);
+        });
+    }
+
+    fn make_source(&self, original: u32) -> Result<bool> {
+        Ok(self.reference(original)?.is_some())
+    }
+
+    fn export(&self, original: u32) -> Option<Arc<[u8]>> {
+        self.with_state(|s| s.exports.remove(&original))
+    }
+
+    /// Bytes that are no reference are as good as none: the frame that needs it makes it.
+    fn import(&self, original: u32, bytes: &[u8]) {
+        let Some(terms) = &self.exchange else { return };
+        let recentring = &self.renderer.scene.recentring;
+        let decode = || store::decode(Path::new("another rank"), bytes, terms, recentring);
+        if let Ok((mut reference, _)) = self.pool.install(decode) {
+            reference.frame = original;
+            self.with_state(|s| s.take(original, reference));
+        }
+    }
+
+    fn strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
+        let camera = self.camera(original)?;
+        let mask = strips::mask(strip, camera.width, camera.height);
+        self.with_state(|s| s.references.expect(&self.schedule, &[original]));
+        let rendered = self.rendered(original, strip.is_source, Some(&mask), &Unheard);
+        self.with_state(|s| s.references.done(&self.schedule, original));
+        rendered?.map(|rendered| strips::encode(rendered, strip)).transpose()
+    }
+
+    fn lay(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+        let settings = self.renderer.settings;
+        self.laid.put(original, strips::join(strips, settings.width, settings.height)?);
+        Ok(())
+    }
+}

@@ -1,0 +1,104 @@
+//! How a sequence on disk stands, by its manifest alone: nothing is changed.
+
+use crate::error::{Error, Result};
+use crate::output::FramePattern;
+use crate::output::manifest::{Manifest, Row, Stray, folder_of};
+use crate::scene::FrameRange;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Frames of a sequence by how they stand; each list ascends.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Survey {
+    /// Where its frames lie, as a pattern.
+    pub frames: String,
+    /// Whether every frame that was asked about is there.
+    pub complete: bool,
+    /// Frames that were asked about.
+    pub total: u32,
+    /// There, whole, of this sequence.
+    pub done: Vec<u32>,
+    /// Not there.
+    pub missing: Vec<u32>,
+    /// There, but not as they were written, or not in the manifest.
+    pub damaged: Vec<u32>,
+    /// There, but of other settings.
+    pub other_settings: Vec<u32>,
+    /// There, but of another camera move, or made for a shorter or longer one.
+    pub other_move: Vec<u32>,
+    /// Frames in the manifest that the camera move does not have any more.
+    pub beyond: Vec<u32>,
+}
+
+/// How the sequence of the manifest at `path` stands. `range` picks frames from its shot's number of
+/// frames; without it all are asked about.
+///
+/// Errors: there is no manifest, or none that can be read; `range`'s.
+pub fn survey(path: &Path, range: impl Fn(u32) -> Result<FrameRange>) -> Result<Survey> {
+    let missing = || Error::Usage(format!("there is no manifest {}", path.display()));
+    let manifest = Manifest::as_of_now(path)?.ok_or_else(missing)?;
+    let folder = folder_of(path);
+    let FrameRange { first, last } = range(manifest.header.shot_frames)?;
+    let files = folder.join(&manifest.header.files).display().to_string();
+    let pattern = FramePattern::parse(&files, last - first + 1)?;
+    let stand = |frame| Ok((frame, stands(&pattern, folder, frame, &manifest)?));
+    let frames: Vec<Result<(u32, Stands)>> = (first..=last).into_par_iter().map(stand).collect();
+    let frames = frames.into_iter().collect::<Result<Vec<_>>>()?;
+    let all = |wanted| frames.iter().filter(|(_, s)| *s == wanted).map(|(f, _)| *f).collect();
+    let done: Vec<u32> = all(Stands::Done);
+    let beyond = manifest.rows.values().filter(|row| row.frame > manifest.header.shot_frames);
+    let is_there = |row: &&Row| folder.join(&row.file).exists();
+    Ok(Survey {
+        frames: pattern.to_string(),
+        complete: done.len() == frames.len(),
+        total: last - first + 1,
+        done,
+        missing: all(Stands::Missing),
+        damaged: all(Stands::Damaged),
+        other_settings: all(Stands::Stray(Stray::OtherSettings)),
+        other_move: all(Stands::Stray(Stray::OtherMove)),
+        beyond: beyond.filter(is_there).map(|row| row.frame).collect(),
+    })
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stands {
+    Done,
+    Missing,
+    Damaged,
+    Stray(Stray),
+}
+
+fn stands(
+    pattern: &FramePattern,
+    folder: &Path,
+    frame: u32,
+    manifest: &Manifest,
+) -> Result<Stands> {
+    let path = pattern.path(frame);
+    let Some(row) = manifest.rows.get(&frame) else {
+        return Ok(if path.exists() { Stands::Damaged } else { Stands::Missing });
+    };
+    let Some(hash) = hash_of(&path)? else { return Ok(Stands::Missing) };
+    let same_name = path.file_name().is_some_and(|name| name == row.file.as_str());
+    let maps = row.maps.iter().map(|map| (folder.join(&map.file), &map.blake3));
+    let is_whole = |(path, hash): (PathBuf, &String)| Ok(hash_of(&path)?.as_ref() == Some(hash));
+    let with_maps = maps.map(is_whole).collect::<Result<Vec<bool>>>()?;
+    Ok(match row.stray {
+        Some(stray) => Stands::Stray(stray),
+        None if same_name && hash == row.blake3 && with_maps.iter().all(|m| *m) => Stands::Done,
+        None => Stands::Damaged,
+    })
+}
+
+/// BLAKE3 of a file, hexadecimal; `None` where there is none.
+fn hash_of(path: &Path) -> Result<Option<String>> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(blake3::hash(&bytes).to_hex().to_string())),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::io("read", path, e)),
+    }
+}

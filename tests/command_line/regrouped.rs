@@ -1,0 +1,137 @@
+//! Jobs of several ranks that are killed or stopped, and go on with another number of them.
+
+use super::job::Job;
+use super::launch::{launched, under_mpirun};
+use std::fs;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const LINE: &str = "render cube.obj --size 64x36 --spp 2 --segment 8 --frames 1..20 --no-video \
+    --threads 1 --checkpoint 0s";
+
+/// Signals to all ranks, or one.
+fn send(job: &Job, signal: &str, pids: &str) {
+    let kill = format!("kill -{signal} $(cat {pids}) 2>/dev/null; true");
+    let shell = Command::new("sh").args(["-c", &kill]).current_dir(job.path(".")).status();
+    assert!(shell.expect("a shell").success());
+}
+
+/// Starts a job; `None` where there is no mpirun.
+fn start(job: &Job, ranks: u32, line: &str) -> Option<Child> {
+    let mut command = launched(job, ranks, line);
+    let errors = fs::File::create(job.path("errors")).expect("a file");
+    command.stdout(Stdio::null()).stderr(errors).spawn().ok()
+}
+
+/// Ends the whole job as a lost machine would; whether it had ended by itself.
+fn kill_after(job: &Job, child: &mut Child, moment: Duration) -> bool {
+    std::thread::sleep(moment);
+    if child.try_wait().expect("a child").is_some() {
+        return true;
+    }
+    send(job, "KILL", "pid.*");
+    child.kill().expect("killed");
+    child.wait().expect("dead");
+    false
+}
+
+fn assert_same(job: &Job, folder: &str, ending: &str, all: bool) {
+    for frame in 1..=20 {
+        let name = format!("f_{frame:02}.{ending}");
+        if all || job.path(format!("{folder}/{name}")).exists() {
+            let same = job.read(&format!("{folder}/{name}")) == job.read(&format!("whole/{name}"));
+            assert!(same, "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_killed_job_goes_on_with_any_number_of_ranks() {
+    for (ending, more) in [("png", ""), ("exr", ""), ("exr", "--crop 8,4,50,30"), ("png", "--maps")]
+    {
+        let job = Job::new();
+        let line = |out: &str| format!("{LINE} {more} -o {out}/f_##.{ending}");
+        job.done(&line("whole"));
+        // Later and later, so that any part of the job is met.
+        for (ranks, tenths) in [(3, 2), (2, 4), (4, 5), (1, 5), (3, 7)] {
+            let Some(mut child) = start(&job, ranks, &line("k")) else { return };
+            let done = kill_after(&job, &mut child, Duration::from_millis(100 * tenths));
+            let words = fs::read_to_string(job.path("errors")).expect("text");
+            assert!(!words.contains("damaged"), "{words}");
+            assert_same(&job, "k", ending, false);
+            if done {
+                break;
+            }
+        }
+        let Some(ran) = under_mpirun(&job, 2, &line("k")) else { return };
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert_same(&job, "k", ending, true);
+        assert!(!job.path("k/.f.references").exists(), "references are left");
+        job.done("status k --frames 1..20");
+    }
+}
+
+/// Key frames of half a minute and more: nobody gets through with one.
+const LONG: &str =
+    "render cube.obj --size 512x288 --spp 4096 --frames 1..40 --segment 8 --no-video";
+
+/// A signal to any one rank, and a time limit, stop all of them in the middle of their frames.
+#[test]
+fn all_ranks_stop_soon_whichever_is_asked() {
+    let job = Job::new();
+    for (signal, pid) in [("TERM", "pid.0"), ("USR1", "pid.1"), ("TERM", "pid.2")] {
+        let Some(mut child) = start(&job, 3, &format!("{LONG} -o o/f_##.png")) else { return };
+        std::thread::sleep(Duration::from_secs(2));
+        assert_eq!(child.try_wait().expect("a child"), None);
+        let asked = Instant::now();
+        send(&job, signal, pid);
+        let code = child.wait().expect("it ends").code();
+        let words = fs::read_to_string(job.path("errors")).expect("text");
+        assert!(asked.elapsed() < Duration::from_secs(5), "{:?}: {words}", asked.elapsed());
+        assert_eq!(code, Some(75), "{words}");
+        let says = format!("stopped by SIG{signal}: 0 of 40 frames are finished");
+        assert_eq!(words.matches(&says).count(), 1, "{words}");
+    }
+    let line = format!("{LONG} --time-limit 2s -o o/f_##.png");
+    let begun = Instant::now();
+    let Some(ran) = under_mpirun(&job, 2, &line) else { return };
+    assert!(begun.elapsed() < Duration::from_secs(8), "{:?}", begun.elapsed());
+    assert!(ran.err.contains("stopped at the time limit of 2.0 s"), "{}", ran.err);
+    assert_eq!(ran.code, Some(75));
+}
+
+/// All ranks put their key frames' references on disk when they stop, and leave none in the end.
+#[test]
+fn every_rank_leaves_its_references_when_it_is_stopped() {
+    let job = Job::new();
+    let line = |out: &str, more: &str| {
+        format!(
+            "render cube.obj --size 96x54 --spp 16 --segment 16 --frames 1..17 --no-video \
+             --threads 1 --audit 0 {more} -o {out}/f_##.png"
+        )
+    };
+    job.done(&line("whole", ""));
+    let slow = line("o", "--checkpoint 1h");
+    let Some(mut child) = start(&job, 2, &slow) else { return };
+    let both = || ["o/f_01.png", "o/f_17.png"].iter().all(|name| job.path(name).exists());
+    while !both() {
+        assert_eq!(child.try_wait().expect("a child"), None);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    send(&job, "USR1", "pid.*");
+    let code = child.wait().expect("it ends").code();
+    if code == Some(0) {
+        // A quick machine was through before it heard.
+        return;
+    }
+    assert_eq!(code, Some(75));
+    let references = job.names("o/.f.references");
+    assert_eq!(references, ["0000001.reference", "0000017.reference"]);
+    let Some(ran) = under_mpirun(&job, 3, &line("o", "")) else { return };
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    for frame in 1..=17 {
+        let name = format!("f_{frame:02}.png");
+        assert!(job.read(&format!("o/{name}")) == job.read(&format!("whole/{name}")), "{name}");
+    }
+    assert!(!job.path("o/.f.references").exists(), "references are left");
+}

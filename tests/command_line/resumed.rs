@@ -1,0 +1,90 @@
+//! Shots that get longer, and how far a sequence is.
+
+use super::job::Job;
+use std::fs;
+
+/// A scene with a key pose for each of `frames` frames; frame `moved` stands elsewhere.
+fn scene(frames: u32, moved: u32) -> String {
+    let key = |frame: u32| {
+        let height = if frame == moved { 3.5 } else { 2.5 };
+        let x = 0.1 * f64::from(frame) - 2.0;
+        format!("  {{ eye = [{x}, {height}, 6], target = [0, 0, 0] }},\n")
+    };
+    let keys: String = (1..=frames).map(key).collect();
+    format!(
+        "camera = {{ frames = {frames}, keys = [\n{keys}] }}\n\
+         sky = {{ radiance = [0.5, 0.6, 0.8], lights = true }}\n\
+         mesh = [{{ file = \"cube.obj\" }}]\n"
+    )
+}
+
+fn folder() -> Job {
+    let job = Job::new();
+    for (name, frames, moved) in [("short", 12, 0), ("long", 21, 0), ("moved", 12, 6)] {
+        fs::write(job.path(format!("{name}.toml")), scene(frames, moved)).expect("written");
+    }
+    job
+}
+
+fn line(scene: &str, out: &str) -> String {
+    format!("render {scene}.toml --size 48x27 --spp 2 --segment 8 --no-video -o {out}")
+}
+
+#[test]
+fn a_longer_shot_keeps_its_frames_and_equals_one_made_at_once() {
+    let job = folder();
+    for ending in ["png", "exr"] {
+        let (grown, once) = (format!("g/f_##.{ending}"), format!("o/f_##.{ending}"));
+        job.done(&line("short", &grown));
+        let ran = job.done(&line("long", &grown));
+        // Frames 1 to 9 are a whole segment; 10 to 12 were inferred from 12, and are from 17.
+        assert!(ran.out.contains("(12 rendered, 9 kept)"), "{}", ran.out);
+        assert!(ran.err.contains("3 frames from frame 10 on"), "{}", ran.err);
+        job.done(&line("long", &once));
+        for frame in 1..=21 {
+            let name = format!("f_{frame:02}.{ending}");
+            assert_eq!(job.read(&format!("g/{name}")), job.read(&format!("o/{name}")), "{name}");
+        }
+        for folder in ["g", "o"] {
+            fs::remove_file(job.path(folder).join("f.manifest.jsonl")).expect("removed");
+        }
+    }
+}
+
+#[test]
+fn another_move_is_refused_and_nothing_is_lost() {
+    let job = folder();
+    job.done(&line("short", "o/f_##.png"));
+    let before = job.read("o/f_06.png");
+    job.refused(&line("moved", "o/f_##.png"), "o/f_06.png is of another camera move");
+    assert_eq!(job.read("o/f_06.png"), before);
+    let ran = job.done(&line("short", "o/f_##.png"));
+    assert!(ran.out.contains("0 rendered, 12 kept"), "{}", ran.out);
+}
+
+#[test]
+fn status_says_what_is_done_and_what_is_not() {
+    let job = folder();
+    assert_eq!(job.run("status .").code, Some(2));
+    job.done(&format!("{} --frames 1..9", line("short", "o/f_##.png")));
+    let ran = job.run("status o");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(ran.out.contains("not complete, 9 of 12 frames done"), "{}", ran.out);
+    assert!(ran.out.contains("3 missing: 10..12"), "{}", ran.out);
+    job.done("status o --frames 1..9");
+    fs::write(job.path("o/f_03.png"), "torn").expect("written");
+    let ran = job.run("status o/f_##.png --json");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    let found: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert_eq!(found[0]["damaged"], serde_json::json!([3]));
+    assert_eq!(found[0]["complete"], false);
+    job.done(&line("short", "o/f_##.png"));
+    let ran = job.done("status o");
+    assert!(ran.out.starts_with("o/f_##.png: complete, 12 of 12 frames done"), "{}", ran.out);
+    // The last segment's frames are to be made again, 1 to 9 are not.
+    job.done(&format!("{} --frames 1..9", line("long", "o/f_##.png")));
+    let ran = job.run("status o");
+    assert!(ran.out.contains("3 of another camera move: 10..12"), "{}", ran.out);
+    assert!(ran.out.contains("9 missing: 13..21"), "{}", ran.out);
+    assert_eq!(job.run("status o/f_##.exr").code, Some(2), "frames of another kind");
+}

@@ -1,0 +1,255 @@
+//! References that an earlier run left on disk: read where they are whole and its own, made again where
+//! not, and in neither case does a frame differ.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+use tweenray::effects::EffectPlan;
+use tweenray::import::{self, LoadOptions};
+use tweenray::intersect;
+use tweenray::output::manifest::{FORMAT, Header, manifest_path};
+use tweenray::output::{Format, FramePattern, WriteOptions};
+use tweenray::reuse;
+use tweenray::reuse::store::Terms;
+use tweenray::scene::{FrameRange, Rect, Scene, Settings, Shot};
+use tweenray::sequence::checkpoint::Checkpoints;
+use tweenray::sequence::{
+    FrameMaker, Inferrer, Pyramid, Recipes, Shared, Target, prepare, render_frames,
+};
+use tweenray::shade::{Progress, Renderer};
+use tweenray::stats::RayCounts;
+
+const SCENE: &str = "
+camera = { frames = 17, orbit = { target = [0, 0.5, 0], eye = [0, 2.6, 7], degrees = 30 } }
+sky = { radiance = [0.4, 0.5, 0.7], lights = true }
+material.silver = { mirror = 0.9 }
+material.sand = { diffuse = [0.5, 0.42, 0.3] }
+mesh = [{ terrain = { vertices = 20, size = 12 }, material = 'sand' }]
+sphere = [{ centre = [0, 1.4, 0], radius = 1, material = 'silver' }]
+";
+const ALL: FrameRange = FrameRange { first: 1, last: 17 };
+
+/// How many frames' worth of tiles were traced.
+#[derive(Default)]
+struct Traced(Mutex<f64>);
+
+impl Progress for Traced {
+    fn tile_done(&self, share: f64, _: &RayCounts) {
+        *self.0.lock().expect("whole") += share;
+    }
+}
+
+/// A job in a folder.
+struct Bed {
+    folder: tempfile::TempDir,
+    scene: Scene,
+    shot: Shot,
+    settings: Settings,
+    ending: &'static str,
+}
+
+/// What a run of some frames took and said.
+struct Run {
+    frames: f64,
+    notes: Vec<String>,
+}
+
+impl Bed {
+    fn new(ending: &'static str, crop: Option<Rect>) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("scene.toml");
+        fs::write(&file, SCENE).expect("written");
+        let loaded = import::load(&file, &LoadOptions::default()).expect("a scene");
+        let mut settings = Settings { width: 64, height: 36, spp: 2, crop, ..loaded.settings };
+        settings.reuse.segment = 8;
+        let scene = loaded.world.into_scene(true).expect("a scene");
+        Self { folder, scene, shot: loaded.shot, settings, ending }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn target(&self) -> Target {
+        let name = self.path(&format!("f_##.{}", self.ending)).display().to_string();
+        let pattern = FramePattern::parse(&name, 17).expect("a pattern");
+        let with_motion = pattern.format() == Format::Exr;
+        let header = Header {
+            manifest: FORMAT,
+            command: Vec::new(),
+            tweenray: "0".into(),
+            scene: "s".into(),
+            scene_hash: "h".into(),
+            shot_hash: "s".into(),
+            shot_frames: 17,
+            files: "f_##".into(),
+            tracer: "embree".into(),
+            settings: Header::settings(&self.settings),
+        };
+        Target {
+            pattern,
+            header,
+            recipes: Recipes::new(&self.shot, &self.settings, true, with_motion).expect("cameras"),
+            write: WriteOptions::of(&self.settings, None),
+            overwrite: false,
+        }
+    }
+
+    /// A process as it were, that expects `frames` and makes the first `count` of them.
+    fn run(&self, frames: &[u32], count: usize) -> Run {
+        self.process(|maker, target, _| {
+            maker.expect(frames);
+            let journal = manifest_path(&target.pattern);
+            render_frames(target, &frames[..count], (0, &journal), maker, &mut |_| Ok(()))
+                .expect("renders");
+        })
+    }
+
+    fn process(&self, act: impl FnOnce(&mut Inferrer, &Target, &Terms)) -> Run {
+        let target = self.target();
+        let settings = &self.settings;
+        let mut notes = prepare(&target, ALL).expect("ready").notes;
+        let plan = EffectPlan::of(&self.scene, settings);
+        let channels = reuse::channels(&self.scene, &plan, settings);
+        let terms = Terms::of("h", &channels, settings);
+        let whole = settings.crop.is_none();
+        let every = Some(Duration::ZERO);
+        let checkpoints = Checkpoints::new(&target, every, &terms, self.scene.recentring, whole);
+        let intersector = intersect::build(&self.scene, settings, 1).expect("a tree");
+        let renderer = Renderer { scene: &self.scene, settings, plan, intersector: &*intersector };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+        let (stop, traced) = (AtomicBool::new(false), Traced::default());
+        let pyramid = Pyramid { segment: 8, frames: 17 };
+        let maker = Inferrer::new(renderer, &self.shot, &pool, &stop, &traced, pyramid);
+        let mut maker = maker.expect("cameras");
+        maker.with_gbuffer = self.ending == "exr";
+        maker.terms = maker.with_gbuffer.then(|| terms.clone());
+        maker.checkpoints = Some(&checkpoints);
+        act(&mut maker, &target, &terms);
+        notes.extend(maker.notes());
+        let frames = *traced.0.lock().expect("whole");
+        Run { frames: frames.round(), notes }
+    }
+
+    fn frame(&self, frame: u32) -> Vec<u8> {
+        fs::read(self.path(&format!("f_{frame:02}.{}", self.ending))).expect("whole")
+    }
+
+    fn reference(&self, frame: u32) -> PathBuf {
+        self.path(&format!(".f.references/{frame:07}.reference"))
+    }
+}
+
+/// As a kill leaves it that comes before frame 2 is made of frames 1, 9, 5 and 3.
+fn killed(ending: &'static str, crop: Option<Rect>) -> Bed {
+    let bed = Bed::new(ending, crop);
+    assert_eq!(bed.run(&[1, 9, 5, 3, 2], 4).frames, 4.0, "{ending}");
+    bed
+}
+
+fn undisturbed(ending: &'static str, crop: Option<Rect>) -> Vec<u8> {
+    let bed = Bed::new(ending, crop);
+    bed.run(&[1, 9, 5, 3, 2], 5);
+    assert!(!bed.reference(1).exists(), "what no frame needs is removed");
+    bed.frame(2)
+}
+
+fn flip(path: &Path, at: usize) {
+    let mut bytes = fs::read(path).expect("there");
+    let at = at.min(bytes.len() - 1);
+    bytes[at] ^= 4;
+    fs::write(path, bytes).expect("written");
+}
+
+#[test]
+fn references_are_read_and_the_frame_is_the_same() {
+    let crop = Some(Rect { x0: 5, y0: 3, x1: 40, y1: 30 });
+    // Key frames alone are checkpoints: frames 5 and 3 are inferred again.
+    for (ending, crop, frames) in [("png", None, 3.0), ("exr", None, 1.0), ("exr", crop, 3.0)] {
+        let bed = killed(ending, crop);
+        let run = bed.run(&[2], 1);
+        assert_eq!((run.frames, &run.notes[..]), (frames, &[][..]), "{ending}");
+        assert!(bed.frame(2) == undisturbed(ending, crop), "{ending}");
+    }
+}
+
+#[test]
+fn references_go_from_disk_to_other_ranks_without_a_ray() {
+    for (ending, on_disk) in [("png", &[1, 9][..]), ("exr", &[1, 9, 5, 3])] {
+        let bed = killed(ending, None);
+        let run = bed.process(|maker, _, terms| {
+            maker.exchange = Some(terms.clone());
+            let found: Vec<u32> = (1..=17).filter(|f| maker.lies_on_disk(*f)).collect();
+            let mut expected = on_disk.to_vec();
+            expected.sort_unstable();
+            assert_eq!(found, expected);
+            for frame in on_disk {
+                maker.hold(*frame);
+                assert!(maker.make_source(*frame).expect("read"));
+                let sent = maker.export(*frame).expect("bytes");
+                let file = fs::read(bed.reference(1)).unwrap_or_default();
+                assert!(*frame != 1 || file.is_empty() || file.ends_with(&sent));
+                maker.import(*frame, &sent);
+            }
+        });
+        assert_eq!(run.frames, 0.0, "{ending}");
+    }
+}
+
+#[test]
+fn exr_frames_are_references_themselves() {
+    let bed = killed("exr", None);
+    fs::remove_dir_all(bed.path(".f.references")).expect("removed");
+    assert_eq!(bed.run(&[2], 1).frames, 1.0);
+    assert!(bed.frame(2) == undisturbed("exr", None));
+    // A frame that is not what the manifest says is nobody's reference.
+    let bed = killed("exr", None);
+    fs::remove_dir_all(bed.path(".f.references")).expect("removed");
+    flip(&bed.path("f_05.exr"), 3000);
+    assert_eq!(bed.run(&[2], 1).frames, 2.0);
+    assert!(bed.frame(2) == undisturbed("exr", None));
+}
+
+#[test]
+fn missing_and_damaged_references_are_made_again() {
+    let whole = undisturbed("png", None);
+    let bed = killed("png", None);
+    fs::remove_file(bed.reference(1)).expect("removed");
+    let length = fs::metadata(bed.reference(9)).expect("there").len() as usize;
+    flip(&bed.reference(9), length * 3 / 4);
+    let run = bed.run(&[2], 1);
+    assert_eq!(run.frames, 5.0);
+    assert!(run.notes.len() == 1 && run.notes[0].contains("0000009.reference"), "{:?}", run.notes);
+    assert!(run.notes[0].contains("is damaged; its frame is traced again"), "{:?}", run.notes);
+    assert!(bed.frame(2) == whole);
+    for at in [0, 40, 1500] {
+        let bed = killed("png", None);
+        flip(&bed.reference(1), at);
+        bed.run(&[2], 1);
+        assert!(bed.frame(2) == whole, "byte {at}");
+        let bed = killed("png", None);
+        let bytes = fs::read(bed.reference(1)).expect("there");
+        fs::write(bed.reference(1), &bytes[..at]).expect("cut");
+        assert_eq!(bed.run(&[2], 1).frames, 4.0, "cut at {at}");
+        assert!(bed.frame(2) == whole, "cut at {at}");
+    }
+}
+
+#[test]
+fn references_of_other_jobs_are_removed_with_the_reason() {
+    let mut bed = killed("png", None);
+    (1..=17).for_each(|f| _ = fs::remove_file(bed.path(&format!("f_{f:02}.png"))));
+    bed.settings.seed = 7;
+    let run = bed.run(&[2], 1);
+    assert_eq!(run.frames, 5.0);
+    assert!(run.notes[0].contains("removed 2 references"), "{:?}", run.notes);
+    assert!(run.notes[0].contains("seed was 0, now it is 7"), "{:?}", run.notes);
+    let mut bed = killed("png", None);
+    (1..=17).for_each(|f| _ = fs::remove_file(bed.path(&format!("f_{f:02}.png"))));
+    bed.shot.vfov_degrees += 1.0;
+    let notes = bed.run(&[2], 0).notes;
+    assert!(notes[0].contains("is of another camera move"), "{notes:?}");
+    assert!(!bed.reference(1).exists());
+}
