@@ -12,14 +12,13 @@ pub fn squares(patches: &Patches, truth: &Seen, seen: &Seen) -> Vec<f64> {
     means.into_iter().map(|(mean, _)| 255.0 * 255.0 * mean).collect()
 }
 
-/// The standard error of the frames' squared errors, a share of them: the mean frame's.
-pub fn doubt(patches: &Patches, truth: &Seen, seen: &Seen) -> f64 {
-    let means = patches.means(&each(truth, seen, mse));
+/// For each frame the standard error of its squared error, a share of it.
+pub fn doubts(patches: &Patches, truth: &Seen, seen: &Seen) -> Vec<f64> {
     let share = |(mean, error): (f64, f64)| if mean > 0.0 { error / mean } else { 0.0 };
-    mean(&means.into_iter().map(share).collect::<Vec<_>>())
+    patches.means(&each(truth, seen, mse)).into_iter().map(share).collect()
 }
 
-/// The figure of `goal` as it rises with the error, the mean over all frames.
+/// The figure of `goal` as it rises with the error: the worst frame's.
 ///
 /// # Errors
 /// Those of [`compare`].
@@ -36,8 +35,7 @@ pub fn figure(goal: Goal, patches: &Patches, truth: &Seen, seen: &Seen) -> Resul
         });
         frames.push(all.collect::<Result<Vec<f64>>>()?);
     }
-    let means = patches.means(&frames);
-    Ok(mean(&means.into_iter().map(|(mean, _)| mean).collect::<Vec<_>>()))
+    Ok(patches.means(&frames).into_iter().map(|(mean, _)| mean).fold(0.0, f64::max))
 }
 
 fn each(truth: &Seen, seen: &Seen, of: fn(&Image, &Image) -> f64) -> Vec<Vec<f64>> {
@@ -45,9 +43,4 @@ fn each(truth: &Seen, seen: &Seen, of: fn(&Image, &Image) -> f64) -> Vec<Vec<f64
         truth.iter().zip(seen).map(|(a, b)| of(a, b)).collect()
     };
     truth.iter().zip(seen).map(frame).collect()
-}
-
-/// The mean of all.
-pub fn mean(all: &[f64]) -> f64 {
-    all.iter().sum::<f64>() / all.len().max(1) as f64
 }

@@ -7,14 +7,24 @@ use crate::scene::{ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
 /// A way to take over light from other frames, as it came out on a few small frames.
+///
+/// Errors are those of traced frames in every mode: key frames are traced, and must reach a target like
+/// any other; frames between are mostly nearer to the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
     /// What is taken over, and with how much care.
     pub reuse: ReuseSettings,
     /// Seconds per frame of the full size: of each frame, and by n, n·s, n·k.
     pub seconds: [f64; 4],
-    /// The light's squared error of a frame between, as a share of a traced one's, and what is added.
-    pub kept: [f64; 2],
+}
+
+/// What some samples came to, in each frame looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// The samples.
+    pub samples: Samples,
+    /// Squared errors, the reference's own left aside.
+    pub errors: Vec<f64>,
 }
 
 /// A figure as a power of the squared error in display steps: both of its logarithms' line.
@@ -39,6 +49,14 @@ impl Line {
         (n >= 2.0 && rise > 0.0).then_some(Self { at_one: y - rise * x, rise })
     }
 
+    /// The line with the same rise through `(squared_error, figure)`.
+    pub fn shifted_to(self, (squared_error, figure): (f64, f64)) -> Self {
+        if squared_error <= 0.0 || figure <= 0.0 {
+            return self;
+        }
+        Self { at_one: figure.ln() - self.rise * squared_error.ln(), ..self }
+    }
+
     /// The squared error at which the figure is `figure`.
     fn squared_error(&self, figure: f64) -> f64 {
         ((figure.ln() - self.at_one) / self.rise).exp()
@@ -48,8 +66,10 @@ impl Line {
 /// All that the probe found out. Squared errors are in squares of a display step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Foretelling {
-    /// Of camera and light samples.
+    /// Of samples that were not tried.
     pub law: Law,
+    /// Samples that were tried.
+    pub measured: Vec<Measured>,
     /// What the probe's frames are off by for their bounces and cut-off.
     pub bias: Vec<f64>,
     /// What rounding to the file's bits adds.
@@ -60,8 +80,11 @@ pub struct Foretelling {
     pub modes: Vec<Mode>,
     /// How the goal's figure goes with the squared error, unless it is that.
     pub line: Option<Line>,
-    /// How far the squared errors may be off, a share: the standard error of pixels drawn.
+    /// How far a frame's squared error may be off, a share: the standard error of pixels drawn, the mean
+    /// of all frames. That of a single frame is in doubt itself.
     pub doubt: f64,
+    /// How much larger errors came out than foretold.
+    pub excess: f64,
 }
 
 /// A setting with what is foretold of it.
@@ -121,13 +144,15 @@ impl Foretelling {
         }
     }
 
-    /// What is foretold of `samples` in `mode`.
+    /// What is foretold of `samples` in `mode`; twice the doubt is added.
     pub fn of(&self, mode: &Mode, samples: Samples) -> Foretold {
-        let [kept, floor] = mode.kept;
-        let errors = self.law.parts(samples).zip(&self.bias).map(|(parts, bias)| {
-            // Key frames are traced, whatever the mode.
-            let light = parts.light.max(kept * parts.light + floor);
-            (1.0 + self.doubt) * (parts.camera + light + bias) + self.rounding
+        let tried = self.measured.iter().find(|measured| measured.samples == samples);
+        let errors = tried.map_or_else(
+            || self.law.errors(samples).collect::<Vec<_>>(),
+            |measured| measured.errors.clone(),
+        );
+        let each = errors.iter().zip(&self.bias).map(|(error, bias)| {
+            (1.0 + 2.0 * self.doubt) * (self.excess * error + bias) + self.rounding
         });
         let n = f64::from(samples.spp);
         let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
@@ -135,7 +160,7 @@ impl Foretelling {
             samples,
             bounces: self.bounces,
             reuse: mode.reuse,
-            squared_error: errors.fold(0.0, f64::max),
+            squared_error: each.fold(0.0, f64::max),
             seconds: by.iter().zip(mode.seconds).map(|(x, seconds)| x * seconds).sum(),
         }
     }
@@ -167,7 +192,7 @@ impl Foretelling {
 
     /// The same with all errors of samples `factor` times as large.
     pub fn worse(&self, factor: f64) -> Self {
-        Self { law: self.law.times(factor), ..self.clone() }
+        Self { excess: self.excess * factor, ..self.clone() }
     }
 
     /// The setting with the least error foretold.
@@ -189,6 +214,7 @@ impl Foretelling {
 
 #[cfg(test)]
 mod tests {
+    use super::super::law::Causes;
     use super::*;
     use crate::scene::Policy;
 
@@ -201,16 +227,18 @@ mod tests {
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
         Foretelling {
-            law: Law::of(&points, samples(4096, 16)),
+            law: Law::of(Causes { shadow: true, sky: false }, &points, &[samples(4096, 16); 5]),
+            measured: Vec::new(),
             bias: vec![0.5],
             rounding: 1.0 / 12.0,
             bounces: 4,
             modes: vec![
-                Mode { reuse: off, seconds: [0.0, 1.0, 1.0, 0.0], kept: [1.0, 0.0] },
-                Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0], kept: [0.5, 0.0] },
+                Mode { reuse: off, seconds: [0.0, 1.0, 1.0, 0.0] },
+                Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
             ],
             line: Line::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
             doubt: 0.0,
+            excess: 1.0,
         }
     }
 

@@ -4,11 +4,10 @@
 //! step, by
 //!
 //! ```text
-//! camera · n^-a  +  n^-p · (shadow · s^-q + sky · k^-q)  +  what samples do not mend
+//! camera · n^-a  +  n^-p · (shadow · s^-q + sky · k^-q)  +  bias · s^-2
 //! ```
 //!
-//! with n camera samples, s shadow and k sky samples each. A frame between takes over ratios, so its
-//! light's part is `kept` of the traced one's, plus a floor.
+//! with n camera samples, s shadow and k sky samples each; the bias is that of a ratio of two averages.
 
 use super::fit::fit;
 use serde::{Deserialize, Serialize};
@@ -34,53 +33,63 @@ struct Powers {
     samples: f64,
 }
 
-/// A frame's amplitudes: squared error at one sample of everything, display steps.
-type Amplitudes = [f64; 3];
+/// A frame's amplitudes, of camera, shadow, sky and bias: squared error at one sample of everything,
+/// display steps.
+type Amplitudes = [f64; 4];
+
+/// Which causes there are at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Causes {
+    /// Area lights.
+    pub shadow: bool,
+    /// A sky that lights.
+    pub sky: bool,
+}
 
 /// The law of a move's traced frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Law {
+    causes: Causes,
     powers: Powers,
     frames: Vec<Amplitudes>,
     /// Root mean square of what the law misses the measurements by, as a share of them.
     pub misfit: f64,
 }
 
-/// What a frame's error is made of, squares of a display step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parts {
-    /// Edges, textures, mirrored edges.
-    pub camera: f64,
-    /// Noise of area lights and sky.
-    pub light: f64,
-}
-
 /// A measured error: samples, and for each frame the mean squared difference from the reference.
 pub type Point = (Samples, Vec<f64>);
 
 impl Powers {
-    fn regressors(&self, s: Samples) -> Amplitudes {
+    fn regressors(&self, causes: Causes, s: Samples) -> Amplitudes {
         let n = f64::from(s.spp);
         let light = n.powf(-self.light);
-        let each = |count: u32| light * f64::from(count.max(1)).powf(-self.samples);
-        [n.powf(-self.camera), each(s.shadow), each(s.sky)]
+        let each = |is_there: bool, count: u32| match is_there {
+            true => light * f64::from(count.max(1)).powf(-self.samples),
+            false => 0.0,
+        };
+        let bias = f64::from(u8::from(causes.shadow)) / f64::from(s.shadow.max(1)).powi(2);
+        [n.powf(-self.camera), each(causes.shadow, s.shadow), each(causes.sky, s.sky), bias]
     }
 }
 
 impl Law {
-    /// The law that comes nearest to `points`, as shares of them. `reference` are the samples of what
-    /// they were held against, whose own error is part of every difference.
-    pub fn of(points: &[Point], reference: Samples) -> Self {
+    /// The law that comes nearest to `points`, as shares of them. `references` are the samples of what
+    /// each was held against, whose own error is part of the difference.
+    pub fn of(causes: Causes, points: &[Point], references: &[Samples]) -> Self {
         let frames = points.first().map_or(0, |(_, errors)| errors.len());
         let mut best = Self {
+            causes,
             powers: Powers { camera: 1.0, light: 1.0, samples: 1.0 },
-            frames: vec![[0.0; 3]; frames],
+            frames: vec![[0.0; 4]; frames],
             misfit: f64::INFINITY,
         };
-        for camera in grid(0.5, 2.0) {
-            for light in grid(0.5, 1.6) {
-                for samples in grid(0.5, 2.0) {
-                    let law = Self::with(Powers { camera, light, samples }, points, reference);
+        let lit = causes.shadow || causes.sky;
+        for camera in grid(0.9, 1.7) {
+            // Without soft light its powers mean nothing.
+            for light in grid(1.0, if lit { 1.6 } else { 1.0 }) {
+                for samples in grid(0.8, if lit { 1.8 } else { 0.8 }) {
+                    let powers = Powers { camera, light, samples };
+                    let law = Self::with(causes, powers, points, references);
                     if law.misfit < best.misfit {
                         best = law;
                     }
@@ -90,11 +99,12 @@ impl Law {
         best
     }
 
-    fn with(powers: Powers, points: &[Point], reference: Samples) -> Self {
-        let own = powers.regressors(reference);
-        let rows = points.iter().map(|(samples, _)| {
-            let mut row = powers.regressors(*samples);
-            row.iter_mut().zip(own).for_each(|(x, own)| *x += own);
+    fn with(causes: Causes, powers: Powers, points: &[Point], references: &[Samples]) -> Self {
+        let rows = points.iter().zip(references).map(|((samples, _), reference)| {
+            let mut row = powers.regressors(causes, *samples);
+            let [camera, shadow, sky, _] = powers.regressors(causes, *reference);
+            // Both are biased the same way.
+            row.iter_mut().zip([camera, shadow, sky]).for_each(|(x, own)| *x += own);
             row
         });
         let rows: Vec<Amplitudes> = rows.collect();
@@ -106,16 +116,26 @@ impl Law {
             frames.push(amplitudes);
             squares += misfit * misfit;
         }
-        Self { powers, frames, misfit: (squares / count.max(1) as f64).sqrt() }
+        let misfit = (squares / count.max(1) as f64).sqrt();
+        Self { causes, powers, frames, misfit }
     }
 
-    /// For each frame looked at, what its error is made of.
-    pub fn parts(&self, samples: Samples) -> impl Iterator<Item = Parts> + '_ {
-        let [n, shadow, sky] = self.powers.regressors(samples);
-        self.frames.iter().map(move |[camera, by_shadow, by_sky]| Parts {
-            camera: camera * n,
-            light: by_shadow * shadow + by_sky * sky,
-        })
+    /// The squared error of each frame looked at.
+    pub fn errors(&self, samples: Samples) -> impl Iterator<Item = f64> + '_ {
+        let row = self.powers.regressors(self.causes, samples);
+        self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
+    }
+
+    /// The law under which `samples` come to `measured`, frame by frame, held against `reference`.
+    pub fn through(&self, samples: Samples, measured: &[f64], reference: Samples) -> Self {
+        let own: Vec<f64> = self.errors(reference).collect();
+        let mut law = self.clone();
+        let told = self.errors(samples).zip(own).zip(measured);
+        for (frame, ((foretold, own), measured)) in law.frames.iter_mut().zip(told) {
+            let factor = measured / f64::max(foretold + own, 1e-12);
+            frame.iter_mut().for_each(|amplitude| *amplitude *= factor);
+        }
+        law
     }
 
     /// The law of frames whose errors are all `factor` times as large.
@@ -136,6 +156,7 @@ mod tests {
     use super::*;
 
     const REFERENCE: Samples = Samples { spp: 128, shadow: 16, sky: 16 };
+    const LIT: Causes = Causes { shadow: true, sky: true };
 
     fn truth(s: Samples, scale: f64) -> f64 {
         let (n, m, k) = (f64::from(s.spp), f64::from(s.shadow), f64::from(s.sky));
@@ -155,30 +176,44 @@ mod tests {
         let design =
             [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
         let points: Vec<Point> = design.into_iter().enumerate().map(point).collect();
-        let law = Law::of(&points, REFERENCE);
+        let law = Law::of(LIT, &points, &[REFERENCE; 7]);
         assert!(law.misfit < 0.05, "{law:?}");
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
             let s = Samples { spp, shadow, sky };
-            for (parts, scale) in law.parts(s).zip([1.0, 2.0]) {
-                let ratio = (parts.camera + parts.light) / truth(s, scale);
-                assert!((0.8..1.25).contains(&ratio), "{s:?}: {ratio}");
+            for (error, scale) in law.errors(s).zip([1.0, 2.0]) {
+                let ratio = error / truth(s, scale);
+                assert!((0.75..1.33).contains(&ratio), "{s:?}: {ratio}");
             }
         }
-        let twice: Vec<Parts> = law.times(2.0).parts(REFERENCE).collect();
-        let once: Vec<Parts> = law.parts(REFERENCE).collect();
-        assert!((twice[0].camera / once[0].camera - 2.0).abs() < 1e-12);
+        let twice: Vec<f64> = law.times(2.0).errors(REFERENCE).collect();
+        let once: Vec<f64> = law.errors(REFERENCE).collect();
+        assert!((twice[0] / once[0] - 2.0).abs() < 1e-12);
     }
 
     #[test]
     fn an_effect_that_is_not_there_has_no_part() {
-        let point = |spp: u32, shadow: u32| {
-            let s = Samples { spp, shadow, sky: 1 };
+        let point = |spp: u32| {
+            let s = Samples { spp, shadow: 16, sky: 16 };
             (s, vec![9.0 / f64::from(spp) + 9.0 / 128.0])
         };
-        let points = [point(1, 1), point(4, 1), point(16, 1), point(4, 16), point(16, 16)];
-        let law = Law::of(&points, REFERENCE);
-        for parts in law.parts(Samples { spp: 8, shadow: 1, sky: 1 }) {
-            assert!(parts.light < 0.02 && (parts.camera - 9.0 / 8.0).abs() < 0.02, "{parts:?}");
-        }
+        let points = [point(1), point(4), point(16)];
+        let law = Law::of(Causes { shadow: false, sky: false }, &points, &[REFERENCE; 3]);
+        let error =
+            |shadow| law.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
+        assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{law:?}");
+        assert_eq!(error(1), error(64));
+    }
+
+    #[test]
+    fn a_law_is_put_through_what_was_measured() {
+        let s = Samples { spp: 8, shadow: 2, sky: 1 };
+        let points = [1, 4, 16].map(|spp| {
+            let s = Samples { spp, ..s };
+            (s, vec![truth(s, 1.0), truth(s, 2.0)])
+        });
+        let law = Law::of(LIT, &points, &[REFERENCE; 3]).through(s, &[3.0, 7.0], REFERENCE);
+        let [own, _] = [0, 1].map(|i| law.errors(REFERENCE).nth(i).expect("a frame"));
+        let now: Vec<f64> = law.errors(s).collect();
+        assert!((now[0] + own - 3.0).abs() < 1e-9 && now[1] > 6.0, "{now:?}");
     }
 }

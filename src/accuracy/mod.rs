@@ -30,6 +30,7 @@ mod oracle;
 mod patches;
 mod probe;
 mod reference;
+mod search;
 mod sentences;
 mod stage;
 mod sweep;

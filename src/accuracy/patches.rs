@@ -14,6 +14,9 @@ use crate::scene::{Policy, Settings};
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
+/// Pixels of the picture that contrast is told from, or more.
+const SMALL: f64 = 50_000.0;
+
 /// Square patches of some frames, with what each counts for.
 #[derive(Debug, Clone)]
 pub struct Patches {
@@ -22,12 +25,14 @@ pub struct Patches {
 }
 
 /// A frame's patches.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Drawn {
     frame: u32,
     corners: Vec<(u32, u32)>,
     /// What a patch counts for in the frame's mean.
     weights: Vec<f64>,
+    /// The chance with which it might not have been drawn.
+    unsure: Vec<f64>,
 }
 
 /// The patches of each frame, as displayed: one image a patch.
@@ -41,13 +46,15 @@ impl Patches {
         let draw = |frame: &u32| {
             let corners = places(settings, edge, pixels, mix(lot ^ u64::from(*frame)));
             let weights = vec![1.0 / corners.len() as f64; corners.len()];
-            Drawn { frame: *frame, corners, weights }
+            let unsure = vec![1.0; corners.len()];
+            Drawn { frame: *frame, corners, weights, unsure }
         };
         Self { edge, frames: frames.iter().map(draw).collect() }
     }
 
     /// Single pixels, about `count` of each of `frames`. Most of a frame's error lies in a few pixels at
-    /// the edges of what is bright, so pixels are drawn by their contrast in a frame of one sample.
+    /// the edges of what is bright, so pixels are drawn by their contrast in a picture of one sample a
+    /// pixel, a small one of a large frame.
     ///
     /// # Errors
     /// Those of [`Stage::trace`].
@@ -55,31 +62,63 @@ impl Patches {
         let mut settings = stage.base.clone();
         (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
         settings.reuse.policy = Policy::Off;
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let shrink = (pixels / SMALL).sqrt().floor().clamp(1.0, 4.0) as u32;
+        (settings.width, settings.height) =
+            ((settings.width / shrink).max(1), (settings.height / shrink).max(1));
+        let small = |frame| Ok(stage.trace(&settings, stage.intersector, frame)?.0);
+        Self::by_contrast_of(stage.base, frames, &small, count, lot)
+    }
+
+    /// The same by the contrast of pictures of the frames, of any size, which `image` gives.
+    ///
+    /// # Errors
+    /// Those of `image`.
+    pub fn by_contrast_of(
+        settings: &Settings,
+        frames: &[u32],
+        image: &dyn Fn(u32) -> Result<Image>,
+        count: u32,
+        lot: u64,
+    ) -> Result<Self> {
+        let (width, height) = (settings.width, settings.height);
         let draw = |frame: &u32| {
-            let (image, _) = stage.trace(&settings, stage.intersector, *frame)?;
+            let image = image(*frame)?;
             let foretold = contrast(&image);
-            let pixels = foretold.len() as u32;
             let lot = Lot { seed: lot, frame: *frame, number: 0 };
-            let drawn = audit::draw(&foretold, 0..pixels, f64::from(count), lot);
-            let place = |d: &audit::Drawn| (d.index % image.width, d.index / image.width);
-            Ok(Drawn {
-                frame: *frame,
-                corners: drawn.iter().map(place).collect(),
-                weights: drawn.iter().map(|d| d.weight / f64::from(pixels)).collect(),
-            })
+            let among = 0..foretold.len() as u32;
+            let mut drawn = Drawn { frame: *frame, ..Drawn::default() };
+            for d in audit::draw(&foretold, among, f64::from(count), lot) {
+                // One pixel of those that a pixel of the small picture stands for.
+                let random = mix(mix(lot.seed ^ u64::from(*frame)) ^ u64::from(d.index));
+                let within = |k: u32, of: u32, length: u32, random: u64| {
+                    let at = |k: u32| (u64::from(length) * u64::from(k) / u64::from(of)) as u32;
+                    let (from, to) = (at(k), at(k + 1).max(at(k) + 1));
+                    (from + (random % u64::from(to - from)) as u32, to - from)
+                };
+                let (x, columns) = within(d.index % image.width, image.width, width, random);
+                let (y, rows) = within(d.index / image.width, image.height, height, random >> 32);
+                let stands_for = f64::from(columns * rows);
+                drawn.corners.push((x, y));
+                drawn.weights.push(d.weight * stands_for / (f64::from(width) * f64::from(height)));
+                drawn.unsure.push((1.0 - 1.0 / (d.weight * stands_for)).max(0.0));
+            }
+            Ok(drawn)
         };
         Ok(Self { edge: 1, frames: frames.iter().map(draw).collect::<Result<_>>()? })
     }
 
     /// The mean over each frame of a figure of its patches, and how far it may be off: its standard
-    /// error.
+    /// error. A pixel that was sure to be drawn leaves nothing open (Horvitz and Thompson, 1952).
     pub fn means(&self, seen: &[Vec<f64>]) -> Vec<(f64, f64)> {
         let of = |(drawn, figures): (&Drawn, &Vec<f64>)| {
             let parts: Vec<f64> = drawn.weights.iter().zip(figures).map(|(w, x)| w * x).collect();
             let sum: f64 = parts.iter().sum();
-            let squares: f64 = parts.iter().map(|part| part * part).sum();
-            let variance = squares - sum * sum / parts.len().max(1) as f64;
-            (sum, variance.max(0.0).sqrt())
+            let open = || parts.iter().zip(&drawn.unsure);
+            let (all, each) = open().fold((0.0, 0.0), |(n, s), (x, u)| (n + u, s + u * x));
+            let middle = each / f64::max(all, 1e-300);
+            let variance: f64 = open().map(|(x, u)| u * (x - middle) * (x - middle)).sum();
+            (sum, variance.sqrt())
         };
         self.frames.iter().zip(seen).map(of).collect()
     }

@@ -1,43 +1,45 @@
 //! A quick look at a scene: what there has to be known to choose its settings.
 //!
-//! Errors are told from patches of some frames at the full size, traced at a short sweep of samples and
-//! held against many samples. Times, and how much better or worse frames between are, come from whole
-//! frames of a small size, where the audit says how far they are off.
+//! Errors are told from some pixels of some frames at the full size, traced at a short sweep of samples
+//! and held against more of them; what the sweep leads to is traced there as well before it is chosen.
+//! Times come from whole frames of a small size.
 
 use super::choice::Goal;
-use super::figures::{doubt, figure, mean, squares};
-use super::foretell::{Foretelling, Foretold, Line, Range};
-use super::frames::chosen_frames;
-use super::law::{Law, Point, Samples};
-use super::patches::{Patches, Seen};
+use super::foretell::{Foretelling, Foretold, Range};
+use super::frames::{Cut, chosen_frames};
+use super::law::{Causes, Samples};
+use super::patches::Patches;
 use super::reference::truth_settings;
+use super::search::Search;
 use super::stage::Stage;
 use super::trial::{self, Trial};
 use crate::effects::EffectPlan;
 use crate::error::Result;
+use crate::film::Image;
+use crate::reuse;
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
-use crate::scene::{Policy, Settings};
+use crate::scene::{FrameRange, Settings};
+use serde::{Deserialize, Serialize};
 
-/// Samples of the probe's reference.
-const REFERENCE: Samples = Samples { spp: 128, shadow: 8, sky: 8 };
 /// Frames, and pixels of each, that errors are told from.
-const FRAMES: u32 = 4;
-const PIXELS: u32 = 2500;
-/// Edge and pixels of patches in which neighbours count (SSIM, FLIP).
-const WIDE: (u32, u32) = (48, 12_000);
+const FRAMES: u32 = 8;
+const PIXELS: u32 = 1200;
+/// Frames, edge and pixels of patches in which neighbours count (SSIM, FLIP).
+const WIDE: (u32, u32, u32) = (4, 48, 9_300);
 /// Pixels of the small frames that are timed.
-const SMALL: f64 = 7_000.0;
-/// How often the likely choices are timed in turns; the shortest time counts.
-const TURNS: u32 = 2;
-/// Share of what the goal allows that bounces and cut-off may take.
-const BIAS: f64 = 0.1;
+pub(super) const SMALL: f64 = 7_000.0;
+/// How many times as many pixels the likely choices are timed with as well: the larger a frame, the less
+/// of it is edges, where light is not known from other frames.
+const LARGER: f64 = 4.0;
+/// Ways to take over light foretold to take so many times as long as the fastest are not tried.
+const SLOWER: f64 = 2.5;
 /// Draws the patches: of the probe, and of the check.
 pub const PROBE: u64 = 1;
 /// See [`PROBE`].
 pub const CHECK: u64 = 2;
 
 /// What the user set already, which is not chosen.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Given {
     /// Camera samples.
     pub spp: bool,
@@ -49,14 +51,14 @@ pub struct Given {
     pub bounces: bool,
     /// Policy.
     pub policy: bool,
-    /// Tolerance.
-    pub tolerance: bool,
 }
 
 /// The scene and what is wanted of it.
 pub struct Probe<'a> {
     /// What all trials share.
     pub stage: &'a Stage<'a>,
+    /// The frames of the job.
+    pub frames: FrameRange,
     /// What is to be reached; `None` where a time is to be kept.
     pub goal: Option<Goal>,
     /// What is not chosen.
@@ -71,49 +73,15 @@ impl Probe<'_> {
     /// # Errors
     /// [`crate::error::Error::Stopped`]; those of rendering.
     pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Foretelling> {
-        let patches = self.patches(PROBE, &spread(self.stage.shot.frames, FRAMES, 0.5))?;
-        heard("a reference for some pixels");
-        let truth = patches.trace(self.stage, &reference(self.stage.base))?;
         heard("errors of a short sweep");
-        let mut sweep = Vec::new();
-        for samples in self.design() {
-            sweep.push((samples, self.traced(&patches, samples)?));
+        let mut search = Search::begin(self)?;
+        heard("times");
+        search.foretelling.modes = self.modes(search.foretelling.bounces)?;
+        if let Some(goal) = self.goal {
+            heard("errors of what may be chosen");
+            search.try_likely(goal)?;
         }
-        let mut points: Vec<Point> = sweep
-            .iter()
-            .map(|(samples, seen)| (*samples, squares(&patches, &truth, seen)))
-            .collect();
-        let figures = sweep.iter().zip(&points).map(|((_, seen), (_, errors))| {
-            Ok((
-                mean(errors),
-                self.goal.map_or(Ok(0.0), |goal| figure(goal, &patches, &truth, seen))?,
-            ))
-        });
-        let figures = figures.collect::<Result<Vec<_>>>()?;
-        let mut foretelling = Foretelling {
-            law: Law::of(&points, REFERENCE),
-            bias: Vec::new(),
-            rounding: if self.rounds { 1.0 / 12.0 } else { 0.0 },
-            bounces: self.stage.base.bounces,
-            modes: Vec::new(),
-            line: Line::through(&figures),
-            doubt: sweep.last().map_or(0.0, |(_, seen)| doubt(&patches, &truth, seen)),
-        };
-        let most = self.goal.map_or(f64::INFINITY, |goal| foretelling.allowed(goal));
-        (foretelling.bounces, foretelling.bias) = self.bounces(&patches, BIAS * most)?;
-        heard("times, and errors of frames between");
-        foretelling.modes = self.modes(foretelling.bounces)?;
-        // The law is fitted once more with what it led to: there it has to be right.
-        for _ in 0..2 {
-            let Some(likely) = self.likely(&foretelling) else { break };
-            if points.iter().any(|(samples, _)| *samples == likely.samples) {
-                break;
-            }
-            let seen = self.traced(&patches, likely.samples)?;
-            points.push((likely.samples, squares(&patches, &truth, &seen)));
-            foretelling.law = Law::of(&points, REFERENCE);
-        }
-        Ok(foretelling)
+        Ok(search.foretelling)
     }
 
     /// Of the fastest setting of each mode the one that is fastest when all are tried.
@@ -121,15 +89,10 @@ impl Probe<'_> {
     /// # Errors
     /// As [`Self::look`].
     pub fn fastest(&self, foretelling: &Foretelling, allowed: f64) -> Result<Option<Foretold>> {
-        let mut found = foretelling.fastest(&self.range(), allowed);
-        let mut seconds = vec![f64::INFINITY; found.len()];
-        for _ in 0..TURNS {
-            for (foretold, seconds) in found.iter().zip(&mut seconds) {
-                let trial = self.small_trial(&foretold.settings(self.stage.base))?;
-                *seconds = seconds.min(trial.seconds * self.enlargement());
-            }
+        let mut found = likely(foretelling.fastest(&self.range(), allowed));
+        for foretold in &mut found {
+            foretold.seconds = self.tried_seconds(foretold)?;
         }
-        found.iter_mut().zip(seconds).for_each(|(foretold, seconds)| foretold.seconds = seconds);
         Ok(found.into_iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
     }
 
@@ -142,22 +105,38 @@ impl Probe<'_> {
         let mut found = None;
         for _ in 0..3 {
             let Some(best) = foretelling.best_within(&self.range(), seconds) else { break };
-            let trial = self.small_trial(&best.settings(self.stage.base))?;
-            let taken = trial.seconds * self.enlargement();
+            let taken = self.tried_seconds(&best)?;
             foretelling = foretelling.slower(taken / best.seconds);
             found = Some(Foretold { seconds: taken, ..best });
-            if taken <= 1.05 * seconds {
+            if taken <= 1.02 * seconds {
                 break;
             }
         }
         Ok(found)
     }
 
+    /// Seconds of a frame of the full size, from frames of two small ones: what edges take goes with
+    /// their length, all else with the area.
+    fn tried_seconds(&self, foretold: &Foretold) -> Result<f64> {
+        let settings = foretold.settings(self.stage.base);
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let [small, large] = [SMALL, LARGER * SMALL].map(|most| most.min(pixels));
+        let of_large = self.small_seconds(&settings, large)? / large;
+        if large < 1.5 * small {
+            return Ok(of_large * pixels);
+        }
+        let of_small = self.small_seconds(&settings, small)? / small;
+        let edges = (of_small - of_large) / (small.powf(-0.5) - large.powf(-0.5));
+        let each = of_large + edges * (pixels.powf(-0.5) - large.powf(-0.5));
+        Ok(each.clamp(0.3 * of_large, of_large) * pixels)
+    }
+
     /// What may be chosen.
     pub fn range(&self) -> Range {
         let (base, plan) = (self.stage.base, self.plan());
-        let numbers =
-            [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024];
+        // Sobol points are laid out evenly in powers of two; 24 camera samples are often no better
+        // than 16.
+        let numbers = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024];
         let among = |is_free: bool, most: u32, given: u32| match is_free {
             true => numbers.into_iter().filter(|n| *n <= most).collect(),
             false => vec![given],
@@ -169,147 +148,140 @@ impl Probe<'_> {
         }
     }
 
-    /// Patches of `frames` in which the goal's figure can be taken.
+    /// Patches of the job's frames in which the goal's figure can be taken.
     ///
     /// # Errors
     /// Those of [`Patches::by_contrast`].
-    pub(super) fn patches(&self, lot: u64, frames: &[u32]) -> Result<Patches> {
-        match self.goal {
-            Some(Goal::Ssim(_) | Goal::Flip(_)) => {
-                Ok(Patches::grid(self.stage.base, frames, WIDE.0, WIDE.1, lot))
+    pub(super) fn patches(&self) -> Result<Patches> {
+        match self.is_wide() {
+            true => {
+                let (frames, edge, pixels) = WIDE;
+                let frames = spread(self.frames, frames, 0.5);
+                Ok(Patches::grid(self.stage.base, &frames, edge, pixels, PROBE))
             }
-            _ => Patches::by_contrast(self.stage, frames, PIXELS, lot),
+            false => {
+                let frames = spread(self.frames, FRAMES, 0.5);
+                Patches::by_contrast(self.stage, &frames, PIXELS, PROBE)
+            }
         }
     }
 
-    fn likely(&self, foretelling: &Foretelling) -> Option<Foretold> {
-        let range = self.range();
-        let goal = self.goal?;
-        let found = foretelling.fastest(&range, foretelling.allowed(goal));
-        found.into_iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+    /// Patches of finished frames that a check looks at, whose pictures `image` gives; and which frames.
+    ///
+    /// # Errors
+    /// Those of `image`.
+    pub(super) fn check_patches(
+        &self,
+        image: &dyn Fn(u32) -> Result<Image>,
+    ) -> Result<(Vec<u32>, Patches)> {
+        let base = self.stage.base;
+        Ok(match self.is_wide() {
+            true => {
+                let (frames, edge, pixels) = WIDE;
+                let frames = spread(self.frames, frames, 0.1);
+                let patches = Patches::grid(base, &frames, edge, pixels, CHECK);
+                (frames, patches)
+            }
+            false => {
+                let frames = spread(self.frames, 2 * FRAMES, 0.1);
+                let patches = Patches::by_contrast_of(base, &frames, image, PIXELS, CHECK)?;
+                (frames, patches)
+            }
+        })
     }
 
-    fn plan(&self) -> EffectPlan {
+    /// How many frames are made: those of the job, and all that they are inferred from.
+    pub fn made_frames(&self) -> u32 {
+        let plan = self.plan();
+        let looks_up = !reuse::channels(self.stage.scene, &plan, self.stage.base).is_empty();
+        let cut = Cut::of(self.stage.base, self.stage.shot.frames, looks_up);
+        let frames: Vec<u32> = (self.frames.first..=self.frames.last).collect();
+        cut.with_ancestors(&frames).len() as u32
+    }
+
+    fn is_wide(&self) -> bool {
+        matches!(self.goal, Some(Goal::Ssim(_) | Goal::Flip(_)))
+    }
+
+    pub(super) fn plan(&self) -> EffectPlan {
         EffectPlan::of(self.stage.scene, self.stage.base)
     }
 
-    fn design(&self) -> Vec<Samples> {
-        let (base, plan) = (self.stage.base, self.plan());
-        let all = [
-            (1, 1, 1),
-            (4, 1, 1),
-            (16, 1, 1),
-            (4, 16, 1),
-            (4, 1, 16),
-            (4, 4, 4),
-            (1, 16, 16),
-            (16, 4, 4),
-            (16, 16, 16),
-        ];
-        let mut design = Vec::new();
-        for (spp, shadow, sky) in all {
-            let shadow = if plan.area_lights { shadow } else { base.shadow_samples };
-            let sky = if plan.sky_light { sky } else { base.sky_samples };
-            let samples = Samples { spp, shadow, sky };
-            if !design.contains(&samples) {
-                design.push(samples);
-            }
-        }
-        design
-    }
-
-    /// The patches with the reference's bounces: what samples alone do.
-    fn traced(&self, patches: &Patches, samples: Samples) -> Result<Seen> {
-        let Samples { spp, shadow, sky } = samples;
-        let mut settings = reference(self.stage.base);
-        (settings.spp, settings.shadow_samples, settings.sky_samples) = (spp, shadow, sky);
-        settings.seed = self.stage.base.seed;
-        patches.trace(self.stage, &settings)
-    }
-
-    /// The fewest bounces that miss at most `allowed`, the most there are otherwise; and what they
-    /// miss in each frame. The same random numbers with more bounces tell.
-    fn bounces(&self, patches: &Patches, allowed: f64) -> Result<(u32, Vec<f64>)> {
-        let base = self.stage.base;
+    pub(super) fn causes(&self) -> Causes {
         let plan = self.plan();
-        let few = Samples { spp: 4, shadow: 1, sky: 1 };
-        let truth = self.traced(patches, few)?;
-        let mut settings = base.clone();
-        (settings.spp, settings.shadow_samples, settings.sky_samples) = (4, 1, 1);
-        settings.reuse.policy = Policy::Off;
-        let is_free = allowed.is_finite() && !self.given.bounces && (plan.mirror || plan.glass);
-        let mut tried = vec![base.bounces];
-        if is_free {
-            tried = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32].to_vec();
-            tried.push(base.bounces);
-            tried.sort_unstable();
-            tried.dedup();
-        }
-        let mut last = (base.bounces, Vec::new());
-        for bounces in tried {
-            settings.bounces = bounces;
-            let bias = squares(patches, &truth, &patches.trace(self.stage, &settings)?);
-            let is_enough = bias.iter().all(|bias| *bias <= allowed);
-            last = (bounces, bias);
-            if is_enough {
-                break;
-            }
-        }
-        Ok(last)
+        Causes { shadow: plan.area_lights, sky: plan.sky_light }
     }
 
-    pub(super) fn small_trial(&self, settings: &Settings) -> Result<Trial> {
+    /// Frames with about `pixels` pixels, and all that they are inferred from.
+    pub(super) fn small_trial(&self, settings: &Settings, pixels: f64) -> Result<Trial> {
         let mut settings = settings.clone();
-        (settings.width, settings.height) = self.small_size();
+        (settings.width, settings.height) = self.small_size(pixels);
         let frames = chosen_frames(self.stage.shot.frames);
         trial::run(self.stage, &settings, self.stage.intersector, &frames)
     }
 
-    fn small_size(&self) -> (u32, u32) {
+    fn small_size(&self, pixels: f64) -> (u32, u32) {
         let Settings { width, height, .. } = *self.stage.base;
-        let scale = (SMALL / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+        let scale = (pixels / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
         let edge = |length: u32| ((f64::from(length) * scale).round() as u32).max(1);
         (edge(width), edge(height))
     }
 
     /// Pixels of a frame over those of a small one.
     pub(super) fn enlargement(&self) -> f64 {
-        let (width, height) = self.small_size();
+        let (width, height) = self.small_size(SMALL);
         let base = self.stage.base;
         f64::from(base.width) * f64::from(base.height) / (f64::from(width) * f64::from(height))
     }
 }
 
-/// `count` frames of a move of `frames`, evenly spread; `offset` in [0, 1) shifts them.
-pub fn spread(frames: u32, count: u32, offset: f64) -> Vec<u32> {
-    let step = f64::from(frames) / f64::from(count);
+/// Those of `found` that may turn out to be the fastest.
+pub(super) fn likely(mut found: Vec<Foretold>) -> Vec<Foretold> {
+    let least = found.iter().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
+    found.retain(|f| f.seconds <= SLOWER * least);
+    found
+}
+
+/// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.
+pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
+    let FrameRange { first, last } = frames;
+    let step = f64::from(last - first + 1) / f64::from(count);
     let mut all: Vec<u32> = (0..count)
-        .map(|k| (1.0 + (f64::from(k) + offset) * step).floor() as u32)
-        .map(|frame| frame.clamp(1, frames))
+        .map(|k| first + ((f64::from(k) + offset) * step).floor() as u32)
+        .map(|frame| frame.clamp(first, last))
         .collect();
     all.dedup();
     all
 }
 
-/// Settings of a reference: its seed is none of a job's or of a sweep's.
-pub fn reference(base: &Settings) -> Settings {
+/// Samples enough to hold `samples` against.
+pub fn samples_of_reference(samples: Samples) -> Samples {
+    Samples {
+        spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
+        shadow: samples.shadow.max(4),
+        sky: samples.sky.max(2),
+    }
+}
+
+/// Settings of a reference of so many samples: its seed is none of a job's or of a sweep's.
+pub fn reference(base: &Settings, samples: Samples) -> Settings {
     let mut settings = truth_settings(base, &[]);
-    settings.spp = REFERENCE.spp;
-    settings.shadow_samples = REFERENCE.shadow.min(MAX_SAMPLES);
-    settings.sky_samples = REFERENCE.sky;
+    (settings.spp, settings.shadow_samples) = (samples.spp, samples.shadow);
+    settings.sky_samples = samples.sky;
     settings.seed = (base.seed + MAX_SEED / 4) % (MAX_SEED + 1);
     settings
 }
 
 #[cfg(test)]
 mod tests {
-    use super::spread;
+    use super::*;
 
     #[test]
-    fn frames_are_spread_and_stay_in_the_move() {
-        assert_eq!(spread(16, 4, 0.5), [3, 7, 11, 15]);
-        assert_eq!(spread(16, 4, 0.0), [1, 5, 9, 13]);
-        assert_eq!(spread(2, 4, 0.5), [1, 2]);
-        assert_eq!(spread(1, 4, 0.0), [1]);
+    fn frames_are_spread_and_stay_in_the_job() {
+        let spread = |first, last, offset| spread(FrameRange { first, last }, 4, offset);
+        assert_eq!(spread(1, 16, 0.5), [3, 7, 11, 15]);
+        assert_eq!(spread(9, 24, 0.0), [9, 13, 17, 21]);
+        assert_eq!(spread(1, 2, 0.5), [1, 2]);
+        assert_eq!(spread(5, 5, 0.9), [5]);
     }
 }

@@ -11,7 +11,7 @@ use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
 use crate::sequence::{ColourMaker, FrameMaker, Inferrer, Made, Pyramid, Tracer};
 use crate::shade::Renderer;
-use crate::stats::{AuditSums, RayCounts};
+use crate::stats::RayCounts;
 use std::time::Instant;
 
 /// What came of a trial: means over the move, per frame.
@@ -30,8 +30,6 @@ pub struct Trial {
     pub rays_per_frame: f64,
     /// Memory of the intersector and of the references, bytes.
     pub memory: u64,
-    /// What the audits of all frames that were made found.
-    pub audit: AuditSums,
 }
 
 /// Makes `chosen` frames under `settings`, and what they are inferred from.
@@ -55,7 +53,6 @@ pub fn run(
     let mut frames = Frames::new();
     let (mut seconds, mut cpu, mut rays) = (Vec::new(), Vec::new(), Vec::new());
     let mut all_rays = RayCounts::default();
-    let mut audit = AuditSums::default();
     for frame in order {
         let (start, cpu_start) = (Instant::now(), cpu_now());
         let made = maker.make(frame)?.ok_or(Error::Stopped)?;
@@ -64,7 +61,6 @@ pub fn run(
         let cast = rays_of(&made);
         rays.push((frame, cast.total() as f64));
         all_rays += cast;
-        audit += made.audit.unwrap_or_default();
         if chosen.contains(&frame) {
             let image = stage.pool.install(|| displayed(&made.film, settings));
             frames.insert(frame, image);
@@ -77,7 +73,6 @@ pub fn run(
         rays: all_rays,
         rays_per_frame: cut.mean(rays.into_iter()),
         memory: intersector.memory() + maker.reference_memory(),
-        audit,
         cut,
     })
 }

@@ -39,8 +39,9 @@ pub struct ChoiceArgs {
 pub struct Choice {
     /// What was wanted, in words.
     pub wanted: String,
-    /// The settings before.
+    /// The settings before, and which of them the user gave.
     base: Value,
+    given: Given,
     /// The squared error that the target allows, display steps.
     allowed: Option<f64>,
     /// What is foretold of the choice.
@@ -111,25 +112,29 @@ impl Choice {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// The options that it stands for.
     fn options(&self) -> String {
-        let Foretold { samples, bounces, reuse, .. } = &self.foretold;
-        let reuse = match reuse.policy {
-            Policy::Off => "--policy off".into(),
-            _ => format!("--policy surface --tolerance {}", reuse.tolerance),
-        };
-        format!(
-            "--spp {} --shadow-samples {} --sky-samples {} --bounces {bounces} {reuse}",
-            samples.spp, samples.shadow, samples.sky
-        )
+        options(&self.foretold)
     }
+}
+
+/// The options that stand for a choice.
+fn options(foretold: &Foretold) -> String {
+    let Foretold { samples, bounces, reuse, .. } = foretold;
+    let reuse = match reuse.policy {
+        Policy::Off => "--policy off".into(),
+        _ => format!("--policy surface --tolerance {}", reuse.tolerance),
+    };
+    format!(
+        "--spp {} --shadow-samples {} --sky-samples {} --bounces {bounces} {reuse}",
+        samples.spp, samples.shadow, samples.sky
+    )
 }
 
 impl Chooser<'_> {
     /// The choice that the manifest holds, if it answers the same question; else a new one.
     ///
     /// # Errors
-    /// Those of the probe; a target that nothing reaches is none: the best there is is chosen then.
+    /// Those of the probe; a target that nothing is foretold to reach.
     pub fn choose(&self, started: Instant, tracer: &str) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
             self.tell(format!("for {}, as chosen before: {}", before.wanted, before.options()));
@@ -139,23 +144,22 @@ impl Chooser<'_> {
         let probe = self.probe();
         let foretelling = probe.look(&|what| self.tell(format!("probe: {what}")))?;
         let allowed = self.args.target.map(|goal| foretelling.allowed(goal));
-        let found = match allowed {
-            Some(allowed) => probe.fastest(&foretelling, allowed)?,
+        let foretold = match allowed {
+            Some(allowed) => {
+                let found = probe.fastest(&foretelling, allowed)?;
+                found.ok_or_else(|| self.out_of_reach(&foretelling))?
+            }
             None => {
-                let left = self.args.budget.unwrap_or_default().as_secs_f64()
-                    - started.elapsed().as_secs_f64();
+                let left = self.budget() - started.elapsed().as_secs_f64();
                 let each = (1.0 - RESERVE) * left.max(0.0) / self.frames();
-                probe.best_within(&foretelling, each)?
+                let found = probe.best_within(&foretelling, each)?;
+                found.ok_or_else(|| self.out_of_reach(&foretelling))?
             }
         };
-        let best = || foretelling.best(&probe.range());
-        let is_found = found.is_some();
-        let foretold = found.or_else(best).ok_or_else(|| {
-            Error::Failed("no setting is left to choose; give fewer options".into())
-        })?;
         let choice = Choice {
             wanted: self.args.words(),
             base: Header::settings(self.stage.base),
+            given: self.given(),
             allowed,
             foretold,
             foretelling,
@@ -163,14 +167,28 @@ impl Chooser<'_> {
         };
         self.say_choice(&choice);
         self.tell(format!("the probe took {}", duration(start.elapsed().as_secs_f64())));
-        let over = self
-            .args
-            .budget
-            .is_some_and(|b| choice.foretold.seconds * self.frames() > 1.1 * b.as_secs_f64());
-        if !self.quiet && (!is_found || over) {
-            say::warning("no setting is foretold to reach this; the nearest one is taken");
+        if self.args.budget.is_some() && choice.foretold.seconds * self.frames() > self.budget() {
+            self.warn("no setting is foretold to fit this time; the fastest is taken".into());
         }
         Ok(choice)
+    }
+
+    /// What to say where no setting will do.
+    fn out_of_reach(&self, foretelling: &Foretelling) -> Error {
+        let best = foretelling.best(&self.probe().range());
+        let nearest = best.map_or(String::new(), |best| {
+            let seconds = duration(best.seconds * self.frames());
+            format!("; {} would come to {:.1} dB, in {seconds}", options(&best), best.psnr())
+        });
+        let bits = match self.rounds() {
+            true => ", --png-bits 16 (8 bits hold 58.9 dB at most)",
+            false => "",
+        };
+        Error::Usage(format!(
+            "no setting is foretold to reach {}{nearest}\n  \
+             help: ask for less, or give fewer options{bits}",
+            self.args.words()
+        ))
     }
 
     /// Says what came out; a tighter choice where the target was missed.
@@ -183,13 +201,16 @@ impl Chooser<'_> {
         audit: Option<&AuditRow>,
         rendered: Option<f64>,
     ) -> Result<Option<Choice>> {
-        let check = Check::of(&self.probe(), self.request.frames, &|frame| self.image(frame))?;
+        let samples = choice.foretold.samples;
+        let check = Check::of(&self.probe(), samples, &|frame| self.image(frame))?;
         let [mean, worst] = check.psnr();
         let looked = check.frames.len();
         let figure = match self.args.target {
-            Some(Goal::Ssim(_)) => format!(", SSIM {:.4}", 1.0 - check.figure),
-            Some(Goal::Flip(_)) => format!(", FLIP {:.4}", check.figure),
-            Some(Goal::MaxShare(_)) => format!(", share {:.3} %", 100.0 * check.figure),
+            Some(Goal::Ssim(_)) => format!(", SSIM {:.4} in the worst", 1.0 - check.figure),
+            Some(Goal::Flip(_)) => format!(", FLIP {:.4} in the worst", check.figure),
+            Some(Goal::MaxShare(_)) => {
+                format!(", share {:.3} % in the worst", 100.0 * check.figure)
+            }
             _ => String::new(),
         };
         let time = rendered.map_or(String::new(), |seconds| {
@@ -222,7 +243,7 @@ impl Chooser<'_> {
         // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
         let foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
         let found = self.probe().fastest(&foretelling, allowed)?;
-        let foretold = match found.or_else(|| foretelling.best(&self.probe().range())) {
+        let foretold = match found {
             Some(foretold) if foretold.samples != choice.foretold.samples => foretold,
             _ => {
                 self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
@@ -239,26 +260,41 @@ impl Chooser<'_> {
     fn before(&self, tracer: &str) -> Option<Choice> {
         let value = self.request.header_before(tracer)?.chosen?;
         let before: Choice = serde_json::from_value(value).ok()?;
-        let is_same =
-            before.wanted == self.args.words() && before.base == Header::settings(self.stage.base);
+        let is_same = before.wanted == self.args.words()
+            && before.base == Header::settings(self.stage.base)
+            && before.given == self.given();
         is_same.then_some(before)
     }
 
-    fn probe(&self) -> Probe<'_> {
+    fn given(&self) -> Given {
         let s = self.options;
+        Given {
+            spp: s.spp.is_some(),
+            shadow: s.shadow_samples.is_some(),
+            sky: s.sky_samples.is_some(),
+            bounces: s.bounces.is_some(),
+            policy: s.reuse.policy.is_some() || self.request.maps,
+        }
+    }
+
+    /// Whether frames are rounded to 8 bits.
+    fn rounds(&self) -> bool {
+        self.request.pattern.format() != Format::Exr && self.stage.base.png_bits == 8
+    }
+
+    fn probe(&self) -> Probe<'_> {
         Probe {
             stage: self.stage,
+            frames: self.request.frames,
             goal: self.args.target,
-            given: Given {
-                spp: s.spp.is_some(),
-                shadow: s.shadow_samples.is_some(),
-                sky: s.sky_samples.is_some(),
-                bounces: s.bounces.is_some(),
-                policy: s.reuse.policy.is_some() || self.request.maps,
-                tolerance: s.reuse.tolerance.is_some(),
-            },
-            rounds: self.request.pattern.format() != Format::Exr && self.stage.base.png_bits == 8,
+            given: self.given(),
+            rounds: self.rounds(),
         }
+    }
+
+    /// Seconds.
+    fn budget(&self) -> f64 {
+        self.args.budget.unwrap_or_default().as_secs_f64()
     }
 
     /// A finished frame as displayed.
@@ -275,10 +311,9 @@ impl Chooser<'_> {
         Ok(image)
     }
 
-    /// Frames that one rank renders.
+    /// Frames that one rank renders, those among them that others are inferred from.
     fn frames(&self) -> f64 {
-        let range = self.request.frames;
-        f64::from((range.last - range.first + 1).div_ceil(self.ranks))
+        f64::from(self.probe().made_frames().div_ceil(self.ranks))
     }
 
     fn say_choice(&self, choice: &Choice) {
