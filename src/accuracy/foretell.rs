@@ -144,16 +144,17 @@ impl Foretelling {
         }
     }
 
-    /// What is foretold of `samples` in `mode`; twice the doubt is added.
+    /// What is foretold of `samples` in `mode`, the doubt added.
     pub fn of(&self, mode: &Mode, samples: Samples) -> Foretold {
         let tried = self.measured.iter().find(|measured| measured.samples == samples);
         let errors = tried.map_or_else(
             || self.law.errors(samples).collect::<Vec<_>>(),
             |measured| measured.errors.clone(),
         );
-        let each = errors.iter().zip(&self.bias).map(|(error, bias)| {
-            (1.0 + 2.0 * self.doubt) * (self.excess * error + bias) + self.rounding
-        });
+        let each = errors
+            .iter()
+            .zip(&self.bias)
+            .map(|(error, bias)| (1.0 + self.doubt) * (self.excess * error + bias) + self.rounding);
         let n = f64::from(samples.spp);
         let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
         Foretold {

@@ -6,44 +6,61 @@ use super::probe::{Probe, SMALL};
 use crate::error::Result;
 use crate::scene::{Policy, ReuseSettings, Settings};
 
-/// A trial shorter than this, seconds, is repeated: the shortest counts.
-const SHORT: f64 = 0.1;
+/// The least that a shadow or sky sample takes, of what a camera sample does.
+const LEAST: f64 = 0.03;
+
+/// Seconds. Settings are compared by those of CPU, which others on the machine change less; how these
+/// pass on the clock is told by many together.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Spent {
+    pub wall: f64,
+    pub cpu: f64,
+}
+
+impl Spent {
+    /// Wall seconds per second of CPU.
+    pub fn pace(self) -> f64 {
+        self.wall / f64::max(self.cpu, 1e-9)
+    }
+}
 
 impl Probe<'_> {
     /// All that may be chosen, with `bounces`.
     pub(super) fn modes(&self, bounces: u32) -> Result<Vec<Mode>> {
+        let causes = self.causes();
+        let mut turned = vec![(1, 1, 1), (6, 1, 1), (2, 4, 4)];
+        turned.extend(causes.shadow.then_some((2, 8, 1)));
+        turned.extend(causes.sky.then_some((2, 1, 8)));
         let mut modes = Vec::new();
         for reuse in self.kinds_of_reuse() {
             let (mut rows, mut measured) = (Vec::new(), Vec::new());
-            for (spp, shadow, sky) in [(1, 1, 1), (6, 1, 1), (2, 4, 4), (2, 8, 1), (2, 1, 8)] {
+            let mut spent = Spent::default();
+            for &(spp, shadow, sky) in &turned {
                 let mut settings = self.stage.base.clone();
                 (settings.spp, settings.shadow_samples, settings.sky_samples) = (spp, shadow, sky);
                 (settings.bounces, settings.reuse) = (bounces, reuse);
-                let (n, m, k) = (f64::from(spp), f64::from(shadow), f64::from(sky));
-                rows.push([1.0, n, n * m, n * k]);
-                measured.push(self.small_seconds(&settings, SMALL)?);
+                let by = |is_there, count: u32| if is_there { f64::from(spp * count) } else { 0.0 };
+                let (shadow, sky) = (by(causes.shadow, shadow), by(causes.sky, sky));
+                rows.push([1.0, f64::from(spp), shadow, sky]);
+                let small = self.small(&settings, SMALL)?;
+                measured.push(small.cpu);
+                spent = Spent { wall: spent.wall + small.wall, cpu: spent.cpu + small.cpu };
             }
             let [each, by_spp, by_shadow, by_sky] = fit(&rows, &measured).0;
+            // Such a sample is never free, whatever the noise says.
+            let least = |is_there, by: f64| if is_there { by.max(LEAST * by_spp) } else { 0.0 };
+            let (by_shadow, by_sky) = (least(causes.shadow, by_shadow), least(causes.sky, by_sky));
             let larger = self.enlargement();
-            modes.push(Mode {
-                reuse,
-                seconds: [each, larger * by_spp, larger * by_shadow, larger * by_sky],
-            });
+            let seconds = [each, larger * by_spp, larger * by_shadow, larger * by_sky];
+            modes.push(Mode { reuse, seconds: seconds.map(|cpu| cpu * spent.pace()) });
         }
         Ok(modes)
     }
 
-    /// Seconds of a frame with about `pixels` pixels.
-    pub(super) fn small_seconds(&self, settings: &Settings, pixels: f64) -> Result<f64> {
-        let mut shortest = f64::INFINITY;
-        for _ in 0..3 {
-            let trial = self.small_trial(settings, pixels)?;
-            shortest = shortest.min(trial.seconds);
-            if trial.seconds > SHORT {
-                break;
-            }
-        }
-        Ok(shortest)
+    /// What a frame with about `pixels` pixels takes.
+    pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Spent> {
+        let trial = self.small_trial(settings, pixels)?;
+        Ok(Spent { wall: trial.seconds, cpu: trial.cpu_seconds })
     }
 
     fn kinds_of_reuse(&self) -> Vec<ReuseSettings> {

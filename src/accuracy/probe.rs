@@ -30,7 +30,7 @@ const WIDE: (u32, u32, u32) = (4, 48, 9_300);
 pub(super) const SMALL: f64 = 7_000.0;
 /// How many times as many pixels the likely choices are timed with as well: the larger a frame, the less
 /// of it is edges, where light is not known from other frames.
-const LARGER: f64 = 4.0;
+const LARGER: f64 = 3.0;
 /// Ways to take over light foretold to take so many times as long as the fastest are not tried.
 const SLOWER: f64 = 2.5;
 /// Draws the patches: of the probe, and of the check.
@@ -121,22 +121,23 @@ impl Probe<'_> {
         let settings = foretold.settings(self.stage.base);
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let [small, large] = [SMALL, LARGER * SMALL].map(|most| most.min(pixels));
-        let of_large = self.small_seconds(&settings, large)? / large;
+        let by_large = self.small(&settings, large)?;
         if large < 1.5 * small {
-            return Ok(of_large * pixels);
+            return Ok(by_large.wall / large * pixels);
         }
-        let of_small = self.small_seconds(&settings, small)? / small;
+        let by_small = self.small(&settings, small)?;
+        let [of_small, of_large] = [by_small.cpu / small, by_large.cpu / large];
         let edges = (of_small - of_large) / (small.powf(-0.5) - large.powf(-0.5));
         let each = of_large + edges * (pixels.powf(-0.5) - large.powf(-0.5));
-        Ok(each.clamp(0.3 * of_large, of_large) * pixels)
+        Ok(each.clamp(0.3 * of_large, of_large) * pixels * by_large.pace())
     }
 
     /// What may be chosen.
     pub fn range(&self) -> Range {
         let (base, plan) = (self.stage.base, self.plan());
-        // Sobol points are laid out evenly in powers of two; 24 camera samples are often no better
-        // than 16.
-        let numbers = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024];
+        // Sobol points are laid out best in powers of two; half way between them is tried where a
+        // step is dear.
+        let numbers = [1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192, 256, 512, 1024];
         let among = |is_free: bool, most: u32, given: u32| match is_free {
             true => numbers.into_iter().filter(|n| *n <= most).collect(),
             false => vec![given],

@@ -18,8 +18,8 @@ use std::time::{Duration, Instant};
 
 /// How often a target that was missed is tightened.
 const ROUNDS: u32 = 2;
-/// Kept back of a budget: for writing frames, and for what is foretold too short.
-const RESERVE: f64 = 0.05;
+/// Kept back of a budget: for writing frames and the check, and for what is foretold too short.
+const RESERVE: f64 = 0.08;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]

@@ -1,34 +1,28 @@
 //! `tweenray render`: every frame of a shot, and a video of them.
 
 mod choosing;
+mod round;
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::choose::{Choice, ChoiceArgs};
 use super::exit::Exit;
 use super::machine;
-use super::progress::{Watch, duration, percent};
+use super::progress::{duration, percent};
 use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
-use super::stats::{self, RankStats};
+use super::stats;
 use crate::cluster::{self, Outcome, World};
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
-use crate::intersect::{self, Intersector};
+use crate::intersect;
 use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
-use crate::output::{Format, atomic};
-use crate::reuse::colour::Rule;
-use crate::scene::{Policy, Settings};
-use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{
-    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
-};
-use crate::shade::Renderer;
+use crate::scene::Settings;
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
 use clap::{Args, Command, FromArgMatches};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use round::{Clock, Frames, Round, Site};
 use std::time::Instant;
 
 /// Render the frames of a camera move
@@ -137,75 +131,6 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     }
 }
 
-/// Where frames are rendered.
-struct Site<'a> {
-    world: &'a World,
-    intersector: &'a dyn Intersector,
-    pool: &'a ThreadPool,
-    /// The ranks, node by node.
-    order: &'a [u32],
-    interrupt: &'a Interrupt,
-    clock: Clock,
-    /// Whether nothing is said.
-    quiet: bool,
-}
-
-/// When the program started, and when it had loaded and built the scene.
-struct Clock {
-    start: Instant,
-    loaded: Instant,
-    built: Instant,
-}
-
-/// What came of rendering all frames once.
-struct Round {
-    plan: Plan,
-    outcome: Outcome,
-    /// Frames that no rank got to; every rank knows it.
-    unfinished: usize,
-    seconds: f64,
-    /// What each rank took, and why it was asked to stop; known on rank 0.
-    ranks: Vec<RankStats>,
-    reasons: Vec<String>,
-}
-
-impl Site<'_> {
-    /// Renders the frames of `request` that are not there yet. All ranks call it.
-    fn render(&self, request: &Request, target: &Target) -> Result<Round> {
-        let plan = self.world.from_root(|| {
-            request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
-            self.pool.install(|| sequence::prepare(target, request.frames))
-        })?;
-        tell(self.quiet, &plan.notes, |n| say::note(n));
-        let job = Frames { request, target, plan: &plan, site: self };
-        let begun = Instant::now();
-        let (outcome, reference_bytes, saved) = job.render()?;
-        let seconds = begun.elapsed().as_secs_f64();
-        let Clock { start, loaded, built } = self.clock;
-        let rank = RankStats {
-            threads: self.pool.current_num_threads(),
-            load_seconds: (loaded - start).as_secs_f64(),
-            build_seconds: (built - loaded).as_secs_f64(),
-            render_seconds: built.elapsed().as_secs_f64(),
-            intersector_bytes: self.intersector.memory(),
-            reference_bytes,
-            checkpoint_seconds: saved.seconds,
-            checkpoint_bytes: saved.bytes,
-            duty: outcome.own,
-            peak_memory_bytes: None,
-        };
-        let ranks = self.world.gather(&rank.with_peak())?;
-        // Whichever rank was asked to stop knows why.
-        let reasons = self.world.gather(&self.interrupt.reason())?;
-        // A rank that was asked to stop when all its frames were finished has not stopped the job.
-        let unfinished = self.world.from_root(|| Ok(outcome.unfinished))?;
-        if unfinished == 0 && self.world.is_root() {
-            checkpoint::clear(target);
-        }
-        Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons })
-    }
-}
-
 /// Tells what there is to tell of a job that renders no more frames.
 fn conclude(job: &Frames, round: &Round) -> Result<Exit> {
     let Round { plan, outcome, unfinished, ranks, .. } = round;
@@ -251,76 +176,6 @@ fn thread_pool(threads: usize) -> Result<ThreadPool> {
 fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {
     if !quiet {
         words.iter().for_each(say);
-    }
-}
-
-/// What rendering the planned frames takes.
-struct Frames<'a> {
-    request: &'a Request,
-    target: &'a Target,
-    plan: &'a Plan,
-    site: &'a Site<'a>,
-}
-
-impl Frames<'_> {
-    /// What became of the frames, the most memory that references took, bytes, and what it took to
-    /// put them on disk.
-    fn render(&self) -> Result<(Outcome, u64, SaveCost)> {
-        let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
-        let Site { world, intersector, pool, order, interrupt, quiet, .. } = *self.site;
-        let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
-        let effects = EffectPlan::of(scene, settings);
-        let renderer = Renderer { scene, settings, plan: effects, intersector };
-        let with_gbuffer = pattern.format() == Format::Exr;
-        let checkpoints = self.checkpoints();
-        let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
-        let maker: Box<dyn Shared> = match settings.reuse.policy {
-            Policy::Surface => {
-                let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
-                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
-                maker.with_gbuffer = with_gbuffer;
-                maker.supplied = &self.request.references.list;
-                maker.checkpoints = Some(&checkpoints);
-                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
-                maker.terms = with_gbuffer.then(|| self.request.terms.clone());
-                Box::new(maker)
-            }
-            Policy::Colour => {
-                let rule = Rule {
-                    colour_epsilon: settings.reuse.colour_epsilon,
-                    distance_epsilon: settings.reuse.distance_epsilon,
-                };
-                let mut maker =
-                    ColourMaker::new(renderer, shot, pool, stop, &watch, rule, uploads)?;
-                maker.with_gbuffer = with_gbuffer;
-                Box::new(maker)
-            }
-            Policy::Off => {
-                let (progress, laid) = (&watch, Default::default());
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
-            }
-        };
-        let done = |report: &_| watch.frame_done(report);
-        let work = || cluster::render(world, order, target, plan, &*maker, stop, &done);
-        let outcome = interrupt.watched(work);
-        watch.finish();
-        tell(quiet, &maker.notes(), |n| say::note(n));
-        if let (Err(error), true) = (&outcome, world.size() > 1) {
-            // The other ranks are in the middle of their frames and would wait for this one.
-            say::error(error);
-            world.abort(Exit::of(error).code());
-        }
-        Ok((outcome?, maker.reference_memory(), maker.save_cost()))
-    }
-
-    fn checkpoints(&self) -> Checkpoints<'_> {
-        let Request { scene, settings, terms, checkpoint, .. } = self.request;
-        let whole = settings.crop.is_none();
-        Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
-    }
-
-    fn total(&self) -> usize {
-        self.plan.kept.len() + self.plan.render.len()
     }
 }
 

@@ -53,9 +53,44 @@ fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
     assert_eq!(header(&job)["chosen"]["wanted"], "20 s");
 }
 
+/// A job that was stopped goes on under the choice that it began with, however many frames it has.
+#[test]
+fn a_job_that_was_cut_short_chooses_the_same() {
+    let job = Job::new();
+    let line = LINE.replace("1..3", "1..9");
+    job.done(&format!("{} --target psnr=36", line.replace("1..9", "1..2")));
+    let before = (header(&job)["settings"].clone(), job.read("o/f_01.png"));
+    let ran = job.done(&format!("{line} --target psnr=36"));
+    assert!(ran.err.contains("as chosen before"), "{}", ran.err);
+    assert_eq!((header(&job)["settings"].clone(), job.read("o/f_01.png")), before);
+}
+
+#[test]
+fn figures_that_need_neighbours_are_targets_too() {
+    let job = Job::new();
+    for (target, figure) in [("ssim=0.9", ", SSIM 0.9"), ("flip=10%", ", FLIP 0.0")] {
+        let said = job.done(&format!("{LINE} --target {target} --overwrite")).err;
+        assert!(said.contains(figure), "{said}");
+    }
+}
+
+#[test]
+fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
+    let job = Job::new();
+    job.refused(&format!("{LINE} --target psnr=70"), "--png-bits 16");
+    job.refused(
+        &format!("{LINE} --target psnr=50 --spp 1"),
+        "is foretold to reach psnr=50; --spp 1",
+    );
+    assert!(!job.path("o/f_01.png").exists());
+}
+
 #[test]
 fn what_cannot_be_foretold_is_refused() {
     let job = Job::new();
+    for target in ["psnr", "psnr=", "psnr=-1", "psnr=nan", "ssim=2", "max-share=200%", "flip=0"] {
+        job.refused(&format!("{LINE} --target {target}"), "--target");
+    }
     job.refused(&format!("{LINE} --target mse=1"), "psnr=45, ssim=0.99");
     job.refused(&format!("{LINE} --target psnr=45 --budget 1m"), "cannot be used with");
     job.refused(&format!("{LINE} --budget never"), "90s, 10m or 1h30m");

@@ -1,6 +1,7 @@
 //! Settings that the program chooses: by rank 0, for all.
 
-use super::{Frames, RenderArgs, Round, Site};
+use super::RenderArgs;
+use super::round::{Frames, Round, Site};
 use crate::accuracy::Stage;
 use crate::cli::choose::{Choice, Chooser};
 use crate::cli::request::Request;
