@@ -123,7 +123,11 @@ impl<'a> Search<'a> {
             Some(((samples, errors), reference)) => law.through(*samples, errors, *reference),
             None => law,
         };
-        let line = Line::through(&self.figures);
+        // Where errors are small: a share of pixels cannot go on rising.
+        let mut smallest = self.figures.clone();
+        smallest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        smallest.truncate(4);
+        let line = Line::through(&smallest);
         self.foretelling.line = match self.figures.last() {
             Some(last) => line.map(|line| line.shifted_to(*last)),
             None => line,

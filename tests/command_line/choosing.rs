@@ -45,7 +45,7 @@ fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
 #[test]
 fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
     let job = Job::new();
-    job.done(&format!("{LINE} --target max-share=5% --spp 5 --policy off"));
+    job.done(&format!("{LINE} --target psnr=30 --spp 5 --policy off"));
     let settings = &header(&job)["settings"];
     assert_eq!((&settings["spp"], &settings["reuse"]["policy"]), (&5.into(), &"off".into()));
     let said = job.done(&format!("{LINE} --budget 20s --overwrite")).err;

@@ -39,15 +39,18 @@ impl Choosing<'_> {
         choice: Option<Choice>,
     ) -> Result<Option<Choice>> {
         let Some(choice) = choice else { return Ok(None) };
-        let judge = || {
+        // A list of one or none: to other ranks, nothing would look like no answer.
+        let judge = || -> Result<Vec<Choice>> {
             if round.plan.render.is_empty() {
-                return Ok(None);
+                return Ok(Vec::new());
             }
             let audit = stats::audit_of(&round.plan, &round.outcome);
             let seconds = round.plan.kept.is_empty().then_some(round.seconds);
-            self.ask(job.request, |chooser| chooser.judge(&choice, audit.as_ref(), seconds))
+            let judge = |chooser: &Chooser| chooser.judge(&choice, audit.as_ref(), seconds);
+            Ok(self.ask(job.request, judge)?.into_iter().collect())
         };
-        self.site.interrupt.watched(|| self.site.world.from_root(judge))
+        let tighter = self.site.interrupt.watched(|| self.site.world.from_root(judge))?;
+        Ok(tighter.into_iter().next())
     }
 
     fn ask<T>(&self, request: &Request, question: impl Fn(&Chooser) -> Result<T>) -> Result<T> {
