@@ -53,16 +53,21 @@ fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
     assert_eq!(header(&job)["chosen"]["wanted"], "20 s");
 }
 
-/// A job that was stopped goes on under the choice that it began with, however many frames it has.
+/// More frames are rendered under the choice of the first, or all under a tighter one where these show
+/// that it is not enough; the next run keeps them either way.
 #[test]
-fn a_job_that_was_cut_short_chooses_the_same() {
+fn a_job_that_gets_longer_keeps_its_choice_or_its_tighter_one() {
     let job = Job::new();
     let line = LINE.replace("1..3", "1..9");
     job.done(&format!("{} --target psnr=36", line.replace("1..9", "1..2")));
-    let before = (header(&job)["settings"].clone(), job.read("o/f_01.png"));
     let ran = job.done(&format!("{line} --target psnr=36"));
     assert!(ran.err.contains("as chosen before"), "{}", ran.err);
-    assert_eq!((header(&job)["settings"].clone(), job.read("o/f_01.png")), before);
+    let before = (header(&job), job.read("o/f_01.png"));
+    let tightened = before.0["chosen"]["tightened"].as_u64() > Some(0);
+    assert_eq!(tightened, ran.err.contains("rendered again, tightened"), "{}", ran.err);
+    let ran = job.done(&format!("{line} --target psnr=36"));
+    assert!(ran.out.contains("0 rendered, 9 kept"), "{}", ran.out);
+    assert_eq!((header(&job), job.read("o/f_01.png")), before);
 }
 
 #[test]
@@ -93,7 +98,7 @@ fn what_cannot_be_foretold_is_refused() {
     }
     job.refused(&format!("{LINE} --target mse=1"), "psnr=45, ssim=0.99");
     job.refused(&format!("{LINE} --target psnr=45 --budget 1m"), "cannot be used with");
-    job.refused(&format!("{LINE} --budget never"), "90s, 10m or 1h30m");
+    job.refused(&format!("{LINE} --budget never"), "90s, 25m or 1h30m");
     job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
 }
