@@ -59,6 +59,7 @@ fn target(folder: &Path) -> Target {
         header: Header {
             manifest: FORMAT,
             command: Vec::new(),
+            chosen: None,
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),

@@ -89,6 +89,7 @@ impl Bed {
         let header = Header {
             manifest: FORMAT,
             command: Vec::new(),
+            chosen: None,
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),

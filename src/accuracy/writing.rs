@@ -134,6 +134,7 @@ fn target(stage: &Stage, folder: &Path, keeps_light: bool) -> Result<Target> {
         files: manifest::file_name(&pattern),
         tracer: String::new(),
         command: Vec::new(),
+        chosen: None,
         settings: Header::settings(stage.base),
     };
     let recipes = Recipes::new(stage.shot, stage.base, keeps_light, false)?;

@@ -66,6 +66,11 @@ impl References {
         supply.serve(cards);
         Ok(Self { supply: Some(supply), hash })
     }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.supply.is_none()
+    }
 }
 
 /// Which of `count` files this rank looks into.

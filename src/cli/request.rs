@@ -9,7 +9,7 @@ use crate::cluster::World;
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
-use crate::output::manifest::{self, Header};
+use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
@@ -50,6 +50,8 @@ pub struct Request {
     pub maps: bool,
     /// On which terms frames serve as references.
     pub terms: Terms,
+    /// What each frame of the shot is made of.
+    pub recipes: Recipes,
     /// Frames of an earlier job.
     pub references: References,
     /// Pictures that are taken for frames.
@@ -61,7 +63,6 @@ pub struct Request {
     scene_name: String,
     scene_hash: String,
     shot_hash: String,
-    recipes: Recipes,
 }
 
 /// What files say, and what comes of it. One rank of each node reads them; the others are told.
@@ -126,7 +127,7 @@ impl Read {
 impl Request {
     /// Reads the scene and puts the options over it. All ranks call it.
     pub fn load(world: &World, args: &RenderArgs) -> Result<Self> {
-        let RenderArgs { scene, settings, output } = args;
+        let RenderArgs { scene, settings, output, .. } = args;
         // Before the work of reading a scene.
         world.agree(machine::best_isa())?;
         let read = world.from_node(|| Read::by(scene, settings, output));
@@ -193,6 +194,26 @@ impl Request {
         settings
     }
 
+    /// What depends on the settings: on which terms frames serve as references, and their recipes.
+    ///
+    /// Errors: those of [`Recipes::new`].
+    pub fn terms_and_recipes(&self, settings: &Settings) -> Result<(Terms, Recipes)> {
+        let Self { scene, shot, pattern, scene_hash, .. } = self;
+        let Derived { terms, recipes } =
+            Derived::new((scene, shot), settings, pattern, scene_hash)?;
+        Ok((terms, recipes))
+    }
+
+    /// The header of the frames that are there, where they are of this scene, version and `tracer`
+    /// and are to be kept.
+    pub fn header_before(&self, tracer: &str) -> Option<Header> {
+        let header = Manifest::read(&manifest::manifest_path(&self.pattern)).ok()??.header;
+        let is_same = header.scene_hash == self.scene_hash
+            && header.tweenray == env!("CARGO_PKG_VERSION")
+            && header.tracer == tracer;
+        (is_same && !self.overwrite).then_some(header)
+    }
+
     /// Where frames traced by `tracer` go, and what they share.
     pub fn target(&self, tracer: String) -> Target {
         let header = Header {
@@ -205,6 +226,7 @@ impl Request {
             files: manifest::file_name(&self.pattern),
             tracer,
             command: super::words(),
+            chosen: None,
             settings: self.header_settings(),
         };
         Target {
@@ -230,6 +252,15 @@ impl Derived {
     fn of(read: &Read, output: &OutputArgs) -> Result<Self> {
         let Read { scene, shot, settings, pattern, scene_hash, .. } = read;
         refuse_maps(output.maps, settings)?;
+        Self::new((scene, shot), settings, pattern, scene_hash)
+    }
+
+    fn new(
+        (scene, shot): (&Scene, &Shot),
+        settings: &Settings,
+        pattern: &FramePattern,
+        scene_hash: &str,
+    ) -> Result<Self> {
         let terms = references::terms(scene_hash, scene, settings);
         let with_motion = pattern.format() == Format::Exr;
         let recipes = Recipes::new(shot, settings, !terms.lights.is_empty(), with_motion)?;

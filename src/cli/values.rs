@@ -1,5 +1,6 @@
 //! Values of options as people type them: sizes, frame ranges, crops, choices, numbers in bounds.
 
+use crate::accuracy::Goal;
 use crate::scene::{FrameRange, Interval, Rect, parse_time};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
@@ -92,6 +93,27 @@ pub fn crop(text: &str) -> Result<Rect, String> {
     }
 }
 
+/// `psnr=45`, `ssim=0.99`, `flip=0.02`, `max-share=0.1%`.
+pub fn goal(text: &str) -> Result<Goal, String> {
+    let wrong = "a target is written psnr=45, ssim=0.99, flip=0.02 or max-share=0.1%";
+    let (figure, value) = text.split_once('=').ok_or(wrong)?;
+    let share = |text: &str| match text.strip_suffix('%') {
+        Some(percent) => within(0.0..=100.0)(percent).map(|p| 0.01 * p),
+        None => within(0.0..=1.0)(text),
+    };
+    let inner = |x: f64| match x > 0.0 && x < 1.0 {
+        true => Ok(x),
+        false => Err("this target has to lie between 0 and 1 (100 %), both excluded".to_string()),
+    };
+    match figure.trim() {
+        "psnr" => within(10.0..=100.0)(value).map(Goal::Psnr),
+        "ssim" => share(value).and_then(inner).map(Goal::Ssim),
+        "flip" => share(value).and_then(inner).map(Goal::Flip),
+        "max-share" => share(value).and_then(inner).map(Goal::MaxShare),
+        _ => Err(wrong.into()),
+    }
+}
+
 /// `25m`, `1h30m`, `90s`, `2d`.
 pub fn time(text: &str) -> Result<Duration, String> {
     parse_time(text)
@@ -176,6 +198,18 @@ mod tests {
         assert_eq!(upload("9=a=b.png"), Ok((9, PathBuf::from("a=b.png"))));
         for text in ["9", "9=", "=a.png", "x=a.png", "-1=a.png", "a.png"] {
             assert!(upload(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn targets_are_read_as_people_write_them() {
+        assert_eq!(goal("psnr=45"), Ok(Goal::Psnr(45.0)));
+        assert_eq!(goal("max-share=25%"), Ok(Goal::MaxShare(0.25)));
+        assert_eq!(goal("ssim=0.99"), Ok(Goal::Ssim(0.99)));
+        for text in
+            ["psnr", "psnr=", "psnr=nan", "psnr=999", "ssim=1", "flip=0", "mse=1", "flip=x%"]
+        {
+            assert!(goal(text).is_err(), "{text}");
         }
     }
 

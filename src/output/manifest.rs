@@ -49,6 +49,9 @@ pub struct Header {
     /// The words of the command that started the sequence, program first; told, never compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
+    /// How the program chose the settings, where it did; told, never compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<Value>,
     /// Every setting, by name. Kept as JSON, so that a manifest of another version can be read
     /// far enough to say what differs.
     pub settings: Value,

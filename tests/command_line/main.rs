@@ -1,5 +1,6 @@
 //! The program as a user meets it: words, exit codes, files.
 
+mod choosing;
 mod comparing;
 mod interrupted;
 mod job;
