@@ -102,3 +102,19 @@ fn what_cannot_be_foretold_is_refused() {
     job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
 }
+
+/// Another tree takes another time, and may give other last bits.
+#[test]
+fn a_choice_serves_only_the_tree_that_it_was_made_with() {
+    let job = Job::new();
+    let line = format!("{LINE} --target psnr=30");
+    job.done(&line);
+    for option in ["--build-quality high", "--compact on"] {
+        let ran = job.run(&format!("{line} {option}"));
+        // The frames that are there are of the first tree.
+        assert_eq!(ran.code, Some(2), "{}", ran.err);
+        assert!(ran.err.contains("probe:") && ran.err.contains("--overwrite"), "{}", ran.err);
+        assert!(!ran.err.contains("as chosen before"), "{}", ran.err);
+    }
+    assert!(job.done(&line).err.contains("as chosen before"));
+}
