@@ -8,7 +8,7 @@ use support::camera_rays;
 
 use std::cell::Cell;
 use support::Candidate;
-use tweenray::embree::{BareCamera, BuildOptions, CommittedScene, SceneBuilder};
+use tweenray::embree::{BareCamera, BuildOptions, CommittedScene, Quality, SceneBuilder};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
 use tweenray::scene::{Camera, HitRules, Recheck, Scene};
 use tweenray::stats::RayCounts;
@@ -32,7 +32,13 @@ fn main() {
 
 /// The scene's triangles in Embree, as the intersect layer builds them.
 fn commit(scene: &Scene) -> CommittedScene<'_> {
-    let options = BuildOptions { threads: 2, isa: None, robust: true };
+    let options = BuildOptions {
+        threads: 2,
+        isa: None,
+        robust: true,
+        quality: Quality::Medium,
+        compact: false,
+    };
     let mut builder = SceneBuilder::new(&options).expect("a device");
     for mesh in &scene.meshes {
         let added = builder.add_triangles(

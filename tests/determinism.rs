@@ -12,7 +12,8 @@ use tweenray::film::Film;
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    Filter, Glass, Light, Material, QuadLight, Rect, Sky, World, WorldMesh, WorldSphere,
+    BuildQuality, Filter, Glass, Light, Material, QuadLight, Rect, Sky, World, WorldMesh,
+    WorldSphere,
 };
 use tweenray::shade::Renderer;
 
@@ -106,6 +107,31 @@ fn any_number_of_threads_gives_the_same_bytes() {
     for threads in [2, 3, 8] {
         assert!(one == on_threads(&job, threads), "{threads} threads differ");
     }
+}
+
+#[test]
+fn other_trees_see_the_same_and_a_compact_one_is_smaller() {
+    let plain = on_threads(&busy_job(101, 77), 2);
+    let memory = |job: &Job| {
+        let scene = job.world.clone().into_scene(true).unwrap();
+        intersect::build(&scene, &job.settings, 2).unwrap().memory()
+    };
+    for quality in [BuildQuality::Low, BuildQuality::Medium, BuildQuality::High] {
+        for compact in [false, true] {
+            let mut job = busy_job(101, 77);
+            job.settings.build_quality = quality;
+            job.settings.compact = compact;
+            let one = on_threads(&job, 1);
+            assert!(one == on_threads(&job, 3), "{quality:?} {compact}: 3 threads differ");
+            let differing = one.rgb.iter().zip(&plain.rgb).filter(|(a, b)| a != b).count();
+            // A ray that meets two triangles at their common edge may take either.
+            assert!(differing <= 8, "{quality:?} {compact}: {differing} pixels");
+        }
+    }
+    let mut job = busy_job(101, 77);
+    let was = memory(&job);
+    job.settings.compact = true;
+    assert!(memory(&job) < was, "{} {was}", memory(&job));
 }
 
 #[test]

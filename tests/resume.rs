@@ -12,11 +12,12 @@ use tweenray::intersect;
 use tweenray::output::manifest::{FORMAT, Header, manifest_path};
 use tweenray::output::{Format, FramePattern, WriteOptions};
 use tweenray::reuse;
+use tweenray::reuse::colour::Rule;
 use tweenray::reuse::store::Terms;
-use tweenray::scene::{FrameRange, Rect, Scene, Settings, Shot};
+use tweenray::scene::{FrameRange, Policy, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
 use tweenray::sequence::{
-    FrameMaker, Inferrer, Pyramid, Recipes, Shared, Target, prepare, render_frames,
+    ColourMaker, FrameMaker, Inferrer, Pyramid, Recipes, Shared, Target, prepare, render_frames,
 };
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
@@ -56,6 +57,15 @@ struct Run {
     notes: Vec<String>,
 }
 
+/// What makers are made of.
+struct Tools<'a> {
+    renderer: Renderer<'a>,
+    pool: &'a rayon::ThreadPool,
+    stop: &'a AtomicBool,
+    traced: &'a Traced,
+    checkpoints: &'a Checkpoints<'a>,
+}
+
 impl Bed {
     fn new(ending: &'static str, crop: Option<Rect>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
@@ -79,6 +89,7 @@ impl Bed {
         let header = Header {
             manifest: FORMAT,
             command: Vec::new(),
+            chosen: None,
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),
@@ -108,27 +119,56 @@ impl Bed {
     }
 
     fn process(&self, act: impl FnOnce(&mut Inferrer, &Target, &Terms)) -> Run {
+        self.with(|tools| {
+            let pyramid = Pyramid { segment: 8, frames: 17 };
+            let Tools { renderer, pool, stop, traced, checkpoints } = tools;
+            let maker = Inferrer::new(renderer, &self.shot, pool, stop, traced, pyramid);
+            let mut maker = maker.expect("cameras");
+            maker.with_gbuffer = self.ending == "exr";
+            maker.terms = maker.with_gbuffer.then(|| checkpoints.terms.clone());
+            maker.checkpoints = Some(checkpoints);
+            act(&mut maker, checkpoints.target, checkpoints.terms);
+            maker.notes()
+        })
+    }
+
+    /// As [`run`](Self::run), under policy `colour`.
+    fn run_colour(&self, frames: &[u32], count: usize) -> Run {
+        self.with(|tools| {
+            let rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+            let Tools { renderer, pool, stop, traced, checkpoints } = tools;
+            let maker = ColourMaker::new(renderer, &self.shot, pool, stop, traced, rule, &[]);
+            let mut maker = maker.expect("no pictures");
+            maker.checkpoints = Some(checkpoints);
+            maker.expect(frames);
+            let (target, frames) = (checkpoints.target, &frames[..count]);
+            let journal = manifest_path(&target.pattern);
+            render_frames(target, frames, (0, &journal), &maker, &mut |_| Ok(())).expect("renders");
+            maker.notes()
+        })
+    }
+
+    fn with(&self, act: impl FnOnce(Tools) -> Vec<String>) -> Run {
         let target = self.target();
         let settings = &self.settings;
         let mut notes = prepare(&target, ALL).expect("ready").notes;
         let plan = EffectPlan::of(&self.scene, settings);
         let channels = reuse::channels(&self.scene, &plan, settings);
         let terms = Terms::of("h", &channels, settings);
-        let whole = settings.crop.is_none();
+        let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
         let every = Some(Duration::ZERO);
         let checkpoints = Checkpoints::new(&target, every, &terms, self.scene.recentring, whole);
         let intersector = intersect::build(&self.scene, settings, 1).expect("a tree");
         let renderer = Renderer { scene: &self.scene, settings, plan, intersector: &*intersector };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
         let (stop, traced) = (AtomicBool::new(false), Traced::default());
-        let pyramid = Pyramid { segment: 8, frames: 17 };
-        let maker = Inferrer::new(renderer, &self.shot, &pool, &stop, &traced, pyramid);
-        let mut maker = maker.expect("cameras");
-        maker.with_gbuffer = self.ending == "exr";
-        maker.terms = maker.with_gbuffer.then(|| terms.clone());
-        maker.checkpoints = Some(&checkpoints);
-        act(&mut maker, &target, &terms);
-        notes.extend(maker.notes());
+        notes.extend(act(Tools {
+            renderer,
+            pool: &pool,
+            stop: &stop,
+            traced: &traced,
+            checkpoints: &checkpoints,
+        }));
         let frames = *traced.0.lock().expect("whole");
         Run { frames: frames.round(), notes }
     }
@@ -252,4 +292,40 @@ fn references_of_other_jobs_are_removed_with_the_reason() {
     let notes = bed.run(&[2], 0).notes;
     assert!(notes[0].contains("is of another camera move"), "{notes:?}");
     assert!(!bed.reference(1).exists());
+}
+
+/// Under policy `colour` frame 2 is inferred from frames 1, 17, 9, 5 and 3.
+#[test]
+fn discoveries_of_policy_colour_are_read_or_made_again() {
+    let frames = [1, 17, 9, 5, 3, 2];
+    for ending in ["png", "exr"] {
+        let colour = || {
+            let mut bed = Bed::new(ending, None);
+            bed.settings.reuse.policy = Policy::Colour;
+            bed
+        };
+        let whole = colour();
+        whole.run_colour(&frames, 6);
+        assert!(!whole.reference(1).exists(), "what no frame needs is removed");
+        let killed = || {
+            let bed = colour();
+            assert_eq!(bed.run_colour(&frames, 5).frames, 5.0);
+            bed
+        };
+        let bed = killed();
+        let run = bed.run_colour(&[2], 1);
+        assert_eq!((run.frames, &run.notes[..]), (1.0, &[][..]));
+        assert!(bed.frame(2) == whole.frame(2), "{ending}");
+        // Frame 17's are damaged: it is traced again, and frame 9, which is there, is not.
+        let bed = killed();
+        flip(&bed.reference(17), 1_000_000);
+        let run = bed.run_colour(&[2], 1);
+        assert_eq!(run.frames, 2.0);
+        assert!(run.notes[0].contains("is damaged"), "{:?}", run.notes);
+        assert!(bed.frame(2) == whole.frame(2), "{ending}");
+        let bed = killed();
+        fs::remove_dir_all(bed.path(".f.references")).expect("removed");
+        assert_eq!(bed.run_colour(&[2], 1).frames, 6.0);
+        assert!(bed.frame(2) == whole.frame(2), "{ending}");
+    }
 }

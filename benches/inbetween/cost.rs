@@ -3,7 +3,7 @@
 use super::moves::{self, Set};
 use super::{Choice, quartiles, support};
 use rayon::ThreadPool;
-use tweenray::embree::{BareCamera, BuildOptions, CommittedScene, SceneBuilder};
+use tweenray::embree::{BareCamera, BuildOptions, CommittedScene, Quality, SceneBuilder};
 use tweenray::scene::{Camera, Policy, Scene, Settings};
 
 /// Frames of the move.
@@ -18,7 +18,13 @@ pub struct Bare<'s> {
 impl<'s> Bare<'s> {
     /// The scene's triangles in Embree, as the intersect layer builds them.
     pub fn new(scene: &'s Scene, threads: usize) -> Self {
-        let options = BuildOptions { threads, isa: None, robust: true };
+        let options = BuildOptions {
+            threads,
+            isa: None,
+            robust: true,
+            quality: Quality::Medium,
+            compact: false,
+        };
         let mut builder = SceneBuilder::new(&options).expect("a device");
         for mesh in &scene.meshes {
             let none = std::iter::empty();

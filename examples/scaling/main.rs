@@ -17,6 +17,7 @@ mod real;
 use predict::{Change, MOST, NONE, curve};
 
 fn main() {
+    let before = load();
     let stage = real::Stage::new();
     println!("real ranks, oversubscribed");
     let fit = fit::fit(&stage);
@@ -38,7 +39,9 @@ fn main() {
     let to_all = Change { tells_all: true, ..NONE };
     let all =
         curve(&costs, "every discovery to every rank", &[1, 4, 16, 64, 256, 1024, MOST], to_all);
+    let machine = machine(&before);
     let page = page::Page {
+        machine: &machine,
         fit: &fit,
         costs: &costs,
         ours: &ours,
@@ -48,4 +51,23 @@ fn main() {
         paper: &paper,
     };
     page.write();
+}
+
+/// What it ran on, in words, with the load average of the last minute before it began and now.
+fn machine(before: &str) -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let online = info.lines().filter(|line| line.starts_with("processor")).count();
+    let own = std::thread::available_parallelism().map_or(1, usize::from);
+    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let model = model.map_or("unknown", |(_, name)| name.trim());
+    format!(
+        "{own} of {online} cores ({model}), which other work used too: the load average was {before} when it \
+         began and {} when it ended",
+        load()
+    )
+}
+
+fn load() -> String {
+    let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    text.split(' ').next().unwrap_or("unknown").into()
 }

@@ -12,6 +12,7 @@ const TEXT: &str = include_str!("page.md");
 
 /// What stands on it.
 pub struct Page<'a> {
+    pub machine: &'a str,
     pub fit: &'a Fit,
     pub costs: &'a Costs,
     pub ours: &'a Curve,
@@ -45,6 +46,7 @@ impl Page<'_> {
             seconds.iter().sum::<f64>() / seconds.len() as f64
         };
         vec![
+            ("machine", self.machine.into()),
             ("frames", format!("{FRAMES}")),
             ("words", WORDS.into()),
             ("key", format!("{:.2} s", mean(true))),

@@ -16,6 +16,17 @@ pub enum Goal {
     MaxShare(f64),
 }
 
+impl std::fmt::Display for Goal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Psnr(least) => write!(f, "psnr={least}"),
+            Self::Ssim(least) => write!(f, "ssim={least}"),
+            Self::Flip(most) => write!(f, "flip={most}"),
+            Self::MaxShare(most) => write!(f, "max-share={}%", 100.0 * most),
+        }
+    }
+}
+
 impl Goal {
     /// Whether `errors` reach it.
     pub fn is_met(self, errors: &Errors) -> bool {

@@ -16,10 +16,15 @@ pub type Frames = BTreeMap<u32, Image>;
 
 /// The film as it is displayed.
 pub fn displayed(film: &Film, settings: &Settings) -> Image {
+    let rgb = displayed_rgb(&film.rgb, settings);
+    Image { width: film.width, height: film.height, rgb, encoding: Encoding::Srgb }
+}
+
+/// Radiance as it is displayed.
+pub fn displayed_rgb(rgb: &[Rgb], settings: &Settings) -> Vec<Rgb> {
     let display = Display { exposure: settings.exposure, tone: settings.tone };
     let code = |c: &Rgb| Rgb::from_array(display.code(*c).map(|v| v as f32));
-    let rgb = film.rgb.par_iter().map(code).collect();
-    Image { width: film.width, height: film.height, rgb, encoding: Encoding::Srgb }
+    rgb.par_iter().map(code).collect()
 }
 
 /// How far the frames of a setting are off from the reference; means over the move.

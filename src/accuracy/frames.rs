@@ -29,6 +29,11 @@ impl Cut {
         Self(segment.map(|segment| Pyramid { segment, frames }), frames)
     }
 
+    /// Frames of the move that are traced whole.
+    pub fn keys(&self) -> u32 {
+        self.0.map_or(self.1, |pyramid| pyramid.keys())
+    }
+
     /// Whether `frame` is traced whole.
     pub fn is_key(&self, frame: u32) -> bool {
         self.0.is_none_or(|pyramid| pyramid.is_key(frame))
@@ -51,7 +56,7 @@ impl Cut {
             *sum += value;
             *count += 1.0;
         }
-        let keys = self.0.map_or(self.1, |pyramid| pyramid.keys());
+        let keys = self.keys();
         let weights = [f64::from(self.1 - keys), f64::from(keys)];
         let kinds = || sums.iter().zip(weights).filter(|((_, count), _)| *count > 0.0);
         let total: f64 = kinds().map(|((sum, count), weight)| weight * sum / count).sum();

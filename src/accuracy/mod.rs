@@ -8,30 +8,55 @@
 //! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
 //! and weighed by how many of it the move has.
 //!
-//! Nothing here is decided by a clock: times are only measured.
+//! [`Probe`] takes a quick look instead, from which the error and the time of any setting are foretold
+//! ([`Foretelling`]), and the program chooses one; [`Check`] says afterwards what came out.
 //!
-//! Not done: knobs that the program does not have yet (adaptive sampling, texture filters, Embree's
-//! build quality).
+//! Only that choice is decided by measured times; the sweep only tells them.
+//!
+//! A [`Ledger`] keeps what was measured on disk, trial by trial, so that a sweep that was stopped or
+//! killed goes on.
+//!
+//! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
+mod candidates;
+mod check;
 mod choice;
 mod errors;
+mod figures;
+mod fit;
+mod foretell;
 mod frames;
+mod front;
 mod knobs;
+mod law;
+mod ledger;
+mod modes;
 mod oracle;
+mod patches;
+mod probe;
 mod reference;
+mod search;
 mod sentences;
 mod stage;
 mod sweep;
 mod table;
 mod trial;
+mod writing;
 
+pub use candidates::candidates;
+pub use check::{Check, Checked};
 pub use choice::{Goal, best_within, fastest_reaching};
 pub use errors::Errors;
+pub use foretell::{Foretelling, Foretold, Range};
 pub use frames::chosen_frames;
-pub use knobs::{Candidate, Group, Knob, candidates};
+pub use knobs::{Candidate, Group, Knob};
+pub use law::Samples;
+pub use ledger::{Entry, Ledger};
 pub use oracle::{OracleCrop, on_a_crop};
-pub use reference::{Truth, converge, truth_settings};
-pub use sentences::{about_knob, about_oracle};
+pub use probe::{Given, Probe};
+pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
+pub use sentences::{about_knob, about_oracle, about_writing};
 pub use stage::Stage;
 pub use sweep::{Heard, Picture, Sweep};
 pub use table::{Measured, Row, Spread};
+pub use writing::{Writing, on_disk};

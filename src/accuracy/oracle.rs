@@ -6,7 +6,7 @@ use super::table::Change;
 use crate::error::Result;
 use crate::intersect::{Intersector, Oracle};
 use crate::scene::{Policy, Rect, Settings};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Seconds that the oracle may take, roughly.
@@ -19,7 +19,7 @@ const RAYS: f64 = 10.0;
 const EDGE: (f64, f64) = (8.0, 96.0);
 
 /// How the crop came out.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct OracleCrop {
     /// Columns and rows.
     pub size: [u32; 2],

@@ -53,41 +53,105 @@ pub fn seed_of_turn(base: u64, turn: u32) -> u64 {
     (base + u64::from(turn)) % (MAX_SEED + 1)
 }
 
-/// Renders `frames` with twice as many camera samples each time, until a doubling changes them by less
-/// than `wanted` display steps, or more than `most` samples would be needed. Each time all samples are
-/// new: a doubling that only added to the ones before would seem to change less. Their mean is no
-/// better: many samples that were laid out together are worth more than as many that were not.
-/// `heard` hears of every doubling: samples, and by how much it changed the frames.
-///
-/// # Errors
-/// Those of [`Stage::trace`].
-pub fn converge(
-    stage: &Stage,
-    mut settings: Settings,
-    frames: &[u32],
-    wanted: f64,
-    most: u32,
-    heard: &dyn Fn(u32, Option<f64>),
-) -> Result<Truth> {
-    let mut last: Option<Frames> = None;
-    let mut doubling = 0;
-    loop {
-        settings.seed = seed_of_doubling(stage.base.seed, doubling);
-        let mut now = Frames::new();
-        for frame in frames {
-            let (image, _) = stage.trace(&settings, stage.intersector, *frame)?;
-            now.insert(*frame, image);
+/// The reference so far.
+#[derive(Debug, Clone)]
+pub struct Doubling {
+    /// How often the samples were doubled.
+    pub number: u32,
+    /// Camera samples.
+    pub spp: u32,
+    /// By how much the last doubling changed the frames, display steps.
+    pub change: Option<f64>,
+    /// As displayed.
+    pub frames: Frames,
+}
+
+/// What is heard of a reference in the making.
+pub enum Step<'a> {
+    /// A frame of so many camera samples is about to be rendered: number `k` of `of`.
+    Frame {
+        /// Camera samples.
+        spp: u32,
+        /// Which frame, from 0.
+        k: usize,
+        /// How many.
+        of: usize,
+    },
+    /// All frames have twice the samples.
+    Doubled(&'a Doubling),
+}
+
+/// How the reference is made: its frames with twice as many camera samples each time, until a doubling
+/// changes them by less than `wanted` display steps, or more than `most` samples would be needed.
+pub struct Convergence<'a> {
+    /// The scene.
+    pub stage: &'a Stage<'a>,
+    /// Those of the first frames ([`truth_settings`]).
+    pub settings: Settings,
+    /// Which frames.
+    pub frames: &'a [u32],
+    /// Display steps.
+    pub wanted: f64,
+    /// Camera samples.
+    pub most: u32,
+}
+
+impl Convergence<'_> {
+    /// Goes on from `last`, if there is one. Each time all samples are new: a doubling that only added
+    /// to the ones before would seem to change less. Their mean is no better: many samples that were
+    /// laid out together are worth more than as many that were not.
+    ///
+    /// # Errors
+    /// Those of [`Stage::trace`] and of `hear`.
+    pub fn run(
+        &self,
+        mut last: Option<Doubling>,
+        hear: &mut dyn FnMut(Step) -> Result<()>,
+    ) -> Result<Truth> {
+        loop {
+            match last {
+                Some(last) if self.is_done(&last) => return Ok(self.truth(last)),
+                _ => last = Some(self.double(last, hear)?),
+            }
         }
-        let change = last.as_ref().map(|last| rms_between(&now, last));
-        heard(settings.spp, change);
-        let is_done = change.is_some_and(|change| change <= wanted);
-        if is_done || settings.spp.saturating_mul(2) > most {
-            let change = change.unwrap_or(f64::INFINITY);
-            return Ok(Truth { frames: now, change, wanted, settings });
+    }
+
+    /// Whether no doubling comes after this one.
+    pub fn is_done(&self, last: &Doubling) -> bool {
+        let is_near = last.change.is_some_and(|change| change <= self.wanted);
+        is_near || last.spp.saturating_mul(2) > self.most
+    }
+
+    fn settings_of(&self, number: u32) -> Settings {
+        let spp = self.settings.spp << number;
+        let seed = seed_of_doubling(self.stage.base.seed, number);
+        Settings { spp, seed, ..self.settings.clone() }
+    }
+
+    fn double(
+        &self,
+        last: Option<Doubling>,
+        hear: &mut dyn FnMut(Step) -> Result<()>,
+    ) -> Result<Doubling> {
+        let number = last.as_ref().map_or(0, |last| last.number + 1);
+        let settings = self.settings_of(number);
+        let (spp, of) = (settings.spp, self.frames.len());
+        let mut frames = Frames::new();
+        for (k, frame) in self.frames.iter().enumerate() {
+            hear(Step::Frame { spp, k, of })?;
+            let (image, _) = self.stage.trace(&settings, self.stage.intersector, *frame)?;
+            frames.insert(*frame, image);
         }
-        settings.spp *= 2;
-        doubling += 1;
-        last = Some(now);
+        let change = last.map(|last| rms_between(&frames, &last.frames));
+        let doubling = Doubling { number, spp, change, frames };
+        hear(Step::Doubled(&doubling))?;
+        Ok(doubling)
+    }
+
+    fn truth(&self, last: Doubling) -> Truth {
+        let settings = self.settings_of(last.number);
+        let change = last.change.unwrap_or(f64::INFINITY);
+        Truth { frames: last.frames, change, wanted: self.wanted, settings }
     }
 }
 

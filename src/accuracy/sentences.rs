@@ -3,8 +3,9 @@
 use super::knobs::{Group, Knob};
 use super::oracle::OracleCrop;
 use super::table::{Change, Measured, Row};
+use super::writing::Writing;
 use crate::measure::Median;
-use crate::page::words::{change, count, percent, seconds, short};
+use crate::page::words::{bytes, change, count, percent, seconds, short};
 
 /// What turning `knob` does, one sentence for each of its settings; empty where it was not turned.
 pub fn about_knob(measured: &Measured, knob: Knob) -> Vec<String> {
@@ -13,22 +14,43 @@ pub fn about_knob(measured: &Measured, knob: Knob) -> Vec<String> {
 }
 
 fn sentence(default: &Row, row: &Row) -> String {
+    let changed = || row.change.map_or(String::new(), |c| pixels(&c));
     let what = match row.knob.group() {
-        Some(Group::Intersection) => row.change.map_or(String::new(), |c| pixels(&c)),
+        Some(Group::Intersection) => changed(),
+        Some(Group::Tree) => format!("{}; {}", changed(), tree(default, row)),
         _ => error(default, row),
     };
-    format!("{}: {}, {what}.", row.options, time(row.time_ratio))
+    format!("{}: {}, {what}.", row.options, time(row))
 }
 
-fn time(ratio: Option<Median>) -> String {
-    let Some(ratio) = ratio else { return "not timed".into() };
-    let ends = [ratio.interval.low, ratio.interval.high].map(change);
-    if !ratio.is_sure() {
-        return format!("too few turns to tell the time ({} to {})", ends[0], ends[1]);
+/// What its tree takes.
+fn tree(default: &Row, row: &Row) -> String {
+    let [was, is] = [default, row].map(|r| seconds(r.build_seconds.median.interval.estimate));
+    let memory = [default, row].map(|r| bytes(r.memory_bytes));
+    format!("built in {is} instead of {was}, {} instead of {} of memory", memory[1], memory[0])
+}
+
+fn time(row: &Row) -> String {
+    let Some(wall) = row.time_ratio else { return "not timed".into() };
+    let told = |ratio: &Median| {
+        let [is, low, high] =
+            [ratio.interval.estimate, ratio.interval.low, ratio.interval.high].map(change);
+        (is, format!("({low} to {high})"))
+    };
+    let (is, ends) = told(&wall);
+    if !wall.is_sure() {
+        return format!("too few turns to tell the time {ends}");
     }
-    match ratio.differs_from(1.0) {
-        true => format!("{} time ({} to {})", change(ratio.interval.estimate), ends[0], ends[1]),
-        false => format!("no more than noise in time ({} to {})", ends[0], ends[1]),
+    if wall.differs_from(1.0) {
+        return format!("{is} time {ends}");
+    }
+    match row.cpu_ratio.filter(|cpu| cpu.differs_from(1.0)) {
+        // Waiting for a core is no work.
+        Some(cpu) => {
+            let (is, cpu_ends) = told(&cpu);
+            format!("no more than noise in time {ends}, but {is} CPU time {cpu_ends}")
+        }
+        None => format!("no more than noise in time {ends}"),
     }
 }
 
@@ -62,6 +84,31 @@ fn pixels(c: &Change) -> String {
         count(c.pixels),
         short(c.largest)
     )
+}
+
+/// What `writing` takes where a frame takes `frame_seconds` to make.
+pub fn about_writing(writing: &Writing, frame_seconds: f64) -> Vec<String> {
+    let w = writing;
+    let mut all = vec![format!(
+        "A frame as png ({}): {} to encode, write and sync, {} of them for the sync. {} time. No setting \
+         spares the sync: a frame that is there is whole.",
+        bytes(w.frame_bytes),
+        seconds(w.frame_seconds),
+        seconds(w.sync_seconds),
+        change(1.0 + w.frame_seconds / frame_seconds)
+    )];
+    if let Some((taken, size)) = w.checkpoint {
+        let share = f64::from(w.keys) * taken / (f64::from(w.frames) * frame_seconds);
+        all.push(format!(
+            "--checkpoint 0s: {} and {} of disk for each of the move's {} key frames, {} time at most. \
+             --checkpoint off spares it, and a killed job traces them again.",
+            seconds(taken),
+            bytes(size),
+            count(w.keys.into()),
+            change(1.0 + share)
+        ));
+    }
+    all
 }
 
 /// What the oracle says.

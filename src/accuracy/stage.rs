@@ -24,6 +24,8 @@ pub struct Stage<'a> {
     pub base: &'a Settings,
     /// The default's intersector.
     pub intersector: &'a dyn Intersector,
+    /// Wall seconds that it took to build.
+    pub build_seconds: f64,
     /// The threads that render.
     pub pool: &'a ThreadPool,
     /// Set when the sweep shall stop.
@@ -47,7 +49,8 @@ impl<'a> Stage<'a> {
         &self,
         settings: &Settings,
     ) -> Result<Option<Box<dyn Intersector + Send + 'a>>> {
-        let same = |s: &Settings| (s.rules, s.intersector, s.isa.clone());
+        let same =
+            |s: &Settings| (s.rules, s.intersector, s.isa.clone(), s.build_quality, s.compact);
         if same(settings) == same(self.base) {
             return Ok(None);
         }

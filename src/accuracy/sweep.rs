@@ -5,8 +5,9 @@
 //! The first turn warms up: its pictures count, its times do not. Each turn has a seed of its own,
 //! the same for all candidates.
 
-use super::errors::{Errors, Frames};
+use super::errors::Errors;
 use super::knobs::Candidate;
+use super::ledger::{Entry, Ledger};
 use super::reference::{Truth, seed_of_turn};
 use super::stage::Stage;
 use super::table::{Change, Measured, Taken};
@@ -14,6 +15,7 @@ use super::trial::{self, Trial};
 use crate::error::Result;
 use crate::page;
 use crate::scene::Settings;
+use std::time::Instant;
 
 /// What there is to do.
 pub struct Sweep<'a> {
@@ -28,9 +30,11 @@ pub struct Sweep<'a> {
 }
 
 /// A candidate is about to be tried.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Heard<'a> {
-    /// Trials done so far, and all that there will be.
+    /// What was measured so far.
+    pub ledger: &'a Ledger,
+    /// Trials done so far.
     pub done: usize,
     /// All trials.
     pub of: usize,
@@ -38,12 +42,14 @@ pub struct Heard<'a> {
     pub turn: u32,
     /// Whose turn it is.
     pub candidate: &'a Candidate,
+    /// Seconds that are left, if anything is known of it.
+    pub left: Option<f64>,
 }
 
 /// A candidate's picture of the frame that pictures are shown of.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// Index of the candidate.
+    /// Index of its row.
     pub candidate: usize,
     /// The picture.
     pub picture: page::Picture,
@@ -61,57 +67,138 @@ impl Sweep<'_> {
     /// # Errors
     /// Those of building and rendering.
     pub fn least_noise(&self) -> Result<f64> {
-        let samples = |s: &Settings| {
-            let lights = u64::from(s.shadow_samples) + u64::from(s.sky_samples) + 1;
-            u64::from(s.spp) * lights
-        };
         let best = self.candidates.iter().max_by_key(|c| samples(&c.settings));
         let Some(best) = best else { return Ok(0.0) };
         let frame = [self.shown_frame()];
         let mut frames = Vec::new();
         for turn in 0..2 {
             let settings = self.with_seed(best, turn);
-            frames.push(self.try_one(&settings, &frame)?.frames);
+            frames.push(self.try_one(&settings, &frame)?.trial.frames);
         }
         Ok(super::errors::rms_between(&frames[0], &frames[1]) / 2f64.sqrt())
     }
 
-    /// Tries every candidate in every turn; gives the figures, and a picture of each candidate.
+    /// Tries every candidate in every turn, as far as `ledger` has not heard of it, and tells it.
     ///
     /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of building and rendering.
+    /// [`crate::error::Error::Stopped`]; those of building, rendering and writing, and of `hear`. What
+    /// the ledger has by then stays there.
     pub fn run(
         &self,
         truth: &Truth,
-        heard: &mut dyn FnMut(Heard),
-    ) -> Result<(Measured, Vec<Picture>)> {
-        let n = self.candidates.len();
-        let mut taken: Vec<Taken> = (0..n).map(|_| Taken::default()).collect();
-        let mut pictures = Vec::new();
-        let of = n * (self.turns as usize + 1);
+        ledger: &mut Ledger,
+        hear: &mut dyn FnMut(Heard) -> Result<()>,
+    ) -> Result<()> {
+        let mut is_warm = false;
         for turn in 0..=self.turns {
-            // The default goes first: the others' pixels are compared with its.
-            let mut default_frames = Frames::new();
-            for (k, index) in order(n, turn).into_iter().enumerate() {
-                let candidate = &self.candidates[index];
-                heard(Heard { done: turn as usize * n + k, of, turn, candidate });
-                let trial = self.try_one(&self.with_seed(candidate, turn), self.frames)?;
-                let errors = Errors::of(&truth.frames, &trial.frames, &trial.cut)?;
-                if turn == 0 {
-                    let image = &trial.frames[&self.shown_frame()];
-                    pictures
-                        .push(Picture { candidate: index, picture: page::Picture::png(image)? });
-                }
-                if index == 0 {
-                    default_frames.clone_from(&trial.frames);
-                } else {
-                    taken[index].change += Change::between(&default_frames, &trial.frames);
-                }
-                taken[index].add(turn, errors, &trial);
+            let mut open = order(self.candidates.len(), turn);
+            open.retain(|candidate| !ledger.has(turn, *candidate));
+            if open.is_empty() {
+                continue;
             }
+            if turn > 0 && !is_warm {
+                self.heard(ledger, turn, 0, hear)?;
+                self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
+            }
+            is_warm = true;
+            self.turn(truth, ledger, turn, &open, hear)?;
         }
-        pictures.sort_by_key(|p| p.candidate);
-        Ok((Measured::of(self.candidates, &taken), pictures))
+        Ok(())
+    }
+
+    /// The `open` candidates of a turn.
+    fn turn(
+        &self,
+        truth: &Truth,
+        ledger: &mut Ledger,
+        turn: u32,
+        open: &[usize],
+        hear: &mut dyn FnMut(Heard) -> Result<()>,
+    ) -> Result<()> {
+        // The default goes first, also where an earlier run has had its turn: the others' pixels and
+        // times are compared with its.
+        self.heard(ledger, turn, 0, hear)?;
+        let default = self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
+        for candidate in open {
+            let own = match *candidate {
+                0 => None,
+                k => {
+                    self.heard(ledger, turn, k, hear)?;
+                    Some(self.try_one(&self.with_seed(&self.candidates[k], turn), self.frames)?)
+                }
+            };
+            let tried = own.as_ref().unwrap_or(&default);
+            let errors = Errors::of(&truth.frames, &tried.trial.frames, &tried.trial.cut)?;
+            if turn == 0 {
+                let image = &tried.trial.frames[&self.shown_frame()];
+                ledger.keep_picture(*candidate, &page::Picture::png(image)?)?;
+            }
+            ledger.append(Entry {
+                turn,
+                candidate: *candidate,
+                errors: errors.into(),
+                default_seconds: default.entry.seconds,
+                change: Change::between(&default.trial.frames, &tried.trial.frames),
+                ..tried.entry.clone()
+            })?;
+        }
+        Ok(())
+    }
+
+    fn heard(
+        &self,
+        ledger: &Ledger,
+        turn: u32,
+        candidate: usize,
+        hear: &mut dyn FnMut(Heard) -> Result<()>,
+    ) -> Result<()> {
+        let left = self.seconds_left(ledger.entries());
+        let candidate = &self.candidates[candidate];
+        hear(Heard { ledger, done: self.done(ledger), of: self.trials(), turn, candidate, left })
+    }
+
+    /// Trials that there are in all.
+    pub fn trials(&self) -> usize {
+        self.candidates.len() * (self.turns as usize + 1)
+    }
+
+    /// Trials that `ledger` has.
+    pub fn done(&self, ledger: &Ledger) -> usize {
+        ledger.entries().iter().filter(|entry| entry.turn <= self.turns).count()
+    }
+
+    /// How long the trials take that are missing: a setting's last one tells of its next one, and by
+    /// how many samples they take those that were tried tell of others. `None` before any was tried.
+    fn seconds_left(&self, entries: &[Entry]) -> Option<f64> {
+        let work = |candidate: usize| samples(&self.candidates[candidate].settings) as f64;
+        let all: f64 = entries.iter().map(|entry| entry.took).sum();
+        let pace = all / entries.iter().map(|entry| work(entry.candidate)).sum::<f64>();
+        let missing = |candidate: usize| {
+            let own = || entries.iter().filter(move |entry| entry.candidate == candidate);
+            let each = own().next_back().map_or(pace * work(candidate), |entry| entry.took);
+            let turns = self.turns as usize + 1;
+            turns.saturating_sub(own().filter(|entry| entry.turn <= self.turns).count()) as f64
+                * each
+        };
+        let left: f64 = (0..self.candidates.len()).map(missing).sum();
+        (!entries.is_empty() && left.is_finite()).then_some(left)
+    }
+
+    /// What `ledger` tells: a row for every candidate that was timed at least once, and their pictures;
+    /// `None` before the default was.
+    pub fn measured(&self, ledger: &Ledger) -> Option<(Measured, Vec<Picture>)> {
+        let taken = |k: &usize| Taken::of(ledger.entries(), *k);
+        let all: Vec<usize> = (0..self.candidates.len()).filter(|k| taken(k).is_timed()).collect();
+        if all.first() != Some(&0) {
+            return None;
+        }
+        let candidates: Vec<Candidate> = all.iter().map(|k| self.candidates[*k].clone()).collect();
+        let measured = Measured::of(&candidates, &all.iter().map(taken).collect::<Vec<_>>());
+        let picture = |(candidate, k): (usize, &usize)| {
+            ledger.picture(*k).map(|picture| Picture { candidate, picture })
+        };
+        let pictures = all.iter().enumerate().filter_map(picture).collect();
+        Some((measured, pictures))
     }
 
     fn with_seed(&self, candidate: &Candidate, turn: u32) -> Settings {
@@ -119,13 +206,40 @@ impl Sweep<'_> {
         Settings { seed, ..candidate.settings.clone() }
     }
 
-    fn try_one(&self, settings: &Settings, frames: &[u32]) -> Result<Trial> {
+    fn try_one(&self, settings: &Settings, frames: &[u32]) -> Result<Tried> {
+        let start = Instant::now();
         // Other rules build another tree, one at a time: several would not fit beside a large scene.
-        match self.stage.own_intersector(settings)? {
-            Some(own) => trial::run(self.stage, settings, &*own, frames),
-            None => trial::run(self.stage, settings, self.stage.intersector, frames),
-        }
+        let own = self.stage.own_intersector(settings)?;
+        let build_seconds = match own {
+            Some(_) => start.elapsed().as_secs_f64(),
+            None => self.stage.build_seconds,
+        };
+        let intersector = own.as_deref().map_or(self.stage.intersector, |own| own as _);
+        let trial = trial::run(self.stage, settings, intersector, frames)?;
+        let entry = Entry {
+            seconds: trial.seconds,
+            cpu_seconds: trial.cpu_seconds,
+            build_seconds,
+            took: start.elapsed().as_secs_f64(),
+            rays: trial.rays,
+            rays_per_frame: trial.rays_per_frame,
+            memory: trial.memory,
+            ..Entry::default()
+        };
+        Ok(Tried { trial, entry })
     }
+}
+
+/// A trial, and its figures.
+struct Tried {
+    trial: Trial,
+    entry: Entry,
+}
+
+/// Samples a pixel, of the camera and of the lights; roughly what a setting costs.
+fn samples(s: &Settings) -> u64 {
+    let lights = u64::from(s.shadow_samples) + u64::from(s.sky_samples) + 1;
+    u64::from(s.spp) * lights
 }
 
 /// The default, then the others, in every second turn in reverse.

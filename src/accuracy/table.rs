@@ -1,11 +1,13 @@
 //! What was measured, a row a candidate.
 
 use super::errors::{Errors, Frames};
+use super::front;
 use super::knobs::{Candidate, Knob};
-use super::trial::Trial;
+use super::ledger::Entry;
 use crate::measure::{Median, largest_error, median, share_exceeding};
 use crate::stats::RayCounts;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::ops::AddAssign;
 
 /// All rows, the default's first.
@@ -30,8 +32,12 @@ pub struct Row {
     pub seconds: Spread,
     /// CPU seconds, all threads together.
     pub cpu_seconds: Spread,
-    /// Seconds over the default's of the same turn; `None` for the default.
+    /// Wall seconds to build the intersector, once a job.
+    pub build_seconds: Spread,
+    /// Seconds over the default's of the same turn and run; `None` for the default.
     pub time_ratio: Option<Median>,
+    /// CPU seconds over the default's of the same turn: on a busy machine they tell more.
+    pub cpu_ratio: Option<Median>,
     /// Root mean squared error over the default's of the same turn.
     pub error_ratio: Option<Median>,
     /// How its pixels differ from the default's with the same seed.
@@ -42,8 +48,11 @@ pub struct Row {
     pub rays: RayCounts,
     /// Intersector and references, bytes.
     pub memory_bytes: u64,
-    /// Whether no other candidate that may be recommended is both faster and nearer to the truth.
+    /// Whether no other candidate that may be recommended is both faster and nearer to the truth, and
+    /// it is not there for noise alone.
     pub on_front: bool,
+    /// The same by CPU seconds.
+    pub on_cpu_front: bool,
 }
 
 /// A median, and what it is the median of.
@@ -57,7 +66,7 @@ pub struct Spread {
 }
 
 /// How pixels differ from the default's.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// Pixels compared.
     pub pixels: u64,
@@ -97,35 +106,40 @@ impl AddAssign for Change {
     }
 }
 
-/// What a candidate's turns gave so far.
+/// What a candidate's turns gave so far, by turn.
 #[derive(Default)]
-pub struct Taken {
-    /// Against the default, all turns.
-    pub change: Change,
-    errors: Vec<Errors>,
-    seconds: Vec<f64>,
-    cpu_seconds: Vec<f64>,
-    rays_per_frame: f64,
-    rays: RayCounts,
-    memory: u64,
-}
+pub struct Taken(BTreeMap<u32, Entry>);
 
 impl Taken {
-    /// Takes a turn in. The first one's time is no figure.
-    pub fn add(&mut self, turn: u32, errors: Errors, trial: &Trial) {
-        self.errors.push(errors);
-        if turn == 0 {
-            self.rays = trial.rays;
-            self.rays_per_frame = trial.rays_per_frame;
-        } else {
-            self.seconds.push(trial.seconds);
-            self.cpu_seconds.push(trial.cpu_seconds);
-        }
-        self.memory = self.memory.max(trial.memory);
+    /// Those of `candidate` among `entries`.
+    pub fn of(entries: &[Entry], candidate: usize) -> Self {
+        let own = entries.iter().filter(|entry| entry.candidate == candidate);
+        Self(own.map(|entry| (entry.turn, entry.clone())).collect())
     }
 
-    fn rmse(&self) -> Vec<f64> {
-        self.errors.iter().map(|e| e.rmse_steps).collect()
+    /// Whether any turn was timed: the first one warms up.
+    pub fn is_timed(&self) -> bool {
+        self.0.keys().any(|turn| *turn > 0)
+    }
+
+    fn timed(&self, of: fn(&Entry) -> f64) -> Vec<f64> {
+        self.0.range(1..).map(|(_, entry)| of(entry)).collect()
+    }
+
+    fn errors(&self) -> Vec<Errors> {
+        self.0.values().map(|entry| entry.errors.into()).collect()
+    }
+
+    fn change(&self) -> Change {
+        let mut sum = Change::default();
+        self.0.values().for_each(|entry| sum += entry.change);
+        sum
+    }
+
+    /// `of` each turn from the `first` on over that of the same turn of `other`.
+    fn ratios(&self, other: &Self, first: u32, of: fn(&Entry) -> f64) -> Vec<f64> {
+        let ratio = |(turn, entry): (&u32, &Entry)| Some(of(entry) / of(other.0.get(turn)?));
+        self.0.range(first..).filter_map(ratio).collect()
     }
 }
 
@@ -136,9 +150,10 @@ impl Measured {
         let rows =
             rows.map(|(k, (candidate, own))| row(candidate, own, (k > 0).then(|| &taken[0])));
         let mut measured = Self { rows: rows.collect() };
-        for k in 0..measured.rows.len() {
-            measured.rows[k].on_front = measured.is_on_front(k);
-        }
+        let rows = &mut measured.rows;
+        front::of(rows, |row| &row.seconds).into_iter().for_each(|k| rows[k].on_front = true);
+        let by_cpu = front::of(rows, |row| &row.cpu_seconds);
+        by_cpu.into_iter().for_each(|k| rows[k].on_cpu_front = true);
         measured
     }
 
@@ -146,39 +161,30 @@ impl Measured {
     pub fn default_row(&self) -> &Row {
         &self.rows[0]
     }
-
-    fn is_on_front(&self, k: usize) -> bool {
-        let place = |row: &Row| (row.seconds.median.interval.estimate, row.errors.mse);
-        let (seconds, mse) = place(&self.rows[k]);
-        let beats = |(i, other): (usize, &Row)| {
-            let (s, e) = place(other);
-            // Of two that are equal the first stays.
-            let better = s < seconds || e < mse || i < k;
-            i != k && other.knob.is_ranked() && s <= seconds && e <= mse && better
-        };
-        self.rows[k].knob.is_ranked() && !self.rows.iter().enumerate().any(beats)
-    }
 }
 
 fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> Row {
-    let ratio = |own: &[f64], other: &[f64]| {
-        let ratios: Vec<f64> = own.iter().zip(other).map(|(a, b)| a / b).collect();
-        median(&ratios).filter(|m| m.interval.estimate.is_finite())
-    };
+    let sure = |ratios: &[f64]| median(ratios).filter(|m| m.interval.estimate.is_finite());
+    let errors = own.errors();
+    let first = own.0.values().next().cloned().unwrap_or_default();
     Row {
         knob: candidate.knob,
         options: candidate.options.clone(),
-        errors: Errors::mean(&own.errors),
-        rmse_of_turns: own.rmse(),
-        seconds: spread(&own.seconds),
-        cpu_seconds: spread(&own.cpu_seconds),
-        time_ratio: default.and_then(|d| ratio(&own.seconds, &d.seconds)),
-        error_ratio: default.and_then(|d| ratio(&own.rmse(), &d.rmse())),
-        change: default.map(|_| own.change),
-        rays_per_frame: own.rays_per_frame,
-        rays: own.rays,
-        memory_bytes: own.memory,
+        errors: Errors::mean(&errors),
+        rmse_of_turns: errors.iter().map(|e| e.rmse_steps).collect(),
+        seconds: spread(&own.timed(|e| e.seconds)),
+        cpu_seconds: spread(&own.timed(|e| e.cpu_seconds)),
+        build_seconds: spread(&own.timed(|e| e.build_seconds)),
+        time_ratio: default.and_then(|_| sure(&own.timed(|e| e.seconds / e.default_seconds))),
+        cpu_ratio: default.and_then(|d| sure(&own.ratios(d, 1, |e| e.cpu_seconds))),
+        error_ratio: default
+            .and_then(|d| sure(&own.ratios(d, 0, |e| Errors::from(e.errors).rmse_steps))),
+        change: default.map(|_| own.change()),
+        rays_per_frame: first.rays_per_frame,
+        rays: first.rays,
+        memory_bytes: own.0.values().map(|entry| entry.memory).max().unwrap_or(0),
         on_front: false,
+        on_cpu_front: false,
     }
 }
 
@@ -201,6 +207,7 @@ pub(super) mod tests {
             options: (*options).into(),
             settings: Settings::default(),
         };
+        let default = list[0].2;
         let taken = |(.., seconds, rmse): &(Knob, &str, f64, f64)| {
             let mse = (rmse / 255.0) * (rmse / 255.0);
             let errors = Errors {
@@ -212,12 +219,15 @@ pub(super) mod tests {
                 share_over_2: 0.0,
                 flicker: None,
             };
-            Taken {
-                errors: vec![errors; 7],
-                seconds: vec![*seconds; 6],
-                cpu_seconds: vec![*seconds; 6],
-                ..Taken::default()
-            }
+            let entry = |turn| Entry {
+                turn,
+                seconds: *seconds,
+                default_seconds: default,
+                cpu_seconds: *seconds,
+                errors: errors.into(),
+                ..Entry::default()
+            };
+            Taken((0..=6).map(|turn| (turn, entry(turn))).collect())
         };
         let candidates: Vec<Candidate> = list.iter().map(candidate).collect();
         let taken: Vec<Taken> = list.iter().map(taken).collect();

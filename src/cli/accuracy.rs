@@ -1,34 +1,40 @@
 //! `tweenray accuracy`: what accuracy costs in time, on the user's own scene.
 
 mod files;
+mod line;
+mod measure;
 mod page;
 
 use super::args::{SceneArgs, SettingArgs};
 use super::exit::Exit;
-use super::progress::duration;
 use super::signals::Interrupt;
-use super::{job, say, values};
+use super::{job, machine, say, values};
 use crate::accuracy::{
-    self, Candidate, Group, Heard, Measured, OracleCrop, Picture, Stage, Sweep, Truth,
+    self, Candidate, Group, Ledger, Measured, OracleCrop, Picture, Stage, Sweep, Truth, Writing,
 };
 use crate::cluster;
 use crate::effects::EffectPlan;
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result};
 use crate::import::Loaded;
 use crate::intersect;
 use crate::output::atomic;
+use crate::output::manifest::Header;
 use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
 use crate::scene::{Scene, Settings};
+use crate::sequence::fingerprint;
 use clap::Args;
+use measure::Job;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Measure what accuracy costs in time: error against seconds for every setting that matters
 ///
 /// Renders some frames of the move at a converged reference and at each setting of a sweep, several
 /// times in turns, and writes a page (report.html, which opens from disk), accuracy.csv and
-/// accuracy.json.
+/// accuracy.json. What was measured lies in the folder's sweep/, trial by trial: the same command goes
+/// on with a sweep that was stopped, and more --turns add to one that is complete.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Times are only as good as the machine is quiet: run nothing else beside it. A difference that is
@@ -58,10 +64,18 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(64..=i64::from(MAX_SAMPLES)))]
     reference_spp: u32,
-    /// What is turned: reuse, samples, specular, intersection, oracle, combinations [default: all]
+    /// What is turned: reuse, samples, specular, intersection, tree, oracle, writing, combinations
+    /// [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',',
-        value_parser = values::choice::<Group>(&["reuse", "samples", "specular", "intersection", "oracle", "combinations"]))]
+        value_parser = values::choice::<Group>(&["reuse", "samples", "specular", "intersection", "tree", "oracle", "writing", "combinations"]))]
     knobs: Vec<Group>,
+    /// Measure everything anew, whatever the folder holds
+    #[arg(long)]
+    overwrite: bool,
+    /// Stop after this long and exit with code 75, with the page of what there is: 25m, 1h30m. In a
+    /// Slurm job at the latest 30 s before its end
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    time_limit: Option<Duration>,
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
@@ -73,22 +87,30 @@ pub struct AccuracyArgs {
     settings: SettingArgs,
 }
 
-/// Everything that came out.
-struct Outcome {
-    base: Settings,
-    truth: Truth,
+/// Everything that came out so far.
+struct Outcome<'a> {
+    base: &'a Settings,
+    truth: &'a Truth,
     measured: Measured,
     pictures: Vec<Picture>,
     oracle: Option<OracleCrop>,
     oracle_was_wanted: bool,
-    frames: Vec<u32>,
+    writing: Option<Writing>,
+    frames: &'a [u32],
     shown_frame: u32,
     shot_frames: u32,
     threads: usize,
     tracer: String,
     /// Load of the machine over the last minute, before and after.
     load: [Option<f64>; 2],
+    /// Wall seconds of this run of the program.
     seconds: f64,
+    /// How many runs of the program measured it.
+    runs: u32,
+    /// Trials that are over, and all.
+    trials: [usize; 2],
+    /// Settings that shall be compared.
+    settings: usize,
 }
 
 /// Runs the command.
@@ -108,6 +130,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     atomic::make_room(args.output.join("report.html"))?;
     let frames = frames(args, shot.frames)?;
     let groups = if args.knobs.is_empty() { Group::ALL.to_vec() } else { args.knobs.clone() };
+    let hash = fingerprint(&world, &shot);
     // Rounded twice, about the scene's own centre and not, where that is compared.
     let otherwise = groups.contains(&Group::Intersection).then(|| world.clone());
     let scene = world.into_scene(base.rules.recentre)?;
@@ -115,6 +138,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let candidates = candidates(&scene, &base, shot.frames, &groups, otherwise.is_some());
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);
     let pool = thread_pool(threads)?;
+    let building = Instant::now();
     let intersector = pool.install(|| intersect::build(&scene, &base, threads))?;
     let stage = Stage {
         scene: &scene,
@@ -122,39 +146,50 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         shot: &shot,
         base: &base,
         intersector: &*intersector,
+        build_seconds: building.elapsed().as_secs_f64(),
         pool: &pool,
         stop: &interrupt.stop,
     };
-    let load = super::machine::load();
     let sweep =
         Sweep { stage: &stage, candidates: &candidates, frames: &frames, turns: args.turns };
-    // First: whoever is out of patience loses no sweep.
-    let oracle = match groups.contains(&Group::Oracle) {
-        true => {
-            if !args.quiet {
-                say::aside("the oracle, on a crop");
-            }
-            interrupt.watched(|| accuracy::on_a_crop(&stage, sweep.shown_frame()))?
-        }
-        false => None,
+    let terms = terms(args, &sweep, &hash);
+    let ledger = Ledger::open(&args.output.join("sweep"), &terms, args.overwrite)?;
+    let oracle_was_wanted = groups.contains(&Group::Oracle);
+    interrupt.before_slurm_ends();
+    interrupt.limit(start, args.time_limit);
+    let job = Job {
+        args,
+        sweep: &sweep,
+        interrupt: &interrupt,
+        line: line::Line::new(args.quiet),
+        oracle_was_wanted,
+        writing_is_wanted: groups.contains(&Group::Writing),
+        load: machine::load(),
+        start,
     };
-    let (truth, measured, pictures) = interrupt.watched(|| measure(args, &sweep))?;
-    let outcome = Outcome {
-        truth,
-        measured,
-        pictures,
-        oracle,
-        oracle_was_wanted: groups.contains(&Group::Oracle),
-        shown_frame: sweep.shown_frame(),
-        frames: frames.clone(),
-        shot_frames: shot.frames,
-        threads,
-        tracer: intersector.describe(),
-        load: [load, super::machine::load()],
-        seconds: start.elapsed().as_secs_f64(),
-        base: base.clone(),
-    };
-    finish(args, &outcome)
+    job.run(ledger)
+}
+
+/// All that the figures depend on, by name.
+fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
+    let stage = sweep.stage;
+    let options: Vec<&str> = sweep.candidates.iter().map(|c| c.options.as_str()).collect();
+    let mut terms = Map::new();
+    if let Value::Object(settings) = Header::settings(stage.base) {
+        terms.extend(settings.into_iter().map(|(name, value)| (name.replace('_', "-"), value)));
+    }
+    let others = [
+        ("frames", json!(sweep.frames)),
+        ("settings to compare", json!(options)),
+        ("reference-spp", json!(args.reference_spp)),
+        ("threads", json!(stage.pool.current_num_threads())),
+        ("scene content", json!(hash)),
+        ("tweenray version", json!(env!("CARGO_PKG_VERSION"))),
+        ("tracer", json!(stage.intersector.describe())),
+        ("machine", json!(machine::Machine::here().cpu)),
+    ];
+    terms.extend(others.map(|(name, value)| (name.to_string(), value)));
+    terms
 }
 
 fn thread_pool(threads: usize) -> Result<ThreadPool> {
@@ -189,66 +224,4 @@ fn candidates(
     let mut all = accuracy::candidates(base, &EffectPlan::of(scene, base), frames, groups);
     all.retain(|c| otherwise || c.settings.rules.recentre == base.rules.recentre);
     all
-}
-
-fn measure(args: &AccuracyArgs, sweep: &Sweep) -> Result<(Truth, Measured, Vec<Picture>)> {
-    let tell = |text: String| {
-        if !args.quiet {
-            say::aside(text);
-        }
-    };
-    let trials = sweep.candidates.len() * (args.turns as usize + 1);
-    tell(format!(
-        "{} on {}, {}",
-        counted(sweep.candidates.len(), "setting"),
-        counted(sweep.frames.len(), "frame"),
-        counted(trials, "trial")
-    ));
-    let wanted = sweep.least_noise()? / 4.0;
-    let settings: Vec<&Settings> = sweep.candidates.iter().map(|c| &c.settings).collect();
-    let settings = accuracy::truth_settings(sweep.stage.base, &settings);
-    let heard = |spp: u32, change: Option<f64>| {
-        let change = change.map_or(String::new(), |change| {
-            format!(", {change:.3}/255 away from half as many; wanted {wanted:.3}")
-        });
-        tell(format!("reference: {spp} camera samples{change}"));
-    };
-    let truth = accuracy::converge(
-        sweep.stage,
-        settings,
-        sweep.frames,
-        wanted,
-        args.reference_spp,
-        &heard,
-    )?;
-    let start = Instant::now();
-    let mut heard = |h: Heard| {
-        let Heard { done, of, turn, candidate } = h;
-        let left = match done {
-            0 => String::new(),
-            n => {
-                let each = start.elapsed().as_secs_f64() / n as f64;
-                format!("  left {}", duration(each * (of - n) as f64))
-            }
-        };
-        let name = page::name_of(&candidate.options);
-        let turn = if turn == 0 { "warm-up".into() } else { format!("turn {turn}") };
-        tell(format!("{} of {of}  {turn}  {name}{left}", done + 1));
-    };
-    let (measured, pictures) = sweep.run(&truth, &mut heard)?;
-    Ok((truth, measured, pictures))
-}
-
-fn finish(args: &AccuracyArgs, outcome: &Outcome) -> Result<Exit> {
-    let command = super::words();
-    files::write(&args.output, args, outcome, &command)?;
-    let page = page::page(args, outcome, &command)?;
-    let out = args.output.join("report.html");
-    let html = page.to_html()?;
-    atomic::write(&out, |w| w.write_all(html.as_bytes()))?;
-    if !args.quiet {
-        page.summary.iter().chain(&page.warnings).try_for_each(say::result)?;
-        say::result(format!("{}, in {}", out.display(), duration(outcome.seconds)))?;
-    }
-    Ok(Exit::Done)
 }

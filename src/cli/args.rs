@@ -3,7 +3,8 @@
 use super::values::{self, FrameRequest};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
-    Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings, ToneCurve, limits,
+    BuildQuality, Filter, IntersectorKind, Interval, Policy, Recheck, Rect, ReuseSettings,
+    Settings, ToneCurve, limits,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -139,6 +140,14 @@ pub struct TracingArgs {
     #[arg(long, value_name = "ISA", help_heading = "Tracing",
         value_parser = ["sse2", "sse4.2", "avx", "avx2", "avx512"])]
     pub isa: Option<String>,
+    /// How much work Embree puts into its tree: more takes longer to build and less to trace
+    /// [default: medium]
+    #[arg(long, value_name = "QUALITY", help_heading = "Tracing",
+        value_parser = values::choice::<BuildQuality>(&["low", "medium", "high"]))]
+    pub build_quality: Option<BuildQuality>,
+    /// A tree that takes less memory, and more time to trace [default: off]
+    #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
+    pub compact: Option<bool>,
     /// Which hits are recomputed in f64 at once; "always" gives the same picture [default: risky]
     #[arg(long, value_name = "WHICH", help_heading = "Tracing",
         value_parser = values::choice::<Recheck>(&["risky", "always", "off"]))]
@@ -203,6 +212,8 @@ impl TracingArgs {
             s.isa.clone_from(&self.isa);
         }
         put(&mut s.intersector, self.intersector);
+        put(&mut s.build_quality, self.build_quality);
+        put(&mut s.compact, self.compact);
         put(&mut s.rules.recheck, self.recheck);
         put(&mut s.rules.robust, self.robust);
         put(&mut s.rules.retry, self.retry);
@@ -248,14 +259,14 @@ pub struct OutputArgs {
     /// from it too; repeatable
     #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]
     pub upload: Vec<(u32, PathBuf)>,
-    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s. In a Slurm job at the latest 30 s
-    /// before its end
+    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s; counted from the program's start. In
+    /// a Slurm job at the latest 30 s before its end
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     pub time_limit: Option<Duration>,
     /// Put what frames to come need on disk every so often, so that a killed job need not trace it
     /// again: 30s, 5m, off [default: 30s]
     #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
-    pub checkpoint: Option<values::Interval>,
+    pub checkpoint: Option<Interval>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,

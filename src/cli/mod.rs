@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod args;
+mod choose;
 mod compare;
 mod convert;
 mod exit;

@@ -2,22 +2,23 @@
 
 use super::exit::as_input;
 use super::machine;
+use crate::cluster::World;
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
-use crate::output::{FramePattern, exr};
-use crate::reuse::store::{ATTRIBUTE, Terms, decode};
-use crate::reuse::{self, Reference};
+use crate::output::FramePattern;
+use crate::reuse;
+use crate::reuse::store::Terms;
 use crate::scene::{Policy, Scene, Settings};
+use crate::sequence::{Card, Supply};
+use std::ffi::OsString;
 use std::fs;
+use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
-
-/// Largest file that is read.
-const LARGEST: u64 = 2 << 30;
 
 /// What the user supplies.
 pub struct References {
-    /// Sorted by content, so that names and folders do not matter.
-    pub list: Vec<Reference>,
+    /// Read when they serve; `None` for none.
+    pub supply: Option<Supply>,
     /// What tells this set from others; `none` for none.
     pub hash: String,
 }
@@ -29,67 +30,67 @@ pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Terms {
 }
 
 impl References {
-    /// Reads all exr files in `folders` for a job whose frames go to `pattern`.
+    /// Looks through all exr files in `folders` for a job whose frames go to `pattern`: each rank
+    /// through a part of them, so that the job has looked into each once before its first frame. Then
+    /// ranks read those that serve their frames. All ranks call it.
     ///
-    /// Errors: a folder without such files or with the job's own, a file that cannot serve, by name;
-    /// more of them than memory holds.
-    pub fn read(
+    /// Errors: a folder without such files or with the job's own; a file that cannot serve, by name.
+    pub fn survey(
+        world: &World,
         folders: &[PathBuf],
         pattern: &FramePattern,
-        scene: &Scene,
-        settings: &Settings,
-        terms: &Terms,
+        (scene, settings, terms): (&Scene, &Settings, &Terms),
     ) -> Result<Self> {
-        if !folders.is_empty() && settings.reuse.policy != Policy::Surface {
+        if folders.is_empty() {
+            return Ok(Self { supply: None, hash: "none".into() });
+        }
+        if settings.reuse.policy != Policy::Surface {
             return Err(Error::Usage("--references needs --policy surface".into()));
         }
+        // (Names as they are, which may be no text.)
+        let names = || Ok(list(folders, pattern)?.into_iter().map(bytes_of).collect());
+        let names: Vec<Vec<u8>> = world.from_root(names)?;
+        let count = names.len();
+        let files = names.into_iter().map(|name| OsString::from_vec(name).into()).collect();
         let most = machine::memory().map_or(u64::MAX, |memory| memory / 2);
-        let mut found = Vec::new();
-        let mut held = 0;
-        for file in files(folders, pattern)? {
-            let (reference, hash) = read_one(&file, scene, terms).map_err(as_input)?;
-            held += reference.memory();
-            if held > most {
-                return Err(Error::Usage(format!(
-                    "the references take more than half of this machine's memory\n  \
-                     help: supply fewer of them; {} and the files before it fit nearly",
-                    file.display()
-                )));
-            }
-            found.push((hash, reference));
-        }
-        found.sort_by_key(|(hash, _)| *hash);
-        found.dedup_by_key(|(hash, _)| *hash);
-        let hash = name_of(&found);
-        let known = found.into_iter().map(|(_, reference)| reference);
-        Ok(Self { list: known.filter(|r| !r.is_empty()).collect(), hash })
+        let budget = most / u64::from(world.size_of_node());
+        let mut supply = Supply::new(files, terms.clone(), scene.recentring, budget);
+        // Alone it needs them itself, as long as there is room.
+        let is_kept = world.size() == 1;
+        let look = |file| supply.look(file, is_kept).map_err(as_input);
+        let own: Result<Vec<Card>> = own_part(count, world).map(look).collect();
+        let mut cards = world.all(world.agree(own)?)?.concat();
+        cards.sort_by_key(|card| card.hash);
+        cards.dedup_by_key(|card| card.hash);
+        let hash = name_of(&cards);
+        supply.serve(cards);
+        Ok(Self { supply: Some(supply), hash })
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.supply.is_none()
     }
 }
 
-fn name_of(found: &[([u8; 32], Reference)]) -> String {
-    if found.is_empty() {
-        return "none".into();
-    }
+/// Which of `count` files this rank looks into.
+fn own_part(count: usize, world: &World) -> std::ops::Range<usize> {
+    let edge = |rank: u32| count * rank as usize / world.size() as usize;
+    edge(world.rank())..edge(world.rank() + 1)
+}
+
+fn bytes_of(path: PathBuf) -> Vec<u8> {
+    path.into_os_string().into_vec()
+}
+
+fn name_of(cards: &[Card]) -> String {
     let mut all = blake3::Hasher::new();
-    for (hash, _) in found {
-        all.update(hash);
-    }
-    format!("{}, {}", counted(found.len(), "frame"), &all.finalize().to_hex()[..16])
-}
-
-fn read_one(file: &Path, scene: &Scene, terms: &Terms) -> Result<(Reference, [u8; 32])> {
-    let bytes = exr::read_attribute(file, ATTRIBUTE, LARGEST)?.ok_or_else(|| {
-        Error::input(
-            file,
-            "cannot serve as a reference: it holds no traced points\n  \
-             help: frames rendered to exr with --policy surface do",
-        )
-    })?;
-    decode(file, &bytes, terms, &scene.recentring)
+    cards.iter().for_each(|card| _ = all.update(&card.hash));
+    format!("{}, {}", counted(cards.len(), "frame"), &all.finalize().to_hex()[..16])
 }
 
 /// The exr files of all folders.
-fn files(folders: &[PathBuf], pattern: &FramePattern) -> Result<Vec<PathBuf>> {
+fn list(folders: &[PathBuf], pattern: &FramePattern) -> Result<Vec<PathBuf>> {
     let own = match pattern.folder() {
         folder if folder == Path::new("") => Path::new("."),
         folder => folder,

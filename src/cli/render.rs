@@ -1,30 +1,28 @@
 //! `tweenray render`: every frame of a shot, and a video of them.
 
+mod choosing;
+mod round;
+
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
+use super::choose::{Choice, ChoiceArgs};
 use super::exit::Exit;
 use super::machine;
-use super::progress::{Watch, duration, percent};
+use super::progress::{duration, percent};
 use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
-use super::stats::{self, RankStats};
+use super::stats;
 use crate::cluster::{self, Outcome, World};
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
-use crate::intersect::{self, Intersector};
+use crate::intersect;
 use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
-use crate::output::{Format, atomic};
-use crate::reuse::colour::Rule;
-use crate::scene::{Policy, Settings};
-use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{
-    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
-};
-use crate::shade::Renderer;
+use crate::scene::Settings;
 use crate::stats::ReuseCounts;
+use choosing::Choosing;
 use clap::{Args, Command, FromArgMatches};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use round::{Clock, Frames, Round, Site};
 use std::time::Instant;
 
 /// Render the frames of a camera move
@@ -41,12 +39,15 @@ Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resume
 Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16 --size 640x360 --spp 4
   tweenray render bunny.obj --up z
+  tweenray render scene.toml --target psnr=45
   mpirun -n 4 tweenray render scene.toml")]
 pub struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     #[command(flatten)]
     pub output: OutputArgs,
+    #[command(flatten)]
+    pub choice: ChoiceArgs,
     #[command(flatten)]
     pub settings: SettingArgs,
 }
@@ -75,8 +76,11 @@ pub fn run(args: &RenderArgs) -> Exit {
         }
     };
     render(&world, args).unwrap_or_else(|error| {
-        if world.is_root() {
+        if world.is_root() || world.is_stranded() {
             say::error(&error);
+        }
+        if world.is_stranded() {
+            world.abort(Exit::of(&error).code());
         }
         Exit::of(&error)
     })
@@ -85,10 +89,15 @@ pub fn run(args: &RenderArgs) -> Exit {
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::listen()?;
-    interrupt.limit(args.output.time_limit);
+    interrupt.before_slurm_ends();
+    interrupt.limit(start, args.output.time_limit);
     // Only one rank talks.
     let quiet = args.output.quiet || !world.is_root();
-    let mut request = world.agree(Request::load(&args.scene, &args.settings, &args.output))?;
+    let mut request = Request::load(world, args)?;
+    if args.output.time_limit.is_none() {
+        interrupt.limit(start, request.time_limit);
+    }
+    world.agree(args.choice.check(&request))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
     let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
@@ -99,48 +108,54 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let intersector = world.agree(pool.install(build))?;
     let built = Instant::now();
     let tracer = request.tracer(&intersector.describe())?;
-    let target = request.target(world.same_everywhere("traces with", tracer)?);
-    let prepare = || {
-        request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
-        pool.install(|| sequence::prepare(&target, request.frames))
-    };
-    let plan = world.from_root(prepare)?;
-    tell(quiet, &plan.notes, |n| say::note(n));
-    let job =
-        Frames { request: &request, target: &target, plan: &plan, pool: &pool, order: &order };
-    let (outcome, reference_bytes, saved) = job.render(world, &*intersector, &interrupt, quiet)?;
-    let rank = RankStats {
-        threads,
-        load_seconds: (loaded - start).as_secs_f64(),
-        build_seconds: (built - loaded).as_secs_f64(),
-        render_seconds: built.elapsed().as_secs_f64(),
-        intersector_bytes: intersector.memory(),
-        reference_bytes,
-        checkpoint_seconds: saved.seconds,
-        checkpoint_bytes: saved.bytes,
-        duty: outcome.own,
-        peak_memory_bytes: None,
-    };
-    let ranks = world.gather(&rank.with_peak())?;
-    // Whichever rank was asked to stop knows why.
-    let reasons = world.gather(&interrupt.reason())?;
-    // A rank that was asked to stop when all its frames were finished has not stopped the job.
-    let unfinished = world.from_root(|| Ok(outcome.unfinished))?;
+    let tracer = world.same_everywhere("traces with", tracer)?;
+    let clock = Clock { start, loaded, built };
+    let (intersector, pool, order) = (&*intersector, &pool, &order[..]);
+    let site = Site { world, intersector, pool, order, interrupt: &interrupt, clock, quiet };
+    let base = request.settings.clone();
+    let choosing = Choosing { args, base: &base, site: &site };
+    let mut choice = choosing.first(&request, &tracer)?;
+    let mut is_again = false;
+    loop {
+        if let Some(choice) = &choice {
+            request.settings = choice.settings(&base);
+            (request.terms, request.recipes) = request.terms_and_recipes(&request.settings)?;
+        }
+        let mut target = request.target(tracer.clone());
+        target.header.chosen = choice.as_ref().map(Choice::value);
+        // What is replaced was this job's own.
+        target.overwrite |= is_again;
+        let round = site.render(&request, &target)?;
+        let job = Frames { request: &request, target: &target, plan: &round.plan, site: &site };
+        let tighter = match round.unfinished {
+            0 => choosing.next(&job, &round, choice.take())?,
+            _ => None,
+        };
+        if tighter.is_none() {
+            return conclude(&job, &round);
+        }
+        (choice, is_again) = (tighter, true);
+    }
+}
+
+/// Tells what there is to tell of a job that renders no more frames.
+fn conclude(job: &Frames, round: &Round) -> Result<Exit> {
+    let Round { plan, outcome, unfinished, ranks, .. } = round;
+    let Site { world, clock: Clock { start, .. }, quiet, .. } = job.site;
     if !world.is_root() {
-        return Ok(if unfinished > 0 { Exit::Stopped } else { Exit::Done });
+        return Ok(if *unfinished > 0 { Exit::Stopped } else { Exit::Done });
     }
-    if let Some(path) = &request.stats {
+    if let Some(path) = &job.request.stats {
         let seconds = start.elapsed().as_secs_f64();
-        stats::write(path, &target.header, &plan, &outcome, &ranks, seconds)?;
+        stats::write(path, &job.target.header, plan, outcome, ranks, seconds)?;
     }
-    if unfinished > 0 {
-        let reason = reasons.into_iter().find(|reason| !reason.is_empty());
-        say_stopped(&job, &outcome, &reason.unwrap_or_default());
+    if *unfinished > 0 {
+        let reason = round.reasons.iter().find(|reason| !reason.is_empty());
+        say_stopped(job, outcome, reason.map_or("", |reason| reason));
         return Ok(Exit::Stopped);
     }
-    checkpoint::clear(&target);
-    let done = finish(&job, &outcome, start, quiet)?;
-    Ok(judge_samples(&job, &outcome, quiet).unwrap_or(done))
+    let done = finish(job, outcome, *start, *quiet)?;
+    Ok(judge_samples(job, outcome, *quiet).unwrap_or(done))
 }
 
 /// Holds every rank to the best instruction set that all their machines have, unless one was
@@ -168,83 +183,6 @@ fn thread_pool(threads: usize) -> Result<ThreadPool> {
 fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {
     if !quiet {
         words.iter().for_each(say);
-    }
-}
-
-/// What rendering the planned frames takes.
-struct Frames<'a> {
-    request: &'a Request,
-    target: &'a Target,
-    plan: &'a Plan,
-    pool: &'a ThreadPool,
-    /// The ranks, node by node.
-    order: &'a [u32],
-}
-
-impl Frames<'_> {
-    /// What became of the frames, the most memory that references took, bytes, and what it took to
-    /// put them on disk.
-    fn render(
-        &self,
-        world: &World,
-        intersector: &dyn Intersector,
-        interrupt: &Interrupt,
-        quiet: bool,
-    ) -> Result<(Outcome, u64, SaveCost)> {
-        let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
-        let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
-        let effects = EffectPlan::of(scene, settings);
-        let renderer = Renderer { scene, settings, plan: effects, intersector };
-        let with_gbuffer = pattern.format() == Format::Exr;
-        let checkpoints = self.checkpoints();
-        let (target, plan, pool, stop) = (self.target, self.plan, self.pool, &interrupt.stop);
-        let maker: Box<dyn Shared> = match settings.reuse.policy {
-            Policy::Surface => {
-                let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
-                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
-                maker.with_gbuffer = with_gbuffer;
-                maker.supplied = &self.request.references.list;
-                maker.checkpoints = Some(&checkpoints);
-                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
-                maker.terms = with_gbuffer.then(|| self.request.terms.clone());
-                Box::new(maker)
-            }
-            Policy::Colour => {
-                let rule = Rule {
-                    colour_epsilon: settings.reuse.colour_epsilon,
-                    distance_epsilon: settings.reuse.distance_epsilon,
-                };
-                let mut maker =
-                    ColourMaker::new(renderer, shot, pool, stop, &watch, rule, uploads)?;
-                maker.with_gbuffer = with_gbuffer;
-                Box::new(maker)
-            }
-            Policy::Off => {
-                let (progress, laid) = (&watch, Default::default());
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
-            }
-        };
-        let done = |report: &_| watch.frame_done(report);
-        let work = || cluster::render(world, self.order, target, plan, &*maker, stop, &done);
-        let outcome = interrupt.watched(work);
-        watch.finish();
-        tell(quiet, &maker.notes(), |n| say::note(n));
-        if let (Err(error), true) = (&outcome, world.size() > 1) {
-            // The other ranks are in the middle of their frames and would wait for this one.
-            say::error(error);
-            world.abort(Exit::of(error).code());
-        }
-        Ok((outcome?, maker.reference_memory(), maker.save_cost()))
-    }
-
-    fn checkpoints(&self) -> Checkpoints<'_> {
-        let Request { scene, settings, terms, checkpoint, .. } = self.request;
-        let whole = settings.crop.is_none();
-        Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
-    }
-
-    fn total(&self) -> usize {
-        self.plan.kept.len() + self.plan.render.len()
     }
 }
 

@@ -158,7 +158,7 @@ impl Job {
             facts.push(("Surface points inferred".into(), words::percent(share)));
         }
         if let Some([rmse, low, high]) = self.audited().and_then(|sums| audit_row(&sums).rmse) {
-            let [rmse, low, high] = [rmse, low, high].map(words::short);
+            let [rmse, low, high] = [rmse, low, high].map(words::steps);
             facts.push(("Error of inferred frames".into(), format!("{rmse}/255 ({low}–{high})")));
         }
         facts

@@ -3,15 +3,18 @@
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::as_input;
 use super::references::{self, References};
+use super::render::RenderArgs;
 use super::{job, machine, values};
+use crate::cluster::World;
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
-use crate::output::manifest::{self, Header};
+use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
 use crate::sequence::{Recipes, Target, check_upload, fingerprint, world_fingerprint};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -47,61 +50,115 @@ pub struct Request {
     pub maps: bool,
     /// On which terms frames serve as references.
     pub terms: Terms,
+    /// What each frame of the shot is made of.
+    pub recipes: Recipes,
     /// Frames of an earlier job.
     pub references: References,
     /// Pictures that are taken for frames.
     pub uploads: Vec<(u32, Image)>,
     /// What import warns of, and what rounding lost.
     pub warnings: Vec<Diagnostic>,
+    /// How long the program may run, where the scene file says.
+    pub time_limit: Option<Duration>,
     scene_name: String,
     scene_hash: String,
     shot_hash: String,
-    recipes: Recipes,
 }
 
-impl Request {
-    /// Reads the scene and puts the options over it.
-    pub fn load(scene: &SceneArgs, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
-        // Before the work of reading a scene.
-        machine::best_isa()?;
+/// What files say, and what comes of it. One rank of each node reads them; the others are told.
+#[derive(Serialize, Deserialize)]
+struct Read {
+    scene: Scene,
+    shot: Shot,
+    settings: Settings,
+    frames: FrameRange,
+    pattern: FramePattern,
+    overwrite: bool,
+    strict: bool,
+    video: bool,
+    fps: f64,
+    threads: Option<u32>,
+    stats: Option<PathBuf>,
+    time_limit: Option<Duration>,
+    checkpoint: Option<Option<Duration>>,
+    uploads: Vec<(u32, Image)>,
+    scene_hash: String,
+    shot_hash: String,
+    /// (Only rank 0 tells of them, which reads by itself.)
+    #[serde(skip)]
+    warnings: Vec<Diagnostic>,
+}
+
+impl Read {
+    fn by(scene: &SceneArgs, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
         let loaded = job::load(scene, settings)?;
         let frames = frames(output, &loaded)?;
         let pattern = pattern(scene, output, &loaded, frames)?;
-        let video = output.video || (loaded.video && !output.no_video);
-        let stats = output.stats.clone().or(loaded.stats);
-        refuse_input(stats.as_deref(), &loaded.files)?;
+        refuse_input(output.stats.as_deref().or(loaded.stats.as_deref()), &loaded.files)?;
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
-        refuse_maps(output.maps, &settings)?;
         let scene_hash = world_fingerprint(&world);
         let shot_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));
-        let terms = references::terms(&scene_hash, &scene, &settings);
-        let with_motion = pattern.format() == Format::Exr;
-        let recipes = Recipes::new(&shot, &settings, !terms.lights.is_empty(), with_motion)?;
-        let references = References::read(&output.references, &pattern, &scene, &settings, &terms)?;
         Ok(Self {
             scene,
             shot,
             settings,
             frames,
             pattern,
-            overwrite: output.overwrite || loaded.overwrite,
-            strict: output.strict || loaded.strict,
-            fps: video.then(|| output.fps.unwrap_or(loaded.fps)),
-            threads: output.threads.or(loaded.threads).map(|n| n as usize),
-            stats,
-            checkpoint: output.checkpoint.map_or(Some(CHECKPOINT), |interval| interval.0),
+            overwrite: loaded.overwrite,
+            strict: loaded.strict,
+            video: loaded.video,
+            fps: loaded.fps,
+            threads: loaded.threads,
+            stats: loaded.stats,
+            time_limit: loaded.time_limit,
+            checkpoint: loaded.checkpoint.map(|interval| interval.0),
+            uploads,
+            scene_hash,
+            shot_hash,
+            warnings,
+        })
+    }
+}
+
+impl Request {
+    /// Reads the scene and puts the options over it. All ranks call it.
+    pub fn load(world: &World, args: &RenderArgs) -> Result<Self> {
+        let RenderArgs { scene, settings, output, .. } = args;
+        // Before the work of reading a scene.
+        world.agree(machine::best_isa())?;
+        let read = world.from_node(|| Read::by(scene, settings, output));
+        let read = world.agree(read)?;
+        let derived = world.agree(Derived::of(&read, output))?;
+        let Derived { terms, recipes } = derived;
+        let on = (&read.scene, &read.settings, &terms);
+        let references = References::survey(world, &output.references, &read.pattern, on)?;
+        let checkpoint = output.checkpoint.map(|interval| interval.0).or(read.checkpoint);
+        Ok(Self {
+            scene: read.scene,
+            shot: read.shot,
+            settings: read.settings,
+            frames: read.frames,
+            pattern: read.pattern,
+            overwrite: output.overwrite || read.overwrite,
+            strict: output.strict || read.strict,
+            fps: (output.video || (read.video && !output.no_video))
+                .then(|| output.fps.unwrap_or(read.fps)),
+            threads: output.threads.or(read.threads).map(|n| n as usize),
+            stats: output.stats.clone().or(read.stats),
+            time_limit: read.time_limit,
+            checkpoint: checkpoint.unwrap_or(Some(CHECKPOINT)),
             maps: output.maps,
             references,
             terms,
-            uploads,
-            warnings,
-            scene_name: path.display().to_string(),
-            scene_hash,
-            shot_hash,
+            uploads: read.uploads,
+            warnings: read.warnings,
+            scene_name: scene.scene.display().to_string(),
+            scene_hash: read.scene_hash,
+            shot_hash: read.shot_hash,
             recipes,
         })
     }
@@ -137,6 +194,26 @@ impl Request {
         settings
     }
 
+    /// What depends on the settings: on which terms frames serve as references, and their recipes.
+    ///
+    /// Errors: those of [`Recipes::new`].
+    pub fn terms_and_recipes(&self, settings: &Settings) -> Result<(Terms, Recipes)> {
+        let Self { scene, shot, pattern, scene_hash, .. } = self;
+        let Derived { terms, recipes } =
+            Derived::new((scene, shot), settings, pattern, scene_hash)?;
+        Ok((terms, recipes))
+    }
+
+    /// The header of the frames that are there, where they are of this scene, version and `tracer`
+    /// and are to be kept.
+    pub fn header_before(&self, tracer: &str) -> Option<Header> {
+        let header = Manifest::read(&manifest::manifest_path(&self.pattern)).ok()??.header;
+        let is_same = header.scene_hash == self.scene_hash
+            && header.tweenray == env!("CARGO_PKG_VERSION")
+            && header.tracer == tracer;
+        (is_same && !self.overwrite).then_some(header)
+    }
+
     /// Where frames traced by `tracer` go, and what they share.
     pub fn target(&self, tracer: String) -> Target {
         let header = Header {
@@ -149,6 +226,7 @@ impl Request {
             files: manifest::file_name(&self.pattern),
             tracer,
             command: super::words(),
+            chosen: None,
             settings: self.header_settings(),
         };
         Target {
@@ -161,6 +239,32 @@ impl Request {
             },
             overwrite: self.overwrite,
         }
+    }
+}
+
+/// What follows from what was read; each rank sees to it for itself.
+struct Derived {
+    terms: Terms,
+    recipes: Recipes,
+}
+
+impl Derived {
+    fn of(read: &Read, output: &OutputArgs) -> Result<Self> {
+        let Read { scene, shot, settings, pattern, scene_hash, .. } = read;
+        refuse_maps(output.maps, settings)?;
+        Self::new((scene, shot), settings, pattern, scene_hash)
+    }
+
+    fn new(
+        (scene, shot): (&Scene, &Shot),
+        settings: &Settings,
+        pattern: &FramePattern,
+        scene_hash: &str,
+    ) -> Result<Self> {
+        let terms = references::terms(scene_hash, scene, settings);
+        let with_motion = pattern.format() == Format::Exr;
+        let recipes = Recipes::new(shot, settings, !terms.lights.is_empty(), with_motion)?;
+        Ok(Self { terms, recipes })
     }
 }
 

@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// How long before the end of its Slurm allocation a job stops: it takes at most ten seconds, and the
 /// clocks of two machines differ.
@@ -44,12 +44,15 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Stops after `limit`, and shortly before the Slurm allocation ends that this process runs in.
-    pub fn limit(&self, limit: Option<Duration>) {
-        if let Some(limit) = limit {
-            let limit_text = duration(limit.as_secs_f64());
-            self.stop_after(limit, format!(" at the time limit of {limit_text}"));
-        }
+    /// Stops when `limit` has passed since `start`.
+    pub fn limit(&self, start: Instant, limit: Option<Duration>) {
+        let Some(limit) = limit else { return };
+        let reason = format!(" at the time limit of {}", duration(limit.as_secs_f64()));
+        self.stop_after(limit.saturating_sub(start.elapsed()), reason);
+    }
+
+    /// Stops shortly before the Slurm allocation ends that this process runs in, if it does.
+    pub fn before_slurm_ends(&self) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let end = std::env::var("SLURM_JOB_END_TIME").ok();
         if let Some(left) = end.and_then(|end| until_slurm_ends(&end, now)) {

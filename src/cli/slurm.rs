@@ -71,7 +71,7 @@ pub fn run(args: &SlurmArgs) -> Result<Exit> {
     let notice = notice(args.time, args.notice)?;
     let render = render::parse(&args.scene, &args.render)?;
     one_line(&args.scene).map_err(Error::Usage)?;
-    let RenderArgs { scene, output, settings } = &render;
+    let RenderArgs { scene, output, settings, .. } = &render;
     let loaded = job::load(scene, settings)?;
     refuse_overwrite(output.overwrite, loaded.overwrite, scene)?;
     let frames = frames(output, &loaded)?;

@@ -1,6 +1,7 @@
 //! Values of options as people type them: sizes, frame ranges, crops, choices, numbers in bounds.
 
-use crate::scene::{FrameRange, Rect};
+use crate::accuracy::Goal;
+use crate::scene::{FrameRange, Interval, Rect, parse_time};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use std::ops::RangeInclusive;
@@ -92,40 +93,36 @@ pub fn crop(text: &str) -> Result<Rect, String> {
     }
 }
 
+/// `psnr=45`, `ssim=0.99`, `flip=0.02`, `max-share=0.1%`.
+pub fn goal(text: &str) -> Result<Goal, String> {
+    let wrong = "a target is written psnr=45, ssim=0.99, flip=0.02 or max-share=0.1%";
+    let (figure, value) = text.split_once('=').ok_or(wrong)?;
+    let share = |text: &str| match text.strip_suffix('%') {
+        Some(percent) => within(0.0..=100.0)(percent).map(|p| 0.01 * p),
+        None => within(0.0..=1.0)(text),
+    };
+    let inner = |x: f64| match x > 0.0 && x < 1.0 {
+        true => Ok(x),
+        false => Err("this target has to lie between 0 and 1 (100 %), both excluded".to_string()),
+    };
+    match figure.trim() {
+        "psnr" => within(10.0..=100.0)(value).map(Goal::Psnr),
+        "ssim" => share(value).and_then(inner).map(Goal::Ssim),
+        "flip" => share(value).and_then(inner).map(Goal::Flip),
+        "max-share" => share(value).and_then(inner).map(Goal::MaxShare),
+        _ => Err(wrong.into()),
+    }
+}
+
 /// `25m`, `1h30m`, `90s`, `2d`.
 pub fn time(text: &str) -> Result<Duration, String> {
-    let wrong = || "a time is written with its units, as in 90s, 25m or 1h30m".to_string();
-    let (mut rest, mut seconds) = (text.trim(), 0_u64);
-    if rest.is_empty() {
-        return Err(wrong());
-    }
-    while !rest.is_empty() {
-        let digits = rest.find(|c: char| !c.is_ascii_digit()).ok_or_else(wrong)?;
-        let number: u32 = rest[..digits].parse().map_err(|_| wrong())?;
-        let unit = match rest.as_bytes()[digits] {
-            b's' => 1,
-            b'm' => 60,
-            b'h' => 3600,
-            b'd' => 86_400,
-            _ => return Err(wrong()),
-        };
-        seconds += u64::from(number) * unit;
-        rest = &rest[digits + 1..];
-    }
-    Ok(Duration::from_secs(seconds))
+    parse_time(text)
 }
 
 /// A time, or `off`.
 pub fn time_or_off(text: &str) -> Result<Interval, String> {
-    match text.trim() {
-        "off" => Ok(Interval(None)),
-        text => time(text).map(|time| Interval(Some(time))),
-    }
+    Interval::parse(text)
 }
-
-/// How often something is done, if ever.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interval(pub Option<Duration>);
 
 /// A parser of numbers in `range`.
 pub fn within(
@@ -197,24 +194,22 @@ mod tests {
     }
 
     #[test]
-    fn times_have_units() {
-        let seconds = |text| time(text).map(|t| t.as_secs());
-        assert_eq!(seconds("25m"), Ok(1500));
-        assert_eq!(seconds("1h30m"), Ok(5400));
-        assert_eq!(seconds("0s"), Ok(0));
-        assert_eq!(seconds("2d4h"), Ok(187_200));
-        for text in ["", "25", "m", "1.5h", "-3s", "5 m x", "99999999999s", "5é", "1h30"] {
-            assert!(time(text).is_err(), "{text}");
-        }
-        assert_eq!(time_or_off("off"), Ok(Interval(None)));
-        assert_eq!(time_or_off("30s"), Ok(Interval(Some(Duration::from_secs(30)))));
-    }
-
-    #[test]
     fn an_upload_names_frame_and_file() {
         assert_eq!(upload("9=a=b.png"), Ok((9, PathBuf::from("a=b.png"))));
         for text in ["9", "9=", "=a.png", "x=a.png", "-1=a.png", "a.png"] {
             assert!(upload(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn targets_are_read_as_people_write_them() {
+        assert_eq!(goal("psnr=45"), Ok(Goal::Psnr(45.0)));
+        assert_eq!(goal("max-share=25%"), Ok(Goal::MaxShare(0.25)));
+        assert_eq!(goal("ssim=0.99"), Ok(Goal::Ssim(0.99)));
+        for text in
+            ["psnr", "psnr=", "psnr=nan", "psnr=999", "ssim=1", "flip=0", "mse=1", "flip=x%"]
+        {
+            assert!(goal(text).is_err(), "{text}");
         }
     }
 

@@ -11,6 +11,7 @@
 
 mod board;
 mod clerk;
+mod collective;
 mod frames;
 mod launcher;
 #[cfg(feature = "mpi")]
@@ -31,12 +32,15 @@ use launcher::Launcher;
 use note::{Cargo, Kind};
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
+use std::time::Duration;
 
 /// This process's place in the job.
 pub struct World {
     ranks: Ranks,
-    /// What this rank sent while rendering, so far.
+    /// What this rank sent, so far.
     sent: Cell<Traffic>,
+    /// Whether this rank failed and could not tell the others.
+    is_stranded: Cell<bool>,
 }
 
 enum Ranks {
@@ -52,7 +56,7 @@ impl World {
     }
 
     fn of(ranks: Ranks) -> Self {
-        Self { ranks, sent: Cell::default() }
+        Self { ranks, sent: Cell::default(), is_stranded: Cell::default() }
     }
 
     /// Joins the ranks that a launcher started with this one; alone without a launcher.
@@ -98,72 +102,14 @@ impl World {
         }
     }
 
+    /// How many of the processes share this one's memory, itself included.
+    pub fn size_of_node(&self) -> u32 {
+        self.place_in_node().1
+    }
+
     /// Whether this rank talks to people and keeps the manifest.
     pub fn is_root(&self) -> bool {
         self.rank() == 0
-    }
-
-    /// `outcome`, if no rank failed; else the error of the lowest rank that did, on every rank.
-    /// All ranks call it.
-    pub fn agree<T>(&self, outcome: Result<T>) -> Result<T> {
-        if self.size() == 1 {
-            return outcome;
-        }
-        let mine = outcome.as_ref().err().map(Verdict::of);
-        let verdicts: Vec<Option<Verdict>> = self.exchange(&mine)?;
-        match (verdicts.into_iter().enumerate().find_map(|(r, v)| Some((r, v?))), outcome) {
-            (None, outcome) => outcome,
-            (Some((rank, _)), Err(own)) if rank as u32 == self.rank() => Err(own),
-            (Some((rank, verdict)), _) => Err(verdict.into_error(rank)),
-        }
-    }
-
-    /// What rank 0 makes of `make`, on every rank; its error too. All ranks call it.
-    pub fn from_root<T>(&self, make: impl FnOnce() -> Result<T>) -> Result<T>
-    where
-        T: Serialize + for<'de> Deserialize<'de>,
-    {
-        if self.size() == 1 {
-            return make();
-        }
-        let made = if self.is_root() { make().map(Some) } else { Ok(None) };
-        let bytes = encode(&self.agree(made)?)?;
-        match decode(&self.broadcast(bytes))? {
-            Some(value) => Ok(value),
-            None => Err(Error::Failed("rank 0 sent nothing".into())),
-        }
-    }
-
-    /// Every rank's `value`, in rank order, on rank 0; nothing on the others. All ranks call it.
-    pub fn gather<T: Serialize + for<'de> Deserialize<'de>>(&self, value: &T) -> Result<Vec<T>> {
-        let all = self.gather_bytes(encode(value)?);
-        all.iter().map(|bytes| decode(bytes)).collect()
-    }
-
-    /// Every rank's `value`, in rank order, on every rank. All ranks call it.
-    pub fn all<T: Serialize + for<'de> Deserialize<'de>>(&self, value: T) -> Result<Vec<T>> {
-        if self.size() == 1 { Ok(vec![value]) } else { self.exchange(&value) }
-    }
-
-    /// `value` if all ranks have the same, else an error that says what differs. All ranks call it.
-    pub fn same_everywhere(&self, what: &str, value: String) -> Result<String> {
-        if self.size() == 1 {
-            return Ok(value);
-        }
-        let all: Vec<String> = self.exchange(&value)?;
-        match all.iter().enumerate().find(|(_, other)| **other != all[0]) {
-            None => Ok(value),
-            Some((rank, other)) => Err(Error::Usage(format!(
-                "rank 0 {what} {}, but rank {rank} {what} {other}\n  help: frames would differ in \
-                 their last bits; --isa avx2 makes mixed machines agree",
-                all[0]
-            ))),
-        }
-    }
-
-    fn exchange<T: Serialize + for<'de> Deserialize<'de>>(&self, value: &T) -> Result<Vec<T>> {
-        let gathered = self.gather(value)?;
-        decode(&self.broadcast(encode(&gathered)?))
     }
 
     fn broadcast(&self, bytes: Vec<u8>) -> Vec<u8> {
@@ -171,6 +117,35 @@ impl World {
             Ranks::Solo => bytes,
             #[cfg(feature = "mpi")]
             Ranks::Mpi(session) => session.broadcast(bytes),
+        }
+    }
+
+    fn broadcast_in_node(&self, bytes: Vec<u8>) -> Vec<u8> {
+        match &self.ranks {
+            Ranks::Solo => bytes,
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => session.broadcast_in_node(bytes),
+        }
+    }
+
+    /// This rank's place among those of its node, from 0, and how many these are.
+    fn place_in_node(&self) -> (u32, u32) {
+        match &self.ranks {
+            Ranks::Solo => (0, 1),
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => session.place_in_node(),
+        }
+    }
+
+    /// Waits, asleep, for all ranks to get here; false where some do not within `patience`.
+    fn assemble(&self, patience: Option<Duration>) -> bool {
+        match &self.ranks {
+            Ranks::Solo => {
+                _ = patience;
+                true
+            }
+            #[cfg(feature = "mpi")]
+            Ranks::Mpi(session) => session.assemble(patience),
         }
     }
 
@@ -277,35 +252,6 @@ impl World {
             Ranks::Solo => _ = code,
             #[cfg(feature = "mpi")]
             Ranks::Mpi(session) => session.abort(code),
-        }
-    }
-}
-
-/// An error as other ranks hear of it.
-#[derive(Serialize, Deserialize)]
-enum Verdict {
-    Input(String),
-    Usage(String),
-    Stopped,
-    Failed(String),
-}
-
-impl Verdict {
-    fn of(error: &Error) -> Self {
-        match error {
-            Error::Input(fault) => Self::Input(fault.to_string()),
-            Error::Usage(text) => Self::Usage(text.clone()),
-            Error::Stopped => Self::Stopped,
-            other => Self::Failed(other.to_string()),
-        }
-    }
-
-    fn into_error(self, rank: usize) -> Error {
-        match self {
-            // Kept apart from `Failed` for the exit code; the text already holds the place.
-            Self::Input(text) | Self::Usage(text) => Error::Usage(text),
-            Self::Stopped => Error::Stopped,
-            Self::Failed(text) => Error::Failed(format!("rank {rank}: {text}")),
         }
     }
 }

@@ -13,11 +13,12 @@ use ::mpi::point_to_point::MatchedReceiveVec;
 use ::mpi::topology::SimpleCommunicator;
 use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::RefCell;
+use std::ffi::{c_char, c_void};
 use std::mem::MaybeUninit;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How long a waiting rank sleeps between looks; Open MPI would spin on a core instead.
-const NAP: Duration = Duration::from_millis(5);
+const NAP: Duration = Duration::from_millis(2);
 /// Tag of notes.
 const NOTE: i32 = 1;
 /// Tag of what `gather` sends.
@@ -31,6 +32,8 @@ const PIECE: usize = 1 << 30;
 pub struct Session {
     outbox: RefCell<Vec<Posted>>,
     world: SimpleCommunicator,
+    /// The ranks that share memory with this one, in the order of their numbers.
+    node: SimpleCommunicator,
     // Dropped last: it finalises MPI.
     _universe: Universe,
 }
@@ -53,8 +56,10 @@ impl Session {
             // and MPI is not used by this process again.
             unsafe { ffi::MPI_Abort(ffi::RSMPI_COMM_WORLD, 1) };
         }));
+        wait_for_all_to_start();
         let world = universe.world();
-        Ok(Self { outbox: RefCell::default(), world, _universe: universe })
+        let node = world.split_shared(world.rank());
+        Ok(Self { outbox: RefCell::default(), world, node, _universe: universe })
     }
 
     pub fn rank(&self) -> u32 {
@@ -66,15 +71,18 @@ impl Session {
     }
 
     /// Rank 0's `bytes`, on every rank.
-    pub fn broadcast(&self, mut bytes: Vec<u8>) -> Vec<u8> {
-        let root = self.world.process_at_rank(0);
-        let mut length = bytes.len() as u64;
-        root.broadcast_into(&mut length);
-        bytes.resize(length as usize, 0);
-        for piece in bytes.chunks_mut(PIECE) {
-            root.broadcast_into(piece);
-        }
-        bytes
+    pub fn broadcast(&self, bytes: Vec<u8>) -> Vec<u8> {
+        from_first(&self.world, bytes)
+    }
+
+    /// The `bytes` of this node's first rank, on every rank of it. All ranks of the node call it.
+    pub fn broadcast_in_node(&self, bytes: Vec<u8>) -> Vec<u8> {
+        from_first(&self.node, bytes)
+    }
+
+    /// This rank's place among the ranks of its node, from 0, and how many these are.
+    pub fn place_in_node(&self) -> (u32, u32) {
+        (self.node.rank() as u32, self.node.size() as u32)
     }
 
     /// Every rank's `bytes` on rank 0, nothing elsewhere.
@@ -100,9 +108,8 @@ impl Session {
 
     /// The lowest of the ranks that share memory with this one, itself included. All ranks call it.
     pub fn node(&self) -> u32 {
-        let node = self.world.split_shared(self.world.rank());
         let mut first = self.world.rank();
-        node.process_at_rank(0).broadcast_into(&mut first);
+        self.node.process_at_rank(0).broadcast_into(&mut first);
         first as u32
     }
 
@@ -167,6 +174,23 @@ impl Session {
         Ok(())
     }
 
+    /// Waits, asleep, until every rank called this; false where somebody is not there after
+    /// `patience`, and then nothing is left to do with the others but to end them.
+    pub fn assemble(&self, patience: Option<Duration>) -> bool {
+        let start = Instant::now();
+        let mut barrier = self.world.immediate_barrier();
+        while let Err(pending) = barrier.test() {
+            if patience.is_some_and(|patience| start.elapsed() > patience) {
+                // (Its request is MPI's until the end, which is near.)
+                std::mem::forget(pending);
+                return false;
+            }
+            barrier = pending;
+            std::thread::sleep(NAP);
+        }
+        true
+    }
+
     /// Ends all ranks.
     pub fn abort(&self, code: u8) {
         self.world.abort(i32::from(code));
@@ -184,4 +208,42 @@ impl Session {
         });
         outbox.is_empty()
     }
+}
+
+/// Waits until every rank has left `MPI_Init`, by the launcher's own barrier where it has one. In Open
+/// MPI 5 a rank that is still in there crashes where a message of a quicker one reaches it
+/// (open-mpi/ompi#12495; met with 5.0.7 over TCP on busy cores).
+#[cfg(target_os = "linux")]
+fn wait_for_all_to_start() {
+    type Fence =
+        unsafe extern "C" fn(*const c_void, usize, *const c_void, usize) -> std::ffi::c_int;
+    unsafe extern "C" {
+        fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
+    }
+    // SAFETY: the name is a C string; on Linux the null library is `RTLD_DEFAULT`, all that the
+    // program was linked with and what that needs. Open MPI 5 needs PMIx, others may not.
+    let found = unsafe { dlsym(std::ptr::null_mut(), c"PMIx_Fence".as_ptr()) };
+    if found.is_null() {
+        return;
+    }
+    // SAFETY: `pmix_status_t PMIx_Fence(const pmix_proc_t[], size_t, const pmix_info_t[], size_t)` by
+    // the PMIx Standard since 2.0, in which no processes are all of the job. MPI has initialised PMIx.
+    let fence = unsafe { std::mem::transmute::<*mut c_void, Fence>(found) };
+    // SAFETY: as above; every rank calls it once, here. Where it fails there is nothing to wait for.
+    unsafe { fence(std::ptr::null(), 0, std::ptr::null(), 0) };
+}
+
+#[cfg(not(target_os = "linux"))]
+fn wait_for_all_to_start() {}
+
+/// The `bytes` of the first of some ranks, on all of them.
+fn from_first(ranks: &SimpleCommunicator, mut bytes: Vec<u8>) -> Vec<u8> {
+    let first = ranks.process_at_rank(0);
+    let mut length = bytes.len() as u64;
+    first.broadcast_into(&mut length);
+    bytes.resize(length as usize, 0);
+    for piece in bytes.chunks_mut(PIECE) {
+        first.broadcast_into(piece);
+    }
+    bytes
 }

@@ -12,9 +12,11 @@ pub struct Sent {
     pub bytes: u64,
 }
 
-/// Messages sent while rendering.
+/// Messages sent: the scene before the first frame, the others while rendering.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Traffic {
+    /// The scene as it was read, to the other ranks of the node.
+    pub scene: Sent,
     /// Orders, reports and the like.
     pub notes: Sent,
     /// References of policy `surface`, to ranks that need them.
@@ -26,6 +28,11 @@ pub struct Traffic {
 }
 
 impl Traffic {
+    /// The scene to one more rank.
+    pub fn scene(&mut self, bytes: usize) {
+        self.scene.count(bytes);
+    }
+
     /// One more note.
     pub fn note(&mut self, bytes: usize) {
         self.notes.count(bytes);
@@ -40,9 +47,10 @@ impl Traffic {
         }
     }
 
-    /// What was sent since it stood at `before`.
+    /// What was sent since it stood at `before`, and the scene.
     pub fn since(&self, before: &Self) -> Self {
         Self {
+            scene: self.scene,
             notes: self.notes.since(before.notes),
             references: self.references.since(before.references),
             discoveries: self.discoveries.since(before.discoveries),

@@ -4,9 +4,11 @@
 //! queries; knows nothing of materials, rules or retries. Only a committed scene can be traced,
 //! and it borrows the buffers that Embree shares.
 
+mod options;
 mod packet;
 mod yardstick;
 
+pub use options::{BuildOptions, Quality};
 use packet::Query;
 pub use packet::{Packet, PacketHit, QueryFlags};
 pub use yardstick::{BareCamera, BareTally};
@@ -131,17 +133,6 @@ unsafe extern "C" fn count_memory(counter: *mut c_void, bytes: isize, _post: boo
     true
 }
 
-/// How Embree builds its scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BuildOptions<'a> {
-    /// Threads for the build.
-    pub threads: usize,
-    /// Instruction set ("avx2"), or `None` for the machine's best.
-    pub isa: Option<&'a str>,
-    /// ROBUST traversal.
-    pub robust: bool,
-}
-
 /// A scene that takes geometry; `commit` makes it traceable. Borrows the geometry for `'g`.
 pub struct SceneBuilder<'g> {
     // Declared before the device, so dropped before it.
@@ -178,10 +169,12 @@ impl<'g> SceneBuilder<'g> {
         // SAFETY: the device is live; the scene is owned by the handle.
         let scene = SceneHandle(unsafe { sys::rtcNewScene(device.raw) });
         device.check("make a scene")?;
-        if options.robust {
-            // SAFETY: the scene is live and not committed yet.
-            unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
+        // SAFETY: the scene is live and not committed yet.
+        unsafe {
+            sys::rtcSetSceneFlags(scene.0, options.flags());
+            sys::rtcSetSceneBuildQuality(scene.0, options.build_quality());
         }
+        device.check("set how the scene is built")?;
         Ok(Self {
             scene,
             device,

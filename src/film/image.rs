@@ -4,9 +4,10 @@ use super::Film;
 use crate::error::{Error, Result};
 use crate::math::{Rgb, srgb_decode, srgb_encode};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// What the numbers of an [`Image`] mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Encoding {
     /// Linear radiance, unbounded (exr, hdr).
     Linear,
@@ -15,13 +16,14 @@ pub enum Encoding {
 }
 
 /// An RGB picture. Row 0 is the top.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Image {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
     /// `width · height` pixels, row by row.
+    #[serde(with = "crate::math::bulk")]
     pub rgb: Vec<Rgb>,
     /// What the pixels' numbers mean.
     pub encoding: Encoding,

@@ -30,8 +30,9 @@ pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::{FrameRange, Settings, Shot, World, limits};
+use crate::scene::{FrameRange, Interval, Settings, Shot, World, limits};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
 pub const DEFAULT_CREASE_DEGREES: f64 = 30.0;
@@ -92,6 +93,10 @@ pub struct Loaded {
     pub threads: Option<u32>,
     /// File for statistics, where the file says, relative to the current folder.
     pub stats: Option<PathBuf>,
+    /// How long the program may run, where the file says.
+    pub time_limit: Option<Duration>,
+    /// How often what frames to come need is put on disk, where the file says.
+    pub checkpoint: Option<Interval>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
     /// Every file read, in order.
@@ -133,6 +138,8 @@ impl Loaded {
             strict: false,
             threads: None,
             stats: None,
+            time_limit: None,
+            checkpoint: None,
             warnings: Vec::new(),
             files: Vec::new(),
             stage: None,

@@ -23,11 +23,11 @@ use super::facts::MeshFacts;
 use super::triangle;
 use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
-    BuildOptions, CommittedScene, Packet, PacketHit, QueryFlags, SceneBuilder, SphereData,
+    BuildOptions, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder, SphereData,
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
-use crate::scene::{HitRules, Scene};
+use crate::scene::{BuildQuality, HitRules, Scene, Settings};
 use crate::stats::RayCounts;
 
 /// Half an ulp at 1 in f32.
@@ -88,8 +88,32 @@ impl<'s> EmbreeIntersector<'s> {
         isa: Option<&str>,
         threads: usize,
     ) -> Result<Self> {
+        Self::of(
+            scene,
+            &Settings { rules, isa: isa.map(Into::into), ..Settings::default() },
+            threads,
+        )
+    }
+
+    /// [`Self::new`] with the rules, the instruction set and the kind of tree of `settings`.
+    ///
+    /// Errors: those of [`Self::new`].
+    pub fn of(scene: &'s Scene, settings: &Settings, threads: usize) -> Result<Self> {
+        let rules = settings.rules;
+        let quality = match settings.build_quality {
+            BuildQuality::Low => Quality::Low,
+            BuildQuality::Medium => Quality::Medium,
+            BuildQuality::High => Quality::High,
+        };
+        let options = BuildOptions {
+            threads,
+            isa: settings.isa.as_deref(),
+            robust: rules.robust,
+            quality,
+            compact: settings.compact,
+        };
         let near = if rules.recentre { NEAR } else { f64::INFINITY };
-        let mut builder = SceneBuilder::new(&BuildOptions { threads, isa, robust: rules.robust })?;
+        let mut builder = SceneBuilder::new(&options)?;
         let copies = coincident::copies(scene);
         let copies_in = |geom_id: u32| {
             let first = copies.partition_point(|copy| copy.geom_id < geom_id);

@@ -55,12 +55,7 @@ pub fn build<'s>(
     threads: usize,
 ) -> Result<Box<dyn Intersector + Send + 's>> {
     Ok(match settings.intersector {
-        IntersectorKind::Embree => Box::new(EmbreeIntersector::new(
-            scene,
-            settings.rules,
-            settings.isa.as_deref(),
-            threads,
-        )?),
+        IntersectorKind::Embree => Box::new(EmbreeIntersector::of(scene, settings, threads)?),
         IntersectorKind::Oracle => Box::new(Oracle::new(scene)),
     })
 }

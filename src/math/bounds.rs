@@ -1,9 +1,10 @@
 //! Axis-aligned boxes in f64.
 
 use super::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// An axis-aligned box; empty while `min > max` on an axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounds3 {
     /// Lower corner.
     pub min: DVec3,

@@ -6,6 +6,7 @@
 pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, UVec2, Vec2, Vec3};
 
 mod bounds;
+pub mod bulk;
 mod double_double;
 mod srgb;
 

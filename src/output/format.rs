@@ -4,11 +4,12 @@ use super::{Display, Written, atomic, exr, maps, png};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::scene::{Settings, ToneCurve};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
 /// What can be written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Format {
     /// Display values, 8 or 16 bits.
     Png,

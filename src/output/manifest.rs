@@ -16,6 +16,7 @@ use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
 use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -48,6 +49,9 @@ pub struct Header {
     /// The words of the command that started the sequence, program first; told, never compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
+    /// How the program chose the settings, where it did; told, never compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<Value>,
     /// Every setting, by name. Kept as JSON, so that a manifest of another version can be read
     /// far enough to say what differs.
     pub settings: Value,
@@ -242,7 +246,7 @@ impl Manifest {
                 path.display()
             ))
         })?;
-        let rows = rows_in(&bytes).map(|row| (row.frame, row)).collect();
+        let rows = rows_in(&bytes).map(|row: Row| (row.frame, row)).collect();
         Ok(Some(Self { header, rows }))
     }
 
@@ -254,7 +258,7 @@ impl Manifest {
         // Parts first: a job that ends in between moves rows from them into the manifest.
         let mut pending = Vec::new();
         for part in parts(path)? {
-            pending.extend(rows_in(&read_if_there(&part)?.unwrap_or_default()));
+            pending.extend(rows_in::<Row>(&read_if_there(&part)?.unwrap_or_default()));
         }
         let Some(mut manifest) = Self::read(path)? else { return Ok(None) };
         manifest.rows.extend(pending.into_iter().map(|row| (row.frame, row)));
@@ -281,7 +285,7 @@ impl Manifest {
         let parts = parts(path)?;
         let mut lines = Vec::new();
         for part in &parts {
-            for row in rows_in(&read_if_there(part)?.unwrap_or_default()) {
+            for row in rows_in::<Row>(&read_if_there(part)?.unwrap_or_default()) {
                 lines.extend(line_of(path, &row)?);
             }
         }
@@ -293,6 +297,11 @@ impl Manifest {
 }
 
 impl Journal {
+    /// The lines at `path` that can be understood; none where there is no file.
+    pub fn lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
+        Ok(rows_in(&read_if_there(path)?.unwrap_or_default()).collect())
+    }
+
     /// Opens the manifest or part at `path` for appending; a torn last line is cut off.
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = read_if_there(path)?.unwrap_or_default();
@@ -308,8 +317,8 @@ impl Journal {
         Ok(Self { path: path.to_path_buf(), file })
     }
 
-    /// Appends a row: one write, then a sync.
-    pub fn append(&mut self, row: &Row) -> Result<()> {
+    /// Appends a row, as one line of JSON: one write, then a sync.
+    pub fn append(&mut self, row: &impl Serialize) -> Result<()> {
         let line = line_of(&self.path, row)?;
         self.append_bytes(&line)
     }
@@ -374,7 +383,7 @@ fn header_of(line: &[u8]) -> std::result::Result<Header, String> {
     }
 }
 
-fn rows_in(bytes: &[u8]) -> impl Iterator<Item = Row> + '_ {
+fn rows_in<T: DeserializeOwned>(bytes: &[u8]) -> impl Iterator<Item = T> + '_ {
     // Without its line feed the last line is torn, even if it happens to parse.
     let lines = bytes.split_inclusive(|b| *b == b'\n').filter(|l| l.ends_with(b"\n"));
     lines.filter_map(|line| serde_json::from_slice(line).ok())

@@ -6,10 +6,11 @@
 
 use super::Format;
 use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// A file name with a place for the frame number.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FramePattern {
     folder: PathBuf,
     before: String,

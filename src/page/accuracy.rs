@@ -1,6 +1,6 @@
 //! The page of a sweep.
 
-use super::{Picture, Plot, SCRIPT, STYLE, Scatter, Table, json_for_script, set};
+use super::{Picture, Plot, SCRIPT, STYLE, Scatter, Table, json_for_script, set, with_options};
 use crate::error::Result;
 use askama::Template;
 use serde::Serialize;
@@ -30,7 +30,7 @@ pub struct Detail {
 }
 
 /// What turning a knob does.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct KnobText {
     /// The knob.
     pub name: String,
@@ -75,6 +75,9 @@ pub struct AccuracyPage {
 #[template(path = "accuracy.html")]
 struct Html<'a> {
     page: &'a AccuracyPage,
+    summary: Vec<String>,
+    warnings: Vec<String>,
+    knobs: Vec<(&'a str, Vec<String>)>,
     style: &'static str,
     script: &'static str,
     own_script: &'static str,
@@ -92,8 +95,12 @@ impl AccuracyPage {
     /// # Errors
     /// [`crate::error::Error::Failed`] when it cannot be set.
     pub fn to_html(&self) -> Result<String> {
+        let all = |texts: &[String]| texts.iter().map(|text| with_options(text)).collect();
         set(&Html {
             page: self,
+            summary: all(&self.summary),
+            warnings: all(&self.warnings),
+            knobs: self.knobs.iter().map(|k| (k.name.as_str(), all(&k.sentences))).collect(),
             style: STYLE,
             script: SCRIPT,
             own_script: include_str!("../../templates/accuracy.js"),

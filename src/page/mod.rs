@@ -40,6 +40,30 @@ fn set(page: &impl Template) -> Result<String> {
     page.render().map_err(|e| Error::Failed(format!("cannot set the page: {e}")))
 }
 
+/// Text that may stand in HTML and in an attribute.
+fn escaped(text: &str) -> String {
+    let escape = |c: char| match c {
+        '&' => "&amp;".to_string(),
+        '<' => "&lt;".into(),
+        '>' => "&gt;".into(),
+        '"' => "&quot;".into(),
+        c => c.into(),
+    };
+    text.chars().map(escape).collect()
+}
+
+/// Text as HTML, with the options of the command line set as such: no line is broken within one.
+fn with_options(text: &str) -> String {
+    let word = |word: &str| match word.starts_with("--") {
+        true => {
+            let end = word.trim_end_matches([':', ',', '.', ';']);
+            format!("<code>{}</code>{}", escaped(end), &word[end.len()..])
+        }
+        false => escaped(word),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
 /// `value` as JSON that may stand in a script element: nothing in it can end one.
 fn json_for_script(value: &impl serde::Serialize) -> Result<String> {
     let text = serde_json::to_string(value)
@@ -55,5 +79,13 @@ mod tests {
         assert!(!text.contains('<'), "{text}");
         let back: String = serde_json::from_str(&text).expect("JSON");
         assert_eq!(back, "</script><!--");
+    }
+
+    #[test]
+    fn options_are_set_as_such() {
+        assert_eq!(
+            super::with_options("<b> --spp 4: less, --cutoff."),
+            "&lt;b&gt; <code>--spp</code> 4: less, <code>--cutoff</code>."
+        );
     }
 }

@@ -55,6 +55,24 @@ impl Picture {
         Ok(Self::of(&pixels, "png", &bytes))
     }
 
+    /// A png file as it is.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when it is none.
+    pub fn of_png(bytes: &[u8]) -> Result<Self> {
+        let pixels = image::load_from_memory_with_format(bytes, image::ImageFormat::Png);
+        Ok(Self::of(&pixels.map_err(failed)?.to_rgb8(), "png", bytes))
+    }
+
+    /// The picture as a file.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] when it is not one of these.
+    pub fn bytes(&self) -> Result<Vec<u8>> {
+        let data = self.uri.split_once(";base64,").map_or("", |(_, data)| data);
+        STANDARD.decode(data).map_err(|e| Error::Failed(format!("a picture is damaged: {e}")))
+    }
+
     fn of(pixels: &RgbImage, kind: &str, bytes: &[u8]) -> Self {
         let uri = format!("data:image/{kind};base64,{}", STANDARD.encode(bytes));
         Self { width: pixels.width(), height: pixels.height(), uri }
@@ -87,8 +105,7 @@ mod tests {
     }
 
     fn decoded(picture: &Picture) -> RgbImage {
-        let (_, data) = picture.uri.split_once(";base64,").expect("a data URI");
-        let bytes = STANDARD.decode(data).expect("base64");
+        let bytes = picture.bytes().expect("a data URI");
         image::load_from_memory(&bytes).expect("a picture").to_rgb8()
     }
 
@@ -97,6 +114,9 @@ mod tests {
         let image = ramp(64, 20);
         let exact = decoded(&Picture::png(&image).expect("encoded"));
         assert_eq!(exact, to_8_bit(&image));
+        let bytes = Picture::png(&image).and_then(|p| p.bytes()).expect("bytes");
+        assert_eq!(decoded(&Picture::of_png(&bytes).expect("a png file")), exact);
+        assert!(Picture::of_png(&bytes[..50]).is_err());
         let small = Picture::jpeg(&image, 32).expect("encoded");
         assert_eq!((small.width, small.height), (32, 10));
         let small = decoded(&small);

@@ -1,6 +1,7 @@
 //! Error against time, both axes logarithmic, with the points that no other one beats.
 
 use super::axis::Axis;
+use super::escaped;
 use super::plot::Plot;
 use std::fmt::Write;
 
@@ -63,7 +64,7 @@ impl Scatter {
             x: x.ticks(&self.units[0]),
             y: y.ticks(&self.units[1]),
             legend: self.legend.clone(),
-            data: format!("data-metric=\"{}\"", askama_text(&self.metric)),
+            data: format!("data-metric=\"{}\"", escaped(&self.metric)),
         }
     }
 
@@ -110,22 +111,10 @@ impl Scatter {
             "<button type=\"button\" class=\"point {class}\" data-id=\"{}\" \
              style=\"left:{left}%;bottom:{bottom}%\" aria-label=\"{}: {}\"></button>",
             p.id,
-            askama_text(&p.name),
-            askama_text(&p.text)
+            escaped(&p.name),
+            escaped(&p.text)
         );
     }
-}
-
-/// Text that may stand in an attribute.
-fn askama_text(text: &str) -> String {
-    let escape = |c: char| match c {
-        '&' => "&amp;".to_string(),
-        '<' => "&lt;".into(),
-        '>' => "&gt;".into(),
-        '"' => "&quot;".into(),
-        c => c.into(),
-    };
-    text.chars().map(escape).collect()
 }
 
 #[cfg(test)]

@@ -65,10 +65,16 @@ pub fn bytes(n: u64) -> String {
     }
 }
 
-/// `0.41 s`, `25 s`, `3 min 20 s`, `2 h 5 min`.
+/// Display steps of 1/255, to a thousandth: `1.2`, `0.004`; less is as good as none.
+pub fn steps(x: f64) -> String {
+    short(if x.abs() < 5e-4 { 0.0 } else { x })
+}
+
+/// `4.1 ms`, `0.41 s`, `25 s`, `3 min 20 s`, `2 h 5 min`.
 pub fn seconds(s: f64) -> String {
     let whole = s.round() as u64;
     match whole {
+        0 if s > 0.0 && s < 0.0995 => format!("{} ms", short(s * 1e3)),
         0..60 => format!("{} s", short(s)),
         60..3600 => format!("{} min {} s", whole / 60, whole % 60),
         _ => format!("{} h {} min", whole / 3600, whole % 3600 / 60),
@@ -132,6 +138,8 @@ mod tests {
         }
         assert_eq!((change(1.063), change(0.5)), ("+6.3 %".into(), "−50 %".into()));
         assert_eq!((change(1.0), change(3.5)), ("+0 %".into(), "+250 %".into()));
+        assert_eq!((seconds(0.0041), seconds(0.41)), ("4.1 ms".into(), "0.41 s".into()));
+        assert_eq!((steps(7.4e-8), steps(0.012)), ("0".into(), "0.012".into()));
         assert_eq!((bytes(27_300_000), seconds(200.0)), ("27.3 MB".into(), "3 min 20 s".into()));
     }
 

@@ -6,9 +6,10 @@ mod tests;
 use super::Recentring;
 use crate::error::{Error, Result};
 use crate::math::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// Where a camera stands and looks, world space, f64.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Eye point.
     pub eye: DVec3,

@@ -4,9 +4,10 @@ use super::{Light, Recentring, World};
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Triangles of a mesh that rounding to f32 made nothing of.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Collapsed {
     /// The mesh's name.
     pub mesh: String,

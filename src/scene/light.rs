@@ -1,9 +1,10 @@
 //! Lights: plain data, in world space inside a `World` and in scene space inside a `Scene`.
 
 use crate::math::{DVec3, Rgb};
+use serde::{Deserialize, Serialize};
 
 /// A light. Radiometric units: radiance W/(m²·sr), intensity W/sr, irradiance W/m².
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Light {
     /// A point that emits alike in all directions (a delta light).
     Point {
@@ -33,7 +34,7 @@ pub enum Light {
 }
 
 /// A flat convex quad that emits from the side its corners run counter-clockwise on.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct QuadLight {
     /// Corners in order.
     pub corners: [DVec3; 4],
@@ -61,7 +62,7 @@ impl QuadLight {
 }
 
 /// What a ray that hits nothing sees, and how it lights surfaces.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sky {
     /// Constant background radiance.
     pub radiance: Rgb,

@@ -1,6 +1,7 @@
 //! Materials and textures: the parameters of a surface's scattering, no behaviour.
 
-use crate::math::Rgb;
+use crate::math::{Rgb, bulk};
+use serde::{Deserialize, Serialize};
 
 /// Index into `Scene::materials`.
 pub type MaterialId = u32;
@@ -9,7 +10,7 @@ pub type TextureId = u32;
 
 /// A surface's parameters. Components add up: the course's materials are diffuse and
 /// mirror-like at once. Reflectances are linear RGB in `[0, 1]`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// Name as the file spells it.
     pub name: String,
@@ -51,7 +52,7 @@ impl Material {
 ///
 /// With a `priority` the body that it bounds may overlap others: where several are, the one of
 /// the highest priority is, and the rest are not (Schmidt and Budge, 2002).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Glass {
     /// Index of refraction inside; positive. Relative to outside, whatever that is; with a
     /// `priority`, relative to air.
@@ -64,7 +65,7 @@ pub struct Glass {
 }
 
 /// A decoded image, linear RGB, row 0 at the top.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Texture {
     /// The file it came from.
     pub name: String,
@@ -73,5 +74,6 @@ pub struct Texture {
     /// Rows.
     pub height: u32,
     /// `width · height` texels, row by row.
+    #[serde(with = "bulk")]
     pub texels: Vec<Rgb>,
 }

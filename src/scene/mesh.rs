@@ -1,16 +1,21 @@
 //! Meshes and spheres, before (`World…`) and after recentring.
 
 use super::MaterialId;
-use crate::math::{Bounds3, DVec3, Vec2, Vec3};
+use crate::math::{Bounds3, DVec3, Vec2, Vec3, bulk};
+use bytemuck::Pod;
+use serde::{Deserialize, Serialize};
 
 /// A per-corner attribute: values, and which value each triangle's corners use.
 ///
 /// `corners: None` means that the attribute is indexed like the positions.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Pod")]
 pub struct Corners<T> {
     /// The values.
+    #[serde(with = "bulk")]
     pub values: Vec<T>,
     /// Three indices into `values` a triangle, or `None` for the triangle's own.
+    #[serde(with = "bulk::optional")]
     pub corners: Option<Vec<[u32; 3]>>,
 }
 
@@ -40,7 +45,7 @@ pub enum NormalPolicy {
 }
 
 /// What the surface of a mesh or sphere is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Surface {
     /// Its material.
     pub material: MaterialId,
@@ -70,16 +75,18 @@ pub struct WorldMesh {
 }
 
 /// A mesh in scene space, f32: the very numbers that Embree holds.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Mesh {
     /// Name for messages and AOVs.
     pub name: String,
     /// Vertex positions, scene space. One spare element follows the last vertex in memory
     /// (Embree reads 16 bytes a vertex); `vertex_count` is the true number.
+    #[serde(with = "bulk")]
     pub positions: Vec<Vec3>,
     /// Vertices without the spare one.
     pub vertex_count: usize,
     /// Vertex indices.
+    #[serde(with = "bulk")]
     pub triangles: Vec<[u32; 3]>,
     /// Shading normals, or `None` to shade flat.
     pub normals: Option<Corners<Vec3>>,
@@ -114,7 +121,7 @@ pub struct WorldSphere {
 }
 
 /// An analytic sphere in scene space, f64.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Sphere {
     /// Name for messages and AOVs.
     pub name: String,

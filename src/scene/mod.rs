@@ -19,6 +19,7 @@ mod place;
 mod recentre;
 mod reuse;
 mod settings;
+mod time;
 mod weld;
 mod winding;
 
@@ -31,12 +32,14 @@ pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentre::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
-    Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
+    BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
+pub use time::{Interval, parse_time};
 pub(crate) use weld::weld;
 pub(crate) use winding::closed_volume;
 
 use crate::math::{Bounds3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// A scene as read: f64 positions in world units (y up unless the file says otherwise).
 #[derive(Debug, Clone, Default)]
@@ -59,7 +62,7 @@ pub struct World {
 }
 
 /// A scene ready to trace: immutable, in scene space (see [`Recentring`]).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scene {
     /// How world and scene space belong together.
     pub recentring: Recentring,

@@ -13,9 +13,10 @@ mod tests;
 use super::{Camera, Pose};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// A camera move: path, timing and lens.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shot {
     /// The curve the camera follows.
     pub path: CameraPath,
@@ -28,7 +29,7 @@ pub struct Shot {
 }
 
 /// The curve that a camera follows, as a function of progress in `[0, 1]`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum CameraPath {
     /// A camera that does not move.
     Still(Pose),
@@ -79,7 +80,7 @@ pub enum CameraPath {
 }
 
 /// A pose at a moment of the path.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct KeyPose {
     /// When, in `[0, 1]` of the path; strictly increasing from key to key.
     pub at: f64,

@@ -6,9 +6,10 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Rgb, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// `scene = (world − centre) · 2^log2_scale`. A power of two, so scaling rounds nothing.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Recentring {
     /// World point that becomes the scene's origin.
     pub centre: DVec3,

@@ -37,6 +37,13 @@ pub struct Settings {
     pub intersector: IntersectorKind,
     /// Embree's instruction set ("avx2"), or `None` for the machine's best.
     pub isa: Option<String>,
+    /// How much work Embree puts into its tree. Where two triangles lie equally far, at their common
+    /// edge, the tree decides which is met first.
+    #[serde(default)]
+    pub build_quality: BuildQuality,
+    /// Whether Embree's tree takes less memory, and more time to trace.
+    #[serde(default)]
+    pub compact: bool,
     /// The rules that make hits trustworthy.
     pub rules: HitRules,
     /// What frames take over from one another.
@@ -65,6 +72,8 @@ impl Default for Settings {
             png_bits: 8,
             intersector: IntersectorKind::Embree,
             isa: None,
+            build_quality: BuildQuality::default(),
+            compact: false,
             rules: HitRules::default(),
             reuse: ReuseSettings::default(),
             crop: None,
@@ -109,6 +118,22 @@ pub enum IntersectorKind {
     Embree,
     /// The f64 Möller–Trumbore path: brute force, for small scenes and for trust.
     Oracle,
+}
+
+/// How much work goes into Embree's tree.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum BuildQuality {
+    /// Sorted along a space-filling curve: built fastest, traced slowest.
+    Low,
+    /// By the surface area heuristic.
+    #[default]
+    Medium,
+    /// By the surface area heuristic, triangles split between boxes where that pays: built slowest,
+    /// largest.
+    High,
 }
 
 /// Switches of the rules in `docs/architecture.md`, "Intersection: trust nothing".

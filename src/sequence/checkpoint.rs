@@ -2,7 +2,8 @@
 //!
 //! A job needs few references at a time, and those of key frames are dear. These lie in a hidden
 //! folder beside the frames (`.frame.references` for `frame_####.png`), one file each: a line of JSON
-//! that says what job and frame it belongs to, then the bytes of [`crate::reuse::store`]. A file is
+//! that says what job and frame it belongs to, then the bytes of [`crate::reuse::store`] (policy
+//! `surface`) or the frame's discoveries (`colour`). A file is
 //! removed when no frame of its job needs it any more, and the folder when the job is complete. An exr
 //! frame holds its own reference, and is read where there is one. What is damaged or belongs to another
 //! job is never read: its frame is traced again.
@@ -24,7 +25,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Version of the files.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Ending of the files.
 const ENDING: &str = ".reference";
 /// Longest first line that is read, bytes.
@@ -40,6 +41,9 @@ struct Head {
     frame: u32,
     /// What the frame was made of.
     recipe: String,
+    /// Of what follows.
+    #[serde(default)]
+    blake3: String,
     /// What the job's frames share.
     header: Header,
 }
@@ -83,7 +87,8 @@ impl<'a> Checkpoints<'a> {
     /// The reference of an original frame, if it is on disk, whole and this job's.
     /// Its bytes come with it.
     pub fn read(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
-        let (mut found, bytes) = self.in_frame(frame).or_else(|| self.in_file(frame))?;
+        let in_file = || self.decode(&self.path(frame), self.read_bytes(frame)?);
+        let (mut found, bytes) = self.in_frame(frame).or_else(in_file)?;
         found.frame = frame;
         Some((found, bytes))
     }
@@ -114,7 +119,8 @@ impl<'a> Checkpoints<'a> {
         self.rows.get_or_init(|| read().map(|manifest| manifest.rows).unwrap_or_default())
     }
 
-    fn in_file(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+    /// What [`write`](Self::write) put there, if it is on disk, whole and this job's.
+    pub fn read_bytes(&self, frame: u32) -> Option<Arc<[u8]>> {
         let path = self.path(frame);
         let file = fs::File::open(&path).ok()?;
         let mut source = BufReader::new(file);
@@ -125,7 +131,12 @@ impl<'a> Checkpoints<'a> {
         }
         let mut bytes = Vec::new();
         source.read_to_end(&mut bytes).ok()?;
-        self.decode(&path, bytes.into())
+        let hash = blake3::hash(&bytes).to_hex();
+        if head.is_none_or(|head| head.blake3 != hash.as_str()) {
+            self.note(format!("{} is damaged; its frame is traced again", path.display()));
+            return None;
+        }
+        Some(bytes.into())
     }
 
     fn decode(&self, path: &Path, bytes: Arc<[u8]>) -> Option<(Reference, Arc<[u8]>)> {
@@ -143,7 +154,9 @@ impl<'a> Checkpoints<'a> {
         let path = self.path(frame);
         let recipe = self.target.recipes.get(frame).copied().unwrap_or_default();
         let header = self.target.header.clone();
-        let head = Head { checkpoint: FORMAT, frame, recipe: recipe.whole.to_string(), header };
+        let recipe = recipe.whole.to_string();
+        let blake3 = blake3::hash(bytes).to_hex().to_string();
+        let head = Head { checkpoint: FORMAT, frame, recipe, blake3, header };
         let mut line =
             serde_json::to_vec(&head).map_err(|e| Error::io("write", &path, e.into()))?;
         line.push(b'\n');

@@ -15,9 +15,11 @@
 //! as always traced may be inferred: an inferred pixel does not know what it shows.
 
 mod exchange;
+mod saved;
 
+use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
-use super::{FrameMaker, Made, previous_camera};
+use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Film, Image, PixelSource, Provenance};
 use crate::math::{Rgb, Vec2, srgb_decode};
@@ -45,6 +47,8 @@ pub struct ColourMaker<'a> {
     pub progress: &'a dyn Progress,
     /// When cached colours agree.
     pub rule: Rule,
+    /// Where discoveries are kept for a job that goes on after this one; `None` for nowhere.
+    pub checkpoints: Option<&'a Checkpoints<'a>>,
     pyramid: Pyramid,
     uploads: Vec<Known>,
     state: Mutex<State>,
@@ -60,6 +64,7 @@ struct State {
     known: BTreeMap<u32, Arc<Known>>,
     /// The most that all of it took at a time, bytes.
     most_memory: u64,
+    saved: saved::Saved,
 }
 
 impl<'a> ColourMaker<'a> {
@@ -94,6 +99,7 @@ impl<'a> ColourMaker<'a> {
             stop,
             progress,
             rule,
+            checkpoints: None,
             pyramid: Pyramid::whole(shot.frames),
             uploads: known,
             state: Mutex::default(),
@@ -169,7 +175,11 @@ impl<'a> ColourMaker<'a> {
         if let Some(found) = self.with_state(|s| s.known.get(&frame).cloned()) {
             return Ok(Some(found));
         }
+        if let Some(found) = self.left_on_disk(frame) {
+            return Ok(Some(found));
+        }
         let Some((_, known)) = self.frame(frame)? else { return Ok(None) };
+        self.made(frame);
         Ok(Some(self.keep(known)))
     }
 
@@ -202,7 +212,9 @@ impl FrameMaker for ColourMaker<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
         let Some((made, known)) = self.frame(frame)? else { return Ok(None) };
         self.keep(known);
+        self.made(frame);
         self.forget(frame);
+        self.tend(false)?;
         Ok(Some(made))
     }
 
@@ -215,6 +227,18 @@ impl FrameMaker for ColourMaker<'_> {
 
     fn expect(&self, frames: &[u32]) {
         self.with_state(|s| s.to_come.extend(frames));
+    }
+
+    fn stopped(&self) -> Result<()> {
+        self.tend(true)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.checkpoints.map(Checkpoints::notes).unwrap_or_default()
+    }
+
+    fn save_cost(&self) -> SaveCost {
+        self.with_state(|s| s.saved.cost)
     }
 
     fn reference_memory(&self) -> u64 {

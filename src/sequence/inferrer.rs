@@ -7,7 +7,7 @@ use super::pyramid::Pyramid;
 use super::saved::Saved;
 use super::schedule::{Schedule, Stock};
 use super::shared::Laid;
-use super::supplied::with_supplied;
+use super::supplied::{Supply, with_supplied};
 use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
@@ -39,7 +39,7 @@ pub struct Inferrer<'a> {
     /// What counts as evidence.
     pub evidence: Evidence,
     /// Frames of other shots that all frames, key frames too, are inferred from.
-    pub supplied: &'a [Reference],
+    pub supplied: Option<&'a Supply>,
     /// On which terms frames serve later jobs as references; `None` where none is kept.
     pub terms: Option<Terms>,
     /// Where references are kept for a job that goes on after this one; `None` for nowhere.
@@ -94,7 +94,7 @@ impl<'a> Inferrer<'a> {
             stop,
             progress,
             evidence,
-            supplied: &[],
+            supplied: None,
             terms: None,
             checkpoints: None,
             exchange: None,
@@ -147,7 +147,9 @@ impl<'a> Inferrer<'a> {
         let camera = self.camera(frame)?;
         let own = camera.to_scene(&self.renderer.scene.recentring);
         let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
-        let references = with_supplied(references, self.supplied, &own);
+        let nearest = |supply: &Supply| self.pool.install(|| supply.nearest(&own));
+        let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
+        let references = with_supplied(references, &supplied);
         let (rays, evidence) = (&self.rays, self.evidence);
         let lookup = Lookup { frame, references: &references, rays, evidence };
         let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
@@ -316,7 +318,7 @@ impl FrameMaker for Inferrer<'_> {
     }
 
     fn reference_memory(&self) -> u64 {
-        let supplied: u64 = self.supplied.iter().map(Reference::memory).sum();
+        let supplied = self.supplied.map_or(0, Supply::most_memory);
         supplied + self.with_state(|s| s.most_memory)
     }
 }

@@ -32,6 +32,7 @@ pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{Plan, Target, prepare};
 pub use schedule::Schedule;
 pub use shared::{Laid, Shared, Strip};
+pub use supplied::{Card, Supply};
 pub use tracer::Tracer;
 
 #[cfg(test)]

@@ -1,26 +1,187 @@
 //! References that somebody supplies: frames of an earlier job of the same scene.
+//!
+//! Each is read when a frame that is inferred from it is made, so a process reads those that serve its
+//! own frames. Which these are is known from [`Card`]s.
 
+use crate::error::{Error, Result};
 use crate::math::DVec3;
+use crate::output::exr;
 use crate::reuse::Reference;
-use crate::scene::Camera;
+use crate::reuse::store::{ATTRIBUTE, Terms, decode};
+use crate::scene::{Camera, Recentring};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Largest file that is read.
+const LARGEST: u64 = 2 << 30;
 
 /// How many of those that know much a frame asks, and how many of the others.
 const DENSE: usize = 2;
 const OTHERS: usize = 6;
 
-/// A frame's `own` references, and behind them those of `supplied` that it is inferred from too. With
+/// What is known of a supplied reference before it is read again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Card {
+    /// Where it lies in the list of all files.
+    pub file: usize,
+    /// Of its content.
+    pub hash: [u8; 32],
+    /// Where its camera stands, scene space.
+    eye: DVec3,
+    /// Where it looks.
+    forward: DVec3,
+    /// How many samples it has.
+    samples: usize,
+}
+
+impl Card {
+    /// Of what was read from the `file`-th file.
+    pub fn of(file: usize, hash: [u8; 32], reference: &Reference) -> Self {
+        let (eye, forward) = (reference.eye(), reference.forward());
+        Self { file, hash, eye, forward, samples: reference.len() }
+    }
+}
+
+/// Reads a file's reference, and the hash of its content.
+type Read = Box<dyn Fn(&Path) -> Result<(Reference, [u8; 32])> + Send + Sync>;
+
+/// All that is supplied.
+pub struct Supply {
+    files: Vec<PathBuf>,
+    cards: Vec<Card>,
+    read: Read,
+    /// Most memory that references take as long as nobody needs them at this moment, bytes.
+    budget: u64,
+    held: Mutex<Held>,
+}
+
+#[derive(Default)]
+struct Held {
+    /// By file, with when it was last asked for.
+    references: BTreeMap<usize, (u64, Arc<Reference>)>,
+    asked: u64,
+    memory: u64,
+    most_memory: u64,
+}
+
+impl Supply {
+    /// The references in `files` for a job on `terms` of a scene with `recentring`. Those that were used
+    /// last are held, up to `budget` bytes.
+    pub fn new(files: Vec<PathBuf>, terms: Terms, recentring: Recentring, budget: u64) -> Self {
+        let read = move |file: &Path| {
+            let bytes = exr::read_attribute(file, ATTRIBUTE, LARGEST)?.ok_or_else(|| {
+                Error::input(
+                    file,
+                    "cannot serve as a reference: it holds no traced points\n  \
+                     help: frames rendered to exr with --policy surface do",
+                )
+            })?;
+            decode(file, &bytes, &terms, &recentring)
+        };
+        Self::reading(files, Box::new(read), budget)
+    }
+
+    fn reading(files: Vec<PathBuf>, read: Read, budget: u64) -> Self {
+        Self { files, cards: Vec::new(), read, budget, held: Mutex::default() }
+    }
+
+    /// Looks into the `file`-th file; holds what it read if it `is_kept`.
+    ///
+    /// # Errors
+    /// The file cannot be read, or cannot serve.
+    pub fn look(&self, file: usize, is_kept: bool) -> Result<Card> {
+        let (reference, hash) = (self.read)(&self.files[file])?;
+        let card = Card::of(file, hash, &reference);
+        if is_kept {
+            let mut held = self.held();
+            held.put(file, Arc::new(reference));
+            held.shrink(self.budget);
+        }
+        Ok(card)
+    }
+
+    /// These serve, of all files, by what was seen in them. Their order counts; those that know nothing
+    /// are left out.
+    pub fn serve(&mut self, cards: Vec<Card>) {
+        self.cards = cards.into_iter().filter(|card| card.samples > 0).collect();
+    }
+
+    /// The most memory that references took at a time so far, bytes.
+    pub fn most_memory(&self) -> u64 {
+        self.held().most_memory
+    }
+
+    /// Those that a frame seen by `camera` (scene space) is inferred from.
+    ///
+    /// # Errors
+    /// One of them cannot be read, or has changed.
+    pub fn nearest(&self, camera: &Camera) -> Result<Vec<Arc<Reference>>> {
+        let mut held = self.held();
+        let mut found = Vec::new();
+        for card in nearest(&self.cards, camera) {
+            found.push(match held.get(card.file) {
+                Some(reference) => reference,
+                None => held.put(card.file, Arc::new(self.read_again(card)?)),
+            });
+        }
+        held.shrink(self.budget);
+        Ok(found)
+    }
+
+    fn read_again(&self, card: &Card) -> Result<Reference> {
+        let file = &self.files[card.file];
+        match (self.read)(file)? {
+            (reference, hash) if hash == card.hash => Ok(reference),
+            _ => Err(Error::input(file, "this reference has changed since the job began")),
+        }
+    }
+
+    fn held(&self) -> MutexGuard<'_, Held> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held {
+    fn get(&mut self, file: usize) -> Option<Arc<Reference>> {
+        self.asked += 1;
+        let (last, reference) = self.references.get_mut(&file)?;
+        *last = self.asked;
+        Some(Arc::clone(reference))
+    }
+
+    fn put(&mut self, file: usize, reference: Arc<Reference>) -> Arc<Reference> {
+        self.asked += 1;
+        self.memory += reference.memory();
+        self.most_memory = self.most_memory.max(self.memory);
+        self.references.insert(file, (self.asked, Arc::clone(&reference)));
+        reference
+    }
+
+    /// Lets those go that were asked for longest ago.
+    fn shrink(&mut self, budget: u64) {
+        while self.memory > budget {
+            let oldest = self.references.iter().min_by_key(|(_, (last, _))| *last);
+            let Some(file) = oldest.map(|(file, _)| *file) else { return };
+            let gone = self.references.remove(&file);
+            self.memory -= gone.map_or(0, |(_, reference)| reference.memory());
+        }
+    }
+}
+
+/// A frame's `own` references, and behind them those `supplied` for it. With
 /// any of these, references that know much come before those that do not: the first two are always
 /// asked, and key frames that were inferred themselves know little.
 pub(super) fn with_supplied<'r>(
     own: Vec<&'r Reference>,
-    supplied: &'r [Reference],
-    camera: &Camera,
+    supplied: &'r [Arc<Reference>],
 ) -> Vec<&'r Reference> {
     if supplied.is_empty() {
         return own;
     }
     let mut all = own;
-    all.extend(nearest(supplied, camera));
+    all.extend(supplied.iter().map(|r| &**r));
     let most = all.iter().map(|r| r.len()).max().unwrap_or(0);
     all.sort_by_key(|r| 2 * r.len() < most);
     all
@@ -30,22 +191,23 @@ pub(super) fn with_supplied<'r>(
 /// these alone. Frames in between know only what they discovered, so the nearest ones alone would
 /// know little: the two nearest of those with at least half as many samples as the one with most come
 /// first, then the nearest of the others.
-fn nearest<'r>(supplied: &'r [Reference], camera: &Camera) -> Vec<&'r Reference> {
-    let most = supplied.iter().map(Reference::len).max().unwrap_or(0);
-    let farthest = supplied.iter().map(|r| r.eye().distance(camera.eye)).fold(0.0, f64::max);
-    let apart = |r: &Reference| {
-        let eyes = r.eye().distance(camera.eye) / farthest.max(f64::MIN_POSITIVE);
-        let turn: DVec3 = r.forward() - camera.forward;
+fn nearest<'c>(supplied: &'c [Card], camera: &Camera) -> Vec<&'c Card> {
+    let most = supplied.iter().map(|c| c.samples).max().unwrap_or(0);
+    let farthest = supplied.iter().map(|c| c.eye.distance(camera.eye)).fold(0.0, f64::max);
+    let apart = |c: &Card| {
+        let eyes = c.eye.distance(camera.eye) / farthest.max(f64::MIN_POSITIVE);
+        let turn: DVec3 = c.forward - camera.forward;
         eyes + 0.5 * turn.length()
     };
-    let mut all: Vec<(f64, &Reference)> = supplied.iter().map(|r| (apart(r), r)).collect();
+    let mut all: Vec<(f64, &Card)> = supplied.iter().map(|c| (apart(c), c)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (dense, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, r)| 2 * r.len() >= most);
+    let (dense, others): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|(_, c)| 2 * c.samples >= most);
     let rest = dense.iter().skip(DENSE).chain(&others);
     let mut rest: Vec<_> = rest.copied().collect();
     rest.sort_by(|a, b| a.0.total_cmp(&b.0));
     let chosen = dense.into_iter().take(DENSE).chain(rest.into_iter().take(OTHERS));
-    chosen.map(|(_, r)| r).collect()
+    chosen.map(|(_, c)| c).collect()
 }
 
 #[cfg(test)]
@@ -76,15 +238,19 @@ mod tests {
         Reference::new(Reference::SUPPLIED, &camera(x), &traced, 1)
     }
 
+    fn cards(references: &[Reference]) -> Vec<Card> {
+        (0..).zip(references).map(|(i, r)| Card::of(i, [i as u8; 32], r)).collect()
+    }
+
     #[test]
     fn what_knows_much_is_asked_first_and_nothing_changes_without_a_supply() {
         let own = [reference(0.0, 3), reference(1.0, 900), reference(2.0, 4)];
-        let places = |supplied: &[Reference]| -> Vec<f64> {
-            let all = with_supplied(own.iter().collect(), supplied, &camera(0.0));
+        let places = |supplied: &[Arc<Reference>]| -> Vec<f64> {
+            let all = with_supplied(own.iter().collect(), supplied);
             all.iter().map(|r| r.eye().x).collect()
         };
         assert_eq!(places(&[]), [0.0, 1.0, 2.0]);
-        let supplied = [reference(5.0, 6), reference(7.0, 1000)];
+        let supplied = [reference(7.0, 1000), reference(5.0, 6)].map(Arc::new);
         assert_eq!(places(&supplied), [1.0, 7.0, 0.0, 2.0, 5.0]);
     }
 
@@ -92,10 +258,56 @@ mod tests {
     fn two_that_know_much_come_before_the_nearest_of_the_others() {
         let mut all: Vec<Reference> = (0..20).map(|i| reference(f64::from(i), 5)).collect();
         all.extend([0.5, 9.0, 19.5].map(|x| reference(x, 1000)));
+        let all = cards(&all);
         let places =
-            |x| -> Vec<f64> { nearest(&all, &camera(x)).iter().map(|r| r.eye().x).collect() };
+            |x| -> Vec<f64> { nearest(&all, &camera(x)).iter().map(|c| c.eye.x).collect() };
         assert_eq!(places(18.9), [19.5, 9.0, 19.0, 18.0, 17.0, 16.0, 15.0, 14.0]);
         assert_eq!(places(0.4)[..3], [0.5, 9.0, 0.0]);
         assert!(nearest(&[], &camera(0.0)).is_empty());
+    }
+
+    /// Forty references along a line, named by where they stand, and what was read of them.
+    fn supply(budget: u64) -> (Supply, Arc<Mutex<Vec<usize>>>) {
+        let reads = Arc::new(Mutex::new(Vec::new()));
+        let theirs = Arc::clone(&reads);
+        let read = move |file: &Path| {
+            let place: u8 = file.to_str().and_then(|name| name.parse().ok()).expect("a place");
+            theirs.lock().expect("no panic").push(usize::from(place));
+            Ok((reference(f64::from(place), 100), [place; 32]))
+        };
+        let files = (0..40).map(|place: u8| place.to_string().into()).collect();
+        let mut supply = Supply::reading(files, Box::new(read), budget);
+        supply.serve((0..40).map(|file| supply.look(file, file == 5).expect("there")).collect());
+        reads.lock().expect("no panic").clear();
+        (supply, reads)
+    }
+
+    #[test]
+    fn only_those_that_serve_are_read_each_once_while_there_is_room() {
+        let one = reference(0.0, 100).memory();
+        let ask = |supply: &Supply, x| supply.nearest(&camera(x)).expect("readable").len();
+        let (wide, reads) = supply(100 * one);
+        for x in [4.0, 4.0, 5.0] {
+            assert_eq!(ask(&wide, x), 8);
+        }
+        let mut read = std::mem::take(&mut *reads.lock().expect("no panic"));
+        assert!(!read.contains(&5) && read.iter().all(|file| *file < 12), "{read:?}");
+        let count = read.len();
+        read.sort();
+        read.dedup();
+        assert_eq!(read.len(), count, "read twice");
+        // What there is no room for is read again, and the eight of a frame always serve.
+        let (narrow, reads) = supply(3 * one);
+        assert_eq!((ask(&narrow, 4.0), ask(&narrow, 4.0)), (8, 8));
+        assert!(reads.lock().expect("no panic").len() > 8);
+        assert_eq!(narrow.held().references.len(), 3);
+    }
+
+    #[test]
+    fn a_file_that_has_changed_is_refused_by_name() {
+        let (mut supply, _) = supply(0);
+        supply.cards[3].hash = [99; 32];
+        let error = supply.nearest(&camera(3.0)).expect_err("refused").to_string();
+        assert!(error.starts_with("3: this reference has changed"), "{error}");
     }
 }

@@ -48,6 +48,7 @@ impl Folder {
         let header = Header {
             manifest: 2,
             command: Vec::new(),
+            chosen: None,
             tweenray: "0".into(),
             scene: "s".into(),
             scene_hash: "h".into(),

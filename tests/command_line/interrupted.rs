@@ -77,6 +77,20 @@ fn a_kill_loses_the_frame_in_flight_at_most() {
     assert_same_frames(&job, "k", "whole");
 }
 
+/// A scene file sets both; an option stands over it.
+#[test]
+fn a_scene_file_sets_time_limit_and_checkpoint() {
+    let job = Job::new();
+    let text = "[settings]\nspp = 4096\nvideo = false\ntime_limit = '1s'\ncheckpoint = 'off'\n\
+                [[mesh]]\nfile = 'cube.obj'\n[sky]\nradiance = 1\n";
+    std::fs::write(job.path("scene.toml"), text).expect("written");
+    for (option, says) in [("", "time limit of 1.0 s"), ("--time-limit 2s", "time limit of 2.0 s")]
+    {
+        let ran = job.run(&format!("render scene.toml -o o/f_##.png {option}"));
+        assert!(ran.code == Some(75) && ran.err.contains(says), "{}", ran.err);
+    }
+}
+
 /// Runs a job of minutes under `limit` with `variables`; it must stop by itself.
 fn stops_in_time(limit: &str, variables: &[(&str, String)], reason: &str) {
     let job = Job::new();

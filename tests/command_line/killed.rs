@@ -8,11 +8,12 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// What the jobs are called with, each with the ending of its frames.
-const JOBS: [(&str, &str); 4] = [
+const JOBS: [(&str, &str); 5] = [
     ("png", "--checkpoint 0s"),
     ("exr", "--checkpoint 0s"),
     ("exr", "--checkpoint 1s --crop 8,4,50,30"),
     ("png", "--checkpoint 0s --maps --threads 1"),
+    ("png", "--checkpoint 0s --policy colour"),
 ];
 
 /// Numbers without a pattern, the same in each run (Marsaglia, 2003: xorshift).

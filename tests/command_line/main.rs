@@ -1,5 +1,6 @@
 //! The program as a user meets it: words, exit codes, files.
 
+mod choosing;
 mod comparing;
 mod interrupted;
 mod job;
@@ -11,6 +12,8 @@ mod launch;
 mod launcher;
 mod pages;
 mod ranks;
+#[cfg(feature = "mpi")]
+mod read_once;
 mod references;
 #[cfg(feature = "mpi")]
 mod regrouped;
@@ -18,6 +21,7 @@ mod rendering;
 mod resumed;
 mod reuse;
 mod slurm;
+mod sweeps;
 #[cfg(feature = "mpi")]
 mod together;
 mod verify;

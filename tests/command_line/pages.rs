@@ -61,7 +61,7 @@ fn errors_are_the_same_on_any_number_of_threads_and_less_with_more_samples() {
         row["errors"]["mse"].as_f64().expect("a figure")
     };
     assert!(error("--spp 16") < error("") && error("") < error("--spp 1"));
-    assert_eq!(job.names("t1"), ["accuracy.csv", "accuracy.json", "report.html"]);
+    assert_eq!(job.names("t1"), ["accuracy.csv", "accuracy.json", "report.html", "sweep"]);
 }
 
 #[test]

@@ -76,6 +76,21 @@ mod with_mpi {
         }
     }
 
+    /// Rank 0 alone looks at the scene; all render what it chose, and one process goes on with it.
+    #[test]
+    fn ranks_render_what_one_of_them_chose() {
+        let job = Job::new();
+        let line = format!("{} --target psnr=36 -o r/f_##.png", LINE.replace(" --spp 1", ""));
+        let Some(ran) = under_mpirun(&job, 2, &line) else { return };
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert_eq!(ran.err.matches("the probe took").count(), 1, "{}", ran.err);
+        let before = job.read("r/f_03.png");
+        fs::remove_file(job.path("r/f_03.png")).expect("removed");
+        let ran = job.done(&line);
+        assert!(ran.out.contains("1 rendered, 4 kept"), "{}", ran.out);
+        assert_eq!(job.read("r/f_03.png"), before);
+    }
+
     /// Ranks on unlike machines use what all have, and say so.
     #[test]
     fn unlike_machines_share_an_instruction_set() {

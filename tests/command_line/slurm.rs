@@ -73,6 +73,14 @@ fn a_run_that_gets_no_further_is_the_last() {
         assert!(ran.err.contains("got no further"), "{}", ran.err);
         assert_eq!(requeues(&job), "");
     }
+    // A start that failed is tried again, with whatever code it did.
+    let tried = job.path("tried").display().to_string();
+    let second = format!(
+        "[ -e {tried} ] || {{ touch {tried}; exit 14; }}\nwhile [[ $1 == --* ]]; do shift; done\n\"$@\""
+    );
+    stand_in(&job, "srun", &second);
+    assert_eq!(batch(&job, &script).code, Some(0));
+    std::fs::remove_dir_all(job.path("o")).expect("removed");
     // Slurm may forbid it.
     job.done("render cube.obj --size 8x8 --frames 1 --no-video -o alone/f_##.png");
     stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\"; rm o/f_02.png; exit 9");

@@ -8,7 +8,7 @@ fn plot_points_slider_and_heat_map() {
     let folder = tempfile::tempdir().expect("a folder");
     job::scene(folder.path());
     let line = "accuracy scene.toml -o a --turns 2 --reference-spp 64 --size 64x36 --threads 2 \
-                --knobs reuse,samples,intersection,oracle -q";
+                --knobs reuse,samples,intersection,tree,oracle,writing,combinations -q";
     tweenray(folder.path(), line);
     let page = folder.path().join("a/report.html");
     browser.open(&page, (1400, 900), false);
@@ -29,6 +29,22 @@ fn plot_points_slider_and_heat_map() {
     let points =
         browser.number("document.querySelectorAll('#plots > div:first-child .point').length");
     assert!(points > 12.0, "{points}");
+
+    // By keyboard alone: through the measures of error to the points.
+    browser.value("document.activeElement.blur()");
+    browser.value("document.querySelector('[data-show=\"RMSE\"]').focus()");
+    let is_point = "document.activeElement.matches('.point')";
+    for _ in 0..8 {
+        if browser.value(is_point) == false {
+            browser.press("Tab");
+        }
+    }
+    assert_eq!(browser.value(is_point), true);
+    let focused = browser.text("document.activeElement.dataset.id");
+    assert_eq!(browser.text(chosen), focused);
+    browser.value("document.querySelector('[data-show=\"Pixels off\"]').focus()");
+    browser.press("Enter");
+    browser.wait("!document.querySelector('[data-of=\"Pixels off\"]').hidden");
 
     // Another measure of error.
     browser.click("[data-show='FLIP']", (0.5, 0.5));
@@ -79,4 +95,9 @@ fn plot_points_slider_and_heat_map() {
     };
     assert!(error("--spp 8") < error("") && error("") < error("--spp 1"), "{csv}");
     assert_eq!(json["oracle"]["change"]["over_2"], 0);
+    let writing = &json["writing"];
+    assert!(writing["frame_seconds"].as_f64() >= writing["sync_seconds"].as_f64(), "{writing}");
+    assert!(writing["checkpoint"][1].as_u64() > Some(1000), "{writing}");
+    let low = rows.iter().find(|row| row["options"] == "--build-quality low").expect("a row");
+    assert!(low["build_seconds"]["estimate"].as_f64() > Some(0.0), "{low}");
 }

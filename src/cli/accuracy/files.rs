@@ -1,15 +1,15 @@
 //! The figures for other programs: JSON and CSV.
 
 use super::{AccuracyArgs, Outcome};
-use crate::accuracy::{OracleCrop, Row};
+use crate::accuracy::{OracleCrop, Row, Writing};
 use crate::cli::machine::Machine;
 use crate::error::{Error, Result};
 use crate::measure::Median;
 use crate::output::atomic;
 use crate::output::manifest::Header;
+use crate::page::accuracy::KnobText;
 use serde::Serialize;
 use serde_json::Value;
-use std::path::Path;
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -24,10 +24,17 @@ struct Document<'a> {
     frames: &'a [u32],
     shot_frames: u32,
     turns: u32,
+    /// Trials that are over, and all: fewer where the sweep was stopped.
+    trials: [usize; 2],
+    /// Runs of the program that measured them.
+    runs: u32,
     default: Value,
     reference: Reference,
     rows: &'a [Row],
     oracle: Option<OracleCrop>,
+    writing: Option<Writing>,
+    /// What the page says of each knob.
+    knobs: Vec<KnobText>,
 }
 
 #[derive(Serialize)]
@@ -38,14 +45,9 @@ struct Reference {
     wanted: f64,
 }
 
-/// Writes `accuracy.json` and `accuracy.csv` into `folder`.
-pub fn write(
-    folder: &Path,
-    args: &AccuracyArgs,
-    outcome: &Outcome,
-    command: &[String],
-) -> Result<()> {
-    let truth = &outcome.truth;
+/// Writes `accuracy.json` and `accuracy.csv` beside the page.
+pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Result<()> {
+    let (folder, truth) = (&args.output, outcome.truth);
     let document = Document {
         tweenray: env!("CARGO_PKG_VERSION"),
         command,
@@ -54,10 +56,12 @@ pub fn write(
         machine: Machine::here(),
         threads: outcome.threads,
         load: outcome.load,
-        frames: &outcome.frames,
+        frames: outcome.frames,
         shot_frames: outcome.shot_frames,
         turns: args.turns,
-        default: Header::settings(&outcome.base),
+        trials: outcome.trials,
+        runs: outcome.runs,
+        default: Header::settings(outcome.base),
         reference: Reference {
             settings: Header::settings(&truth.settings),
             change: truth.change,
@@ -65,6 +69,8 @@ pub fn write(
         },
         rows: &outcome.measured.rows,
         oracle: outcome.oracle,
+        writing: outcome.writing,
+        knobs: super::page::knobs(outcome),
     };
     let path = folder.join("accuracy.json");
     let mut text =
@@ -76,9 +82,9 @@ pub fn write(
 }
 
 const HEAD: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,time_ratio,\
-    time_ratio_low,time_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
+    time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
     error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame,\
-    memory_bytes,on_front\n";
+    build_seconds,memory_bytes,on_front\n";
 
 fn csv(rows: &[Row]) -> String {
     HEAD.to_string() + &rows.iter().map(line).collect::<String>()
@@ -94,6 +100,7 @@ fn line(row: &Row) -> String {
     cells.extend(ends(&row.seconds.median));
     cells.push(number(row.cpu_seconds.median.interval.estimate));
     cells.extend(ratio(&row.time_ratio));
+    cells.extend(ratio(&row.cpu_ratio));
     cells.push(number(row.seconds.median.confidence));
     let e = &row.errors;
     cells.extend([e.mse, e.rmse_steps, e.psnr, e.ssim, e.flip, e.share_over_2].map(number));
@@ -101,6 +108,7 @@ fn line(row: &Row) -> String {
     cells.extend(ratio(&row.error_ratio));
     cells.push(row.change.map_or(String::new(), |c| c.over_2.to_string()));
     cells.push(number(row.rays_per_frame));
+    cells.push(number(row.build_seconds.median.interval.estimate));
     cells.push(row.memory_bytes.to_string());
     cells.push(row.on_front.to_string());
     cells.join(",") + "\n"

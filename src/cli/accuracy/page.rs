@@ -4,7 +4,9 @@ mod plots;
 mod tables;
 
 use super::{AccuracyArgs, Outcome};
-use crate::accuracy::{Goal, Knob, Row, about_knob, about_oracle, best_within, fastest_reaching};
+use crate::accuracy::{
+    Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching,
+};
 use crate::error::Result;
 use crate::measure::Median;
 use crate::output::video::shell_line;
@@ -23,8 +25,8 @@ pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resul
     Ok(AccuracyPage {
         title: scene.clone(),
         summary: summary(outcome),
-        facts: facts(args, outcome),
-        warnings: warnings(args, outcome),
+        facts: facts(outcome),
+        warnings: warnings(outcome),
         scatters: plots::METRICS
             .iter()
             .filter_map(|metric| plots::scatter(outcome, metric))
@@ -62,7 +64,8 @@ fn summary(outcome: &Outcome) -> Vec<String> {
         short(e.flip)
     )];
     let half = best_within(&outcome.measured, time * 1.02).filter(|row| row.knob != Knob::Default);
-    if let Some(row) = half.filter(|row| row.errors.mse < 0.9 * e.mse) {
+    let beyond_noise = |ratio: &Option<Median>| ratio.is_some_and(|r| r.differs_from(1.0));
+    if let Some(row) = half.filter(|row| beyond_noise(&row.error_ratio)) {
         lines.push(format!(
             "In the same time {} comes nearer: {}/255.",
             row.options,
@@ -70,8 +73,8 @@ fn summary(outcome: &Outcome) -> Vec<String> {
         ));
     }
     let same = fastest_reaching(&outcome.measured, Goal::Psnr(e.psnr));
-    if let Some(row) = same.filter(|row| row.knob != Knob::Default && median_of(row) < 0.95 * time)
-    {
+    let other = same.filter(|row| row.knob != Knob::Default);
+    if let Some(row) = other.filter(|row| beyond_noise(&row.time_ratio)) {
         lines.push(format!(
             "{} is as near in {} of the time.",
             row.options,
@@ -81,44 +84,70 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     lines
 }
 
-fn facts(args: &AccuracyArgs, outcome: &Outcome) -> Vec<(String, String)> {
+fn facts(outcome: &Outcome) -> Vec<(String, String)> {
     let frames: Vec<String> = outcome.frames.iter().map(u32::to_string).collect();
     let confidence = outcome.measured.default_row().seconds.median.confidence;
     let load = outcome.load.map(|l| l.map_or("?".into(), short));
-    let base = &outcome.base;
+    let base = outcome.base;
+    let turns = outcome.measured.default_row().seconds.turns.len();
     let fact = |name: &str, value: String| (name.to_string(), value);
     vec![
         fact("Size", format!("{} × {}", base.width, base.height)),
         fact("Frames looked at", format!("{} of {}", frames.join(", "), outcome.shot_frames)),
         fact("Settings compared", count(outcome.measured.rows.len() as u64)),
-        fact("Timed", format!("{} times each, after a warm-up", args.turns)),
+        fact("Turns timed", format!("{turns}, after a warm-up")),
         fact("Intervals", format!("of {}", percent(confidence))),
-        fact(
-            "Reference",
-            format!(
-                "{} camera and {} shadow samples, {}/255 away from half as many",
-                outcome.truth.settings.spp,
-                outcome.truth.settings.shadow_samples,
-                short(outcome.truth.change)
-            ),
-        ),
+        fact("Reference", reference(outcome)),
         fact("Threads", outcome.threads.to_string()),
         fact("Machine's load", format!("{} before, {} after", load[0], load[1])),
         fact("Tracer", outcome.tracer.clone()),
-        fact("Whole sweep", seconds(outcome.seconds)),
+        fact("Whole sweep", whole(outcome)),
     ]
 }
 
-fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
+fn reference(outcome: &Outcome) -> String {
+    let truth = outcome.truth;
+    let (spp, shadow) = (truth.settings.spp, truth.settings.shadow_samples);
+    let samples = format!("{spp} camera and {shadow} shadow samples");
+    match truth.change.is_finite() {
+        true => format!("{samples}, {}/255 away from half as many", short(truth.change)),
+        false => format!("{samples}, never doubled"),
+    }
+}
+
+/// How long it took, as far as that is known.
+fn whole(outcome: &Outcome) -> String {
+    let own = seconds(outcome.seconds);
+    if outcome.runs > 1 { format!("{} runs, the last {own}", outcome.runs) } else { own }
+}
+
+fn warnings(outcome: &Outcome) -> Vec<String> {
     let mut warnings = Vec::new();
+    let [done, of] = outcome.trials;
+    if done < of {
+        warnings.push(format!(
+            "This is what there is of a sweep that is not complete: {} of {} trials, {} of {} settings. \
+             The same command goes on.",
+            count(done as u64),
+            count(of as u64),
+            count(outcome.measured.rows.len() as u64),
+            count(outcome.settings as u64)
+        ));
+    }
     let rows = &outcome.measured.rows;
     let best = rows.iter().map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
     let change = outcome.truth.change;
-    if change > best / 4.0 {
+    let longer = "Errors near that are too large here. --reference-spp lets it converge longer.";
+    if !change.is_finite() {
+        let best = short(best);
+        warnings.push(format!(
+            "Nobody knows how far the reference itself is off: it was never doubled. The best setting's \
+             error is {best}/255. {longer}"
+        ));
+    } else if change > best / 4.0 {
         warnings.push(format!(
             "The reference is not far enough ahead: its last doubling changed {}/255, more than a \
-             quarter of the best setting's error, {}/255. Errors near that are too large here. \
-             --reference-spp lets it converge longer.",
+             quarter of the best setting's error, {}/255. {longer}",
             short(change),
             short(best)
         ));
@@ -130,11 +159,12 @@ fn warnings(args: &AccuracyArgs, outcome: &Outcome) -> Vec<String> {
             short(before)
         ));
     }
-    if args.turns < 6 {
+    let seconds = &outcome.measured.default_row().seconds;
+    let turns = seconds.turns.len();
+    if turns < 6 {
         warnings.push(format!(
-            "With --turns {} the intervals hold the truth in {} of cases, not in 95 %.",
-            args.turns,
-            percent(outcome.measured.default_row().seconds.median.confidence)
+            "With --turns {turns} the intervals hold the truth in {} of cases, not in 95 %.",
+            percent(seconds.median.confidence)
         ));
     }
     warnings
@@ -179,7 +209,8 @@ fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
     outcome.measured.rows.iter().enumerate().map(detail).collect()
 }
 
-fn knobs(outcome: &Outcome) -> Vec<KnobText> {
+/// What turning each knob does.
+pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
     let mut seen: Vec<Knob> = Vec::new();
     for row in &outcome.measured.rows {
         let alone = !matches!(row.knob, Knob::Default | Knob::Combination);
@@ -198,6 +229,10 @@ fn knobs(outcome: &Outcome) -> Vec<KnobText> {
         let why = "Left out: it holds every ray against every triangle, and even a few pixels of this \
                    scene would take it minutes.";
         all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
+    }
+    if let Some(writing) = &outcome.writing {
+        let sentences = about_writing(writing, median_of(outcome.measured.default_row()));
+        all.push(KnobText { name: "Writing to disk".into(), sentences });
     }
     all
 }

@@ -3,7 +3,7 @@
 use super::Job;
 use crate::output::manifest::{AuditRow, Header, Row};
 use crate::page::Table;
-use crate::page::words::{bytes, count, date, percent, seconds, short};
+use crate::page::words::{bytes, count, date, percent, seconds, short, steps};
 use crate::reuse::of_frame;
 use crate::sequence::audit_row;
 use crate::stats::RayCounts;
@@ -80,7 +80,7 @@ pub fn audit(job: &Job) -> Table {
 fn audit_cells(name: &str, audit: &AuditRow) -> Vec<String> {
     let figure = |rmse: Option<[f64; 3]>| {
         rmse.map_or("–".into(), |r| {
-            let [rmse, low, high] = r.map(short);
+            let [rmse, low, high] = r.map(steps);
             format!("{rmse} ({low}–{high})")
         })
     };
@@ -161,7 +161,7 @@ pub fn frames(job: &Job) -> Table {
     let head = ["frame", "file", "size", "seconds", "rays", "inferred", "error (1/255)", "rank"];
     let mut table = Table::new("Frames", &head);
     for row in &job.rows {
-        let error = row.audit.and_then(|audit| audit.rmse).map_or("–".into(), |[e, ..]| short(e));
+        let error = row.audit.and_then(|audit| audit.rmse).map_or("–".into(), |[e, ..]| steps(e));
         table.rows.push(vec![
             row.frame.to_string(),
             row.file.clone(),

@@ -53,7 +53,7 @@ for pause in 5 30 0; do
     exit 75
   fi
   # Processes that could not be started may be so a little later: nodes clear up after the run before.
-  if [ "$code" -ne 1 ] && [ "$code" -lt 128 ]; then break; fi
+  case $code in 0 | 2 | 75) break ;; esac
   sleep "$pause"
 done
 echo "this run got no further and ended with exit code $code: not requeued" >&2

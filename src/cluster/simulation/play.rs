@@ -5,7 +5,6 @@ use super::super::note::Kind;
 use super::{Job, Model, Played, Table};
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
-use std::time::Instant;
 
 /// A job half-way.
 pub struct Play<'a> {
@@ -190,14 +189,14 @@ impl<'a> Play<'a> {
         if inbox.is_empty() && self.now > 0.0 {
             return;
         }
-        let start = Instant::now();
+        let start = thread_seconds();
         for (rank, order, seconds) in &inbox {
             self.board.done(*rank, order, *seconds);
         }
         let steps = self.board.give();
         let table = match self.model.table {
             Table::Seconds(each) => each * inbox.len() as f64,
-            Table::Measured => start.elapsed().as_secs_f64(),
+            Table::Measured => thread_seconds() - start,
         };
         self.played.table_seconds += table;
         self.played.longest_look = self.played.longest_look.max(table);
@@ -302,4 +301,10 @@ impl<'a> Play<'a> {
         self.post(at, Mail::Done { rank, order, seconds });
         self.hand_out(rank);
     }
+}
+
+/// Processor seconds of this thread so far: what the table takes, however busy the machine is.
+fn thread_seconds() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }

@@ -22,6 +22,7 @@ mod settings;
 mod shapes;
 #[cfg(test)]
 mod tests;
+mod time;
 mod transform;
 mod vector;
 

@@ -5,11 +5,13 @@ mod switches;
 use super::at::At;
 use super::number::{FrameRate, Int, Positive, Share};
 use super::report::Source;
+use super::time::{Time, TimeOrOff};
 use super::vector::List;
 use crate::error::Result;
 use crate::import::{Loaded, OutputName};
 use crate::scene::{
-    self, Filter, FrameRange, HitRules, IntersectorKind, Rect, ReuseSettings, ToneCurve, limits,
+    self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Rect, ReuseSettings,
+    ToneCurve, limits,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -59,6 +61,11 @@ pub(super) struct Settings {
     intersector: IntersectorKind,
     /// Embree's instruction set; frames differ in the last bits by it. Absent: the machine's best.
     isa: Option<Isa>,
+    /// How much work Embree puts into its tree: "low" is built fastest and traced slowest, "high" the
+    /// other way round.
+    build_quality: BuildQuality,
+    /// Whether Embree's tree takes less memory, and more time to trace.
+    compact: bool,
     /// The rules that make hits trustworthy.
     rules: Rules,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, as `[x0, y0, x1, y1]`; row 0 is the top.
@@ -83,6 +90,12 @@ pub(super) struct Settings {
     threads: Option<Int<1, { limits::MAX_THREADS as i64 }>>,
     /// File for what the job took, as JSON, relative to the current folder. Absent: none.
     stats: Option<PathBuf>,
+    /// Stop after this long, counted from the program's start, to go on later: "25m", "1h30m", "90s".
+    /// Absent: only a Slurm job stops, 30 s before its end.
+    time_limit: Option<Time>,
+    /// Put what frames to come need on disk every so often, so that a killed job need not trace it
+    /// again: "30s", "5m", "off". Absent: every 30 s.
+    checkpoint: Option<TimeOrOff>,
 }
 
 impl Default for Settings {
@@ -103,6 +116,8 @@ impl Default for Settings {
             png_bits: PngBits(s.png_bits),
             intersector: s.intersector,
             isa: None,
+            build_quality: s.build_quality,
+            compact: s.compact,
             rules: Rules::default(),
             crop: None,
             flag_bad: s.flag_bad,
@@ -114,6 +129,8 @@ impl Default for Settings {
             overwrite: false,
             threads: None,
             stats: None,
+            time_limit: None,
+            checkpoint: None,
         }
     }
 }
@@ -145,6 +162,8 @@ impl Settings {
             png_bits: self.png_bits.0,
             intersector: self.intersector,
             isa: self.isa.map(|isa| isa.name().to_owned()),
+            build_quality: self.build_quality,
+            compact: self.compact,
             rules: HitRules { robust, retry, recheck, spawn_offset, recentre },
             reuse,
             crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
@@ -183,6 +202,8 @@ impl Settings {
         loaded.overwrite = self.overwrite;
         loaded.threads = self.threads.map(Int::u32);
         loaded.stats.clone_from(&self.stats);
+        loaded.time_limit = self.time_limit.map(|limit| limit.0);
+        loaded.checkpoint = self.checkpoint.map(|interval| interval.0);
         Ok(())
     }
 }

@@ -41,23 +41,36 @@ impl Shared for ColourMaker<'_> {
         Ok(self.known(original)?.is_some())
     }
 
+    fn lies_on_disk(&self, original: u32) -> bool {
+        self.checkpoints.is_some_and(|c| c.has(original))
+    }
+
     fn export(&self, original: u32) -> Option<Arc<[u8]>> {
         let known = self.with_state(|s| s.known.get(&original).cloned())?;
-        let entries = || known.entries.iter();
-        let columns = Columns {
-            pixels: entries().map(|e| e.pixel).collect(),
-            rgb: entries().map(|e| e.rgb).collect(),
-            distances: entries().map(|e| e.distance).collect(),
-        };
-        pack(&columns).ok().map(Into::into)
+        self.pool.install(|| encode(&known)).ok().map(Into::into)
     }
 
     fn import(&self, original: u32, bytes: &[u8]) {
-        let Ok(Columns { pixels, rgb, distances }) = unpack::<Columns>(bytes) else { return };
-        let rest = rgb.into_iter().zip(distances);
-        let entry = |(pixel, (rgb, distance))| Entry { pixel, rgb, distance };
-        let entries = pixels.into_iter().zip(rest).map(entry).collect();
+        let Some(known) = self.pool.install(|| decode(original, bytes)) else { return };
         self.with_state(|s| s.held.insert(original));
-        self.keep(Known { frame: original, entries });
+        self.keep(known);
     }
+}
+
+/// A frame's discoveries as bytes.
+pub(super) fn encode(known: &Known) -> Result<Vec<u8>> {
+    let entries = || known.entries.iter();
+    pack(&Columns {
+        pixels: entries().map(|e| e.pixel).collect(),
+        rgb: entries().map(|e| e.rgb).collect(),
+        distances: entries().map(|e| e.distance).collect(),
+    })
+}
+
+/// What [`encode`] made bytes of; `None` for other bytes.
+pub(super) fn decode(frame: u32, bytes: &[u8]) -> Option<Known> {
+    let Columns { pixels, rgb, distances } = unpack::<Columns>(bytes).ok()?;
+    let rest = rgb.into_iter().zip(distances);
+    let entry = |(pixel, (rgb, distance))| Entry { pixel, rgb, distance };
+    Some(Known { frame, entries: pixels.into_iter().zip(rest).map(entry).collect() })
 }

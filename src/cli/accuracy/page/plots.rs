@@ -46,7 +46,10 @@ fn colour_of(knob: Knob) -> (&'static str, &'static str) {
         Some(Group::Reuse) => ("c1", "reuse"),
         Some(Group::Samples) => ("c2", "samples"),
         Some(Group::Specular) => ("c3", "bounces, cut-off"),
-        Some(Group::Intersection | Group::Oracle) => ("c4", "rules of intersection"),
+        Some(Group::Tree) => ("c6", "Embree's tree"),
+        Some(Group::Intersection | Group::Oracle | Group::Writing) => {
+            ("c4", "rules of intersection")
+        }
     }
 }
 

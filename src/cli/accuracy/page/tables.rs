@@ -3,6 +3,7 @@
 use super::{median_of, name_of, with_ends};
 use crate::accuracy::{Goal, fastest_reaching};
 use crate::cli::accuracy::Outcome;
+use crate::measure::Median;
 use crate::page::Table;
 use crate::page::words::{bytes, change, count, percent, short};
 
@@ -77,28 +78,41 @@ pub fn figures(outcome: &Outcome) -> Table {
 
 /// Every setting's times, with their intervals.
 pub fn times(outcome: &Outcome) -> Table {
-    let head = ["", "wall seconds", "CPU seconds", "against default", "beyond noise"];
+    let head = [
+        "",
+        "wall seconds",
+        "against default",
+        "beyond noise",
+        "CPU seconds",
+        "against default",
+        "beyond noise",
+    ];
     let mut table = Table::new("Times, with their intervals", &head);
     for row in &outcome.measured.rows {
-        let ratio = row.time_ratio.as_ref();
-        let against = ratio.map_or("–".into(), |r| {
-            let [is, low, high] =
-                [r.interval.estimate, r.interval.low, r.interval.high].map(change);
-            format!("{is} ({low} to {high})")
-        });
-        let beyond = match ratio {
-            None => "–",
-            Some(r) if r.differs_from(1.0) => "yes",
-            Some(r) if r.is_sure() => "no",
-            Some(_) => "too few turns",
-        };
+        let [wall, beyond] = against(row.time_ratio.as_ref());
+        let [cpu, cpu_beyond] = against(row.cpu_ratio.as_ref());
         table.rows.push(vec![
             name_of(&row.options),
             with_ends(&row.seconds.median, short),
+            wall,
+            beyond,
             with_ends(&row.cpu_seconds.median, short),
-            against,
-            beyond.into(),
+            cpu,
+            cpu_beyond,
         ]);
     }
     table
+}
+
+/// A ratio to the default's, and whether it is more than noise.
+fn against(ratio: Option<&Median>) -> [String; 2] {
+    let Some(ratio) = ratio else { return ["–".into(), "–".into()] };
+    let i = ratio.interval;
+    let [is, low, high] = [i.estimate, i.low, i.high].map(change);
+    let beyond = match ratio.is_sure() {
+        true if ratio.differs_from(1.0) => "yes",
+        true => "no",
+        false => "too few turns",
+    };
+    [format!("{is} ({low} to {high})"), beyond.into()]
 }

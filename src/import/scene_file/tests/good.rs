@@ -4,8 +4,10 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    CameraPath, Light as SceneLight, Policy, ReuseSettings, Settings as SceneSettings,
+    BuildQuality, CameraPath, Interval, Light as SceneLight, Policy, ReuseSettings,
+    Settings as SceneSettings,
 };
+use std::time::Duration;
 
 #[test]
 fn an_empty_file_is_an_empty_scene_with_all_defaults() {
@@ -26,16 +28,18 @@ fn every_setting_reaches_its_place() {
          sky_samples = 6\nsmooth_terminator = false\nbounces = 2\ncutoff = 0.25\nseed = 11\n\
          exposure = 1.5\n\
          tone = 'filmic'\npng_bits = 16\nintersector = 'oracle'\nisa = 'sse4.2'\n\
+         build_quality = 'low'\ncompact = true\n\
          rules = { robust = false, retry = false, recheck = 'always', spawn_offset = false, \
          recentre = false }\ncrop = [1, 2, 30, 40]\nframes = [2, 3]\n\
          output = 'out/f_####.exr'\nfps = 30\nvideo = false\noverwrite = true\nthreads = 2\n\
-         stats = 's.json'\n[camera]\nframes = 5\n",
+         stats = 's.json'\ntime_limit = '1h30m'\ncheckpoint = 'off'\n[camera]\nframes = 5\n",
     );
     let s = &loaded.settings;
     assert_eq!((s.width, s.height, s.spp, s.seed), (320, 200, 7, 11));
     assert_eq!((s.shadow_samples, s.sky_samples, s.bounces, s.png_bits), (5, 6, 2, 16));
     assert_eq!((s.cutoff, s.exposure, s.isa.as_deref()), (0.25, 1.5, Some("sse4.2")));
     assert!(!s.smooth_terminator);
+    assert_eq!((s.build_quality, s.compact), (BuildQuality::Low, true));
     // What is left at its default would show here.
     let d = SceneSettings::default();
     assert!(s.filter != d.filter && s.tone != d.tone && s.intersector != d.intersector);
@@ -49,6 +53,8 @@ fn every_setting_reaches_its_place() {
     assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
     assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
     assert!(loaded.overwrite && !loaded.video);
+    assert_eq!(loaded.time_limit, Some(Duration::from_secs(5400)));
+    assert_eq!(loaded.checkpoint, Some(Interval(None)));
 }
 
 #[test]

@@ -1,0 +1,205 @@
+//! `render --target` and `--budget`, as a user runs them: in how many frames a target is reached against
+//! a converged reference, how much longer it takes than the fastest setting of a sweep that reaches it
+//! in as many (95 %), and how near a budget of half the default's time is kept.
+//!
+//! `SCENE`, `TARGETS` (dB, or `budget`), `PIXELS`, `SPP` (of the reference) and `THREADS` change what is
+//! run, `PROGRAM` which program. With `KEEP`, a folder, references and sweeps are made once and read again.
+#![allow(clippy::print_stdout, reason = "a bench prints its figures")]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tweenray::import::{self, LoadOptions};
+use tweenray::measure::{mse, psnr};
+use tweenray::output::read_image;
+
+/// The program in a folder of its own.
+struct Place {
+    folder: PathBuf,
+    scene: PathBuf,
+    size: String,
+    frames: u32,
+    threads: String,
+}
+
+/// A setting of the sweep: seconds, options, PSNR of every frame.
+type Swept = (f64, String, Vec<f64>);
+
+fn var<T: std::str::FromStr>(name: &str, default: T) -> T {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}
+
+impl Place {
+    fn of(scene: &str, folder: &Path) -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
+        let scene_file = file.join("scene.toml");
+        let loaded = import::load(&scene_file, &LoadOptions::default()).expect("a scene");
+        let (width, height) = (loaded.settings.width, loaded.settings.height);
+        let pixels: f64 = var("PIXELS", 12_000.0);
+        let scale = (pixels / (f64::from(width) * f64::from(height))).sqrt();
+        let edge = |length: u32| (f64::from(length) * scale).round();
+        Self {
+            folder: folder.join(scene),
+            scene: scene_file,
+            size: format!("{}x{}", edge(width), edge(height)),
+            frames: loaded.shot.frames,
+            threads: var("THREADS", "2".into()),
+        }
+    }
+
+    /// Renders with `options`: seconds that tracing took, and what was said.
+    fn render(&self, name: &str, options: &str) -> (f64, String) {
+        let folder = self.folder.join(name);
+        let stats = self.folder.join(format!("{name}.json"));
+        let mut command = Command::new(var("PROGRAM", env!("CARGO_BIN_EXE_tweenray").to_string()));
+        command.arg("render").arg(&self.scene).arg("--no-video").arg("--stats").arg(&stats);
+        command.args(["--size", &self.size, "--threads", &self.threads]);
+        command.arg("-o").arg(folder.join("f_##.png"));
+        let ran = command.args(options.split_whitespace()).output().expect("the program starts");
+        let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(ran.status.success(), "{options}: {said}");
+        let text = std::fs::read(stats).expect("statistics");
+        let stats: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+        // Of the last round: frames that were rendered again are counted once.
+        let frames = stats["frames"].as_array().expect("frames");
+        let seconds = |f: &serde_json::Value| f["trace_seconds"].as_f64().expect("seconds");
+        (frames.iter().map(seconds).sum(), said)
+    }
+
+    /// PSNR of every frame, dB.
+    fn psnr(&self, name: &str) -> Vec<f64> {
+        let read = |name: &str, frame: u32| {
+            let file = self.folder.join(name).join(format!("f_{frame:02}.png"));
+            read_image(file).expect("a frame")
+        };
+        (1..=self.frames).map(|f| psnr(mse(&read("truth", f), &read(name, f)))).collect()
+    }
+
+    /// The reference is made, and all settings of the sweep are held against it.
+    fn sweep(&self) -> Vec<Swept> {
+        let file = self.folder.join(format!("sweep_{}.json", self.size));
+        let kept = std::fs::read(&file).ok();
+        if let Some(swept) = kept.and_then(|text| serde_json::from_slice(&text).ok()) {
+            return swept;
+        }
+        let spp: u32 = var("SPP", 256);
+        let truth = format!(
+            "--spp {spp} --shadow-samples 8 --sky-samples 8 --bounces 16 --cutoff 1e-5 \
+             --policy off --png-bits 16 --seed 77 --overwrite"
+        );
+        self.render("truth", &truth);
+        let mut swept = Vec::new();
+        for spp in [1, 2, 4, 8, 16, 32, 64] {
+            for lights in [1, 4, 16] {
+                if spp * lights > 256 {
+                    continue;
+                }
+                for policy in ["off", "surface"] {
+                    let options = format!(
+                        "--spp {spp} --shadow-samples {lights} --sky-samples {lights} \
+                         --policy {policy}"
+                    );
+                    let (seconds, _) = self.render("swept", &(options.clone() + " --overwrite"));
+                    swept.push((seconds, options, self.psnr("swept")));
+                }
+            }
+        }
+        std::fs::write(file, serde_json::to_vec(&swept).expect("JSON")).expect("a file");
+        swept
+    }
+
+    /// The shortest time of two turns of each of `options`.
+    fn contest(&self, options: &[&str]) -> Vec<f64> {
+        let mut seconds = vec![f64::INFINITY; options.len()];
+        for _ in 0..2 {
+            for (options, seconds) in options.iter().zip(&mut seconds) {
+                let (taken, _) = self.render("contest", &format!("{options} --overwrite"));
+                *seconds = seconds.min(taken);
+            }
+        }
+        seconds
+    }
+}
+
+fn reached(frames: &[f64], target: f64) -> usize {
+    frames.iter().filter(|psnr| **psnr >= target).count()
+}
+
+/// The last line of what was said that holds `what`.
+fn line(said: &str, what: &str) -> String {
+    said.lines().rfind(|line| line.contains(what)).unwrap_or_default().to_string()
+}
+
+fn main() {
+    support::title("target");
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = var("KEEP", temporary.path().to_path_buf());
+    let scenes = var("SCENE", "cornell demo reflective_spheres spheres_on_terrain".to_string());
+    let targets = var("TARGETS", "40 45 50".to_string());
+    for scene in scenes.split_whitespace() {
+        let place = Place::of(scene, &folder);
+        std::fs::create_dir_all(&place.folder).expect("a folder");
+        let seconds = support::seconds(|| run(scene, &place, &targets));
+        println!("({seconds:.0} s; load average {})", support::load_average());
+    }
+}
+
+fn run(scene: &str, place: &Place, targets: &str) {
+    let mut rows = Vec::new();
+    for target in targets.split_whitespace() {
+        match target {
+            "budget" => budget(scene, place),
+            _ => rows.push(row(scene, place, target)),
+        }
+    }
+    let heads =
+        ["scene", "dB", "reached", "worst", "time", "over swept", "again", "chosen", "swept"];
+    if !rows.is_empty() {
+        support::table(&heads, &rows);
+    }
+}
+
+fn row(scene: &str, place: &Place, target: &str) -> Vec<String> {
+    let swept = place.sweep();
+    let (_, said) = place.render("chosen", &format!("--target psnr={target} --overwrite"));
+    let wanted: f64 = target.parse().expect("a PSNR");
+    let frames = place.psnr("chosen");
+    let enough = |swept: &&Swept| reached(&swept.2, wanted) as f64 >= 0.95 * swept.2.len() as f64;
+    let mut best: Vec<&Swept> = swept.iter().filter(enough).collect();
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let chosen = line(&said, ": --spp");
+    let chosen = chosen.split_once(": ").map_or("", |(_, options)| options);
+    // Times that were kept are of another hour: the two fastest run again, in turns with the choice.
+    let rivals: Vec<&str> = best.iter().take(2).map(|(_, options, _)| options.as_str()).collect();
+    let seconds = place.contest(&[&[chosen][..], &rivals].concat());
+    let fastest = seconds[1..].iter().copied().fold(f64::INFINITY, f64::min);
+    println!(
+        "{}\n{}\n{}",
+        line(&said, "foretold:"),
+        line(&said, "came out"),
+        line(&said, "probe t")
+    );
+    vec![
+        scene.into(),
+        target.into(),
+        format!("{}/{}", reached(&frames, wanted), frames.len()),
+        format!("{:.1}", support::quantile(&frames, 0.0)),
+        format!("{:.2} s", seconds[0]),
+        if rivals.is_empty() { "-".into() } else { format!("{:.2}", seconds[0] / fastest) },
+        said.matches("tightened").count().to_string(),
+        chosen.into(),
+        rivals.first().map_or("-", |options| options).into(),
+    ]
+}
+
+/// A budget of half the default's time, all included.
+fn budget(scene: &str, place: &Place) {
+    let (_, default) = support::timed(|| place.render("default", "--overwrite"));
+    let half = (0.5 * default).round().max(1.0);
+    let options = format!("--budget {half}s --overwrite");
+    let ((_, said), taken) = support::timed(|| place.render("within", &options));
+    let off = 100.0 * (taken / half - 1.0);
+    println!("{scene}: default {default:.1} s; budget {half} s, took {taken:.1} s ({off:+.0} %)");
+    println!("{}\n{}", line(&said, "came out"), line(&said, "probe t"));
+}

@@ -1,0 +1,238 @@
+//! The settings that are compared: each knob alone, then combinations of those that trade error for
+//! time.
+
+use super::knobs::{Candidate, Group, Knob};
+use crate::effects::EffectPlan;
+use crate::scene::{BuildQuality, HitRules, IntersectorKind, Policy, Recheck, Settings};
+
+/// The default first, then each knob of `groups` alone, then combinations. What `plan` says has no
+/// part in the scene is left out, and so is what equals something before it, and what makes no
+/// difference in a move of `frames` frames.
+pub fn candidates(
+    base: &Settings,
+    plan: &EffectPlan,
+    frames: u32,
+    groups: &[Group],
+) -> Vec<Candidate> {
+    let mut list = List { base, frames, all: Vec::new() };
+    list.add(Knob::Default, String::new(), |_| ());
+    let takes = |group| groups.contains(&group);
+    if takes(Group::Reuse) {
+        list.reuse();
+    }
+    if takes(Group::Samples) {
+        list.samples(plan);
+    }
+    if takes(Group::Specular) && (plan.mirror || plan.glass) {
+        list.specular();
+    }
+    if takes(Group::Intersection) {
+        list.intersection();
+    }
+    if takes(Group::Tree) && base.intersector == IntersectorKind::Embree {
+        list.tree();
+    }
+    if takes(Group::Combinations) {
+        list.combinations(plan);
+    }
+    list.all
+}
+
+struct List<'a> {
+    base: &'a Settings,
+    frames: u32,
+    all: Vec<Candidate>,
+}
+
+impl List<'_> {
+    fn add(&mut self, knob: Knob, options: String, turn: impl FnOnce(&mut Settings)) {
+        let mut settings = self.base.clone();
+        turn(&mut settings);
+        if self.all.iter().all(|other| other.settings != settings) {
+            self.all.push(Candidate { knob, options, settings });
+        }
+    }
+
+    fn reuse(&mut self) {
+        for (name, policy) in
+            [("off", Policy::Off), ("surface", Policy::Surface), ("colour", Policy::Colour)]
+        {
+            self.add(Knob::Policy, format!("--policy {name}"), |s| s.reuse.policy = policy);
+        }
+        if self.base.reuse.policy != Policy::Surface {
+            return;
+        }
+        for tolerance in [0.25, 0.5, 2.0, 4.0].map(|f| times(f, self.base.reuse.tolerance)) {
+            let options = format!("--tolerance {tolerance}");
+            self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = tolerance);
+        }
+        // A segment longer than the move is one as long as it.
+        let cut = |segment: u32| segment.min(self.frames);
+        let others = [16, 256].into_iter().filter(|s| cut(*s) != cut(self.base.reuse.segment));
+        for segment in others.collect::<Vec<u32>>() {
+            let options = format!("--segment {segment}");
+            self.add(Knob::Segment, options, |s| s.reuse.segment = segment);
+        }
+        for audit in [0.0, 0.1] {
+            self.add(Knob::Audit, format!("--audit {audit}"), |s| s.reuse.audit = audit);
+        }
+    }
+
+    fn samples(&mut self, plan: &EffectPlan) {
+        for spp in around(self.base.spp) {
+            self.add(Knob::CameraSamples, format!("--spp {spp}"), |s| s.spp = spp);
+        }
+        if plan.area_lights {
+            for n in around(self.base.shadow_samples) {
+                let options = format!("--shadow-samples {n}");
+                self.add(Knob::ShadowSamples, options, |s| s.shadow_samples = n);
+            }
+        }
+        if plan.sky_light {
+            for n in around(self.base.sky_samples) {
+                let options = format!("--sky-samples {n}");
+                self.add(Knob::SkySamples, options, |s| s.sky_samples = n);
+            }
+        }
+    }
+
+    fn specular(&mut self) {
+        let bounces = self.base.bounces;
+        for n in [1, bounces / 2, bounces * 2].into_iter().filter(|n| *n > 0) {
+            self.add(Knob::Bounces, format!("--bounces {n}"), |s| s.bounces = n);
+        }
+        for cutoff in [10.0, 0.1].map(|f| times(f, self.base.cutoff)) {
+            self.add(Knob::CutOff, format!("--cutoff {cutoff}"), |s| s.cutoff = cutoff);
+        }
+    }
+
+    fn intersection(&mut self) {
+        for (name, recheck) in
+            [("off", Recheck::Off), ("risky", Recheck::Risky), ("always", Recheck::Always)]
+        {
+            self.add(Knob::Recheck, format!("--recheck {name}"), |s| s.rules.recheck = recheck);
+        }
+        let word = |on: bool| if on { "off" } else { "on" };
+        let rules = self.base.rules;
+        self.add(Knob::Retry, format!("--retry {}", word(rules.retry)), |s| s.rules.retry ^= true);
+        let options = format!("--robust {}", word(rules.robust));
+        self.add(Knob::Robust, options, |s| s.rules.robust ^= true);
+        let options = format!("--spawn-offset {}", word(rules.spawn_offset));
+        self.add(Knob::SpawnOffset, options, |s| s.rules.spawn_offset ^= true);
+        let options = format!("--recentre {}", word(rules.recentre));
+        self.add(Knob::Recentre, options, |s| s.rules.recentre ^= true);
+        let options = "--recheck off --retry off --robust off --spawn-offset off".to_string();
+        self.add(Knob::AllRules, options, |s| {
+            let recentre = s.rules.recentre;
+            let recheck = Recheck::Off;
+            s.rules =
+                HitRules { robust: false, retry: false, recheck, spawn_offset: false, recentre };
+        });
+    }
+
+    fn tree(&mut self) {
+        let qualities = [
+            ("low", BuildQuality::Low),
+            ("medium", BuildQuality::Medium),
+            ("high", BuildQuality::High),
+        ];
+        for (name, quality) in qualities {
+            let options = format!("--build-quality {name}");
+            self.add(Knob::BuildQuality, options, |s| s.build_quality = quality);
+        }
+        let options = format!("--compact {}", if self.base.compact { "off" } else { "on" });
+        self.add(Knob::Compact, options, |s| s.compact ^= true);
+    }
+
+    fn combinations(&mut self, plan: &EffectPlan) {
+        let with_base = |n: u32| {
+            let [less, more] = around(n);
+            [less, n, more]
+        };
+        let base = self.base;
+        let (shadow, sky) = (with_base(base.shadow_samples), with_base(base.sky_samples));
+        let lit = usize::from(plan.area_lights || plan.sky_light);
+        for spp in with_base(base.spp) {
+            // Without soft light there is but one number of shadow samples: none.
+            for k in if lit == 1 { 0..3 } else { 1..2 } {
+                for (name, policy) in [("off", Policy::Off), ("surface", Policy::Surface)] {
+                    let mut options = format!("--spp {spp}");
+                    if plan.area_lights {
+                        options += &format!(" --shadow-samples {}", shadow[k]);
+                    }
+                    if plan.sky_light {
+                        options += &format!(" --sky-samples {}", sky[k]);
+                    }
+                    options += &format!(" --policy {name}");
+                    self.add(Knob::Combination, options, |s| {
+                        s.spp = spp;
+                        // Samples of what is not there would only make twins.
+                        if plan.area_lights {
+                            s.shadow_samples = shadow[k];
+                        }
+                        if plan.sky_light {
+                            s.sky_samples = sky[k];
+                        }
+                        s.reuse.policy = policy;
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// `x` times `factor` as people multiply: of 0.001 ten times is 0.01, not 0.010000001.
+fn times(factor: f64, x: f32) -> f32 {
+    (factor * x.to_string().parse::<f64>().unwrap_or(f64::from(x))) as f32
+}
+
+/// A quarter and four times as many, at least one.
+fn around(n: u32) -> [u32; 2] {
+    [(n / 4).max(1), n.saturating_mul(4).clamp(1, crate::scene::limits::MAX_SAMPLES)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_candidate_twice_and_none_for_effects_that_are_not_there() {
+        let base = Settings::default();
+        let all = candidates(&base, &EffectPlan::EVERYTHING, 100, &Group::ALL);
+        assert_eq!((all[0].knob, &all[0].settings), (Knob::Default, &base));
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| a.settings != b.settings), "{}", a.options);
+        }
+        let one = Settings { shadow_samples: 1, ..Settings::default() };
+        let no_sky = EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING };
+        let list = candidates(&one, &no_sky, 100, &Group::ALL);
+        for (i, a) in list.iter().enumerate() {
+            assert!(list[..i].iter().all(|b| a.options != b.options), "{}", a.options);
+        }
+        let nothing = EffectPlan {
+            mirror: false,
+            glass: false,
+            area_lights: false,
+            sky_light: false,
+            ..EffectPlan::EVERYTHING
+        };
+        let few = candidates(&base, &nothing, 10, &Group::ALL);
+        let has = |knob| few.iter().any(|c| c.knob == knob);
+        assert!(!has(Knob::Bounces) && !has(Knob::ShadowSamples) && !has(Knob::SkySamples));
+        assert!(has(Knob::CameraSamples) && has(Knob::Policy) && has(Knob::Retry));
+        // The tree of today's default is no candidate beside it.
+        let trees: Vec<&str> = few
+            .iter()
+            .filter(|c| c.knob.group() == Some(Group::Tree))
+            .map(|c| &*c.options)
+            .collect();
+        assert_eq!(trees, ["--build-quality low", "--build-quality high", "--compact on"]);
+        let all_rules = few.iter().find(|c| c.knob == Knob::AllRules).expect("there");
+        assert!(!all_rules.settings.rules.robust && all_rules.settings.rules.recentre);
+        assert!(few.len() < all.len());
+        let segments = |list: &[Candidate]| list.iter().filter(|c| c.knob == Knob::Segment).count();
+        assert_eq!((segments(&all), segments(&few)), (2, 0));
+        assert_eq!(candidates(&base, &nothing, 10, &[]).len(), 1);
+        assert_eq!((times(10.0, 0.001), times(0.1, 0.001)), (0.01, 0.0001));
+    }
+}

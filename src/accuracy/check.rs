@@ -1,0 +1,109 @@
+//! What came out: some pixels of finished frames against many samples.
+
+use super::choice::Goal;
+use super::figures::{doubts, figure, squares};
+use super::law::Samples;
+use super::probe::{Probe, reference, samples_of_reference};
+use crate::error::Result;
+use crate::film::Image;
+use crate::measure::psnr;
+
+/// What was found in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Checked {
+    /// The frame.
+    pub frame: u32,
+    /// Its mean squared error, display steps.
+    pub squared_error: f64,
+    /// By how much that may be off, a share.
+    pub doubt: f64,
+}
+
+/// What was found in all that were looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Check {
+    /// Frame by frame.
+    pub frames: Vec<Checked>,
+    /// The goal's figure of the worst of them: SSIM less than 1 by how much, FLIP, share.
+    pub figure: f64,
+}
+
+impl Check {
+    /// Looks at some finished frames, rendered with `samples`, at other pixels than the probe did;
+    /// `image` gives a frame as displayed.
+    ///
+    /// # Errors
+    /// Those of tracing and of `image`.
+    pub fn of(
+        probe: &Probe,
+        samples: Samples,
+        image: &dyn Fn(u32) -> Result<Image>,
+    ) -> Result<Self> {
+        let (chosen, patches) = probe.check_patches(image)?;
+        let seen = patches.of_images(image)?;
+        let reference = reference(probe.stage.base, samples_of_reference(samples));
+        let truth = patches.trace(probe.stage, &reference)?;
+        let found =
+            squares(&patches, &truth, &seen).into_iter().zip(doubts(&patches, &truth, &seen));
+        let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| Checked {
+            frame,
+            squared_error,
+            doubt,
+        };
+        Ok(Self {
+            frames: chosen.into_iter().zip(found).map(checked).collect(),
+            figure: probe.goal.map_or(Ok(0.0), |goal| figure(goal, &patches, &truth, &seen))?,
+        })
+    }
+
+    /// The mean of the frames' squared errors.
+    pub fn mean(&self) -> f64 {
+        let sum: f64 = self.frames.iter().map(|f| f.squared_error).sum();
+        sum / self.frames.len().max(1) as f64
+    }
+
+    /// The worst frame.
+    pub fn worst(&self) -> Option<Checked> {
+        self.frames.iter().copied().max_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
+    }
+
+    /// By which factor squared errors are too large for `goal`, of which `allowed` is the squared error;
+    /// 1 and less where it is reached. The reference's own error, about a sixth, and half of what so few
+    /// pixels leave open are to the good of a frame.
+    pub fn excess(&self, goal: Goal, allowed: f64) -> f64 {
+        let sure = |f: &Checked| f.squared_error / (1.15 * (1.0 + 0.5 * f.doubt));
+        match goal {
+            Goal::Psnr(_) => self.frames.iter().map(sure).fold(0.0, f64::max) / allowed,
+            // The figure itself decides; it rises no faster than the squared error.
+            Goal::Ssim(least) => self.figure / (1.0 - least),
+            Goal::Flip(most) | Goal::MaxShare(most) => self.figure / most,
+        }
+    }
+
+    /// PSNR of the mean and of the worst frame, dB.
+    pub fn psnr(&self) -> [f64; 2] {
+        let of = |squared_error: f64| psnr(squared_error / (255.0 * 255.0));
+        [of(self.mean()), of(self.worst().map_or(0.0, |worst| worst.squared_error))]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_goal_is_missed_by_a_frame_beyond_doubt() {
+        let check = |errors: &[f64]| Check {
+            frames: errors
+                .iter()
+                .map(|e| Checked { frame: 1, squared_error: *e, doubt: 0.2 })
+                .collect(),
+            figure: 0.03,
+        };
+        let goal = Goal::Psnr(45.0);
+        assert!(check(&[1.9, 2.0, 2.5]).excess(goal, 2.0) <= 1.0);
+        assert!(check(&[1.9, 2.0, 2.6]).excess(goal, 2.0) > 1.0);
+        assert!((check(&[9.0]).excess(Goal::Flip(0.02), 2.0) - 1.5).abs() < 1e-9);
+        assert!((check(&[1.0]).excess(Goal::Ssim(0.97), 2.0) - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,277 @@
+//! What a setting is foretold to come to, and the choice among all of them.
+
+use super::choice::Goal;
+use super::law::{Law, Samples};
+use crate::measure::psnr;
+use crate::scene::{ReuseSettings, Settings};
+use serde::{Deserialize, Serialize};
+
+/// A way to take over light from other frames, as it came out on a few small frames.
+///
+/// Errors are those of traced frames in every mode: key frames are traced, and must reach a target like
+/// any other; frames between are mostly nearer to the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mode {
+    /// What is taken over, and with how much care.
+    pub reuse: ReuseSettings,
+    /// Seconds per frame of the full size: of each frame, and by n, n·s, n·k.
+    pub seconds: [f64; 4],
+}
+
+/// What some samples came to, in each frame looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// The samples.
+    pub samples: Samples,
+    /// Squared errors, the reference's own left aside.
+    pub errors: Vec<f64>,
+}
+
+/// A figure as a power of the squared error in display steps: both of its logarithms' line.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Logarithm of the figure where the squared error is 1.
+    pub at_one: f64,
+    /// Its rise with the logarithm of the squared error.
+    pub rise: f64,
+}
+
+impl Line {
+    /// The line nearest to pairs of squared error and figure; `None` where they do not rise together.
+    pub fn through(pairs: &[(f64, f64)]) -> Option<Self> {
+        let logs =
+            || pairs.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln()));
+        let n = logs().count() as f64;
+        let (x, y) = logs().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / n, y + b / n));
+        let (xx, xy) = logs()
+            .fold((0.0, 0.0), |(xx, xy), (a, b)| (xx + (a - x) * (a - x), xy + (a - x) * (b - y)));
+        let rise = xy / xx;
+        (n >= 2.0 && rise > 0.0).then_some(Self { at_one: y - rise * x, rise })
+    }
+
+    /// The line with the same rise through `(squared_error, figure)`.
+    pub fn shifted_to(self, (squared_error, figure): (f64, f64)) -> Self {
+        if squared_error <= 0.0 || figure <= 0.0 {
+            return self;
+        }
+        Self { at_one: figure.ln() - self.rise * squared_error.ln(), ..self }
+    }
+
+    /// The squared error at which the figure is `figure`.
+    fn squared_error(&self, figure: f64) -> f64 {
+        ((figure.ln() - self.at_one) / self.rise).exp()
+    }
+}
+
+/// All that the probe found out. Squared errors are in squares of a display step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Foretelling {
+    /// Of samples that were not tried.
+    pub law: Law,
+    /// Samples that were tried.
+    pub measured: Vec<Measured>,
+    /// What the probe's frames are off by for their bounces and cut-off.
+    pub bias: Vec<f64>,
+    /// What rounding to the file's bits adds.
+    pub rounding: f64,
+    /// The bounces that go with it.
+    pub bounces: u32,
+    /// Ways to take over light.
+    pub modes: Vec<Mode>,
+    /// How the goal's figure goes with the squared error, unless it is that.
+    pub line: Option<Line>,
+    /// How far a frame's squared error may be off, a share: the standard error of pixels drawn, the mean
+    /// of all frames. That of a single frame is in doubt itself.
+    pub doubt: f64,
+    /// How much larger errors came out than foretold.
+    pub excess: f64,
+}
+
+/// A setting with what is foretold of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Foretold {
+    /// Samples.
+    pub samples: Samples,
+    /// Bounces.
+    pub bounces: u32,
+    /// What is taken over.
+    pub reuse: ReuseSettings,
+    /// Squared error of the worst frame looked at, display steps.
+    pub squared_error: f64,
+    /// Wall seconds a frame.
+    pub seconds: f64,
+}
+
+impl Foretold {
+    /// PSNR of the worst frame, dB.
+    pub fn psnr(&self) -> f64 {
+        psnr(self.squared_error / (255.0 * 255.0))
+    }
+
+    /// `base` so set.
+    pub fn settings(&self, base: &Settings) -> Settings {
+        let Samples { spp, shadow, sky } = self.samples;
+        Settings {
+            spp,
+            shadow_samples: shadow,
+            sky_samples: sky,
+            bounces: self.bounces,
+            reuse: self.reuse,
+            ..base.clone()
+        }
+    }
+}
+
+/// Which numbers of samples are thought of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Range {
+    /// Camera samples.
+    pub spp: Vec<u32>,
+    /// Shadow samples.
+    pub shadow: Vec<u32>,
+    /// Sky samples.
+    pub sky: Vec<u32>,
+}
+
+impl Foretelling {
+    /// The squared error that `goal` allows.
+    pub fn allowed(&self, goal: Goal) -> f64 {
+        let by_line = |figure: f64| self.line.map_or(0.0, |line| line.squared_error(figure));
+        match goal {
+            Goal::Psnr(least) => 255.0 * 255.0 * 10f64.powf(-least / 10.0),
+            Goal::Ssim(least) => by_line(1.0 - least),
+            Goal::Flip(most) | Goal::MaxShare(most) => by_line(most),
+        }
+    }
+
+    /// What is foretold of `samples` in `mode`, the doubt added.
+    pub fn of(&self, mode: &Mode, samples: Samples) -> Foretold {
+        let tried = self.measured.iter().find(|measured| measured.samples == samples);
+        let errors = tried.map_or_else(
+            || self.law.errors(samples).collect::<Vec<_>>(),
+            |measured| measured.errors.clone(),
+        );
+        let each = errors
+            .iter()
+            .zip(&self.bias)
+            .map(|(error, bias)| (1.0 + self.doubt) * (self.excess * error + bias) + self.rounding);
+        let n = f64::from(samples.spp);
+        let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
+        Foretold {
+            samples,
+            bounces: self.bounces,
+            reuse: mode.reuse,
+            squared_error: each.fold(0.0, f64::max),
+            seconds: by.iter().zip(mode.seconds).map(|(x, seconds)| x * seconds).sum(),
+        }
+    }
+
+    /// For each mode the fastest setting that is foretold to be off by at most `allowed`.
+    pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Foretold> {
+        let best = |mode| {
+            let reach = self.all(mode, range).filter(|f| f.squared_error <= allowed);
+            reach.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+        };
+        self.modes.iter().filter_map(best).collect()
+    }
+
+    /// The setting nearest to the truth, of those foretold to take at most `seconds` a frame; the
+    /// fastest of all where none does.
+    pub fn best_within(&self, range: &Range, seconds: f64) -> Option<Foretold> {
+        let all = || self.modes.iter().flat_map(|mode| self.all(mode, range));
+        let within = all().filter(|f| f.seconds <= seconds);
+        let best = within.min_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
+        best.or_else(|| all().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
+    }
+
+    /// The same with all times `factor` times as long.
+    pub fn slower(&self, factor: f64) -> Self {
+        let mut slower = self.clone();
+        slower.modes.iter_mut().flat_map(|mode| &mut mode.seconds).for_each(|s| *s *= factor);
+        slower
+    }
+
+    /// The same with all errors of samples `factor` times as large.
+    pub fn worse(&self, factor: f64) -> Self {
+        Self { excess: self.excess * factor, ..self.clone() }
+    }
+
+    /// The setting with the least error foretold.
+    pub fn best(&self, range: &Range) -> Option<Foretold> {
+        self.best_within(range, f64::INFINITY)
+    }
+
+    fn all<'s>(&'s self, mode: &'s Mode, range: &'s Range) -> impl Iterator<Item = Foretold> + 's {
+        let lights = move |spp: u32| {
+            let skies = move |shadow: u32| {
+                range.sky.iter().map(move |sky| Samples { spp, shadow, sky: *sky })
+            };
+            range.shadow.iter().flat_map(move |shadow| skies(*shadow))
+        };
+        let samples = range.spp.iter().flat_map(move |spp| lights(*spp));
+        samples.map(move |samples| self.of(mode, samples))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::law::Causes;
+    use super::*;
+    use crate::scene::Policy;
+
+    fn foretelling() -> Foretelling {
+        let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
+        let error =
+            |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
+        let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)]
+            .map(|(n, m)| (samples(n, m), vec![error(samples(n, m)) + error(samples(4096, 16))]));
+        let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
+        let surface = ReuseSettings::default();
+        Foretelling {
+            law: Law::of(Causes { shadow: true, sky: false }, &points, &[samples(4096, 16); 5]),
+            measured: Vec::new(),
+            bias: vec![0.5],
+            rounding: 1.0 / 12.0,
+            bounces: 4,
+            modes: vec![
+                Mode { reuse: off, seconds: [0.0, 1.0, 1.0, 0.0] },
+                Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
+            ],
+            line: Line::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
+            doubt: 0.0,
+            excess: 1.0,
+        }
+    }
+
+    fn range() -> Range {
+        Range { spp: vec![1, 2, 4, 8, 16, 32, 64], shadow: vec![1, 4, 16], sky: vec![1] }
+    }
+
+    #[test]
+    fn the_fastest_of_each_mode_reaches_the_goal_and_nothing_cheaper_would() {
+        let foretelling = foretelling();
+        let allowed = foretelling.allowed(Goal::Psnr(psnr(8.0 / (255.0 * 255.0))));
+        assert!((allowed - 8.0).abs() < 1e-9);
+        let found = foretelling.fastest(&range(), allowed);
+        // 40/8 + 20/8 + 0.58 is 8.1: one shadow sample is not enough with 8 camera samples.
+        let samples = |f: &Foretold| (f.samples.spp, f.samples.shadow);
+        assert_eq!(found.iter().map(samples).collect::<Vec<_>>(), [(16, 1), (8, 4)]);
+        assert!(found.iter().all(|f| f.squared_error <= allowed));
+        assert!(foretelling.fastest(&range(), 0.1).is_empty());
+        // A figure that rises as the root of the squared error.
+        assert!((foretelling.allowed(Goal::Flip(0.02)) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_best_within_a_time_takes_no_longer_and_a_longer_time_is_never_worse() {
+        let foretelling = foretelling();
+        let mut last = f64::INFINITY;
+        for seconds in [3.0, 10.0, 30.0, 100.0] {
+            let best = foretelling.best_within(&range(), seconds).expect("one");
+            assert!(best.seconds <= seconds && best.squared_error <= last, "{best:?}");
+            last = best.squared_error;
+        }
+        assert_eq!(foretelling.best_within(&range(), 0.01).expect("the fastest").samples.spp, 1);
+        assert_eq!(foretelling.best(&range()).expect("one").samples.spp, 64);
+    }
+}

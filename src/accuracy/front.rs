@@ -1,0 +1,75 @@
+//! The settings that nothing beats in both time and error.
+
+use super::table::{Row, Spread};
+use crate::measure::median;
+
+/// The rows on the front, by `time`, the fastest first: those that may be recommended and that no other
+/// such row beats. Of two neighbours on it, of which the one is not surely faster or the other not surely
+/// nearer to the truth, only the better one stays: the difference is noise.
+pub fn of(rows: &[Row], time: fn(&Row) -> &Spread) -> Vec<usize> {
+    let seconds = |k: &usize| time(&rows[*k]).median.interval.estimate;
+    let mut front: Vec<usize> = (0..rows.len()).filter(|k| is_unbeaten(rows, time, *k)).collect();
+    front.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
+    let noise = |front: &[usize]| front.windows(2).find_map(|pair| noise_of(rows, time, pair));
+    while let Some(leaves) = noise(&front) {
+        front.retain(|k| *k != leaves);
+    }
+    front
+}
+
+fn is_unbeaten(rows: &[Row], time: fn(&Row) -> &Spread, k: usize) -> bool {
+    let place = |row: &Row| (time(row).median.interval.estimate, row.errors.mse);
+    let (seconds, mse) = place(&rows[k]);
+    let beats = |(i, other): (usize, &Row)| {
+        let (s, e) = place(other);
+        // Of two that are equal the first stays.
+        let better = s < seconds || e < mse || i < k;
+        i != k && other.knob.is_ranked() && s <= seconds && e <= mse && better
+    };
+    rows[k].knob.is_ranked() && !rows.iter().enumerate().any(beats)
+}
+
+/// Which of two neighbours, the faster one first, is there for noise alone, if either is.
+fn noise_of(rows: &[Row], time: fn(&Row) -> &Spread, pair: &[usize]) -> Option<usize> {
+    let (fast, near) = (&rows[pair[0]], &rows[pair[1]]);
+    let compared = |a: &[f64], b: &[f64]| {
+        let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| a / b).collect();
+        median(&ratios).filter(|ratio| ratio.is_sure())
+    };
+    // Too few turns tell nothing: then both stay.
+    let errors = compared(&near.rmse_of_turns, &fast.rmse_of_turns)?;
+    let times = compared(&time(fast).turns, &time(near).turns)?;
+    if !errors.differs_from(1.0) {
+        return Some(pair[1]);
+    }
+    (!times.differs_from(1.0)).then_some(pair[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::knobs::Knob;
+    use super::super::table::tests::measured;
+    use super::*;
+
+    #[test]
+    fn what_is_there_for_noise_alone_leaves() {
+        let mut rows = measured(&[
+            (Knob::Default, "", 1.0, 2.0),
+            (Knob::Tolerance, "--tolerance 2", 0.99, 2.01),
+            (Knob::CutOff, "--cutoff 0.01", 0.5, 2.5),
+            (Knob::Bounces, "--bounces 8", 1.2, 1.99),
+        ])
+        .rows;
+        let fronts = |rows: &[Row]| -> Vec<bool> {
+            let front = of(rows, |row| &row.seconds);
+            (0..rows.len()).map(|k| front.contains(&k)).collect()
+        };
+        assert_eq!(fronts(&rows), [true; 4], "as sure as can be");
+        // Its time goes up and down, and so does the other's error.
+        rows[1].seconds.turns = vec![0.9, 1.1, 0.95, 1.05, 0.97, 1.03];
+        rows[3].rmse_of_turns = vec![1.9, 2.1, 1.95, 2.05, 1.99, 2.0, 2.0];
+        assert_eq!(fronts(&rows), [true, false, true, false]);
+        rows.iter_mut().for_each(|row| row.seconds.turns.truncate(3));
+        assert_eq!(fronts(&rows), [true; 4], "too few turns to tell");
+    }
+}

@@ -1,0 +1,219 @@
+//! What adds up to a frame's squared error, and by which powers of the samples it falls.
+//!
+//! Squared errors of independent causes add. So a traced frame's is foretold, in squares of a display
+//! step, by
+//!
+//! ```text
+//! camera · n^-a  +  n^-p · (shadow · s^-q + sky · k^-q)  +  bias · s^-2
+//! ```
+//!
+//! with n camera samples, s shadow and k sky samples each; the bias is that of a ratio of two averages.
+
+use super::fit::fit;
+use serde::{Deserialize, Serialize};
+
+/// Samples a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Samples {
+    /// Camera samples.
+    pub spp: u32,
+    /// Shadow samples of each, per light.
+    pub shadow: u32,
+    /// Sky samples of each.
+    pub sky: u32,
+}
+
+/// The powers that all frames of a move share.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Powers {
+    camera: f64,
+    /// Of the light's part, with the camera samples.
+    light: f64,
+    /// Of the light's part, with the samples of each.
+    samples: f64,
+}
+
+/// A frame's amplitudes, of camera, shadow, sky and bias: squared error at one sample of everything,
+/// display steps.
+type Amplitudes = [f64; 4];
+
+/// Which causes there are at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Causes {
+    /// Area lights.
+    pub shadow: bool,
+    /// A sky that lights.
+    pub sky: bool,
+}
+
+/// The law of a move's traced frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Law {
+    causes: Causes,
+    powers: Powers,
+    frames: Vec<Amplitudes>,
+    /// Root mean square of what the law misses the measurements by, as a share of them.
+    pub misfit: f64,
+}
+
+/// A measured error: samples, and for each frame the mean squared difference from the reference.
+pub type Point = (Samples, Vec<f64>);
+
+impl Powers {
+    fn regressors(&self, causes: Causes, s: Samples) -> Amplitudes {
+        let n = f64::from(s.spp);
+        let light = n.powf(-self.light);
+        let each = |is_there: bool, count: u32| match is_there {
+            true => light * f64::from(count.max(1)).powf(-self.samples),
+            false => 0.0,
+        };
+        let bias = f64::from(u8::from(causes.shadow)) / f64::from(s.shadow.max(1)).powi(2);
+        [n.powf(-self.camera), each(causes.shadow, s.shadow), each(causes.sky, s.sky), bias]
+    }
+}
+
+impl Law {
+    /// The law that comes nearest to `points`, as shares of them. `references` are the samples of what
+    /// each was held against, whose own error is part of the difference.
+    pub fn of(causes: Causes, points: &[Point], references: &[Samples]) -> Self {
+        let frames = points.first().map_or(0, |(_, errors)| errors.len());
+        let mut best = Self {
+            causes,
+            powers: Powers { camera: 1.0, light: 1.0, samples: 1.0 },
+            frames: vec![[0.0; 4]; frames],
+            misfit: f64::INFINITY,
+        };
+        let lit = causes.shadow || causes.sky;
+        for camera in grid(0.9, 1.7) {
+            // Without soft light its powers mean nothing.
+            for light in grid(1.0, if lit { 1.6 } else { 1.0 }) {
+                for samples in grid(0.8, if lit { 1.8 } else { 0.8 }) {
+                    let powers = Powers { camera, light, samples };
+                    let law = Self::with(causes, powers, points, references);
+                    if law.misfit < best.misfit {
+                        best = law;
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    fn with(causes: Causes, powers: Powers, points: &[Point], references: &[Samples]) -> Self {
+        let rows = points.iter().zip(references).map(|((samples, _), reference)| {
+            let mut row = powers.regressors(causes, *samples);
+            let [camera, shadow, sky, _] = powers.regressors(causes, *reference);
+            // Both are biased the same way.
+            row.iter_mut().zip([camera, shadow, sky]).for_each(|(x, own)| *x += own);
+            row
+        });
+        let rows: Vec<Amplitudes> = rows.collect();
+        let count = points.first().map_or(0, |(_, errors)| errors.len());
+        let (mut frames, mut squares) = (Vec::new(), 0.0);
+        for frame in 0..count {
+            let measured: Vec<f64> = points.iter().map(|(_, errors)| errors[frame]).collect();
+            let (amplitudes, misfit) = fit(&rows, &measured);
+            frames.push(amplitudes);
+            squares += misfit * misfit;
+        }
+        let misfit = (squares / count.max(1) as f64).sqrt();
+        Self { causes, powers, frames, misfit }
+    }
+
+    /// The squared error of each frame looked at.
+    pub fn errors(&self, samples: Samples) -> impl Iterator<Item = f64> + '_ {
+        let row = self.powers.regressors(self.causes, samples);
+        self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
+    }
+
+    /// The law under which `samples` come to `measured`, frame by frame, held against `reference`.
+    pub fn through(&self, samples: Samples, measured: &[f64], reference: Samples) -> Self {
+        let own: Vec<f64> = self.errors(reference).collect();
+        let mut law = self.clone();
+        let told = self.errors(samples).zip(own).zip(measured);
+        for (frame, ((foretold, own), measured)) in law.frames.iter_mut().zip(told) {
+            let factor = measured / f64::max(foretold + own, 1e-12);
+            frame.iter_mut().for_each(|amplitude| *amplitude *= factor);
+        }
+        law
+    }
+
+    /// The law of frames whose errors are all `factor` times as large.
+    pub fn times(&self, factor: f64) -> Self {
+        let mut law = self.clone();
+        law.frames.iter_mut().flatten().for_each(|amplitude| *amplitude *= factor);
+        law
+    }
+}
+
+fn grid(from: f64, to: f64) -> impl Iterator<Item = f64> {
+    let steps = ((to - from) / 0.1_f64).round() as u32;
+    (0..=steps).map(move |k| from + 0.1 * f64::from(k))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REFERENCE: Samples = Samples { spp: 128, shadow: 16, sky: 16 };
+    const LIT: Causes = Causes { shadow: true, sky: true };
+
+    fn truth(s: Samples, scale: f64) -> f64 {
+        let (n, m, k) = (f64::from(s.spp), f64::from(s.shadow), f64::from(s.sky));
+        let light = n.powf(-1.1) * (7.0 * m.powf(-1.4) + 3.0 * k.powf(-1.4));
+        scale * (20.0 * n.powf(-1.3) + light)
+    }
+
+    /// From errors of up to 16 samples, each off by up to 5 %, those of up to 64 are foretold.
+    #[test]
+    fn a_short_sweep_foretells_settings_that_were_not_in_it() {
+        let point = |(i, (spp, shadow, sky)): (usize, (u32, u32, u32))| {
+            let s = Samples { spp, shadow, sky };
+            let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];
+            let error = |scale: f64| (truth(s, scale) + truth(REFERENCE, scale)) * off;
+            (s, vec![error(1.0), error(2.0)])
+        };
+        let design =
+            [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
+        let points: Vec<Point> = design.into_iter().enumerate().map(point).collect();
+        let law = Law::of(LIT, &points, &[REFERENCE; 7]);
+        assert!(law.misfit < 0.05, "{law:?}");
+        for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
+            let s = Samples { spp, shadow, sky };
+            for (error, scale) in law.errors(s).zip([1.0, 2.0]) {
+                let ratio = error / truth(s, scale);
+                assert!((0.75..1.33).contains(&ratio), "{s:?}: {ratio}");
+            }
+        }
+        let twice: Vec<f64> = law.times(2.0).errors(REFERENCE).collect();
+        let once: Vec<f64> = law.errors(REFERENCE).collect();
+        assert!((twice[0] / once[0] - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_effect_that_is_not_there_has_no_part() {
+        let point = |spp: u32| {
+            let s = Samples { spp, shadow: 16, sky: 16 };
+            (s, vec![9.0 / f64::from(spp) + 9.0 / 128.0])
+        };
+        let points = [point(1), point(4), point(16)];
+        let law = Law::of(Causes { shadow: false, sky: false }, &points, &[REFERENCE; 3]);
+        let error =
+            |shadow| law.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
+        assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{law:?}");
+        assert_eq!(error(1), error(64));
+    }
+
+    #[test]
+    fn a_law_is_put_through_what_was_measured() {
+        let s = Samples { spp: 8, shadow: 2, sky: 1 };
+        let points = [1, 4, 16].map(|spp| {
+            let s = Samples { spp, ..s };
+            (s, vec![truth(s, 1.0), truth(s, 2.0)])
+        });
+        let law = Law::of(LIT, &points, &[REFERENCE; 3]).through(s, &[3.0, 7.0], REFERENCE);
+        let [own, _] = [0, 1].map(|i| law.errors(REFERENCE).nth(i).expect("a frame"));
+        let now: Vec<f64> = law.errors(s).collect();
+        assert!((now[0] + own - 3.0).abs() < 1e-9 && now[1] > 6.0, "{now:?}");
+    }
+}

@@ -1,0 +1,234 @@
+//! Patches of frames at their full size, traced alone: what a whole frame's error is told from.
+//!
+//! A small picture will not do in their place: the smaller, the more of it is edges.
+
+use super::errors::displayed_rgb;
+use super::stage::Stage;
+use crate::effects::EffectPlan;
+use crate::error::{Error, Result};
+use crate::film::{Encoding, Image};
+use crate::math::Rgb;
+use crate::reuse::audit::{self, Lot};
+use crate::sampling::mix;
+use crate::scene::{Policy, Settings};
+use crate::shade::Renderer;
+use rayon::prelude::*;
+
+/// Pixels of the picture that contrast is told from, or more.
+const SMALL: f64 = 50_000.0;
+
+/// Square patches of some frames, with what each counts for.
+#[derive(Debug, Clone)]
+pub struct Patches {
+    edge: u32,
+    frames: Vec<Drawn>,
+}
+
+/// A frame's patches.
+#[derive(Debug, Clone, Default)]
+struct Drawn {
+    frame: u32,
+    corners: Vec<(u32, u32)>,
+    /// What a patch counts for in the frame's mean.
+    weights: Vec<f64>,
+    /// The chance with which it might not have been drawn.
+    unsure: Vec<f64>,
+}
+
+/// The patches of each frame, as displayed: one image a patch.
+pub type Seen = Vec<Vec<Image>>;
+
+impl Patches {
+    /// Patches of `edge` pixels of each of `frames`, one in each cell of a grid, about `pixels` pixels
+    /// of a frame, at places that `lot` draws.
+    pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, lot: u64) -> Self {
+        let edge = edge.min(settings.width).min(settings.height);
+        let draw = |frame: &u32| {
+            let corners = places(settings, edge, pixels, mix(lot ^ u64::from(*frame)));
+            let weights = vec![1.0 / corners.len() as f64; corners.len()];
+            let unsure = vec![1.0; corners.len()];
+            Drawn { frame: *frame, corners, weights, unsure }
+        };
+        Self { edge, frames: frames.iter().map(draw).collect() }
+    }
+
+    /// Single pixels, about `count` of each of `frames`. Most of a frame's error lies in a few pixels at
+    /// the edges of what is bright, so pixels are drawn by their contrast in a picture of one sample a
+    /// pixel, a small one of a large frame.
+    ///
+    /// # Errors
+    /// Those of [`Stage::trace`].
+    pub fn by_contrast(stage: &Stage, frames: &[u32], count: u32, lot: u64) -> Result<Self> {
+        let mut settings = stage.base.clone();
+        (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+        settings.reuse.policy = Policy::Off;
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let shrink = (pixels / SMALL).sqrt().floor().clamp(1.0, 4.0) as u32;
+        (settings.width, settings.height) =
+            ((settings.width / shrink).max(1), (settings.height / shrink).max(1));
+        let small = |frame| Ok(stage.trace(&settings, stage.intersector, frame)?.0);
+        Self::by_contrast_of(stage.base, frames, &small, count, lot)
+    }
+
+    /// The same by the contrast of pictures of the frames, of any size, which `image` gives.
+    ///
+    /// # Errors
+    /// Those of `image`.
+    pub fn by_contrast_of(
+        settings: &Settings,
+        frames: &[u32],
+        image: &dyn Fn(u32) -> Result<Image>,
+        count: u32,
+        lot: u64,
+    ) -> Result<Self> {
+        let (width, height) = (settings.width, settings.height);
+        let draw = |frame: &u32| {
+            let image = image(*frame)?;
+            let foretold = contrast(&image);
+            let lot = Lot { seed: lot, frame: *frame, number: 0 };
+            let among = 0..foretold.len() as u32;
+            let mut drawn = Drawn { frame: *frame, ..Drawn::default() };
+            for d in audit::draw(&foretold, among, f64::from(count), lot) {
+                // One pixel of those that a pixel of the small picture stands for.
+                let random = mix(mix(lot.seed ^ u64::from(*frame)) ^ u64::from(d.index));
+                let within = |k: u32, of: u32, length: u32, random: u64| {
+                    let at = |k: u32| (u64::from(length) * u64::from(k) / u64::from(of)) as u32;
+                    let (from, to) = (at(k), at(k + 1).max(at(k) + 1));
+                    (from + (random % u64::from(to - from)) as u32, to - from)
+                };
+                let (x, columns) = within(d.index % image.width, image.width, width, random);
+                let (y, rows) = within(d.index / image.width, image.height, height, random >> 32);
+                let stands_for = f64::from(columns * rows);
+                drawn.corners.push((x, y));
+                drawn.weights.push(d.weight * stands_for / (f64::from(width) * f64::from(height)));
+                drawn.unsure.push((1.0 - 1.0 / (d.weight * stands_for)).max(0.0));
+            }
+            Ok(drawn)
+        };
+        Ok(Self { edge: 1, frames: frames.iter().map(draw).collect::<Result<_>>()? })
+    }
+
+    /// The mean over each frame of a figure of its patches, and how far it may be off: its standard
+    /// error. A pixel that was sure to be drawn leaves nothing open (Horvitz and Thompson, 1952).
+    pub fn means(&self, seen: &[Vec<f64>]) -> Vec<(f64, f64)> {
+        let of = |(drawn, figures): (&Drawn, &Vec<f64>)| {
+            let parts: Vec<f64> = drawn.weights.iter().zip(figures).map(|(w, x)| w * x).collect();
+            let sum: f64 = parts.iter().sum();
+            let open = || parts.iter().zip(&drawn.unsure);
+            let (all, each) = open().fold((0.0, 0.0), |(n, s), (x, u)| (n + u, s + u * x));
+            let middle = each / f64::max(all, 1e-300);
+            let variance: f64 = open().map(|(x, u)| u * (x - middle) * (x - middle)).sum();
+            (sum, variance.sqrt())
+        };
+        self.frames.iter().zip(seen).map(of).collect()
+    }
+
+    /// Traces the patches under `settings`.
+    ///
+    /// # Errors
+    /// [`Error::Stopped`]; those of cameras.
+    pub fn trace(&self, stage: &Stage, settings: &Settings) -> Result<Seen> {
+        let plan = EffectPlan::of(stage.scene, settings);
+        let renderer =
+            Renderer { scene: stage.scene, settings, plan, intersector: stage.intersector };
+        let one = |Drawn { frame, corners, .. }: &Drawn| {
+            let camera = stage.shot.camera(*frame, settings.width, settings.height)?;
+            let places: Vec<(u32, u32)> = corners.iter().flat_map(|c| self.pixels(*c)).collect();
+            let trace = || renderer.render_scattered(&camera, *frame, &places, stage.stop);
+            let (rgb, _) = stage.pool.install(trace).ok_or(Error::Stopped)?;
+            Ok(self.cut(&displayed_rgb(&rgb, settings)))
+        };
+        self.frames.iter().map(one).collect()
+    }
+
+    /// The patches of whole images of the frames, which `image` gives as displayed.
+    ///
+    /// # Errors
+    /// Those of `image`.
+    pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<Seen> {
+        let one = |Drawn { frame, corners, .. }: &Drawn| {
+            let image = image(*frame)?;
+            let at = |(x, y): (u32, u32)| image.rgb[(y * image.width + x) as usize];
+            let rgb: Vec<Rgb> = corners.iter().flat_map(|c| self.pixels(*c)).map(at).collect();
+            Ok(self.cut(&rgb))
+        };
+        self.frames.iter().map(one).collect()
+    }
+
+    fn pixels(&self, (x, y): (u32, u32)) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let edge = self.edge;
+        (0..edge * edge).map(move |i| (x + i % edge, y + i / edge))
+    }
+
+    fn cut(&self, rgb: &[Rgb]) -> Vec<Image> {
+        let (width, height) = (self.edge, self.edge);
+        let image =
+            |rgb: &[Rgb]| Image { width, height, rgb: rgb.to_vec(), encoding: Encoding::Srgb };
+        rgb.chunks((self.edge * self.edge) as usize).map(image).collect()
+    }
+}
+
+/// For each pixel how much it and its neighbours differ: the square of the largest difference of a
+/// channel.
+fn contrast(image: &Image) -> Vec<f32> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let of = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        let columns = x.saturating_sub(1)..(x + 2).min(width);
+        let near = rows.flat_map(|row| &image.rgb[row * width..][columns.clone()]);
+        let apart = near.map(|c| (*c - image.rgb[i]).abs().max_element()).fold(0.0, f32::max);
+        apart * apart
+    };
+    (0..image.rgb.len()).into_par_iter().map(of).collect()
+}
+
+fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u32)> {
+    let (width, height) = (settings.width, settings.height);
+    let wanted = f64::from(pixels) / f64::from(edge * edge);
+    let columns = (wanted * f64::from(width) / f64::from(height)).sqrt().round() as u32;
+    let columns = columns.clamp(1, width / edge);
+    let rows = ((wanted / f64::from(columns)).round() as u32).clamp(1, height / edge);
+    let place = |k: u32, cells: u32, length: u32, random: u64| {
+        let (from, to) = (length * k / cells, length * (k + 1) / cells);
+        from + (random % u64::from(to - from - edge + 1)) as u32
+    };
+    let cells = (0..rows * columns).map(|cell| {
+        let random = mix(lot ^ u64::from(cell));
+        let x = place(cell % columns, columns, width, random);
+        (x, place(cell / columns, rows, height, random >> 32))
+    });
+    cells.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contrast_is_at_an_edge_and_on_both_its_sides() {
+        let rgb = (0..20).map(|i| Rgb::splat(if i % 5 < 2 { 0.0 } else { 0.5 })).collect();
+        let image = Image { width: 5, height: 4, rgb, encoding: Encoding::Srgb };
+        for (i, contrast) in contrast(&image).into_iter().enumerate() {
+            assert_eq!(contrast, if [1, 2].contains(&(i % 5)) { 0.25 } else { 0.0 }, "{i}");
+        }
+    }
+
+    #[test]
+    fn patches_lie_in_the_picture_apart_and_are_as_many_as_wanted() {
+        for (width, height, edge, pixels) in
+            [(640, 360, 1, 3000), (37, 91, 8, 2000), (16, 9, 1, 3000), (5, 7, 64, 100)]
+        {
+            let settings = Settings { width, height, ..Settings::default() };
+            let patches = Patches::grid(&settings, &[1, 9], edge, pixels, 3);
+            let Drawn { corners, weights, .. } = &patches.frames[0];
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            let all = || corners.iter().flat_map(|c| patches.pixels(*c));
+            assert!(all().all(|(x, y)| x < width && y < height), "{width}x{height}");
+            let distinct: std::collections::BTreeSet<_> = all().collect();
+            assert_eq!(distinct.len(), all().count(), "{width}x{height}");
+            let most = f64::from(pixels.min(width * height));
+            assert!(distinct.len() as f64 > 0.4 * most, "{} of {most}", distinct.len());
+        }
+    }
+}

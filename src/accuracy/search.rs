@@ -1,0 +1,190 @@
+//! The probe's errors: a sweep, a law of it, and what the law leads to, tried.
+
+use super::choice::Goal;
+use super::figures::{doubts, figure, squares};
+use super::foretell::{Foretelling, Line, Measured};
+use super::law::{Law, Point, Samples};
+use super::patches::{Patches, Seen};
+use super::probe::{Probe, likely, reference, samples_of_reference};
+use crate::error::Result;
+use crate::scene::Policy;
+
+/// Share of what the goal allows that bounces and cut-off may take.
+const BIAS: f64 = 0.1;
+/// How often the likely choices are tried.
+const ROUNDS: u32 = 3;
+
+/// What is known so far.
+pub(super) struct Search<'a> {
+    probe: &'a Probe<'a>,
+    patches: Patches,
+    truth: Seen,
+    reference: Samples,
+    points: Vec<Point>,
+    references: Vec<Samples>,
+    figures: Vec<(f64, f64)>,
+    /// What it comes to.
+    pub foretelling: Foretelling,
+}
+
+impl<'a> Search<'a> {
+    /// Runs the sweep.
+    pub fn begin(probe: &'a Probe<'a>) -> Result<Self> {
+        let patches = probe.patches()?;
+        let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
+        let truth =
+            patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
+        let causes = probe.causes();
+        let foretelling = Foretelling {
+            law: Law::of(causes, &[], &[]),
+            measured: Vec::new(),
+            bias: Vec::new(),
+            rounding: if probe.rounds { 1.0 / 12.0 } else { 0.0 },
+            bounces: probe.stage.base.bounces,
+            modes: Vec::new(),
+            line: None,
+            doubt: 0.0,
+            excess: 1.0,
+        };
+        let (points, references, figures) = (Vec::new(), Vec::new(), Vec::new());
+        let mut search =
+            Self { probe, patches, truth, reference, points, references, figures, foretelling };
+        for samples in search.design() {
+            search.measure(samples)?;
+        }
+        search.learn();
+        let allowed = probe.goal.map_or(f64::INFINITY, |goal| search.foretelling.allowed(goal));
+        let (bounces, bias) = search.bounces(BIAS * allowed)?;
+        (search.foretelling.bounces, search.foretelling.bias) = (bounces, bias);
+        Ok(search)
+    }
+
+    /// Tries what would be chosen, until it has been tried.
+    pub fn try_likely(&mut self, goal: Goal) -> Result<()> {
+        for _ in 0..ROUNDS {
+            let allowed = self.foretelling.allowed(goal);
+            let likely = likely(self.foretelling.fastest(&self.probe.range(), allowed));
+            let tried = |s: &Samples| self.points.iter().any(|(samples, _)| samples == s);
+            let mut new: Vec<Samples> = likely.iter().map(|found| found.samples).collect();
+            new.retain(|samples| !tried(samples));
+            new.dedup();
+            if new.is_empty() {
+                break;
+            }
+            for samples in new {
+                self.sharpen(samples)?;
+                self.measure(samples)?;
+            }
+            self.learn();
+        }
+        Ok(())
+    }
+
+    /// Traces the reference again where it is too coarse to hold `samples` against.
+    fn sharpen(&mut self, samples: Samples) -> Result<()> {
+        if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
+            let stage = self.probe.stage;
+            self.reference = samples_of_reference(samples);
+            self.truth = self.patches.trace(stage, &reference(stage.base, self.reference))?;
+        }
+        Ok(())
+    }
+
+    fn measure(&mut self, samples: Samples) -> Result<()> {
+        let seen = self.traced(samples)?;
+        let errors = squares(&self.patches, &self.truth, &seen);
+        let doubts = doubts(&self.patches, &self.truth, &seen);
+        self.foretelling.doubt = doubts.iter().sum::<f64>() / doubts.len().max(1) as f64;
+        if let Some(goal) = self.probe.goal {
+            let worst = errors.iter().copied().fold(0.0, f64::max);
+            self.figures.push((worst, figure(goal, &self.patches, &self.truth, &seen)?));
+        }
+        self.points.push((samples, errors));
+        self.references.push(self.reference);
+        Ok(())
+    }
+
+    /// Fits the law to all that was measured, and puts it through the last.
+    fn learn(&mut self) {
+        let law = Law::of(self.probe.causes(), &self.points, &self.references);
+        let own = |reference: Samples| law.errors(reference).collect::<Vec<_>>();
+        let all = self.points.iter().zip(&self.references);
+        self.foretelling.measured = all
+            .map(|((samples, errors), reference)| {
+                // The law tells the reference's part of the difference.
+                let parts =
+                    law.errors(*samples).zip(own(*reference)).map(|(s, r)| s / (s + r).max(1e-12));
+                let errors = errors.iter().zip(parts).map(|(error, part)| error * part).collect();
+                Measured { samples: *samples, errors }
+            })
+            .collect();
+        let last = self.points.last().zip(self.references.last());
+        self.foretelling.law = match last {
+            Some(((samples, errors), reference)) => law.through(*samples, errors, *reference),
+            None => law,
+        };
+        // Where errors are small: a share of pixels cannot go on rising.
+        let mut smallest = self.figures.clone();
+        smallest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        smallest.truncate(4);
+        let line = Line::through(&smallest);
+        self.foretelling.line = match self.figures.last() {
+            Some(last) => line.map(|line| line.shifted_to(*last)),
+            None => line,
+        };
+    }
+
+    fn design(&self) -> Vec<Samples> {
+        let (base, causes) = (self.probe.stage.base, self.probe.causes());
+        let all = [(1, 1, 1), (4, 1, 1), (4, 8, 1), (4, 1, 8), (2, 4, 4), (16, 1, 1), (8, 2, 2)];
+        let mut design = Vec::new();
+        for (spp, shadow, sky) in all {
+            let shadow = if causes.shadow { shadow } else { base.shadow_samples };
+            let sky = if causes.sky { sky } else { base.sky_samples };
+            let samples = Samples { spp, shadow, sky };
+            if !design.contains(&samples) {
+                design.push(samples);
+            }
+        }
+        design
+    }
+
+    /// The patches with the reference's bounces: what samples alone do.
+    fn traced(&self, samples: Samples) -> Result<Seen> {
+        let stage = self.probe.stage;
+        let mut settings = reference(stage.base, samples);
+        settings.seed = stage.base.seed;
+        self.patches.trace(stage, &settings)
+    }
+
+    /// The fewest bounces that miss at most `allowed`, the most there are otherwise; and what they
+    /// miss in each frame. The same random numbers with more bounces tell.
+    fn bounces(&self, allowed: f64) -> Result<(u32, Vec<f64>)> {
+        let (base, plan) = (self.probe.stage.base, self.probe.plan());
+        let truth = self.traced(Samples { spp: 4, shadow: 1, sky: 1 })?;
+        let mut settings = base.clone();
+        (settings.spp, settings.shadow_samples, settings.sky_samples) = (4, 1, 1);
+        settings.reuse.policy = Policy::Off;
+        let is_free =
+            allowed.is_finite() && !self.probe.given.bounces && (plan.mirror || plan.glass);
+        let mut tried = vec![base.bounces];
+        if is_free {
+            tried = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32].to_vec();
+            tried.push(base.bounces);
+            tried.sort_unstable();
+            tried.dedup();
+        }
+        let mut last = (base.bounces, Vec::new());
+        for bounces in tried {
+            settings.bounces = bounces;
+            let seen = self.patches.trace(self.probe.stage, &settings)?;
+            let bias = squares(&self.patches, &truth, &seen);
+            let is_enough = bias.iter().all(|bias| *bias <= allowed);
+            last = (bounces, bias);
+            if is_enough {
+                break;
+            }
+        }
+        Ok(last)
+    }
+}

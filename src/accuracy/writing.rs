@@ -1,0 +1,143 @@
+//! What putting frames and checkpoints on disk takes: time alone, no pixel differs by it.
+
+use super::frames::Cut;
+use super::stage::{Stage, Unheard};
+use crate::effects::EffectPlan;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::measure::median;
+use crate::output::manifest::{self, Header};
+use crate::output::{FramePattern, WriteOptions, atomic, write_image};
+use crate::reuse::{self, store::Terms};
+use crate::scene::Policy;
+use crate::sequence::checkpoint::{self, Checkpoints};
+use crate::sequence::{FrameMaker, Inferrer, Pyramid, Recipes, Target, Tracer};
+use crate::shade::Renderer;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// How often each thing is written.
+const TIMES: usize = 15;
+/// How often a key frame is made for its reference.
+const KEY_TIMES: usize = 5;
+
+/// What writing takes; medians.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Writing {
+    /// Wall seconds to encode, write and sync a frame as png.
+    pub frame_seconds: f64,
+    /// By how much writing its bytes takes longer for being synced.
+    pub sync_seconds: f64,
+    /// Size of the file.
+    pub frame_bytes: u64,
+    /// Wall seconds to encode, write and sync the reference of a key frame, and its bytes; `None`
+    /// where no frame is inferred from others.
+    pub checkpoint: Option<(f64, u64)>,
+    /// Key frames of the move.
+    pub keys: u32,
+    /// Frames of the move.
+    pub frames: u32,
+}
+
+/// Writes the first frame of the default, and what others need of it, into `folder`, several times.
+///
+/// # Errors
+/// Those of rendering and writing.
+pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
+    let frames = stage.shot.frames;
+    let (film, checkpoint) = match stage.base.reuse.policy {
+        Policy::Surface => with_checkpoints(stage, folder)?,
+        _ => (traced(stage)?, None),
+    };
+    let path = folder.join("writing_0001.png");
+    let options = WriteOptions::of(stage.base, Some(1));
+    let write = || write_image(&path, &film, &options).map(drop);
+    write()?;
+    let bytes = fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
+    let synced = || atomic::write(&path, |w| w.write_all(&bytes)).map(drop);
+    let plain = || fs::write(&path, &bytes).map_err(|e| Error::io("write", &path, e));
+    let [frame_seconds, synced, plain] = in_turns([&write, &synced, &plain])?;
+    fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
+    let keys = Cut::of(stage.base, frames, checkpoint.is_some()).keys();
+    Ok(Writing {
+        frame_seconds,
+        sync_seconds: (synced - plain).clamp(0.0, frame_seconds),
+        frame_bytes: bytes.len() as u64,
+        checkpoint,
+        keys,
+        frames,
+    })
+}
+
+/// The median seconds of each.
+fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[f64; 3]> {
+    let mut seconds = [const { Vec::new() }; 3];
+    for _ in 0..TIMES {
+        for (work, seconds) in works.iter().zip(&mut seconds) {
+            let start = Instant::now();
+            work()?;
+            seconds.push(start.elapsed().as_secs_f64());
+        }
+    }
+    Ok(seconds.map(|s| median(&s).map_or(0.0, |m| m.interval.estimate)))
+}
+
+fn renderer<'a>(stage: &Stage<'a>) -> Renderer<'a> {
+    let Stage { scene, base: settings, intersector, .. } = *stage;
+    Renderer { scene, settings, plan: EffectPlan::of(scene, settings), intersector }
+}
+
+fn traced(stage: &Stage) -> Result<Film> {
+    let Stage { shot, pool, stop, .. } = *stage;
+    let (renderer, progress, laid) = (renderer(stage), &Unheard, Default::default());
+    let tracer = Tracer { renderer, shot, pool, with_gbuffer: false, stop, progress, laid };
+    Ok(tracer.make(1)?.ok_or(Error::Stopped)?.film)
+}
+
+/// The first frame, and what its reference takes: seconds, and bytes on disk.
+fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
+    let Stage { scene, shot, base, pool, stop, .. } = *stage;
+    let channels = reuse::channels(scene, &EffectPlan::of(scene, base), base);
+    let terms = Terms::of("", &channels, base);
+    let target = target(stage, folder, !channels.is_empty())?;
+    let checkpoints =
+        Checkpoints::new(&target, Some(Duration::ZERO), &terms, scene.recentring, true);
+    let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
+    let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
+    for _ in 0..KEY_TIMES {
+        let mut maker = Inferrer::new(renderer(stage), shot, pool, stop, &Unheard, pyramid)?;
+        maker.checkpoints = Some(&checkpoints);
+        let all: Vec<u32> = (1..=shot.frames).collect();
+        maker.expect(&all);
+        film = Some(maker.make(1)?.ok_or(Error::Stopped)?.film);
+        let cost = maker.save_cost();
+        seconds.push(cost.seconds);
+        bytes = cost.bytes;
+    }
+    checkpoint::clear(&target);
+    let cost = median(&seconds).map(|m| (m.interval.estimate, bytes));
+    Ok((film.ok_or(Error::Stopped)?, cost.filter(|_| bytes > 0)))
+}
+
+fn target(stage: &Stage, folder: &Path, keeps_light: bool) -> Result<Target> {
+    let name = folder.join("writing_####.png");
+    let pattern = FramePattern::parse(&name.to_string_lossy(), stage.shot.frames)?;
+    let header = Header {
+        manifest: manifest::FORMAT,
+        tweenray: env!("CARGO_PKG_VERSION").into(),
+        scene: String::new(),
+        scene_hash: String::new(),
+        shot_hash: String::new(),
+        shot_frames: stage.shot.frames,
+        files: manifest::file_name(&pattern),
+        tracer: String::new(),
+        command: Vec::new(),
+        chosen: None,
+        settings: Header::settings(stage.base),
+    };
+    let recipes = Recipes::new(stage.shot, stage.base, keeps_light, false)?;
+    let write = WriteOptions::of(stage.base, None);
+    Ok(Target { pattern, header, recipes, write, overwrite: false })
+}

@@ -1,0 +1,218 @@
+//! Measuring, going on, and telling what there is.
+
+use super::line::Line;
+use super::{AccuracyArgs, Outcome, files, page};
+use crate::accuracy::{self, Convergence, Heard, Ledger, OracleCrop, Step, Sweep, Truth, Writing};
+use crate::cli::exit::Exit;
+use crate::cli::progress::duration;
+use crate::cli::signals::Interrupt;
+use crate::cli::{machine, say};
+use crate::error::{Error, Result, counted};
+use crate::output::atomic;
+use crate::scene::Settings;
+use std::cell::Cell;
+use std::time::Instant;
+
+/// Name of the oracle's figures in the ledger.
+const ORACLE: &str = "oracle.json";
+/// Name of the figures of writing.
+const WRITING: &str = "writing.json";
+
+/// A sweep to be measured and told of.
+pub struct Job<'a> {
+    pub args: &'a AccuracyArgs,
+    pub sweep: &'a Sweep<'a>,
+    pub interrupt: &'a Interrupt,
+    pub line: Line,
+    pub oracle_was_wanted: bool,
+    pub writing_is_wanted: bool,
+    /// Load of the machine over the minute before.
+    pub load: Option<f64>,
+    /// When the program began.
+    pub start: Instant,
+}
+
+impl Job<'_> {
+    /// Measures what `ledger` has not, and writes the page.
+    pub fn run(&self, mut ledger: Ledger) -> Result<Exit> {
+        self.greet(&ledger);
+        let measured = self.interrupt.watched(|| self.measure(&mut ledger));
+        self.line.finish();
+        match measured {
+            Ok(()) => {
+                self.tell(&ledger)?;
+                Ok(Exit::Done)
+            }
+            Err(Error::Stopped) => self.take_leave(&ledger),
+            Err(other) => Err(other),
+        }
+    }
+
+    fn greet(&self, ledger: &Ledger) {
+        let sweep = self.sweep;
+        let (done, of) = (sweep.done(ledger), sweep.trials());
+        self.line.note(&format!(
+            "{} on {}, {}",
+            counted(sweep.candidates.len(), "setting"),
+            counted(sweep.frames.len(), "frame"),
+            counted(of, "trial")
+        ));
+        if done == of {
+            self.line.note("all of it is measured; --overwrite measures anew, more --turns go on");
+        } else if done > 0 {
+            let text = format!("going on: {done} of {of} are measured; --overwrite measures anew");
+            self.line.note(&text);
+        }
+    }
+
+    fn measure(&self, ledger: &mut Ledger) -> Result<()> {
+        // First: whoever is out of patience loses no sweep.
+        if self.oracle_was_wanted && ledger.note::<Option<OracleCrop>>(ORACLE).is_none() {
+            self.line.tell("the oracle, on a crop", 0.0, None);
+            let crop = accuracy::on_a_crop(self.sweep.stage, self.sweep.shown_frame())?;
+            ledger.keep_note(ORACLE, &crop)?;
+        }
+        if self.writing_is_wanted && ledger.note::<Writing>(WRITING).is_none() {
+            self.line.tell("writing frames and checkpoints", 0.0, None);
+            let writing = accuracy::on_disk(self.sweep.stage, &self.args.output.join("sweep"))?;
+            ledger.keep_note(WRITING, &writing)?;
+        }
+        let truth = self.truth(ledger)?;
+        let last_turn = Cell::new(None);
+        let mut hear = |heard: Heard| {
+            self.heard(&heard);
+            // After each turn: whoever kills the program has a page of what there was.
+            if last_turn.replace(Some(heard.turn)).is_some_and(|turn| turn != heard.turn) {
+                self.publish(&truth, heard.ledger)?;
+            }
+            Ok(())
+        };
+        self.sweep.run(&truth, ledger, &mut hear)
+    }
+
+    fn heard(&self, heard: &Heard) {
+        let Heard { done, of, turn, candidate, left, .. } = heard;
+        let turn = if *turn == 0 { "warm-up".into() } else { format!("turn {turn}") };
+        let name = page::name_of(&candidate.options);
+        let text = format!("{} of {of}  {turn}  {name}", (done + 1).min(*of));
+        let share = left.map_or(0.0, |left| self.line.seconds() / (self.line.seconds() + left));
+        self.line.tell(&text, share, *left);
+    }
+
+    /// The reference, as far as it is not on disk.
+    fn truth(&self, ledger: &Ledger) -> Result<Truth> {
+        let (last, wanted) = match ledger.reference() {
+            Some((last, wanted)) => (Some(last), wanted),
+            None => {
+                self.line.tell("how noisy the best-sampled setting is", 0.0, None);
+                (None, self.sweep.least_noise()? / 4.0)
+            }
+        };
+        let settings: Vec<&Settings> = self.sweep.candidates.iter().map(|c| &c.settings).collect();
+        let convergence = Convergence {
+            stage: self.sweep.stage,
+            settings: accuracy::truth_settings(self.sweep.stage.base, &settings),
+            frames: self.sweep.frames,
+            wanted,
+            most: self.args.reference_spp,
+        };
+        let start = Cell::new(Instant::now());
+        let mut hear = |step: Step| match step {
+            Step::Frame { spp, k, of } => {
+                if k == 0 {
+                    start.set(Instant::now());
+                }
+                if k == 0 || self.line.is_drawn() {
+                    let text = format!("reference: {spp} camera samples, frame {} of {of}", k + 1);
+                    self.line.tell(&text, 0.0, None);
+                }
+                Ok(())
+            }
+            Step::Doubled(doubling) => {
+                ledger.keep_reference(doubling, wanted)?;
+                let seconds = start.get().elapsed().as_secs_f64();
+                let change = doubling.change.map_or(String::new(), |change| {
+                    format!(", {change:.3}/255 away from half as many; wanted {wanted:.3}")
+                });
+                // Each doubling takes twice the time of the one before.
+                let more = self.args.reference_spp / doubling.spp.max(1);
+                let most = (f64::from(more.max(1)).log2().floor().exp2() - 1.0) * 2.0 * seconds;
+                let most = match convergence.is_done(doubling) {
+                    true => String::new(),
+                    false => format!("; at most {} more", duration(most)),
+                };
+                let spp = doubling.spp;
+                self.line.note(&format!("reference: {spp} camera samples{change}{most}"));
+                Ok(())
+            }
+        };
+        convergence.run(last, &mut hear)
+    }
+
+    /// What there is so far; `None` before the default was timed.
+    fn outcome<'o>(&'o self, truth: &'o Truth, ledger: &Ledger) -> Option<Outcome<'o>> {
+        let sweep = self.sweep;
+        let (measured, pictures) = sweep.measured(ledger)?;
+        Some(Outcome {
+            truth,
+            measured,
+            pictures,
+            oracle: ledger.note(ORACLE).flatten(),
+            oracle_was_wanted: self.oracle_was_wanted,
+            writing: ledger.note(WRITING).filter(|_| self.writing_is_wanted),
+            shown_frame: sweep.shown_frame(),
+            frames: sweep.frames,
+            shot_frames: sweep.stage.shot.frames,
+            threads: sweep.stage.pool.current_num_threads(),
+            tracer: sweep.stage.intersector.describe(),
+            load: [self.load, machine::load()],
+            seconds: self.start.elapsed().as_secs_f64(),
+            runs: ledger.runs(),
+            trials: [sweep.done(ledger), sweep.trials()],
+            settings: sweep.candidates.len(),
+            base: sweep.stage.base,
+        })
+    }
+
+    /// Writes page and figures of what there is; gives the page's own summary.
+    fn publish(&self, truth: &Truth, ledger: &Ledger) -> Result<Option<Vec<String>>> {
+        let Some(outcome) = self.outcome(truth, ledger) else { return Ok(None) };
+        let command = crate::cli::words();
+        files::write(self.args, &outcome, &command)?;
+        let page = page::page(self.args, &outcome, &command)?;
+        let html = page.to_html()?;
+        atomic::write(self.report(), |w| w.write_all(html.as_bytes()))?;
+        Ok(Some(page.summary.into_iter().chain(page.warnings).collect()))
+    }
+
+    fn report(&self) -> std::path::PathBuf {
+        self.args.output.join("report.html")
+    }
+
+    /// Writes what there is and says it; whether there was anything.
+    fn tell(&self, ledger: &Ledger) -> Result<bool> {
+        // It converged, or was as near as it may come: nothing is rendered.
+        let truth = self.truth(ledger)?;
+        let Some(summary) = self.publish(&truth, ledger)? else { return Ok(false) };
+        if !self.args.quiet {
+            summary.iter().try_for_each(say::result)?;
+            let seconds = self.start.elapsed().as_secs_f64();
+            say::result(format!("{}, in {}", self.report().display(), duration(seconds)))?;
+        }
+        Ok(true)
+    }
+
+    /// The page of what there is, when the sweep was asked to stop.
+    fn take_leave(&self, ledger: &Ledger) -> Result<Exit> {
+        let (done, of) = (self.sweep.done(ledger), self.sweep.trials());
+        let is_told = done > 0 && self.tell(ledger)?;
+        if !self.args.quiet {
+            let page = if is_told { "" } else { " (too few for a page)" };
+            say::aside(format!(
+                "stopped{}: {done} of {of} trials are measured{page}; the same command goes on",
+                self.interrupt.reason()
+            ));
+        }
+        Ok(Exit::Stopped)
+    }
+}

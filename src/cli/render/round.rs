@@ -1,0 +1,171 @@
+//! One round of a job: every frame that is not there yet, by all ranks.
+
+use super::tell;
+use crate::cli::exit::Exit;
+use crate::cli::progress::Watch;
+use crate::cli::request::Request;
+use crate::cli::say;
+use crate::cli::signals::Interrupt;
+use crate::cli::stats::RankStats;
+use crate::cluster::{self, Outcome, World};
+use crate::effects::EffectPlan;
+use crate::error::Result;
+use crate::intersect::Intersector;
+use crate::output::{Format, atomic};
+use crate::reuse::colour::Rule;
+use crate::scene::Policy;
+use crate::sequence::checkpoint::{self, Checkpoints};
+use crate::sequence::{
+    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
+};
+use crate::shade::Renderer;
+use rayon::ThreadPool;
+use std::time::Instant;
+
+/// Where frames are rendered.
+pub(super) struct Site<'a> {
+    pub world: &'a World,
+    pub intersector: &'a dyn Intersector,
+    pub pool: &'a ThreadPool,
+    /// The ranks, node by node.
+    pub order: &'a [u32],
+    pub interrupt: &'a Interrupt,
+    pub clock: Clock,
+    /// Whether nothing is said.
+    pub quiet: bool,
+}
+
+/// When the program started, and when it had loaded and built the scene.
+pub(super) struct Clock {
+    pub start: Instant,
+    pub loaded: Instant,
+    pub built: Instant,
+}
+
+impl Clock {
+    /// What building the intersector took.
+    pub fn build_seconds(&self) -> f64 {
+        (self.built - self.loaded).as_secs_f64()
+    }
+}
+
+/// What came of rendering all frames once.
+pub(super) struct Round {
+    pub plan: Plan,
+    pub outcome: Outcome,
+    /// Frames that no rank got to; every rank knows it.
+    pub unfinished: usize,
+    pub seconds: f64,
+    /// What each rank took, and why it was asked to stop; known on rank 0.
+    pub ranks: Vec<RankStats>,
+    pub reasons: Vec<String>,
+}
+
+impl Site<'_> {
+    /// Renders the frames of `request` that are not there yet. All ranks call it.
+    pub fn render(&self, request: &Request, target: &Target) -> Result<Round> {
+        let plan = self.world.from_root(|| {
+            request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
+            self.pool.install(|| sequence::prepare(target, request.frames))
+        })?;
+        tell(self.quiet, &plan.notes, |n| say::note(n));
+        let job = Frames { request, target, plan: &plan, site: self };
+        let begun = Instant::now();
+        let (outcome, reference_bytes, saved) = job.render()?;
+        let seconds = begun.elapsed().as_secs_f64();
+        let Clock { start, loaded, built } = self.clock;
+        let rank = RankStats {
+            threads: self.pool.current_num_threads(),
+            load_seconds: (loaded - start).as_secs_f64(),
+            build_seconds: self.clock.build_seconds(),
+            render_seconds: built.elapsed().as_secs_f64(),
+            intersector_bytes: self.intersector.memory(),
+            reference_bytes,
+            checkpoint_seconds: saved.seconds,
+            checkpoint_bytes: saved.bytes,
+            duty: outcome.own,
+            peak_memory_bytes: None,
+        };
+        let ranks = self.world.gather(&rank.with_peak())?;
+        // Whichever rank was asked to stop knows why.
+        let reasons = self.world.gather(&self.interrupt.reason())?;
+        // A rank that was asked to stop when all its frames were finished has not stopped the job.
+        let unfinished = self.world.from_root(|| Ok(outcome.unfinished))?;
+        if unfinished == 0 && self.world.is_root() {
+            checkpoint::clear(target);
+        }
+        Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons })
+    }
+}
+
+/// What rendering the planned frames takes.
+pub(super) struct Frames<'a> {
+    pub request: &'a Request,
+    pub target: &'a Target,
+    pub plan: &'a Plan,
+    pub site: &'a Site<'a>,
+}
+
+impl Frames<'_> {
+    /// What became of the frames, the most memory that references took, bytes, and what it took to
+    /// put them on disk.
+    pub fn render(&self) -> Result<(Outcome, u64, SaveCost)> {
+        let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
+        let Site { world, intersector, pool, order, interrupt, quiet, .. } = *self.site;
+        let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
+        let effects = EffectPlan::of(scene, settings);
+        let renderer = Renderer { scene, settings, plan: effects, intersector };
+        let with_gbuffer = pattern.format() == Format::Exr;
+        let checkpoints = self.checkpoints();
+        let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
+        let maker: Box<dyn Shared> = match settings.reuse.policy {
+            Policy::Surface => {
+                let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
+                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
+                maker.with_gbuffer = with_gbuffer;
+                maker.supplied = self.request.references.supply.as_ref();
+                maker.checkpoints = Some(&checkpoints);
+                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
+                maker.terms = with_gbuffer.then(|| self.request.terms.clone());
+                Box::new(maker)
+            }
+            Policy::Colour => {
+                let rule = Rule {
+                    colour_epsilon: settings.reuse.colour_epsilon,
+                    distance_epsilon: settings.reuse.distance_epsilon,
+                };
+                let mut maker =
+                    ColourMaker::new(renderer, shot, pool, stop, &watch, rule, uploads)?;
+                maker.with_gbuffer = with_gbuffer;
+                maker.checkpoints = Some(&checkpoints);
+                Box::new(maker)
+            }
+            Policy::Off => {
+                let (progress, laid) = (&watch, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
+            }
+        };
+        let done = |report: &_| watch.frame_done(report);
+        let work = || cluster::render(world, order, target, plan, &*maker, stop, &done);
+        let outcome = interrupt.watched(work);
+        watch.finish();
+        tell(quiet, &maker.notes(), |n| say::note(n));
+        if let (Err(error), true) = (&outcome, world.size() > 1) {
+            // The other ranks are in the middle of their frames and would wait for this one.
+            say::error(error);
+            world.abort(Exit::of(error).code());
+        }
+        Ok((outcome?, maker.reference_memory(), maker.save_cost()))
+    }
+
+    fn checkpoints(&self) -> Checkpoints<'_> {
+        let Request { scene, settings, terms, checkpoint, .. } = self.request;
+        // Frame files hold references of policy `surface` only.
+        let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
+        Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
+    }
+
+    pub fn total(&self) -> usize {
+        self.plan.kept.len() + self.plan.render.len()
+    }
+}

@@ -1,0 +1,120 @@
+//! `render --target` and `--budget`: the choice is told, kept and held against what came out.
+
+use super::job::Job;
+use serde_json::Value;
+
+const LINE: &str = "render cube.obj --size 48x32 --frames 1..3 --no-video -o o/f_##.png";
+
+fn header(job: &Job) -> Value {
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    serde_json::from_str(manifest.lines().next().expect("a header")).expect("JSON")
+}
+
+/// A frame that is lost is rendered again with the same settings, without another probe: whatever the
+/// clock would say now, its bytes are the same.
+#[test]
+fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
+    let job = Job::new();
+    let said = job.done(&format!("{LINE} --target psnr=38")).err;
+    for words in ["for psnr=38: --spp ", "foretold: PSNR ", "came out: PSNR "] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let (first, before) = (header(&job), job.read("o/f_02.png"));
+    assert_eq!(first["chosen"]["wanted"], "psnr=38");
+    assert_eq!(first["settings"]["spp"], first["chosen"]["foretold"]["samples"]["spp"]);
+    std::fs::remove_file(job.path("o/f_02.png")).expect("removed");
+    let ran = job.done(&format!("{LINE} --target psnr=38 --threads 1"));
+    assert!(ran.err.contains("as chosen before") && !ran.err.contains("probe:"), "{}", ran.err);
+    assert!(ran.out.contains("1 rendered, 2 kept"), "{}", ran.out);
+    assert_eq!((header(&job), job.read("o/f_02.png")), (first.clone(), before.clone()));
+    // What was chosen gives the same frames when it is spelled out.
+    let s = &first["settings"];
+    let options = format!(
+        "--spp {} --shadow-samples {} --sky-samples {} --bounces {} --policy {} --tolerance {}",
+        s["spp"],
+        s["shadow_samples"],
+        s["sky_samples"],
+        s["bounces"],
+        s["reuse"]["policy"].as_str().expect("a name"),
+        s["reuse"]["tolerance"]
+    );
+    job.done(&format!("{} {options}", LINE.replace("o/", "p/")));
+    assert_eq!(job.read("p/f_02.png"), before);
+}
+
+#[test]
+fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
+    let job = Job::new();
+    job.done(&format!("{LINE} --target psnr=30 --spp 5 --policy off"));
+    let settings = &header(&job)["settings"];
+    assert_eq!((&settings["spp"], &settings["reuse"]["policy"]), (&5.into(), &"off".into()));
+    let said = job.done(&format!("{LINE} --budget 20s --overwrite")).err;
+    assert!(said.contains("for 20 s: --spp ") && said.contains("%)"), "{said}");
+    assert_eq!(header(&job)["chosen"]["wanted"], "20 s");
+}
+
+/// More frames are rendered under the choice of the first, or all under a tighter one where these show
+/// that it is not enough; the next run keeps them either way.
+#[test]
+fn a_job_that_gets_longer_keeps_its_choice_or_its_tighter_one() {
+    let job = Job::new();
+    let line = LINE.replace("1..3", "1..9");
+    job.done(&format!("{} --target psnr=36", line.replace("1..9", "1..2")));
+    let ran = job.done(&format!("{line} --target psnr=36"));
+    assert!(ran.err.contains("as chosen before"), "{}", ran.err);
+    let before = (header(&job), job.read("o/f_01.png"));
+    let tightened = before.0["chosen"]["tightened"].as_u64() > Some(0);
+    assert_eq!(tightened, ran.err.contains("rendered again, tightened"), "{}", ran.err);
+    let ran = job.done(&format!("{line} --target psnr=36"));
+    assert!(ran.out.contains("0 rendered, 9 kept"), "{}", ran.out);
+    assert_eq!((header(&job), job.read("o/f_01.png")), before);
+}
+
+#[test]
+fn figures_that_need_neighbours_are_targets_too() {
+    let job = Job::new();
+    for (target, figure) in [("ssim=0.9", ", SSIM 0.9"), ("flip=10%", ", FLIP 0.0")] {
+        let said = job.done(&format!("{LINE} --target {target} --overwrite")).err;
+        assert!(said.contains(figure), "{said}");
+    }
+}
+
+#[test]
+fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
+    let job = Job::new();
+    job.refused(&format!("{LINE} --target psnr=70"), "--png-bits 16");
+    job.refused(
+        &format!("{LINE} --target psnr=50 --spp 1"),
+        "is foretold to reach psnr=50; --spp 1",
+    );
+    assert!(!job.path("o/f_01.png").exists());
+}
+
+#[test]
+fn what_cannot_be_foretold_is_refused() {
+    let job = Job::new();
+    for target in ["psnr", "psnr=", "psnr=-1", "psnr=nan", "ssim=2", "max-share=200%", "flip=0"] {
+        job.refused(&format!("{LINE} --target {target}"), "--target");
+    }
+    job.refused(&format!("{LINE} --target mse=1"), "psnr=45, ssim=0.99");
+    job.refused(&format!("{LINE} --target psnr=45 --budget 1m"), "cannot be used with");
+    job.refused(&format!("{LINE} --budget never"), "90s, 25m or 1h30m");
+    job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
+    job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
+}
+
+/// Another tree takes another time, and may give other last bits.
+#[test]
+fn a_choice_serves_only_the_tree_that_it_was_made_with() {
+    let job = Job::new();
+    let line = format!("{LINE} --target psnr=30");
+    job.done(&line);
+    for option in ["--build-quality high", "--compact on"] {
+        let ran = job.run(&format!("{line} {option}"));
+        // The frames that are there are of the first tree.
+        assert_eq!(ran.code, Some(2), "{}", ran.err);
+        assert!(ran.err.contains("probe:") && ran.err.contains("--overwrite"), "{}", ran.err);
+        assert!(!ran.err.contains("as chosen before"), "{}", ran.err);
+    }
+    assert!(job.done(&line).err.contains("as chosen before"));
+}

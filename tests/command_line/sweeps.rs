@@ -1,0 +1,108 @@
+//! Sweeps of `accuracy` that are stopped or killed, and go on.
+
+use super::job::{Job, Ran};
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const LINE: &str = "accuracy cube.obj --size 32x24 --frames 1,2 --turns 2 --reference-spp 64 \
+    --shadow-samples 2 --knobs reuse,tree,writing --threads 1";
+
+fn json(job: &Job, folder: &str) -> Value {
+    serde_json::from_slice(&job.read(&format!("{folder}/accuracy.json"))).expect("JSON")
+}
+
+/// What is the same however often the sweep was stopped.
+fn measured(job: &Job, folder: &str) -> Vec<(String, u64, Vec<f64>, Value)> {
+    let rows = json(job, folder)["rows"].as_array().expect("rows").clone();
+    let of = |row: &Value| {
+        let number = |value: &Value| value.as_f64().expect("a figure");
+        let turns = row["rmse_of_turns"].as_array().expect("turns");
+        let timed = row["seconds"]["turns"].as_array().expect("turns").len() as u64;
+        let name = row["options"].as_str().expect("options").to_string();
+        (name, timed, turns.iter().map(number).collect(), row["change"].clone())
+    };
+    rows.iter().map(of).collect()
+}
+
+fn assert_same(job: &Job, a: &str, b: &str) {
+    let (a, b) = (measured(job, a), measured(job, b));
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(&b) {
+        assert_eq!((&a.0, a.1, a.2.len()), (&b.0, b.1, b.2.len()));
+        // JSON gives figures back but for their last digit.
+        let near = |(x, y): (&f64, &f64)| (x - y).abs() <= 1e-9 * x.abs();
+        assert!(a.2.iter().zip(&b.2).all(near), "{a:?} {b:?}");
+        for part in ["pixels", "differing", "over_2"] {
+            assert_eq!(a.3[part], b.3[part], "{} {part}", a.0);
+        }
+    }
+}
+
+#[test]
+fn a_sweep_that_is_killed_again_and_again_measures_what_a_whole_one_does() {
+    let job = Job::new();
+    let start = Instant::now();
+    job.done(&format!("{LINE} -o whole -q"));
+    let whole = start.elapsed();
+    let mut kills = 0;
+    for part in 1.. {
+        // Short at first, so that it is killed in every stage; then long enough to end.
+        let patience = whole.mul_f64(0.1 * f64::from(part));
+        let mut child = job.command(&format!("{LINE} -o o -q")).spawn().expect("it starts");
+        let start = Instant::now();
+        let status = loop {
+            match child.try_wait().expect("a child") {
+                None if start.elapsed() > patience => break None,
+                None => std::thread::sleep(Duration::from_millis(2)),
+                status => break status,
+            }
+        };
+        if let Some(status) = status {
+            assert!(status.success(), "{status}");
+            break;
+        }
+        child.kill().and_then(|()| child.wait().map(drop)).expect("killed");
+        kills += 1;
+    }
+    assert!(kills > 0);
+    assert_same(&job, "whole", "o");
+    // Nothing is left to be measured.
+    let again = job.done(&format!("{LINE} -o o"));
+    assert!(again.err.contains("all of it is measured"), "{}", again.err);
+}
+
+#[test]
+fn a_sweep_that_is_stopped_has_a_page_that_says_so_and_goes_on() {
+    let job = Job::new();
+    let line = format!("{LINE} -o o");
+    let mut child = job.command(&line).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut told = String::new();
+    while !told.contains("turn 2") {
+        assert!(err.read_line(&mut told).expect("text") > 0, "{told}");
+    }
+    let kill = format!("kill -TERM {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
+    err.read_to_string(&mut told).expect("text");
+    assert_eq!(child.wait().expect("a child").code(), Some(75), "{told}");
+    assert!(told.contains("stopped by SIGTERM") && told.contains("goes on"), "{told}");
+    let page = || String::from_utf8(job.read("o/report.html")).expect("UTF-8");
+    assert!(page().contains("not complete"));
+    let trials = json(&job, "o")["trials"].clone();
+    assert!(trials[0].as_u64() < trials[1].as_u64(), "{trials}");
+
+    let Ran { err, .. } = job.done(&line);
+    assert!(err.contains("going on: "), "{err}");
+    assert!(!err.contains("reference: ") && !err.contains("turn 1"), "{err}");
+    assert!(!page().contains("not complete"));
+    assert_eq!((json(&job, "o")["trials"][0].clone(), json(&job, "o")["runs"].clone()), {
+        (trials[1].clone(), 2.into())
+    });
+    // What is there is of these settings alone, unless it is measured anew.
+    job.refused(&format!("{line} --seed 3"), "seed was 0, now it is 3");
+    let more = line.replace("--turns 2", "--turns 3");
+    assert!(job.done(&more).err.contains("going on: "));
+    assert!(!job.done(&format!("{line} --seed 3 --overwrite")).err.contains("going on"));
+}

@@ -1,0 +1,164 @@
+//! A rank that panics, or fails alone, ends the whole job, with its words. Nothing in the program is known to panic, so
+//! this starts itself under mpirun, with a maker of frames that does: on the thread that renders, on one
+//! that it traces with, or on the main one.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(not(feature = "mpi"), allow(dead_code, unused_imports))]
+
+#[path = "common/mpirun.rs"]
+mod launcher;
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+use tweenray::cluster::{self, World};
+use tweenray::error::{Error, Result};
+use tweenray::film::Film;
+use tweenray::output::manifest::{FORMAT, Header};
+use tweenray::output::{FramePattern, WriteOptions};
+use tweenray::scene::{FrameRange, Settings};
+use tweenray::sequence::{self, FrameMaker, Made, Recipes, Shared, Target};
+use tweenray::stats::{RayCounts, ReuseCounts};
+
+/// First word of a rank's command line.
+const AS_RANK: &str = "--as-rank";
+const FRAMES: u32 = 60;
+const SETTINGS: (u32, u32) = (8, 8);
+
+/// Makes black frames of a tenth of a second; from frame 20 on it panics where it is told to.
+struct Lemon {
+    place: String,
+}
+
+impl FrameMaker for Lemon {
+    fn make(&self, frame: u32) -> Result<Option<Made>> {
+        std::thread::sleep(Duration::from_millis(100));
+        let is_due = (20..40).contains(&frame);
+        match &*self.place {
+            "rendering" if is_due => panic!("the rendering thread met a lemon"),
+            "pool" if is_due => rayon::join(|| (), || panic!("the pool met a lemon")),
+            _ => ((), ()),
+        };
+        Ok(Some(Made {
+            film: Film::new(SETTINGS.0, SETTINGS.1, false),
+            rays: RayCounts::default(),
+            reuse: ReuseCounts::default(),
+            audit: None,
+            reference: None,
+        }))
+    }
+}
+
+impl Shared for Lemon {}
+
+fn target(folder: &Path) -> Target {
+    let settings = Settings { width: SETTINGS.0, height: SETTINGS.1, ..Settings::default() };
+    let name = folder.join("f_##.png").display().to_string();
+    Target {
+        pattern: FramePattern::parse(&name, FRAMES).expect("a pattern"),
+        header: Header {
+            manifest: FORMAT,
+            command: Vec::new(),
+            chosen: None,
+            tweenray: "0".into(),
+            scene: "s".into(),
+            scene_hash: "h".into(),
+            shot_hash: "s".into(),
+            shot_frames: FRAMES,
+            files: "f_##".into(),
+            tracer: "none".into(),
+            settings: Header::settings(&settings),
+        },
+        recipes: Recipes::default(),
+        write: WriteOptions::of(&settings, None),
+        overwrite: false,
+    }
+}
+
+/// One rank of a job that will not end well.
+fn be_a_rank(place: &str, folder: &Path) {
+    let world = World::join().expect("a job");
+    if place == "agreeing" {
+        return fail_while_others_are_busy(&world);
+    }
+    let target = target(folder);
+    let frames = FrameRange { first: 1, last: FRAMES };
+    let plan = world.from_root(|| sequence::prepare(&target, frames)).expect("a plan");
+    let order: Vec<u32> = (0..world.size()).collect();
+    let maker = Lemon { place: place.into() };
+    let stop = AtomicBool::new(false);
+    let done = |_: &_| assert!(place != "main", "the main thread met a lemon");
+    let outcome = cluster::render(&world, &order, &target, &plan, &maker, &stop, &done);
+    assert!(outcome.is_ok_and(|outcome| outcome.unfinished == 0));
+}
+
+/// Rank 1 fails, and the others do not come to hear of it.
+fn fail_while_others_are_busy(world: &World) {
+    let outcome = match world.rank() {
+        1 => Err(Error::Failed("rank 1 met a lemon".into())),
+        _ => {
+            std::thread::sleep(Duration::from_secs(60));
+            Ok(())
+        }
+    };
+    if let Err(error) = world.agree(outcome) {
+        assert!(world.is_stranded());
+        eprintln!("{error}");
+        world.abort(1);
+    }
+}
+
+/// Whether there is an mpirun to try it with.
+fn a_panic_ends_the_job(place: &str, says: &str) -> bool {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = std::env::current_exe().expect("a path");
+    let mut command = launcher::mpirun();
+    command.args(["-n", "3"]).arg(own).args([AS_RANK, place]).arg(folder.path());
+    let start = Instant::now();
+    let Ok(output) = command.output() else { return false };
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(start.elapsed() < Duration::from_secs(5), "{place}: {:?}", start.elapsed());
+    match says {
+        "" => assert!(output.status.success(), "{words}"),
+        says => {
+            assert!(!output.status.success(), "{place}: the job ended as if it were done");
+            assert!(words.contains(says), "{place}: {words}");
+            // What was finished stays finished, and whole.
+            let names = fs::read_dir(folder.path()).expect("a folder").flatten();
+            let frames = names.filter(|n| n.file_name().to_string_lossy().ends_with(".png"));
+            let all_whole = frames.map(|f| fs::read(f.path()).expect("a file"));
+            assert!(all_whole.into_iter().all(|bytes| bytes.ends_with(b"IEND\xaeB`\x82")));
+        }
+    }
+    true
+}
+
+#[cfg(not(feature = "mpi"))]
+fn main() {}
+
+#[cfg(feature = "mpi")]
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if let [first, place, folder] = &words[..] {
+        if first == AS_RANK {
+            return be_a_rank(place, Path::new(folder));
+        }
+    }
+    // `cargo test -- --list` and the like ask for no run.
+    if words.iter().any(|word| word == "--list" || word == "--ignored") {
+        return;
+    }
+    for (place, says) in [
+        ("rendering", "the rendering thread met a lemon"),
+        ("pool", "the pool met a lemon"),
+        ("main", "the main thread met a lemon"),
+        ("agreeing", "rank 1 met a lemon"),
+        ("nowhere", ""),
+    ] {
+        if !a_panic_ends_the_job(place, says) {
+            println!("no mpirun: nothing to test");
+            return;
+        }
+        println!("ends the job: {place} ... ok");
+    }
+}
