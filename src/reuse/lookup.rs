@@ -133,9 +133,7 @@ impl Inference for Lookup<'_> {
 /// What the taps tell of one light.
 #[derive(Clone, Copy)]
 struct Told {
-    /// Sum of the weights of the taps that know it.
-    weight: f32,
-    /// Weighted mean of their ratios.
+    /// Weighted mean of the ratios of the taps that know it.
     mean: f32,
     /// Weighted mean of the squared distances from that.
     variance: f32,
@@ -147,29 +145,16 @@ struct Told {
     change: Change,
 }
 
-impl Told {
-    const NOTHING: Self = Self {
-        weight: 0.0,
-        mean: 0.0,
-        variance: 0.0,
-        samples: 0.0,
-        offset: 0.0,
-        change: Change::UNKNOWN,
-    };
-}
-
 impl Lookup<'_> {
     /// Means of the ratios that agree, about a point with the normal `n`. `shown` is what the pixel
     /// would show of each light without shadows.
     fn answer(&self, n: Vec3, taps: &Taps, shown: &[f32], ratios: &mut [f32]) {
         // Of many lights the last are told twice.
-        let mut told = [Told::NOTHING; 8];
+        let mut told = [None; 8];
         let mut seen = 0.0;
         for (channel, shown) in shown.iter().enumerate() {
             let own = self.told(taps, channel);
-            if f64::from(own.weight) >= self.evidence.least_weight {
-                seen += shown * own.mean;
-            }
+            seen += own.map_or(0.0, |own| shown * own.mean);
             if let Some(kept) = told.get_mut(channel) {
                 *kept = own;
             }
@@ -177,12 +162,9 @@ impl Lookup<'_> {
         let steps = steps_per_radiance(seen);
         for (channel, (out, shown)) in ratios.iter_mut().zip(shown).enumerate() {
             let kept = told.get(channel).copied();
-            let own = kept.unwrap_or_else(|| self.told(taps, channel));
+            let Some(own) = kept.unwrap_or_else(|| self.told(taps, channel)) else { continue };
             let allowed = self.evidence.tolerance / (steps * shown).max(1e-6);
             let rays = own.samples * self.rays[channel] as f32;
-            if f64::from(own.weight) < self.evidence.least_weight {
-                continue;
-            }
             if self.agrees(&own, rays, allowed) {
                 *out = own.mean;
             } else if let Some(ratio) = self.by_plane(n, taps, channel, (&own, rays, allowed)) {
@@ -191,7 +173,8 @@ impl Lookup<'_> {
         }
     }
 
-    fn told(&self, taps: &Taps, channel: usize) -> Told {
+    /// `None` where too few of the taps know the light.
+    fn told(&self, taps: &Taps, channel: usize) -> Option<Told> {
         let mut first = f32::NAN;
         let (mut weight, mut share) = (0.0, 0.0);
         let (mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0);
@@ -216,18 +199,17 @@ impl Lookup<'_> {
             apart += tap.apart * tap.share;
             change = change.max(reference.change(tap.sample, channel));
         }
-        if weight == 0.0 {
-            return Told::NOTHING;
+        if f64::from(weight) < self.evidence.least_weight {
+            return None;
         }
         let (share, mean) = (1.0 / share, sum / share);
-        Told {
-            weight,
+        Some(Told {
             mean: first + mean,
             variance: (squares * share - mean * mean).max(0.0),
             samples: samples * share,
             offset: apart.length() * share,
             change,
-        }
+        })
     }
 
     /// Whether ratios of `rays` shadow rays each lie no further from their mean than their sampling noise
