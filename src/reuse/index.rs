@@ -1,8 +1,9 @@
 //! Samples found by place: a hash grid over cells as large as the samples are apart.
 
-use super::reference::Sample;
+use super::reference::Point;
 use crate::math::DVec3;
 use crate::sampling::mix;
+use std::ops::Range;
 
 /// Cells of a level that a query looks at: those whose middles surround it.
 pub(super) const CELLS: usize = 8;
@@ -10,12 +11,10 @@ pub(super) const CELLS: usize = 8;
 /// A cell: level of size, mesh and place, hashed.
 type Key = u64;
 
-/// Samples by cell.
+/// Which samples, which lie sorted by cell, belong to which.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Index {
-    /// Sorted by cell, then as they came.
-    members: Vec<u32>,
-    /// Open addressing: cell, first member, one past the last.
+    /// Open addressing: cell, first sample, one past the last.
     table: Vec<(Key, u32, u32)>,
     /// A bit for each cell, by its key; eight for each slot of the table.
     present: Vec<u64>,
@@ -33,22 +32,27 @@ impl Cells {
     pub fn around(level: i32, geom_id: u32, p: DVec3) -> Self {
         let edge = edge_of(level);
         let [x, y, z] = cell_of(p - DVec3::splat(0.5 * edge), edge);
-        let cell = |k: i64| [x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)];
-        Self { edge, keys: std::array::from_fn(|k| key_of(level, geom_id, cell(k as i64))) }
+        // As `key_of` says, what they share mixed once.
+        let all = key_of_level(level, geom_id);
+        let columns = [x, x.wrapping_add(1)].map(|x| further(all, x));
+        let rows = [y, y.wrapping_add(1)].map(|y| columns.map(|key| further(key, y)));
+        let layers = [z, z.wrapping_add(1)].map(|z| rows.map(|row| row.map(|key| further(key, z))));
+        let keys = std::array::from_fn(|k| layers[k >> 2][k >> 1 & 1][k & 1]);
+        Self { edge, keys }
     }
 }
 
 impl Index {
-    /// Indexes those of `samples`, which lie as far from their neighbours as `footprints` say, whose
-    /// numbers are `members`.
-    pub fn new(samples: &[Sample], footprints: &[f32], members: Vec<u32>) -> Self {
+    /// Indexes those of `points` whose numbers are `members`. Returns these sorted by cell too: so the
+    /// samples must lie, from number `first` on.
+    pub fn new(points: &[Point], members: &[u32], first: u32) -> (Self, Vec<u32>) {
         if members.is_empty() {
-            return Self::default();
+            return Default::default();
         }
         let key = |i: &u32| {
-            let s = &samples[*i as usize];
-            let level = level_of(footprints[*i as usize]);
-            key_of(level, s.geom_id, cell_of(s.position(), edge_of(level)))
+            let point = &points[*i as usize];
+            let level = level_of(point.footprint);
+            key_of(level, point.geom_id, cell_of(point.p.as_dvec3(), edge_of(level)))
         };
         let mut keyed: Vec<(Key, u32)> = members.iter().map(|i| (key(i), *i)).collect();
         keyed.sort_unstable();
@@ -56,7 +60,7 @@ impl Index {
         let cells = runs.clone().count();
         let mut table = vec![(0, 0, 0); (2 * cells).next_power_of_two()];
         let mut present = vec![0; table.len().div_ceil(8)];
-        let mut first = 0;
+        let mut first = first;
         for run in runs {
             let mut at = run[0].0 as usize & (table.len() - 1);
             while table[at].2 != 0 {
@@ -67,13 +71,13 @@ impl Index {
             let bit = bit_of(run[0].0, &present);
             present[bit / 64] |= 1 << (bit % 64);
         }
-        Self { members: keyed.into_iter().map(|(_, i)| i).collect(), table, present }
+        (Self { table, present }, keyed.into_iter().map(|(_, i)| i).collect())
     }
 
     /// The samples in `cells`.
     pub fn members<'i>(&'i self, cells: &'i Cells) -> impl Iterator<Item = u32> + 'i {
         let keys = cells.keys.iter().filter(|key| self.may_hold(**key));
-        keys.flat_map(|key| self.cell(*key)).copied()
+        keys.flat_map(|key| self.cell(*key))
     }
 
     /// Whether the cell is there, or another with the same bits: told by memory that stays in the
@@ -83,22 +87,21 @@ impl Index {
         self.present.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1)
     }
 
-    fn cell(&self, key: Key) -> &[u32] {
+    fn cell(&self, key: Key) -> Range<u32> {
         let mut at = key as usize & (self.table.len() - 1);
         while self.table[at].2 != 0 {
             let (there, first, end) = self.table[at];
             if there == key {
-                return &self.members[first as usize..end as usize];
+                return first..end;
             }
             at = (at + 1) & (self.table.len() - 1);
         }
-        &[]
+        0..0
     }
 
     /// Bytes that it holds.
     pub fn memory(&self) -> u64 {
-        let table = size_of::<(Key, u32, u32)>() * self.table.len();
-        (4 * self.members.len() + table + 8 * self.present.len()) as u64
+        (size_of_val(&self.table[..]) + size_of_val(&self.present[..])) as u64
     }
 }
 
@@ -120,12 +123,23 @@ pub(super) fn edge_of(level: i32) -> f64 {
 }
 
 fn cell_of(p: DVec3, edge: f64) -> [i64; 3] {
-    (p / edge).floor().to_array().map(|c| c as i64)
+    (p / edge).to_array().map(|c| {
+        // Towards zero, then down: without SSE 4.1 `floor` is a call.
+        let towards_zero = c as i64;
+        towards_zero.saturating_sub(i64::from(c < towards_zero as f64))
+    })
 }
 
 fn key_of(level: i32, geom_id: u32, cell: [i64; 3]) -> Key {
-    let of_mesh = u64::from(geom_id) << 32 | u64::from(level as u32 & 0xffff);
-    cell.into_iter().fold(mix(of_mesh), |key, c| mix(key ^ c as u64))
+    cell.into_iter().fold(key_of_level(level, geom_id), further)
+}
+
+fn key_of_level(level: i32, geom_id: u32) -> Key {
+    mix(u64::from(geom_id) << 32 | u64::from(level as u32 & 0xffff))
+}
+
+fn further(key: Key, coordinate: i64) -> Key {
+    mix(key ^ coordinate as u64)
 }
 
 #[cfg(test)]
@@ -133,8 +147,8 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
 
-    fn sample(p: Vec3) -> Sample {
-        Sample { p, n: Vec3::Y, geom_id: 3, samples: 1 }
+    fn point(p: Vec3) -> Point {
+        Point { p, n: Vec3::Y, geom_id: 3, samples: 1, footprint: 0.12 }
     }
 
     #[test]
@@ -148,18 +162,21 @@ mod tests {
     #[test]
     fn everything_within_half_a_cell_is_found_and_nothing_of_another_mesh() {
         let place = |i: usize| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32);
-        let samples: Vec<Sample> =
-            (0..1000).map(|i| sample(place(i) * 0.1 - Vec3::splat(0.45))).collect();
-        let index = Index::new(&samples, &[0.12; 1000], (0..1000).collect());
+        let points: Vec<Point> =
+            (0..1000).map(|i| point(place(i) * 0.1 - Vec3::splat(0.45))).collect();
+        let all: Vec<u32> = (0..1000).collect();
+        let (index, sorted) = Index::new(&points, &all, 7);
         let level = level_of(0.12);
         for p in [DVec3::ZERO, DVec3::new(0.11, -0.32, 0.4), DVec3::splat(-0.449)] {
             let found_in = |level, mesh| -> Vec<u32> {
-                index.members(&Cells::around(level, mesh, p)).collect()
+                let cells = Cells::around(level, mesh, p);
+                let members = index.members(&cells);
+                members.map(|sample| sorted[sample as usize - 7]).collect()
             };
             let mut found = found_in(level, 3);
             let reach = 0.5 * edge_of(level);
-            for (i, s) in samples.iter().enumerate() {
-                let near = (s.position() - p).abs().max_element() <= reach;
+            for (i, s) in points.iter().enumerate() {
+                let near = (s.p.as_dvec3() - p).abs().max_element() <= reach;
                 assert!(!near || found.contains(&(i as u32)), "{p} misses {i}");
             }
             found.sort_unstable();

@@ -8,13 +8,14 @@
 
 use super::plane::Plane;
 use super::reference::{Change, NONE, Reference};
-use super::taps::{ALWAYS, Images, Taps};
+use super::taps::{ALWAYS, Taps, Taps4, sum};
 use crate::inference::{Inference, Origin, Questions};
 use crate::math::Vec3;
+use wide::{CmpEq, CmpGt, f32x4};
 
 /// Points that are looked up together: the memory that all of them need is asked for before any of it
 /// is waited for.
-const TOGETHER: usize = 16;
+pub(super) const TOGETHER: usize = 16;
 /// Fewer shadow rays do not excuse that samples lie off a plane.
 const PLANE_RAYS: f32 = 100.0;
 /// A bend, 1 - 2 + 1 ratios, has √6 times the noise of one: this is 1/√6.
@@ -117,16 +118,54 @@ impl Inference for Lookup<'_> {
         for (((points, unshadowed), ratios), origins) in each {
             let shown = |i: usize| &unshadowed[i * channels..][..channels];
             let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
-            let mut images: [Images; TOGETHER] = [[None; ALWAYS]; TOGETHER];
-            self.find_images(points, is_lit, &mut images);
+            let mut found: [[Option<Taps4>; ALWAYS]; TOGETHER] = [[None; ALWAYS]; TOGETHER];
+            self.find(points, is_lit, &mut found);
             for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
-                self.gather(point, &images[i], &mut taps);
+                self.gather(point, &found[i], &mut taps);
                 if taps.weight >= self.evidence.least_weight {
                     self.answer(point.n, &taps, shown(i), &mut ratios[i * channels..][..channels]);
                     origins[i] = self.origin(&taps);
                 }
             }
         }
+    }
+}
+
+/// Weighted sums over the taps that know a light, and the largest changes, lane by lane.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    weight: f32x4,
+    share: f32x4,
+    mean: f32x4,
+    squares: f32x4,
+    samples: f32x4,
+    x: f32x4,
+    y: f32x4,
+    z: f32x4,
+    slope: Largest,
+    bend: Largest,
+}
+
+/// The largest of numbers none of which is negative; NaN is no number.
+#[derive(Clone, Copy)]
+struct Largest(f32x4);
+
+impl Default for Largest {
+    fn default() -> Self {
+        Self(f32x4::splat(-1.0))
+    }
+}
+
+impl Largest {
+    fn note(&mut self, other: f32x4) {
+        self.0 = other.cmp_gt(self.0).blend(other, self.0);
+    }
+
+    /// NaN where none was noted.
+    fn get(self) -> f32 {
+        let [a, b, c, d] = self.0.to_array();
+        let most = a.max(b).max(c.max(d));
+        if most < 0.0 { f32::NAN } else { most }
     }
 }
 
@@ -176,39 +215,42 @@ impl Lookup<'_> {
     /// `None` where too few of the taps know the light.
     fn told(&self, taps: &Taps, channel: usize) -> Option<Told> {
         let mut first = f32::NAN;
-        let (mut weight, mut share) = (0.0, 0.0);
-        let (mut sum, mut squares, mut samples) = (0.0, 0.0, 0.0);
-        let mut apart = Vec3::ZERO;
-        let mut change = Change::UNKNOWN;
-        for tap in taps.iter() {
-            let reference = self.references[tap.reference as usize];
-            let ratio = reference.ratio(tap.sample, channel);
-            if ratio.is_nan() {
-                continue;
-            }
+        let mut sums = Sums::default();
+        for four in taps.fours() {
+            let own = self.references[four.reference as usize].known(&four.samples, channel);
+            let known = own.ratio.cmp_eq(own.ratio);
+            let weight = four.weight & known;
             if first.is_nan() {
-                first = ratio;
+                let lane = weight.cmp_gt(f32x4::ZERO).move_mask().trailing_zeros() as usize;
+                first = own.ratio.to_array().get(lane).copied().unwrap_or(first);
             }
             // From the first, so that equal ones give just that, and no variance.
-            let further = ratio - first;
-            weight += tap.weight;
-            share += tap.share;
-            sum += tap.share * further;
-            squares += tap.share * further * further;
-            samples += tap.share * reference.samples[tap.sample as usize].samples as f32;
-            apart += tap.apart * tap.share;
-            change = change.max(reference.change(tap.sample, channel));
+            let further = (own.ratio - f32x4::splat(first)) & known;
+            let share = four.share & known;
+            let [x, y, z] = four.apart;
+            sums.weight += weight;
+            sums.share += share;
+            sums.mean += share * further;
+            sums.squares += share * further * further;
+            sums.samples += share * four.camera_samples;
+            sums.x += share * x;
+            sums.y += share * y;
+            sums.z += share * z;
+            sums.slope.note(own.slope);
+            sums.bend.note(own.bend);
         }
-        if f64::from(weight) < self.evidence.least_weight {
+        if f64::from(sum(sums.weight)) < self.evidence.least_weight {
             return None;
         }
-        let (share, mean) = (1.0 / share, sum / share);
+        let share = 1.0 / sum(sums.share);
+        let mean = sum(sums.mean) * share;
+        let offset = Vec3::new(sum(sums.x), sum(sums.y), sum(sums.z));
         Some(Told {
             mean: first + mean,
-            variance: (squares * share - mean * mean).max(0.0),
-            samples: samples * share,
-            offset: apart.length() * share,
-            change,
+            variance: (sum(sums.squares) * share - mean * mean).max(0.0),
+            samples: sum(sums.samples) * share,
+            offset: offset.length() * share,
+            change: Change { slope: sums.slope.get(), bend: sums.bend.get() },
         })
     }
 
@@ -237,7 +279,8 @@ impl Lookup<'_> {
     ) -> Option<f32> {
         let Evidence { plane_tolerance, plane_noise, plane_leverage, .. } = self.evidence;
         let known = taps.iter().filter_map(|tap| {
-            let ratio = self.references[tap.reference as usize].ratio(tap.sample, channel);
+            let reference = self.references[tap.reference as usize];
+            let ratio = reference.ratio(tap.sample, channel);
             (!ratio.is_nan()).then_some((tap, ratio))
         });
         let plane = Plane::fit(n, known)?;
@@ -280,14 +323,14 @@ impl Lookup<'_> {
         let mut distance = 0.0;
         let mut by_reference = 0.0;
         let mut last = NONE;
-        for tap in taps.iter() {
-            let frame = self.references[tap.reference as usize].frame;
+        for four in taps.fours() {
+            let frame = self.references[four.reference as usize].frame;
             origin.earlier |= frame < self.frame;
             origin.later |= frame > self.frame;
-            distance += tap.weight * tap.apart.length();
-            by_reference =
-                if last == tap.reference { by_reference + tap.weight } else { tap.weight };
-            last = tap.reference;
+            distance += sum(four.weight * four.distance);
+            let weight = sum(four.weight);
+            by_reference = if last == four.reference { by_reference + weight } else { weight };
+            last = four.reference;
             if by_reference > most {
                 most = by_reference;
                 origin.frame = frame;

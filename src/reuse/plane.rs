@@ -35,7 +35,7 @@ struct Sums {
 impl Plane {
     /// Fits the ratios of samples about a point with the normal `n`. `None` if these are fewer than
     /// four, or nearly on a line.
-    pub fn fit<'t>(n: Vec3, samples: impl Iterator<Item = (&'t Tap, f32)>) -> Option<Self> {
+    pub fn fit(n: Vec3, samples: impl Iterator<Item = (Tap, f32)>) -> Option<Self> {
         let (tangent, bitangent) = orthonormal_basis(n.as_dvec3());
         let (tangent, bitangent) = (tangent.as_vec3(), bitangent.as_vec3());
         let mut sums = Sums::default();
@@ -91,12 +91,12 @@ mod tests {
     use super::*;
 
     fn tap(x: f32, z: f32) -> Tap {
-        Tap { reference: 0, sample: 0, weight: 1.0, share: 1.0, apart: Vec3::new(x, 0.0, z) }
+        Tap { reference: 0, sample: 0, apart: Vec3::new(x, 0.0, z) }
     }
 
     fn fit(samples: &[(f32, f32, f32)]) -> Option<Plane> {
         let taps: Vec<Tap> = samples.iter().map(|(x, z, _)| tap(*x, *z)).collect();
-        Plane::fit(Vec3::Y, taps.iter().zip(samples.iter().map(|s| s.2)))
+        Plane::fit(Vec3::Y, taps.into_iter().zip(samples.iter().map(|s| s.2)))
     }
 
     #[test]

@@ -1,27 +1,54 @@
 //! A frame's traced surface points, found by image position or by place in the scene.
+//!
+//! Laid out for lookups, which wait for memory more than they compute: all that a scene's first light
+//! needs of a sample fills half a line of the cache; what a block of pixels sees directly lies
+//! together, and so does what lies in a cell of the index.
+
+mod gather;
 
 use super::index::Index;
-use crate::inference::{SurfacePoint, TracedPoints};
+use crate::inference::TracedPoints;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Camera;
-use rayon::prelude::*;
+use gather::Gathered;
+pub(super) use gather::Point;
+use half::bf16;
+use wide::f32x4;
 
 /// No sample.
 pub(super) const NONE: u32 = u32::MAX;
-/// How far away samples lie beside one another at most, pixels.
-const BESIDE: isize = 3;
-/// Normals of one surface within a pixel: cosine.
-const SAME_SURFACE: f32 = 0.9;
+/// Edge of a block of pixels whose samples lie together.
+const BLOCK: usize = 8;
 
-/// A traced surface point: two fill a line of the cache, and none lies across two.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(32))]
+/// A traced surface point.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(32))]
 pub(super) struct Sample {
     pub p: Vec3,
-    pub n: Vec3,
+    /// A unit of length is [`Sample::UNIT`].
+    n: [i16; 3],
+    /// Camera samples whose shadow rays it gathers; this many stand for more.
+    pub samples: u16,
     pub geom_id: u32,
-    /// Camera samples whose shadow rays it gathers.
-    pub samples: u32,
+    /// Of the first channel.
+    first: Known,
+}
+
+/// What a sample knows about a light.
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+struct Known {
+    /// NaN where unknown.
+    ratio: f32,
+    slope: bf16,
+    bend: bf16,
+}
+
+/// What four samples know about a light: ratio, and [`Change`].
+pub(super) struct Known4 {
+    pub ratio: f32x4,
+    pub slope: f32x4,
+    pub bend: f32x4,
 }
 
 /// How a ratio changes around a sample; NaN where too few samples beside it are known.
@@ -42,134 +69,135 @@ impl Change {
     }
 }
 
+impl Sample {
+    pub const UNIT: f32 = 32767.0;
+
+    fn of(point: &Point, first: Known) -> Self {
+        // To the nearest, without a call of `round`.
+        let n = (point.n * Self::UNIT + Vec3::splat(32768.5)).to_array().map(|x| x as i32 - 32768);
+        Self {
+            p: point.p,
+            n: n.map(|x| x as i16),
+            samples: point.samples.min(u32::from(u16::MAX)) as u16,
+            geom_id: point.geom_id,
+            first,
+        }
+    }
+
+    /// Its normal, times [`Sample::UNIT`].
+    pub fn normal(&self) -> [f32; 3] {
+        let [x, y, z] = self.n;
+        [f32::from(x), f32::from(y), f32::from(z)]
+    }
+}
+
+impl Known {
+    const NOTHING: Self = Self { ratio: f32::NAN, slope: bf16::NAN, bend: bf16::NAN };
+
+    fn of(ratio: f32, change: Change) -> Self {
+        let Change { slope, bend } = change;
+        Self { ratio, slope: bf16::from_f32(slope), bend: bf16::from_f32(bend) }
+    }
+}
+
+/// A camera, made ready to see many points.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    pub eye: DVec3,
+    pub forward: DVec3,
+    /// What right and up of the camera are at depth 1, by the length of a pixel there.
+    pub right: DVec3,
+    pub up: DVec3,
+    /// Where the view axis meets the image, from the middle of its first pixel, pixels.
+    pub middle: [f64; 2],
+    /// Columns and rows.
+    pub size: [i32; 2],
+    /// Edge of a pixel at distance 1.
+    pub pixel_size: f64,
+}
+
+impl View {
+    fn of(camera: &Camera) -> Self {
+        let size = [camera.width, camera.height];
+        let half = size.map(|size| 0.5 * f64::from(size));
+        let by_pixels = |v: DVec3, half: f64| v * (half / v.length_squared());
+        Self {
+            eye: camera.eye,
+            forward: camera.forward,
+            right: by_pixels(camera.half_right, half[0]),
+            up: by_pixels(camera.half_up, half[1]),
+            middle: half.map(|half| half - 0.5),
+            size: size.map(|size| size as i32),
+            pixel_size: camera.pixel_size(),
+        }
+    }
+
+    /// Blocks beside one another.
+    fn blocks_across(&self) -> usize {
+        (self.size[0] as usize).div_ceil(BLOCK)
+    }
+
+    /// Where a pixel within the image stands in an order by blocks.
+    fn slot(&self, x: usize, y: usize) -> usize {
+        let block = y / BLOCK * self.blocks_across() + x / BLOCK;
+        block * (BLOCK * BLOCK) + y % BLOCK * BLOCK + x % BLOCK
+    }
+
+    /// Places of that order.
+    fn slots(&self) -> usize {
+        (self.size[1] as usize).div_ceil(BLOCK) * self.blocks_across() * BLOCK * BLOCK
+    }
+}
+
 /// What one frame knows.
 #[derive(Debug, Clone)]
 pub struct Reference {
     /// Its number; [`Reference::SUPPLIED`] for one of another shot.
     pub frame: u32,
     /// Scene space.
-    pub(super) camera: Camera,
-    /// Edge of a pixel at distance 1.
-    pub(super) pixel_size: f64,
-    /// For each pixel the sample of what is seen there directly.
-    pub(super) slots: Vec<u32>,
+    pub(super) view: View,
+    /// For each pixel, block by block, the sample of what is seen there directly.
+    slots: Vec<u32>,
+    /// Those in the order of `slots`, then all others cell by cell of the index.
     pub(super) samples: Vec<Sample>,
-    /// For each sample the ratio in each channel; NaN where unknown.
-    pub(super) ratios: Vec<f32>,
-    /// How each of them changes from the sample to those beside it.
-    changes: Vec<Change>,
-    pub(super) channels: usize,
-    /// Samples that are no pixel's own: seen in mirrors, through glass, beside another surface.
+    /// For each sample what it knows in the channels after the first.
+    more: Vec<Known>,
+    channels: usize,
+    /// Samples that are no pixel's own.
     pub(super) index: Index,
 }
 
 impl Reference {
     /// What `traced` tells of frame `frame`, seen by `camera` (scene space).
     pub fn new(frame: u32, camera: &Camera, traced: &TracedPoints, channels: usize) -> Self {
-        let mut slots = vec![NONE; camera.width as usize * camera.height as usize];
-        let mut samples: Vec<Sample> = Vec::with_capacity(traced.points.len());
-        let mut ratios: Vec<f32> = Vec::with_capacity(traced.ratios.len());
-        let mut footprints: Vec<f32> = Vec::with_capacity(traced.points.len());
-        let mut others = Vec::new();
-        for (i, t) in traced.points.iter().enumerate() {
-            let own = &traced.ratios[i * channels..(i + 1) * channels];
-            let sample = Sample::of(&t.point);
-            let slot = &mut slots[t.y as usize * camera.width as usize + t.x as usize];
-            if t.point.direct && *slot != NONE && samples[*slot as usize].is_one_surface(&sample) {
-                let at = *slot as usize;
-                samples[at].join(&sample, &mut ratios[at * channels..(at + 1) * channels], own);
-                continue;
-            }
-            let is_own = t.point.direct
-                && (*slot == NONE || samples[*slot as usize].samples < sample.samples);
-            let at = samples.len() as u32;
-            if is_own {
-                let displaced = std::mem::replace(slot, at);
-                others.extend((displaced != NONE).then_some(displaced));
-            } else {
-                others.push(at);
-            }
-            samples.push(sample);
-            footprints.push(t.point.footprint);
-            ratios.extend_from_slice(own);
-        }
-        let pixel_size = camera.pixel_size();
-        let index = Index::new(&samples, &footprints, others);
-        let changes = Vec::new();
-        let mut reference = Self {
-            frame,
-            camera: *camera,
-            pixel_size,
-            slots,
-            samples,
-            ratios,
-            changes,
-            channels,
-            index,
+        let view = View::of(camera);
+        let gathered = Gathered::of(traced, channels, &view);
+        let changes = gathered.changes();
+        let known = |i: u32, channel: usize| {
+            let at = i as usize * channels + channel;
+            Known::of(gathered.ratios[at], changes[at])
         };
-        reference.changes = reference.measure_changes();
-        reference
-    }
-
-    /// How the ratios change around each sample: towards the nearest sample of its surface to the left,
-    /// the right, above and below, if that is no further than a few pixels.
-    fn measure_changes(&self) -> Vec<Change> {
-        let (channels, width) = (self.channels, self.camera.width as usize);
-        let rows = self.slots.par_chunks(width).enumerate().map(|(y, row)| {
-            let mut changes = Vec::new();
-            for (x, own) in row.iter().enumerate().filter(|(_, own)| **own != NONE) {
-                let axes = [(1, 0), (0, 1)]
-                    .map(|(dx, dy)| [self.beside(x, y, (dx, dy)), self.beside(x, y, (-dx, -dy))]);
-                let own = *own as usize;
-                changes.extend((0..channels).map(|channel| self.change_along(&axes, own, channel)));
+        let mut order = Vec::with_capacity(gathered.points.len());
+        let mut slots = vec![NONE; view.slots()];
+        for (y, row) in gathered.slots.chunks(view.size[0] as usize).enumerate() {
+            for (x, own) in row.iter().enumerate() {
+                slots[view.slot(x, y)] = *own;
             }
-            changes
+        }
+        for slot in slots.iter_mut().filter(|slot| **slot != NONE) {
+            order.push(*slot);
+            *slot = order.len() as u32 - 1;
+        }
+        let (index, members) = Index::new(&gathered.points, &gathered.others, order.len() as u32);
+        order.extend(members);
+        let samples = order.iter().map(|i| {
+            let first = if channels == 0 { Known::NOTHING } else { known(*i, 0) };
+            Sample::of(&gathered.points[*i as usize], first)
         });
-        let rows: Vec<Vec<Change>> = rows.collect();
-        let mut changes = vec![Change::UNKNOWN; self.ratios.len()];
-        for (row, found) in self.slots.chunks(width).zip(rows) {
-            let own = row.iter().filter(|own| **own != NONE);
-            for (own, found) in own.zip(found.chunks(channels.max(1))) {
-                changes[*own as usize * channels..][..channels].copy_from_slice(found);
-            }
-        }
-        changes
-    }
-
-    /// The nearest sample of the surface seen at (`x`, `y`) in a direction.
-    fn beside(&self, x: usize, y: usize, (dx, dy): (isize, isize)) -> Option<usize> {
-        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
-        let own = &self.samples[self.slots[y * width + x] as usize];
-        (1..=BESIDE).find_map(|k| {
-            let x = x.checked_add_signed(dx * k).filter(|x| *x < width)?;
-            let y = y.checked_add_signed(dy * k).filter(|y| *y < height)?;
-            let other = self.slots[y * width + x];
-            let is_one = other != NONE && self.samples[other as usize].is_one_surface(own);
-            is_one.then_some(other as usize)
-        })
-    }
-
-    /// How a ratio changes from sample `own` to those on both sides of it along two
-    /// axes.
-    fn change_along(&self, axes: &[[Option<usize>; 2]; 2], own: usize, channel: usize) -> Change {
-        let mut change = Change::UNKNOWN;
-        for axis in axes {
-            let [there, back] =
-                axis.map(|other| other.map_or(f32::NAN, |other| self.rise(own, other, channel)));
-            let slope = there.abs().max(back.abs());
-            change = change.max(Change { slope, bend: (there + back).abs() });
-        }
-        change
-    }
-
-    /// By how much a ratio rises from one sample to another, per footprint.
-    fn rise(&self, from: usize, to: usize, channel: usize) -> f32 {
-        let (a, b) = (&self.samples[from], &self.samples[to]);
-        let depth = (a.position() - self.camera.eye).dot(self.camera.forward);
-        let footprint = (depth * self.pixel_size) as f32;
-        let per_footprint = footprint / a.p.distance(b.p).max(footprint);
-        let [a, b] = [from, to].map(|i| self.ratios[i * self.channels + channel]);
-        (b - a) * per_footprint
+        let samples = samples.collect();
+        let more = order.iter().flat_map(|i| (1..channels).map(|channel| known(*i, channel)));
+        let more = more.collect();
+        Self { frame, view, slots, samples, more, channels, index }
     }
 
     /// Number of references that are frames of another shot: they count as earlier than all.
@@ -177,12 +205,12 @@ impl Reference {
 
     /// Its camera's eye, scene space.
     pub fn eye(&self) -> DVec3 {
-        self.camera.eye
+        self.view.eye
     }
 
     /// Its camera's view direction.
     pub fn forward(&self) -> DVec3 {
-        self.camera.forward
+        self.view.forward
     }
 
     /// How many samples it has.
@@ -197,45 +225,39 @@ impl Reference {
 
     /// Bytes that it holds.
     pub fn memory(&self) -> u64 {
-        let ratio = size_of::<f32>() + size_of::<Change>();
-        let sample = size_of::<Sample>() + ratio * self.channels;
-        (self.samples.len() * sample + 4 * self.slots.len()) as u64 + self.index.memory()
+        let samples = size_of_val(&self.samples[..]) + size_of_val(&self.more[..]);
+        (samples + size_of_val(&self.slots[..])) as u64 + self.index.memory()
     }
 
-    pub(super) fn change(&self, sample: u32, channel: usize) -> Change {
-        self.changes[sample as usize * self.channels + channel]
+    /// The sample of what is seen directly at a pixel; [`NONE`] outside the image too.
+    pub(super) fn seen_at(&self, x: i32, y: i32) -> u32 {
+        let [width, height] = self.view.size;
+        let is_inside = x >= 0 && y >= 0 && x < width && y < height;
+        if is_inside { self.slots[self.view.slot(x as usize, y as usize)] } else { NONE }
     }
 
-    pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {
-        self.ratios[sample as usize * self.channels + channel]
-    }
-}
-
-impl Sample {
-    fn of(point: &SurfacePoint) -> Self {
-        Self { p: point.p.as_vec3(), n: point.n, geom_id: point.geom_id, samples: point.samples }
-    }
-
-    fn is_one_surface(&self, other: &Self) -> bool {
-        self.geom_id == other.geom_id && self.n.dot(other.n) > SAME_SURFACE
-    }
-
-    /// Takes in more camera samples of the same pixel and surface.
-    fn join(&mut self, other: &Self, ratios: &mut [f32], others: &[f32]) {
-        let share = other.samples as f32 / (self.samples + other.samples) as f32;
-        self.p += (other.p - self.p) * share;
-        self.n = (self.n + (other.n - self.n) * share).normalize_or(self.n);
-        for (own, other) in ratios.iter_mut().zip(others) {
-            match (own.is_nan(), other.is_nan()) {
-                (true, _) => *own = *other,
-                (false, false) => *own += (other - *own) * share,
-                (false, true) => {}
-            }
+    /// What samples know in a channel.
+    pub(super) fn known(&self, samples: &[u32; 4], channel: usize) -> Known4 {
+        let [mut ratio, mut slope, mut bend] = [[0.0; 4]; 3];
+        for (k, sample) in samples.iter().enumerate() {
+            let own = self.known_by(*sample, channel);
+            ratio[k] = own.ratio;
+            slope[k] = own.slope.to_f32();
+            bend[k] = own.bend.to_f32();
         }
-        self.samples += other.samples;
+        Known4 { ratio: ratio.into(), slope: slope.into(), bend: bend.into() }
     }
 
-    pub(super) fn position(&self) -> DVec3 {
-        self.p.as_dvec3()
+    /// A sample's ratio in a channel; NaN where unknown.
+    pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {
+        self.known_by(sample, channel).ratio
+    }
+
+    #[inline]
+    fn known_by(&self, sample: u32, channel: usize) -> &Known {
+        match channel {
+            0 => &self.samples[sample as usize].first,
+            _ => &self.more[sample as usize * (self.channels - 1) + channel - 1],
+        }
     }
 }

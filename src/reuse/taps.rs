@@ -1,239 +1,294 @@
-//! The samples around a point in each reference: found by where the point is seen, or by place.
+//! The samples around a point in each reference, four at a time: found by where the point is seen, or by
+//! place.
+
+mod image;
+
+pub(super) use image::ALWAYS;
 
 use super::index::{Cells, level_of};
-use super::lookup::Lookup;
+use super::lookup::{Evidence, Lookup};
 use super::reference::{NONE, Reference, Sample};
 use crate::inference::SurfacePoint;
 use crate::math::Vec3;
+use wide::{CmpGe, CmpGt, CmpLe, f32x4};
 
-/// Samples that one point's answer is made of, at most.
-const MOST_TAPS: usize = 24;
+/// Lanes of four that one point's answer is made of, at most.
+const MOST: usize = 8;
 /// Levels of the index that are asked: a point's own, the finer and the coarser one.
 const LEVELS: usize = 3;
-/// References that are asked about every point.
-pub(super) const ALWAYS: usize = 2;
+
+/// Three coordinates of four places.
+type Vec3x4 = [f32x4; 3];
 
 /// A sample that lies on the point's surface.
 #[derive(Clone, Copy)]
 pub(super) struct Tap {
     pub reference: u32,
     pub sample: u32,
-    /// Of 1 that a whole reference gives.
-    pub weight: f32,
-    /// Weight in means: more alike than the weights, since that averages more of tracing's noise.
-    pub share: f32,
     /// From the point to the sample, footprints.
     pub apart: Vec3,
 }
 
+/// Up to four samples of one reference that lie on the point's surface; the others have no weight.
+#[derive(Clone, Copy)]
+pub(super) struct Taps4 {
+    pub reference: u32,
+    /// All of them can be read: those of no weight are another one once more.
+    pub samples: [u32; 4],
+    /// Of 1 that a whole reference gives.
+    pub weight: f32x4,
+    /// Weight in means: more alike than the weights, since that averages more of tracing's noise.
+    pub share: f32x4,
+    /// From the point to the sample, footprints.
+    pub apart: Vec3x4,
+    pub distance: f32x4,
+    /// Camera samples whose shadow rays each gathers.
+    pub camera_samples: f32x4,
+}
+
 /// The samples about a point.
 pub(super) struct Taps {
-    list: [Tap; MOST_TAPS],
+    list: [Taps4; MOST],
     len: usize,
+    /// Lanes of the last four that are taken.
+    lanes: usize,
     pub weight: f64,
+}
+
+/// A point as samples are compared with it: exact to an f32 of its distance to them, not of its place.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    p: Vec3,
+    /// What the rounding of `p` left over.
+    rest: Vec3,
+    n: Vec3,
+    geom_id: u32,
+}
+
+/// How four samples lie about a point; where they are not on its surface, all is 0.
+struct Near4 {
+    /// All bits set where they are.
+    is_near: f32x4,
+    apart: Vec3x4,
+    distance: f32x4,
+    /// 1 with the point's own normal, 0 where they are as far apart as can be.
+    alike: f32x4,
+    camera_samples: f32x4,
+}
+
+impl Taps4 {
+    const NONE: Self = Self {
+        reference: 0,
+        samples: [0; 4],
+        weight: f32x4::ZERO,
+        share: f32x4::ZERO,
+        apart: [f32x4::ZERO; 3],
+        distance: f32x4::ZERO,
+        camera_samples: f32x4::ZERO,
+    };
+
+    /// Those of `samples` that are `near` and have a weight; `None` where there is none.
+    fn new(reference: u32, mut samples: [u32; 4], weight: f32x4, near: &Near4) -> Option<Self> {
+        let weight = weight & near.is_near & weight.cmp_gt(f32x4::ZERO);
+        let some = weight.cmp_gt(f32x4::ZERO).move_mask();
+        let any = *samples.get(some.trailing_zeros() as usize)?;
+        for (k, sample) in samples.iter_mut().enumerate() {
+            *sample = if some >> k & 1 == 1 { *sample } else { any };
+        }
+        // To the power of 3/4.
+        let root = weight.sqrt();
+        let share = root * root.sqrt();
+        let Near4 { apart, distance, camera_samples, .. } = *near;
+        Some(Self { reference, samples, weight, share, apart, distance, camera_samples })
+    }
+
+    /// Writes lane `from` of `other` into lane `to`.
+    fn set(&mut self, to: usize, other: &Self, from: usize) {
+        self.samples[to] = other.samples[from];
+        let rows = |t: &Self| {
+            let [x, y, z] = t.apart;
+            [t.weight, t.share, x, y, z, t.distance, t.camera_samples].map(f32x4::to_array)
+        };
+        let (mut own, others) = (rows(self), rows(other));
+        own.iter_mut().zip(others).for_each(|(own, other)| own[to] = other[from]);
+        let [weight, share, x, y, z, distance, camera_samples] = own.map(f32x4::from);
+        (self.weight, self.share, self.apart) = (weight, share, [x, y, z]);
+        (self.distance, self.camera_samples) = (distance, camera_samples);
+    }
 }
 
 impl Taps {
     /// None yet.
     pub fn new() -> Self {
-        let none = Tap { reference: 0, sample: 0, weight: 0.0, share: 0.0, apart: Vec3::ZERO };
-        Self { list: [none; MOST_TAPS], len: 0, weight: 0.0 }
+        Self { list: [Taps4::NONE; MOST], len: 0, lanes: 4, weight: 0.0 }
     }
 
     fn clear(&mut self) {
-        self.len = 0;
-        self.weight = 0.0;
+        (self.len, self.lanes, self.weight) = (0, 4, 0.0);
     }
 
-    fn push(&mut self, reference: u32, sample: u32, weight: f32, apart: Vec3) {
-        if self.len < MOST_TAPS && weight > 0.0 {
-            // To the power of 3/4.
-            let share = weight.sqrt() * weight.sqrt().sqrt();
-            self.list[self.len] = Tap { reference, sample, weight, share, apart };
+    /// Takes in four lanes as they are.
+    fn push(&mut self, four: &Taps4) {
+        if self.len < MOST {
+            self.list[self.len] = *four;
             self.len += 1;
+            self.lanes = 4;
+            self.weight += f64::from(sum(four.weight));
+        }
+    }
+
+    /// Takes in those lanes that have weight, where the last four of the reference have room.
+    fn pack(&mut self, four: &Taps4) {
+        let weights = four.weight.to_array();
+        for (from, weight) in weights.into_iter().enumerate().filter(|(_, w)| *w > 0.0) {
+            if self.lanes == 4 || self.list[self.len - 1].reference != four.reference {
+                if self.len == MOST {
+                    return;
+                }
+                let samples = [four.samples[from]; 4];
+                let empty = Taps4 { reference: four.reference, samples, ..Taps4::NONE };
+                self.list[self.len] = empty;
+                (self.len, self.lanes) = (self.len + 1, 0);
+            }
+            self.list[self.len - 1].set(self.lanes, four, from);
+            self.lanes += 1;
             self.weight += f64::from(weight);
         }
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Tap> {
-        self.list[..self.len].iter()
+    /// Four by four.
+    pub fn fours(&self) -> &[Taps4] {
+        &self.list[..self.len]
+    }
+
+    /// One by one.
+    pub fn iter(&self) -> impl Iterator<Item = Tap> {
+        self.fours().iter().flat_map(|four| {
+            let ([x, y, z], weight) = (four.apart.map(f32x4::to_array), four.weight.to_array());
+            let lanes = (0..4).filter(move |k| weight[*k] > 0.0);
+            lanes.map(move |k| Tap {
+                reference: four.reference,
+                sample: four.samples[k],
+                apart: Vec3::new(x[k], y[k], z[k]),
+            })
+        })
     }
 }
 
-/// Where a point is seen in a reference.
-#[derive(Clone, Copy)]
-pub(super) struct Image {
-    /// Between the middles of the four pixels around it, pixels.
-    fx: f32,
-    fy: f32,
-    /// A pixel's edge there, scene units.
-    footprint: f32,
-    /// How far away samples count, footprints.
-    reach: f32,
-    /// The samples of the four pixels; [`NONE`] where there is none, or one of another mesh.
-    samples: [u32; 4],
-}
+impl Place {
+    pub fn of(point: &SurfacePoint) -> Self {
+        let p = point.p.as_vec3();
+        let rest = (point.p - p.as_dvec3()).as_vec3();
+        Self { p, rest, n: point.n, geom_id: point.geom_id }
+    }
 
-/// A point's images in the references that are asked about every point.
-pub(super) type Images = [Option<Image>; ALWAYS];
+    /// How `samples` lie about it, if any counts: of its mesh, with a normal like its own, within `reach`
+    /// footprints and hardly off its plane.
+    fn near(
+        &self,
+        reference: &Reference,
+        samples: &[u32; 4],
+        evidence: &Evidence,
+        (footprint, reach): (f32, f32),
+    ) -> Near4 {
+        let [mut x, mut y, mut z, mut nx, mut ny, mut nz, mut camera_samples] = [[0.0; 4]; 7];
+        for (k, sample) in samples.iter().enumerate() {
+            // A lane that stays 0 has no normal like any.
+            let found = reference.samples.get(*sample as usize);
+            if let Some(s) = found.filter(|s| s.geom_id == self.geom_id) {
+                [x[k], y[k], z[k]] = [s.p.x, s.p.y, s.p.z];
+                [nx[k], ny[k], nz[k]] = s.normal();
+                camera_samples[k] = f32::from(s.samples);
+            }
+        }
+        let by = f32x4::splat(1.0 / footprint);
+        let away = |at: [f32; 4], p: f32, rest: f32| {
+            ((f32x4::from(at) - f32x4::splat(p)) - f32x4::splat(rest)) * by
+        };
+        let apart = [
+            away(x, self.p.x, self.rest.x),
+            away(y, self.p.y, self.rest.y),
+            away(z, self.p.z, self.rest.z),
+        ];
+        let n = [f32x4::splat(self.n.x), f32x4::splat(self.n.y), f32x4::splat(self.n.z)];
+        let cos = dot([nx.into(), ny.into(), nz.into()], n) * f32x4::splat(1.0 / Sample::UNIT);
+        let distance = dot(apart, apart).sqrt();
+        let allowed = f32x4::splat(evidence.slope) * distance + f32x4::splat(evidence.height);
+        let least = f32x4::splat(evidence.least_cos);
+        let is_near = cos.cmp_ge(least)
+            & distance.cmp_le(f32x4::splat(reach))
+            & dot(apart, n).abs().cmp_le(allowed);
+        let alike = (cos - least) * f32x4::splat(1.0 / (1.0 - evidence.least_cos));
+        let [x, y, z] = apart;
+        Near4 {
+            is_near,
+            apart: [x & is_near, y & is_near, z & is_near],
+            distance: distance & is_near,
+            alike: alike.fast_min(f32x4::ONE) & is_near,
+            camera_samples: f32x4::from(camera_samples) & is_near,
+        }
+    }
+}
 
 impl Lookup<'_> {
-    /// Finds the images of those of `points` that `is_wanted` wants.
-    ///
-    /// In two passes, each over all points: most of a lookup's time is waiting for memory, and reads
-    /// that do not depend on one another are waited for together.
-    pub(super) fn find_images(
-        &self,
-        points: &[SurfacePoint],
-        is_wanted: impl Fn(usize) -> bool,
-        images: &mut [Images],
-    ) {
-        for (k, reference) in self.references.iter().take(ALWAYS).enumerate() {
-            for (i, point) in points.iter().enumerate() {
-                let wanted = is_wanted(i).then(|| self.image(reference, point));
-                images[i][k] = wanted.flatten();
-            }
-        }
-        for (k, reference) in self.references.iter().take(ALWAYS).enumerate() {
-            for (images, point) in images.iter_mut().zip(points) {
-                images[k].iter_mut().for_each(|image| image.keep_mesh(reference, point.geom_id));
-            }
-        }
-    }
-
-    /// Gathers the samples about `point`, whose `images` are found, in `taps`.
-    pub(super) fn gather(&self, point: &SurfacePoint, images: &Images, taps: &mut Taps) {
+    /// Gathers the samples about `point` in `taps`, whose samples in the first references are `found`.
+    pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
-        for (number, reference) in self.references.iter().enumerate() {
-            let image = match images.get(number) {
-                Some(image) => *image,
-                None if taps.weight >= self.evidence.enough_weight => break,
-                None => self.image(reference, point),
-            };
-            if let Some(image) = image {
-                self.screen_taps((number as u32, reference), point, &image, taps);
+        found.iter().flatten().for_each(|four| taps.push(four));
+        let place = Place::of(point);
+        for (number, reference) in self.references.iter().enumerate().skip(ALWAYS) {
+            if taps.weight >= self.evidence.enough_weight {
+                return;
             }
+            let image = self.image(reference, point);
+            let four = image.and_then(|image| self.screen_taps(number, &place, &image));
+            four.iter().for_each(|four| taps.push(four));
         }
         if !point.direct && taps.weight < self.evidence.enough_weight {
             let own = level_of(point.footprint);
             let cells =
                 [own, own - 1, own + 1].map(|level| Cells::around(level, point.geom_id, point.p));
-            for (number, reference) in self.references.iter().enumerate() {
+            for number in 0..self.references.len() {
                 if taps.weight >= self.evidence.enough_weight {
-                    break;
+                    return;
                 }
-                self.index_taps((number as u32, reference), point, &cells, taps);
+                self.index_taps(number, (&place, point.footprint), &cells, taps);
             }
         }
     }
 
-    /// Where the point is seen in the reference, if that samples finely enough there.
-    fn image(&self, reference: &Reference, point: &SurfacePoint) -> Option<Image> {
-        let camera = &reference.camera;
-        let (x, y, depth) = camera.project(point.p)?;
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-        if !(left >= -1.0 && top >= -1.0 && left < width && top < height) {
-            return None;
-        }
-        let to_eye = camera.eye - point.p;
-        let cos = (point.n.as_dvec3().dot(to_eye) / to_eye.length()).max(0.02);
-        let footprint = depth * reference.pixel_size;
-        let own = f64::from(point.footprint);
-        let own_area = own * own / if point.direct { f64::from(point.cos).max(0.02) } else { 1.0 };
-        if footprint * footprint / cos > self.evidence.coarser * own_area {
-            return None;
-        }
-        let mut samples = [NONE; 4];
-        for (k, sample) in samples.iter_mut().enumerate() {
-            let (tx, ty) = (left + (k & 1) as f64, top + (k >> 1) as f64);
-            if tx >= 0.0 && ty >= 0.0 && tx < width && ty < height {
-                *sample = reference.slots[ty as usize * camera.width as usize + tx as usize];
-            }
-        }
-        let reach = (2.0 / cos.max(self.evidence.grazing)) as f32;
-        let (fx, fy) = ((x - left) as f32, (y - top) as f32);
-        Some(Image { fx, fy, footprint: footprint as f32, reach, samples })
-    }
-
-    /// The four samples around the point's image in the reference.
-    fn screen_taps(
-        &self,
-        (number, reference): (u32, &Reference),
-        point: &SurfacePoint,
-        image: &Image,
-        taps: &mut Taps,
-    ) {
-        let Image { fx, fy, footprint, reach, samples } = *image;
-        for (k, sample) in samples.into_iter().enumerate().filter(|(_, sample)| *sample != NONE) {
-            let s = &reference.samples[sample as usize];
-            let Some(near) = self.on_surface(point, s, footprint, reach) else { continue };
-            let wx = if k & 1 == 1 { fx } else { 1.0 - fx };
-            let wy = if k >> 1 == 1 { fy } else { 1.0 - fy };
-            let weight = wx * wy * near.alike * near.alike;
-            taps.push(number, sample, weight, near.apart);
-        }
-    }
-
-    /// Samples in the `cells` around the point.
+    /// Samples of a reference in the `cells` around a point.
     fn index_taps(
         &self,
-        (number, reference): (u32, &Reference),
-        point: &SurfacePoint,
+        number: usize,
+        (place, footprint): (&Place, f32),
         cells: &[Cells; LEVELS],
         taps: &mut Taps,
     ) {
+        let reference = self.references[number];
         for cells in cells {
-            let reach = cells.edge as f32 / point.footprint;
-            for sample in reference.index.members(cells) {
-                let s = &reference.samples[sample as usize];
-                let Some(near) = self.on_surface(point, s, point.footprint, reach) else {
-                    continue;
-                };
-                let weight = 0.5 * (1.0 - near.distance / reach);
-                taps.push(number, sample, weight, near.apart);
+            let reach = cells.edge as f32 / footprint;
+            let mut members = reference.index.members(cells);
+            while let Some(first) = members.next() {
+                let mut samples = [first, NONE, NONE, NONE];
+                samples[1..].iter_mut().zip(&mut members).for_each(|(to, sample)| *to = sample);
+                let near = place.near(reference, &samples, &self.evidence, (footprint, reach));
+                let weight = f32x4::splat(0.5) - near.distance * f32x4::splat(0.5 / reach);
+                if let Some(four) = Taps4::new(number as u32, samples, weight, &near) {
+                    taps.pack(&four);
+                }
             }
         }
     }
-
-    /// Where a sample lies, if on the point's own surface and within `reach` footprints.
-    fn on_surface(
-        &self,
-        point: &SurfacePoint,
-        s: &Sample,
-        footprint: f32,
-        reach: f32,
-    ) -> Option<Near> {
-        let least = self.evidence.least_cos;
-        let cos = s.n.dot(point.n);
-        if s.geom_id != point.geom_id || cos < least {
-            return None;
-        }
-        let apart = (s.position() - point.p).as_vec3() / footprint;
-        let distance = apart.length();
-        let height = apart.dot(point.n).abs();
-        let allowed = self.evidence.height + self.evidence.slope * distance;
-        let alike = ((cos - least) / (1.0 - least)).min(1.0);
-        (distance <= reach && height <= allowed).then_some(Near { apart, distance, alike })
-    }
 }
 
-/// A sample on the point's surface.
-struct Near {
-    /// From the point, footprints.
-    apart: Vec3,
-    distance: f32,
-    /// 1 with the point's own normal, 0 where they are as far apart as can be.
-    alike: f32,
+/// Products of four vectors with four others.
+fn dot(a: Vec3x4, b: Vec3x4) -> f32x4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-impl Image {
-    fn keep_mesh(&mut self, reference: &Reference, geom_id: u32) {
-        for sample in self.samples.iter_mut().filter(|sample| **sample != NONE) {
-            if reference.samples[*sample as usize].geom_id != geom_id {
-                *sample = NONE;
-            }
-        }
-    }
+/// Sum of the lanes, in one order on every machine.
+pub(super) fn sum(lanes: f32x4) -> f32 {
+    let [a, b, c, d] = lanes.to_array();
+    (a + b) + (c + d)
 }

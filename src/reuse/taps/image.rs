@@ -1,0 +1,96 @@
+//! Where a point is seen in a reference, and the samples there.
+
+use super::{Place, Taps4};
+use crate::inference::SurfacePoint;
+use crate::reuse::lookup::{Lookup, TOGETHER};
+use crate::reuse::reference::Reference;
+use wide::f32x4;
+
+/// References that are asked about every point.
+pub(in crate::reuse) const ALWAYS: usize = 2;
+
+/// Where a point is seen in a reference.
+#[derive(Clone, Copy)]
+pub(super) struct Image {
+    /// Between the middles of the four pixels around it, pixels.
+    fx: f32,
+    fy: f32,
+    /// A pixel's edge there, scene units.
+    footprint: f32,
+    /// How far away samples count, footprints.
+    reach: f32,
+    /// The samples of the four pixels; no sample's number where there is none.
+    samples: [u32; 4],
+}
+
+/// A point's images in the references that are asked about every point.
+type Images = [Option<Image>; ALWAYS];
+
+impl Lookup<'_> {
+    /// Finds the samples about those of `points` that `is_wanted` wants, in the references that are asked
+    /// about every point.
+    ///
+    /// In two passes, each over all points: most of a lookup's time is waiting for memory, and reads
+    /// that do not depend on one another are waited for together.
+    pub(in crate::reuse) fn find(
+        &self,
+        points: &[SurfacePoint],
+        is_wanted: impl Fn(usize) -> bool,
+        found: &mut [[Option<Taps4>; ALWAYS]],
+    ) {
+        let mut images: [Images; TOGETHER] = [[None; ALWAYS]; TOGETHER];
+        for (k, reference) in self.references.iter().take(ALWAYS).enumerate() {
+            for (i, point) in points.iter().enumerate() {
+                images[i][k] = is_wanted(i).then(|| self.image(reference, point)).flatten();
+            }
+        }
+        for ((point, images), found) in points.iter().zip(&images).zip(found) {
+            let place = Place::of(point);
+            for (k, (image, found)) in images.iter().zip(found).enumerate() {
+                *found = image.as_ref().and_then(|image| self.screen_taps(k, &place, image));
+            }
+        }
+    }
+
+    /// Where the point is seen in the reference, if that samples finely enough there.
+    pub(super) fn image(&self, reference: &Reference, point: &SurfacePoint) -> Option<Image> {
+        let view = &reference.view;
+        let to = point.p - view.eye;
+        let depth = to.dot(view.forward);
+        let per_depth = 1.0 / depth;
+        let x = view.middle[0] + to.dot(view.right) * per_depth;
+        let y = view.middle[1] - to.dot(view.up) * per_depth;
+        let [width, height] = view.size;
+        // NaN is nowhere.
+        let is_seen = x >= -1.0 && y >= -1.0 && x < f64::from(width) && y < f64::from(height);
+        if !(is_seen && depth > 0.0) {
+            return None;
+        }
+        let to = to.as_vec3();
+        let cos = (-point.n.dot(to) / to.length()).max(0.02);
+        let footprint = depth * view.pixel_size;
+        let own = f64::from(point.footprint);
+        let own_cos = if point.direct { f64::from(point.cos).max(0.02) } else { 1.0 };
+        if footprint * footprint * own_cos > self.evidence.coarser * own * own * f64::from(cos) {
+            return None;
+        }
+        // One up, so that rounding towards zero is rounding down.
+        let (left, top) = ((x + 1.0) as i32 - 1, (y + 1.0) as i32 - 1);
+        let seen_at = |dx, dy| reference.seen_at(left + dx, top + dy);
+        let samples = [seen_at(0, 0), seen_at(1, 0), seen_at(0, 1), seen_at(1, 1)];
+        let reach = 2.0 / cos.max(self.evidence.grazing as f32);
+        let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
+        Some(Image { fx, fy, footprint: footprint as f32, reach, samples })
+    }
+
+    /// The four samples around a point's image in a reference.
+    pub(super) fn screen_taps(&self, number: usize, place: &Place, image: &Image) -> Option<Taps4> {
+        let Image { fx, fy, footprint, reach, samples } = *image;
+        let reference = self.references[number];
+        let near = place.near(reference, &samples, &self.evidence, (footprint, reach));
+        let across = f32x4::from([1.0 - fx, fx, 1.0 - fx, fx]);
+        let down = f32x4::from([1.0 - fy, 1.0 - fy, fy, fy]);
+        let weight = across * down * near.alike * near.alike;
+        Taps4::new(number as u32, samples, weight, &near)
+    }
+}
