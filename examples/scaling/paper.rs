@@ -32,7 +32,7 @@ const ALONE: [(u32, f64); 9] = [
 /// Table 4: frames on 32 ranks.
 const THIRTY_TWO: [(u32, f64); 4] = [(32, 30.9), (64, 41.6), (128, 69.2), (256, 146.5)];
 /// The paper's settings; one camera sample a pixel, since it does not say.
-const WORDS: &str = "--size 400x300 --spp 1 --shadow-samples 1";
+const WORDS: &str = "--size 400x300 --spp 1 --shadow-samples 1 --segment 64";
 const SEGMENT: u32 = 64;
 
 /// Ours, as measured and as played.

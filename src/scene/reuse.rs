@@ -28,7 +28,7 @@ impl Default for ReuseSettings {
     fn default() -> Self {
         Self {
             policy: Policy::Surface,
-            segment: 64,
+            segment: 128,
             tolerance: 1.0,
             audit: 0.03,
             max_rmse: None,
