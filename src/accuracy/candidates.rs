@@ -68,7 +68,7 @@ impl List<'_> {
         }
         // A segment longer than the move is one as long as it.
         let cut = |segment: u32| segment.min(self.frames);
-        let others = [16, 256].into_iter().filter(|s| cut(*s) != cut(self.base.reuse.segment));
+        let others = [16, 64, 512].into_iter().filter(|s| cut(*s) != cut(self.base.reuse.segment));
         for segment in others.collect::<Vec<u32>>() {
             let options = format!("--segment {segment}");
             self.add(Knob::Segment, options, |s| s.reuse.segment = segment);
