@@ -79,6 +79,27 @@ fn what_lies_on_the_surface_is_told_exactly() {
 }
 
 #[test]
+fn what_is_seen_in_mirrors_is_told_by_place_by_all_that_know() {
+    let ratio = |x: u32, y: u32| if y % 2 == 1 { f32::NAN } else { 0.25 + 0.5 * (x % 2) as f32 };
+    let mut traced = TracedPoints::default();
+    for (x, y) in (0..EDGE).flat_map(|y| (0..EDGE).map(move |x| (x, y))) {
+        let point = on_wall(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        traced.points.push(TracedPoint { x, y, point: SurfacePoint { direct: false, ..point } });
+        traced.ratios.push(ratio(x, y));
+    }
+    let reference = Reference::new(1, &camera(), &traced, 1);
+    let asked =
+        |point| told(&reference, point, Evidence { tolerance: 255.0, ..Evidence::default() });
+    let mirrored = SurfacePoint { direct: false, ..on_wall(30.1, 31.2) };
+    let mean = asked(mirrored);
+    assert!((0.4..0.6).contains(&mean), "{mean}");
+    // No pixel's own sample, so only by place.
+    assert!(asked(SurfacePoint { direct: true, ..mirrored }).is_nan());
+    assert!(asked(SurfacePoint { geom_id: 1, ..mirrored }).is_nan());
+    assert!(asked(SurfacePoint { n: Vec3::X, ..mirrored }).is_nan());
+}
+
+#[test]
 fn another_mesh_tells_nothing() {
     let point = SurfacePoint { geom_id: 1, ..on_wall(30.2, 31.7) };
     assert!(told(&wall(|_| 1.0), point, Evidence::default()).is_nan());
