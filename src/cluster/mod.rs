@@ -18,6 +18,7 @@ mod launcher;
 mod mpi;
 mod nodes;
 mod note;
+mod parcel;
 pub mod simulation;
 mod traffic;
 mod worker;
@@ -29,16 +30,24 @@ pub use traffic::{Sent, Traffic};
 
 use crate::error::{Error, Result};
 use launcher::Launcher;
-use note::{Cargo, Kind};
+use note::Kind;
+use parcel::Parcel;
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
+use std::sync::Arc;
 use std::time::Duration;
+
+/// How many discoveries a message carries at most, unless told; docs/decisions/019-ranks.md has the
+/// measurement.
+pub const EXCHANGE: u64 = 1_000_000;
 
 /// This process's place in the job.
 pub struct World {
     ranks: Ranks,
     /// What this rank sent, so far.
     sent: Cell<Traffic>,
+    /// How many discoveries a message carries at most.
+    exchange: Cell<u64>,
     /// Whether this rank failed and could not tell the others.
     is_stranded: Cell<bool>,
 }
@@ -56,7 +65,23 @@ impl World {
     }
 
     fn of(ranks: Ranks) -> Self {
-        Self { ranks, sent: Cell::default(), is_stranded: Cell::default() }
+        Self {
+            ranks,
+            sent: Cell::default(),
+            exchange: Cell::new(EXCHANGE),
+            is_stranded: Cell::default(),
+        }
+    }
+
+    /// From here on a message carries so many discoveries at most. It decides when bytes arrive, never
+    /// which.
+    pub fn set_exchange(&self, discoveries: u64) {
+        self.exchange.set(discoveries);
+    }
+
+    /// What stands for so many discoveries, as it will travel.
+    fn parcel(&self, bytes: Arc<[u8]>, discoveries: u64) -> Parcel {
+        Parcel::cut(bytes, discoveries, self.exchange.get())
     }
 
     /// Joins the ranks that a launcher started with this one; alone without a launcher.
@@ -172,14 +197,27 @@ impl World {
     fn post<T: Serialize>(&self, to: u32, note: &T) -> Result<()> {
         let bytes = encode(note)?;
         self.count(|sent| sent.note(bytes.len()));
-        self.send(to, false, bytes)
+        self.send(to, false, bytes.into())
     }
 
-    /// Sends a cargo to rank `to` without waiting for it to be taken in.
-    fn ship(&self, to: u32, kind: Kind, original: u32, number: u32, bytes: &[u8]) -> Result<()> {
-        let bytes = Cargo::encode(kind, original, number, bytes);
-        self.count(|sent| sent.cargo(kind, bytes.len()));
-        self.send(to, true, bytes)
+    /// Sends a parcel to the ranks `to` without waiting for it to be taken in.
+    fn ship(
+        &self,
+        to: &[u32],
+        kind: Kind,
+        original: u32,
+        number: u32,
+        parcel: &Parcel,
+    ) -> Result<()> {
+        for bytes in parcel.messages(kind, original, number) {
+            // One copy for all of them.
+            let bytes: Arc<[u8]> = bytes.into();
+            for rank in to {
+                self.count(|sent| sent.cargo(kind, bytes.len()));
+                self.send(*rank, true, Arc::clone(&bytes))?;
+            }
+        }
+        Ok(())
     }
 
     fn count(&self, count: impl FnOnce(&mut Traffic)) {
@@ -193,7 +231,7 @@ impl World {
         self.sent.get()
     }
 
-    fn send(&self, to: u32, is_cargo: bool, bytes: Vec<u8>) -> Result<()> {
+    fn send(&self, to: u32, is_cargo: bool, bytes: Arc<[u8]>) -> Result<()> {
         match &self.ranks {
             // There is nobody to send to.
             Ranks::Solo => {

@@ -19,6 +19,7 @@ mod saved;
 
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
+use super::saved::{Keeps, Saved};
 use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Film, Image, PixelSource, Provenance};
@@ -64,7 +65,7 @@ struct State {
     known: BTreeMap<u32, Arc<Known>>,
     /// The most that all of it took at a time, bytes.
     most_memory: u64,
-    saved: saved::Saved,
+    saved: Saved<Arc<Known>>,
 }
 
 impl<'a> ColourMaker<'a> {
@@ -179,8 +180,14 @@ impl<'a> ColourMaker<'a> {
             return Ok(Some(found));
         }
         let Some((_, known)) = self.frame(frame)? else { return Ok(None) };
-        self.made(frame);
-        Ok(Some(self.keep(known)))
+        Ok(Some(self.made(known)))
+    }
+
+    /// What a frame discovered that was just made, which is worth keeping on disk too.
+    fn made(&self, known: Known) -> Arc<Known> {
+        let known = self.keep(known);
+        self.with_state(|s| s.saved.add(known.frame, Arc::clone(&known)));
+        known
     }
 
     fn keep(&self, known: Known) -> Arc<Known> {
@@ -211,10 +218,9 @@ impl<'a> ColourMaker<'a> {
 impl FrameMaker for ColourMaker<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
         let Some((made, known)) = self.frame(frame)? else { return Ok(None) };
-        self.keep(known);
-        self.made(frame);
+        self.made(known);
         self.forget(frame);
-        self.tend(false)?;
+        self.put_away(false)?;
         Ok(Some(made))
     }
 
@@ -230,7 +236,7 @@ impl FrameMaker for ColourMaker<'_> {
     }
 
     fn stopped(&self) -> Result<()> {
-        self.tend(true)
+        self.put_away(true)
     }
 
     fn notes(&self) -> Vec<String> {

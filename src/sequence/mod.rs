@@ -31,7 +31,7 @@ pub use pyramid::Pyramid;
 pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{Plan, Target, prepare};
 pub use schedule::Schedule;
-pub use shared::{Laid, Shared, Strip};
+pub use shared::{Laid, Left, Shared, Strip};
 pub use supplied::{Card, Supply};
 pub use tracer::Tracer;
 

@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// The scene of the repository with its large meshes made small.
-fn small(job: &Job, name: &str) -> String {
+pub fn small(job: &Job, name: &str) -> String {
     let path = format!("{}/scenes/{name}/scene.toml", env!("CARGO_MANIFEST_DIR"));
     let mut text = fs::read_to_string(path).expect("a scene");
     for (large, little) in [
@@ -96,6 +96,35 @@ fn exr_files_crops_bounds_and_other_policies_are_the_same_too() {
         assert_eq!(discoveries > 0, more.contains("colour"), "{more}");
         assert_eq!(discoveries % 6, 0, "{more}");
     }
+}
+
+/// However few discoveries a message carries, by word or by scene file: more of them, and the same bytes.
+#[test]
+fn what_an_exchange_carries_changes_no_byte() {
+    let job = Job::new();
+    let scene = small(&job, "reflective_spheres");
+    let text = fs::read_to_string(job.path(&scene)).expect("a scene");
+    let own = text.replace("[settings]", "[settings]\nexchange = 300");
+    assert_ne!(own, text);
+    fs::write(job.path("own.toml"), own).expect("written");
+    for (policy, kind) in [("surface", "references"), ("colour", "discoveries")] {
+        let line = |scene: &str, more: &str| {
+            format!(
+                "render {scene} --size 64x48 --spp 1 --frames 1..9 --segment 4 --policy {policy} \
+                 --no-video --quiet {more}"
+            )
+        };
+        let mut sizes = Vec::new();
+        for line in [line(&scene, ""), line(&scene, "--exchange 100"), line("own.toml", "")] {
+            let Some(stats) = same_bytes(&job, &line, "png", &[(3, 1)]) else { return };
+            let (messages, bytes) = (sent(&stats, kind, "messages"), sent(&stats, kind, "bytes"));
+            assert!(messages > 0, "{line}");
+            sizes.push(bytes / messages);
+        }
+        // 3,072 pixels and more in one, in messages of 100 and of 300.
+        assert!(sizes[1] < sizes[2] && 2 * sizes[2] < sizes[0], "{policy}: {sizes:?}");
+    }
+    job.refused(&format!("render {scene} --exchange 0"), "--exchange");
 }
 
 #[test]
