@@ -47,6 +47,7 @@ impl Stage {
     }
 
     /// A hash of all frames of the last job.
+    #[allow(dead_code, reason = "for benches/ranks.rs")]
     pub fn frames(&self) -> blake3::Hash {
         let entries = std::fs::read_dir(self.folder.path().join("out")).unwrap().flatten();
         let paths = entries.map(|entry| entry.path());
@@ -80,6 +81,7 @@ impl Stage {
     }
 
     /// Runs the job until `frames` of its frames are there, and kills it; seconds of a core.
+    #[allow(dead_code, reason = "for benches/ranks.rs")]
     pub fn kill_after(&self, line: &Line, frames: usize) -> f64 {
         let out = self.folder.path().join("out");
         _ = std::fs::remove_dir_all(&out);

@@ -1,7 +1,8 @@
 //! What all ranks do together before and after the frames: they agree, tell each other, and share what
 //! one of them read.
 
-use super::{World, decode, encode};
+use super::World;
+use super::post::{decode, encode};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
