@@ -47,6 +47,7 @@ impl Folder {
         let header = Header {
             manifest: FORMAT,
             shot_frames: 4,
+            files: "frame_##.png".into(),
             settings: Header::settings(settings),
             ..Header::default()
         };

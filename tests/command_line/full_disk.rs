@@ -1,7 +1,6 @@
 //! A disk that is full in the middle of a job.
 
 use super::job::Job;
-use std::fs;
 use std::process::Command;
 
 /// Runs the program with a disk of its own at `disk` that has room for a few frames, then once more
@@ -43,7 +42,6 @@ fn a_full_disk_ends_the_job_and_what_is_finished_stays() {
             (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert!(out.contains("ended with 1 and 0"), "{line}: {out}\n{err}");
         assert!(err.contains("No space left"), "{err}");
-        assert!(!out.contains(" 0 kept") || job.names("before").is_empty(), "{out}");
         for folder in ["before", "after"] {
             let is_frame = |name: &String| name.ends_with(ending);
             for name in job.names(folder).into_iter().filter(is_frame) {
@@ -52,8 +50,11 @@ fn a_full_disk_ends_the_job_and_what_is_finished_stays() {
                 assert!(same, "{line}: {folder}/{name}");
             }
         }
-        assert_eq!(job.names("after"), job.names("whole"));
-        assert!(job.names("before").len() < job.names("whole").len());
-        _ = fs::remove_dir_all(job.path("disk"));
+        let frames = |folder: &str| {
+            let names = job.names(folder).into_iter();
+            names.filter(|name| name.starts_with("f_")).collect::<Vec<_>>()
+        };
+        assert_eq!(frames("after"), frames("whole"));
+        assert!(frames("before").len() < frames("whole").len());
     }
 }
