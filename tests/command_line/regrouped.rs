@@ -72,7 +72,8 @@ fn a_killed_job_goes_on_with_any_number_of_ranks() {
         let Some(ran) = under_mpirun(&job, 2, &line("k")) else { return };
         assert_eq!(ran.code, Some(0), "{}", ran.err);
         assert_same(&job, "k", ending, true);
-        assert!(!job.path("k/.f.references").exists(), "references are left");
+        let left = job.path("k/.f.references");
+        assert!(!left.exists(), "{more}: references are left: {:?}", job.names("k/.f.references"));
         job.done("status k --frames 1..20");
     }
 }

@@ -110,8 +110,8 @@ fn what_an_exchange_carries_changes_no_byte() {
     for (policy, kind) in [("surface", "references"), ("colour", "discoveries")] {
         let line = |scene: &str, more: &str| {
             format!(
-                "render {scene} --size 64x48 --spp 1 --frames 1..9 --segment 4 --policy {policy} \
-                 --no-video --quiet {more}"
+                "render {scene} --size 64x48 --spp 1 --shadow-samples 16 --frames 1..9 --segment 4 \
+                 --policy {policy} --no-video --quiet {more}"
             )
         };
         let mut sizes = Vec::new();
