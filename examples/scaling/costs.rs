@@ -2,7 +2,6 @@
 
 use crate::real::{Line, Ran, Stage};
 use tweenray::cluster::simulation::{Model, Table};
-use tweenray::scene::limits::MAX_EXCHANGE;
 use tweenray::sequence::Pyramid;
 
 /// What is given, not measured: a cluster whose nodes have 64 ranks and 100 Gbit/s each.
@@ -66,11 +65,8 @@ impl Costs {
 
     /// Bytes of references and of the paper's discoveries, by two ranks that make a few frames.
     pub fn weigh(&mut self, stage: &Stage, words: &str) {
-        let line = |words: String| {
-            // A reference a message.
-            let words = format!("{words} --exchange {MAX_EXCHANGE}");
-            Line { ranks: 2, threads: 1, frames: self.pyramid.frames, words }
-        };
+        let line =
+            |words: String| Line { ranks: 2, threads: 1, frames: self.pyramid.frames, words };
         let ran = stage.run(&line(format!("{words} --segment 2 --frames 1..5")));
         self.reference_bytes = ran.size("references");
         // A reference holds what was traced, so strips hold as much and the colours beside it.

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use tweenray::scene::limits::MAX_EXCHANGE;
 
 /// A scene with as many frames as a job asks for, in a folder of its own, which goes with it.
 pub struct Stage {
@@ -144,6 +145,10 @@ impl Stage {
         };
         command.args(["render", "scene.toml", "-o", "out/f_####.png", "--no-video", "-q"]);
         command.args(["--threads", &line.threads.to_string(), "--stats", "stats.json"]);
+        if !line.words.contains("--exchange") {
+            // What a frame left in one message, so that messages are counted as the model does.
+            command.args(["--exchange", &MAX_EXCHANGE.to_string()]);
+        }
         command.args(line.words.split_whitespace());
         command.current_dir(folder).stdout(Stdio::null());
         command

@@ -268,7 +268,7 @@ pub struct OutputArgs {
     #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
     pub checkpoint: Option<Interval>,
     /// Of several ranks of an MPI job: how many discoveries (points or pixels that one traced and others
-    /// use) a message carries at most [default: 1000000]
+    /// use) a message carries at most [default: 100000]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_EXCHANGE))]
     pub exchange: Option<u32>,
     /// Write what the job took to this file, as JSON

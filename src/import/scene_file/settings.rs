@@ -97,7 +97,7 @@ pub(super) struct Settings {
     /// again: "30s", "5m", "off". Absent: every 30 s.
     checkpoint: Option<TimeOrOff>,
     /// How many discoveries (points or pixels that one rank of an MPI job traced and others use) a
-    /// message to another rank carries at most. Absent: 1000000.
+    /// message to another rank carries at most. Absent: 100000.
     exchange: Option<Int<1, { limits::MAX_EXCHANGE as i64 }>>,
 }
 
