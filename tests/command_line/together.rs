@@ -213,8 +213,10 @@ fn a_killed_rank_ends_the_job_and_the_same_command_goes_on() {
     }
 }
 
-/// What a rank sends for a frame does not grow with the number of ranks, from 2 to 64 of them. (Of
-/// references alone two ranks send half as much as many: each end of the path has one neighbour, not two.)
+/// What a rank sends for a frame does not grow with the number of ranks, from 2 to 64 of them. What rank 0
+/// makes nobody is told of, since it keeps the table, and at one end of the path there is no neighbour: so
+/// of all ranks one has nothing to send, which is half of two and little of many. What the others send
+/// for a frame is the same within a fifth, and so are the messages for each of them.
 /// Minutes, so only by name:
 /// `cargo test --release --features mpi --test command_line -- --ignored --nocapture bytes_sent`
 #[test]
@@ -223,8 +225,10 @@ fn bytes_sent_for_a_frame_do_not_grow_with_the_ranks() {
     let job = Job::new();
     let scene = small(&job, "reflective_spheres");
     let text = fs::read_to_string(job.path(&scene)).expect("a scene");
-    println!("       a rank and frame, bytes                          all ranks");
-    println!("ranks    all  references  strips  notes  most of a rank  messages  a rank  a frame");
+    println!("       bytes a rank and frame                                   messages");
+    println!(
+        "ranks    all  references  strips  notes  but for one  most     all  a rank but for one"
+    );
     let mut rows = Vec::new();
     for ranks in [2, 4, 8, 16, 32, 64] {
         // Each rank gets four segments.
@@ -245,14 +249,15 @@ fn bytes_sent_for_a_frame_do_not_grow_with_the_ranks() {
         let each = stats["ranks"].as_array().expect("ranks").iter();
         let most = each.map(own).fold(0.0, f64::max) / 64.0;
         let all: f64 = bytes.iter().sum();
-        let (a_rank, a_frame) =
-            (messages as f64 / f64::from(ranks), messages as f64 / f64::from(count));
+        let others = f64::from(ranks - 1);
+        let a_rank = messages as f64 / others;
+        let but_one = all * f64::from(ranks) / others;
         println!(
-            "{ranks:5}  {all:5.0}  {:10.0}  {:6.0}  {:5.0}  {most:14.0}  {messages:8}  {a_rank:6.1}  \
-             {a_frame:7.2}",
+            "{ranks:5}  {all:5.0}  {:10.0}  {:6.0}  {:5.0}  {but_one:11.0}  {most:4.0}  {messages:6}  \
+             {a_rank:6.1}",
             bytes[0], bytes[1], bytes[2]
         );
-        rows.push((all, a_rank));
+        rows.push((but_one, a_rank));
         fs::remove_dir_all(job.path("o")).expect("removed");
     }
     let spread = |of: fn(&(f64, f64)) -> f64| {
@@ -264,5 +269,5 @@ fn bytes_sent_for_a_frame_do_not_grow_with_the_ranks() {
         spread(|r| r.0),
         spread(|r| r.1)
     );
-    assert!(spread(|r| r.0) < 1.5 && spread(|r| r.1) < 1.25, "{rows:?}");
+    assert!(spread(|r| r.0) < 1.2 && spread(|r| r.1) < 1.2, "{rows:?}");
 }
