@@ -56,19 +56,7 @@ fn target(folder: &Path) -> Target {
     let name = folder.join("f_##.png").display().to_string();
     Target {
         pattern: FramePattern::parse(&name, FRAMES).expect("a pattern"),
-        header: Header {
-            manifest: FORMAT,
-            command: Vec::new(),
-            chosen: None,
-            tweenray: "0".into(),
-            scene: "s".into(),
-            scene_hash: "h".into(),
-            shot_hash: "s".into(),
-            shot_frames: FRAMES,
-            files: "f_##".into(),
-            tracer: "none".into(),
-            settings: Header::settings(&settings),
-        },
+        header: Header { manifest: FORMAT, ..Header::default() },
         recipes: Recipes::default(),
         write: WriteOptions::of(&settings, None),
         overwrite: false,

@@ -88,16 +88,8 @@ impl Bed {
         let with_motion = pattern.format() == Format::Exr;
         let header = Header {
             manifest: FORMAT,
-            command: Vec::new(),
-            chosen: None,
-            tweenray: "0".into(),
-            scene: "s".into(),
-            scene_hash: "h".into(),
-            shot_hash: "s".into(),
-            shot_frames: 17,
-            files: "f_##".into(),
-            tracer: "embree".into(),
             settings: Header::settings(&self.settings),
+            ..Header::default()
         };
         Target {
             pattern,
@@ -228,7 +220,7 @@ fn references_go_from_disk_to_other_ranks_without_a_ray() {
             for frame in on_disk {
                 maker.hold(*frame);
                 assert!(maker.make_source(*frame).expect("read"));
-                let sent = maker.export(*frame).expect("bytes");
+                let sent = maker.export(*frame).expect("bytes").bytes;
                 let file = fs::read(bed.reference(1)).unwrap_or_default();
                 assert!(*frame != 1 || file.is_empty() || file.ends_with(&sent));
                 maker.import(*frame, &sent);

@@ -65,7 +65,8 @@ impl Costs {
 
     /// Bytes of references and of the paper's discoveries, by two ranks that make a few frames.
     pub fn weigh(&mut self, stage: &Stage, words: &str) {
-        let line = |words: String| Line { ranks: 2, frames: self.pyramid.frames, words };
+        let line =
+            |words: String| Line { ranks: 2, threads: 1, frames: self.pyramid.frames, words };
         let ran = stage.run(&line(format!("{words} --segment 2 --frames 1..5")));
         self.reference_bytes = ran.size("references");
         // A reference holds what was traced, so strips hold as much and the colours beside it.

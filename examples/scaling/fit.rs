@@ -45,7 +45,7 @@ pub fn fit(stage: &Stage) -> Fit {
     let mut costs = None;
     let mut note_bytes = 0;
     for ranks in RANKS {
-        let line = Line { ranks, frames: SHOT.frames, words: WORDS.into() };
+        let line = Line { ranks, threads: 1, frames: SHOT.frames, words: WORDS.into() };
         let runs: Vec<(Ran, f64)> = (0..REPEATS)
             .map(|_| {
                 let ran = stage.run(&line);

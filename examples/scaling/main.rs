@@ -18,7 +18,7 @@ use predict::{Change, MOST, NONE, curve};
 
 fn main() {
     let before = load();
-    let stage = real::Stage::new();
+    let stage = real::Stage::of("reflective_spheres");
     println!("real ranks, oversubscribed");
     let fit = fit::fit(&stage);
     println!("frames of the large job");

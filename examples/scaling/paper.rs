@@ -70,7 +70,7 @@ fn measure(stage: &Stage, small: &Costs) -> Ours {
     let mut costs = None;
     let mut all = Vec::new();
     for (frames, _) in ALONE {
-        let line = Line { ranks: 1, frames, words: WORDS.into() };
+        let line = Line { ranks: 1, threads: 1, frames, words: WORDS.into() };
         let ran = stage.run(&line);
         let cpu = ran.cpu - stage.start_of(&line);
         all.push((frames, ran.total(), cpu));
@@ -97,7 +97,7 @@ fn strong(out: &mut String, stage: &Stage, ours: &Ours) {
          ours, run: 128, seconds of a core |\n|--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for (ranks, paper) in STRONG {
-        let line = Line { ranks, frames: 128, words: WORDS.into() };
+        let line = Line { ranks, threads: 1, frames: 128, words: WORDS.into() };
         let ran = stage.run(&line);
         let cpu = ran.cpu - stage.start_of(&line);
         let [a, b, c] = [32, 64, 128].map(|frames| ours.played(ranks, frames));

@@ -26,7 +26,7 @@ pub struct Curve {
 
 /// What the large job's frames take, measured on one segment.
 pub fn measure(stage: &Stage, fit: &Fit) -> Costs {
-    let line = Line { ranks: 1, frames: MEASURED.frames, words: WORDS.into() };
+    let line = Line { ranks: 1, threads: 1, frames: MEASURED.frames, words: WORDS.into() };
     let ran = stage.run(&line);
     let cpu = ran.cpu - stage.start_of(&line);
     let mut costs = Costs::of(&ran, MEASURED, cpu);
@@ -35,7 +35,7 @@ pub fn measure(stage: &Stage, fit: &Fit) -> Costs {
     let larger = costs.reference_bytes as f64 / fit.costs.reference_bytes.max(1) as f64;
     costs.pack_seconds = fit.costs.pack_seconds * larger;
     costs.note_bytes = fit.costs.note_bytes;
-    let line = Line { ranks: 2, frames: 65, words: CLERK_WORDS.into() };
+    let line = Line { ranks: 2, threads: 1, frames: 65, words: CLERK_WORDS.into() };
     costs.clerk_share = stage.clerk_share(&line);
     println!("  clerks take {:.2} % of a core", 100.0 * costs.clerk_share);
     costs

@@ -6,17 +6,22 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use tweenray::scene::limits::MAX_EXCHANGE;
 
-/// The paper's scene with so many frames, in a folder of its own, which goes with it.
+/// A scene with as many frames as a job asks for, in a folder of its own, which goes with it.
 pub struct Stage {
     folder: tempfile::TempDir,
     program: PathBuf,
+    /// Scene file.
+    text: String,
 }
 
 /// A job.
 #[derive(Clone)]
 pub struct Line {
     pub ranks: u32,
+    /// Of each rank.
+    pub threads: u32,
     /// Frames of the shot.
     pub frames: u32,
     /// Further words for `tweenray render`.
@@ -32,11 +37,27 @@ pub struct Ran {
 }
 
 impl Stage {
-    pub fn new() -> Self {
+    /// That of the repository's scene `name`.
+    pub fn of(name: &str) -> Self {
         let program = std::env::current_exe().unwrap();
         let program = program.parent().unwrap().with_file_name("tweenray");
-        assert!(program.exists(), "{} is missing: start this by ./x scaling", program.display());
-        Self { folder: tempfile::tempdir().unwrap(), program }
+        assert!(program.exists(), "{} is missing: build it with MPI first", program.display());
+        let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+        let text = std::fs::read_to_string(scene.join("scene.toml")).unwrap();
+        Self { folder: tempfile::tempdir().unwrap(), program, text }
+    }
+
+    /// A hash of all frames of the last job.
+    #[allow(dead_code, reason = "for benches/ranks.rs")]
+    pub fn frames(&self) -> blake3::Hash {
+        let entries = std::fs::read_dir(self.folder.path().join("out")).unwrap().flatten();
+        let paths = entries.map(|entry| entry.path());
+        let mut paths: Vec<PathBuf> =
+            paths.filter(|p| p.extension() == Some("png".as_ref())).collect();
+        paths.sort();
+        let mut all = blake3::Hasher::new();
+        paths.iter().for_each(|path| _ = all.update(&std::fs::read(path).unwrap()));
+        all.finalize()
     }
 
     /// Runs the job; its frames are new.
@@ -50,13 +71,33 @@ impl Stage {
         self.run_on(line).cpu
     }
 
-    fn run_on(&self, line: &Line) -> Ran {
+    /// Goes on with the job.
+    pub fn run_on(&self, line: &Line) -> Ran {
         let mut command = self.command(line);
         let before = children_seconds();
         let status = command.status().unwrap_or_else(|e| panic!("{command:?}: {e}"));
         assert!(status.success(), "{command:?}: {status}");
         let text = std::fs::read_to_string(self.folder.path().join("stats.json")).unwrap();
         Ran { cpu: children_seconds() - before, stats: serde_json::from_str(&text).unwrap() }
+    }
+
+    /// Runs the job until `frames` of its frames are there, and kills it; seconds of a core.
+    #[allow(dead_code, reason = "for benches/ranks.rs")]
+    pub fn kill_after(&self, line: &Line, frames: usize) -> f64 {
+        let out = self.folder.path().join("out");
+        _ = std::fs::remove_dir_all(&out);
+        let before = children_seconds();
+        let mut launched = self.command(line).spawn().unwrap();
+        let count = || {
+            let entries = std::fs::read_dir(&out).into_iter().flatten().flatten();
+            entries.filter(|e| e.path().extension() == Some("png".as_ref())).count()
+        };
+        while count() < frames && launched.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        launched.kill().unwrap();
+        launched.wait().unwrap();
+        children_seconds() - before
     }
 
     /// Share of a core that a rank's main thread takes while another renders, all in all.
@@ -92,17 +133,22 @@ impl Stage {
 
     fn command(&self, line: &Line) -> Command {
         let folder = self.folder.path();
-        let scene = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let scene = scene.join("scenes/reflective_spheres/scene.toml");
-        let text = std::fs::read_to_string(scene).unwrap();
-        let text = text.replace("frames = 16", &format!("frames = {}", line.frames));
+        let frames = |text: &str| match text.starts_with("frames = ") {
+            true => format!("frames = {}\n", line.frames),
+            false => format!("{text}\n"),
+        };
+        let text: String = self.text.lines().map(frames).collect();
         std::fs::write(folder.join("scene.toml"), text).unwrap();
         let mut command = match line.ranks {
             1 => Command::new(&self.program),
             ranks => self.launcher(ranks),
         };
         command.args(["render", "scene.toml", "-o", "out/f_####.png", "--no-video", "-q"]);
-        command.args(["--threads", "1", "--stats", "stats.json"]);
+        command.args(["--threads", &line.threads.to_string(), "--stats", "stats.json"]);
+        if !line.words.contains("--exchange") {
+            // What a frame left in one message, so that messages are counted as the model does.
+            command.args(["--exchange", &MAX_EXCHANGE.to_string()]);
+        }
         command.args(line.words.split_whitespace());
         command.current_dir(folder).stdout(Stdio::null());
         command

@@ -267,6 +267,10 @@ pub struct OutputArgs {
     /// again: 30s, 5m, off [default: 30s]
     #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
     pub checkpoint: Option<Interval>,
+    /// Of several ranks of an MPI job: how many discoveries (points or pixels that one traced and others
+    /// use) a message carries at most [default: 100000]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_EXCHANGE))]
+    pub exchange: Option<u32>,
     /// Write what the job took to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,

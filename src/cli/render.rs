@@ -97,6 +97,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     if args.output.time_limit.is_none() {
         interrupt.limit(start, request.time_limit);
     }
+    world.set_exchange(request.exchange);
     world.agree(args.choice.check(&request))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;

@@ -5,7 +5,7 @@ use super::exit::as_input;
 use super::references::{self, References};
 use super::render::RenderArgs;
 use super::{job, machine, values};
-use crate::cluster::World;
+use crate::cluster::{self, World};
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
@@ -46,6 +46,8 @@ pub struct Request {
     pub stats: Option<PathBuf>,
     /// How much time of tracing a killed job may lose; `None` for any.
     pub checkpoint: Option<Duration>,
+    /// How many discoveries a message between ranks carries at most.
+    pub exchange: u64,
     /// Whether frames get maps of reuse.
     pub maps: bool,
     /// On which terms frames serve as references.
@@ -81,6 +83,7 @@ struct Read {
     stats: Option<PathBuf>,
     time_limit: Option<Duration>,
     checkpoint: Option<Option<Duration>>,
+    exchange: Option<u32>,
     uploads: Vec<(u32, Image)>,
     scene_hash: String,
     shot_hash: String,
@@ -116,6 +119,7 @@ impl Read {
             stats: loaded.stats,
             time_limit: loaded.time_limit,
             checkpoint: loaded.checkpoint.map(|interval| interval.0),
+            exchange: loaded.exchange,
             uploads,
             scene_hash,
             shot_hash,
@@ -151,6 +155,7 @@ impl Request {
             stats: output.stats.clone().or(read.stats),
             time_limit: read.time_limit,
             checkpoint: checkpoint.unwrap_or(Some(CHECKPOINT)),
+            exchange: output.exchange.or(read.exchange).map_or(cluster::EXCHANGE, u64::from),
             maps: output.maps,
             references,
             terms,

@@ -94,7 +94,8 @@ impl Interrupt {
         let _ = self.reason.set(reason);
         self.stop.store(true, Ordering::SeqCst);
         if !self.watched.load(Ordering::SeqCst) {
-            say::aside(Error::Stopped);
+            let reason = self.reason();
+            say::aside(format_args!("stopped{reason}; the same command goes on from here"));
             std::process::exit(Exit::Stopped.code().into());
         }
     }

@@ -9,6 +9,7 @@
 use super::World;
 use super::board::{Board, Errand, Step, What};
 use super::note::{Cargo, Kind, Note};
+use super::parcel::{Arriving, Parcel};
 use super::worker::{Done, Job, Told};
 use crate::error::{Error, Result};
 use crate::sequence::{FrameReport, Shared};
@@ -40,7 +41,9 @@ pub struct Clerk<'a> {
     /// References that the maker has not been given.
     arrived: BTreeMap<u32, Arc<[u8]>>,
     /// References as they travel, as long as anybody may need them.
-    packed: BTreeMap<u32, Arc<[u8]>>,
+    packed: BTreeMap<u32, Parcel>,
+    /// What came in part.
+    arriving: Arriving,
     /// Originals whose references nobody needs.
     dropped: BTreeSet<u32>,
     /// Of frames that are put together here: strips by number.
@@ -75,6 +78,7 @@ impl<'a> Clerk<'a> {
             has: BTreeSet::new(),
             arrived: BTreeMap::new(),
             packed: BTreeMap::new(),
+            arriving: Arriving::default(),
             dropped: BTreeSet::new(),
             strips: BTreeMap::new(),
             has_told_stop: false,
@@ -113,7 +117,7 @@ impl<'a> Clerk<'a> {
             self.take(from, note)?;
         }
         for bytes in self.world.cargo() {
-            self.unload(Cargo::decode(&bytes)?);
+            self.unload(&Cargo::decode(&bytes)?);
         }
         if is_news { self.deal() } else { Ok(()) }
     }
@@ -146,8 +150,12 @@ impl<'a> Clerk<'a> {
     }
 
     fn tell_others(&self, note: &Note) -> Result<()> {
-        let mut others = (0..self.world.size()).filter(|rank| *rank != self.world.rank());
-        others.try_for_each(|rank| self.world.post(rank, note))
+        self.others().try_for_each(|rank| self.world.post(rank, note))
+    }
+
+    fn others(&self) -> impl Iterator<Item = u32> + use<> {
+        let own = self.world.rank();
+        (0..self.world.size()).filter(move |rank| *rank != own)
     }
 
     fn take(&mut self, from: u32, note: Note) -> Result<()> {
@@ -164,8 +172,8 @@ impl<'a> Clerk<'a> {
                 self.errands.push_back(errand);
             }
             Note::Send { original, to } => {
-                let bytes = self.packed.get(&original).map_or(&[][..], |bytes| bytes);
-                self.world.ship(to, Kind::Reference, original, 0, bytes)?;
+                let parcel = self.packed.get(&original).cloned().unwrap_or_default();
+                self.world.ship(&[to], Kind::Reference, original, 0, &parcel)?;
             }
             Note::Stop => self.stop.store(true, Ordering::Relaxed),
             Note::End => self.is_over = true,
@@ -173,18 +181,18 @@ impl<'a> Clerk<'a> {
         Ok(())
     }
 
-    fn unload(&mut self, cargo: Cargo) {
-        let Cargo { kind, original, number, bytes } = cargo;
-        let bytes: Arc<[u8]> = bytes.into();
-        match kind {
+    fn unload(&mut self, cargo: &Cargo) {
+        let Some(parcel) = self.arriving.take(cargo) else { return };
+        let original = cargo.original;
+        match cargo.kind {
             Kind::Strip => {
-                self.strips.entry(original).or_default().insert(number, bytes);
+                self.strips.entry(original).or_default().insert(cargo.number, parcel.bytes());
             }
             // (What goes to all may come after the frames that needed it are made.)
             Kind::Reference | Kind::Discoveries if self.dropped.contains(&original) => {}
             Kind::Reference | Kind::Discoveries => {
-                self.packed.insert(original, Arc::clone(&bytes));
-                self.arrived.insert(original, bytes);
+                self.arrived.insert(original, parcel.bytes());
+                self.packed.insert(original, parcel);
             }
         }
     }
@@ -260,26 +268,26 @@ impl<'a> Clerk<'a> {
         self.is_busy = false;
         self.busy_seconds += seconds;
         let original = order.original;
-        match (&order.what, leaves) {
-            (What::Strip { number, leader, .. }, Some(bytes)) => {
+        match &order.what {
+            What::Strip { number, leader, .. } => {
                 if *leader == self.world.rank() {
-                    self.strips.entry(original).or_default().insert(*number, bytes);
+                    self.strips.entry(original).or_default().insert(*number, leaves.bytes);
                 } else {
-                    self.world.ship(*leader, Kind::Strip, original, *number, &bytes)?;
+                    let strip = Parcel::whole(leaves.bytes);
+                    self.world.ship(&[*leader], Kind::Strip, original, *number, &strip)?;
                 }
             }
-            (What::Whole { .. }, leaves) if order.is_source => {
+            What::Whole { .. } if order.is_source => {
                 self.has.insert(original);
-                let bytes = leaves.unwrap_or_else(|| Arc::from(&[][..]));
+                let parcel = self.world.parcel(leaves.bytes, leaves.discoveries);
                 if self.maker.tells_all() {
-                    for rank in (0..self.world.size()).filter(|r| *r != self.world.rank()) {
-                        self.world.ship(rank, Kind::Discoveries, original, 0, &bytes)?;
-                    }
+                    let others: Vec<u32> = self.others().collect();
+                    self.world.ship(&others, Kind::Discoveries, original, 0, &parcel)?;
                 } else {
-                    self.packed.insert(original, bytes);
+                    self.packed.insert(original, parcel);
                 }
             }
-            _ => {}
+            What::Whole { .. } => {}
         }
         self.finished.extend(report.clone());
         self.tell(0, Note::Done { order, reports: report.into_iter().collect(), seconds })?;

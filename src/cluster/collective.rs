@@ -1,7 +1,8 @@
 //! What all ranks do together before and after the frames: they agree, tell each other, and share what
 //! one of them read.
 
-use super::{World, decode, encode};
+use super::World;
+use super::post::{decode, encode};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -38,10 +39,11 @@ impl World {
         if self.size() == 1 {
             return make();
         }
-        let made = if self.is_root() { make().map(Some) } else { Ok(None) };
+        // (As a list of one: what is nothing itself, as `()`, is told from nothing.)
+        let made = if self.is_root() { make().map(|value| Some((value,))) } else { Ok(None) };
         let bytes = encode(&self.agree(made)?)?;
-        match decode(&self.broadcast(bytes))? {
-            Some(value) => Ok(value),
+        match decode::<Option<(T,)>>(&self.broadcast(bytes))? {
+            Some((value,)) => Ok(value),
             None => Err(Error::Failed("rank 0 sent nothing".into())),
         }
     }

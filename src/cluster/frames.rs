@@ -6,8 +6,11 @@ use super::traffic::Traffic;
 use super::{World, worker};
 use crate::error::Result;
 use crate::output::manifest::{Manifest, manifest_path, part_path};
+use crate::scene::FrameRange;
 use crate::sequence::{self, FrameReport, Plan, Shared, Target};
+use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Instant;
@@ -32,6 +35,36 @@ pub struct Duty {
     pub waiting_seconds: f64,
     /// What it sent.
     pub sent: Traffic,
+}
+
+/// What [`sequence::prepare`] decides, on every rank. The files that are there are read by all ranks, each
+/// a part of them, on the threads of `pool`. All ranks call it.
+///
+/// # Errors
+/// Those of `prepare`.
+pub fn prepare(
+    world: &World,
+    pool: &ThreadPool,
+    target: &Target,
+    frames: FrameRange,
+) -> Result<Plan> {
+    if world.size() == 1 {
+        return pool.install(|| sequence::prepare(target, frames));
+    }
+    let mut found = None;
+    if world.from_root(|| sequence::is_worth_a_look(target))? {
+        let own = own_part(frames, world.rank(), world.size());
+        let own = world.agree(pool.install(|| sequence::look(target, own)))?;
+        found = Some(world.gather(&own)?.concat());
+    }
+    world.from_root(|| pool.install(|| sequence::prepare_with(target, frames, found)))
+}
+
+/// Which of `frames` rank `rank` looks at: a run of them, so that all together come in order.
+fn own_part(frames: FrameRange, rank: u32, ranks: u32) -> Range<u32> {
+    let count = u64::from(frames.last - frames.first + 1);
+    let edge = |rank: u32| frames.first + (count * u64::from(rank) / u64::from(ranks)) as u32;
+    edge(rank)..edge(rank + 1)
 }
 
 /// Renders `plan.render`, on as many ranks as there are: rank 0 deals frames out, see `board.rs`; each
@@ -142,4 +175,18 @@ fn join(
         ranks.flat_map(|(rank, list)| list.into_iter().map(move |r| (rank as u32, r))).collect();
     frames.sort_by_key(|(_, report)| report.frame);
     Ok(Outcome { unfinished: plan.render.len() - frames.len(), frames, own })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_frame_is_looked_at_by_one_rank() {
+        for (first, last, ranks) in [(1, 20, 3), (5, 5, 4), (1, 1_000_000, 4096), (7, 9, 64)] {
+            let frames = FrameRange { first, last };
+            let parts: Vec<u32> = (0..ranks).flat_map(|r| own_part(frames, r, ranks)).collect();
+            assert!(parts.into_iter().eq(first..=last), "{first} {last} {ranks}");
+        }
+    }
 }

@@ -18,27 +18,33 @@ mod launcher;
 mod mpi;
 mod nodes;
 mod note;
+mod parcel;
+mod post;
 pub mod simulation;
 mod traffic;
 mod worker;
 
-pub use frames::{Duty, Outcome, render};
+pub use frames::{Duty, Outcome, prepare, render};
 pub use launcher::default_threads;
 pub use nodes::rank_order;
 pub use traffic::{Sent, Traffic};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use launcher::Launcher;
-use note::{Cargo, Kind};
-use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::time::Duration;
+
+/// How many discoveries a message carries at most, unless told; docs/decisions/019-ranks.md has the
+/// measurement.
+pub const EXCHANGE: u64 = 100_000;
 
 /// This process's place in the job.
 pub struct World {
     ranks: Ranks,
     /// What this rank sent, so far.
     sent: Cell<Traffic>,
+    /// How many discoveries a message carries at most.
+    exchange: Cell<u64>,
     /// Whether this rank failed and could not tell the others.
     is_stranded: Cell<bool>,
 }
@@ -56,7 +62,18 @@ impl World {
     }
 
     fn of(ranks: Ranks) -> Self {
-        Self { ranks, sent: Cell::default(), is_stranded: Cell::default() }
+        Self {
+            ranks,
+            sent: Cell::default(),
+            exchange: Cell::new(EXCHANGE),
+            is_stranded: Cell::default(),
+        }
+    }
+
+    /// From here on a message carries so many discoveries at most. It decides when bytes arrive, never
+    /// which.
+    pub fn set_exchange(&self, discoveries: u64) {
+        self.exchange.set(discoveries);
     }
 
     /// Joins the ranks that a launcher started with this one; alone without a launcher.
@@ -168,73 +185,6 @@ impl World {
         self.all(own)
     }
 
-    /// Sends a note to rank `to` without waiting for it to be read.
-    fn post<T: Serialize>(&self, to: u32, note: &T) -> Result<()> {
-        let bytes = encode(note)?;
-        self.count(|sent| sent.note(bytes.len()));
-        self.send(to, false, bytes)
-    }
-
-    /// Sends a cargo to rank `to` without waiting for it to be taken in.
-    fn ship(&self, to: u32, kind: Kind, original: u32, number: u32, bytes: &[u8]) -> Result<()> {
-        let bytes = Cargo::encode(kind, original, number, bytes);
-        self.count(|sent| sent.cargo(kind, bytes.len()));
-        self.send(to, true, bytes)
-    }
-
-    fn count(&self, count: impl FnOnce(&mut Traffic)) {
-        let mut sent = self.sent.get();
-        count(&mut sent);
-        self.sent.set(sent);
-    }
-
-    /// What this rank sent while rendering, so far.
-    fn sent(&self) -> Traffic {
-        self.sent.get()
-    }
-
-    fn send(&self, to: u32, is_cargo: bool, bytes: Vec<u8>) -> Result<()> {
-        match &self.ranks {
-            // There is nobody to send to.
-            Ranks::Solo => {
-                _ = (to, is_cargo, bytes);
-                Ok(())
-            }
-            #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.post(to, is_cargo, bytes),
-        }
-    }
-
-    /// The notes that have arrived for this rank since it last asked, with their senders.
-    fn notes<T: for<'de> Deserialize<'de>>(&self) -> Result<Vec<(u32, T)>> {
-        let notes: Vec<(u32, Vec<u8>)> = match &self.ranks {
-            Ranks::Solo => Vec::new(),
-            #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.arrived(false),
-        };
-        notes.iter().map(|(from, bytes)| Ok((*from, decode(bytes)?))).collect()
-    }
-
-    /// The cargo that has arrived for this rank since it last asked.
-    fn cargo(&self) -> Vec<Vec<u8>> {
-        match &self.ranks {
-            Ranks::Solo => Vec::new(),
-            #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => {
-                session.arrived(true).into_iter().map(|(_, bytes)| bytes).collect()
-            }
-        }
-    }
-
-    /// Whether something is still on its way to others.
-    fn is_sending(&self) -> bool {
-        match &self.ranks {
-            Ranks::Solo => false,
-            #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.is_sending(),
-        }
-    }
-
     /// Waits until every rank got here, asleep between looks; `meanwhile` runs at every look.
     fn settle(&self, meanwhile: &mut dyn FnMut() -> Result<()>) -> Result<()> {
         match &self.ranks {
@@ -254,13 +204,4 @@ impl World {
             Ranks::Mpi(session) => session.abort(code),
         }
     }
-}
-
-fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>> {
-    serde_json::to_vec(value).map_err(|e| Error::Failed(format!("cannot tell other ranks: {e}")))
-}
-
-fn decode<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> Result<T> {
-    serde_json::from_slice(bytes)
-        .map_err(|e| Error::Failed(format!("cannot understand another rank: {e}")))
 }

@@ -15,6 +15,7 @@ use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, R
 use std::cell::RefCell;
 use std::ffi::{c_char, c_void};
 use std::mem::MaybeUninit;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long a waiting rank sleeps between looks; Open MPI would spin on a core instead.
@@ -38,10 +39,10 @@ pub struct Session {
     _universe: Universe,
 }
 
-/// A note on its way, with the memory that MPI still reads.
+/// A message on its way, with the memory that MPI still reads.
 struct Posted {
     request: ffi::MPI_Request,
-    _bytes: Box<[u8]>,
+    _bytes: Arc<[u8]>,
 }
 
 impl Session {
@@ -114,15 +115,13 @@ impl Session {
     }
 
     /// Starts sending and returns at once.
-    pub fn post(&self, to: u32, is_cargo: bool, bytes: Vec<u8>) -> Result<()> {
-        self.clear_outbox();
+    pub fn post(&self, to: u32, is_cargo: bool, bytes: Arc<[u8]>) -> Result<()> {
         let length = i32::try_from(bytes.len())
             .map_err(|_| Error::Failed(format!("{} bytes are too much to send", bytes.len())))?;
         let tag = if is_cargo { CARGO } else { NOTE };
-        let bytes = bytes.into_boxed_slice();
         let mut request = MaybeUninit::uninit();
-        // SAFETY: `MPI_Isend` reads `bytes` until the request completes; the heap memory is kept
-        // beside the request, is not moved or written, and is freed only in `clear_outbox`, after
+        // SAFETY: `MPI_Isend` reads `bytes` until the request completes; the shared memory is kept
+        // beside the request, is not moved or written, and is let go only in `clear_outbox`, after
         // `MPI_Test` said that the request is complete.
         let request = unsafe {
             ffi::MPI_Isend(

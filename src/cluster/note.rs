@@ -23,7 +23,7 @@ pub enum Note {
 }
 
 /// What a cargo is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Kind {
     /// What a frame left, for frames that are made of it.
     Reference,
@@ -33,39 +33,45 @@ pub enum Kind {
     Strip,
 }
 
-/// Bytes for another rank's maker.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cargo {
+/// Bytes for another rank's maker, or a piece of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cargo<'a> {
     pub kind: Kind,
     pub original: u32,
     /// Of a strip.
     pub number: u32,
+    /// Which piece, from 0.
+    pub piece: u32,
+    /// How many pieces there are.
+    pub of: u32,
     /// Empty where there was nothing to send.
-    pub bytes: Vec<u8>,
+    pub bytes: &'a [u8],
 }
 
 /// Bytes in front of a cargo's own.
-const HEAD: usize = 12;
+const HEAD: usize = 20;
 
-impl Cargo {
+impl<'a> Cargo<'a> {
     /// As it travels.
-    pub fn encode(kind: Kind, original: u32, number: u32, bytes: &[u8]) -> Vec<u8> {
-        let mut all = Vec::with_capacity(HEAD + bytes.len());
-        for word in [kind as u32, original, number] {
+    pub fn encode(&self) -> Vec<u8> {
+        let mut all = Vec::with_capacity(HEAD + self.bytes.len());
+        for word in [self.kind as u32, self.original, self.number, self.piece, self.of] {
             all.extend(word.to_le_bytes());
         }
-        all.extend(bytes);
+        all.extend(self.bytes);
         all
     }
 
     /// What [`encode`](Self::encode) made.
-    pub fn decode(all: &[u8]) -> Result<Self> {
+    pub fn decode(all: &'a [u8]) -> Result<Self> {
         let wrong = || Error::Failed("cannot understand another rank's cargo".into());
         let (head, bytes) = all.split_at_checked(HEAD).ok_or_else(wrong)?;
         let word = |i: usize| head[4 * i..4 * i + 4].try_into().map_or(0, u32::from_le_bytes);
         let kinds = [Kind::Reference, Kind::Discoveries, Kind::Strip];
         let kind = *kinds.get(word(0) as usize).ok_or_else(wrong)?;
-        Ok(Self { kind, original: word(1), number: word(2), bytes: bytes.to_vec() })
+        let cargo =
+            Self { kind, original: word(1), number: word(2), piece: word(3), of: word(4), bytes };
+        if cargo.piece < cargo.of { Ok(cargo) } else { Err(wrong()) }
     }
 }
 
@@ -76,10 +82,11 @@ mod tests {
     #[test]
     fn cargo_arrives_as_it_was_sent() {
         for kind in [Kind::Reference, Kind::Discoveries, Kind::Strip] {
-            let cargo = Cargo { kind, original: 70_000, number: 3, bytes: vec![1, 2] };
-            let sent = Cargo::encode(kind, cargo.original, cargo.number, &cargo.bytes);
-            assert_eq!(Cargo::decode(&sent).expect("understood"), cargo);
+            let cargo =
+                Cargo { kind, original: 70_000, number: 3, piece: 1, of: 2, bytes: &[1, 2] };
+            assert_eq!(Cargo::decode(&cargo.encode()).expect("understood"), cargo);
+            assert!(Cargo::decode(&Cargo { piece: 2, ..cargo }.encode()).is_err());
         }
-        assert!(Cargo::decode(&[0; 11]).is_err() && Cargo::decode(&[9; 12]).is_err());
+        assert!(Cargo::decode(&[0; HEAD - 1]).is_err() && Cargo::decode(&[9; HEAD]).is_err());
     }
 }

@@ -3,7 +3,7 @@
 use super::board::{Order, What};
 use crate::error::Result;
 use crate::output::manifest::Journal;
-use crate::sequence::{self, FrameReport, Shared, Strip, Target};
+use crate::sequence::{self, FrameReport, Left, Shared, Strip, Target};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
@@ -36,7 +36,7 @@ pub struct Done {
     /// Of the last frame that was written, if any was.
     pub report: Option<FrameReport>,
     /// For the rank that puts strips together, or for those whose frames are made of this one.
-    pub leaves: Option<Arc<[u8]>>,
+    pub leaves: Left,
     pub seconds: f64,
 }
 
@@ -82,7 +82,7 @@ impl Desk<'_> {
             What::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: order.is_source };
                 let bytes = self.maker.strip(order.original, strip)?;
-                bytes.map(|bytes| (None, Some(bytes.into())))
+                bytes.map(|bytes| (None, Left { bytes: bytes.into(), discoveries: 0 }))
             }
             What::Whole { frames, .. } => {
                 if !strips.is_empty() {
@@ -95,12 +95,11 @@ impl Desk<'_> {
         Ok(did.map(|(report, leaves)| Done { order, report, leaves, seconds }))
     }
 
-    #[allow(clippy::type_complexity, reason = "said once")]
     fn whole(
         &mut self,
         order: &Order,
         frames: &[u32],
-    ) -> Result<Option<(Option<FrameReport>, Option<Arc<[u8]>>)>> {
+    ) -> Result<Option<(Option<FrameReport>, Left)>> {
         if order.is_source {
             self.maker.hold(order.original);
         }
@@ -121,7 +120,7 @@ impl Desk<'_> {
                 _ = self.tell.send(Told::Wrote(Box::new(before)));
             }
         }
-        let leaves = if order.is_source { self.maker.export(order.original) } else { None };
-        Ok(Some((last, leaves)))
+        let leaves = order.is_source.then(|| self.maker.export(order.original)).flatten();
+        Ok(Some((last, leaves.unwrap_or_default())))
     }
 }

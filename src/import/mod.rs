@@ -97,6 +97,8 @@ pub struct Loaded {
     pub time_limit: Option<Duration>,
     /// How often what frames to come need is put on disk, where the file says.
     pub checkpoint: Option<Interval>,
+    /// How many discoveries a message between ranks carries at most, where the file says.
+    pub exchange: Option<u32>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
     /// Every file read, in order.
@@ -140,6 +142,7 @@ impl Loaded {
             stats: None,
             time_limit: None,
             checkpoint: None,
+            exchange: None,
             warnings: Vec::new(),
             files: Vec::new(),
             stage: None,

@@ -103,9 +103,20 @@ fn process_of(name: &str) -> Option<u32> {
     pid.parse().ok()
 }
 
-/// Whether a process lives here. Without `/proc` only this one is known to.
+/// Whether a process lives here. Without `/proc` only this one is known to. One that was killed stays in
+/// there until somebody asks for its exit code, which in a container may be nobody.
 fn is_alive(pid: u32) -> bool {
-    pid == std::process::id() || Path::new("/proc").join(pid.to_string()).exists()
+    if pid == std::process::id() {
+        return true;
+    }
+    match fs::read(format!("/proc/{pid}/stat")) {
+        Err(e) => e.kind() != io::ErrorKind::NotFound,
+        Ok(stat) => {
+            // The name, which may hold anything, ends with a bracket; the state follows.
+            let state = stat.iter().rposition(|b| *b == b')').and_then(|at| stat.get(at + 2));
+            !matches!(state, Some(b'Z' | b'X'))
+        }
+    }
 }
 
 /// The file that `target` stands for: where a link leads. A rename would replace a link by a file,
@@ -304,6 +315,24 @@ mod tests {
         // Small enough to stay in the buffer until it is flushed.
         let error = fill_file(full, |w| w.write_all(b"x")).expect_err("full");
         assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+    }
+
+    #[test]
+    fn a_process_that_ended_is_dead_though_nobody_asked_how() {
+        let mut child = std::process::Command::new("cat")
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .expect("it starts");
+        assert!(is_alive(child.id()));
+        drop(child.stdin.take());
+        let start = std::time::Instant::now();
+        while is_alive(child.id()) {
+            assert!(start.elapsed() < Duration::from_secs(20));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(Path::new("/proc").join(child.id().to_string()).exists());
+        child.wait().expect("asked");
     }
 
     #[test]

@@ -28,7 +28,7 @@ use std::path::{Path, PathBuf};
 pub const FORMAT: u32 = 2;
 
 /// What every frame of a sequence shares: together with its recipe, all that its bytes depend on.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// [`FORMAT`].
     pub manifest: u32,

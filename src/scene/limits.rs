@@ -8,6 +8,8 @@ pub const MAX_EDGE: u32 = 32_768;
 pub const MAX_SAMPLES: u32 = 65_536;
 /// Most specular bounces.
 pub const MAX_BOUNCES: u32 = 1024;
+/// Most discoveries that a message between ranks may carry.
+pub const MAX_EXCHANGE: u32 = 1_000_000_000;
 /// Most rendering threads.
 pub const MAX_THREADS: u32 = 4096;
 /// The largest seed: the largest whole number that TOML has.

@@ -15,21 +15,27 @@
 //! as always traced may be inferred: an inferred pixel does not know what it shows.
 
 mod exchange;
+mod pixels;
 mod saved;
+mod upload;
+
+pub use upload::check_upload;
 
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
+use super::saved::{Keeps, Saved};
 use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
-use crate::film::{Encoding, Film, Image, PixelSource, Provenance};
-use crate::math::{Rgb, Vec2, srgb_decode};
-use crate::reuse::colour::{Entry, Inferred, Known, Rule};
-use crate::scene::{Camera, Rect, Settings, Shot, ToneCurve};
+use crate::film::{Film, Image};
+use crate::math::Vec2;
+use crate::reuse::colour::{Inferred, Known, Rule};
+use crate::scene::{Camera, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer};
-use crate::stats::ReuseCounts;
+use pixels::{discoveries, fill};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
+use upload::known_of_upload;
 
 /// Infers frames from colours.
 pub struct ColourMaker<'a> {
@@ -64,7 +70,7 @@ struct State {
     known: BTreeMap<u32, Arc<Known>>,
     /// The most that all of it took at a time, bytes.
     most_memory: u64,
-    saved: saved::Saved,
+    saved: Saved<Arc<Known>>,
 }
 
 impl<'a> ColourMaker<'a> {
@@ -179,8 +185,14 @@ impl<'a> ColourMaker<'a> {
             return Ok(Some(found));
         }
         let Some((_, known)) = self.frame(frame)? else { return Ok(None) };
-        self.made(frame);
-        Ok(Some(self.keep(known)))
+        Ok(Some(self.made(known)))
+    }
+
+    /// What a frame discovered that was just made, which is worth keeping on disk too.
+    fn made(&self, known: Known) -> Arc<Known> {
+        let known = self.keep(known);
+        self.with_state(|s| s.saved.add(known.frame, Arc::clone(&known)));
+        known
     }
 
     fn keep(&self, known: Known) -> Arc<Known> {
@@ -211,10 +223,9 @@ impl<'a> ColourMaker<'a> {
 impl FrameMaker for ColourMaker<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
         let Some((made, known)) = self.frame(frame)? else { return Ok(None) };
-        self.keep(known);
-        self.made(frame);
+        self.made(known);
         self.forget(frame);
-        self.tend(false)?;
+        self.put_away(false)?;
         Ok(Some(made))
     }
 
@@ -230,7 +241,7 @@ impl FrameMaker for ColourMaker<'_> {
     }
 
     fn stopped(&self) -> Result<()> {
-        self.tend(true)
+        self.put_away(true)
     }
 
     fn notes(&self) -> Vec<String> {
@@ -249,97 +260,4 @@ impl FrameMaker for ColourMaker<'_> {
 /// Bytes that entries take.
 fn memory<'k>(known: impl IntoIterator<Item = &'k Known>) -> u64 {
     known.into_iter().map(|k| size_of_val(&k.entries[..]) as u64).sum()
-}
-
-/// Whether `image` can stand for frame `frame`.
-///
-/// # Errors
-/// [`Error::Usage`]: no such frame in the shot, another size than the job's, or display values of
-/// a tone curve that cannot be undone.
-pub fn check_upload(frame: u32, image: &Image, shot: &Shot, settings: &Settings) -> Result<()> {
-    if !(1..=shot.frames).contains(&frame) {
-        let count = shot.frames;
-        return Err(Error::Usage(format!(
-            "a picture is uploaded for frame {frame}, but the shot has frames 1..{count}"
-        )));
-    }
-    let (width, height) = (settings.width, settings.height);
-    if (image.width, image.height) != (width, height) {
-        return Err(Error::Usage(format!(
-            "the picture uploaded for frame {frame} has {}x{} pixels, the frames have \
-             {width}x{height}",
-            image.width, image.height
-        )));
-    }
-    if image.encoding == Encoding::Srgb && settings.tone != ToneCurve::Srgb {
-        return Err(Error::Usage(format!(
-            "the picture uploaded for frame {frame} holds display values, which stand for radiance \
-             only under the tone curve srgb\n  help: upload an exr, or choose --tone srgb"
-        )));
-    }
-    Ok(())
-}
-
-/// An uploaded picture as entries: display values become radiance again, distances are not known.
-fn known_of_upload(frame: u32, image: &Image, settings: &Settings) -> Known {
-    let decode = |v: f32| (srgb_decode(f64::from(v)) / f64::from(settings.exposure)) as f32;
-    let radiance = |c: &Rgb| match image.encoding {
-        Encoding::Linear => *c,
-        Encoding::Srgb => Rgb::new(decode(c.x), decode(c.y), decode(c.z)),
-    };
-    let entry = |(pixel, c)| Entry { pixel, rgb: radiance(c), distance: f32::NAN };
-    Known { frame, entries: (0..).zip(&image.rgb).map(entry).collect() }
-}
-
-/// The pixels of the film that were traced, as entries.
-fn discoveries(
-    frame: u32,
-    film: &Film,
-    inferred: &[Option<Inferred>],
-    camera: &Camera,
-    settings: &Settings,
-) -> Known {
-    let mut entries = Vec::new();
-    for (x, y) in pixels_of(settings) {
-        let index = film.index(x, y);
-        if inferred[index].is_none() {
-            let depth = film.gbuffer.as_ref().map_or(f32::NAN, |g| g.depth[index]);
-            let middle = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            // Rounding can put a hit at the eye itself a little behind it.
-            let distance = (f64::from(depth) / middle.dot(camera.forward)).max(0.0) as f32;
-            entries.push(Entry { pixel: index as u32, rgb: film.rgb[index], distance });
-        }
-    }
-    Known { frame, entries }
-}
-
-/// Puts inferred pixels into the film, and says of each pixel where it comes from.
-fn fill(
-    film: &mut Film,
-    frame: u32,
-    inferred: &[Option<Inferred>],
-    settings: &Settings,
-) -> ReuseCounts {
-    let mut counts = ReuseCounts::default();
-    let mut sources = vec![PixelSource::default(); film.rgb.len()];
-    for (x, y) in pixels_of(settings) {
-        let index = film.index(x, y);
-        counts.direct += 1;
-        if let Some(known) = &inferred[index] {
-            film.rgb[index] = known.rgb;
-            sources[index] = known.source(frame);
-            counts.direct_inferred += 1;
-        } else {
-            sources[index].provenance = Provenance::Traced;
-        }
-    }
-    film.sources = Some(sources);
-    counts
-}
-
-/// The pixels that are wanted, row by row.
-fn pixels_of(settings: &Settings) -> impl Iterator<Item = (u32, u32)> + use<> {
-    let full = Rect { x0: 0, y0: 0, x1: settings.width, y1: settings.height };
-    let Rect { x0, y0, x1, y1 } = settings.crop.unwrap_or(full);
-    (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
 }

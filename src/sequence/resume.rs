@@ -1,5 +1,7 @@
 //! What a sequence already holds on disk, and what that leaves to render.
 
+mod refuse;
+
 use super::checkpoint;
 use super::recipe::{Recipe, Recipes};
 use crate::error::{Error, Result, counted};
@@ -9,10 +11,12 @@ use crate::output::{Format, FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
+use refuse::{refuse_other_view, refuse_others, refuse_strangers, refuse_taken};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
@@ -72,14 +76,76 @@ pub struct Plan {
 /// Errors: `Error::Usage` where frames of other settings, of another camera move, or of unknown
 /// origin, are in the way and `target` does not say to replace them.
 pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
+    prepare_with(target, frames, None)
+}
+
+/// The same, with what [`look`] found where that is known.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub fn prepare_with(
+    target: &Target,
+    frames: FrameRange,
+    found: Option<Vec<Found>>,
+) -> Result<Plan> {
     atomic::create_folder(target.pattern.folder())?;
     atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE)?;
-    let mut plan = plan(target, frames)?;
+    let mut plan = plan(target, frames, found)?;
     plan.notes.extend(checkpoint::sweep(target)?);
     Ok(plan)
 }
 
-fn plan(target: &Target, frames: FrameRange) -> Result<Plan> {
+/// What lies where a frame and its maps belong.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Found {
+    frame: u32,
+    /// Hash of the frame's file; `None` where there is none.
+    hash: Option<String>,
+    /// Names of its maps, with their hashes.
+    maps: Vec<(String, String)>,
+}
+
+/// Whether there are frames that [`prepare`] would read.
+///
+/// # Errors
+/// The manifest cannot be read.
+pub fn is_worth_a_look(target: &Target) -> Result<bool> {
+    if target.overwrite {
+        return Ok(false);
+    }
+    let found = Manifest::read(&manifest_path(&target.pattern))?;
+    Ok(found.is_some_and(|manifest| manifest.header.first_difference(&target.header).is_none()))
+}
+
+/// Reads whatever lies where `frames` belong.
+///
+/// # Errors
+/// A file that is there and cannot be read.
+pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
+    let found: Vec<Result<Found>> =
+        frames.into_par_iter().map(|frame| look_at(target, frame)).collect();
+    // Of several faults the first frame's is told, whichever thread was quicker.
+    found.into_iter().collect()
+}
+
+fn look_at(target: &Target, frame: u32) -> Result<Found> {
+    let paths = target.paths(frame);
+    let hash = |path: &PathBuf| match fs::read(path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        read => read
+            .map(|bytes| Some(blake3::hash(&bytes).to_hex().to_string()))
+            .map_err(|e| Error::io("read", path, e)),
+    };
+    let own = hash(&paths[0])?;
+    let mut maps = Vec::new();
+    for path in paths[1..].iter().filter(|_| own.is_some()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        maps.extend(hash(path)?.map(|hash| (name, hash)));
+    }
+    Ok(Found { frame, hash: own, maps })
+}
+
+fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) -> Result<Plan> {
     let path = manifest_path(&target.pattern);
     let found = match Manifest::read(&path) {
         Err(_) if target.overwrite => None,
@@ -101,7 +167,14 @@ fn plan(target: &Target, frames: FrameRange) -> Result<Plan> {
     let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
     let plan = match target.overwrite {
         true => Plan::all(frames),
-        false => Plan::of(states(target, frames, &rows)?),
+        false => {
+            let found = match found_on_disk {
+                Some(found) => found,
+                None => look(target, frames.first..frames.last + 1)?,
+            };
+            let states = found.iter().map(|found| Ok((found.frame, state(target, found, &rows)?)));
+            Plan::of(states.collect::<Result<_>>()?)
+        }
     };
     mark_strays(target, &manifest.header, &rows)?;
     Ok(plan)
@@ -129,19 +202,6 @@ fn is_made_of(row: &Row, recipe: Option<&Recipe>) -> bool {
     recipe.is_some_and(|recipe| recipe.whole.to_string() == row.recipe)
 }
 
-fn states(
-    target: &Target,
-    frames: FrameRange,
-    rows: &BTreeMap<u32, Row>,
-) -> Result<Vec<(u32, State)>> {
-    let states: Vec<Result<(u32, State)>> = (frames.first..=frames.last)
-        .into_par_iter()
-        .map(|frame| Ok((frame, state(target, frame, rows)?)))
-        .collect();
-    // Of several refusals the first frame's is told, whichever thread was quicker.
-    states.into_iter().collect()
-}
-
 /// How a frame stands on disk.
 enum State {
     Whole(BadSamples, Option<AuditSums>),
@@ -151,23 +211,20 @@ enum State {
     Outdated,
 }
 
-fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State> {
+fn state(target: &Target, found: &Found, rows: &BTreeMap<u32, Row>) -> Result<State> {
+    let frame = found.frame;
     let path = target.pattern.path(frame);
     let name = path.display();
-    let row = rows.get(&frame);
-    let bytes = match fs::read(&path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(State::Missing),
-        read => read.map_err(|e| Error::io("read", &path, e))?,
-    };
+    let Some(hash) = &found.hash else { return Ok(State::Missing) };
     refuse_taken(&path, frame, rows)?;
-    let Some(row) = row else {
+    let Some(row) = rows.get(&frame) else {
         return Ok(State::Damaged(format!("{name} is not in the manifest; rendered again")));
     };
     let recipe = target.recipes.get(frame);
     refuse_other_view(&path, row, recipe)?;
-    let whole = blake3::hash(&bytes).to_hex().as_str() == row.blake3;
+    let whole = *hash == row.blake3;
     let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
-    if whole && target.has_map_files() && !has_maps(target, row) {
+    if whole && target.has_map_files() && !has_maps(found, row) {
         return Ok(State::Damaged(format!("{name} lacks its maps; rendered again")));
     }
     Ok(match whole {
@@ -177,25 +234,9 @@ fn state(target: &Target, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<State
     })
 }
 
-/// Refuses to replace a frame that shows something else than this shot's frame of that number.
-fn refuse_other_view(path: &Path, row: &Row, recipe: Option<&Recipe>) -> Result<()> {
-    if recipe.is_some_and(|recipe| recipe.view.to_string() == row.view) {
-        return Ok(());
-    }
-    Err(Error::Usage(format!(
-        "{} is of another camera move: frame {} stands elsewhere there\n  \
-         help: choose another output with -o, or replace it with --overwrite",
-        path.display(),
-        row.frame
-    )))
-}
-
 /// Whether all maps of a frame are there, as they were written.
-fn has_maps(target: &Target, row: &Row) -> bool {
-    let is_whole = |map: &MapRow| {
-        let bytes = fs::read(target.pattern.folder().join(&map.file));
-        bytes.is_ok_and(|b| blake3::hash(&b).to_hex().as_str() == map.blake3)
-    };
+fn has_maps(found: &Found, row: &Row) -> bool {
+    let is_whole = |map: &MapRow| found.maps.contains(&(map.file.clone(), map.blake3.clone()));
     row.maps.len() == Map::ALL.len() && row.maps.iter().all(is_whole)
 }
 
@@ -209,25 +250,6 @@ fn left_over(target: &Target, manifest: &Manifest, frames: FrameRange) -> Vec<Ro
     };
     let mark = |row: &Row| Row { stray: Some(Stray::OtherSettings), ..row.clone() };
     manifest.rows.values().filter(stays).map(mark).collect()
-}
-
-/// Refuses to replace a file that holds a frame of other settings, or another frame.
-fn refuse_taken(path: &Path, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<()> {
-    let here = |row: &&Row| path.file_name().is_some_and(|name| name == row.file.as_str());
-    let is_taken = |row: &&Row| here(row) && row.stray == Some(Stray::OtherSettings);
-    let holds = match rows.values().find(is_taken) {
-        Some(_) => "a frame of other settings".to_string(),
-        None if rows.contains_key(&frame) => return Ok(()),
-        None => match rows.values().find(here) {
-            Some(row) => format!("frame {}", row.frame),
-            None => return Ok(()),
-        },
-    };
-    Err(Error::Usage(format!(
-        "{} holds {holds}\n  \
-         help: choose another output with -o, or replace it with --overwrite",
-        path.display()
-    )))
 }
 
 impl Plan {
@@ -269,36 +291,4 @@ impl Plan {
         }
         plan
     }
-}
-
-/// Refuses frames that no manifest vouches for: they may be somebody's work.
-fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
-    let mut in_the_way = (frames.first..=frames.last).flat_map(|f| target.paths(f));
-    match in_the_way.find(|path| path.exists()) {
-        Some(path) if !target.overwrite => Err(Error::Usage(format!(
-            "{} exists, and no manifest beside it says how it was made\n  \
-             help: choose another output with -o, or replace it with --overwrite",
-            path.display()
-        ))),
-        _ => Ok(()),
-    }
-}
-
-/// Refuses frames of other settings, as long as any is left.
-fn refuse_others(target: &Target, manifest: &Manifest, frames: FrameRange) -> Result<()> {
-    let Some(d) = manifest.header.first_difference(&target.header) else { return Ok(()) };
-    let folder = target.pattern.folder();
-    let left = manifest.rows.values().filter(|row| folder.join(&row.file).exists()).count();
-    if left == 0 {
-        return refuse_strangers(target, frames);
-    }
-    Err(Error::Usage(format!(
-        "{} holds {} of other settings: {} was {}, now it is {}\n  \
-         help: set it back, choose another output with -o, or replace the frames with --overwrite",
-        target.pattern,
-        counted(left, "frame"),
-        d.name,
-        d.before,
-        d.now
-    )))
 }

@@ -1,10 +1,10 @@
-//! The references of an [`Inferrer`] on disk: when they are put there, read and removed.
+//! What frames left, on disk for a job that goes on after this one: when it is put there, and when removed.
 //!
-//! Only those of key frames: they are dear, and serve long. The others would take more time to put on
-//! disk, one after every other frame, than the few of them that are lost take to be made again.
+//! Of an [`Inferrer`] only references of key frames: they are dear, and serve long. The others would take
+//! more time to put on disk, one after every other frame, than the few of them that are lost take to be
+//! made again.
 
 use super::checkpoint::Checkpoints;
-use super::schedule::Stock;
 use super::{Inferrer, SaveCost};
 use crate::error::Result;
 use crate::inference::TracedPoints;
@@ -14,19 +14,132 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest that a job which shall stop goes on writing references.
+/// Longest that a job which shall stop goes on writing.
 const LONGEST_FAREWELL: Duration = Duration::from_secs(5);
 
-/// References of a running job, as bytes.
-#[derive(Default)]
-pub(super) struct Saved {
-    /// Those that are not on disk.
-    pending: BTreeMap<u32, Arc<[u8]>>,
-    /// Those that are.
+/// What the frames of a running job left, by frame; as bytes, or as something that bytes can be made of.
+pub(super) struct Saved<T = Arc<[u8]>> {
+    /// What is not on disk.
+    pending: BTreeMap<u32, T>,
+    /// What is.
     on_disk: BTreeSet<u32>,
-    /// When some were last put there, or the first was made.
-    put: Option<Instant>,
+    /// When some was last put there, or the job began.
+    put: Instant,
     pub cost: SaveCost,
+}
+
+/// A maker of frames that keeps on disk what they left.
+pub(super) trait Keeps {
+    /// What a frame left.
+    type Left;
+
+    /// Where it is kept; `None` for nowhere.
+    fn checkpoints(&self) -> Option<&Checkpoints<'_>>;
+
+    /// Acts on what is kept; told is also of which frames others to come need what they left.
+    fn with_saved<R>(
+        &self,
+        act: impl FnOnce(&mut Saved<Self::Left>, &dyn Fn(u32) -> bool) -> R,
+    ) -> R;
+
+    /// As it lies on disk; `None` where it cannot.
+    fn bytes(&self, left: &Self::Left) -> Option<Arc<[u8]>>;
+
+    /// Puts what frames left on disk where that is due, all of it where the job shall stop, and removes
+    /// what no frame to come needs.
+    fn put_away(&self, stopping: bool) -> Result<()> {
+        let Some((checkpoints, every)) = self.checkpoints().and_then(|c| Some((c, c.every?)))
+        else {
+            return Ok(());
+        };
+        let start = Instant::now();
+        let every = if stopping { Duration::ZERO } else { every };
+        for (frame, left) in self.with_saved(|saved, is_needed| saved.due(is_needed, start, every))
+        {
+            if stopping && start.elapsed() > LONGEST_FAREWELL {
+                break;
+            }
+            let Some(bytes) = self.bytes(&left) else { continue };
+            checkpoints.write(frame, &bytes)?;
+            self.with_saved(|saved, _| {
+                saved.on_disk.insert(frame);
+                saved.cost.bytes += bytes.len() as u64;
+            });
+        }
+        let over = self.with_saved(|saved, is_needed| saved.over(is_needed));
+        over.into_iter().for_each(|frame| checkpoints.remove(frame));
+        self.with_saved(|saved, _| saved.cost.seconds += start.elapsed().as_secs_f64());
+        Ok(())
+    }
+}
+
+impl<T> Default for Saved<T> {
+    fn default() -> Self {
+        let (pending, on_disk, cost) = Default::default();
+        Self { pending, on_disk, put: Instant::now(), cost }
+    }
+}
+
+impl<T> Saved<T> {
+    /// What a frame left is to be put on disk, sooner or later.
+    pub fn add(&mut self, frame: u32, left: T) {
+        self.pending.insert(frame, left);
+    }
+
+    /// What a frame left was found on disk.
+    pub fn found(&mut self, frame: u32) {
+        self.on_disk.insert(frame);
+    }
+
+    /// The file of a frame is about to hold what it left.
+    pub fn has_file(&mut self, frame: u32) {
+        self.pending.remove(&frame);
+    }
+
+    /// What is to be put on disk, if the last time is `every` ago.
+    fn due(
+        &mut self,
+        is_needed: &dyn Fn(u32) -> bool,
+        now: Instant,
+        every: Duration,
+    ) -> BTreeMap<u32, T> {
+        self.pending.retain(|frame, _| is_needed(*frame));
+        if now.duration_since(self.put) < every {
+            return BTreeMap::new();
+        }
+        self.put = now;
+        std::mem::take(&mut self.pending)
+    }
+
+    /// What is on disk and not needed any more.
+    fn over(&mut self, is_needed: &dyn Fn(u32) -> bool) -> Vec<u32> {
+        let over: Vec<u32> = self.on_disk.iter().copied().filter(|f| !is_needed(*f)).collect();
+        over.iter().for_each(|frame| _ = self.on_disk.remove(frame));
+        over
+    }
+}
+
+impl Saved {
+    /// Bytes that wait to be put on disk.
+    pub fn memory(&self) -> u64 {
+        self.pending.values().map(|bytes| bytes.len() as u64).sum()
+    }
+}
+
+impl Keeps for Inferrer<'_> {
+    type Left = Arc<[u8]>;
+
+    fn checkpoints(&self) -> Option<&Checkpoints<'_>> {
+        self.checkpoints
+    }
+
+    fn with_saved<R>(&self, act: impl FnOnce(&mut Saved, &dyn Fn(u32) -> bool) -> R) -> R {
+        self.with_state(|s| act(&mut s.saved, &|frame| s.references.get(frame).is_some()))
+    }
+
+    fn bytes(&self, left: &Arc<[u8]>) -> Option<Arc<[u8]>> {
+        Some(Arc::clone(left))
+    }
 }
 
 impl Inferrer<'_> {
@@ -42,7 +155,7 @@ impl Inferrer<'_> {
             if self.exchange.is_some() {
                 s.exports.insert(frame, bytes);
             }
-            s.saved.on_disk.insert(frame);
+            s.saved.found(frame);
             s.keep(&self.schedule, frame, reference);
             s.references.get(frame).cloned()
         })
@@ -76,72 +189,14 @@ impl Inferrer<'_> {
             return Ok(());
         }
         self.with_state(|s| {
-            s.saved.pending.insert(frame, bytes);
+            s.saved.add(frame, bytes);
             s.saved.cost.seconds += start.elapsed().as_secs_f64();
         });
         self.tend(false)
     }
 
-    /// Puts references on disk where that is due, all of them where the job shall stop, and removes
-    /// those that no frame to come needs.
+    /// What is due goes to disk, all of it where the job shall stop.
     pub(super) fn tend(&self, stopping: bool) -> Result<()> {
-        let Some((checkpoints, every)) = self.checkpoints.and_then(|c| Some((c, c.every?))) else {
-            return Ok(());
-        };
-        let start = Instant::now();
-        let every = if stopping { Duration::ZERO } else { every };
-        let put = self.with_state(|s| s.saved.due(&s.references, start, every));
-        for (frame, bytes) in put {
-            if stopping && start.elapsed() > LONGEST_FAREWELL {
-                break;
-            }
-            checkpoints.write(frame, &bytes)?;
-            self.with_state(|s| {
-                s.saved.on_disk.insert(frame);
-                s.saved.cost.bytes += bytes.len() as u64;
-            });
-        }
-        let over = self.with_state(|s| s.saved.over(&s.references));
-        over.into_iter().for_each(|frame| checkpoints.remove(frame));
-        self.with_state(|s| s.saved.cost.seconds += start.elapsed().as_secs_f64());
-        Ok(())
-    }
-}
-
-impl Saved {
-    /// Bytes that wait to be put on disk.
-    pub fn memory(&self) -> u64 {
-        self.pending.values().map(|bytes| bytes.len() as u64).sum()
-    }
-
-    /// The file of a frame is about to hold its reference.
-    pub fn has_file(&mut self, frame: u32) {
-        self.pending.remove(&frame);
-    }
-
-    /// What is to be put on disk, the dearest first, if the last time is `every` ago.
-    fn due(
-        &mut self,
-        references: &Stock<Arc<Reference>>,
-        now: Instant,
-        every: Duration,
-    ) -> Vec<(u32, Arc<[u8]>)> {
-        self.pending.retain(|frame, _| references.get(*frame).is_some());
-        let last = *self.put.get_or_insert(now);
-        if now.duration_since(last) < every {
-            return Vec::new();
-        }
-        self.put = Some(now);
-        let mut all: Vec<_> = std::mem::take(&mut self.pending).into_iter().collect();
-        all.sort_by_key(|(_, bytes)| std::cmp::Reverse(bytes.len()));
-        all
-    }
-
-    /// What is on disk and not needed any more.
-    fn over(&mut self, references: &Stock<Arc<Reference>>) -> Vec<u32> {
-        let is_over = |frame: &u32| references.get(*frame).is_none();
-        let over: Vec<u32> = self.on_disk.iter().copied().filter(is_over).collect();
-        over.iter().for_each(|frame| _ = self.on_disk.remove(frame));
-        over
+        self.put_away(stopping)
     }
 }

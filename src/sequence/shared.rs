@@ -58,7 +58,7 @@ pub trait Shared: FrameMaker + Sync {
     }
 
     /// What `original`, which is held and was just made, left behind; once.
-    fn export(&self, _original: u32) -> Option<Arc<[u8]>> {
+    fn export(&self, _original: u32) -> Option<Left> {
         None
     }
 
@@ -80,6 +80,15 @@ pub trait Shared: FrameMaker + Sync {
     fn lay(&self, _original: u32, _strips: &[Arc<[u8]>]) -> Result<()> {
         Ok(())
     }
+}
+
+/// What an original left behind.
+#[derive(Debug, Clone, Default)]
+pub struct Left {
+    /// For [`Shared::import`].
+    pub bytes: Arc<[u8]>,
+    /// How many points or pixels they tell of.
+    pub discoveries: u64,
 }
 
 /// One of several strips of a frame.

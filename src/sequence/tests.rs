@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::math::DVec3;
-use crate::output::manifest::Stray;
-use crate::output::manifest::{Header, Manifest, manifest_path};
+use crate::output::manifest::{FORMAT, Header, Manifest, Stray, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
 use crate::scene::{CameraPath, Easing, FrameRange, KeyPose, Pose, Settings};
 use std::cell::RefCell;
@@ -46,17 +45,11 @@ impl Folder {
     fn target(&self, settings: &Settings, overwrite: bool) -> Target {
         let name = self.path("frame_##.png").display().to_string();
         let header = Header {
-            manifest: 2,
-            command: Vec::new(),
-            chosen: None,
-            tweenray: "0".into(),
-            scene: "s".into(),
-            scene_hash: "h".into(),
-            shot_hash: "s".into(),
+            manifest: FORMAT,
             shot_frames: 4,
             files: "frame_##.png".into(),
-            tracer: "none".into(),
             settings: Header::settings(settings),
+            ..Header::default()
         };
         Target {
             pattern: FramePattern::parse(&name, 4).expect("a pattern"),

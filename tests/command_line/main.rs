@@ -2,6 +2,7 @@
 
 mod choosing;
 mod comparing;
+mod full_disk;
 mod interrupted;
 mod job;
 mod killed;

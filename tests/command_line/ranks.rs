@@ -76,6 +76,31 @@ mod with_mpi {
         }
     }
 
+    /// Each rank reads a part of what is there; what is found is what one process finds.
+    #[test]
+    fn ranks_find_what_is_damaged_or_missing_together() {
+        let job = Job::new();
+        let line = format!("{LINE} --maps -o o/f_##.png");
+        job.done(&line);
+        let whole: Vec<Vec<u8>> = (1..=5).map(|n| job.read(&format!("o/f_0{n}.png"))).collect();
+        let map = job.names("o").into_iter().find(|name| name.contains("04_")).expect("a map");
+        for ranks in [2, 3, 8] {
+            fs::write(job.path("o/f_02.png"), "no picture").expect("written");
+            fs::remove_file(job.path(format!("o/{map}"))).expect("removed");
+            fs::remove_file(job.path("o/f_05.png")).expect("removed");
+            let Some(ran) = under_mpirun(&job, ranks, &line) else { return };
+            assert_eq!(ran.code, Some(0), "{}", ran.err);
+            assert!(ran.out.contains("3 rendered, 2 kept"), "{}", ran.out);
+            assert_eq!(ran.err.matches("f_02.png is damaged").count(), 1, "{}", ran.err);
+            assert_eq!(ran.err.matches("f_04.png lacks its maps").count(), 1, "{}", ran.err);
+            let same = |n: usize| job.read(&format!("o/f_0{n}.png")) == whole[n - 1];
+            assert!((1..=5).all(same), "{ranks} ranks");
+        }
+        let Some(ran) = under_mpirun(&job, 3, &format!("{line} --seed 5")) else { return };
+        assert_eq!(ran.err.matches("seed was 0, now it is 5").count(), 1, "{}", ran.err);
+        assert_eq!(ran.code, Some(2));
+    }
+
     /// Rank 0 alone looks at the scene; all render what it chose, and one process goes on with it.
     #[test]
     fn ranks_render_what_one_of_them_chose() {

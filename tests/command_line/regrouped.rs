@@ -2,6 +2,7 @@
 
 use super::job::Job;
 use super::launch::{launched, under_mpirun};
+use super::together::small;
 use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -37,8 +38,7 @@ fn kill_after(job: &Job, child: &mut Child, moment: Duration) -> bool {
 }
 
 fn assert_same(job: &Job, folder: &str, ending: &str, all: bool) {
-    for frame in 1..=20 {
-        let name = format!("f_{frame:02}.{ending}");
+    for name in job.names("whole").into_iter().filter(|name| name.ends_with(ending)) {
         if all || job.path(format!("{folder}/{name}")).exists() {
             let same = job.read(&format!("{folder}/{name}")) == job.read(&format!("whole/{name}"));
             assert!(same, "{name}");
@@ -72,8 +72,41 @@ fn a_killed_job_goes_on_with_any_number_of_ranks() {
         let Some(ran) = under_mpirun(&job, 2, &line("k")) else { return };
         assert_eq!(ran.code, Some(0), "{}", ran.err);
         assert_same(&job, "k", ending, true);
-        assert!(!job.path("k/.f.references").exists(), "references are left");
+        let left = job.path("k/.f.references");
+        assert!(!left.exists(), "{more}: references are left: {:?}", job.names("k/.f.references"));
         job.done("status k --frames 1..20");
+    }
+}
+
+/// The scenes of the repository, mirrors and glass among them, audit included: killed, requeued with other
+/// ranks and other threads, again and again.
+#[test]
+fn scenes_that_are_killed_and_regrouped_are_the_same() {
+    for (name, segment) in [("reflective_spheres", 8), ("spheres_on_terrain", 8), ("demo", 16)] {
+        let job = Job::new();
+        let scene = small(&job, name);
+        let line = |threads: u32, out: &str| {
+            format!(
+                "render {scene} --size 96x54 --spp 2 --shadow-samples 16 --frames 1..16 --no-video \
+                 --segment {segment} --audit 0.1 --checkpoint 0s --threads {threads} -o {out}/f_##.png"
+            )
+        };
+        job.done(&line(2, "whole"));
+        let runs = [(2, 1, 5), (4, 1, 8), (1, 2, 6), (3, 2, 9), (8, 1, 12), (2, 2, 10)];
+        for (ranks, threads, tenths) in runs {
+            let Some(mut child) = start(&job, ranks, &line(threads, "k")) else { return };
+            let done = kill_after(&job, &mut child, Duration::from_millis(100 * tenths));
+            let words = fs::read_to_string(job.path("errors")).expect("text");
+            assert!(!words.contains("damaged"), "{words}");
+            assert_same(&job, "k", "png", false);
+            if done {
+                break;
+            }
+        }
+        let Some(ran) = under_mpirun(&job, 16, &line(1, "k")) else { return };
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert_same(&job, "k", "png", true);
+        job.done("status k --frames 1..16");
     }
 }
 

@@ -106,3 +106,14 @@ fn a_sweep_that_is_stopped_has_a_page_that_says_so_and_goes_on() {
     assert!(job.done(&more).err.contains("going on: "));
     assert!(!job.done(&format!("{line} --seed 3 --overwrite")).err.contains("going on"));
 }
+
+#[test]
+fn a_sweep_obeys_the_time_limit_of_the_scene_file() {
+    let job = Job::new();
+    let scene = "[camera]\nframes = 4\n[settings]\ntime_limit = '1s'\nthreads = 1\n\
+                 [sky]\nradiance = 0.5\n[[mesh]]\nfile = 'cube.obj'\n";
+    std::fs::write(job.path("limited.toml"), scene).expect("written");
+    let ran = job.run("accuracy limited.toml -o o --size 640x360 --reference-spp 4096");
+    assert_eq!(ran.code, Some(75), "{}", ran.err);
+    assert!(ran.err.contains("stopped at the time limit of 1.0 s"), "{}", ran.err);
+}

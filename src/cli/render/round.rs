@@ -15,9 +15,7 @@ use crate::output::{Format, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{
-    self, ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer,
-};
+use crate::sequence::{ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer};
 use crate::shade::Renderer;
 use rayon::ThreadPool;
 use std::time::Instant;
@@ -64,10 +62,8 @@ pub(super) struct Round {
 impl Site<'_> {
     /// Renders the frames of `request` that are not there yet. All ranks call it.
     pub fn render(&self, request: &Request, target: &Target) -> Result<Round> {
-        let plan = self.world.from_root(|| {
-            request.stats.as_ref().map_or(Ok(()), atomic::make_room)?;
-            self.pool.install(|| sequence::prepare(target, request.frames))
-        })?;
+        self.world.from_root(|| request.stats.as_ref().map_or(Ok(()), atomic::make_room))?;
+        let plan = cluster::prepare(self.world, self.pool, target, request.frames)?;
         tell(self.quiet, &plan.notes, |n| say::note(n));
         let job = Frames { request, target, plan: &plan, site: self };
         let begun = Instant::now();

@@ -1,8 +1,9 @@
 //! The table, played through without any ranks.
 
+use super::lay::owners;
 use super::*;
 use crate::error::Result;
-use crate::sequence::{FrameMaker, Made, Pyramid};
+use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
 use std::collections::BTreeSet;
 
 /// Frames of a pyramid, or each on its own; makes nothing.

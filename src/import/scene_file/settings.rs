@@ -96,6 +96,9 @@ pub(super) struct Settings {
     /// Put what frames to come need on disk every so often, so that a killed job need not trace it
     /// again: "30s", "5m", "off". Absent: every 30 s.
     checkpoint: Option<TimeOrOff>,
+    /// How many discoveries (points or pixels that one rank of an MPI job traced and others use) a
+    /// message to another rank carries at most. Absent: 100000.
+    exchange: Option<Int<1, { limits::MAX_EXCHANGE as i64 }>>,
 }
 
 impl Default for Settings {
@@ -131,6 +134,7 @@ impl Default for Settings {
             stats: None,
             time_limit: None,
             checkpoint: None,
+            exchange: None,
         }
     }
 }
@@ -204,6 +208,7 @@ impl Settings {
         loaded.stats.clone_from(&self.stats);
         loaded.time_limit = self.time_limit.map(|limit| limit.0);
         loaded.checkpoint = self.checkpoint.map(|interval| interval.0);
+        loaded.exchange = self.exchange.map(Int::u32);
         Ok(())
     }
 }

@@ -4,10 +4,9 @@ use super::ColourMaker;
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::reuse::colour::{Entry, Known};
-use crate::sequence::shared::Shared;
+use crate::sequence::shared::{Left, Shared};
 use crate::sequence::strips::{pack, unpack};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// A frame's discoveries, column by column, which deflates better.
 #[derive(Serialize, Deserialize)]
@@ -45,9 +44,10 @@ impl Shared for ColourMaker<'_> {
         self.checkpoints.is_some_and(|c| c.has(original))
     }
 
-    fn export(&self, original: u32) -> Option<Arc<[u8]>> {
+    fn export(&self, original: u32) -> Option<Left> {
         let known = self.with_state(|s| s.known.get(&original).cloned())?;
-        self.pool.install(|| encode(&known)).ok().map(Into::into)
+        let bytes = self.pool.install(|| encode(&known)).ok()?.into();
+        Some(Left { bytes, discoveries: known.entries.len() as u64 })
     }
 
     fn import(&self, original: u32, bytes: &[u8]) {

@@ -4,7 +4,7 @@
 use super::Inferrer;
 use crate::error::Result;
 use crate::reuse::store;
-use crate::sequence::shared::{Shared, Strip};
+use crate::sequence::shared::{Left, Shared, Strip};
 use crate::sequence::strips::{self, Unheard};
 use std::path::Path;
 use std::sync::Arc;
@@ -45,8 +45,12 @@ impl Shared for Inferrer<'_> {
         Ok(self.reference(original)?.is_some())
     }
 
-    fn export(&self, original: u32) -> Option<Arc<[u8]>> {
-        self.with_state(|s| s.exports.remove(&original))
+    fn export(&self, original: u32) -> Option<Left> {
+        self.with_state(|s| {
+            let bytes = s.exports.remove(&original)?;
+            let discoveries = s.references.get(original).map_or(0, |r| r.len() as u64);
+            Some(Left { bytes, discoveries })
+        })
     }
 
     /// Bytes that are no reference are as good as none: the frame that needs it makes it.

@@ -32,7 +32,7 @@ fn every_setting_reaches_its_place() {
          rules = { robust = false, retry = false, recheck = 'always', spawn_offset = false, \
          recentre = false }\ncrop = [1, 2, 30, 40]\nframes = [2, 3]\n\
          output = 'out/f_####.exr'\nfps = 30\nvideo = false\noverwrite = true\nthreads = 2\n\
-         stats = 's.json'\ntime_limit = '1h30m'\ncheckpoint = 'off'\n[camera]\nframes = 5\n",
+         stats = 's.json'\ntime_limit = '1h30m'\ncheckpoint = 'off'\nexchange = 5000\n[camera]\nframes = 5\n",
     );
     let s = &loaded.settings;
     assert_eq!((s.width, s.height, s.spp, s.seed), (320, 200, 7, 11));
@@ -55,6 +55,7 @@ fn every_setting_reaches_its_place() {
     assert!(loaded.overwrite && !loaded.video);
     assert_eq!(loaded.time_limit, Some(Duration::from_secs(5400)));
     assert_eq!(loaded.checkpoint, Some(Interval(None)));
+    assert_eq!(loaded.exchange, Some(5000));
 }
 
 #[test]

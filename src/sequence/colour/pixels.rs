@@ -1,0 +1,59 @@
+//! From a film to what a frame discovered, and from what others discovered into the film.
+
+use crate::film::{Film, PixelSource, Provenance};
+use crate::reuse::colour::{Entry, Inferred, Known};
+use crate::scene::{Camera, Rect, Settings};
+use crate::stats::ReuseCounts;
+
+/// The pixels of the film that were traced, as entries.
+pub(super) fn discoveries(
+    frame: u32,
+    film: &Film,
+    inferred: &[Option<Inferred>],
+    camera: &Camera,
+    settings: &Settings,
+) -> Known {
+    let mut entries = Vec::new();
+    for (x, y) in pixels_of(settings) {
+        let index = film.index(x, y);
+        if inferred[index].is_none() {
+            let depth = film.gbuffer.as_ref().map_or(f32::NAN, |g| g.depth[index]);
+            let middle = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            // Rounding can put a hit at the eye itself a little behind it.
+            let distance = (f64::from(depth) / middle.dot(camera.forward)).max(0.0) as f32;
+            entries.push(Entry { pixel: index as u32, rgb: film.rgb[index], distance });
+        }
+    }
+    Known { frame, entries }
+}
+
+/// Puts inferred pixels into the film, and says of each pixel where it comes from.
+pub(super) fn fill(
+    film: &mut Film,
+    frame: u32,
+    inferred: &[Option<Inferred>],
+    settings: &Settings,
+) -> ReuseCounts {
+    let mut counts = ReuseCounts::default();
+    let mut sources = vec![PixelSource::default(); film.rgb.len()];
+    for (x, y) in pixels_of(settings) {
+        let index = film.index(x, y);
+        counts.direct += 1;
+        if let Some(known) = &inferred[index] {
+            film.rgb[index] = known.rgb;
+            sources[index] = known.source(frame);
+            counts.direct_inferred += 1;
+        } else {
+            sources[index].provenance = Provenance::Traced;
+        }
+    }
+    film.sources = Some(sources);
+    counts
+}
+
+/// The pixels that are wanted, row by row.
+fn pixels_of(settings: &Settings) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let full = Rect { x0: 0, y0: 0, x1: settings.width, y1: settings.height };
+    let Rect { x0, y0, x1, y1 } = settings.crop.unwrap_or(full);
+    (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
+}

@@ -1,0 +1,77 @@
+//! What is in the way of a job, and must not be replaced unasked.
+
+use super::Target;
+use crate::error::{Error, Result, counted};
+use crate::output::manifest::{Manifest, Row, Stray};
+use crate::scene::FrameRange;
+use crate::sequence::Recipe;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Refuses to replace a frame that shows something else than this shot's frame of that number.
+pub(super) fn refuse_other_view(path: &Path, row: &Row, recipe: Option<&Recipe>) -> Result<()> {
+    if recipe.is_some_and(|recipe| recipe.view.to_string() == row.view) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "{} is of another camera move: frame {} stands elsewhere there\n  \
+         help: choose another output with -o, or replace it with --overwrite",
+        path.display(),
+        row.frame
+    )))
+}
+
+/// Refuses to replace a file that holds a frame of other settings, or another frame.
+pub(super) fn refuse_taken(path: &Path, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<()> {
+    let here = |row: &&Row| path.file_name().is_some_and(|name| name == row.file.as_str());
+    let is_taken = |row: &&Row| here(row) && row.stray == Some(Stray::OtherSettings);
+    let holds = match rows.values().find(is_taken) {
+        Some(_) => "a frame of other settings".to_string(),
+        None if rows.contains_key(&frame) => return Ok(()),
+        None => match rows.values().find(here) {
+            Some(row) => format!("frame {}", row.frame),
+            None => return Ok(()),
+        },
+    };
+    Err(Error::Usage(format!(
+        "{} holds {holds}\n  \
+         help: choose another output with -o, or replace it with --overwrite",
+        path.display()
+    )))
+}
+
+/// Refuses frames that no manifest vouches for: they may be somebody's work.
+pub(super) fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
+    let mut in_the_way = (frames.first..=frames.last).flat_map(|f| target.paths(f));
+    match in_the_way.find(|path| path.exists()) {
+        Some(path) if !target.overwrite => Err(Error::Usage(format!(
+            "{} exists, and no manifest beside it says how it was made\n  \
+             help: choose another output with -o, or replace it with --overwrite",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses frames of other settings, as long as any is left.
+pub(super) fn refuse_others(
+    target: &Target,
+    manifest: &Manifest,
+    frames: FrameRange,
+) -> Result<()> {
+    let Some(d) = manifest.header.first_difference(&target.header) else { return Ok(()) };
+    let folder = target.pattern.folder();
+    let left = manifest.rows.values().filter(|row| folder.join(&row.file).exists()).count();
+    if left == 0 {
+        return refuse_strangers(target, frames);
+    }
+    Err(Error::Usage(format!(
+        "{} holds {} of other settings: {} was {}, now it is {}\n  \
+         help: set it back, choose another output with -o, or replace the frames with --overwrite",
+        target.pattern,
+        counted(left, "frame"),
+        d.name,
+        d.before,
+        d.now
+    )))
+}
