@@ -21,6 +21,7 @@
 mod candidates;
 mod check;
 mod choice;
+mod effort;
 mod errors;
 mod figures;
 mod fit;
@@ -40,12 +41,14 @@ mod sentences;
 mod stage;
 mod sweep;
 mod table;
+mod timing;
 mod trial;
 mod writing;
 
 pub use candidates::candidates;
 pub use check::{Check, Checked};
 pub use choice::{Goal, best_within, fastest_reaching};
+pub use effort::Effort;
 pub use errors::Errors;
 pub use foretell::{Foretelling, Foretold, Range};
 pub use frames::chosen_frames;
@@ -59,4 +62,5 @@ pub use sentences::{about_knob, about_oracle, about_writing};
 pub use stage::Stage;
 pub use sweep::{Heard, Picture, Sweep};
 pub use table::{Measured, Row, Spread};
+pub use timing::{Timer, Timing};
 pub use writing::{Writing, on_disk};

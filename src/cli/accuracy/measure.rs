@@ -166,7 +166,7 @@ impl Job<'_> {
             threads: sweep.stage.pool.current_num_threads(),
             tracer: sweep.stage.intersector.describe(),
             load: [self.load, machine::load()],
-            seconds: self.start.elapsed().as_secs_f64(),
+            seconds: ledger.is_running().then(|| self.start.elapsed().as_secs_f64()),
             runs: ledger.runs(),
             trials: [sweep.done(ledger), sweep.trials()],
             settings: sweep.candidates.len(),
