@@ -93,7 +93,7 @@ impl Place {
         }
         let spp: u32 = var("SPP", 256);
         let truth = format!(
-            "--spp {spp} --shadow-samples 8 --sky-samples 8 --bounces 16 --cutoff 1e-5 \
+            "--spp {spp} --shadow-samples 8 --sky-samples 2 --bounces 16 --cutoff 1e-5 \
              --policy off --png-bits 16 --seed 77 --overwrite"
         );
         self.render("truth", &truth);
