@@ -242,7 +242,7 @@ fn clear(folder: &Path) -> Result<()> {
     };
     let is_ours = |name: &str| {
         let ends = [".json", ".jsonl", ".png", ".exr"].iter().any(|end| name.ends_with(end));
-        let begins = ["sweep", "trials", "setting_", "reference", "oracle", "writing"];
+        let begins = ["sweep", "trials", "setting_", "reference", "oracle", "writing", "load"];
         ends && begins.iter().any(|begin| name.starts_with(begin))
     };
     for path in entries.flatten().map(|entry| entry.path()) {
