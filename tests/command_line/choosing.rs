@@ -75,7 +75,7 @@ fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
     assert_eq!(header(&job)["chosen"]["wanted"], "6 s");
     // How near is for a quiet machine to show; this is that everything counts, and that it is used.
     let taken = begun.elapsed().as_secs_f64();
-    assert!((2.0..15.0).contains(&taken), "{taken} s: {said}");
+    assert!((1.0..25.0).contains(&taken), "{taken} s: {said}");
 }
 
 /// More frames are rendered under the choice of the first, or all under a tighter one where these show
