@@ -5,7 +5,7 @@ use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
 use super::foretell::Foretelling;
 use super::law::Samples;
-use super::probe::{Probe, reference, samples_of_reference};
+use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
@@ -61,8 +61,8 @@ impl Check {
 
     /// Wall seconds that a whole check of frames of `samples` is foretold to take.
     pub fn seconds(foretelling: &Foretelling, samples: Samples) -> f64 {
-        let Effort { frames, pixels, .. } = Effort::WHOLE;
-        let pixels = f64::from(2 * frames) * f64::from(pixels);
+        let whole = Effort::WHOLE;
+        let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
         pixels * foretelling.patch_seconds(samples_of_reference(samples))
     }
 

@@ -18,7 +18,7 @@ const PROBE: f64 = 9e6;
 
 impl Effort {
     /// What a probe does that has time.
-    pub const WHOLE: Self = Self { frames: 8, pixels: 1200, picture: 200_000.0, small: 7_000.0 };
+    pub const WHOLE: Self = Self { frames: 16, pixels: 800, picture: 100_000.0, small: 7_000.0 };
     /// Less than this says nothing.
     const LEAST: Self = Self { frames: 3, pixels: 200, picture: 10_000.0, small: 1_200.0 };
 
@@ -60,6 +60,6 @@ mod tests {
         assert_eq!(Effort::within(1.0, 0.0), Effort::WHOLE);
         // A fourth of the time: half the frames, half their pixels.
         let part = Effort::within(2.25, 1e-6);
-        assert_eq!((part.frames, part.pixels, part.small), (4, 600, 1750.0));
+        assert_eq!((part.frames, part.pixels, part.small), (8, 400, 1750.0));
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! with n camera samples, s shadow and k sky samples each; the bias is that of a ratio of two averages.
 //! So it is for powers of two. Samples are points of a Sobol sequence, whose merit is in whole blocks of so
-//! many (Owen, 1997): another number is blocks, each with an error of its own ([`falls`]).
+//! many (Owen, 1997): another number is blocks, each with an error of its own.
 
 use super::fit::fit;
 use serde::{Deserialize, Serialize};

@@ -148,8 +148,8 @@ impl Probe<'_> {
                 (frames, patches)
             }
             false => {
-                let frames = spread(self.frames, 2 * effort.frames, 0.1);
-                let count = effort.pixels;
+                let frames = spread(self.frames, effort.frames, 0.1);
+                let count = checked_pixels(effort);
                 let patches = Patches::by_contrast_of(base, &frames, image, count, CHECK)?;
                 (frames, patches)
             }
@@ -187,6 +187,11 @@ fn between(numbers: &[u32]) -> Vec<u32> {
     let mut all: Vec<u32> = numbers.windows(2).flat_map(steps).collect();
     all.extend(numbers.last());
     all
+}
+
+/// Pixels that a check of `effort` looks at in each frame: more than the probe, since it does so once.
+pub(super) fn checked_pixels(effort: Effort) -> u32 {
+    effort.pixels + effort.pixels / 2
 }
 
 /// The settings of a look: one sample of everything, and every frame traced.
