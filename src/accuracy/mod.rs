@@ -43,6 +43,7 @@ mod sweep;
 mod table;
 mod timing;
 mod trial;
+mod worst;
 mod writing;
 
 pub use candidates::candidates;
