@@ -66,7 +66,9 @@ fn how(out: &mut String, sweeps: &[Sweep]) {
     line(out, "reference: camera samples, change of the last doubling", sweeps, |s| {
         let reference = &s.json["reference"];
         let change = reference["change"].as_f64().map_or("–".into(), short);
-        format!("{}, {change}/255", reference["settings"]["spp"])
+        let number = |name: &str| reference[name].as_f64().unwrap_or(f64::INFINITY);
+        let end = if number("change") > number("wanted") { ", not converged" } else { "" };
+        format!("{}, {change}/255{end}", reference["settings"]["spp"])
     });
     out.push('\n');
 }

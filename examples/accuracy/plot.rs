@@ -2,6 +2,7 @@
 
 use crate::sweep::{ROOT, Row, Sweep};
 use std::fmt::Write;
+use tweenray::page::Axis;
 use tweenray::page::words::short;
 
 const WIDTH: f64 = 640.0;
@@ -11,31 +12,25 @@ const RIGHT: f64 = 16.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 84.0;
 
-/// A logarithmic axis from pixel to pixel.
-struct Axis {
-    low: f64,
-    high: f64,
+/// An axis from pixel to pixel.
+struct Scale {
+    axis: Axis,
     from: f64,
     to: f64,
 }
 
-impl Axis {
-    fn about(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
-        let low = values.clone().fold(f64::INFINITY, f64::min) / 1.2;
-        let high = values.fold(0.0, f64::max) * 1.2;
-        Self { low, high, from, to }
+impl Scale {
+    /// Where a share of the axis, per cent, stands.
+    fn place(&self, percent: f64) -> f64 {
+        self.from + 0.01 * percent * (self.to - self.from)
     }
 
     fn at(&self, value: f64) -> f64 {
-        let share = (value / self.low).ln() / (self.high / self.low).ln();
-        self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
+        self.place(self.axis.at(value))
     }
 
-    /// 1, 2 and 5 times powers of ten.
-    fn ticks(&self) -> Vec<f64> {
-        let powers = (-9..9).map(|power| 10f64.powi(power));
-        let all = powers.flat_map(|p| [1.0, 2.0, 5.0].map(|digit| digit * p));
-        all.filter(|v| (self.low..=self.high).contains(v)).collect()
+    fn ticks(&self, unit: &str) -> impl Iterator<Item = (f64, String)> {
+        self.axis.ticks(unit).into_iter().map(|tick| (self.place(tick.at), tick.label))
     }
 }
 
@@ -54,8 +49,9 @@ fn kind(row: &Row) -> (&'static str, &'static str) {
 /// Writes `docs/pictures/accuracy-NAME.svg`.
 pub fn write(sweep: &Sweep) {
     let seconds = sweep.rows.iter().flat_map(|r| [r.cpu_seconds.low, r.cpu_seconds.high]);
-    let x = Axis::about(seconds, LEFT, WIDTH - RIGHT);
-    let y = Axis::about(sweep.rows.iter().map(|r| r.rmse), HEIGHT - BOTTOM, TOP);
+    let x = Scale { axis: Axis::log_about(seconds), from: LEFT, to: WIDTH - RIGHT };
+    let errors = sweep.rows.iter().map(|r| r.rmse);
+    let y = Scale { axis: Axis::log_about(errors), from: HEIGHT - BOTTOM, to: TOP };
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n\
@@ -70,28 +66,24 @@ pub fn write(sweep: &Sweep) {
     std::fs::write(format!("{ROOT}/docs/pictures/accuracy-{}.svg", sweep.name), out).unwrap();
 }
 
-fn grid(out: &mut String, x: &Axis, y: &Axis) {
-    for tick in x.ticks() {
-        let at = x.at(tick);
+fn grid(out: &mut String, x: &Scale, y: &Scale) {
+    for (at, label) in x.ticks(" s") {
         _ = writeln!(
             out,
             "<path d=\"M{at:.1} {TOP}V{:.1}\" stroke=\"#ddd\"/>\
-             <text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{} s</text>",
+             <text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
             HEIGHT - BOTTOM,
-            HEIGHT - BOTTOM + 18.0,
-            short(tick)
+            HEIGHT - BOTTOM + 18.0
         );
     }
-    for tick in y.ticks() {
-        let at = y.at(tick);
+    for (at, label) in y.ticks("") {
         _ = writeln!(
             out,
             "<path d=\"M{LEFT} {at:.1}H{:.1}\" stroke=\"#ddd\"/>\
-             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
             WIDTH - RIGHT,
             LEFT - 8.0,
-            at + 4.0,
-            short(tick)
+            at + 4.0
         );
     }
     _ = writeln!(
@@ -106,7 +98,7 @@ fn grid(out: &mut String, x: &Axis, y: &Axis) {
 }
 
 /// Steps through what nothing beats.
-fn front(out: &mut String, sweep: &Sweep, x: &Axis, y: &Axis) {
+fn front(out: &mut String, sweep: &Sweep, x: &Scale, y: &Scale) {
     let mut path = String::new();
     for (k, row) in sweep.front().into_iter().enumerate() {
         let (px, py) = (x.at(row.cpu_seconds.estimate), y.at(row.rmse));
@@ -122,7 +114,7 @@ fn front(out: &mut String, sweep: &Sweep, x: &Axis, y: &Axis) {
     );
 }
 
-fn point(out: &mut String, row: &Row, x: &Axis, y: &Axis) {
+fn point(out: &mut String, row: &Row, x: &Scale, y: &Scale) {
     let (px, py) = (x.at(row.cpu_seconds.estimate), y.at(row.rmse));
     let [low, high] = [row.cpu_seconds.low, row.cpu_seconds.high].map(|s| x.at(s));
     let (colour, _) = kind(row);
@@ -139,7 +131,7 @@ fn point(out: &mut String, row: &Row, x: &Axis, y: &Axis) {
 }
 
 /// Numbers of the front's points, as in the table below the picture.
-fn numbers(out: &mut String, sweep: &Sweep, x: &Axis, y: &Axis) {
+fn numbers(out: &mut String, sweep: &Sweep, x: &Scale, y: &Scale) {
     for (number, row) in (1..).zip(sweep.front()) {
         _ = writeln!(
             out,

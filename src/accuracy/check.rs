@@ -1,9 +1,11 @@
 //! What came out: some pixels of finished frames against many samples.
 
 use super::choice::Goal;
+use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
+use super::foretell::Foretelling;
 use super::law::Samples;
-use super::probe::{Probe, reference, samples_of_reference};
+use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
@@ -29,17 +31,18 @@ pub struct Check {
 }
 
 impl Check {
-    /// Looks at some finished frames, rendered with `samples`, at other pixels than the probe did;
-    /// `image` gives a frame as displayed.
+    /// Looks at some finished frames, rendered with `samples`, at other pixels than the probe did, as
+    /// many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
     /// Those of tracing and of `image`.
     pub fn of(
         probe: &Probe,
         samples: Samples,
+        effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<Self> {
-        let (chosen, patches) = probe.check_patches(image)?;
+        let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
         let reference = reference(probe.stage.base, samples_of_reference(samples));
         let truth = patches.trace(probe.stage, &reference)?;
@@ -54,6 +57,13 @@ impl Check {
             frames: chosen.into_iter().zip(found).map(checked).collect(),
             figure: probe.goal.map_or(Ok(0.0), |goal| figure(goal, &patches, &truth, &seen))?,
         })
+    }
+
+    /// Wall seconds that a whole check of frames of `samples` is foretold to take.
+    pub fn seconds(foretelling: &Foretelling, samples: Samples) -> f64 {
+        let whole = Effort::WHOLE;
+        let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
+        pixels * foretelling.patch_seconds(samples_of_reference(samples))
     }
 
     /// The mean of the frames' squared errors.

@@ -2,8 +2,9 @@
 
 use super::choice::Goal;
 use super::law::{Law, Samples};
+use super::worst::worst;
 use crate::measure::psnr;
-use crate::scene::{ReuseSettings, Settings};
+use crate::scene::{Policy, ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
 /// A way to take over light from other frames, as it came out on a few small frames.
@@ -25,6 +26,17 @@ pub struct Measured {
     pub samples: Samples,
     /// Squared errors, the reference's own left aside.
     pub errors: Vec<f64>,
+    /// How far each may be off, a share: the standard error of pixels drawn.
+    pub doubts: Vec<f64>,
+}
+
+/// What patches took to trace.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pace {
+    /// The samples.
+    pub samples: Samples,
+    /// Wall seconds a pixel.
+    pub seconds: f64,
 }
 
 /// A figure as a power of the squared error in display steps: both of its logarithms' line.
@@ -80,9 +92,10 @@ pub struct Foretelling {
     pub modes: Vec<Mode>,
     /// How the goal's figure goes with the squared error, unless it is that.
     pub line: Option<Line>,
-    /// How far a frame's squared error may be off, a share: the standard error of pixels drawn, the mean
-    /// of all frames. That of a single frame is in doubt itself.
-    pub doubt: f64,
+    /// How far each frame's squared error may be off where samples were not tried, a share.
+    pub doubts: Vec<f64>,
+    /// How fast patches are traced.
+    pub pace: Option<Pace>,
     /// How much larger errors came out than foretold.
     pub excess: f64,
 }
@@ -144,24 +157,22 @@ impl Foretelling {
         }
     }
 
-    /// What is foretold of `samples` in `mode`, the doubt added.
+    /// What is foretold of `samples` in `mode`, of the worst frame.
     pub fn of(&self, mode: &Mode, samples: Samples) -> Foretold {
         let tried = self.measured.iter().find(|measured| measured.samples == samples);
-        let errors = tried.map_or_else(
-            || self.law.errors(samples).collect::<Vec<_>>(),
-            |measured| measured.errors.clone(),
-        );
-        let each = errors
-            .iter()
-            .zip(&self.bias)
-            .map(|(error, bias)| (1.0 + self.doubt) * (self.excess * error + bias) + self.rounding);
+        let (errors, doubts) = match tried {
+            Some(measured) => (measured.errors.clone(), &measured.doubts),
+            None => (self.law.errors(samples).collect::<Vec<_>>(), &self.doubts),
+        };
+        let each = errors.iter().zip(&self.bias).map(|(error, bias)| self.excess * error + bias);
+        let each: Vec<f64> = each.collect();
         let n = f64::from(samples.spp);
         let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
         Foretold {
             samples,
             bounces: self.bounces,
             reuse: mode.reuse,
-            squared_error: each.fold(0.0, f64::max),
+            squared_error: worst(&each, doubts) + self.rounding,
             seconds: by.iter().zip(mode.seconds).map(|(x, seconds)| x * seconds).sum(),
         }
     }
@@ -175,20 +186,20 @@ impl Foretelling {
         self.modes.iter().filter_map(best).collect()
     }
 
-    /// The setting nearest to the truth, of those foretold to take at most `seconds` a frame; the
-    /// fastest of all where none does.
-    pub fn best_within(&self, range: &Range, seconds: f64) -> Option<Foretold> {
+    /// The setting nearest to the truth, of those that `fits` lets through; the fastest of all where it
+    /// lets none.
+    pub fn best_within(&self, range: &Range, fits: &dyn Fn(&Foretold) -> bool) -> Option<Foretold> {
         let all = || self.modes.iter().flat_map(|mode| self.all(mode, range));
-        let within = all().filter(|f| f.seconds <= seconds);
+        let within = all().filter(fits);
         let best = within.min_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
         best.or_else(|| all().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
     }
 
-    /// The same with all times `factor` times as long.
-    pub fn slower(&self, factor: f64) -> Self {
-        let mut slower = self.clone();
-        slower.modes.iter_mut().flat_map(|mode| &mut mode.seconds).for_each(|s| *s *= factor);
-        slower
+    /// Puts the times of a mode through what a setting of it `took`, seconds a frame.
+    pub fn correct(&mut self, foretold: &Foretold, took: f64) {
+        let factor = took / foretold.seconds.max(1e-12);
+        let same = self.modes.iter_mut().filter(|mode| mode.reuse == foretold.reuse);
+        same.flat_map(|mode| &mut mode.seconds).for_each(|seconds| *seconds *= factor);
     }
 
     /// The same with all errors of samples `factor` times as large.
@@ -198,7 +209,20 @@ impl Foretelling {
 
     /// The setting with the least error foretold.
     pub fn best(&self, range: &Range) -> Option<Foretold> {
-        self.best_within(range, f64::INFINITY)
+        self.best_within(range, &|_| true)
+    }
+
+    /// Wall seconds that it takes to trace a pixel of a patch with `samples`.
+    pub fn patch_seconds(&self, samples: Samples) -> f64 {
+        // Patches are traced, whatever the mode.
+        let traced = |mode: &&Mode| mode.reuse.policy == Policy::Off;
+        let mode = self.modes.iter().find(traced).or(self.modes.first());
+        let (Some(mode), Some(pace)) = (mode, self.pace) else { return 0.0 };
+        let of = |s: Samples| {
+            let [_, camera, shadow, sky] = mode.seconds;
+            f64::from(s.spp) * (camera + f64::from(s.shadow) * shadow + f64::from(s.sky) * sky)
+        };
+        pace.seconds * of(samples) / of(pace.samples).max(1e-12)
     }
 
     fn all<'s>(&'s self, mode: &'s Mode, range: &'s Range) -> impl Iterator<Item = Foretold> + 's {
@@ -217,7 +241,6 @@ impl Foretelling {
 mod tests {
     use super::super::law::Causes;
     use super::*;
-    use crate::scene::Policy;
 
     fn foretelling() -> Foretelling {
         let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
@@ -238,7 +261,8 @@ mod tests {
                 Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
             ],
             line: Line::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
-            doubt: 0.0,
+            doubts: vec![0.0],
+            pace: None,
             excess: 1.0,
         }
     }
@@ -267,11 +291,12 @@ mod tests {
         let foretelling = foretelling();
         let mut last = f64::INFINITY;
         for seconds in [3.0, 10.0, 30.0, 100.0] {
-            let best = foretelling.best_within(&range(), seconds).expect("one");
+            let best = foretelling.best_within(&range(), &|f| f.seconds <= seconds).expect("one");
             assert!(best.seconds <= seconds && best.squared_error <= last, "{best:?}");
             last = best.squared_error;
         }
-        assert_eq!(foretelling.best_within(&range(), 0.01).expect("the fastest").samples.spp, 1);
+        let fastest = foretelling.best_within(&range(), &|_| false).expect("the fastest");
+        assert_eq!(fastest.samples.spp, 1);
         assert_eq!(foretelling.best(&range()).expect("one").samples.spp, 64);
     }
 }

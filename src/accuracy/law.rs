@@ -8,6 +8,8 @@
 //! ```
 //!
 //! with n camera samples, s shadow and k sky samples each; the bias is that of a ratio of two averages.
+//! So it is for powers of two. Samples are points of a Sobol sequence, whose merit is in whole blocks of so
+//! many (Owen, 1997): another number is blocks, each with an error of its own.
 
 use super::fit::fit;
 use serde::{Deserialize, Serialize};
@@ -59,16 +61,25 @@ pub struct Law {
 /// A measured error: samples, and for each frame the mean squared difference from the reference.
 pub type Point = (Samples, Vec<f64>);
 
+/// What is left of a squared error with `count` samples, where it falls by `power` from one power of two
+/// to the next. The mean over 6 samples is that of a block of 4 and of one of 2.
+fn falls(count: u32, power: f64) -> f64 {
+    let count = count.max(1);
+    let blocks = (0..u32::BITS).map(|bit| count & (1 << bit)).filter(|block| *block > 0);
+    // (block / count)² · block^-power.
+    let sum: f64 = blocks.map(|block| f64::from(block).powf(2.0 - power)).sum();
+    sum / (f64::from(count) * f64::from(count))
+}
+
 impl Powers {
     fn regressors(&self, causes: Causes, s: Samples) -> Amplitudes {
-        let n = f64::from(s.spp);
-        let light = n.powf(-self.light);
+        let light = falls(s.spp, self.light);
         let each = |is_there: bool, count: u32| match is_there {
-            true => light * f64::from(count.max(1)).powf(-self.samples),
+            true => light * falls(count, self.samples),
             false => 0.0,
         };
         let bias = f64::from(u8::from(causes.shadow)) / f64::from(s.shadow.max(1)).powi(2);
-        [n.powf(-self.camera), each(causes.shadow, s.shadow), each(causes.sky, s.sky), bias]
+        [falls(s.spp, self.camera), each(causes.shadow, s.shadow), each(causes.sky, s.sky), bias]
     }
 }
 
@@ -188,6 +199,20 @@ mod tests {
         let twice: Vec<f64> = law.times(2.0).errors(REFERENCE).collect();
         let once: Vec<f64> = law.errors(REFERENCE).collect();
         assert!((twice[0] / once[0] - 2.0).abs() < 1e-12);
+    }
+
+    /// As `reflective_spheres` came out: with 5 samples as with 4, with 12 by 1.5 dB nearer than with 8.
+    #[test]
+    fn samples_between_powers_of_two_are_blocks() {
+        for count in [1, 2, 64] {
+            assert!((falls(count, 1.3) - f64::from(count).powf(-1.3)).abs() < 1e-12);
+        }
+        let decibels = |more: u32, less: u32, power: f64| {
+            10.0 * (falls(less, power) / falls(more, power)).log10()
+        };
+        assert!(decibels(5, 4, 1.57).abs() < 0.1, "{}", decibels(5, 4, 1.57));
+        assert!((decibels(12, 8, 1.27) - 1.5).abs() < 0.1, "{}", decibels(12, 8, 1.27));
+        assert!(decibels(16, 14, 1.27) > 1.0);
     }
 
     #[test]

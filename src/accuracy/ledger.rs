@@ -142,6 +142,11 @@ impl Ledger {
         self.entries.iter().map(|entry| entry.run).max().unwrap_or(0)
     }
 
+    /// Whether this run has measured any.
+    pub fn is_running(&self) -> bool {
+        self.runs() == self.run
+    }
+
     /// Whether the candidate's trial of the turn is over.
     pub fn has(&self, turn: u32, candidate: usize) -> bool {
         self.entries.iter().any(|entry| (entry.turn, entry.candidate) == (turn, candidate))
@@ -237,7 +242,7 @@ fn clear(folder: &Path) -> Result<()> {
     };
     let is_ours = |name: &str| {
         let ends = [".json", ".jsonl", ".png", ".exr"].iter().any(|end| name.ends_with(end));
-        let begins = ["sweep", "trials", "setting_", "reference", "oracle", "writing"];
+        let begins = ["sweep", "trials", "setting_", "reference", "oracle", "writing", "load"];
         ends && begins.iter().any(|begin| name.starts_with(begin))
     };
     for path in entries.flatten().map(|entry| entry.path()) {

@@ -2,9 +2,9 @@
 
 use super::fit::fit;
 use super::foretell::Mode;
-use super::probe::{Probe, SMALL};
+use super::probe::Probe;
 use crate::error::Result;
-use crate::scene::{Policy, ReuseSettings, Settings};
+use crate::scene::{Policy, ReuseSettings};
 
 /// The least that a shadow or sky sample takes, of what a camera sample does.
 const LEAST: f64 = 0.03;
@@ -25,8 +25,8 @@ impl Spent {
 }
 
 impl Probe<'_> {
-    /// All that may be chosen, with `bounces`.
-    pub(super) fn modes(&self, bounces: u32) -> Result<Vec<Mode>> {
+    /// All that may be chosen, with `bounces`, told from frames of about `pixels` pixels.
+    pub(super) fn modes(&self, bounces: u32, pixels: f64) -> Result<Vec<Mode>> {
         let causes = self.causes();
         let mut turned = vec![(1, 1, 1), (6, 1, 1), (2, 4, 4)];
         turned.extend(causes.shadow.then_some((2, 8, 1)));
@@ -42,7 +42,7 @@ impl Probe<'_> {
                 let by = |is_there, count: u32| if is_there { f64::from(spp * count) } else { 0.0 };
                 let (shadow, sky) = (by(causes.shadow, shadow), by(causes.sky, sky));
                 rows.push([1.0, f64::from(spp), shadow, sky]);
-                let small = self.small(&settings, SMALL)?;
+                let small = self.small(&settings, pixels)?;
                 measured.push(small.cpu);
                 spent = Spent { wall: spent.wall + small.wall, cpu: spent.cpu + small.cpu };
             }
@@ -50,17 +50,18 @@ impl Probe<'_> {
             // Such a sample is never free, whatever the noise says.
             let least = |is_there, by: f64| if is_there { by.max(LEAST * by_spp) } else { 0.0 };
             let (by_shadow, by_sky) = (least(causes.shadow, by_shadow), least(causes.sky, by_sky));
-            let larger = self.enlargement();
+            let larger = self.enlargement(pixels);
             let seconds = [each, larger * by_spp, larger * by_shadow, larger * by_sky];
             modes.push(Mode { reuse, seconds: seconds.map(|cpu| cpu * spent.pace()) });
         }
         Ok(modes)
     }
 
-    /// What a frame with about `pixels` pixels takes.
-    pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Spent> {
-        let trial = self.small_trial(settings, pixels)?;
-        Ok(Spent { wall: trial.seconds, cpu: trial.cpu_seconds })
+    /// Pixels of a frame over those of one of about `pixels`.
+    fn enlargement(&self, pixels: f64) -> f64 {
+        let (width, height) = self.small_size(pixels);
+        let base = self.stage.base;
+        f64::from(base.width) * f64::from(base.height) / (f64::from(width) * f64::from(height))
     }
 
     fn kinds_of_reuse(&self) -> Vec<ReuseSettings> {

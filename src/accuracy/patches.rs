@@ -2,7 +2,9 @@
 //!
 //! A small picture will not do in their place: the smaller, the more of it is edges.
 
+use super::effort::Effort;
 use super::errors::displayed_rgb;
+use super::probe::one_sample;
 use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
@@ -10,12 +12,12 @@ use crate::film::{Encoding, Image};
 use crate::math::Rgb;
 use crate::reuse::audit::{self, Lot};
 use crate::sampling::mix;
-use crate::scene::{Policy, Settings};
+use crate::scene::Settings;
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
-/// Pixels of the picture that contrast is told from, or more.
-const SMALL: f64 = 50_000.0;
+/// How many times as wide and high the pictures are at most that contrast is told from, or the frame.
+const SCALE: f64 = 4.0;
 
 /// Square patches of some frames, with what each counts for.
 #[derive(Debug, Clone)]
@@ -35,6 +37,15 @@ struct Drawn {
     unsure: Vec<f64>,
 }
 
+/// For each pixel of a picture how much it and its neighbours differ: the square of the largest
+/// difference of a channel.
+#[derive(Debug, Clone, PartialEq)]
+struct Contrast {
+    width: u32,
+    height: u32,
+    each: Vec<f32>,
+}
+
 /// The patches of each frame, as displayed: one image a patch.
 pub type Seen = Vec<Vec<Image>>;
 
@@ -52,25 +63,30 @@ impl Patches {
         Self { edge, frames: frames.iter().map(draw).collect() }
     }
 
-    /// Single pixels, about `count` of each of `frames`. Most of a frame's error lies in a few pixels at
-    /// the edges of what is bright, so pixels are drawn by their contrast in a picture of one sample a
-    /// pixel, a small one of a large frame.
+    /// Single pixels, as many as `effort` says, of each of `frames`. Most of a frame's error lies in a
+    /// few pixels at the edges of what is bright, so pixels are drawn by their contrast in a picture of
+    /// one sample a pixel: a small one of a large frame, and a large one of a small frame, lest specks
+    /// fall between its samples.
     ///
     /// # Errors
     /// Those of [`Stage::trace`].
-    pub fn by_contrast(stage: &Stage, frames: &[u32], count: u32, lot: u64) -> Result<Self> {
-        let mut settings = stage.base.clone();
-        (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
-        settings.reuse.policy = Policy::Off;
-        let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let shrink = (pixels / SMALL).sqrt().floor().clamp(1.0, 4.0) as u32;
-        (settings.width, settings.height) =
-            ((settings.width / shrink).max(1), (settings.height / shrink).max(1));
-        let small = |frame| Ok(stage.trace(&settings, stage.intersector, frame)?.0);
-        Self::by_contrast_of(stage.base, frames, &small, count, lot)
+    pub fn by_contrast(stage: &Stage, frames: &[u32], effort: Effort, lot: u64) -> Result<Self> {
+        let mut settings = one_sample(stage.base);
+        let scale = effort.picture / (f64::from(settings.width) * f64::from(settings.height));
+        let (shrink, enlarge) = match scale < 1.0 {
+            true => ((1.0 / scale).sqrt().floor().min(SCALE) as u32, 1),
+            false => (1, scale.sqrt().round().min(SCALE) as u32),
+        };
+        let edge = |length: u32| (length / shrink).max(1) * enlarge;
+        (settings.width, settings.height) = (edge(settings.width), edge(settings.height));
+        let picture = |frame| {
+            let image = stage.trace(&settings, stage.intersector, frame)?.0;
+            Ok(Contrast::of(&image).reduced(enlarge))
+        };
+        Self::drawn(stage.base, frames, &picture, effort.pixels, lot)
     }
 
-    /// The same by the contrast of pictures of the frames, of any size, which `image` gives.
+    /// The same by the contrast of the frames themselves, which `image` gives.
     ///
     /// # Errors
     /// Those of `image`.
@@ -81,14 +97,24 @@ impl Patches {
         count: u32,
         lot: u64,
     ) -> Result<Self> {
+        let contrast = |frame| Ok(Contrast::of(&image(frame)?));
+        Self::drawn(settings, frames, &contrast, count, lot)
+    }
+
+    fn drawn(
+        settings: &Settings,
+        frames: &[u32],
+        contrast: &dyn Fn(u32) -> Result<Contrast>,
+        count: u32,
+        lot: u64,
+    ) -> Result<Self> {
         let (width, height) = (settings.width, settings.height);
         let draw = |frame: &u32| {
-            let image = image(*frame)?;
-            let foretold = contrast(&image);
+            let contrast = contrast(*frame)?;
             let lot = Lot { seed: lot, frame: *frame, number: 0 };
-            let among = 0..foretold.len() as u32;
+            let among = 0..contrast.each.len() as u32;
             let mut drawn = Drawn { frame: *frame, ..Drawn::default() };
-            for d in audit::draw(&foretold, among, f64::from(count), lot) {
+            for d in audit::draw(&contrast.each, among, f64::from(count), lot) {
                 // One pixel of those that a pixel of the small picture stands for.
                 let random = mix(mix(lot.seed ^ u64::from(*frame)) ^ u64::from(d.index));
                 let within = |k: u32, of: u32, length: u32, random: u64| {
@@ -96,8 +122,9 @@ impl Patches {
                     let (from, to) = (at(k), at(k + 1).max(at(k) + 1));
                     (from + (random % u64::from(to - from)) as u32, to - from)
                 };
-                let (x, columns) = within(d.index % image.width, image.width, width, random);
-                let (y, rows) = within(d.index / image.width, image.height, height, random >> 32);
+                let (column, row) = (d.index % contrast.width, d.index / contrast.width);
+                let (x, columns) = within(column, contrast.width, width, random);
+                let (y, rows) = within(row, contrast.height, height, random >> 32);
                 let stands_for = f64::from(columns * rows);
                 drawn.corners.push((x, y));
                 drawn.weights.push(d.weight * stands_for / (f64::from(width) * f64::from(height)));
@@ -155,6 +182,12 @@ impl Patches {
         self.frames.iter().map(one).collect()
     }
 
+    /// Pixels of all patches.
+    pub fn pixels_in_all(&self) -> usize {
+        let patches: usize = self.frames.iter().map(|drawn| drawn.corners.len()).sum();
+        patches * (self.edge * self.edge) as usize
+    }
+
     fn pixels(&self, (x, y): (u32, u32)) -> impl Iterator<Item = (u32, u32)> + use<> {
         let edge = self.edge;
         (0..edge * edge).map(move |i| (x + i % edge, y + i / edge))
@@ -168,19 +201,37 @@ impl Patches {
     }
 }
 
-/// For each pixel how much it and its neighbours differ: the square of the largest difference of a
-/// channel.
-fn contrast(image: &Image) -> Vec<f32> {
-    let (width, height) = (image.width as usize, image.height as usize);
-    let of = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        let rows = y.saturating_sub(1)..(y + 2).min(height);
-        let columns = x.saturating_sub(1)..(x + 2).min(width);
-        let near = rows.flat_map(|row| &image.rgb[row * width..][columns.clone()]);
-        let apart = near.map(|c| (*c - image.rgb[i]).abs().max_element()).fold(0.0, f32::max);
-        apart * apart
-    };
-    (0..image.rgb.len()).into_par_iter().map(of).collect()
+impl Contrast {
+    fn of(image: &Image) -> Self {
+        let (width, height) = (image.width as usize, image.height as usize);
+        let of = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            let rows = y.saturating_sub(1)..(y + 2).min(height);
+            let columns = x.saturating_sub(1)..(x + 2).min(width);
+            let near = rows.flat_map(|row| &image.rgb[row * width..][columns.clone()]);
+            let apart = near.map(|c| (*c - image.rgb[i]).abs().max_element()).fold(0.0, f32::max);
+            apart * apart
+        };
+        let each = (0..image.rgb.len()).into_par_iter().map(of).collect();
+        Self { width: image.width, height: image.height, each }
+    }
+
+    /// The means of squares of `edge` pixels, which divides width and height.
+    fn reduced(&self, edge: u32) -> Self {
+        if edge == 1 {
+            return self.clone();
+        }
+        let (width, height) = (self.width / edge, self.height / edge);
+        let mean = |i: u32| {
+            let (x, y) = (i % width * edge, i / width * edge);
+            let row = |y: u32| {
+                let from = (y * self.width + x) as usize;
+                self.each[from..from + edge as usize].iter().sum::<f32>()
+            };
+            (y..y + edge).map(row).sum::<f32>() / (edge * edge) as f32
+        };
+        Self { width, height, each: (0..width * height).map(mean).collect() }
+    }
 }
 
 fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u32)> {
@@ -209,9 +260,18 @@ mod tests {
     fn contrast_is_at_an_edge_and_on_both_its_sides() {
         let rgb = (0..20).map(|i| Rgb::splat(if i % 5 < 2 { 0.0 } else { 0.5 })).collect();
         let image = Image { width: 5, height: 4, rgb, encoding: Encoding::Srgb };
-        for (i, contrast) in contrast(&image).into_iter().enumerate() {
+        for (i, contrast) in Contrast::of(&image).each.into_iter().enumerate() {
             assert_eq!(contrast, if [1, 2].contains(&(i % 5)) { 0.25 } else { 0.0 }, "{i}");
         }
+    }
+
+    #[test]
+    fn a_larger_picture_is_reduced_to_means() {
+        let each = (0..24).map(|i| if i == 9 { 1.0 } else { 0.0 }).collect();
+        let reduced = Contrast { width: 6, height: 4, each }.reduced(2);
+        // Pixel 9 lies in column 3 and row 1: the second square of the first row.
+        let moved = Contrast { width: 3, height: 2, each: vec![0.0, 0.25, 0.0, 0.0, 0.0, 0.0] };
+        assert_eq!(reduced, moved);
     }
 
     #[test]

@@ -5,34 +5,25 @@
 //! Times come from whole frames of a small size.
 
 use super::choice::Goal;
-use super::foretell::{Foretelling, Foretold, Range};
-use super::frames::{Cut, chosen_frames};
+use super::effort::Effort;
+use super::foretell::{Foretelling, Range};
 use super::law::{Causes, Samples};
 use super::patches::Patches;
 use super::reference::truth_settings;
 use super::search::Search;
 use super::stage::Stage;
-use super::trial::{self, Trial};
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::film::Image;
-use crate::reuse;
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
-use crate::scene::{FrameRange, Settings};
+use crate::scene::{FrameRange, Policy, Settings};
 use serde::{Deserialize, Serialize};
+use std::time::Instant;
 
-/// Frames, and pixels of each, that errors are told from.
-const FRAMES: u32 = 8;
-const PIXELS: u32 = 1200;
 /// Frames, edge and pixels of patches in which neighbours count (SSIM, FLIP).
 const WIDE: (u32, u32, u32) = (4, 48, 9_300);
-/// Pixels of the small frames that are timed.
-pub(super) const SMALL: f64 = 7_000.0;
-/// How many times as many pixels the likely choices are timed with as well: the larger a frame, the less
-/// of it is edges, where light is not known from other frames.
-const LARGER: f64 = 3.0;
-/// Ways to take over light foretold to take so many times as long as the fastest are not tried.
-const SLOWER: f64 = 2.5;
+/// Pixels of the picture that tells how fast tracing is.
+const PILOT: f64 = 12_000.0;
 /// Draws the patches: of the probe, and of the check.
 pub const PROBE: u64 = 1;
 /// See [`PROBE`].
@@ -65,6 +56,10 @@ pub struct Probe<'a> {
     pub given: Given,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
+    /// Seconds that the look may take; `None` where it may take as long as need be.
+    pub seconds: Option<f64>,
+    /// How many ranks share the job.
+    pub ranks: u32,
 }
 
 impl Probe<'_> {
@@ -73,10 +68,11 @@ impl Probe<'_> {
     /// # Errors
     /// [`crate::error::Error::Stopped`]; those of rendering.
     pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Foretelling> {
+        let effort = self.effort()?;
         heard("errors of a short sweep");
-        let mut search = Search::begin(self)?;
+        let mut search = Search::begin(self, effort)?;
         heard("times");
-        search.foretelling.modes = self.modes(search.foretelling.bounces)?;
+        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
         if let Some(goal) = self.goal {
             heard("errors of what may be chosen");
             search.try_likely(goal)?;
@@ -84,52 +80,17 @@ impl Probe<'_> {
         Ok(search.foretelling)
     }
 
-    /// Of the fastest setting of each mode the one that is fastest when all are tried.
-    ///
-    /// # Errors
-    /// As [`Self::look`].
-    pub fn fastest(&self, foretelling: &Foretelling, allowed: f64) -> Result<Option<Foretold>> {
-        let mut found = likely(foretelling.fastest(&self.range(), allowed));
-        for foretold in &mut found {
-            foretold.seconds = self.tried_seconds(foretold)?;
-        }
-        Ok(found.into_iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
-    }
-
-    /// The best setting that takes at most `seconds` a frame, tried on small frames.
-    ///
-    /// # Errors
-    /// As [`Self::look`].
-    pub fn best_within(&self, foretelling: &Foretelling, seconds: f64) -> Result<Option<Foretold>> {
-        let mut foretelling = foretelling.clone();
-        let mut found = None;
-        for _ in 0..3 {
-            let Some(best) = foretelling.best_within(&self.range(), seconds) else { break };
-            let taken = self.tried_seconds(&best)?;
-            foretelling = foretelling.slower(taken / best.seconds);
-            found = Some(Foretold { seconds: taken, ..best });
-            if taken <= 1.02 * seconds {
-                break;
-            }
-        }
-        Ok(found)
-    }
-
-    /// Seconds of a frame of the full size, from frames of two small ones: what edges take goes with
-    /// their length, all else with the area.
-    fn tried_seconds(&self, foretold: &Foretold) -> Result<f64> {
-        let settings = foretold.settings(self.stage.base);
-        let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let [small, large] = [SMALL, LARGER * SMALL].map(|most| most.min(pixels));
-        let by_large = self.small(&settings, large)?;
-        if large < 1.5 * small {
-            return Ok(by_large.wall / large * pixels);
-        }
-        let by_small = self.small(&settings, small)?;
-        let [of_small, of_large] = [by_small.cpu / small, by_large.cpu / large];
-        let edges = (of_small - of_large) / (small.powf(-0.5) - large.powf(-0.5));
-        let each = of_large + edges * (pixels.powf(-0.5) - large.powf(-0.5));
-        Ok(each.clamp(0.3 * of_large, of_large) * pixels * by_large.pace())
+    /// As much as there is time for.
+    fn effort(&self) -> Result<Effort> {
+        let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
+        let mut settings = one_sample(self.stage.base);
+        (settings.width, settings.height) = self.small_size(PILOT);
+        let middle = u32::midpoint(self.frames.first, self.frames.last);
+        let begun = Instant::now();
+        self.stage.trace(&settings, self.stage.intersector, middle)?;
+        let samples = f64::from(settings.width) * f64::from(settings.height);
+        let spent = begun.elapsed().as_secs_f64();
+        Ok(Effort::within(seconds - spent, spent / samples))
     }
 
     /// What may be chosen.
@@ -142,8 +103,10 @@ impl Probe<'_> {
             true => numbers.into_iter().filter(|n| *n <= most).collect(),
             false => vec![given],
         };
+        let spp = among(!self.given.spp, 1024, base.spp);
         Range {
-            spp: among(!self.given.spp, 1024, base.spp),
+            // A time is to be used, not kept by half of it.
+            spp: if self.goal.is_none() && spp.len() > 1 { between(&spp) } else { spp },
             shadow: among(plan.area_lights && !self.given.shadow, 64, base.shadow_samples),
             sky: among(plan.sky_light && !self.given.sky, 64, base.sky_samples),
         }
@@ -153,7 +116,7 @@ impl Probe<'_> {
     ///
     /// # Errors
     /// Those of [`Patches::by_contrast`].
-    pub(super) fn patches(&self) -> Result<Patches> {
+    pub(super) fn patches(&self, effort: Effort) -> Result<Patches> {
         match self.is_wide() {
             true => {
                 let (frames, edge, pixels) = WIDE;
@@ -161,8 +124,8 @@ impl Probe<'_> {
                 Ok(Patches::grid(self.stage.base, &frames, edge, pixels, PROBE))
             }
             false => {
-                let frames = spread(self.frames, FRAMES, 0.5);
-                Patches::by_contrast(self.stage, &frames, PIXELS, PROBE)
+                let frames = spread(self.frames, effort.frames, 0.5);
+                Patches::by_contrast(self.stage, &frames, effort, PROBE)
             }
         }
     }
@@ -173,6 +136,7 @@ impl Probe<'_> {
     /// Those of `image`.
     pub(super) fn check_patches(
         &self,
+        effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<(Vec<u32>, Patches)> {
         let base = self.stage.base;
@@ -184,20 +148,12 @@ impl Probe<'_> {
                 (frames, patches)
             }
             false => {
-                let frames = spread(self.frames, 2 * FRAMES, 0.1);
-                let patches = Patches::by_contrast_of(base, &frames, image, PIXELS, CHECK)?;
+                let frames = spread(self.frames, effort.frames, 0.1);
+                let count = checked_pixels(effort);
+                let patches = Patches::by_contrast_of(base, &frames, image, count, CHECK)?;
                 (frames, patches)
             }
         })
-    }
-
-    /// How many frames are made: those of the job, and all that they are inferred from.
-    pub fn made_frames(&self) -> u32 {
-        let plan = self.plan();
-        let looks_up = !reuse::channels(self.stage.scene, &plan, self.stage.base).is_empty();
-        let cut = Cut::of(self.stage.base, self.stage.shot.frames, looks_up);
-        let frames: Vec<u32> = (self.frames.first..=self.frames.last).collect();
-        cut.with_ancestors(&frames).len() as u32
     }
 
     fn is_wide(&self) -> bool {
@@ -213,34 +169,37 @@ impl Probe<'_> {
         Causes { shadow: plan.area_lights, sky: plan.sky_light }
     }
 
-    /// Frames with about `pixels` pixels, and all that they are inferred from.
-    pub(super) fn small_trial(&self, settings: &Settings, pixels: f64) -> Result<Trial> {
-        let mut settings = settings.clone();
-        (settings.width, settings.height) = self.small_size(pixels);
-        let frames = chosen_frames(self.stage.shot.frames);
-        trial::run(self.stage, &settings, self.stage.intersector, &frames)
-    }
-
-    fn small_size(&self, pixels: f64) -> (u32, u32) {
+    pub(super) fn small_size(&self, pixels: f64) -> (u32, u32) {
         let Settings { width, height, .. } = *self.stage.base;
         let scale = (pixels / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
         let edge = |length: u32| ((f64::from(length) * scale).round() as u32).max(1);
         (edge(width), edge(height))
     }
-
-    /// Pixels of a frame over those of a small one.
-    pub(super) fn enlargement(&self) -> f64 {
-        let (width, height) = self.small_size(SMALL);
-        let base = self.stage.base;
-        f64::from(base.width) * f64::from(base.height) / (f64::from(width) * f64::from(height))
-    }
 }
 
-/// Those of `found` that may turn out to be the fastest.
-pub(super) fn likely(mut found: Vec<Foretold>) -> Vec<Foretold> {
-    let least = found.iter().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
-    found.retain(|f| f.seconds <= SLOWER * least);
-    found
+/// `numbers` and about three between each and the next, where there are as many.
+fn between(numbers: &[u32]) -> Vec<u32> {
+    let steps = |pair: &[u32]| {
+        let (from, to) = (pair[0], pair[1]);
+        let step = ((to - from) / 4).max(from / 8).max(1);
+        (from..to).step_by(step as usize).collect::<Vec<_>>()
+    };
+    let mut all: Vec<u32> = numbers.windows(2).flat_map(steps).collect();
+    all.extend(numbers.last());
+    all
+}
+
+/// Pixels that a check of `effort` looks at in each frame: more than the probe, since it does so once.
+pub(super) fn checked_pixels(effort: Effort) -> u32 {
+    effort.pixels + effort.pixels / 2
+}
+
+/// The settings of a look: one sample of everything, and every frame traced.
+pub(super) fn one_sample(base: &Settings) -> Settings {
+    let mut settings = base.clone();
+    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+    settings.reuse.policy = Policy::Off;
+    settings
 }
 
 /// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.

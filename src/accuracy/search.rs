@@ -1,13 +1,16 @@
 //! The probe's errors: a sweep, a law of it, and what the law leads to, tried.
 
 use super::choice::Goal;
+use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Foretelling, Line, Measured};
+use super::foretell::{Foretelling, Line, Measured, Pace};
 use super::law::{Law, Point, Samples};
 use super::patches::{Patches, Seen};
-use super::probe::{Probe, likely, reference, samples_of_reference};
+use super::probe::{Probe, reference, samples_of_reference};
+use super::timing::likely;
 use crate::error::Result;
 use crate::scene::Policy;
+use std::time::Instant;
 
 /// Share of what the goal allows that bounces and cut-off may take.
 const BIAS: f64 = 0.1;
@@ -22,6 +25,7 @@ pub(super) struct Search<'a> {
     reference: Samples,
     points: Vec<Point>,
     references: Vec<Samples>,
+    doubts: Vec<Vec<f64>>,
     figures: Vec<(f64, f64)>,
     /// What it comes to.
     pub foretelling: Foretelling,
@@ -29,11 +33,13 @@ pub(super) struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Runs the sweep.
-    pub fn begin(probe: &'a Probe<'a>) -> Result<Self> {
-        let patches = probe.patches()?;
+    pub fn begin(probe: &'a Probe<'a>, effort: Effort) -> Result<Self> {
+        let patches = probe.patches(effort)?;
         let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
+        let begun = Instant::now();
         let truth =
             patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
+        let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
         let causes = probe.causes();
         let foretelling = Foretelling {
             law: Law::of(causes, &[], &[]),
@@ -43,12 +49,21 @@ impl<'a> Search<'a> {
             bounces: probe.stage.base.bounces,
             modes: Vec::new(),
             line: None,
-            doubt: 0.0,
+            doubts: Vec::new(),
+            pace: Some(Pace { samples: reference, seconds }),
             excess: 1.0,
         };
-        let (points, references, figures) = (Vec::new(), Vec::new(), Vec::new());
-        let mut search =
-            Self { probe, patches, truth, reference, points, references, figures, foretelling };
+        let mut search = Self {
+            probe,
+            patches,
+            truth,
+            reference,
+            points: Vec::new(),
+            references: Vec::new(),
+            doubts: Vec::new(),
+            figures: Vec::new(),
+            foretelling,
+        };
         for samples in search.design() {
             search.measure(samples)?;
         }
@@ -93,8 +108,7 @@ impl<'a> Search<'a> {
     fn measure(&mut self, samples: Samples) -> Result<()> {
         let seen = self.traced(samples)?;
         let errors = squares(&self.patches, &self.truth, &seen);
-        let doubts = doubts(&self.patches, &self.truth, &seen);
-        self.foretelling.doubt = doubts.iter().sum::<f64>() / doubts.len().max(1) as f64;
+        self.doubts.push(doubts(&self.patches, &self.truth, &seen));
         if let Some(goal) = self.probe.goal {
             let worst = errors.iter().copied().fold(0.0, f64::max);
             self.figures.push((worst, figure(goal, &self.patches, &self.truth, &seen)?));
@@ -108,16 +122,17 @@ impl<'a> Search<'a> {
     fn learn(&mut self) {
         let law = Law::of(self.probe.causes(), &self.points, &self.references);
         let own = |reference: Samples| law.errors(reference).collect::<Vec<_>>();
-        let all = self.points.iter().zip(&self.references);
+        let all = self.points.iter().zip(&self.references).zip(&self.doubts);
         self.foretelling.measured = all
-            .map(|((samples, errors), reference)| {
+            .map(|(((samples, errors), reference), doubts)| {
                 // The law tells the reference's part of the difference.
                 let parts =
                     law.errors(*samples).zip(own(*reference)).map(|(s, r)| s / (s + r).max(1e-12));
                 let errors = errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-                Measured { samples: *samples, errors }
+                Measured { samples: *samples, errors, doubts: doubts.clone() }
             })
             .collect();
+        self.foretelling.doubts = self.doubts.last().cloned().unwrap_or_default();
         let last = self.points.last().zip(self.references.last());
         self.foretelling.law = match last {
             Some(((samples, errors), reference)) => law.through(*samples, errors, *reference),

@@ -103,8 +103,8 @@ struct Outcome<'a> {
     tracer: String,
     /// Load of the machine over the last minute, before and after.
     load: [Option<f64>; 2],
-    /// Wall seconds of this run of the program.
-    seconds: f64,
+    /// Wall seconds of this run of the program; `None` where it only read what others had measured.
+    seconds: Option<f64>,
     /// How many runs of the program measured it.
     runs: u32,
     /// Trials that are over, and all.

@@ -1,25 +1,22 @@
-//! `render --target` and `--budget`: settings that the program chooses for a scene, and what came of
-//! them.
+//! `render --target` and `--budget`: settings that the program chooses for a scene.
+
+mod budget;
+mod judge;
 
 use super::args::SettingArgs;
 use super::progress::duration;
 use super::request::Request;
 use super::{say, values};
-use crate::accuracy::{Check, Foretelling, Foretold, Given, Goal, Probe, Stage};
+use crate::accuracy::{Foretelling, Foretold, Given, Goal, Probe, Stage, Timer};
 use crate::error::{Error, Result};
-use crate::film::{Encoding, Image};
-use crate::output::manifest::{AuditRow, Header};
-use crate::output::{Display, Format, read_image};
-use crate::scene::{Policy, Settings};
+use crate::output::Format;
+use crate::output::manifest::Header;
+use crate::scene::{FrameRange, Policy, Settings};
+use budget::Budget;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::time::{Duration, Instant};
-
-/// How often a target that was missed is tightened.
-const ROUNDS: u32 = 2;
-/// Kept back of a budget: for writing frames and the check, and for what is foretold too short.
-const RESERVE: f64 = 0.08;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
@@ -48,8 +45,12 @@ pub struct Choice {
     pub foretold: Foretold,
     /// All that the probe found out.
     foretelling: Foretelling,
+    /// Wall seconds that rendering and writing all frames is foretold to take.
+    seconds: f64,
     /// How often it was tightened.
     pub tightened: u32,
+    /// What was held against what came out: the shot's hash, and frames of it.
+    checked: Option<(String, FrameRange)>,
 }
 
 /// Who chooses.
@@ -62,6 +63,8 @@ pub struct Chooser<'a> {
     pub stage: &'a Stage<'a>,
     /// The job.
     pub request: &'a Request,
+    /// When the program started: a budget counts from then.
+    pub started: Instant,
     /// How many ranks share it.
     pub ranks: u32,
     /// Whether nothing is said.
@@ -112,6 +115,17 @@ impl Choice {
         serde_json::to_value(self).unwrap_or_default()
     }
 
+    /// Whether `frames` of the shot of this hash were held against what came out.
+    pub fn is_checked(&self, shot: &str, frames: FrameRange) -> bool {
+        let holds = |seen: &FrameRange| seen.first <= frames.first && frames.last <= seen.last;
+        self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
+    }
+
+    /// The choice whose `frames` were.
+    pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
+        Self { checked: Some((shot.into(), frames)), ..self }
+    }
+
     fn options(&self) -> String {
         options(&self.foretold)
     }
@@ -135,27 +149,28 @@ impl Chooser<'_> {
     ///
     /// # Errors
     /// Those of the probe; a target that nothing is foretold to reach.
-    pub fn choose(&self, started: Instant, tracer: &str) -> Result<Choice> {
+    pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
             self.tell(format!("for {}, as chosen before: {}", before.wanted, before.options()));
             return Ok(before);
         }
         let start = Instant::now();
-        let probe = self.probe();
+        let budget = Budget::of(self);
+        let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
         let foretelling = probe.look(&|what| self.tell(format!("probe: {what}")))?;
         let allowed = self.args.target.map(|goal| foretelling.allowed(goal));
-        let foretold = match allowed {
-            Some(allowed) => {
-                let found = probe.fastest(&foretelling, allowed)?;
-                found.ok_or_else(|| self.out_of_reach(&foretelling))?
+        let found = match (allowed, &budget) {
+            (Some(allowed), _) => probe.fastest(&foretelling, allowed, timer)?,
+            (_, Some(budget)) => {
+                let left = |samples| budget.left(&foretelling, samples);
+                probe.best_within(&foretelling, &left, timer)?
             }
-            None => {
-                let left = self.budget() - started.elapsed().as_secs_f64();
-                let each = (1.0 - RESERVE) * left.max(0.0) / self.frames();
-                let found = probe.best_within(&foretelling, each)?;
-                found.ok_or_else(|| self.out_of_reach(&foretelling))?
-            }
+            _ => None,
         };
+        let foretold = found.ok_or_else(|| self.out_of_reach(&foretelling))?;
+        let writing = budget.as_ref().map_or(0.0, |budget| budget.writing);
+        let seconds = foretold.seconds * probe.frames_each(foretold.reuse) + writing;
+        let left = budget.as_ref().map(|b| b.left(&foretelling, foretold.samples) + writing);
         let choice = Choice {
             wanted: self.args.words(),
             base: Header::settings(self.stage.base),
@@ -163,11 +178,13 @@ impl Chooser<'_> {
             allowed,
             foretold,
             foretelling,
+            seconds,
             tightened: 0,
+            checked: None,
         };
         self.say_choice(&choice);
         self.tell(format!("the probe took {}", duration(start.elapsed().as_secs_f64())));
-        if self.args.budget.is_some() && choice.foretold.seconds * self.frames() > self.budget() {
+        if left.is_some_and(|left| seconds > left) {
             self.warn("no setting is foretold to fit this time; the fastest is taken".into());
         }
         Ok(choice)
@@ -177,7 +194,7 @@ impl Chooser<'_> {
     fn out_of_reach(&self, foretelling: &Foretelling) -> Error {
         let best = foretelling.best(&self.probe().range());
         let nearest = best.map_or(String::new(), |best| {
-            let seconds = duration(best.seconds * self.frames());
+            let seconds = duration(best.seconds * self.probe().frames_each(best.reuse));
             format!("; {} would come to {:.1} dB, in {seconds}", options(&best), best.psnr())
         });
         let bits = match self.rounds() {
@@ -189,72 +206,6 @@ impl Chooser<'_> {
              help: ask for less, or give fewer options{bits}",
             self.args.words()
         ))
-    }
-
-    /// Says what came out; a tighter choice where the target was missed.
-    ///
-    /// # Errors
-    /// Those of reading frames and tracing.
-    pub fn judge(
-        &self,
-        choice: &Choice,
-        audit: Option<&AuditRow>,
-        rendered: Option<f64>,
-    ) -> Result<Option<Choice>> {
-        let samples = choice.foretold.samples;
-        let check = Check::of(&self.probe(), samples, &|frame| self.image(frame))?;
-        let [mean, worst] = check.psnr();
-        let looked = check.frames.len();
-        let figure = match self.args.target {
-            Some(Goal::Ssim(_)) => format!(", SSIM {:.4} in the worst", 1.0 - check.figure),
-            Some(Goal::Flip(_)) => format!(", FLIP {:.4} in the worst", check.figure),
-            Some(Goal::MaxShare(_)) => {
-                format!(", share {:.3} % in the worst", 100.0 * check.figure)
-            }
-            _ => String::new(),
-        };
-        let time = rendered.map_or(String::new(), |seconds| {
-            let foretold = choice.foretold.seconds * self.frames();
-            let off = 100.0 * (foretold / seconds - 1.0);
-            format!("; {}, foretold {} ({off:+.0} %)", duration(seconds), duration(foretold))
-        });
-        self.tell(format!(
-            "came out: PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked \
-             at{figure}; foretold {:.1} at worst{time}",
-            choice.foretold.psnr()
-        ));
-        let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
-            return Ok(None);
-        };
-        let excess = check.excess(goal, allowed).max(audited_excess(audit, allowed));
-        if excess <= 1.0 {
-            return Ok(None);
-        }
-        if choice.tightened >= ROUNDS {
-            self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
-            return Ok(None);
-        }
-        // So much more than foretold.
-        self.tighter(choice, allowed, excess * allowed / choice.foretold.squared_error.max(1e-9))
-    }
-
-    /// The choice with errors `factor` times as large as foretold.
-    fn tighter(&self, choice: &Choice, allowed: f64, factor: f64) -> Result<Option<Choice>> {
-        // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
-        let foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
-        let found = self.probe().fastest(&foretelling, allowed)?;
-        let foretold = match found {
-            Some(foretold) if foretold.samples != choice.foretold.samples => foretold,
-            _ => {
-                self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
-                return Ok(None);
-            }
-        };
-        let tightened = choice.tightened + 1;
-        let tighter = Choice { foretold, foretelling, tightened, ..choice.clone() };
-        self.warn(format!("{} was missed; rendered again, tightened", choice.wanted));
-        self.say_choice(&tighter);
-        Ok(Some(tighter))
     }
 
     fn before(&self, tracer: &str) -> Option<Choice> {
@@ -282,49 +233,27 @@ impl Chooser<'_> {
         self.request.pattern.format() != Format::Exr && self.stage.base.png_bits == 8
     }
 
-    fn probe(&self) -> Probe<'_> {
+    /// Who looks at the scene for this job.
+    pub fn probe(&self) -> Probe<'_> {
         Probe {
             stage: self.stage,
             frames: self.request.frames,
             goal: self.args.target,
             given: self.given(),
             rounds: self.rounds(),
+            seconds: None,
+            ranks: self.ranks,
         }
-    }
-
-    /// Seconds.
-    fn budget(&self) -> f64 {
-        self.args.budget.unwrap_or_default().as_secs_f64()
-    }
-
-    /// A finished frame as displayed.
-    fn image(&self, frame: u32) -> Result<Image> {
-        let mut image = read_image(self.request.pattern.path(frame))?;
-        if image.encoding == Encoding::Linear {
-            let Settings { exposure, tone, .. } = *self.stage.base;
-            let display = Display { exposure, tone };
-            for rgb in &mut image.rgb {
-                *rgb = crate::math::Rgb::from_array(display.code(*rgb).map(|v| v as f32));
-            }
-            image.encoding = Encoding::Srgb;
-        }
-        Ok(image)
-    }
-
-    /// Frames that one rank renders, those among them that others are inferred from.
-    fn frames(&self) -> f64 {
-        f64::from(self.probe().made_frames().div_ceil(self.ranks))
     }
 
     fn say_choice(&self, choice: &Choice) {
-        let seconds = choice.foretold.seconds;
         self.tell(format!(
             "for {}: {}\nforetold: PSNR {:.1} dB in the worst frame, {} a frame, {} in all",
             choice.wanted,
             choice.options(),
             choice.foretold.psnr(),
-            duration(seconds),
-            duration(seconds * self.frames())
+            duration(choice.foretold.seconds),
+            duration(choice.seconds)
         ));
     }
 
@@ -338,31 +267,5 @@ impl Chooser<'_> {
         if !self.quiet {
             say::warning(text);
         }
-    }
-}
-
-/// By which factor the light's noise alone, by the audit's lower end, exceeds what is allowed.
-fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
-    let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
-    low * low / allowed
-}
-
-#[cfg(test)]
-mod tests {
-    use super::audited_excess;
-    use crate::output::manifest::AuditRow;
-    use crate::stats::AuditSums;
-
-    #[test]
-    fn an_audit_misses_only_what_it_is_sure_of() {
-        let audit = |rmse| AuditRow {
-            rmse: Some(rmse),
-            rmse_inferred_pixels: None,
-            rmse_traced: None,
-            sums: AuditSums::default(),
-        };
-        assert_eq!(audited_excess(None, 1.0), 0.0);
-        assert!(audited_excess(Some(&audit([1.2, 0.9, 1.5])), 1.0) < 1.0);
-        assert_eq!(audited_excess(Some(&audit([3.0, 2.0, 4.0])), 2.0), 2.0);
     }
 }

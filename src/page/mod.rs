@@ -21,6 +21,7 @@ mod table;
 mod timeline;
 pub mod words;
 
+pub use axis::{Axis, Tick};
 pub use chart::{Chart, Series};
 pub use picture::Picture;
 pub use plot::Plot;

@@ -42,15 +42,40 @@ fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
     assert_eq!(job.read("p/f_02.png"), before);
 }
 
+/// A job that was stopped while it was held against what came out has all its frames, and is not done.
+#[test]
+fn a_check_that_was_interrupted_is_made_when_the_job_goes_on() {
+    let job = Job::new();
+    let line = format!("{LINE} --target psnr=34");
+    assert!(job.done(&line).err.contains("came out: "));
+    let (whole, frame) = (header(&job), job.read("o/f_02.png"));
+    assert_eq!(whole["chosen"]["checked"][1], serde_json::json!({"first": 1, "last": 3}));
+    assert!(!job.done(&line).err.contains("came out: "), "it was made already");
+    // As the check leaves it that was stopped.
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    let (first, rows) = manifest.split_once('\n').expect("lines");
+    let mut stopped: Value = serde_json::from_str(first).expect("JSON");
+    stopped["chosen"]["checked"] = Value::Null;
+    std::fs::write(job.path("o/f.manifest.jsonl"), format!("{stopped}\n{rows}")).expect("written");
+    let ran = job.done(&line);
+    assert!(ran.err.contains("as chosen before") && ran.err.contains("came out: "), "{}", ran.err);
+    assert!(ran.out.contains("0 rendered, 3 kept"), "{}", ran.out);
+    assert_eq!((header(&job), job.read("o/f_02.png")), (whole, frame));
+}
+
 #[test]
 fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
     let job = Job::new();
     job.done(&format!("{LINE} --target psnr=30 --spp 5 --policy off"));
     let settings = &header(&job)["settings"];
     assert_eq!((&settings["spp"], &settings["reuse"]["policy"]), (&5.into(), &"off".into()));
-    let said = job.done(&format!("{LINE} --budget 20s --overwrite")).err;
-    assert!(said.contains("for 20 s: --spp ") && said.contains("%)"), "{said}");
-    assert_eq!(header(&job)["chosen"]["wanted"], "20 s");
+    let begun = std::time::Instant::now();
+    let said = job.done(&format!("{LINE} --budget 6s --overwrite")).err;
+    assert!(said.contains("for 6 s: --spp ") && said.contains("%); in all "), "{said}");
+    assert_eq!(header(&job)["chosen"]["wanted"], "6 s");
+    // How near is for a quiet machine to show; this is that everything counts, and that it is used.
+    let taken = begun.elapsed().as_secs_f64();
+    assert!((1.0..25.0).contains(&taken), "{taken} s: {said}");
 }
 
 /// More frames are rendered under the choice of the first, or all under a tighter one where these show

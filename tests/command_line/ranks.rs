@@ -116,6 +116,22 @@ mod with_mpi {
         assert_eq!(job.read("r/f_03.png"), before);
     }
 
+    /// What may fit a time is tried by all ranks at once.
+    #[test]
+    fn ranks_keep_a_budget_together() {
+        let job = Job::new();
+        let line = format!("{} --budget 5s", LINE.replace(" --spp 1", ""));
+        let Some(ran) = under_mpirun(&job, 2, &format!("{line} -o r/f_##.png")) else { return };
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        assert_eq!(ran.err.matches("for 5 s: --spp ").count(), 1, "{}", ran.err);
+        assert_eq!(ran.err.matches("; in all ").count(), 1, "{}", ran.err);
+        let (before, after) = ran.err.split_once("for 5 s: ").expect("a choice");
+        let options = after.lines().next().expect("options");
+        assert!(before.contains("probe: times"), "{}", ran.err);
+        job.done(&format!("{} {options} -o solo/f_##.png", LINE.replace(" --spp 1", "")));
+        assert!(job.read("r/f_03.png") == job.read("solo/f_03.png"), "{options}");
+    }
+
     /// Ranks on unlike machines use what all have, and say so.
     #[test]
     fn unlike_machines_share_an_instruction_set() {

@@ -17,6 +17,8 @@ use std::time::Instant;
 const ORACLE: &str = "oracle.json";
 /// Name of the figures of writing.
 const WRITING: &str = "writing.json";
+/// Name of the machine's load while there was measured, by the last run that did.
+const LOAD: &str = "load.json";
 
 /// A sweep to be measured and told of.
 pub struct Job<'a> {
@@ -165,8 +167,8 @@ impl Job<'_> {
             shot_frames: sweep.stage.shot.frames,
             threads: sweep.stage.pool.current_num_threads(),
             tracer: sweep.stage.intersector.describe(),
-            load: [self.load, machine::load()],
-            seconds: self.start.elapsed().as_secs_f64(),
+            load: self.load_of(ledger),
+            seconds: ledger.is_running().then(|| self.start.elapsed().as_secs_f64()),
             runs: ledger.runs(),
             trials: [sweep.done(ledger), sweep.trials()],
             settings: sweep.candidates.len(),
@@ -174,9 +176,20 @@ impl Job<'_> {
         })
     }
 
+    /// Load of the machine before and after; of no run that only reads what others measured.
+    fn load_of(&self, ledger: &Ledger) -> [Option<f64>; 2] {
+        match ledger.is_running() {
+            true => [self.load, machine::load()],
+            false => ledger.note(LOAD).unwrap_or_default(),
+        }
+    }
+
     /// Writes page and figures of what there is; gives the page's own summary.
     fn publish(&self, truth: &Truth, ledger: &Ledger) -> Result<Option<Vec<String>>> {
         let Some(outcome) = self.outcome(truth, ledger) else { return Ok(None) };
+        if ledger.is_running() {
+            ledger.keep_note(LOAD, &outcome.load)?;
+        }
         let command = crate::cli::words();
         files::write(self.args, &outcome, &command)?;
         let page = page::page(self.args, &outcome, &command)?;

@@ -117,8 +117,12 @@ fn reference(outcome: &Outcome) -> String {
 
 /// How long it took, as far as that is known.
 fn whole(outcome: &Outcome) -> String {
-    let own = seconds(outcome.seconds);
-    if outcome.runs > 1 { format!("{} runs, the last {own}", outcome.runs) } else { own }
+    match (outcome.seconds.map(seconds), outcome.runs) {
+        (Some(own), 1) => own,
+        (Some(own), runs) => format!("{runs} runs, the last {own}"),
+        (None, 1) => "an earlier run".into(),
+        (None, runs) => format!("{runs} earlier runs"),
+    }
 }
 
 fn warnings(outcome: &Outcome) -> Vec<String> {

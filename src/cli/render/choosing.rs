@@ -2,12 +2,26 @@
 
 use super::RenderArgs;
 use super::round::{Frames, Round, Site};
-use crate::accuracy::Stage;
+use crate::accuracy::{Stage, Timer, Timing};
 use crate::cli::choose::{Choice, Chooser};
 use crate::cli::request::Request;
 use crate::cli::stats;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::output::manifest::{Header, Manifest, Row, manifest_path};
 use crate::scene::Settings;
+use crate::sequence::Target;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::cell::Cell;
+
+/// What rank 0 says to the others.
+#[derive(Serialize, Deserialize)]
+enum Word<T> {
+    /// That all are to time this setting, at once.
+    Time(Timing),
+    /// What it was asked for.
+    Answer(T),
+}
 
 /// Settings that the program chooses, and chooses again where they were not enough.
 pub(super) struct Choosing<'a> {
@@ -25,10 +39,7 @@ impl Choosing<'_> {
         if !self.args.choice.is_any() {
             return Ok(None);
         }
-        let start = self.site.clock.start;
-        let choose = || self.ask(request, |chooser| chooser.choose(start, tracer));
-        // Ranks that wait for the choice hear from rank 0 that the job is to stop.
-        self.site.interrupt.watched(|| self.site.world.from_root(choose)).map(Some)
+        self.answer(request, |chooser, timer| chooser.choose(tracer, timer)).map(Some)
     }
 
     /// A tighter choice where `choice` was not enough. All ranks call it.
@@ -39,18 +50,79 @@ impl Choosing<'_> {
         choice: Option<Choice>,
     ) -> Result<Option<Choice>> {
         let Some(choice) = choice else { return Ok(None) };
+        let (shot, frames) = (&job.target.header.shot_hash, job.request.frames);
         // A list of one or none: to other ranks, nothing would look like no answer.
-        let judge = || -> Result<Vec<Choice>> {
-            if round.plan.render.is_empty() {
+        let judge = |chooser: &Chooser, timer: Timer| -> Result<Vec<Choice>> {
+            // A job that was stopped while it was held against what came out is not done with that.
+            if round.plan.render.is_empty() && choice.is_checked(shot, frames) {
                 return Ok(Vec::new());
             }
             let audit = stats::audit_of(&round.plan, &round.outcome);
             let seconds = round.plan.kept.is_empty().then_some(round.seconds);
-            let judge = |chooser: &Chooser| chooser.judge(&choice, audit.as_ref(), seconds);
-            Ok(self.ask(job.request, judge)?.into_iter().collect())
+            let tighter = chooser.judge(&choice, audit.as_ref(), seconds, timer)?;
+            if tighter.is_none() {
+                keep(job.target, &choice.clone().checked(shot, frames))?;
+            }
+            Ok(tighter.into_iter().collect())
         };
-        let tighter = self.site.interrupt.watched(|| self.site.world.from_root(judge))?;
-        Ok(tighter.into_iter().next())
+        Ok(self.answer(job.request, judge)?.into_iter().next())
+    }
+
+    /// Rank 0's answer to `question`, for all ranks, which meanwhile time what it wants timed. All ranks
+    /// call it.
+    fn answer<T: Serialize + DeserializeOwned>(
+        &self,
+        request: &Request,
+        question: impl Fn(&Chooser, Timer) -> Result<T>,
+    ) -> Result<T> {
+        // Ranks that wait for the answer hear from rank 0 that the job is to stop.
+        self.site.interrupt.watched(|| match self.site.world.is_root() {
+            true => self.lead(request, question),
+            false => self.follow(request),
+        })
+    }
+
+    fn lead<T: Serialize + DeserializeOwned>(
+        &self,
+        request: &Request,
+        question: impl Fn(&Chooser, Timer) -> Result<T>,
+    ) -> Result<T> {
+        let world = self.site.world;
+        // Of a trial that failed all ranks have heard.
+        let is_over = Cell::new(false);
+        let timer = |timing: &Timing| {
+            let told = world.from_root(|| Ok(Word::<T>::Time(timing.clone())));
+            let seconds = told.and_then(|_| self.time(request, timing));
+            is_over.set(seconds.is_err());
+            seconds
+        };
+        let answer = self.ask(request, |chooser| question(chooser, &timer));
+        if is_over.get() {
+            return answer;
+        }
+        match world.from_root(|| answer.map(Word::Answer))? {
+            Word::Answer(answer) => Ok(answer),
+            Word::Time(_) => Err(Error::Failed("rank 0 gave no answer".into())),
+        }
+    }
+
+    fn follow<T: Serialize + DeserializeOwned>(&self, request: &Request) -> Result<T> {
+        let nothing = || Err(Error::Failed("only rank 0 answers".into()));
+        loop {
+            match self.site.world.from_root(nothing)? {
+                Word::Answer(answer) => return Ok(answer),
+                Word::Time(timing) => _ = self.time(request, &timing)?,
+            }
+        }
+    }
+
+    /// Seconds a frame of a rank, when all try at once; the mean of how many they make in a second.
+    fn time(&self, request: &Request, timing: &Timing) -> Result<f64> {
+        let world = self.site.world;
+        let own = self.ask(request, |chooser| chooser.probe().timed(timing));
+        let all = world.all(world.agree(own)?)?;
+        let made: f64 = all.iter().map(|seconds| 1.0 / seconds.max(1e-12)).sum();
+        Ok(all.len() as f64 / made)
     }
 
     fn ask<T>(&self, request: &Request, question: impl Fn(&Chooser) -> Result<T>) -> Result<T> {
@@ -69,8 +141,19 @@ impl Choosing<'_> {
             options: &self.args.settings,
             stage: &stage,
             request,
+            started: self.site.clock.start,
             ranks: self.site.world.size(),
             quiet: self.site.quiet,
         })
     }
+}
+
+/// Writes into the manifest what is known of the choice now.
+fn keep(target: &Target, choice: &Choice) -> Result<()> {
+    let path = manifest_path(&target.pattern);
+    Manifest::merge_parts(&path)?;
+    let Some(manifest) = Manifest::read(&path)? else { return Ok(()) };
+    let header = Header { chosen: Some(choice.value()), ..manifest.header };
+    let rows: Vec<Row> = manifest.rows.into_values().collect();
+    Manifest::create(&path, &header, &rows)
 }

@@ -1,0 +1,92 @@
+//! A time that a job is to take, and what is left of it for rendering.
+
+use super::Chooser;
+use crate::accuracy::{Check, Foretelling, Samples};
+use crate::film::Film;
+use crate::math::Rgb;
+use crate::output::{WriteOptions, write_image};
+use crate::sampling::mix;
+use crate::scene::Settings;
+use std::time::Instant;
+
+/// Shares of what is left when the probe begins: for the probe's sweep, and for the check at most.
+const PROBE: f64 = 0.15;
+const CHECK: f64 = 0.07;
+/// Kept back of what is left for rendering: times foretold are off by some per cent either way.
+const RESERVE: f64 = 0.05;
+/// What a video takes: to start its program, and by the pixel; measured.
+const VIDEO: [f64; 2] = [0.2, 4e-8];
+
+/// A budget, counted from the start of the program.
+pub(super) struct Budget {
+    started: Instant,
+    seconds: f64,
+    /// Seconds for the check at most.
+    check: f64,
+    /// Seconds for the video.
+    video: f64,
+    /// Seconds that a rank takes to write its frames.
+    pub writing: f64,
+}
+
+impl Budget {
+    /// The budget asked for, if any.
+    pub fn of(chooser: &Chooser) -> Option<Self> {
+        let (started, seconds) = (chooser.started, chooser.args.budget?.as_secs_f64());
+        let (request, settings) = (chooser.request, chooser.stage.base);
+        let frames = f64::from(request.frames.last - request.frames.first + 1);
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let [start, each] = VIDEO;
+        let is_video = request.fps.is_some() && frames > 1.0;
+        let check = CHECK * (seconds - started.elapsed().as_secs_f64()).max(0.0);
+        let ending = request.pattern.path(request.frames.first);
+        let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
+        Some(Self {
+            started,
+            seconds,
+            check,
+            video: if is_video { start + each * pixels * frames } else { 0.0 },
+            writing: (frames / f64::from(chooser.ranks)).ceil() * writing(settings, &ending),
+        })
+    }
+
+    fn gone(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Seconds for the probe's sweep.
+    pub fn probe_seconds(&self) -> f64 {
+        PROBE * (self.seconds - self.gone()).max(0.0)
+    }
+
+    /// Seconds that are left, as of now, for tracing frames of `samples`.
+    pub fn left(&self, foretelling: &Foretelling, samples: Samples) -> f64 {
+        let check = Check::seconds(foretelling, samples).min(self.check);
+        let left = self.seconds - self.gone() - check - self.video - self.writing;
+        (1.0 - RESERVE) * left.max(0.0)
+    }
+
+    /// The share of a whole check that there is time for now.
+    pub fn check_share(&self, foretelling: &Foretelling, samples: Samples) -> f64 {
+        let left = (self.seconds - self.gone() - self.video).max(0.5 * self.check);
+        left / Check::seconds(foretelling, samples).max(1e-9)
+    }
+}
+
+/// Wall seconds that writing a frame takes, in the temporary folder; 0 where it cannot be tried: the
+/// job itself will say why.
+fn writing(settings: &Settings, ending: &str) -> f64 {
+    let Ok(folder) = tempfile::tempdir() else { return 0.0 };
+    let mut film = Film::new(settings.width, settings.height, false);
+    // Smooth with some noise, as frames are.
+    for (i, rgb) in (0_u32..).zip(&mut film.rgb) {
+        let noise = (mix(u64::from(i)) % 64) as f32;
+        *rgb = Rgb::splat((((i % settings.width) as f32) + noise) / (settings.width as f32 + 64.0));
+    }
+    let begun = Instant::now();
+    let path = folder.path().join("frame").with_extension(ending);
+    match write_image(path, &film, &WriteOptions::of(settings, None)) {
+        Ok(_) => begun.elapsed().as_secs_f64(),
+        Err(_) => 0.0,
+    }
+}

@@ -1,0 +1,151 @@
+//! What came of the settings that were chosen, and tighter ones where a target was missed.
+
+use super::budget::Budget;
+use super::{Choice, Chooser};
+use crate::accuracy::{Check, Effort, Goal, Timer};
+use crate::cli::progress::duration;
+use crate::error::Result;
+use crate::film::{Encoding, Image};
+use crate::output::manifest::AuditRow;
+use crate::output::{Display, read_image};
+use crate::scene::Settings;
+
+/// How often a target that was missed is tightened.
+const ROUNDS: u32 = 2;
+
+impl Chooser<'_> {
+    /// Says what came out; a tighter choice where the target was missed.
+    ///
+    /// # Errors
+    /// Those of reading frames and tracing.
+    pub fn judge(
+        &self,
+        choice: &Choice,
+        audit: Option<&AuditRow>,
+        rendered: Option<f64>,
+        timer: Timer,
+    ) -> Result<Option<Choice>> {
+        let samples = choice.foretold.samples;
+        let effort = Budget::of(self).map_or(Effort::WHOLE, |budget| {
+            Effort::WHOLE.part(budget.check_share(&choice.foretelling, samples))
+        });
+        let check = Check::of(&self.probe(), samples, effort, &|frame| self.image(frame))?;
+        let [mean, worst] = check.psnr();
+        let looked = check.frames.len();
+        let figure = match self.args.target {
+            Some(Goal::Ssim(_)) => format!(", SSIM {:.4} in the worst", 1.0 - check.figure),
+            Some(Goal::Flip(_)) => format!(", FLIP {:.4} in the worst", check.figure),
+            Some(Goal::MaxShare(_)) => {
+                format!(", share {:.3} % in the worst", 100.0 * check.figure)
+            }
+            _ => String::new(),
+        };
+        let time = rendered.map_or(String::new(), |seconds| self.time(choice, seconds));
+        self.tell(format!(
+            "came out: PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked \
+             at{figure}; foretold {:.1} at worst{time}",
+            choice.foretold.psnr()
+        ));
+        let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
+            return Ok(None);
+        };
+        let excess = check.excess(goal, allowed).max(audited_excess(audit, allowed));
+        if excess <= 1.0 {
+            return Ok(None);
+        }
+        if choice.tightened >= ROUNDS {
+            self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
+            return Ok(None);
+        }
+        // So much more than foretold.
+        let factor = excess * allowed / choice.foretold.squared_error.max(1e-9);
+        self.tighter(choice, allowed, factor, timer)
+    }
+
+    /// What rendering took beside what was foretold, and all beside the budget.
+    fn time(&self, choice: &Choice, seconds: f64) -> String {
+        let off = |foretold: f64, came: f64| 100.0 * (foretold / came.max(1e-9) - 1.0);
+        let foretold = choice.seconds;
+        let rendering = format!(
+            "; {}, foretold {} ({:+.0} %)",
+            duration(seconds),
+            duration(foretold),
+            off(foretold, seconds)
+        );
+        let all = self.started.elapsed().as_secs_f64();
+        let budget = self.args.budget.map_or(String::new(), |budget| {
+            let budget = budget.as_secs_f64();
+            let [all_words, budget_words] = [all, budget].map(duration);
+            format!("; in all {all_words} of {budget_words} ({:+.0} %)", off(all, budget))
+        });
+        rendering + &budget
+    }
+
+    /// The choice with errors `factor` times as large as foretold.
+    fn tighter(
+        &self,
+        choice: &Choice,
+        allowed: f64,
+        factor: f64,
+        timer: Timer,
+    ) -> Result<Option<Choice>> {
+        // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
+        let foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
+        let found = self.probe().fastest(&foretelling, allowed, timer)?;
+        let foretold = match found {
+            Some(foretold) if foretold.samples != choice.foretold.samples => foretold,
+            _ => {
+                self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
+                return Ok(None);
+            }
+        };
+        let tightened = choice.tightened + 1;
+        let seconds = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let checked = None;
+        let tighter =
+            Choice { foretold, foretelling, seconds, tightened, checked, ..choice.clone() };
+        self.warn(format!("{} was missed; rendered again, tightened", choice.wanted));
+        self.say_choice(&tighter);
+        Ok(Some(tighter))
+    }
+
+    /// A finished frame as displayed.
+    fn image(&self, frame: u32) -> Result<Image> {
+        let mut image = read_image(self.request.pattern.path(frame))?;
+        if image.encoding == Encoding::Linear {
+            let Settings { exposure, tone, .. } = *self.stage.base;
+            let display = Display { exposure, tone };
+            for rgb in &mut image.rgb {
+                *rgb = crate::math::Rgb::from_array(display.code(*rgb).map(|v| v as f32));
+            }
+            image.encoding = Encoding::Srgb;
+        }
+        Ok(image)
+    }
+}
+
+/// By which factor the light's noise alone, by the audit's lower end, exceeds what is allowed.
+fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
+    let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
+    low * low / allowed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::audited_excess;
+    use crate::output::manifest::AuditRow;
+    use crate::stats::AuditSums;
+
+    #[test]
+    fn an_audit_misses_only_what_it_is_sure_of() {
+        let audit = |rmse| AuditRow {
+            rmse: Some(rmse),
+            rmse_inferred_pixels: None,
+            rmse_traced: None,
+            sums: AuditSums::default(),
+        };
+        assert_eq!(audited_excess(None, 1.0), 0.0);
+        assert!(audited_excess(Some(&audit([1.2, 0.9, 1.5])), 1.0) < 1.0);
+        assert_eq!(audited_excess(Some(&audit([3.0, 2.0, 4.0])), 2.0), 2.0);
+    }
+}
