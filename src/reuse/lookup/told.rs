@@ -94,7 +94,8 @@ impl Lookup<'_> {
         let mean = sum(sums.mean) * share;
         let offset = Vec3::new(sum(sums.x), sum(sums.y), sum(sums.z));
         Some(Told {
-            mean: first + mean,
+            // Rounding may leave it a little outside.
+            mean: (first + mean).clamp(0.0, 1.0),
             variance: (sum(sums.squares) * share - mean * mean).max(0.0),
             samples: sum(sums.samples) * share,
             offset: offset.length() * share,
