@@ -73,8 +73,10 @@ impl Sample {
     pub const UNIT: f32 = 32767.0;
 
     fn of(point: &Point, first: Known) -> Self {
+        // Normals of files may be a little longer than 1.
+        let n = point.n.clamp(Vec3::NEG_ONE, Vec3::ONE);
         // To the nearest, without a call of `round`.
-        let n = (point.n * Self::UNIT + Vec3::splat(32768.5)).to_array().map(|x| x as i32 - 32768);
+        let n = (n * Self::UNIT + Vec3::splat(32768.5)).to_array().map(|x| x as i32 - 32768);
         Self {
             p: point.p,
             n: n.map(|x| x as i16),

@@ -242,7 +242,7 @@ impl Lookup<'_> {
             }
             let image = self.image(reference, point);
             let four = image.and_then(|image| self.screen_taps(number, &place, &image));
-            four.iter().for_each(|four| taps.push(four));
+            four.iter().for_each(|four| taps.pack(four));
         }
         if !point.direct && taps.weight < self.evidence.enough_weight {
             let own = level_of(point.footprint);

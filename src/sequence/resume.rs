@@ -11,9 +11,9 @@ use crate::output::{Format, FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
-use refuse::{refuse_other_view, refuse_others, refuse_strangers, refuse_taken};
+use refuse::{by_file, refuse_other_view, refuse_others, refuse_strangers, refuse_taken};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -172,7 +172,9 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
                 Some(found) => found,
                 None => look(target, frames.first..frames.last + 1)?,
             };
-            let states = found.iter().map(|found| Ok((found.frame, state(target, found, &rows)?)));
+            let files = by_file(&rows);
+            let states =
+                found.iter().map(|found| Ok((found.frame, state(target, found, (&rows, &files))?)));
             Plan::of(states.collect::<Result<_>>()?)
         }
     };
@@ -211,12 +213,16 @@ enum State {
     Outdated,
 }
 
-fn state(target: &Target, found: &Found, rows: &BTreeMap<u32, Row>) -> Result<State> {
+fn state(
+    target: &Target,
+    found: &Found,
+    (rows, files): (&BTreeMap<u32, Row>, &HashMap<&str, &Row>),
+) -> Result<State> {
     let frame = found.frame;
     let path = target.pattern.path(frame);
     let name = path.display();
     let Some(hash) = &found.hash else { return Ok(State::Missing) };
-    refuse_taken(&path, frame, rows)?;
+    refuse_taken(&path, frame, rows, files)?;
     let Some(row) = rows.get(&frame) else {
         return Ok(State::Damaged(format!("{name} is not in the manifest; rendered again")));
     };

@@ -79,6 +79,20 @@ fn what_lies_on_the_surface_is_told_exactly() {
 }
 
 #[test]
+fn a_file_may_hold_normals_a_little_longer_than_1() {
+    let mut traced = TracedPoints::default();
+    for (x, y) in (0..EDGE).flat_map(|y| (0..EDGE).map(move |x| (x, y))) {
+        let point = on_wall(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let point = SurfacePoint { n: point.n * 1.0009, samples: u32::MAX / 2, ..point };
+        // Three of a pixel: more camera samples than can be counted.
+        traced.points.extend([TracedPoint { x, y, point }; 3]);
+        traced.ratios.extend([0.25; 3]);
+    }
+    let reference = Reference::new(1, &camera(), &traced, 1);
+    assert_eq!(told(&reference, on_wall(30.2, 31.7), Evidence::default()), 0.25);
+}
+
+#[test]
 fn what_is_seen_in_mirrors_is_told_by_place_by_all_that_know() {
     let ratio = |x: u32, y: u32| if y % 2 == 1 { f32::NAN } else { 0.25 + 0.5 * (x % 2) as f32 };
     let mut traced = TracedPoints::default();

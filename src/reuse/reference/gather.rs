@@ -148,7 +148,8 @@ impl Point {
 
     /// Takes in more camera samples of the same pixel and surface.
     fn join(&mut self, other: &Self, ratios: &mut [f32], others: &[f32]) {
-        let share = other.samples as f32 / (self.samples + other.samples) as f32;
+        let samples = self.samples.saturating_add(other.samples);
+        let share = other.samples as f32 / samples as f32;
         self.p += (other.p - self.p) * share;
         self.n = (self.n + (other.n - self.n) * share).normalize_or(self.n);
         for (own, other) in ratios.iter_mut().zip(others) {
@@ -158,6 +159,6 @@ impl Point {
                 (false, true) => {}
             }
         }
-        self.samples += other.samples;
+        self.samples = samples;
     }
 }

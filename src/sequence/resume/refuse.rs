@@ -5,7 +5,7 @@ use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Manifest, Row, Stray};
 use crate::scene::FrameRange;
 use crate::sequence::Recipe;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 /// Refuses to replace a frame that shows something else than this shot's frame of that number.
@@ -21,17 +21,32 @@ pub(super) fn refuse_other_view(path: &Path, row: &Row, recipe: Option<&Recipe>)
     )))
 }
 
+/// For each file the row that says what it holds; of several one of other settings, else the first.
+pub(super) fn by_file(rows: &BTreeMap<u32, Row>) -> HashMap<&str, &Row> {
+    let mut found = HashMap::new();
+    for row in rows.values() {
+        let there = found.entry(&*row.file).or_insert(row);
+        if row.stray == Some(Stray::OtherSettings) {
+            *there = row;
+        }
+    }
+    found
+}
+
 /// Refuses to replace a file that holds a frame of other settings, or another frame.
-pub(super) fn refuse_taken(path: &Path, frame: u32, rows: &BTreeMap<u32, Row>) -> Result<()> {
-    let here = |row: &&Row| path.file_name().is_some_and(|name| name == row.file.as_str());
-    let is_taken = |row: &&Row| here(row) && row.stray == Some(Stray::OtherSettings);
-    let holds = match rows.values().find(is_taken) {
-        Some(_) => "a frame of other settings".to_string(),
-        None if rows.contains_key(&frame) => return Ok(()),
-        None => match rows.values().find(here) {
-            Some(row) => format!("frame {}", row.frame),
-            None => return Ok(()),
-        },
+pub(super) fn refuse_taken(
+    path: &Path,
+    frame: u32,
+    rows: &BTreeMap<u32, Row>,
+    files: &HashMap<&str, &Row>,
+) -> Result<()> {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let holds = match files.get(name) {
+        Some(row) if row.stray == Some(Stray::OtherSettings) => {
+            "a frame of other settings".to_string()
+        }
+        Some(row) if !rows.contains_key(&frame) => format!("frame {}", row.frame),
+        _ => return Ok(()),
     };
     Err(Error::Usage(format!(
         "{} holds {holds}\n  \
