@@ -27,7 +27,7 @@ pub struct ChoiceArgs {
     #[arg(long, value_name = "FIGURE=VALUE", value_parser = values::goal, conflicts_with = "budget")]
     pub target: Option<Goal>,
     /// Choose the most accurate ones foretold to fit this time: 90s, 10m, 1h30m
-    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    #[arg(long, value_name = "TIME", value_parser = values::budget)]
     pub budget: Option<Duration>,
 }
 

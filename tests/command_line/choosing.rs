@@ -124,6 +124,7 @@ fn what_cannot_be_foretold_is_refused() {
     job.refused(&format!("{LINE} --target mse=1"), "psnr=45, ssim=0.99");
     job.refused(&format!("{LINE} --target psnr=45 --budget 1m"), "cannot be used with");
     job.refused(&format!("{LINE} --budget never"), "90s, 25m or 1h30m");
+    job.refused(&format!("{LINE} --budget 0s"), "a budget is at least 1s");
     job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
 }

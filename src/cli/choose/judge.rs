@@ -64,19 +64,18 @@ impl Chooser<'_> {
 
     /// What rendering took beside what was foretold, and all beside the budget.
     fn time(&self, choice: &Choice, seconds: f64) -> String {
-        let off = |foretold: f64, came: f64| 100.0 * (foretold / came.max(1e-9) - 1.0);
         let foretold = choice.seconds;
         let rendering = format!(
-            "; {}, foretold {} ({:+.0} %)",
+            "; {}, foretold {} ({})",
             duration(seconds),
             duration(foretold),
-            off(foretold, seconds)
+            beyond(seconds, foretold)
         );
         let all = self.started.elapsed().as_secs_f64();
         let budget = self.args.budget.map_or(String::new(), |budget| {
             let budget = budget.as_secs_f64();
             let [all_words, budget_words] = [all, budget].map(duration);
-            format!("; in all {all_words} of {budget_words} ({:+.0} %)", off(all, budget))
+            format!("; in all {all_words} of {budget_words} ({})", beyond(all, budget))
         });
         rendering + &budget
     }
@@ -124,6 +123,11 @@ impl Chooser<'_> {
     }
 }
 
+/// By how much what came is more than what was foretold or allowed, in words: a plus is too much.
+fn beyond(came: f64, expected: f64) -> String {
+    format!("{:+.0} %", 100.0 * (came / expected.max(1e-9) - 1.0))
+}
+
 /// By which factor the light's noise alone, by the audit's lower end, exceeds what is allowed.
 fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
     let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
@@ -132,9 +136,16 @@ fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::audited_excess;
+    use super::{audited_excess, beyond};
     use crate::output::manifest::AuditRow;
     use crate::stats::AuditSums;
+
+    #[test]
+    fn what_takes_longer_is_a_plus() {
+        assert_eq!(beyond(0.9, 0.6), "+50 %");
+        assert_eq!(beyond(1.2, 1.0), "+20 %");
+        assert_eq!(beyond(0.3, 0.6), "-50 %");
+    }
 
     #[test]
     fn an_audit_misses_only_what_it_is_sure_of() {
