@@ -152,6 +152,7 @@ impl Chooser<'_> {
     pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
             self.tell(format!("for {}, as chosen before: {}", before.wanted, before.options()));
+            self.warn_if_long(&before);
             return Ok(before);
         }
         let start = Instant::now();

@@ -1,7 +1,8 @@
 //! A time that a job is to take, and what is left of it for rendering.
 
-use super::Chooser;
+use super::{Choice, Chooser};
 use crate::accuracy::{Check, Foretelling, Samples};
+use crate::cli::progress::duration;
 use crate::film::Film;
 use crate::math::Rgb;
 use crate::output::{WriteOptions, write_image};
@@ -70,6 +71,28 @@ impl Budget {
     pub fn check_share(&self, foretelling: &Foretelling, samples: Samples) -> f64 {
         let left = (self.seconds - self.gone() - self.video).max(0.5 * self.check);
         left / Check::seconds(foretelling, samples).max(1e-9)
+    }
+}
+
+impl Chooser<'_> {
+    /// Warns where frames that are not there yet, under what was chosen for fewer frames or more time,
+    /// are foretold to take longer than there is.
+    pub(super) fn warn_if_long(&self, before: &Choice) {
+        let Some(budget) = Budget::of(self) else { return };
+        let (first, last) = (self.request.frames.first, self.request.frames.last);
+        let left = (first..=last).filter(|n| !self.request.pattern.path(*n).exists()).count();
+        let share = left as f64 / f64::from(last - first + 1);
+        let foretold = &before.foretold;
+        let rendering = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let all = budget.gone() + share * (rendering + budget.writing) + budget.video;
+        if left > 0 && all > budget.seconds {
+            let [all, asked] = [all, budget.seconds].map(duration);
+            let frames = if left == 1 { "1 frame is" } else { &format!("{left} frames are") };
+            self.warn(format!(
+                "{frames} left and the job is foretold to take {all}, not {asked}; --overwrite \
+                 chooses anew"
+            ));
+        }
     }
 }
 

@@ -40,7 +40,7 @@ impl Chooser<'_> {
             }
             _ => String::new(),
         };
-        let time = rendered.map_or(String::new(), |seconds| self.time(choice, seconds));
+        let time = self.time(choice, rendered);
         self.tell(format!(
             "came out: PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked \
              at{figure}; foretold {:.1} at worst{time}",
@@ -62,20 +62,19 @@ impl Chooser<'_> {
         self.tighter(choice, allowed, factor, timer)
     }
 
-    /// What rendering took beside what was foretold, and all beside the budget.
-    fn time(&self, choice: &Choice, seconds: f64) -> String {
+    /// What rendering took beside what was foretold, if it was all rendered now, and all beside the
+    /// budget.
+    fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
         let foretold = choice.seconds;
-        let rendering = format!(
-            "; {}, foretold {} ({})",
-            duration(seconds),
-            duration(foretold),
-            beyond(seconds, foretold)
-        );
+        let rendering = rendered.map_or(String::new(), |seconds| {
+            let [came, said] = [seconds, foretold].map(duration);
+            format!("; {came}, foretold {said} ({})", beyond(seconds, foretold))
+        });
         let all = self.started.elapsed().as_secs_f64();
         let budget = self.args.budget.map_or(String::new(), |budget| {
             let budget = budget.as_secs_f64();
-            let [all_words, budget_words] = [all, budget].map(duration);
-            format!("; in all {all_words} of {budget_words} ({})", beyond(all, budget))
+            let [came, asked] = [all, budget].map(duration);
+            format!("; in all {came} of {asked} ({})", beyond(all, budget))
         });
         rendering + &budget
     }
