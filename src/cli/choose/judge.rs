@@ -26,9 +26,15 @@ impl Chooser<'_> {
         timer: Timer,
     ) -> Result<Option<Choice>> {
         let samples = choice.foretold.samples;
-        let effort = Budget::of(self).map_or(Effort::WHOLE, |budget| {
-            Effort::WHOLE.part(budget.check_share(&choice.foretelling, samples))
-        });
+        let budget = Budget::of(self);
+        let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
+            None => Effort::WHOLE,
+            Some(Ok(effort)) => effort,
+            Some(Err(least)) => {
+                self.tell_unchecked(choice, least, rendered);
+                return Ok(None);
+            }
+        };
         let check = Check::of(&self.probe(), samples, effort, &|frame| self.image(frame))?;
         let [mean, worst] = check.psnr();
         let looked = check.frames.len();
@@ -60,6 +66,15 @@ impl Chooser<'_> {
         // So much more than foretold.
         let factor = excess * allowed / choice.foretold.squared_error.max(1e-9);
         self.tighter(choice, allowed, factor, timer)
+    }
+
+    /// Says that there is no time for a look at what came out, which would take `least` seconds.
+    fn tell_unchecked(&self, choice: &Choice, least: f64, rendered: Option<f64>) {
+        self.tell(format!(
+            "came out: not looked at, which would take {} or more{}",
+            duration(least),
+            self.time(choice, rendered)
+        ));
     }
 
     /// What rendering took beside what was foretold, if it was all rendered now, and all beside the
