@@ -75,7 +75,8 @@ mod tests {
     fn a_check_looks_at_what_there_is_and_at_no_more_than_there_is_time_for() {
         let large = 640 * 360;
         assert_eq!(Effort::of_check(2.0, 2.0, 16, large), Some(Effort::WHOLE));
-        assert_eq!(Effort::of_check(0.1, 2.0, 16, large), Some(Effort::LEAST));
+        let least = Effort::of_check(0.1, 2.0, 16, large).expect("time for the least");
+        assert_eq!((least.frames, least.pixels), (3, 200));
         // Three frames of 300 pixels of sixteen of 1200.
         let least = 3.0 * 300.0 / (16.0 * 1200.0);
         assert_eq!(Effort::LEAST.looked_at(100, large), least);
