@@ -1,5 +1,7 @@
 //! How much a probe or a check looks at: a part of it where little time is left.
 
+use super::probe::checked_pixels;
+
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -16,15 +18,37 @@ pub struct Effort {
 /// What a whole probe takes, camera samples of a picture of one sample a pixel: measured on our scenes.
 const PROBE: f64 = 9e6;
 
+/// Steps in which a check's work is made less.
+const STEPS: u32 = 64;
+
 impl Effort {
     /// What a probe does that has time.
     pub const WHOLE: Self = Self { frames: 16, pixels: 800, picture: 100_000.0, small: 7_000.0 };
     /// Less than this says nothing.
-    const LEAST: Self = Self { frames: 3, pixels: 200, picture: 10_000.0, small: 1_200.0 };
+    pub const LEAST: Self = Self { frames: 3, pixels: 200, picture: 10_000.0, small: 1_200.0 };
 
     /// What a probe can do in about `seconds`, where tracing takes `each` seconds a camera sample.
     pub fn within(seconds: f64, each: f64) -> Self {
         Self::WHOLE.part(seconds / (PROBE * each.max(1e-12)))
+    }
+
+    /// The most that a check can look at in `seconds`, in a job of `frames` frames of `pixels` pixels,
+    /// where a whole check of a long one of large frames takes `whole` seconds; `None` where even the
+    /// least that says something takes longer.
+    pub fn of_check(seconds: f64, whole: f64, frames: u32, pixels: u64) -> Option<Self> {
+        let mut steps =
+            (0..=STEPS).rev().map(|k| Self::WHOLE.part(f64::from(k) / f64::from(STEPS)));
+        steps.find(|effort| whole * effort.looked_at(frames, pixels) <= seconds)
+    }
+
+    /// What a check of this looks at in a job of `frames` frames of `pixels` pixels, a share of what a
+    /// whole check does in a long one of large frames.
+    pub fn looked_at(self, frames: u32, pixels: u64) -> f64 {
+        let count = |effort: Self, frames: u32, pixels: u64| {
+            let each = u64::from(checked_pixels(effort)).min(pixels);
+            f64::from(effort.frames.min(frames)) * each as f64
+        };
+        count(self, frames, pixels) / count(Self::WHOLE, u32::MAX, u64::MAX)
     }
 
     /// About `share` of the work.
@@ -45,6 +69,29 @@ impl Effort {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A job of few small frames has less to look at.
+    #[test]
+    fn a_check_looks_at_what_there_is_and_at_no_more_than_there_is_time_for() {
+        let large = 640 * 360;
+        assert_eq!(Effort::of_check(2.0, 2.0, 16, large), Some(Effort::WHOLE));
+        let least = Effort::of_check(0.1, 2.0, 16, large).expect("time for the least");
+        assert_eq!((least.frames, least.pixels), (3, 200));
+        // Three frames of 300 pixels of sixteen of 1200.
+        let least = 3.0 * 300.0 / (16.0 * 1200.0);
+        assert_eq!(Effort::LEAST.looked_at(100, large), least);
+        assert_eq!(Effort::of_check(1.9 * least, 2.0, 16, large), None);
+        assert_eq!(Effort::WHOLE.looked_at(3, 256), 3.0 * 256.0 / (16.0 * 1200.0));
+        assert_eq!(Effort::of_check(0.081, 2.0, 3, 256), Some(Effort::WHOLE));
+        assert_eq!(Effort::of_check(0.079, 2.0, 3, 256), None);
+        let mut last = f64::INFINITY;
+        for seconds in [3.0, 1.0, 0.5, 0.2, 0.1] {
+            let effort = Effort::of_check(seconds, 2.0, 16, large).expect("time for some");
+            let share = effort.looked_at(16, large);
+            assert!(2.0 * share <= seconds && share <= last, "{effort:?}");
+            last = share;
+        }
+    }
 
     #[test]
     fn less_time_is_less_work_down_to_what_still_says_something() {

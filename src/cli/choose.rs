@@ -27,7 +27,7 @@ pub struct ChoiceArgs {
     #[arg(long, value_name = "FIGURE=VALUE", value_parser = values::goal, conflicts_with = "budget")]
     pub target: Option<Goal>,
     /// Choose the most accurate ones foretold to fit this time: 90s, 10m, 1h30m
-    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    #[arg(long, value_name = "TIME", value_parser = values::budget)]
     pub budget: Option<Duration>,
 }
 
@@ -152,6 +152,7 @@ impl Chooser<'_> {
     pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
             self.tell(format!("for {}, as chosen before: {}", before.wanted, before.options()));
+            self.warn_if_long(&before);
             return Ok(before);
         }
         let start = Instant::now();

@@ -129,30 +129,38 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
         let round = site.render(&request, &target)?;
         let job = Frames { request: &request, target: &target, plan: &round.plan, site: &site };
         let tighter = match round.unfinished {
-            0 => choosing.next(&job, &round, choice.take())?,
-            _ => None,
+            0 => choosing.next(&job, &round, choice.take()),
+            _ => Ok(None),
+        };
+        let tighter = match tighter {
+            // All frames are there, but were not all held against what was wanted.
+            Err(Error::Stopped) => return conclude(&job, &round, true),
+            other => other?,
         };
         if tighter.is_none() {
-            return conclude(&job, &round);
+            return conclude(&job, &round, false);
         }
         (choice, is_again) = (tighter, true);
     }
 }
 
-/// Tells what there is to tell of a job that renders no more frames.
-fn conclude(job: &Frames, round: &Round) -> Result<Exit> {
+/// Tells what there is to tell of a job that renders no more frames; `was_checking`: it was stopped
+/// while these were held against what was wanted.
+fn conclude(job: &Frames, round: &Round, was_checking: bool) -> Result<Exit> {
     let Round { plan, outcome, unfinished, ranks, .. } = round;
-    let Site { world, clock: Clock { start, .. }, quiet, .. } = job.site;
+    let Site { world, interrupt, clock: Clock { start, .. }, quiet, .. } = job.site;
+    let is_stopped = was_checking || *unfinished > 0;
     if !world.is_root() {
-        return Ok(if *unfinished > 0 { Exit::Stopped } else { Exit::Done });
+        return Ok(if is_stopped { Exit::Stopped } else { Exit::Done });
     }
     if let Some(path) = &job.request.stats {
         let seconds = start.elapsed().as_secs_f64();
         stats::write(path, &job.target.header, plan, outcome, ranks, seconds)?;
     }
-    if *unfinished > 0 {
-        let reason = round.reasons.iter().find(|reason| !reason.is_empty());
-        say_stopped(job, outcome, reason.map_or("", |reason| reason));
+    if is_stopped {
+        // One that came after the frames is only known here.
+        let reason = round.reasons.iter().find(|reason| !reason.is_empty()).cloned();
+        say_stopped(job, outcome, &reason.unwrap_or_else(|| interrupt.reason()));
         return Ok(Exit::Stopped);
     }
     let done = finish(job, outcome, *start, *quiet)?;

@@ -119,6 +119,15 @@ pub fn time(text: &str) -> Result<Duration, String> {
     parse_time(text)
 }
 
+/// A time to keep to: more than none.
+pub fn budget(text: &str) -> Result<Duration, String> {
+    let time = parse_time(text)?;
+    if time.is_zero() {
+        return Err("nothing is rendered in no time: a budget is at least 1s".into());
+    }
+    Ok(time)
+}
+
 /// A time, or `off`.
 pub fn time_or_off(text: &str) -> Result<Interval, String> {
     Interval::parse(text)
@@ -210,6 +219,14 @@ mod tests {
             ["psnr", "psnr=", "psnr=nan", "psnr=999", "ssim=1", "flip=0", "mse=1", "flip=x%"]
         {
             assert!(goal(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_budget_is_some_time() {
+        assert_eq!(budget("1m30s"), Ok(Duration::from_secs(90)));
+        for text in ["0s", "0h0m", "-1s", "", "5"] {
+            assert!(budget(text).is_err(), "{text}");
         }
     }
 

@@ -78,6 +78,27 @@ fn options_that_are_given_are_not_chosen_and_a_budget_is_told() {
     assert!((1.0..25.0).contains(&taken), "{taken} s: {said}");
 }
 
+/// What was chosen for one frame takes longer for many: that is said, and what it came to.
+#[test]
+fn a_budget_that_more_frames_exceed_is_warned_of() {
+    let job = Job::new();
+    let line = format!("{LINE} --budget 2s");
+    job.done(&line.replace("1..3", "1..1"));
+    // As a slower machine leaves it.
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    let (first, rows) = manifest.split_once('\n').expect("lines");
+    let mut slow: Value = serde_json::from_str(first).expect("JSON");
+    slow["chosen"]["foretold"]["seconds"] = 100.into();
+    std::fs::write(job.path("o/f.manifest.jsonl"), format!("{slow}\n{rows}")).expect("written");
+    let ran = job.done(&line);
+    assert!(ran.err.contains("as chosen before"), "{}", ran.err);
+    assert!(ran.err.contains("warning: 2 frames are left and the job is foretold"), "{}", ran.err);
+    assert!(ran.err.contains(", not 2.0 s; --overwrite"), "{}", ran.err);
+    assert!(ran.err.contains("; in all "), "{}", ran.err);
+    let ran = job.done(&line);
+    assert!(!ran.err.contains("warning: "), "nothing is left: {}", ran.err);
+}
+
 /// More frames are rendered under the choice of the first, or all under a tighter one where these show
 /// that it is not enough; the next run keeps them either way.
 #[test]
@@ -124,6 +145,7 @@ fn what_cannot_be_foretold_is_refused() {
     job.refused(&format!("{LINE} --target mse=1"), "psnr=45, ssim=0.99");
     job.refused(&format!("{LINE} --target psnr=45 --budget 1m"), "cannot be used with");
     job.refused(&format!("{LINE} --budget never"), "90s, 25m or 1h30m");
+    job.refused(&format!("{LINE} --budget 0s"), "a budget is at least 1s");
     job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
 }

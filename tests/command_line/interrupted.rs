@@ -38,6 +38,36 @@ fn assert_same_frames(job: &Job, a: &str, b: &str) {
     }
 }
 
+/// All frames are there then; the same command would replace them.
+#[test]
+fn a_signal_while_frames_are_checked_says_how_to_go_on_without_replacing_them() {
+    let job = Job::new();
+    let line = "render cube.obj --size 48x32 --frames 1..3 --no-video -o o/f_##.png --spp 1024 \
+        --shadow-samples 1 --sky-samples 1 --policy off --target psnr=20";
+    let overwrite = format!("{line} --overwrite");
+    let mut child = job.command(&overwrite).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut said = String::new();
+    while !said.contains("frame 3 of 3") {
+        assert!(err.read_line(&mut said).expect("a line") > 0, "{said}");
+    }
+    // The last frame's line comes shortly before the check begins.
+    std::thread::sleep(Duration::from_millis(100));
+    send("INT", &child);
+    let code = child.wait().expect("it ends").code();
+    let words = rest(err);
+    assert_eq!(code, Some(75), "{words}");
+    let how = "the same command without --overwrite goes on from here";
+    assert!(words.contains("stopped by SIGINT: 3 of 3 frames are finished in "), "{words}");
+    assert!(words.contains(how) && !words.contains("error:"), "{words}");
+    let ran = job.done(line);
+    assert!(
+        ran.out.contains("0 rendered, 3 kept") && ran.err.contains("came out: "),
+        "{}",
+        ran.err
+    );
+}
+
 #[test]
 fn a_signal_stops_within_a_second_and_the_same_command_goes_on() {
     let job = Job::new();

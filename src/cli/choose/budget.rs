@@ -1,7 +1,8 @@
 //! A time that a job is to take, and what is left of it for rendering.
 
-use super::Chooser;
-use crate::accuracy::{Check, Foretelling, Samples};
+use super::{Choice, Chooser};
+use crate::accuracy::{Check, Effort, Foretelling, Samples};
+use crate::cli::progress::duration;
 use crate::film::Film;
 use crate::math::Rgb;
 use crate::output::{WriteOptions, write_image};
@@ -21,8 +22,10 @@ const VIDEO: [f64; 2] = [0.2, 4e-8];
 pub(super) struct Budget {
     started: Instant,
     seconds: f64,
-    /// Seconds for the check at most.
+    /// Seconds kept back for the check at most.
     check: f64,
+    /// Frames, and pixels of each: what there is for a check to look at.
+    there_is: (u32, u64),
     /// Seconds for the video.
     video: f64,
     /// Seconds that a rank takes to write its frames.
@@ -34,8 +37,9 @@ impl Budget {
     pub fn of(chooser: &Chooser) -> Option<Self> {
         let (started, seconds) = (chooser.started, chooser.args.budget?.as_secs_f64());
         let (request, settings) = (chooser.request, chooser.stage.base);
-        let frames = f64::from(request.frames.last - request.frames.first + 1);
-        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let count = request.frames.last - request.frames.first + 1;
+        let there_is = (count, u64::from(settings.width) * u64::from(settings.height));
+        let (frames, pixels) = (f64::from(count), there_is.1 as f64);
         let [start, each] = VIDEO;
         let is_video = request.fps.is_some() && frames > 1.0;
         let check = CHECK * (seconds - started.elapsed().as_secs_f64()).max(0.0);
@@ -45,6 +49,7 @@ impl Budget {
             started,
             seconds,
             check,
+            there_is,
             video: if is_video { start + each * pixels * frames } else { 0.0 },
             writing: (frames / f64::from(chooser.ranks)).ceil() * writing(settings, &ending),
         })
@@ -61,15 +66,54 @@ impl Budget {
 
     /// Seconds that are left, as of now, for tracing frames of `samples`.
     pub fn left(&self, foretelling: &Foretelling, samples: Samples) -> f64 {
-        let check = Check::seconds(foretelling, samples).min(self.check);
+        let check = self.kept_back(foretelling, samples);
         let left = self.seconds - self.gone() - check - self.video - self.writing;
         (1.0 - RESERVE) * left.max(0.0)
     }
 
-    /// The share of a whole check that there is time for now.
-    pub fn check_share(&self, foretelling: &Foretelling, samples: Samples) -> f64 {
-        let left = (self.seconds - self.gone() - self.video).max(0.5 * self.check);
-        left / Check::seconds(foretelling, samples).max(1e-9)
+    /// Seconds for the check of frames of `samples`; none where their share is too little for any.
+    fn kept_back(&self, foretelling: &Foretelling, samples: Samples) -> f64 {
+        let all = |effort: Effort| self.check_seconds(effort, foretelling, samples);
+        self.effort_in(self.check, foretelling, samples).map_or(0.0, all)
+    }
+
+    fn check_seconds(&self, effort: Effort, foretelling: &Foretelling, samples: Samples) -> f64 {
+        let (frames, pixels) = self.there_is;
+        Check::seconds(foretelling, samples) * effort.looked_at(frames, pixels)
+    }
+
+    fn effort_in(&self, time: f64, foretelling: &Foretelling, samples: Samples) -> Option<Effort> {
+        let (frames, pixels) = self.there_is;
+        Effort::of_check(time, Check::seconds(foretelling, samples), frames, pixels)
+    }
+
+    /// What there is time for now to look at; else the seconds that the least check would take.
+    pub fn effort(&self, foretelling: &Foretelling, samples: Samples) -> Result<Effort, f64> {
+        let left = self.seconds - self.gone() - self.video;
+        let least = || self.check_seconds(Effort::LEAST, foretelling, samples);
+        self.effort_in(left, foretelling, samples).ok_or_else(least)
+    }
+}
+
+impl Chooser<'_> {
+    /// Warns where frames that are not there yet, under what was chosen for fewer frames or more time,
+    /// are foretold to take longer than there is.
+    pub(super) fn warn_if_long(&self, before: &Choice) {
+        let Some(budget) = Budget::of(self) else { return };
+        let (first, last) = (self.request.frames.first, self.request.frames.last);
+        let left = (first..=last).filter(|n| !self.request.pattern.path(*n).exists()).count();
+        let share = left as f64 / f64::from(last - first + 1);
+        let foretold = &before.foretold;
+        let rendering = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let all = budget.gone() + share * (rendering + budget.writing) + budget.video;
+        if left > 0 && all > budget.seconds {
+            let [all, asked] = [all, budget.seconds].map(duration);
+            let frames = if left == 1 { "1 frame is" } else { &format!("{left} frames are") };
+            self.warn(format!(
+                "{frames} left and the job is foretold to take {all}, not {asked}; --overwrite \
+                 chooses anew"
+            ));
+        }
     }
 }
 

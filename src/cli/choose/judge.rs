@@ -26,9 +26,15 @@ impl Chooser<'_> {
         timer: Timer,
     ) -> Result<Option<Choice>> {
         let samples = choice.foretold.samples;
-        let effort = Budget::of(self).map_or(Effort::WHOLE, |budget| {
-            Effort::WHOLE.part(budget.check_share(&choice.foretelling, samples))
-        });
+        let budget = Budget::of(self);
+        let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
+            None => Effort::WHOLE,
+            Some(Ok(effort)) => effort,
+            Some(Err(least)) => {
+                self.tell_unchecked(choice, least, rendered);
+                return Ok(None);
+            }
+        };
         let check = Check::of(&self.probe(), samples, effort, &|frame| self.image(frame))?;
         let [mean, worst] = check.psnr();
         let looked = check.frames.len();
@@ -40,7 +46,7 @@ impl Chooser<'_> {
             }
             _ => String::new(),
         };
-        let time = rendered.map_or(String::new(), |seconds| self.time(choice, seconds));
+        let time = self.time(choice, rendered);
         self.tell(format!(
             "came out: PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked \
              at{figure}; foretold {:.1} at worst{time}",
@@ -62,21 +68,28 @@ impl Chooser<'_> {
         self.tighter(choice, allowed, factor, timer)
     }
 
-    /// What rendering took beside what was foretold, and all beside the budget.
-    fn time(&self, choice: &Choice, seconds: f64) -> String {
-        let off = |foretold: f64, came: f64| 100.0 * (foretold / came.max(1e-9) - 1.0);
+    /// Says that there is no time for a look at what came out, which would take `least` seconds.
+    fn tell_unchecked(&self, choice: &Choice, least: f64, rendered: Option<f64>) {
+        self.tell(format!(
+            "came out: not looked at, which would take {} or more{}",
+            duration(least),
+            self.time(choice, rendered)
+        ));
+    }
+
+    /// What rendering took beside what was foretold, if it was all rendered now, and all beside the
+    /// budget.
+    fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
         let foretold = choice.seconds;
-        let rendering = format!(
-            "; {}, foretold {} ({:+.0} %)",
-            duration(seconds),
-            duration(foretold),
-            off(foretold, seconds)
-        );
+        let rendering = rendered.map_or(String::new(), |seconds| {
+            let [came, said] = [seconds, foretold].map(duration);
+            format!("; {came}, foretold {said} ({})", beyond(seconds, foretold))
+        });
         let all = self.started.elapsed().as_secs_f64();
         let budget = self.args.budget.map_or(String::new(), |budget| {
             let budget = budget.as_secs_f64();
-            let [all_words, budget_words] = [all, budget].map(duration);
-            format!("; in all {all_words} of {budget_words} ({:+.0} %)", off(all, budget))
+            let [came, asked] = [all, budget].map(duration);
+            format!("; in all {came} of {asked} ({})", beyond(all, budget))
         });
         rendering + &budget
     }
@@ -124,6 +137,11 @@ impl Chooser<'_> {
     }
 }
 
+/// By how much what came is more than what was foretold or allowed, in words: a plus is too much.
+fn beyond(came: f64, expected: f64) -> String {
+    format!("{:+.0} %", 100.0 * (came / expected.max(1e-9) - 1.0))
+}
+
 /// By which factor the light's noise alone, by the audit's lower end, exceeds what is allowed.
 fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
     let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
@@ -132,9 +150,16 @@ fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::audited_excess;
+    use super::{audited_excess, beyond};
     use crate::output::manifest::AuditRow;
     use crate::stats::AuditSums;
+
+    #[test]
+    fn what_takes_longer_is_a_plus() {
+        assert_eq!(beyond(0.9, 0.6), "+50 %");
+        assert_eq!(beyond(1.2, 1.0), "+20 %");
+        assert_eq!(beyond(0.3, 0.6), "-50 %");
+    }
 
     #[test]
     fn an_audit_misses_only_what_it_is_sure_of() {
