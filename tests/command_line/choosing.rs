@@ -104,22 +104,6 @@ fn figures_that_need_neighbours_are_targets_too() {
     }
 }
 
-/// Shadows of few samples: no figure goes straight with the error, and 1 sample was chosen though the probe
-/// had seen it miss; or nothing, though 64 would do.
-#[test]
-fn what_the_probe_saw_miss_is_not_chosen_and_what_it_saw_reach_is() {
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell/scene.toml");
-    let job = Job::new();
-    for (target, seed) in [("ssim=0.97", 3), ("max-share=5%", 1)] {
-        let line = format!(
-            "render {scene} --size 48x48 --frames 1..4 --no-video -o o/f_##.png --overwrite \
-             --target {target} --seed {seed}"
-        );
-        let said = job.done(&line).err;
-        assert!(said.contains("came out: ") && !said.contains("was missed"), "{said}");
-    }
-}
-
 #[test]
 fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
     let job = Job::new();
