@@ -1,11 +1,16 @@
 //! What a setting is foretold to come to, and the choice among all of them.
 
+mod line;
+mod tried;
+
 use super::choice::Goal;
 use super::law::{Law, Samples};
 use super::worst::worst;
 use crate::measure::psnr;
 use crate::scene::{Policy, ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
+
+pub use line::Line;
 
 /// A way to take over light from other frames, as it came out on a few small frames.
 ///
@@ -28,6 +33,17 @@ pub struct Measured {
     pub errors: Vec<f64>,
     /// How far each may be off, a share: the standard error of pixels drawn.
     pub doubts: Vec<f64>,
+    /// The goal's figure as it was found, unless the goal is the squared error.
+    pub figure: Option<Figure>,
+}
+
+/// A figure that rises with the error, as it was found: less than 1 by how much (SSIM), FLIP, a share.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Figure {
+    /// Of the worst frame.
+    pub figure: f64,
+    /// Squared error of the worst frame, the reference's own in it, display steps.
+    pub squared_error: f64,
 }
 
 /// What patches took to trace.
@@ -37,42 +53,6 @@ pub struct Pace {
     pub samples: Samples,
     /// Wall seconds a pixel.
     pub seconds: f64,
-}
-
-/// A figure as a power of the squared error in display steps: both of its logarithms' line.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// Logarithm of the figure where the squared error is 1.
-    pub at_one: f64,
-    /// Its rise with the logarithm of the squared error.
-    pub rise: f64,
-}
-
-impl Line {
-    /// The line nearest to pairs of squared error and figure; `None` where they do not rise together.
-    pub fn through(pairs: &[(f64, f64)]) -> Option<Self> {
-        let logs =
-            || pairs.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln()));
-        let n = logs().count() as f64;
-        let (x, y) = logs().fold((0.0, 0.0), |(x, y), (a, b)| (x + a / n, y + b / n));
-        let (xx, xy) = logs()
-            .fold((0.0, 0.0), |(xx, xy), (a, b)| (xx + (a - x) * (a - x), xy + (a - x) * (b - y)));
-        let rise = xy / xx;
-        (n >= 2.0 && rise > 0.0).then_some(Self { at_one: y - rise * x, rise })
-    }
-
-    /// The line with the same rise through `(squared_error, figure)`.
-    pub fn shifted_to(self, (squared_error, figure): (f64, f64)) -> Self {
-        if squared_error <= 0.0 || figure <= 0.0 {
-            return self;
-        }
-        Self { at_one: figure.ln() - self.rise * squared_error.ln(), ..self }
-    }
-
-    /// The squared error at which the figure is `figure`.
-    fn squared_error(&self, figure: f64) -> f64 {
-        ((figure.ln() - self.at_one) / self.rise).exp()
-    }
 }
 
 /// All that the probe found out. Squared errors are in squares of a display step.
@@ -92,6 +72,8 @@ pub struct Foretelling {
     pub modes: Vec<Mode>,
     /// How the goal's figure goes with the squared error, unless it is that.
     pub line: Option<Line>,
+    /// The largest figure that reaches the goal, unless that is the squared error.
+    pub most: Option<f64>,
     /// How far each frame's squared error may be off where samples were not tried, a share.
     pub doubts: Vec<f64>,
     /// How fast patches are traced.
@@ -149,11 +131,11 @@ pub struct Range {
 impl Foretelling {
     /// The squared error that `goal` allows.
     pub fn allowed(&self, goal: Goal) -> f64 {
-        let by_line = |figure: f64| self.line.map_or(0.0, |line| line.squared_error(figure));
-        match goal {
-            Goal::Psnr(least) => 255.0 * 255.0 * 10f64.powf(-least / 10.0),
-            Goal::Ssim(least) => by_line(1.0 - least),
-            Goal::Flip(most) | Goal::MaxShare(most) => by_line(most),
+        match (goal, self.line, goal.most()) {
+            (Goal::Psnr(least), ..) => 255.0 * 255.0 * 10f64.powf(-least / 10.0),
+            (_, Some(line), Some(most)) => line.squared_error(most),
+            // Nothing but what was tried tells.
+            _ => self.most_that_reached(),
         }
     }
 
@@ -177,11 +159,16 @@ impl Foretelling {
         }
     }
 
-    /// For each mode the fastest setting that is foretold to be off by at most `allowed`.
+    /// For each mode the fastest setting that is foretold to be off by at most `allowed`. Where the goal's
+    /// figure was found of a setting, that decides.
     pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Foretold> {
+        let least = |found: &mut dyn Iterator<Item = Foretold>| {
+            found.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+        };
         let best = |mode| {
-            let reach = self.all(mode, range).filter(|f| f.squared_error <= allowed);
-            reach.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+            let within = |f: &Foretold| f.squared_error <= allowed && !self.missed(f.samples);
+            least(&mut self.all(mode, range).filter(within))
+                .or_else(|| least(&mut self.all(mode, range).filter(|f| self.reached(f.samples))))
         };
         self.modes.iter().filter_map(best).collect()
     }
@@ -238,11 +225,11 @@ impl Foretelling {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::law::Causes;
     use super::*;
 
-    fn foretelling() -> Foretelling {
+    pub(super) fn foretelling() -> Foretelling {
         let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
         let error =
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
@@ -261,13 +248,14 @@ mod tests {
                 Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
             ],
             line: Line::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
+            most: None,
             doubts: vec![0.0],
             pace: None,
             excess: 1.0,
         }
     }
 
-    fn range() -> Range {
+    pub(super) fn range() -> Range {
         Range { spp: vec![1, 2, 4, 8, 16, 32, 64], shadow: vec![1, 4, 16], sky: vec![1] }
     }
 

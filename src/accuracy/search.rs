@@ -3,11 +3,11 @@
 use super::choice::Goal;
 use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Foretelling, Line, Measured, Pace};
+use super::foretell::{Figure, Foretelling, Line, Measured, Pace};
 use super::law::{Law, Point, Samples};
 use super::patches::{Patches, Seen};
 use super::probe::{Probe, reference, samples_of_reference};
-use super::timing::likely;
+use super::timing::likely as likely_of;
 use crate::error::Result;
 use crate::scene::Policy;
 use std::time::Instant;
@@ -16,6 +16,8 @@ use std::time::Instant;
 const BIAS: f64 = 0.1;
 /// How often the likely choices are tried.
 const ROUNDS: u32 = 3;
+/// The same where the goal's figure only goes somehow with the squared error.
+const ROUNDS_BY_FIGURE: u32 = 8;
 
 /// What is known so far.
 pub(super) struct Search<'a> {
@@ -26,7 +28,7 @@ pub(super) struct Search<'a> {
     points: Vec<Point>,
     references: Vec<Samples>,
     doubts: Vec<Vec<f64>>,
-    figures: Vec<(f64, f64)>,
+    figures: Vec<Option<Figure>>,
     /// What it comes to.
     pub foretelling: Foretelling,
 }
@@ -49,6 +51,7 @@ impl<'a> Search<'a> {
             bounces: probe.stage.base.bounces,
             modes: Vec::new(),
             line: None,
+            most: probe.goal.and_then(Goal::most),
             doubts: Vec::new(),
             pace: Some(Pace { samples: reference, seconds }),
             excess: 1.0,
@@ -76,9 +79,13 @@ impl<'a> Search<'a> {
 
     /// Tries what would be chosen, until it has been tried.
     pub fn try_likely(&mut self, goal: Goal) -> Result<()> {
-        for _ in 0..ROUNDS {
-            let allowed = self.foretelling.allowed(goal);
-            let likely = likely(self.foretelling.fastest(&self.probe.range(), allowed));
+        let is_squared = self.foretelling.most.is_none();
+        for _ in 0..if is_squared { ROUNDS } else { ROUNDS_BY_FIGURE } {
+            let within = |allowed| self.foretelling.fastest(&self.probe.range(), allowed);
+            let mut likely = likely_of(within(self.foretelling.allowed(goal)));
+            if likely.is_empty() && !is_squared {
+                likely = likely_of(within(self.foretelling.next_step()));
+            }
             let tried = |s: &Samples| self.points.iter().any(|(samples, _)| samples == s);
             let mut new: Vec<Samples> = likely.iter().map(|found| found.samples).collect();
             new.retain(|samples| !tried(samples));
@@ -109,10 +116,13 @@ impl<'a> Search<'a> {
         let seen = self.traced(samples)?;
         let errors = squares(&self.patches, &self.truth, &seen);
         self.doubts.push(doubts(&self.patches, &self.truth, &seen));
-        if let Some(goal) = self.probe.goal {
-            let worst = errors.iter().copied().fold(0.0, f64::max);
-            self.figures.push((worst, figure(goal, &self.patches, &self.truth, &seen)?));
-        }
+        let of = |goal| -> Result<Figure> {
+            let squared_error = errors.iter().copied().fold(0.0, f64::max);
+            let figure = figure(goal, &self.patches, &self.truth, &seen)?;
+            Ok(Figure { figure, squared_error })
+        };
+        let goal = self.probe.goal.filter(|goal| goal.most().is_some());
+        self.figures.push(goal.map(of).transpose()?);
         self.points.push((samples, errors));
         self.references.push(self.reference);
         Ok(())
@@ -122,14 +132,14 @@ impl<'a> Search<'a> {
     fn learn(&mut self) {
         let law = Law::of(self.probe.causes(), &self.points, &self.references);
         let own = |reference: Samples| law.errors(reference).collect::<Vec<_>>();
-        let all = self.points.iter().zip(&self.references).zip(&self.doubts);
+        let all = self.points.iter().zip(&self.references).zip(&self.doubts).zip(&self.figures);
         self.foretelling.measured = all
-            .map(|(((samples, errors), reference), doubts)| {
+            .map(|((((samples, errors), reference), doubts), figure)| {
                 // The law tells the reference's part of the difference.
                 let parts =
                     law.errors(*samples).zip(own(*reference)).map(|(s, r)| s / (s + r).max(1e-12));
                 let errors = errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-                Measured { samples: *samples, errors, doubts: doubts.clone() }
+                Measured { samples: *samples, errors, doubts: doubts.clone(), figure: *figure }
             })
             .collect();
         self.foretelling.doubts = self.doubts.last().cloned().unwrap_or_default();
@@ -138,15 +148,20 @@ impl<'a> Search<'a> {
             Some(((samples, errors), reference)) => law.through(*samples, errors, *reference),
             None => law,
         };
-        // Where errors are small: a share of pixels cannot go on rising.
-        let mut smallest = self.figures.clone();
-        smallest.sort_by(|a, b| a.0.total_cmp(&b.0));
-        smallest.truncate(4);
-        let line = Line::through(&smallest);
-        self.foretelling.line = match self.figures.last() {
-            Some(last) => line.map(|line| line.shifted_to(*last)),
-            None => line,
-        };
+        self.foretelling.line = self.foretelling.most.and_then(|most| self.line(most));
+    }
+
+    /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
+    /// say, cannot go on rising.
+    fn line(&self, most: f64) -> Option<Line> {
+        let all = self.figures.iter().flatten().filter(|found| found.figure > 0.0);
+        let mut nearest: Vec<(f64, f64)> =
+            all.map(|found| (found.squared_error, found.figure)).collect();
+        let off = |found: &(f64, f64)| (found.1 / most).ln().abs();
+        nearest.sort_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.truncate(4);
+        let line = Line::through(&nearest)?;
+        nearest.first().map(|found| line.shifted_to(*found))
     }
 
     fn design(&self) -> Vec<Samples> {

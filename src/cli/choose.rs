@@ -193,11 +193,24 @@ impl Chooser<'_> {
 
     /// What to say where no setting will do.
     fn out_of_reach(&self, foretelling: &Foretelling) -> Error {
-        let best = foretelling.best(&self.probe().range());
-        let nearest = best.map_or(String::new(), |best| {
+        let best = foretelling.best(&self.probe().range()).map(|best| {
             let seconds = duration(best.seconds * self.probe().frames_each(best.reuse));
             format!("; {} would come to {:.1} dB, in {seconds}", options(&best), best.psnr())
         });
+        // A figure that goes with no error for sure: what was seen of it.
+        let seen = foretelling.nearest().map(|(tried, figure)| {
+            let figure = match self.args.target {
+                Some(Goal::Ssim(_)) => format!("SSIM {:.4}", 1.0 - figure),
+                Some(Goal::MaxShare(_)) => format!("a share of {:.3} %", 100.0 * figure),
+                _ => format!("FLIP {figure:.4}"),
+            };
+            format!(
+                "; of what was tried, --spp {} --shadow-samples {} --sky-samples {} came nearest, to \
+                 {figure}",
+                tried.spp, tried.shadow, tried.sky
+            )
+        });
+        let nearest = seen.or(best).unwrap_or_default();
         let bits = match self.rounds() {
             true => ", --png-bits 16 (8 bits hold 58.9 dB at most)",
             false => "",

@@ -1,0 +1,140 @@
+//! What the figures of settings that were tried tell of these, and of others.
+
+use super::super::choice::Goal;
+use super::super::law::Samples;
+use super::{Foretelling, Measured};
+
+/// Where nothing that was tried reaches the goal, the squared error is to come down by so much at a time.
+const STEP: f64 = 4.0;
+
+impl Goal {
+    /// The largest figure that reaches it, as figures rise with the error; `None` for the squared error.
+    pub(in super::super) fn most(self) -> Option<f64> {
+        match self {
+            Self::Psnr(_) => None,
+            Self::Ssim(least) => Some(1.0 - least),
+            Self::Flip(most) | Self::MaxShare(most) => Some(most),
+        }
+    }
+}
+
+impl Foretelling {
+    /// The goal's figure of `samples` if they were tried: as it was found, and the larger for all that is
+    /// added to the squared error.
+    pub fn figure(&self, samples: Samples) -> Option<f64> {
+        let tried = self.measured.iter().rev().find(|measured| measured.samples == samples)?;
+        self.figure_of(tried)
+    }
+
+    /// What came nearest to the goal of all that was tried, and its figure as [`Self::figure`].
+    pub fn nearest(&self) -> Option<(Samples, f64)> {
+        let all = self.measured.iter().filter_map(|m| Some((m.samples, self.figure_of(m)?)));
+        all.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Whether `samples` were tried and reached the goal's figure.
+    pub(super) fn reached(&self, samples: Samples) -> bool {
+        let figure = self.figure(samples).zip(self.most);
+        figure.is_some_and(|(figure, most)| figure <= most)
+    }
+
+    /// Whether `samples` were tried and missed the goal's figure; or, untried, are no more in any respect
+    /// than some that did.
+    pub(super) fn missed(&self, samples: Samples) -> bool {
+        let Some(most) = self.most else { return false };
+        if let Some(figure) = self.figure(samples) {
+            return figure > most;
+        }
+        let holds =
+            |s: Samples| samples.spp <= s.spp && samples.shadow <= s.shadow && samples.sky <= s.sky;
+        let misses = |m: &Measured| self.figure_of(m).is_some_and(|figure| figure > most);
+        self.measured.iter().any(|m| holds(m.samples) && misses(m))
+    }
+
+    /// The largest squared error that is foretold of what reached the goal's figure; none is 0.
+    pub(super) fn most_that_reached(&self) -> f64 {
+        let reached = |samples: &Samples| self.reached(*samples);
+        self.errors_tried().filter(|(samples, _)| reached(samples)).fold(0.0, |m, (_, e)| m.max(e))
+    }
+
+    /// A squared error to try where nothing reaches the goal: well below all that was tried.
+    pub fn next_step(&self) -> f64 {
+        self.errors_tried().fold(f64::INFINITY, |least, (_, e)| least.min(e)) / STEP
+    }
+
+    fn errors_tried(&self) -> impl Iterator<Item = (Samples, f64)> + '_ {
+        let of = |m: &Measured| {
+            let foretold = self.of(self.modes.first()?, m.samples);
+            Some((m.samples, foretold.squared_error))
+        };
+        self.measured.iter().filter_map(of)
+    }
+
+    fn figure_of(&self, tried: &Measured) -> Option<f64> {
+        let found = tried.figure?;
+        let bias = self.bias.iter().copied().fold(0.0, f64::max);
+        let all = self.excess * found.squared_error + bias + self.rounding;
+        // Without a line: no figure rises faster than the squared error.
+        let rise = self.line.map_or(1.0, |line| line.rise.min(1.0));
+        Some(found.figure * (all / found.squared_error.max(1e-12)).powf(rise))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{foretelling, range};
+    use super::super::{Figure, Foretelling, Line};
+    use super::*;
+
+    fn tried(all: &[(u32, u32, f64)]) -> Foretelling {
+        let mut foretelling = foretelling();
+        (foretelling.most, foretelling.rounding, foretelling.bias) = (Some(0.02), 0.0, vec![0.0]);
+        let measured = |&(spp, shadow, figure): &(u32, u32, f64)| {
+            let samples = Samples { spp, shadow, sky: 1 };
+            let errors: Vec<f64> = foretelling.law.errors(samples).collect();
+            let figure = Some(Figure { figure, squared_error: errors[0] });
+            Measured { samples, errors, doubts: vec![0.0], figure }
+        };
+        foretelling.measured = all.iter().map(measured).collect();
+        foretelling
+    }
+
+    fn first(foretelling: &Foretelling) -> Option<(u32, u32)> {
+        let allowed = foretelling.allowed(Goal::Flip(0.02));
+        let found = foretelling.fastest(&range(), allowed);
+        found.first().map(|f| (f.samples.spp, f.samples.shadow))
+    }
+
+    #[test]
+    fn what_was_seen_to_miss_is_not_chosen_whatever_the_line_says() {
+        // The line allows a squared error of 4: 16 camera samples with one shadow sample.
+        assert_eq!(first(&tried(&[])), Some((16, 1)));
+        assert_eq!(first(&tried(&[(16, 1, 0.019)])), Some((16, 1)));
+        let missed = first(&tried(&[(16, 1, 0.021)])).expect("another");
+        assert!(missed.0 > 16 || missed.1 > 1, "{missed:?}");
+        // Nor what is less in every respect than something that missed.
+        let less = first(&tried(&[(32, 1, 0.021)])).expect("another");
+        assert!(less.0 > 32 || less.1 > 1, "{less:?}");
+        // Errors that came out larger than foretold make figures larger too.
+        let worse = tried(&[(16, 1, 0.019)]).worse(1.3);
+        assert!(!worse.reached(Samples { spp: 16, shadow: 1, sky: 1 }), "{worse:?}");
+    }
+
+    #[test]
+    fn without_a_line_what_was_seen_decides() {
+        let without = |all: &[(u32, u32, f64)]| Foretelling { line: None, ..tried(all) };
+        let none = without(&[(4, 1, 0.5), (16, 1, 0.5)]);
+        assert_eq!((none.allowed(Goal::Flip(0.02)), first(&none)), (0.0, None));
+        let (samples, figure) = none.nearest().expect("one");
+        assert!(samples.spp > 1 && (figure - 0.5).abs() < 1e-9);
+        // There is something further to try.
+        assert!(!none.fastest(&range(), none.next_step()).is_empty());
+        assert_eq!(first(&without(&[(4, 1, 0.5), (16, 1, 0.5), (64, 4, 0.002)])), Some((64, 4)));
+    }
+
+    #[test]
+    fn a_line_that_hardly_rises_tells_nothing() {
+        assert!(Line::through(&[(1.0, 0.500), (4.0, 0.501), (16.0, 0.502)]).is_none());
+        assert!(Line::through(&[(1.0, 0.1), (4.0, 0.2), (16.0, 0.4)]).is_some());
+    }
+}
