@@ -141,8 +141,7 @@ impl Foretelling {
 
     /// What is foretold of `samples` in `mode`, of the worst frame.
     pub fn of(&self, mode: &Mode, samples: Samples) -> Foretold {
-        let tried = self.measured.iter().find(|measured| measured.samples == samples);
-        let (errors, doubts) = match tried {
+        let (errors, doubts) = match self.tried(samples) {
             Some(measured) => (measured.errors.clone(), &measured.doubts),
             None => (self.law.errors(samples).collect::<Vec<_>>(), &self.doubts),
         };

@@ -86,10 +86,13 @@ impl<'a> Search<'a> {
             if likely.is_empty() && !is_squared {
                 likely = likely_of(within(self.foretelling.next_step()));
             }
-            let tried = |s: &Samples| self.points.iter().any(|(samples, _)| samples == s);
-            let mut new: Vec<Samples> = likely.iter().map(|found| found.samples).collect();
-            new.retain(|samples| !tried(samples));
-            new.dedup();
+            let mut new: Vec<Samples> = Vec::new();
+            for samples in likely.iter().map(|found| found.samples) {
+                // Modes may agree on samples, not only neighbours among them.
+                if self.foretelling.tried(samples).is_none() && !new.contains(&samples) {
+                    new.push(samples);
+                }
+            }
             if new.is_empty() {
                 break;
             }

@@ -22,8 +22,12 @@ impl Foretelling {
     /// The goal's figure of `samples` if they were tried: as it was found, and the larger for all that is
     /// added to the squared error.
     pub fn figure(&self, samples: Samples) -> Option<f64> {
-        let tried = self.measured.iter().rev().find(|measured| measured.samples == samples)?;
-        self.figure_of(tried)
+        self.figure_of(self.tried(samples)?)
+    }
+
+    /// What `samples` came to, if they were tried, which nothing is twice.
+    pub(in super::super) fn tried(&self, samples: Samples) -> Option<&Measured> {
+        self.measured.iter().find(|measured| measured.samples == samples)
     }
 
     /// What came nearest to the goal of all that was tried, and its figure as [`Self::figure`].
