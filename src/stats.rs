@@ -73,6 +73,11 @@ impl ReuseCounts {
         *self == Self::default()
     }
 
+    /// Whether anything was inferred.
+    pub fn is_inferred(&self) -> bool {
+        self.direct_inferred + self.specular_inferred > 0
+    }
+
     /// Share of the points that were inferred, 0 to 1; `None` where there was none to infer.
     pub fn share(&self) -> Option<f64> {
         share(self.direct_inferred + self.specular_inferred, self.direct + self.specular)

@@ -22,6 +22,9 @@ use tweenray::stats::ReuseCounts;
 const SIZE: (u32, u32) = (128, 72);
 const FRAMES: u32 = 33;
 const SEGMENT: u32 = 8;
+/// By how much two traces of a frame with other random numbers differ, dB: where next to all noise is
+/// traced, inferred frames differ from traced ones by as much.
+const SCATTER: f64 = 0.05;
 /// Samples of the frames that are taken for the truth.
 const BEST: u32 = 256;
 
@@ -57,7 +60,7 @@ fn is_no_worse_than_traced(scene: &str, samples: u32, direct: f64, specular: f64
         let ours = psnr_of(&settings, &made[frame as usize - 1].film, &truth);
         let theirs = psnr_of(&settings, &traced, &truth);
         println!("{scene}, frame {frame}: {ours:.2} dB inferred, {theirs:.2} dB traced");
-        if ours < theirs {
+        if ours < theirs - SCATTER {
             worse.push(frame);
         }
     }
@@ -82,10 +85,10 @@ fn cornell_is_no_worse_than_traced() {
     is_no_worse_than_traced("cornell", 16, 0.97, 0.95);
 }
 
+/// Its traced frames have 88 dB, where 8 bits hold 59: evidence must be stricter than elsewhere.
 #[test]
-#[ignore = "at 88 dB, where 8 bits hold 59, inferred frames are up to 5 dB below traced ones"]
 fn reflective_spheres_is_no_worse_than_traced() {
-    is_no_worse_than_traced("reflective_spheres", 16, 0.97, 0.9);
+    is_no_worse_than_traced("reflective_spheres", 16, 0.97, 0.7);
 }
 
 #[test]

@@ -62,9 +62,10 @@ impl List<'_> {
         if self.base.reuse.policy != Policy::Surface {
             return;
         }
-        for tolerance in [0.25, 0.5, 2.0, 4.0].map(|f| times(f, self.base.reuse.tolerance)) {
+        let base = self.base.reuse.tolerance.unwrap_or(1.0);
+        for tolerance in [0.25, 0.5, 2.0, 4.0].map(|f| times(f, base)) {
             let options = format!("--tolerance {tolerance}");
-            self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = tolerance);
+            self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = Some(tolerance));
         }
         // A segment longer than the move is one as long as it.
         let cut = |segment: u32| segment.min(self.frames);

@@ -102,12 +102,13 @@ pub struct ReuseArgs {
     #[arg(long, value_name = "POLICY", help_heading = "Reuse",
         value_parser = values::choice::<Policy>(&["surface", "colour", "off"]))]
     pub policy: Option<Policy>,
-    /// Frames from one key frame to the next [default: 64]
+    /// Frames from one key frame to the next [default: 128]
     #[arg(long, value_name = "FRAMES", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SEGMENT))]
     pub segment: Option<u32>,
     /// By how many display steps (1/255) samples may disagree beyond their noise and still stand for
-    /// one another: less is more exact and slower [default: 1]
+    /// one another: less is more exact and slower [default: 1, and less where traced frames are more
+    /// exact than that]
     #[arg(long, value_name = "STEPS", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
     pub tolerance: Option<f32>,
@@ -196,11 +197,9 @@ impl ReuseArgs {
     fn apply(&self, s: &mut ReuseSettings) {
         put(&mut s.policy, self.policy);
         put(&mut s.segment, self.segment);
-        put(&mut s.tolerance, self.tolerance);
         put(&mut s.audit, self.audit);
-        if self.max_rmse.is_some() {
-            s.max_rmse = self.max_rmse;
-        }
+        s.tolerance = self.tolerance.or(s.tolerance);
+        s.max_rmse = self.max_rmse.or(s.max_rmse);
         put(&mut s.colour_epsilon, self.colour_epsilon);
         put(&mut s.distance_epsilon, self.distance_epsilon);
     }

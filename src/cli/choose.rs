@@ -136,7 +136,10 @@ fn options(foretold: &Foretold) -> String {
     let Foretold { samples, bounces, reuse, .. } = foretold;
     let reuse = match reuse.policy {
         Policy::Off => "--policy off".into(),
-        _ => format!("--policy surface --tolerance {}", reuse.tolerance),
+        _ => match reuse.tolerance {
+            Some(tolerance) => format!("--policy surface --tolerance {tolerance}"),
+            None => "--policy surface".into(),
+        },
     };
     format!(
         "--spp {} --shadow-samples {} --sky-samples {} --bounces {bounces} {reuse}",

@@ -148,6 +148,7 @@ mod tests {
             bytes: 1,
             rays,
             reuse: Default::default(),
+            tolerance: None,
             audit: None,
             bad: Default::default(),
         };

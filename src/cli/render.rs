@@ -220,6 +220,13 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
         duration(start.elapsed().as_secs_f64())
     ))?;
     reused(&stats::reuse_of(outcome)).map_or(Ok(()), result)?;
+    let fixed = job.request.settings.reuse.tolerance;
+    if let Some(least) = stats::tolerance_of(outcome).filter(|t| *t < 1.0 && fixed.is_none()) {
+        result(format!(
+            "traced frames are so exact here that samples had to agree within {}/255",
+            steps(least.into())
+        ))?;
+    }
     if let Some(line) = stats::audit_of(job.plan, outcome).and_then(|audit| audit_line(&audit)) {
         result(line)?;
     }

@@ -95,6 +95,19 @@ impl Default for Evidence {
     }
 }
 
+impl Evidence {
+    /// With a `share` of what is allowed: of the deviation, and of the variance for noise.
+    pub fn shared(self, share: f32) -> Self {
+        Self {
+            tolerance: self.tolerance * share,
+            noise: self.noise * share,
+            plane_noise: self.plane_noise * share,
+            change_noise: self.change_noise * share.sqrt(),
+            ..self
+        }
+    }
+}
+
 /// Answers from reference frames, asked in their order.
 pub struct Lookup<'a> {
     /// The frame that is inferred.
@@ -206,8 +219,7 @@ impl Lookup<'_> {
 
     /// By how much a ratio may change unseen.
     fn most_change(&self, mean: f32, rays: f32, allowed: f32) -> f32 {
-        // Stratified: a shadow's edge crosses the cells of about the root of n of n samples.
-        let traced = variance_of_one(mean) / (rays * rays.sqrt());
+        let traced = stratified_variance(mean, rays);
         self.evidence.change * allowed + self.evidence.change_noise * traced.sqrt()
     }
 
@@ -253,9 +265,14 @@ fn variance_of_one(mean: f32) -> f32 {
     (mean * (1.0 - mean)).max(0.0)
 }
 
+/// Variance of `rays` of them, stratified: a shadow's edge crosses the cells of about the root of n of n.
+pub(super) fn stratified_variance(mean: f32, rays: f32) -> f32 {
+    variance_of_one(mean) / (rays * rays.sqrt())
+}
+
 /// How many display steps of 1/255 a unit of radiance makes where `radiance` is shown: the slope of
 /// the sRGB curve, as a power of 1/2.4.
-fn steps_per_radiance(radiance: f32) -> f32 {
+pub(super) fn steps_per_radiance(radiance: f32) -> f32 {
     let shown = f64::from(radiance).clamp(0.003, 1.0);
     // Nearly x^(-7/12), by square roots, which are the same on every machine.
     let root = shown.sqrt();

@@ -12,6 +12,7 @@ pub mod colour;
 mod cost;
 mod index;
 mod lookup;
+mod noise;
 mod plane;
 mod reference;
 pub mod store;
@@ -21,4 +22,5 @@ pub use cost::{
     LookupReason, channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of,
 };
 pub use lookup::{Evidence, Lookup};
+pub use noise::NoiseMeter;
 pub use reference::Reference;

@@ -10,8 +10,8 @@ pub struct ReuseSettings {
     /// Frames from one key frame to the next.
     pub segment: u32,
     /// By how much samples that stand for one another may disagree beyond their noise, display steps
-    /// of 1/255.
-    pub tolerance: f32,
+    /// of 1/255; `None` for one step, and less where traced frames are more exact than that.
+    pub tolerance: Option<f32>,
     /// Share of an in-between frame's cost that goes into tracing inferred pixels again, to measure
     /// how far off they are.
     pub audit: f32,
@@ -29,7 +29,7 @@ impl Default for ReuseSettings {
         Self {
             policy: Policy::Surface,
             segment: 128,
-            tolerance: 1.0,
+            tolerance: None,
             audit: 0.03,
             max_rmse: None,
             colour_epsilon: 0.02,

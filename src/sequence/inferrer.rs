@@ -1,5 +1,6 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
+mod calibrate;
 mod exchange;
 
 use super::checkpoint::Checkpoints;
@@ -16,6 +17,7 @@ use crate::reuse::store::{Kept, Terms};
 use crate::reuse::{self, Evidence, Lookup, Reference};
 use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
+use calibrate::Allowed;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -36,8 +38,10 @@ pub struct Inferrer<'a> {
     pub progress: &'a dyn Progress,
     /// Which frames depend on which.
     pub pyramid: Pyramid,
-    /// What counts as evidence.
+    /// What counts as evidence, where that is not left to the scene.
     pub evidence: Evidence,
+    /// Whether evidence is made stricter where traced frames are more exact than its tolerance.
+    pub calibrates: bool,
     /// Frames of other shots that all frames, key frames too, are inferred from.
     pub supplied: Option<&'a Supply>,
     /// On which terms frames serve later jobs as references; `None` where none is kept.
@@ -64,6 +68,8 @@ pub(super) struct State {
     again: Option<(u32, Made)>,
     pub(super) saved: Saved,
     most_memory: u64,
+    /// By segment: what was found out about its evidence.
+    allowed: BTreeMap<u32, Allowed>,
     /// References for other ranks, until they are fetched.
     pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
 }
@@ -81,7 +87,9 @@ impl<'a> Inferrer<'a> {
         pyramid: Pyramid,
     ) -> Result<Self> {
         let tolerance = renderer.settings.reuse.tolerance;
-        let evidence = Evidence { tolerance, ..Evidence::default() };
+        let by_default = Evidence::default();
+        let evidence =
+            Evidence { tolerance: tolerance.unwrap_or(by_default.tolerance), ..by_default };
         let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
         let rays = channels.iter().map(|c| reuse::rays_of(c, renderer.settings)).collect();
         // Where nothing is worth a lookup every frame is a key frame.
@@ -94,6 +102,7 @@ impl<'a> Inferrer<'a> {
             stop,
             progress,
             evidence,
+            calibrates: tolerance.is_none(),
             supplied: None,
             terms: None,
             checkpoints: None,
@@ -116,7 +125,9 @@ impl<'a> Inferrer<'a> {
             Some(rendered) => Some(rendered),
             None => self.rendered(frame, is_due, None, self.progress)?,
         };
-        let Some(Rendered { film, rays, reuse, sources }) = rendered else { return Ok(None) };
+        let Some(Rendered { film, mut rays, reuse, sources }) = rendered else { return Ok(None) };
+        let Some(allowed) = self.allowed(frame)? else { return Ok(None) };
+        rays += allowed.rays_of(frame);
         // In one order, however the frame was cut for tracing, and as they come back from a file.
         let sources = self.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources);
@@ -126,7 +137,8 @@ impl<'a> Inferrer<'a> {
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
             self.leave(frame, &camera, &sources, kept.as_ref())?;
         }
-        Ok(Some(Made { film, rays, reuse, audit: None, reference: kept }))
+        let tolerance = reuse.is_inferred().then_some(allowed.evidence.tolerance);
+        Ok(Some(Made { film, rays, reuse, tolerance, audit: None, reference: kept }))
     }
 
     /// Renders the pixels of an original that `mask` names, or all.
@@ -137,32 +149,52 @@ impl<'a> Inferrer<'a> {
         mask: Option<&[bool]>,
         progress: &dyn Progress,
     ) -> Result<Option<Rendered>> {
-        let mut references = Vec::new();
-        for other in self.schedule.ancestors(frame) {
-            match self.reference(other)? {
-                Some(reference) => references.push(reference),
-                None => return Ok(None),
-            }
-        }
+        let Some(references) = self.references(&self.schedule.ancestors(frame))? else {
+            return Ok(None);
+        };
+        let Some(Allowed { evidence, .. }) = self.allowed(frame)? else { return Ok(None) };
         let camera = self.camera(frame)?;
+        let job = FrameJob {
+            camera: &camera,
+            stream: frame,
+            with_gbuffer: self.with_gbuffer,
+            reuse: None,
+            mask,
+            beyond_crop: is_due,
+        };
+        self.with_lookup((frame, &camera), &references, evidence, |lookup| {
+            let inference = lookup.as_ref().map(|lookup| lookup as &dyn Inference);
+            self.render(job, inference, progress)
+        })
+    }
+
+    /// Lets `act` use what `references`, and those of other shots, tell about `frame`, which `camera` sees;
+    /// `None` where there is none.
+    fn with_lookup<T>(
+        &self,
+        (frame, camera): (u32, &Camera),
+        references: &[Arc<Reference>],
+        evidence: Evidence,
+        act: impl FnOnce(Option<Lookup>) -> T,
+    ) -> Result<T> {
         let own = camera.to_scene(&self.renderer.scene.recentring);
         let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
         let nearest = |supply: &Supply| self.pool.install(|| supply.nearest(&own));
         let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
         let references = with_supplied(references, &supplied);
-        let (rays, evidence) = (&self.rays, self.evidence);
-        let lookup = Lookup { frame, references: &references, rays, evidence };
-        let inference = (!references.is_empty()).then_some(&lookup as &dyn Inference);
+        let lookup = Lookup { frame, references: &references, rays: &self.rays, evidence };
+        Ok(act((!references.is_empty()).then_some(lookup)))
+    }
+
+    fn render(
+        &self,
+        job: FrameJob,
+        inference: Option<&dyn Inference>,
+        progress: &dyn Progress,
+    ) -> Option<Rendered> {
         let reuse = Reuse { channels: &self.channels, inference };
-        let job = FrameJob {
-            camera: &camera,
-            stream: frame,
-            with_gbuffer: self.with_gbuffer,
-            reuse: (!self.channels.is_empty()).then_some(reuse),
-            mask,
-            beyond_crop: is_due,
-        };
-        Ok(self.pool.install(|| self.renderer.render_job(&job, self.stop, progress)))
+        let job = FrameJob { reuse: (!self.channels.is_empty()).then_some(reuse), ..job };
+        self.pool.install(|| self.renderer.render_job(&job, self.stop, progress))
     }
 
     /// What the file of `frame` keeps for later jobs.
@@ -186,6 +218,11 @@ impl<'a> Inferrer<'a> {
     pub(super) fn camera(&self, frame: u32) -> Result<Camera> {
         let settings = self.renderer.settings;
         self.shot.camera(frame, settings.width, settings.height)
+    }
+
+    /// Those of `originals`, which are in use.
+    fn references(&self, originals: &[u32]) -> Result<Option<Vec<Arc<Reference>>>> {
+        originals.iter().map(|original| self.reference(*original)).collect()
     }
 
     /// The reference of an original, which is in use.

@@ -108,6 +108,9 @@ pub struct Made {
     pub rays: RayCounts,
     /// How much of it was inferred.
     pub reuse: ReuseCounts,
+    /// By how much samples that it is inferred from may disagree, display steps of 1/255; `None` where
+    /// it is not inferred so.
+    pub tolerance: Option<f32>,
     /// How good the inferred part is, where that was looked at.
     pub audit: Option<AuditSums>,
     /// What its exr file keeps for later jobs, see [`crate::reuse::store`].
@@ -126,6 +129,7 @@ impl Made {
             film: self.film.clone(),
             rays: RayCounts::default(),
             reuse,
+            tolerance: self.tolerance,
             audit: None,
             reference: None,
         }
@@ -148,6 +152,9 @@ pub struct FrameReport {
     /// How much was inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
+    /// By how much samples that it is inferred from may disagree, display steps of 1/255.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<f32>,
     /// How good the inferred part is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,
@@ -197,10 +204,18 @@ pub fn render_frame(
     let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
     journal.append(&row)?;
     let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-    let Row { bytes, bad, rays, reuse, .. } = row;
-    let report =
-        FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad };
-    Ok(Some(report))
+    let Row { bytes, bad, rays, reuse, tolerance, .. } = row;
+    Ok(Some(FrameReport {
+        frame,
+        trace_seconds,
+        write_seconds,
+        bytes,
+        rays,
+        reuse,
+        tolerance,
+        audit,
+        bad,
+    }))
 }
 
 /// What an audit found, with the figures that it amounts to.
@@ -254,6 +269,7 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         rank: 0,
         rays: *rays,
         reuse: *reuse,
+        tolerance: made.tolerance,
         audit: None,
         bad: film.bad,
         maps,

@@ -59,6 +59,12 @@ impl Pyramid {
         all
     }
 
+    /// The frame in the middle of the segment that `frame`, which is no key frame, lies in.
+    pub fn middle_of(&self, frame: u32) -> u32 {
+        let (low, high) = self.ends(frame);
+        middle(low, high)
+    }
+
     /// `frames` in the order that needs the fewest references at a time: segment by segment, each
     /// frame after its ancestors.
     pub fn order(&self, frames: &[u32]) -> Vec<u32> {

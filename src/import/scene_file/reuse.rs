@@ -22,8 +22,9 @@ pub(super) struct Reuse {
     /// Frames from one key frame to the next.
     segment: Int<1, { limits::MAX_SEGMENT as i64 }>,
     /// By how much samples may disagree beyond their noise and still stand for one another, display
-    /// steps of 1/255: less is more exact and slower.
-    tolerance: Steps,
+    /// steps of 1/255: less is more exact and slower. Absent: 1, and less where traced frames are more
+    /// exact than that.
+    tolerance: Option<Steps>,
     /// Share of a frame's cost that goes into measuring its error.
     audit: Share,
     /// What is inferred with a larger measured root mean square error is traced, display steps of
@@ -53,7 +54,7 @@ impl Default for Reuse {
         Self {
             policy: r.policy,
             segment: Int::clamped(r.segment.into()),
-            tolerance: Steps(shortest(r.tolerance)),
+            tolerance: r.tolerance.map(|x| Steps(shortest(x))),
             audit: Share(shortest(r.audit)),
             max_rmse: r.max_rmse.map(|x| Steps(shortest(x))),
             colour_epsilon: Amount(shortest(r.colour_epsilon)),
@@ -84,7 +85,7 @@ impl Reuse {
         ReuseSettings {
             policy: self.policy,
             segment: self.segment.u32(),
-            tolerance: self.tolerance.0 as f32,
+            tolerance: self.tolerance.map(|x| x.0 as f32),
             audit: self.audit.0 as f32,
             max_rmse: self.max_rmse.map(|x| x.0 as f32),
             colour_epsilon: self.colour_epsilon.0 as f32,

@@ -71,7 +71,7 @@ fn everything_about_reuse_reaches_its_place() {
     let reuse = ReuseSettings {
         policy: Policy::Colour,
         segment: 9,
-        tolerance: 0.5,
+        tolerance: Some(0.5),
         audit: 0.25,
         max_rmse: Some(2.0),
         colour_epsilon: 0.125,
