@@ -122,11 +122,11 @@ mod tests {
     #[test]
     fn noise_is_that_of_stratified_samples_where_light_is_half_open() {
         // √(0.25 · 0.75 / 100^1.5) of a light that would show 1 and shows a quarter, where a step is
-        // 1/255 of the sRGB curve: its slope at 0.25 is 1.055/2.4 · 0.25^(−7/12).
+        // 1/255 of the sRGB curve: its slope at 0.25 is 1.055/2.4 · 0.25^(−7/12), for which roots stand in.
         let step = 255.0 * 1.055 / 2.4 * 0.25f64.powf(-7.0 / 12.0);
         let expected = (0.25f64 * 0.75 / 1000.0).sqrt() * step;
         let got = noise(0.25, 100, 1.0).expect("lit");
-        assert!((got / expected - 1.0).abs() < 0.02, "{got} of {expected}");
+        assert!((got / expected - 1.0).abs() < 0.04, "{got} of {expected}");
         // A fourth of the samples, √8 times the noise.
         let fewer = noise(0.25, 25, 1.0).expect("lit");
         assert!((fewer / got / 8f64.sqrt() - 1.0).abs() < 1e-3, "{fewer} {got}");
