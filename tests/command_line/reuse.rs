@@ -64,7 +64,7 @@ fn each_setting_of_reuse_keeps_frames_apart() {
         ("--policy off", "policy was surface, now it is off"),
         ("--policy colour", "policy was surface, now it is colour"),
         ("--segment 5", "segment was 4, now it is 5"),
-        ("--tolerance 2", "tolerance was none, now it is 2"),
+        ("--tolerance 2", "tolerance was default, now it is 2"),
         ("--audit 0.5", "audit was 0.03, now it is 0.5"),
         ("--max-rmse 4", "max-rmse was 3, now it is 4"),
         ("--colour-epsilon 1", "colour-epsilon was 0.02, now it is 1"),
