@@ -129,9 +129,11 @@ impl<'s> EmbreeIntersector<'s> {
             spheres.map(|s| SphereData { centre: s.centre.to_array(), radius: s.radius }).collect();
         builder.add_spheres(spheres, copies_in(scene.sphere_geom_id()))?;
         let margin = rounding_margin(&scene.bounds);
-        let coarse =
-            if rules.retry { CoarseTree::new(scene, margin) } else { CoarseTree::default() };
-        let meshes = scene.meshes.iter().map(MeshFacts::of).collect();
+        let meshes: Vec<MeshFacts> = scene.meshes.iter().map(MeshFacts::of).collect();
+        let coarse = match rules.retry {
+            true => CoarseTree::new(scene, &meshes, margin),
+            false => CoarseTree::default(),
+        };
         let Bounds3 { min, max } = scene.bounds;
         let bounds = Bounds3 { min: min - margin, max: max + margin };
         let committed = builder.commit()?;
@@ -215,12 +217,17 @@ impl<'s> EmbreeIntersector<'s> {
     /// meets a front first, and once it went in, in glass say, a back of the same mesh.
     fn is_doubtful(&self, ray: &Ray, hit: &PacketHit) -> bool {
         let left = ray.exclude.geom_id;
+        let back = self.is_back(ray, hit);
+        // The front of another mesh is right wherever the ray runs; so the triangle that it leaves is
+        // mostly not looked at.
+        if !back && hit.prim.geom_id != left {
+            return false;
+        }
         let inside = self.scene.meshes.get(left as usize).is_some_and(|mesh| {
             let [a, b, c] = mesh.corners(ray.exclude.prim_id as usize);
             (b - a).cross(c - a).dot(ray.dir) * self.meshes[left as usize].sense < 0.0
         });
-        let back = self.is_back(ray, hit);
-        if inside { !back && hit.prim.geom_id == left } else { back }
+        inside != back
     }
 
     /// The first true hit of `ray`, turned by a second try or not.
