@@ -20,7 +20,6 @@ mod recheck;
 use super::coarse::{Bundle, CoarseTree};
 use super::coincident;
 use super::facts::MeshFacts;
-use super::triangle;
 use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
     BuildOptions, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder, SphereData,
@@ -37,7 +36,7 @@ const NEAR: f64 = 4.0;
 /// Phantoms that one ray may pass.
 const MOST_PHANTOMS: usize = 4096;
 /// Rays that go through the steps together: a block of the renderer's.
-const BLOCK: usize = triangle::MOST;
+const BLOCK: usize = 64;
 /// A fault that no build has but one by which `./x faults` shows that `tweenray verify` sees it: no
 /// second try.
 const PLANTED_NO_RETRY: bool = cfg!(feature = "planted-no-retry");
