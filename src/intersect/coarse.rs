@@ -260,3 +260,6 @@ impl Bundle {
         near <= far
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -46,7 +46,7 @@ fn edges(n: DVec3, from: [f64x4; 3], to: [f64x4; 3]) -> f64 {
     (a + b) + (c + d)
 }
 
-/// The angles in 0..=π whose tangents are `sin / cos`, `sin` not negative: to 2e-16 relative (Moshier,
+/// The angles in 0..=π whose tangents are `sin / cos`, `sin` not negative: to 5e-16 relative (Moshier,
 /// Cephes 2.2, 1992). Four at once, from operations that are the same on every machine.
 fn angle(sin: f64x4, cos: f64x4) -> f64x4 {
     /// Tangent of 3π/8.
@@ -198,7 +198,7 @@ mod tests {
             let (sin, cos) = (length * exact.sin(), length * exact.cos());
             let expected = libm::atan2(sin.abs(), cos);
             let [got, ..] = angle(sin.abs().into(), cos.into()).to_array();
-            assert!((got - expected).abs() <= 4e-16 * expected, "{got} against {expected}");
+            assert!((got - expected).abs() <= 6e-16 * expected, "{got} against {expected}");
         }
     }
 
