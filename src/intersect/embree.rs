@@ -6,8 +6,9 @@
 //! * A hit's `t, u, v` are recomputed in f64; one that lies beside its triangle is a phantom, and
 //!   the ray goes on past it.
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
-//! * A ray that misses although it comes near some triangle is tried again, turned by 4 ulp to one
-//!   side and then to the other; and so is one that must have missed something before its hit.
+//! * A ray that misses although it comes near some triangle (other than the backs of a closed mesh
+//!   that it leaves) is tried again, turned by 4 ulp to one side and then to the other; and so is one
+//!   that must have missed something before its hit.
 //!
 //! Shadow rays report no primitive: of these, only validation and coincidence reach them.
 //!
