@@ -6,8 +6,9 @@
 //! * A hit's `t, u, v` are recomputed in f64; one that lies beside its triangle is a phantom, and
 //!   the ray goes on past it.
 //! * Of coincident primitives the lowest `(geom_id, prim_id)` is hit.
-//! * A ray that misses although it comes near some triangle is tried again, turned by 4 ulp to one
-//!   side and then to the other; and so is one that must have missed something before its hit.
+//! * A ray that misses although it comes near some triangle (other than the backs of a closed mesh
+//!   that it leaves) is tried again, turned by 4 ulp to one side and then to the other; and so is one
+//!   that must have missed something before its hit.
 //!
 //! Shadow rays report no primitive: of these, only validation and coincidence reach them.
 //!
@@ -20,7 +21,6 @@ mod recheck;
 use super::coarse::{Bundle, CoarseTree};
 use super::coincident;
 use super::facts::MeshFacts;
-use super::triangle;
 use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
     BuildOptions, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder, SphereData,
@@ -37,7 +37,7 @@ const NEAR: f64 = 4.0;
 /// Phantoms that one ray may pass.
 const MOST_PHANTOMS: usize = 4096;
 /// Rays that go through the steps together: a block of the renderer's.
-const BLOCK: usize = triangle::MOST;
+const BLOCK: usize = 64;
 /// A fault that no build has but one by which `./x faults` shows that `tweenray verify` sees it: no
 /// second try.
 const PLANTED_NO_RETRY: bool = cfg!(feature = "planted-no-retry");
@@ -129,9 +129,11 @@ impl<'s> EmbreeIntersector<'s> {
             spheres.map(|s| SphereData { centre: s.centre.to_array(), radius: s.radius }).collect();
         builder.add_spheres(spheres, copies_in(scene.sphere_geom_id()))?;
         let margin = rounding_margin(&scene.bounds);
-        let coarse =
-            if rules.retry { CoarseTree::new(scene, margin) } else { CoarseTree::default() };
-        let meshes = scene.meshes.iter().map(MeshFacts::of).collect();
+        let meshes: Vec<MeshFacts> = scene.meshes.iter().map(MeshFacts::of).collect();
+        let coarse = match rules.retry {
+            true => CoarseTree::new(scene, &meshes, margin),
+            false => CoarseTree::default(),
+        };
         let Bounds3 { min, max } = scene.bounds;
         let bounds = Bounds3 { min: min - margin, max: max + margin };
         let committed = builder.commit()?;
@@ -215,12 +217,17 @@ impl<'s> EmbreeIntersector<'s> {
     /// meets a front first, and once it went in, in glass say, a back of the same mesh.
     fn is_doubtful(&self, ray: &Ray, hit: &PacketHit) -> bool {
         let left = ray.exclude.geom_id;
+        let back = self.is_back(ray, hit);
+        // The front of another mesh is right wherever the ray runs; so the triangle that it leaves is
+        // mostly not looked at.
+        if !back && hit.prim.geom_id != left {
+            return false;
+        }
         let inside = self.scene.meshes.get(left as usize).is_some_and(|mesh| {
             let [a, b, c] = mesh.corners(ray.exclude.prim_id as usize);
             (b - a).cross(c - a).dot(ray.dir) * self.meshes[left as usize].sense < 0.0
         });
-        let back = self.is_back(ray, hit);
-        if inside { !back && hit.prim.geom_id == left } else { back }
+        inside != back
     }
 
     /// The first true hit of `ray`, turned by a second try or not.

@@ -17,6 +17,8 @@ pub(super) struct MeshFacts {
     /// 1 where counter-clockwise sides face outwards, -1 for a closed mesh wound inwards. An open
     /// mesh counts as wound outwards.
     pub sense: f64,
+    /// Whether it has an inside, as far as its area vectors tell.
+    pub closed: bool,
 }
 
 /// Sums over triangles.
@@ -57,6 +59,7 @@ impl MeshFacts {
         Self {
             longest_edge: sums.longest2.sqrt() * (1.0 + f64::from(f32::EPSILON)),
             sense: if inwards { -1.0 } else { 1.0 },
+            closed,
         }
     }
 }

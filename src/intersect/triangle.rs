@@ -83,23 +83,15 @@ fn meet(org: [f64; 3], dir: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> 
     [dot(e2, q) * inv, dot(s, p) * inv, dot(dir, q) * inv]
 }
 
-/// Most pairs of a [`Pairs`].
-pub(super) const MOST: usize = 64;
 /// Pairs that are computed together: two SSE2 registers, one of AVX.
-const STEP: usize = 4;
+pub(super) const STEP: usize = 4;
 
-/// Rays, each with one triangle, in groups of [`STEP`]: filled once and computed together.
-pub(super) struct Pairs {
-    count: usize,
-    groups: [Group; MOST / STEP],
-}
-
-/// One component of the pairs of a group.
+/// One component of some pairs.
 type Lane = [f64; STEP];
 
-/// Structure of arrays.
-#[derive(Clone, Copy)]
-struct Group {
+/// A few rays, each with one triangle, computed together: structure of arrays.
+pub(super) struct Pairs {
+    count: usize,
     /// Origin, direction, corners.
     inputs: [[Lane; 3]; 5],
     /// `t`, `u`, `v`.
@@ -108,16 +100,15 @@ struct Group {
 
 impl Pairs {
     pub fn new() -> Self {
-        let group = Group { inputs: [[[0.0; STEP]; 3]; 5], outputs: [[0.0; STEP]; 3] };
-        Self { count: 0, groups: [group; MOST / STEP] }
+        Self { count: 0, inputs: [[[0.0; STEP]; 3]; 5], outputs: [[0.0; STEP]; 3] }
     }
 
-    /// Adds a pair; there is room for [`MOST`].
+    /// Adds a pair; there is room for [`STEP`].
     #[inline(always)]
     pub fn push(&mut self, ray: &Ray, corners: &[DVec3; 3]) {
-        let (group, k) = (&mut self.groups[self.count / STEP], self.count % STEP);
+        let k = self.count;
         let [a, b, c] = corners;
-        for (slot, value) in group.inputs.iter_mut().zip([&ray.org, &ray.dir, a, b, c]) {
+        for (slot, value) in self.inputs.iter_mut().zip([&ray.org, &ray.dir, a, b, c]) {
             slot[0][k] = value.x;
             slot[1][k] = value.y;
             slot[2][k] = value.z;
@@ -126,22 +117,21 @@ impl Pairs {
     }
 
     /// Computes all pairs.
+    #[inline(always)]
     pub fn compute(&mut self) {
-        for group in &mut self.groups[..self.count.div_ceil(STEP)] {
-            let mut out = [[0.0; STEP]; 3];
-            for k in 0..STEP {
-                let [org, dir, a, b, c] = group.inputs.map(|value| value.map(|axis| axis[k]));
-                let [t, u, v] = meet(org, dir, a, b, c);
-                (out[0][k], out[1][k], out[2][k]) = (t, u, v);
-            }
-            group.outputs = out;
+        let mut out = [[0.0; STEP]; 3];
+        for k in 0..STEP {
+            let [org, dir, a, b, c] = self.inputs.map(|value| value.map(|axis| axis[k]));
+            let [t, u, v] = meet(org, dir, a, b, c);
+            (out[0][k], out[1][k], out[2][k]) = (t, u, v);
         }
+        self.outputs = out;
     }
 
     /// Pair `k`'s plane point; weights that are not finite where there is none.
     #[inline(always)]
     pub fn get(&self, k: usize) -> PlaneHit {
-        let [t, u, v] = self.groups[k / STEP].outputs.map(|lane| lane[k % STEP]);
+        let [t, u, v] = self.outputs.map(|lane| lane[k]);
         PlaneHit { t, u, v }
     }
 }
@@ -195,17 +185,19 @@ mod tests {
 
     #[test]
     fn many_give_the_bits_of_one() {
-        let mut pairs = Pairs::new();
-        let rays: Vec<Ray> = (0..MOST)
+        let rays: Vec<Ray> = (0..64)
             .map(|k| {
-                let k = k as f64;
+                let k = f64::from(k);
                 Ray::new(DVec3::new(0.01 * k, 0.3, 2.0), DVec3::new(0.003 * k, 0.1, -1.0))
             })
             .collect();
-        rays.iter().for_each(|ray| pairs.push(ray, &UNIT));
-        pairs.compute();
-        for (k, ray) in rays.iter().enumerate() {
-            assert_eq!(meet_plane(ray, &UNIT), Some(pairs.get(k)), "{k}");
+        for rays in rays.chunks(STEP) {
+            let mut pairs = Pairs::new();
+            rays.iter().for_each(|ray| pairs.push(ray, &UNIT));
+            pairs.compute();
+            for (k, ray) in rays.iter().enumerate() {
+                assert_eq!(meet_plane(ray, &UNIT), Some(pairs.get(k)), "{k}");
+            }
         }
     }
 }

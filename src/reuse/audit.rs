@@ -79,22 +79,29 @@ impl Shown<'_> {
     pub fn foretold(&self) -> Vec<f32> {
         let width = self.width as usize;
         let mut all = vec![0.0; self.rgb.len()];
-        all.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-            for (x, out) in row.iter_mut().enumerate() {
+        let start = || vec![0.0; width + 2];
+        all.par_chunks_mut(width).enumerate().for_each_init(start, |near, (y, row)| {
+            self.note_risks(y, &mut near[1..=width]);
+            for (x, (out, near)) in row.iter_mut().zip(near.windows(3)).enumerate() {
                 let i = y * width + x;
-                *out = if self.is_lit(i) { self.variance(i, self.risk_near(x, y)) } else { -1.0 };
+                let risk = near[0].max(near[1]).max(near[2]);
+                *out = if self.is_lit(i) { self.variance(i, risk) } else { -1.0 };
             }
         });
         all
     }
 
-    /// The greatest risk of a pixel and its eight neighbours: a penumbra's rim shows no doubt.
-    fn risk_near(&self, x: usize, y: usize) -> f32 {
+    /// The greatest risk in row `y` and those beside it, column by column. With the columns beside it
+    /// that is a pixel's own, since a penumbra's rim shows no doubt.
+    fn note_risks(&self, y: usize, most: &mut [f32]) {
+        most.fill(0.0);
         let width = self.width as usize;
         let rows = y.saturating_sub(1)..(y + 2).min(self.sources.len() / width);
-        let columns = x.saturating_sub(1)..(x + 2).min(width);
-        let of_row = |row: usize| &self.sources[row * width..][columns.clone()];
-        rows.flat_map(of_row).map(|s| s.risk).filter(|r| r.is_finite()).fold(0.0, f32::max)
+        for row in rows {
+            for (most, source) in most.iter_mut().zip(&self.sources[row * width..]) {
+                *most = if source.risk.is_finite() { most.max(source.risk) } else { *most };
+            }
+        }
     }
 
     /// What radiance off by `risk` does to the shown value. A square root stands in for the

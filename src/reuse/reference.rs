@@ -102,6 +102,11 @@ impl Known {
     }
 }
 
+/// `x` as it is: the crate's own way looks at what kind of NaN it may be.
+fn widened(x: bf16) -> f32 {
+    f32::from_bits(u32::from(x.to_bits()) << 16)
+}
+
 /// A camera, made ready to see many points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
@@ -244,8 +249,8 @@ impl Reference {
         for (k, sample) in samples.iter().enumerate() {
             let own = self.known_by(*sample, channel);
             ratio[k] = own.ratio;
-            slope[k] = own.slope.to_f32();
-            bend[k] = own.bend.to_f32();
+            slope[k] = widened(own.slope);
+            bend[k] = widened(own.bend);
         }
         Known4 { ratio: ratio.into(), slope: slope.into(), bend: bend.into() }
     }

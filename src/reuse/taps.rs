@@ -235,6 +235,9 @@ impl Lookup<'_> {
     pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
         found.iter().flatten().for_each(|four| taps.push(four));
+        if taps.weight >= self.evidence.enough_weight {
+            return;
+        }
         let place = Place::of(point);
         for (number, reference) in self.references.iter().enumerate().skip(ALWAYS) {
             if taps.weight >= self.evidence.enough_weight {

@@ -114,7 +114,9 @@ impl Inferrer<'_> {
         let trace = |stream: u32| {
             self.renderer.render_scattered(camera, frame | stream, &places, self.stop)
         };
-        let ((a, mut rays), (b, more)) = (trace(streams[0])?, trace(streams[1])?);
+        // At once: few pixels would not keep all threads busy.
+        let (a, b) = rayon::join(|| trace(streams[0]), || trace(streams[1]));
+        let ((a, mut rays), (b, more)) = (a?, b?);
         rays += more;
         Some(([a, b], rays))
     }

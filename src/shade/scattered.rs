@@ -1,8 +1,8 @@
-//! A few pixels of a frame, wherever they lie: 64 of them make a block, so that they cost no more
-//! than as many neighbours do, and no film is made for them.
+//! A few pixels of a frame, wherever they lie: eight of them make a block, which fills packets and leaves
+//! enough blocks for all threads; no film is made for them.
 
 use super::kernel::Scratch;
-use super::pixels::{BLOCK, BlockPixels};
+use super::pixels::BlockPixels;
 use super::{Left, Renderer};
 use crate::math::Rgb;
 use crate::scene::Camera;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pixels traced together.
-const TOGETHER: usize = (BLOCK * BLOCK) as usize;
+const TOGETHER: usize = 8;
 
 impl Renderer<'_> {
     /// Traces the pixels at `places` (column, row) of the frame seen by `camera` (world space), with

@@ -1,7 +1,7 @@
 //! A block of rays: through Embree in packets, the further tries and the recheck, each step on arrays.
 
 use super::super::coarse::Bundle;
-use super::super::triangle::Pairs;
+use super::super::triangle::{Pairs, STEP};
 use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn};
 use crate::embree::{Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
@@ -73,12 +73,7 @@ impl EmbreeIntersector<'_> {
     }
 
     /// Sends the `valid` lanes through Embree in packets; returns those that hit.
-    fn trace<const W: usize>(
-        &self,
-        rays: &[Ray],
-        valid: Lanes,
-        found: &mut [PacketHit; BLOCK],
-    ) -> Lanes {
+    fn trace<const W: usize>(&self, rays: &[Ray], valid: Lanes, found: &mut [PacketHit]) -> Lanes {
         let mut packet = Packet::<W>::new();
         let mut hit = 0;
         for (k, rays) in rays.chunks(W).enumerate() {
@@ -155,24 +150,27 @@ impl EmbreeIntersector<'_> {
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
     ) -> Lanes {
-        let tried = doubtful.count_ones();
-        if tried == 0 {
-            return 0;
-        }
-        counts.retry += u64::from(tried);
-        let mut again = [rays[0]; BLOCK];
-        for (k, lane) in each(doubtful).enumerate() {
-            again[k] = self.nudged(&rays[lane], shifts[lane], turn);
-        }
-        let mut found_again = [NOTHING; BLOCK];
-        let all = Lanes::MAX >> (BLOCK as u32 - tried);
-        let hit_again = self.trace::<W>(&again[..tried as usize], all, &mut found_again);
+        counts.retry += u64::from(doubtful.count_ones());
         let mut hit = 0;
-        for (k, lane) in each(doubtful).enumerate() {
-            let is_hit = hit_again >> k & 1 == 1;
-            if is_hit && is_well_before(&rays[lane], found_again[k].t, found[lane].t) {
-                found[lane] = found_again[k];
-                hit |= 1 << lane;
+        let mut left = doubtful;
+        // Few are, mostly: arrays for all of a block would be dear to make.
+        while left != 0 {
+            let mut lanes = [0; PART];
+            let mut again = [rays[0]; PART];
+            let mut tried = 0;
+            for (k, lane) in each(left).take(PART).enumerate() {
+                (lanes[k], again[k]) = (lane, self.nudged(&rays[lane], shifts[lane], turn));
+                left &= !(1 << lane);
+                tried = k + 1;
+            }
+            let mut found_again = [NOTHING; PART];
+            let hit_again = self.trace::<W>(&again[..tried], Lanes::MAX, &mut found_again);
+            for (k, lane) in lanes[..tried].iter().enumerate() {
+                let is_hit = hit_again >> k & 1 == 1;
+                if is_hit && is_well_before(&rays[*lane], found_again[k].t, found[*lane].t) {
+                    found[*lane] = found_again[k];
+                    hit |= 1 << *lane;
+                }
             }
         }
         hit
@@ -202,7 +200,6 @@ impl EmbreeIntersector<'_> {
     /// be a phantom.
     fn recheck_block(&self, block: &Block, hit: Lanes, hits: &mut [Option<Hit>]) -> Lanes {
         let Block { rays, cast, shifts, found } = *block;
-        let mut pairs = Pairs::new();
         let mut lanes = [0u8; BLOCK];
         let mut corners = [[0u32; 3]; BLOCK];
         let mut wanted = 0;
@@ -223,21 +220,23 @@ impl EmbreeIntersector<'_> {
                 }
             }
         }
-        for (lane, corners) in lanes[..wanted].iter().zip(&corners) {
-            let lane = *lane as usize;
-            let mesh = &self.scene.meshes[found[lane].prim.geom_id as usize];
-            pairs.push(&rays[lane], &corners.map(|i| mesh.positions[i as usize].as_dvec3()));
-        }
-        pairs.compute();
-        for (k, lane) in lanes[..wanted].iter().map(|lane| *lane as usize).enumerate() {
-            let met = pairs.get(k);
-            let (ray, prim) = (&rays[lane], found[lane].prim);
-            if met.is_inside() && (ray.tnear..=ray.tfar).contains(&met.t) {
-                hits[lane] = Some(Hit { t: met.t, u: met.u, v: met.v, prim, rough: false });
-            } else {
-                hits[lane] =
-                    self.recheck(ray, &Candidate { hit: found[lane], shift: shifts[lane] });
-                open |= Lanes::from(hits[lane].is_none()) << lane;
+        for (lanes, corners) in lanes[..wanted].chunks(STEP).zip(corners.chunks(STEP)) {
+            let mut pairs = Pairs::new();
+            for (lane, corners) in lanes.iter().map(|lane| *lane as usize).zip(corners) {
+                let mesh = &self.scene.meshes[found[lane].prim.geom_id as usize];
+                pairs.push(&rays[lane], &corners.map(|i| mesh.positions[i as usize].as_dvec3()));
+            }
+            pairs.compute();
+            for (k, lane) in lanes.iter().map(|lane| *lane as usize).enumerate() {
+                let met = pairs.get(k);
+                let (ray, prim) = (&rays[lane], found[lane].prim);
+                if met.is_inside() && (ray.tnear..=ray.tfar).contains(&met.t) {
+                    hits[lane] = Some(Hit { t: met.t, u: met.u, v: met.v, prim, rough: false });
+                } else {
+                    hits[lane] =
+                        self.recheck(ray, &Candidate { hit: found[lane], shift: shifts[lane] });
+                    open |= Lanes::from(hits[lane].is_none()) << lane;
+                }
             }
         }
         open
