@@ -28,6 +28,18 @@ fn send(signal: &str, child: &Child) {
     assert!(Command::new("sh").args(["-c", &line]).status().expect("a shell").success());
 }
 
+/// Waits until the program listens for SIGTERM.
+fn wait_for_ears(child: &Child) {
+    let listens = || {
+        let text = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("a process");
+        let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a mask");
+        u64::from_str_radix(mask.trim(), 16).expect("a number") & (1 << (15 - 1)) != 0
+    };
+    while !listens() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 fn rest(mut err: BufReader<std::process::ChildStderr>) -> String {
     let mut text = String::new();
     std::io::Read::read_to_string(&mut err, &mut text).expect("text");
@@ -45,12 +57,11 @@ fn assert_same_frames(job: &Job, a: &str, b: &str) {
 #[test]
 fn a_signal_while_the_scene_is_read_says_to_give_the_same_command_again() {
     let job = Job::new();
-    // Whoever opens it waits for somebody to write.
-    let made = Command::new("mkfifo").arg(job.path("slow.obj")).status();
-    assert!(made.expect("mkfifo").success());
-    let line = "render slow.obj --no-video --overwrite -o o/f_##.png";
+    let text = "mesh = [{ terrain = { vertices = 1500, size = 12 } }]\n";
+    fs::write(job.path("large.toml"), text).expect("written");
+    let line = "render large.toml --threads 1 --no-video --overwrite -o o/f_##.png";
     let child = job.command(line).stderr(Stdio::piped()).spawn().expect("it starts");
-    std::thread::sleep(Duration::from_millis(500));
+    wait_for_ears(&child);
     send("TERM", &child);
     let ran = Ran::of(&child.wait_with_output().expect("it ends"));
     assert_eq!(ran.code, Some(75), "{}", ran.err);
