@@ -205,6 +205,7 @@ fn is_made_of(row: &Row, recipe: Option<&Recipe>) -> bool {
 }
 
 /// How a frame stands on disk.
+#[allow(clippy::large_enum_variant, reason = "most are the large one")]
 enum State {
     Whole(BadSamples, Option<AuditSums>),
     Missing,
