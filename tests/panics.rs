@@ -1,6 +1,6 @@
-//! A rank that panics, or fails alone, ends the whole job, with its words. Nothing in the program is known to panic, so
-//! this starts itself under mpirun, with a maker of frames that does: on the thread that renders, on one
-//! that it traces with, or on the main one.
+//! A rank that panics, or fails alone, ends the whole job, and rank 0 says why, once. Nothing in the program
+//! is known to panic, so this starts itself under mpirun, with a maker of frames that does: on the
+//! thread that renders, on one that it traces with, or on the main one.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(not(feature = "mpi"), allow(dead_code, unused_imports))]
 
@@ -25,7 +25,8 @@ const AS_RANK: &str = "--as-rank";
 const FRAMES: u32 = 60;
 const SETTINGS: (u32, u32) = (8, 8);
 
-/// Makes black frames of a tenth of a second; from frame 20 on it panics where it is told to.
+/// Makes black frames of a tenth of a second; from frame 20 on, which are rank 1's, it fails where it is
+/// told to.
 struct Lemon {
     place: String,
 }
@@ -37,6 +38,8 @@ impl FrameMaker for Lemon {
         match &*self.place {
             "rendering" if is_due => panic!("the rendering thread met a lemon"),
             "pool" if is_due => rayon::join(|| (), || panic!("the pool met a lemon")),
+            "error" if is_due => return Err(Error::Failed("a frame met a lemon".into())),
+            "everywhere" => return Err(Error::Failed("all met a lemon".into())),
             _ => ((), ()),
         };
         Ok(Some(Made {
@@ -66,9 +69,9 @@ fn target(folder: &Path) -> Target {
 
 /// One rank of a job that will not end well.
 fn be_a_rank(place: &str, folder: &Path) {
-    let world = World::join().expect("a job");
-    if place == "agreeing" {
-        return fail_while_others_are_busy(&world);
+    let world = World::join(say).expect("a job");
+    if let Some(busy) = place.strip_prefix("agreeing while rank ") {
+        return fail_while_another_is_busy(&world, busy.parse().expect("a rank"));
     }
     let target = target(folder);
     let frames = FrameRange { first: 1, last: FRAMES };
@@ -77,28 +80,34 @@ fn be_a_rank(place: &str, folder: &Path) {
     let maker = Lemon { place: place.into() };
     let stop = AtomicBool::new(false);
     let done = |_: &_| assert!(place != "main", "the main thread met a lemon");
-    let outcome = cluster::render(&world, &order, &target, &plan, &maker, &stop, &done);
-    assert!(outcome.is_ok_and(|outcome| outcome.unfinished == 0));
+    match cluster::render(&world, &order, &target, &plan, &maker, &stop, &done) {
+        Ok(outcome) => assert_eq!(outcome.unfinished, 0),
+        Err(error) => world.fail(&error),
+    }
 }
 
-/// Rank 1 fails, and the others do not come to hear of it.
-fn fail_while_others_are_busy(world: &World) {
+fn say(error: &Error) -> u8 {
+    eprintln!("rank {} says: {error}", std::env::var("OMPI_COMM_WORLD_RANK").expect("a number"));
+    7
+}
+
+/// Rank 1 fails, and not all others come to hear of it.
+fn fail_while_another_is_busy(world: &World, busy: u32) {
     let outcome = match world.rank() {
-        1 => Err(Error::Failed("rank 1 met a lemon".into())),
-        _ => {
-            std::thread::sleep(Duration::from_secs(60));
+        1 => Err(Error::Failed("it met a lemon".into())),
+        rank => {
+            std::thread::sleep(Duration::from_secs(if rank == busy { 60 } else { 0 }));
             Ok(())
         }
     };
     if let Err(error) = world.agree(outcome) {
         assert!(world.is_stranded());
-        eprintln!("{error}");
-        world.abort(1);
+        world.fail(&error);
     }
 }
 
 /// Whether there is an mpirun to try it with.
-fn a_panic_ends_the_job(place: &str, says: &str) -> bool {
+fn a_failure_ends_the_job(place: &str, says: &str) -> bool {
     let folder = tempfile::tempdir().expect("a folder");
     let own = std::env::current_exe().expect("a path");
     let mut command = launcher::mpirun();
@@ -112,6 +121,7 @@ fn a_panic_ends_the_job(place: &str, says: &str) -> bool {
         says => {
             assert!(!output.status.success(), "{place}: the job ended as if it were done");
             assert!(words.contains(says), "{place}: {words}");
+            assert_eq!(words.matches("met a lemon").count(), 1, "{place}: {words}");
             // What was finished stays finished, and whole.
             let names = fs::read_dir(folder.path()).expect("a folder").flatten();
             let frames = names.filter(|n| n.file_name().to_string_lossy().ends_with(".png"));
@@ -138,13 +148,16 @@ fn main() {
         return;
     }
     for (place, says) in [
-        ("rendering", "the rendering thread met a lemon"),
-        ("pool", "the pool met a lemon"),
+        ("rendering", "rank 0 says: rank 1: this is a fault in tweenray"),
+        ("pool", "rank 0 says: rank 1: this is a fault in tweenray"),
+        ("error", "rank 0 says: rank 1: a frame met a lemon"),
+        ("everywhere", "rank 0 says: "),
         ("main", "the main thread met a lemon"),
-        ("agreeing", "rank 1 met a lemon"),
+        ("agreeing while rank 2", "rank 0 says: rank 1: it met a lemon"),
+        ("agreeing while rank 0", "rank 1 says: it met a lemon"),
         ("nowhere", ""),
     ] {
-        if !a_panic_ends_the_job(place, says) {
+        if !a_failure_ends_the_job(place, says) {
             println!("no mpirun: nothing to test");
             return;
         }

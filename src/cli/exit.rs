@@ -50,7 +50,9 @@ impl From<Exit> for ExitCode {
 pub fn as_input(error: Error) -> Error {
     match error {
         Error::Io { action, path, source } => {
-            Error::input(path, format!("cannot {action} it: {source}"))
+            // ("read", but "read the folder")
+            let it = if action.contains(' ') { "" } else { " it" };
+            Error::input(path, format!("cannot {action}{it}: {source}"))
         }
         other => other,
     }

@@ -76,7 +76,7 @@ const VERSION: &str = concat!(
 /// Runs the program with the process's arguments; the process ends with what this returns.
 pub fn run() -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
-        say::aside(format_args!("error: this is a fault in tweenray, please report it: {panic}"));
+        say::aside(format_args!("error: {}: {panic}", crate::cluster::FAULT));
     }));
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,

@@ -66,29 +66,40 @@ pub fn parse(scene: &str, words: &[String]) -> Result<RenderArgs> {
     })
 }
 
+/// How a job goes on of which no frame was begun: one that is to replace frames has to be told so again.
+const NOTHING_DONE: &str = " before the first frame; give the same command again";
+
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> Exit {
-    let world = match World::join() {
+    let world = match World::join(tell_failure) {
         Ok(world) => world,
         Err(error) => {
             say::error(&error);
             return Exit::of(&error);
         }
     };
-    render(&world, args).unwrap_or_else(|error| {
-        if world.is_root() || world.is_stranded() {
+    let exit = render(&world, args).unwrap_or_else(|error| {
+        if world.is_stranded() {
+            world.fail(&error);
+        } else if world.is_root() {
             say::error(&error);
         }
-        if world.is_stranded() {
-            world.abort(Exit::of(&error).code());
-        }
         Exit::of(&error)
-    })
+    });
+    // Rank 0 may make a video yet.
+    world.part();
+    exit
+}
+
+fn tell_failure(error: &Error) -> u8 {
+    say::error(error);
+    Exit::of(error).code()
 }
 
 fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
-    let interrupt = Interrupt::listen()?;
+    let interrupt = Interrupt::listen(world.is_root())?;
+    interrupt.goes_on(NOTHING_DONE.into());
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.output.time_limit);
     // Only one rank talks.
@@ -102,7 +113,10 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     tell(quiet, &request.warnings, |w| say::warning(w));
     share_isa(world, &mut request.settings, quiet)?;
     let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
-    let threads = request.threads.unwrap_or_else(cluster::default_threads);
+    let threads = match request.threads {
+        Some(threads) => threads,
+        None => world.default_threads()?,
+    };
     let pool = world.agree(thread_pool(threads))?;
     let loaded = Instant::now();
     let build = || intersect::build(&request.scene, &request.settings, threads);
@@ -115,7 +129,15 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let site = Site { world, intersector, pool, order, interrupt: &interrupt, clock, quiet };
     let base = request.settings.clone();
     let choosing = Choosing { args, base: &base, site: &site };
-    let mut choice = choosing.first(&request, &tracer)?;
+    let mut choice = match choosing.first(&request, &tracer) {
+        Err(Error::Stopped) => {
+            if world.is_root() {
+                interrupt.say_stopped();
+            }
+            return Ok(Exit::Stopped);
+        }
+        first => first?,
+    };
     let mut is_again = false;
     loop {
         if let Some(choice) = &choice {
@@ -198,12 +220,11 @@ fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {
 /// Says how to go on.
 fn say_stopped(job: &Frames, outcome: &Outcome, reason: &str) {
     let finished = job.total() - outcome.unfinished;
-    let again = if job.request.overwrite { " without --overwrite" } else { "" };
     say::aside(format_args!(
-        "stopped{reason}: {finished} of {} frames are finished in {}; the same command{again} goes on \
-         from here",
+        "stopped{reason}: {finished} of {} frames are finished in {}{}",
         job.total(),
-        job.target.pattern
+        job.target.pattern,
+        job.goes_on()
     ));
 }
 

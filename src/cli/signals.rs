@@ -8,12 +8,19 @@ use crate::error::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// How long before the end of its Slurm allocation a job stops: it takes at most ten seconds, and the
 /// clocks of two machines differ.
 const BEFORE_SLURM_ENDS: Duration = Duration::from_secs(30);
+
+/// How long a rank leaves it to rank 0 to end the job where nobody watches: a batch system signals to all of
+/// them, and one line is enough.
+const AFTER_RANK_0: Duration = Duration::from_secs(3);
+
+/// How to go on, unless told otherwise.
+const GOES_ON: &str = "; the same command goes on from here";
 
 /// What signals and limits have asked for.
 #[derive(Debug, Clone)]
@@ -21,19 +28,25 @@ pub struct Interrupt {
     /// Set by the first signal or limit.
     pub stop: Arc<AtomicBool>,
     /// Whether somebody watches `stop`, so that work in hand can be finished cleanly. While
-    /// nobody does (loading, building), nothing is at risk and the first signal ends the program.
+    /// nobody does (loading, building, making the video), nothing is at risk and the first signal
+    /// ends the program.
     watched: Arc<AtomicBool>,
+    is_root: bool,
+    /// How to go on, to follow the reason.
+    how: Arc<Mutex<String>>,
     /// Whether a person, or a system that waits no longer, has asked.
     asked: Arc<AtomicBool>,
     reason: Arc<OnceLock<String>>,
 }
 
 impl Interrupt {
-    /// Starts to listen.
-    pub fn listen() -> Result<Self> {
+    /// Starts to listen, on rank 0 or another.
+    pub fn listen(is_root: bool) -> Result<Self> {
         let interrupt = Self {
             stop: Arc::default(),
             watched: Arc::default(),
+            is_root,
+            how: Arc::new(Mutex::new(GOES_ON.into())),
             asked: Arc::default(),
             reason: Arc::default(),
         };
@@ -65,6 +78,17 @@ impl Interrupt {
         self.reason.get().cloned().unwrap_or_default()
     }
 
+    /// Whoever ends the program from now on says `how` to go on.
+    pub fn goes_on(&self, how: String) {
+        *self.how.lock().unwrap_or_else(PoisonError::into_inner) = how;
+    }
+
+    /// Says that the job was stopped, outside of its frames, and how to go on.
+    pub fn say_stopped(&self) {
+        let how = self.how.lock().unwrap_or_else(PoisonError::into_inner);
+        say::aside(format_args!("stopped{}{how}", self.reason()));
+    }
+
     /// Runs `work`, which watches `stop`.
     pub fn watched<T>(&self, work: impl FnOnce() -> T) -> T {
         self.watched.store(true, Ordering::SeqCst);
@@ -94,8 +118,13 @@ impl Interrupt {
         let _ = self.reason.set(reason);
         self.stop.store(true, Ordering::SeqCst);
         if !self.watched.load(Ordering::SeqCst) {
-            let reason = self.reason();
-            say::aside(format_args!("stopped{reason}; the same command goes on from here"));
+            if !self.is_root {
+                std::thread::sleep(AFTER_RANK_0);
+                if self.watched.load(Ordering::SeqCst) {
+                    return;
+                }
+            }
+            self.say_stopped();
             std::process::exit(Exit::Stopped.code().into());
         }
     }

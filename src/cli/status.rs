@@ -77,7 +77,10 @@ fn manifests(sequence: &str) -> Result<Vec<PathBuf>> {
 }
 
 fn of_pattern(sequence: &str) -> Result<PathBuf> {
-    let pattern = FramePattern::parse(sequence, 1)?;
+    let pattern = FramePattern::parse(sequence, 1).map_err(|why| match sequence.contains('#') {
+        true => why,
+        false => Error::Usage(format!("there is no folder {sequence}")),
+    })?;
     let path = manifest_path(&pattern);
     let none = || {
         let path = path.display();

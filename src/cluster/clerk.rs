@@ -111,6 +111,7 @@ impl<'a> Clerk<'a> {
 
     /// Takes in what other ranks sent.
     pub fn hear(&mut self) -> Result<()> {
+        self.world.heed_failures();
         let notes: Vec<(u32, Note)> = self.world.notes()?;
         let is_news = !notes.is_empty();
         for (from, note) in notes {

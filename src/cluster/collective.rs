@@ -2,13 +2,14 @@
 //! one of them read.
 
 use super::World;
+use super::failure::Verdict;
 use super::post::{decode, encode};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// How long a rank that failed waits for the others to hear of it.
-const PATIENCE: Duration = Duration::from_secs(2);
+const PATIENCE: Duration = Duration::from_millis(1500);
 
 impl World {
     /// `outcome`, if no rank failed; else the error of the lowest rank that did, on every rank.
@@ -74,7 +75,7 @@ impl World {
         }
     }
 
-    /// Whether this rank failed and the others do not know: only [`abort`](Self::abort) is left.
+    /// Whether this rank failed and the others do not know: only [`fail`](Self::fail) is left.
     pub fn is_stranded(&self) -> bool {
         self.is_stranded.get()
     }
@@ -112,35 +113,6 @@ impl World {
         let all = self.broadcast(wire(postcard::to_stdvec(&gathered))?);
         let all: Vec<Vec<u8>> = wire(postcard::from_bytes(&all))?;
         all.iter().map(|bytes| wire(postcard::from_bytes(bytes))).collect()
-    }
-}
-
-/// An error as other ranks hear of it.
-#[derive(Serialize, Deserialize)]
-enum Verdict {
-    Input(String),
-    Usage(String),
-    Stopped,
-    Failed(String),
-}
-
-impl Verdict {
-    fn of(error: &Error) -> Self {
-        match error {
-            Error::Input(fault) => Self::Input(fault.to_string()),
-            Error::Usage(text) => Self::Usage(text.clone()),
-            Error::Stopped => Self::Stopped,
-            other => Self::Failed(other.to_string()),
-        }
-    }
-
-    fn into_error(self, rank: usize) -> Error {
-        match self {
-            // Kept apart from `Failed` for the exit code; the text already holds the place.
-            Self::Input(text) | Self::Usage(text) => Error::Usage(text),
-            Self::Stopped => Error::Stopped,
-            Self::Failed(text) => Error::Failed(format!("rank {rank}: {text}")),
-        }
     }
 }
 

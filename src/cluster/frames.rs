@@ -74,7 +74,7 @@ fn own_part(frames: FrameRange, rank: u32, ranks: u32) -> Range<u32> {
 /// flight. All ranks call it.
 ///
 /// # Errors
-/// This rank's own; other ranks may still be at work, and [`World::abort`] ends them.
+/// This rank's own; other ranks may still be at work, and [`World::fail`] ends them.
 pub fn render(
     world: &World,
     order: &[u32],

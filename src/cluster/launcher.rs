@@ -1,6 +1,7 @@
 //! Whether a launcher (mpirun, srun) started this process, and what its environment says.
 
-use crate::error::Error;
+use super::World;
+use crate::error::{Error, Result};
 
 /// What is known of the launcher before MPI is asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,25 +33,30 @@ pub fn detect(env: impl Fn(&str) -> Option<String>) -> Option<Launcher> {
     env("PMIX_RANK").map(|_| Launcher { name: "a PMIx launcher".into(), ranks: None })
 }
 
-/// How many threads a rank uses unless told: the cores that this process may use, shared with
-/// the other ranks of its node where the launcher bound nobody to cores of their own.
+/// How many threads a process uses unless told, with nobody to share with: the cores that it may use.
 pub fn default_threads() -> usize {
-    let allowed = std::thread::available_parallelism().map_or(1, usize::from);
-    share_of_node(allowed, cores_online(), |name| std::env::var(name).ok())
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-fn share_of_node(allowed: usize, online: usize, env: impl Fn(&str) -> Option<String>) -> usize {
-    let local = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"];
-    let neighbours = local.iter().find_map(|name| env(name)?.trim().parse::<usize>().ok());
-    match neighbours {
-        Some(ranks) if allowed >= online => (allowed / ranks.max(1)).max(1),
-        _ => allowed,
+impl World {
+    /// How many threads this rank uses unless told: the cores that the launcher gave it, shared with
+    /// those ranks of its node that got the very same ones. All ranks call it.
+    ///
+    /// # Errors
+    /// Those of talking to other ranks.
+    pub fn default_threads(&self) -> Result<usize> {
+        let own = (self.nodes()?[self.rank() as usize], allowed_cores());
+        let all = self.all(own.clone())?;
+        let sharers = all.iter().filter(|other| **other == own).count();
+        Ok((default_threads() / sharers.max(1)).max(1))
     }
 }
 
-fn cores_online() -> usize {
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    text.lines().filter(|line| line.starts_with("processor")).count().max(1)
+/// The cores that this process may use, as the system lists them; empty where it does not tell.
+fn allowed_cores() -> String {
+    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+    line.unwrap_or_default().trim().into()
 }
 
 impl Launcher {
@@ -103,14 +109,5 @@ mod tests {
         assert_eq!(name(&pmi2), "srun --mpi=pmi2");
         assert_eq!(name(&[("PMI_SIZE", "8"), ("SLURM_STEP_NUM_TASKS", "2")])[..7], *"mpiexec");
         assert!(detect(env(&[("PMIX_RANK", "0")])).is_some_and(|l| l.ranks.is_none()));
-    }
-
-    #[test]
-    fn unbound_ranks_share_the_cores_and_bound_ranks_keep_theirs() {
-        let two = [("OMPI_COMM_WORLD_LOCAL_SIZE", "2")];
-        assert_eq!(share_of_node(8, 8, env(&two)), 4);
-        assert_eq!(share_of_node(4, 8, env(&two)), 4);
-        assert_eq!(share_of_node(8, 8, env(&[])), 8);
-        assert_eq!(share_of_node(1, 1, env(&two)), 1);
     }
 }

@@ -12,6 +12,7 @@
 mod board;
 mod clerk;
 mod collective;
+mod failure;
 mod frames;
 mod launcher;
 #[cfg(feature = "mpi")]
@@ -24,12 +25,13 @@ pub mod simulation;
 mod traffic;
 mod worker;
 
+pub use failure::FAULT;
 pub use frames::{Duty, Outcome, prepare, render};
 pub use launcher::default_threads;
 pub use nodes::rank_order;
 pub use traffic::{Sent, Traffic};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use launcher::Launcher;
 use std::cell::Cell;
 use std::time::Duration;
@@ -47,6 +49,9 @@ pub struct World {
     exchange: Cell<u64>,
     /// Whether this rank failed and could not tell the others.
     is_stranded: Cell<bool>,
+    /// Says why the job ends, and gives its exit code.
+    #[cfg_attr(not(feature = "mpi"), allow(dead_code))]
+    tell: fn(&Error) -> u8,
 }
 
 enum Ranks {
@@ -58,15 +63,16 @@ enum Ranks {
 impl World {
     /// A world of one process.
     pub fn solo() -> Self {
-        Self::of(Ranks::Solo)
+        Self::of(Ranks::Solo, |_| 1)
     }
 
-    fn of(ranks: Ranks) -> Self {
+    fn of(ranks: Ranks, tell: fn(&Error) -> u8) -> Self {
         Self {
             ranks,
             sent: Cell::default(),
             exchange: Cell::new(EXCHANGE),
             is_stranded: Cell::default(),
+            tell,
         }
     }
 
@@ -76,28 +82,30 @@ impl World {
         self.exchange.set(discoveries);
     }
 
-    /// Joins the ranks that a launcher started with this one; alone without a launcher.
+    /// Joins the ranks that a launcher started with this one; alone without a launcher. Where a rank
+    /// fails while others are busy, `tell` says why and gives the exit code: on rank 0 if that
+    /// hears of it in time, else on the rank that failed, and all end.
     ///
     /// Errors: several processes were started, but they cannot know of each other, so each would
     /// render everything.
-    pub fn join() -> Result<Self> {
+    pub fn join(tell: fn(&Error) -> u8) -> Result<Self> {
         match launcher::detect(|name| std::env::var(name).ok()) {
-            Some(launcher) if launcher.ranks != Some(1) => Self::join_by(&launcher),
+            Some(launcher) if launcher.ranks != Some(1) => Self::join_by(&launcher, tell),
             _ => Ok(Self::solo()),
         }
     }
 
     #[cfg(feature = "mpi")]
-    fn join_by(launcher: &Launcher) -> Result<Self> {
-        let session = mpi::Session::start()?;
+    fn join_by(launcher: &Launcher, tell: fn(&Error) -> u8) -> Result<Self> {
+        let session = mpi::Session::start(failure::of_panic)?;
         if session.size() == 1 && launcher.ranks.is_some_and(|n| n > 1) {
             return Err(launcher.stranger());
         }
-        Ok(Self::of(Ranks::Mpi(session)))
+        Ok(Self::of(Ranks::Mpi(session), tell))
     }
 
     #[cfg(not(feature = "mpi"))]
-    fn join_by(launcher: &Launcher) -> Result<Self> {
+    fn join_by(launcher: &Launcher, _: fn(&Error) -> u8) -> Result<Self> {
         Err(launcher.without_mpi())
     }
 
@@ -162,8 +170,14 @@ impl World {
                 true
             }
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.assemble(patience),
+            Ranks::Mpi(session) => session.assemble(patience, &|| self.heed_failures()),
         }
+    }
+
+    /// Waits, asleep, for all ranks to get to the end; MPI itself would have those that wait look without
+    /// a pause. All ranks call it, last.
+    pub fn part(&self) {
+        self.assemble(None);
     }
 
     fn gather_bytes(&self, bytes: Vec<u8>) -> Vec<Vec<u8>> {
@@ -193,15 +207,5 @@ impl World {
             Ranks::Mpi(session) => session.settle(meanwhile)?,
         }
         meanwhile()
-    }
-
-    /// Ends every rank of the job at once; alone it does nothing. For a failure on one rank while
-    /// the others are busy: what they finished is on disk.
-    pub fn abort(&self, code: u8) {
-        match &self.ranks {
-            Ranks::Solo => _ = code,
-            #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.abort(code),
-        }
     }
 }

@@ -5,6 +5,8 @@
 //! (a rank that unwinds hangs the job in `MPI_Finalize`).
 #![allow(unsafe_code)]
 
+mod relay;
+
 use crate::error::{Error, Result};
 use ::mpi::Threading;
 use ::mpi::environment::Universe;
@@ -14,6 +16,7 @@ use ::mpi::topology::SimpleCommunicator;
 use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::RefCell;
 use std::ffi::{c_char, c_void};
+use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -46,13 +49,18 @@ struct Posted {
 }
 
 impl Session {
-    /// Initialises MPI and makes every later panic of this process end the job.
-    pub fn start() -> Result<Self> {
+    /// Initialises MPI and makes every later panic of this process end the job. Rank 0 says of others'
+    /// what `words` makes of it.
+    pub fn start(words: fn(&dyn Display) -> Vec<u8>) -> Result<Self> {
         let (universe, _) = ::mpi::initialize_with_threading(Threading::Funneled)
             .ok_or_else(|| Error::Failed("MPI was already initialised".into()))?;
+        relay::start();
+        let is_root = universe.world().rank() == 0;
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            before(panic);
+            if is_root || !relay::confess(words(panic)) {
+                before(panic);
+            }
             // SAFETY: MPI is initialised; `MPI_Abort` on the world communicator does not return,
             // and MPI is not used by this process again.
             unsafe { ffi::MPI_Abort(ffi::RSMPI_COMM_WORLD, 1) };
@@ -174,11 +182,13 @@ impl Session {
     }
 
     /// Waits, asleep, until every rank called this; false where somebody is not there after
-    /// `patience`, and then nothing is left to do with the others but to end them.
-    pub fn assemble(&self, patience: Option<Duration>) -> bool {
+    /// `patience`, and then nothing is left to do with the others but to end them. `meanwhile` runs at
+    /// every look.
+    pub fn assemble(&self, patience: Option<Duration>, meanwhile: &dyn Fn()) -> bool {
         let start = Instant::now();
         let mut barrier = self.world.immediate_barrier();
         while let Err(pending) = barrier.test() {
+            meanwhile();
             if patience.is_some_and(|patience| start.elapsed() > patience) {
                 // (Its request is MPI's until the end, which is near.)
                 std::mem::forget(pending);
@@ -188,6 +198,24 @@ impl Session {
             std::thread::sleep(NAP);
         }
         true
+    }
+
+    /// On rank 0: a rank that failed, with its words, which are to be said now. On others: takes along
+    /// what a thread of this rank has to say.
+    pub fn failure(&self) -> Option<(u32, Vec<u8>)> {
+        if self.rank() != 0 {
+            relay::pass_on();
+            return None;
+        }
+        let arrived = self.world.any_process().immediate_matched_probe_with_tag(relay::FAILED)?;
+        let (words, status) = arrived.matched_receive_vec();
+        relay::answer(status.source_rank());
+        Some((status.source_rank() as u32, words))
+    }
+
+    /// Has rank 0 say `words`; false where it does not hear.
+    pub fn confess(&self, words: Vec<u8>) -> bool {
+        self.rank() != 0 && relay::confess(words)
     }
 
     /// Ends all ranks.

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
@@ -175,7 +175,7 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
             let files = by_file(&rows);
             let states =
                 found.iter().map(|found| Ok((found.frame, state(target, found, (&rows, &files))?)));
-            Plan::of(states.collect::<Result<_>>()?)
+            Plan::of(states.collect::<Result<_>>()?, &target.pattern)
         }
     };
     mark_strays(target, &manifest.header, &rows)?;
@@ -205,12 +205,38 @@ fn is_made_of(row: &Row, recipe: Option<&Recipe>) -> bool {
 }
 
 /// How a frame stands on disk.
+#[allow(clippy::large_enum_variant, reason = "most are the large one")]
 enum State {
     Whole(BadSamples, Option<AuditSums>),
     Missing,
-    Damaged(String),
+    Damaged(Damage),
     /// Seen by the same camera, but inferred from other frames.
     Outdated,
+}
+
+/// Why a file that is there is rendered again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Damage {
+    Unlisted,
+    OtherHash,
+    LacksMaps,
+}
+
+impl Damage {
+    /// Of frame `first` and so many more, in a line however many they are: of a job that was stopped
+    /// while it replaced frames, all that it did not get to are not in the manifest.
+    fn note(self, first: &Path, more: usize) -> String {
+        let why = match (self, more) {
+            (Self::Unlisted, 0) => "is not in the manifest",
+            (Self::Unlisted, _) => "are not in the manifest",
+            (Self::OtherHash, 0) => "is damaged: its hash is not the manifest's",
+            (Self::OtherHash, _) => "are damaged: their hashes are not the manifest's",
+            (Self::LacksMaps, 0) => "lacks its maps",
+            (Self::LacksMaps, _) => "lack their maps",
+        };
+        let and = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{}{and} {why}; rendered again", first.display())
+    }
 }
 
 fn state(
@@ -220,21 +246,17 @@ fn state(
 ) -> Result<State> {
     let frame = found.frame;
     let path = target.pattern.path(frame);
-    let name = path.display();
     let Some(hash) = &found.hash else { return Ok(State::Missing) };
     refuse_taken(&path, frame, rows, files)?;
-    let Some(row) = rows.get(&frame) else {
-        return Ok(State::Damaged(format!("{name} is not in the manifest; rendered again")));
-    };
+    let Some(row) = rows.get(&frame) else { return Ok(State::Damaged(Damage::Unlisted)) };
     let recipe = target.recipes.get(frame);
     refuse_other_view(&path, row, recipe)?;
     let whole = *hash == row.blake3;
-    let note = || format!("{name} is damaged: its hash is not the manifest's; rendered again");
     if whole && target.has_map_files() && !has_maps(found, row) {
-        return Ok(State::Damaged(format!("{name} lacks its maps; rendered again")));
+        return Ok(State::Damaged(Damage::LacksMaps));
     }
     Ok(match whole {
-        false => State::Damaged(note()),
+        false => State::Damaged(Damage::OtherHash),
         true if !is_made_of(row, recipe) => State::Outdated,
         true => State::Whole(row.bad, row.audit.map(|a| a.sums)),
     })
@@ -263,9 +285,10 @@ impl Plan {
         Self { render: (frames.first..=frames.last).collect(), ..Self::default() }
     }
 
-    fn of(states: Vec<(u32, State)>) -> Self {
+    fn of(states: Vec<(u32, State)>, pattern: &FramePattern) -> Self {
         let mut plan = Self::default();
         let mut outdated = Vec::new();
+        let mut damaged: BTreeMap<Damage, Vec<u32>> = BTreeMap::new();
         for (frame, state) in states {
             match state {
                 State::Whole(bad, audit) => {
@@ -282,12 +305,16 @@ impl Plan {
                     plan.render.push(frame);
                     outdated.push(frame);
                 }
-                State::Damaged(note) => {
+                State::Damaged(why) => {
                     plan.render.push(frame);
-                    plan.notes.push(note);
+                    damaged.entry(why).or_default().push(frame);
                 }
             }
         }
+        let notes = damaged.iter().filter_map(|(why, frames)| {
+            frames.first().map(|first| why.note(&pattern.path(*first), frames.len() - 1))
+        });
+        plan.notes.extend(notes);
         if let [first, ..] = outdated[..] {
             plan.notes.push(format!(
                 "the camera move has changed: {} from frame {first} on, inferred from other frames \

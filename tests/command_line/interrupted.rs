@@ -1,7 +1,9 @@
 //! Jobs that are stopped, politely or not, and go on.
 
 use super::job::{Job, Ran};
+use std::fs;
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -11,7 +13,8 @@ const SLOW: &str = "render cube.obj --size 192x108 --spp 32 --shadow-samples 1 \
 
 /// Starts the job and waits for its first finished frame.
 fn after_first_frame(job: &Job, out: &str) -> (Child, BufReader<std::process::ChildStderr>) {
-    let line = format!("{SLOW} -o {out}/f_##.png");
+    let (out, more) = out.split_once(' ').unwrap_or((out, ""));
+    let line = format!("{SLOW} -o {out}/f_##.png {more}");
     let mut child = job.command(&line).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
     let mut first = String::new();
@@ -25,6 +28,18 @@ fn send(signal: &str, child: &Child) {
     assert!(Command::new("sh").args(["-c", &line]).status().expect("a shell").success());
 }
 
+/// Waits until the program listens for SIGTERM.
+fn wait_for_ears(child: &Child) {
+    let listens = || {
+        let text = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("a process");
+        let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a mask");
+        u64::from_str_radix(mask.trim(), 16).expect("a number") & (1 << (15 - 1)) != 0
+    };
+    while !listens() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 fn rest(mut err: BufReader<std::process::ChildStderr>) -> String {
     let mut text = String::new();
     std::io::Read::read_to_string(&mut err, &mut text).expect("text");
@@ -36,6 +51,69 @@ fn assert_same_frames(job: &Job, a: &str, b: &str) {
         let name = format!("f_0{n}.png");
         assert_eq!(job.read(&format!("{a}/{name}")), job.read(&format!("{b}/{name}")), "{name}");
     }
+}
+
+/// Nothing is there yet that the same command could go on from, and what it was to replace is as it was.
+#[test]
+fn a_signal_while_the_scene_is_read_says_to_give_the_same_command_again() {
+    let job = Job::new();
+    let text = "mesh = [{ terrain = { vertices = 1500, size = 12 } }]\n";
+    fs::write(job.path("large.toml"), text).expect("written");
+    let line = "render large.toml --threads 1 --no-video --overwrite -o o/f_##.png";
+    let child = job.command(line).stderr(Stdio::piped()).spawn().expect("it starts");
+    wait_for_ears(&child);
+    send("TERM", &child);
+    let ran = Ran::of(&child.wait_with_output().expect("it ends"));
+    assert_eq!(ran.code, Some(75), "{}", ran.err);
+    let says = "stopped by SIGTERM before the first frame; give the same command again\n";
+    assert_eq!(ran.err, says);
+}
+
+/// All frames are there, and the same command would replace them.
+#[test]
+fn a_signal_while_the_video_is_made_says_to_leave_overwrite_out() {
+    let job = Job::new();
+    fs::create_dir(job.path("bin")).expect("made");
+    let slow = job.path("bin/ffmpeg");
+    fs::write(&slow, "#!/bin/sh\n[ \"$1\" = -version ] || sleep 5\n").expect("written");
+    fs::set_permissions(&slow, fs::Permissions::from_mode(0o755)).expect("runs");
+    let path = format!("{}:{}", job.path("bin").display(), env!("PATH"));
+    let line = "render cube.obj --size 48x27 --spp 1 --frames 1..3 -o o/f_##.png";
+    let mut command = job.command(&format!("{line} --overwrite"));
+    let child = command.env("PATH", path).stderr(Stdio::piped()).stdout(Stdio::null()).spawn();
+    let child = child.expect("it starts");
+    // The video's temporary name is there as soon as it is begun.
+    let is_begun =
+        || job.path("o").exists() && job.names("o").iter().any(|name| name.contains(".mp4.tmp"));
+    let start = Instant::now();
+    while !is_begun() {
+        assert!(start.elapsed() < Duration::from_secs(60), "no video is begun");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    send("TERM", &child);
+    let ran = Ran::of(&child.wait_with_output().expect("it ends"));
+    assert_eq!(ran.code, Some(75), "{}", ran.err);
+    let how = "stopped by SIGTERM; the same command without --overwrite goes on from here";
+    assert!(ran.err.contains(how), "{}", ran.err);
+    assert!(job.done(&format!("{line} --no-video")).out.contains("0 rendered, 3 kept"));
+}
+
+/// However many frames were still to be replaced, one line tells of them.
+#[test]
+fn a_job_that_was_stopped_while_it_replaced_frames_goes_on_with_one_line() {
+    let job = Job::new();
+    job.done(&format!("{} -o o/f_##.png", SLOW.replace("--spp 32", "--spp 1")));
+    let (child, err) = after_first_frame(&job, "o --overwrite");
+    send("TERM", &child);
+    let words = rest(err);
+    assert!(words.contains("the same command without --overwrite goes on"), "{words}");
+    let ran = job.done(&format!("{SLOW} -o o/f_##.png"));
+    let says = "more are not in the manifest; rendered again";
+    let notes = ran.err.lines().filter(|line| line.starts_with("note: ")).count();
+    assert_eq!((notes, ran.err.matches(says).count()), (1, 1), "{}", ran.err);
+    assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
+    job.done(&format!("{SLOW} -o whole/f_##.png"));
+    assert_same_frames(&job, "o", "whole");
 }
 
 /// All frames are there then; the same command would replace them.

@@ -187,6 +187,24 @@ mod with_mpi {
         assert!(differ, "the first of them is not the one that is seen");
     }
 
+    /// Ranks that the launcher bound to no cores, or several to the same ones, share these.
+    #[test]
+    fn ranks_share_the_cores_that_they_have_in_common() {
+        let job = Job::new();
+        let alone = job.command(&format!("{LINE} --stats s.json -o o/f_##.png"));
+        let mut command = mpirun(&job);
+        command.args(["--bind-to", "none", "-n", "2"]);
+        command.arg(alone.get_program()).args(alone.get_args());
+        let Ok(output) = command.output() else { return };
+        let ran = Ran::of(&output);
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        let stats: serde_json::Value =
+            serde_json::from_slice(&job.read("s.json")).expect("valid JSON");
+        let cores = std::thread::available_parallelism().expect("cores").get();
+        let threads = |rank: usize| stats["ranks"][rank]["threads"].as_u64();
+        assert_eq!([threads(0), threads(1)], [Some((cores as u64 / 2).max(1)); 2]);
+    }
+
     #[test]
     fn a_failing_rank_ends_the_job_with_its_words() {
         let job = Job::new();
@@ -195,7 +213,7 @@ mod with_mpi {
         let start = Instant::now();
         let line = format!("{LINE} --policy off -o o/f_##.png --overwrite");
         let Some(ran) = under_mpirun(&job, 2, &line) else { return };
-        assert!(ran.code != Some(0) && ran.err.contains("o/f_05.png"), "{}", ran.err);
+        assert_eq!((ran.code, ran.err.matches("o/f_05.png").count()), (Some(1), 1), "{}", ran.err);
         assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
         let Some(ran) = under_mpirun(&job, 2, "render none.obj") else { return };
         assert_eq!(ran.err.matches("error: none.obj").count(), 1, "{}", ran.err);

@@ -109,7 +109,10 @@ fn maps_lie_beside_their_frames_and_come_back_when_lost() {
     fs::remove_file(job.path("o/f_2_provenance.png")).expect("removed");
     fs::write(job.path("o/f_3_audit.png"), "torn").expect("written");
     let again = job.done("render scene.toml -o o/f_#.png --frames 1..3 --maps");
-    assert!(again.out.contains("2 rendered, 1 kept") && again.err.contains("lacks its maps"));
+    assert!(
+        again.out.contains("2 rendered, 1 kept")
+            && again.err.contains("and 1 more lack their maps")
+    );
     assert!(job.read("o/f_2_provenance.png") == map);
     // Somebody's own picture is in the way.
     fs::create_dir(job.path("p")).expect("made");

@@ -143,6 +143,28 @@ fn all_ranks_stop_soon_whichever_is_asked() {
     assert_eq!(ran.code, Some(75));
 }
 
+/// While rank 0 looks for settings the others wait: whichever is asked, the job ends, with one line.
+#[test]
+fn all_ranks_stop_while_settings_are_chosen() {
+    let job = Job::new();
+    let line =
+        "render cube.obj --size 640x360 --target psnr=60 --png-bits 16 --no-video -o o/f_##.png";
+    for pids in ["pid.0", "pid.1", "pid.*"] {
+        let Some(mut child) = start(&job, 3, line) else { return };
+        let words = || fs::read_to_string(job.path("errors")).expect("text");
+        while !words().contains("probe: ") {
+            assert_eq!(child.try_wait().expect("a child"), None, "{}", words());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let asked = Instant::now();
+        send(&job, "TERM", pids);
+        let code = child.wait().expect("it ends").code();
+        assert!(asked.elapsed() < Duration::from_secs(10), "{:?}", asked.elapsed());
+        let says = "stopped by SIGTERM before the first frame; give the same command again";
+        assert_eq!((code, words().matches(says).count()), (Some(75), 1), "{pids}: {}", words());
+    }
+}
+
 /// All ranks put their key frames' references on disk when they stop, and leave none in the end.
 #[test]
 fn every_rank_leaves_its_references_when_it_is_stopped() {

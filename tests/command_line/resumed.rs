@@ -88,3 +88,27 @@ fn status_says_what_is_done_and_what_is_not() {
     assert!(ran.out.contains("9 missing: 13..21"), "{}", ran.out);
     assert_eq!(job.run("status o/f_##.exr").code, Some(2), "frames of another kind");
 }
+
+/// A folder that is mistyped is told as such.
+#[test]
+fn a_folder_that_is_not_there_is_named() {
+    let job = Job::new();
+    job.refused("status nowhere", "there is no folder nowhere");
+    job.refused("render cube.obj --references nowhere", "nowhere: cannot read the folder: ");
+}
+
+/// Of several frames of a kind, one line.
+#[test]
+fn damaged_frames_are_told_in_a_line() {
+    let job = Job::new();
+    let line = "render cube.obj --size 16x9 --spp 1 --frames 1..6 --no-video -o o/f_##.png";
+    job.done(line);
+    for frame in [2, 3, 5] {
+        fs::write(job.path(format!("o/f_0{frame}.png")), "no picture").expect("written");
+    }
+    let says = "note: o/f_02.png and 2 more are damaged: their hashes are not the manifest's";
+    let ran = job.done(line);
+    assert!(ran.err.contains(says) && ran.err.matches("note: ").count() == 1, "{}", ran.err);
+    fs::write(job.path("o/f_04.png"), "no picture").expect("written");
+    assert!(job.done(line).err.contains("o/f_04.png is damaged: its hash is not the manifest's"));
+}

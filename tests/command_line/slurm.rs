@@ -60,6 +60,24 @@ fn a_script_goes_on_until_the_sequence_is_complete() {
     }
 }
 
+/// A limit may come between the last frame and the video.
+#[test]
+fn a_run_that_is_stopped_after_the_last_frame_is_followed_by_one_more() {
+    let job = Job::new();
+    let script = job.done(&format!("{LINE} -- --size 8x8 --frames 1..2 -o o/f_##.png")).out;
+    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
+    stand_in(&job, "scontrol", &note);
+    stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video; exit 75");
+    let ran = batch(&job, &script);
+    assert_eq!((ran.code, &*requeues(&job)), (Some(75), "requeue 7\n"), "{}", ran.err);
+    // One that is stopped there again gets no further.
+    let ran = batch(&job, &script);
+    assert_eq!((ran.code, &*requeues(&job)), (Some(75), "requeue 7\n"), "{}", ran.err);
+    assert!(ran.err.contains("got no further"), "{}", ran.err);
+    stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video");
+    assert_eq!(batch(&job, &script).code, Some(0));
+}
+
 #[test]
 fn a_run_that_gets_no_further_is_the_last() {
     let job = Job::new();

@@ -75,11 +75,13 @@ impl Choosing<'_> {
         request: &Request,
         question: impl Fn(&Chooser, Timer) -> Result<T>,
     ) -> Result<T> {
-        // Ranks that wait for the answer hear from rank 0 that the job is to stop.
-        self.site.interrupt.watched(|| match self.site.world.is_root() {
-            true => self.lead(request, question),
+        let Site { world, interrupt, .. } = self.site;
+        match world.is_root() {
+            true => interrupt.watched(|| self.lead(request, question)),
+            // Who waits for the answer cannot tell rank 0, which looks at nothing but its trials: where it
+            // alone is asked to stop, it ends the job, of which nothing is in hand.
             false => self.follow(request),
-        })
+        }
     }
 
     fn lead<T: Serialize + DeserializeOwned>(

@@ -1,7 +1,6 @@
 //! One round of a job: every frame that is not there yet, by all ranks.
 
 use super::tell;
-use crate::cli::exit::Exit;
 use crate::cli::progress::Watch;
 use crate::cli::request::Request;
 use crate::cli::say;
@@ -66,6 +65,7 @@ impl Site<'_> {
         let plan = cluster::prepare(self.world, self.pool, target, request.frames)?;
         tell(self.quiet, &plan.notes, |n| say::note(n));
         let job = Frames { request, target, plan: &plan, site: self };
+        self.interrupt.goes_on(job.goes_on());
         let begun = Instant::now();
         let (outcome, reference_bytes, saved) = job.render()?;
         let seconds = begun.elapsed().as_secs_f64();
@@ -148,8 +148,7 @@ impl Frames<'_> {
         tell(quiet, &maker.notes(), |n| say::note(n));
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.
-            say::error(error);
-            world.abort(Exit::of(error).code());
+            world.fail(error);
         }
         Ok((outcome?, maker.reference_memory(), maker.save_cost()))
     }
@@ -159,6 +158,13 @@ impl Frames<'_> {
         // Frame files hold references of policy `surface` only.
         let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
         Checkpoints::new(self.target, *checkpoint, terms, scene.recentring, whole)
+    }
+
+    /// How a job goes on that was stopped once its frames were begun: what it was to replace is its own
+    /// by then.
+    pub fn goes_on(&self) -> String {
+        let again = if self.request.overwrite { " without --overwrite" } else { "" };
+        format!("; the same command{again} goes on from here")
     }
 
     pub fn total(&self) -> usize {

@@ -42,11 +42,11 @@ before=$(so_far)/$(kept)
 for pause in 5 30 0; do
   srun --mpi=pmix --export=ALL --kill-on-bad-exit=1 "${srun[@]}" "$tweenray" "${render[@]}"
   code=$?
-  if now=$(so_far); then
-    echo "$now"
-    exit "$code"
-  fi
+  now=$(so_far)
+  is_all=$?
   echo "$now"
+  # Stopped with all frames there: the video is left, or a look at what came out.
+  if [ "$is_all" = 0 ] && [ "$code" != 75 ]; then exit "$code"; fi
   if [ "$now/$(kept)" != "$before" ]; then
     scontrol requeue "$SLURM_JOB_ID" || exit $((code ? code : 1))
     echo "requeued after exit code $code"
