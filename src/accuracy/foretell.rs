@@ -225,7 +225,7 @@ impl Foretelling {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::law::Causes;
+    use super::super::law::{Causes, Point};
     use super::*;
 
     pub(super) fn foretelling() -> Foretelling {
@@ -233,11 +233,14 @@ pub(super) mod tests {
         let error =
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
         let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)]
-            .map(|(n, m)| (samples(n, m), vec![error(samples(n, m)) + error(samples(4096, 16))]));
+            .map(|(n, m)| {
+                let (samples, reference) = (samples(n, m), samples(4096, 16));
+                Point { samples, reference, errors: vec![error(samples) + error(reference)] }
+            });
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
         Foretelling {
-            law: Law::of(Causes { shadow: true, sky: false }, &points, &[samples(4096, 16); 5]),
+            law: Law::of(Causes { shadow: true, sky: false }, &points.each_ref()),
             measured: Vec::new(),
             bias: vec![0.5],
             rounding: 1.0 / 12.0,

@@ -19,16 +19,22 @@ const ROUNDS: u32 = 3;
 /// The same where the goal's figure only goes somehow with the squared error.
 const ROUNDS_BY_FIGURE: u32 = 8;
 
+/// What samples that were traced came to.
+struct Found {
+    point: Point,
+    /// How far each frame's error may be off, a share.
+    doubts: Vec<f64>,
+    /// The goal's figure, unless that is the squared error.
+    figure: Option<Figure>,
+}
+
 /// What is known so far.
 pub(super) struct Search<'a> {
     probe: &'a Probe<'a>,
     patches: Patches,
     truth: Seen,
     reference: Samples,
-    points: Vec<Point>,
-    references: Vec<Samples>,
-    doubts: Vec<Vec<f64>>,
-    figures: Vec<Option<Figure>>,
+    found: Vec<Found>,
     /// What it comes to.
     pub foretelling: Foretelling,
 }
@@ -44,7 +50,7 @@ impl<'a> Search<'a> {
         let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
         let causes = probe.causes();
         let foretelling = Foretelling {
-            law: Law::of(causes, &[], &[]),
+            law: Law::of(causes, &[]),
             measured: Vec::new(),
             bias: Vec::new(),
             rounding: if probe.rounds { 1.0 / 12.0 } else { 0.0 },
@@ -61,10 +67,7 @@ impl<'a> Search<'a> {
             patches,
             truth,
             reference,
-            points: Vec::new(),
-            references: Vec::new(),
-            doubts: Vec::new(),
-            figures: Vec::new(),
+            found: Vec::new(),
             foretelling,
         };
         for samples in search.design() {
@@ -118,46 +121,41 @@ impl<'a> Search<'a> {
     fn measure(&mut self, samples: Samples) -> Result<()> {
         let seen = self.traced(samples)?;
         let errors = squares(&self.patches, &self.truth, &seen);
-        self.doubts.push(doubts(&self.patches, &self.truth, &seen));
         let of = |goal| -> Result<Figure> {
             let squared_error = errors.iter().copied().fold(0.0, f64::max);
             let figure = figure(goal, &self.patches, &self.truth, &seen)?;
             Ok(Figure { figure, squared_error })
         };
         let goal = self.probe.goal.filter(|goal| goal.most().is_some());
-        self.figures.push(goal.map(of).transpose()?);
-        self.points.push((samples, errors));
-        self.references.push(self.reference);
+        let figure = goal.map(of).transpose()?;
+        let doubts = doubts(&self.patches, &self.truth, &seen);
+        let point = Point { samples, reference: self.reference, errors };
+        self.found.push(Found { point, doubts, figure });
         Ok(())
     }
 
     /// Fits the law to all that was measured, and puts it through the last.
     fn learn(&mut self) {
-        let law = Law::of(self.probe.causes(), &self.points, &self.references);
-        let own = |reference: Samples| law.errors(reference).collect::<Vec<_>>();
-        let all = self.points.iter().zip(&self.references).zip(&self.doubts).zip(&self.figures);
-        self.foretelling.measured = all
-            .map(|((((samples, errors), reference), doubts), figure)| {
-                // The law tells the reference's part of the difference.
-                let parts =
-                    law.errors(*samples).zip(own(*reference)).map(|(s, r)| s / (s + r).max(1e-12));
-                let errors = errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-                Measured { samples: *samples, errors, doubts: doubts.clone(), figure: *figure }
-            })
-            .collect();
-        self.foretelling.doubts = self.doubts.last().cloned().unwrap_or_default();
-        let last = self.points.last().zip(self.references.last());
-        self.foretelling.law = match last {
-            Some(((samples, errors), reference)) => law.through(*samples, errors, *reference),
-            None => law,
+        let points: Vec<&Point> = self.found.iter().map(|found| &found.point).collect();
+        let law = Law::of(self.probe.causes(), &points);
+        let measured = |Found { point, doubts, figure }: &Found| {
+            // The law tells the reference's part of the difference.
+            let own = law.errors(point.samples).zip(law.errors(point.reference));
+            let parts = own.map(|(s, r)| s / (s + r).max(1e-12));
+            let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
+            Measured { samples: point.samples, errors, doubts: doubts.clone(), figure: *figure }
         };
+        self.foretelling.measured = self.found.iter().map(measured).collect();
+        let last = self.found.last();
+        self.foretelling.doubts = last.map_or(Vec::new(), |last| last.doubts.clone());
+        self.foretelling.law = last.map_or(law.clone(), |last| law.through(&last.point));
         self.foretelling.line = self.foretelling.most.and_then(|most| self.line(most));
     }
 
     /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
     /// say, cannot go on rising.
     fn line(&self, most: f64) -> Option<Line> {
-        let all = self.figures.iter().flatten().filter(|found| found.figure > 0.0);
+        let all = self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
         let mut nearest: Vec<(f64, f64)> =
             all.map(|found| (found.squared_error, found.figure)).collect();
         let off = |found: &(f64, f64)| (found.1 / most).ln().abs();
