@@ -7,6 +7,7 @@ use super::choice::Goal;
 use super::law::{Law, Samples};
 use super::worst::worst;
 use crate::measure::psnr;
+use crate::scene::limits::MAX_BOUNCES;
 use crate::scene::{Policy, ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
@@ -191,6 +192,13 @@ impl Foretelling {
     /// The same with all errors of samples `factor` times as large.
     pub fn worse(&self, factor: f64) -> Self {
         Self { excess: self.excess * factor, ..self.clone() }
+    }
+
+    /// The same with twice the bounces, where rays ended for too few of them.
+    pub fn with_more_bounces(self) -> Self {
+        let is_cut = self.bias.iter().any(|bias| *bias > 0.0);
+        let bounces = if is_cut { (2 * self.bounces).min(MAX_BOUNCES) } else { self.bounces };
+        Self { bounces, ..self }
     }
 
     /// The setting with the least error foretold.

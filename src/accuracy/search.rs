@@ -9,15 +9,18 @@ use super::patches::{Patches, Seen};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
 use crate::error::Result;
-use crate::scene::Policy;
 use std::time::Instant;
 
 /// Share of what the goal allows that bounces and cut-off may take.
 const BIAS: f64 = 0.1;
+/// What a budget may come to, of the least error that the sweep did.
+const BEYOND: f64 = 0.25;
+/// Numbers of bounces that are thought of.
+const BOUNCES: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 /// How often the likely choices are tried.
 const ROUNDS: u32 = 3;
 /// The same where the goal's figure only goes somehow with the squared error.
-const ROUNDS_BY_FIGURE: u32 = 8;
+const ROUNDS_BY_FIGURE: u32 = 10;
 
 /// What samples that were traced came to.
 struct Found {
@@ -74,7 +77,10 @@ impl<'a> Search<'a> {
             search.measure(samples)?;
         }
         search.learn();
-        let allowed = probe.goal.map_or(f64::INFINITY, |goal| search.foretelling.allowed(goal));
+        let allowed = match probe.goal {
+            Some(goal) => search.foretelling.to_try(goal),
+            None => BEYOND * search.least(),
+        };
         let (bounces, bias) = search.bounces(BIAS * allowed)?;
         (search.foretelling.bounces, search.foretelling.bias) = (bounces, bias);
         Ok(search)
@@ -84,17 +90,10 @@ impl<'a> Search<'a> {
     pub fn try_likely(&mut self, goal: Goal) -> Result<()> {
         let is_squared = self.foretelling.most.is_none();
         for _ in 0..if is_squared { ROUNDS } else { ROUNDS_BY_FIGURE } {
-            let within = |allowed| self.foretelling.fastest(&self.probe.range(), allowed);
-            let mut likely = likely_of(within(self.foretelling.allowed(goal)));
-            if likely.is_empty() && !is_squared {
-                likely = likely_of(within(self.foretelling.next_step()));
-            }
-            let mut new: Vec<Samples> = Vec::new();
-            for samples in likely.iter().map(|found| found.samples) {
-                // Modes may agree on samples, not only neighbours among them.
-                if self.foretelling.tried(samples).is_none() && !new.contains(&samples) {
-                    new.push(samples);
-                }
+            let mut new = self.untried(self.foretelling.to_try(goal));
+            if new.is_empty() {
+                let between = self.foretelling.between();
+                new = between.map_or(Vec::new(), |allowed| self.untried(allowed));
             }
             if new.is_empty() {
                 break;
@@ -106,6 +105,19 @@ impl<'a> Search<'a> {
             self.learn();
         }
         Ok(())
+    }
+
+    /// The samples that would be chosen if squared errors up to `allowed` were, but for those that were
+    /// tried.
+    fn untried(&self, allowed: f64) -> Vec<Samples> {
+        let mut new: Vec<Samples> = Vec::new();
+        for found in likely_of(self.foretelling.fastest(&self.probe.range(), allowed)) {
+            // Modes may agree on samples, not only neighbours among them.
+            if self.foretelling.tried(found.samples).is_none() && !new.contains(&found.samples) {
+                new.push(found.samples);
+            }
+        }
+        new
     }
 
     /// Traces the reference again where it is too coarse to hold `samples` against.
@@ -188,34 +200,41 @@ impl<'a> Search<'a> {
         self.patches.trace(stage, &settings)
     }
 
-    /// The fewest bounces that miss at most `allowed`, the most there are otherwise; and what they
-    /// miss in each frame. The same random numbers with more bounces tell.
+    /// The least error of the worst frame that the sweep came to.
+    fn least(&self) -> f64 {
+        let worst = |found: &Found| found.point.errors.iter().copied().fold(0.0, f64::max);
+        self.found.iter().map(worst).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The fewest bounces that miss at most `allowed`, or no more than that beyond what the most miss; and
+    /// what they miss in each frame. The same random numbers with more bounces tell.
     fn bounces(&self, allowed: f64) -> Result<(u32, Vec<f64>)> {
-        let (base, plan) = (self.probe.stage.base, self.probe.plan());
-        let truth = self.traced(Samples { spp: 4, shadow: 1, sky: 1 })?;
-        let mut settings = base.clone();
-        (settings.spp, settings.shadow_samples, settings.sky_samples) = (4, 1, 1);
-        settings.reuse.policy = Policy::Off;
-        let is_free =
-            allowed.is_finite() && !self.probe.given.bounces && (plan.mirror || plan.glass);
+        let (probe, base, plan) = (self.probe, self.probe.stage.base, self.probe.plan());
         let mut tried = vec![base.bounces];
-        if is_free {
-            tried = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32].to_vec();
-            tried.push(base.bounces);
+        if !probe.given.bounces && (plan.mirror || plan.glass) {
+            tried.extend(BOUNCES);
             tried.sort_unstable();
             tried.dedup();
         }
-        let mut last = (base.bounces, Vec::new());
+        let mut settings = reference(base, Samples { spp: 4, shadow: 1, sky: 1 });
+        settings.seed = base.seed;
+        settings.bounces = tried.iter().copied().fold(settings.bounces, u32::max);
+        let truth = self.patches.trace(probe.stage, &settings)?;
+        settings.cutoff = base.cutoff;
+        let mut all: Vec<(u32, Vec<f64>)> = Vec::new();
         for bounces in tried {
             settings.bounces = bounces;
-            let seen = self.patches.trace(self.probe.stage, &settings)?;
+            let seen = self.patches.trace(probe.stage, &settings)?;
             let bias = squares(&self.patches, &truth, &seen);
-            let is_enough = bias.iter().all(|bias| *bias <= allowed);
-            last = (bounces, bias);
-            if is_enough {
-                break;
+            if bias.iter().all(|bias| *bias <= allowed) {
+                return Ok((bounces, bias));
             }
+            all.push((bounces, bias));
         }
-        Ok(last)
+        // What the cut-off leaves out no number of them brings.
+        let most = all.last().map_or(Vec::new(), |(_, bias)| bias.clone());
+        let is_as_good = |bias: &[f64]| bias.iter().zip(&most).all(|(b, m)| *b <= m + allowed);
+        let found = all.into_iter().find(|(_, bias)| is_as_good(bias));
+        Ok(found.unwrap_or((base.bounces, most)))
     }
 }

@@ -119,9 +119,15 @@ fn a_job_that_gets_longer_keeps_its_choice_or_its_tighter_one() {
 #[test]
 fn figures_that_need_neighbours_are_targets_too() {
     let job = Job::new();
-    for (target, figure) in [("ssim=0.9", ", SSIM 0.9"), ("flip=10%", ", FLIP 0.0")] {
+    let targets = [("ssim=0.9", "SSIM 0.9"), ("flip=10%", "FLIP 0.0"), ("max-share=30%", "share ")];
+    for (target, figure) in targets {
         let said = job.done(&format!("{LINE} --target {target} --overwrite")).err;
-        assert!(said.contains(figure), "{said}");
+        // Before and afterwards in the same unit.
+        let line = |begin: &str| said.lines().rfind(|line| line.starts_with(begin)).expect("said");
+        assert!(line("foretold: ").starts_with(&format!("foretold: {figure}")), "{said}");
+        let came = line("came out: ");
+        assert!(came.starts_with(&format!("came out: {figure}")), "{said}");
+        assert!(came.contains(&format!(" in the worst, foretold {figure}")), "{said}");
     }
 }
 
