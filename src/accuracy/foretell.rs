@@ -160,15 +160,14 @@ impl Foretelling {
     }
 
     /// For each mode the fastest setting that is foretold to be off by at most `allowed`. Where the goal's
-    /// figure was found of a setting, that decides.
+    /// figure was found of a setting, that alone decides.
     pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Foretold> {
-        let least = |found: &mut dyn Iterator<Item = Foretold>| {
-            found.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+        let will_do = |f: &Foretold| {
+            self.reached(f.samples) || (f.squared_error <= allowed && !self.missed(f.samples))
         };
         let best = |mode| {
-            let within = |f: &Foretold| f.squared_error <= allowed && !self.missed(f.samples);
-            least(&mut self.all(mode, range).filter(within))
-                .or_else(|| least(&mut self.all(mode, range).filter(|f| self.reached(f.samples))))
+            let found = self.all(mode, range).filter(will_do);
+            found.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
         };
         self.modes.iter().filter_map(best).collect()
     }
@@ -282,6 +281,16 @@ pub(super) mod tests {
         assert!(foretelling.fastest(&range(), 0.1).is_empty());
         // A figure that rises as the root of the squared error.
         assert!((foretelling.allowed(Goal::Flip(0.02)) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bounces_are_more_where_rays_ended_for_too_few() {
+        let some = foretelling().with_more_bounces();
+        assert_eq!((some.bounces, some.clone().with_more_bounces().bounces), (8, 16));
+        let none = Foretelling { bias: vec![0.0], ..foretelling() };
+        assert_eq!(none.with_more_bounces().bounces, 4);
+        let most = Foretelling { bounces: MAX_BOUNCES - 1, ..foretelling() };
+        assert_eq!(most.with_more_bounces().bounces, MAX_BOUNCES);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// Share of what the goal allows that bounces and cut-off may take.
 const BIAS: f64 = 0.1;
-/// What a budget may come to, of the least error that the sweep did.
+/// What samples may come to, of the least error that the sweep did, where no goal says.
 const BEYOND: f64 = 0.25;
 /// Numbers of bounces that are thought of.
 const BOUNCES: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
@@ -77,11 +77,7 @@ impl<'a> Search<'a> {
             search.measure(samples)?;
         }
         search.learn();
-        let allowed = match probe.goal {
-            Some(goal) => search.foretelling.to_try(goal),
-            None => BEYOND * search.least(),
-        };
-        let (bounces, bias) = search.bounces(BIAS * allowed)?;
+        let (bounces, bias) = search.bounces(BIAS * search.in_reach())?;
         (search.foretelling.bounces, search.foretelling.bias) = (bounces, bias);
         Ok(search)
     }
@@ -200,10 +196,24 @@ impl<'a> Search<'a> {
         self.patches.trace(stage, &settings)
     }
 
-    /// The least error of the worst frame that the sweep came to.
-    fn least(&self) -> f64 {
+    /// The squared error that the sweep leaves to hope for: what the goal allows. Where its figure alone
+    /// decides, what reached that, if anything did; else no less than a quarter of the least, which
+    /// goes for a budget too.
+    fn in_reach(&self) -> f64 {
+        let foretelling = &self.foretelling;
+        if let Some(goal @ Goal::Psnr(_)) = self.probe.goal {
+            return foretelling.allowed(goal);
+        }
         let worst = |found: &Found| found.point.errors.iter().copied().fold(0.0, f64::max);
-        self.found.iter().map(worst).fold(f64::INFINITY, f64::min)
+        let least = BEYOND * self.found.iter().map(worst).fold(f64::INFINITY, f64::min);
+        let Some(most) = foretelling.most else { return least };
+        let reaches = |found: &&Found| found.figure.is_some_and(|f| f.figure <= most);
+        let reached = self.found.iter().filter(reaches).map(worst).fold(0.0, f64::max);
+        let line = foretelling.line.map(|line| line.squared_error(most));
+        match reached > 0.0 {
+            true => line.unwrap_or(f64::INFINITY).min(reached),
+            false => line.unwrap_or(0.0).max(least),
+        }
     }
 
     /// The fewest bounces that miss at most `allowed`, or no more than that beyond what the most miss; and

@@ -156,6 +156,30 @@ fn what_cannot_be_foretold_is_refused() {
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
 }
 
+/// Between mirrors that face each other four bounces, which are the default, leave the picture dark in the
+/// middle: no time makes that up.
+#[test]
+fn a_budget_pays_for_the_bounces_that_a_scene_needs() {
+    let job = Job::new();
+    let scene = "[camera]\nframes = 2\npan = { from = [0, 1, 1], to = [0.2, 1, 1], target = [0, 1, -2] }\n\
+                 [[light]]\nquad = { centre = [0, 3.9, 0], normal = '-y', size = [1, 1], radiance = 12 }\n\
+                 [material.mirror]\nmirror = 0.95\n\
+                 [[mesh]]\nquad = { corner = [-5, 0, 3], edges = [[10, 0, 0], [0, 0, -6]] }\n\
+                 [[mesh]]\nquad = { corner = [-3, 0, -2], edges = [[6, 0, 0], [0, 4, 0]] }\n\
+                 material = 'mirror'\n\
+                 [[mesh]]\nquad = { corner = [3, 0, 2], edges = [[-6, 0, 0], [0, 4, 0]] }\n\
+                 material = 'mirror'\n";
+    std::fs::write(job.path("mirrors.toml"), scene).expect("written");
+    let line = LINE.replace("cube.obj", "mirrors.toml").replace("1..3", "1..2");
+    let bounces = |options: &str| {
+        job.done(&format!("{line} {options} --overwrite"));
+        header(&job)["settings"]["bounces"].as_u64().expect("a number")
+    };
+    assert!(bounces("--budget 4s") > 8);
+    assert!(bounces("--target psnr=35") > 8);
+    assert_eq!(bounces("--budget 4s --bounces 3"), 3);
+}
+
 /// Another tree takes another time, and may give other last bits.
 #[test]
 fn a_choice_serves_only_the_tree_that_it_was_made_with() {

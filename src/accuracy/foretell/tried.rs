@@ -180,7 +180,11 @@ mod tests {
         let [high, low] = [4, 64].map(|spp| error(&some, spp).squared_error);
         assert!(near(some.to_try(goal), some.allowed(goal)));
         assert!(near(some.between().expect("between"), (low * high).sqrt()));
-        assert_eq!(missed(&[(32, 1, 0.03), (32, 2, 0.001)]).between(), None, "they are close");
+        assert_eq!(missed(&[(32, 1, 0.03), (32, 4, 0.001)]).between(), None, "they are close");
+        // What reached is taken, although the line allows less.
+        let fewer = missed(&[(4, 1, 0.03), (64, 1, 0.001), (16, 1, 0.019)]);
+        assert!(error(&fewer, 16).squared_error > fewer.allowed(goal));
+        assert_eq!(first(&fewer), Some((16, 1)));
     }
 
     fn near(a: f64, b: f64) -> bool {
