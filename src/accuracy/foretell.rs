@@ -239,11 +239,10 @@ pub(super) mod tests {
         let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
         let error =
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
-        let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)]
-            .map(|(n, m)| {
-                let (samples, reference) = (samples(n, m), samples(4096, 16));
-                Point { samples, reference, errors: vec![error(samples) + error(reference)] }
-            });
+        let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)].map(|(n, m)| {
+            let (samples, reference) = (samples(n, m), samples(4096, 16));
+            Point { samples, reference, errors: vec![error(samples) + error(reference)] }
+        });
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
         Foretelling {

@@ -93,7 +93,8 @@ mod tests {
             let follows = |f: &u32| has(f + 1) || (*f > 1 && has(f - 1));
             assert!(count == 1 || frames.iter().all(follows), "{count}: {frames:?}");
             // The gaps between pairs are alike.
-            let gaps: Vec<u32> = frames.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1).collect();
+            let gaps: Vec<u32> =
+                frames.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1).collect();
             assert!(gaps.iter().all(|gap| gap.abs_diff(gaps[0]) <= 1), "{count}: {frames:?}");
             let timed = timed_frames(count);
             assert!(timed[0] == 1 && rises(&timed) && timed.iter().all(|f| *f <= count));

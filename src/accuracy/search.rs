@@ -65,14 +65,7 @@ impl<'a> Search<'a> {
             pace: Some(Pace { samples: reference, seconds }),
             excess: 1.0,
         };
-        let mut search = Self {
-            probe,
-            patches,
-            truth,
-            reference,
-            found: Vec::new(),
-            foretelling,
-        };
+        let mut search = Self { probe, patches, truth, reference, found: Vec::new(), foretelling };
         for samples in search.design() {
             search.measure(samples)?;
         }
@@ -163,7 +156,8 @@ impl<'a> Search<'a> {
     /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
     /// say, cannot go on rising.
     fn line(&self, most: f64) -> Option<Line> {
-        let all = self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
+        let all =
+            self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
         let mut nearest: Vec<(f64, f64)> =
             all.map(|found| (found.squared_error, found.figure)).collect();
         let off = |found: &(f64, f64)| (found.1 / most).ln().abs();

@@ -115,8 +115,7 @@ impl Probe<'_> {
     fn small_within(&self, seconds: f64, foretold: &Foretold) -> f64 {
         let base = self.stage.base;
         let pixels = f64::from(base.width) * f64::from(base.height);
-        let frames =
-            self.cut(foretold.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
+        let frames = self.cut(foretold.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
         let each = foretold.seconds / pixels * frames.len() as f64;
         (seconds / ((1.0 + LARGER) * each)).min(Effort::WHOLE.small)
     }

@@ -195,7 +195,8 @@ mod tests {
     fn a_figure_is_foretold_of_what_was_tried_and_of_what_was_not() {
         let foretelling = tried(&[(16, 1, 0.019)]);
         let of = |spp| {
-            let foretold = foretelling.of(&foretelling.modes[0], Samples { spp, shadow: 1, sky: 1 });
+            let foretold =
+                foretelling.of(&foretelling.modes[0], Samples { spp, shadow: 1, sky: 1 });
             foretelling.foretold_figure(&foretold).expect("a figure")
         };
         assert!((of(16) - 0.019).abs() < 1e-9);
