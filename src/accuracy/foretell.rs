@@ -13,6 +13,9 @@ use serde::{Deserialize, Serialize};
 
 pub use line::Line;
 
+/// Times are not known to a tenth; so much longer may be taken by what is more accurate.
+const ALIKE: f64 = 1.1;
+
 /// A way to take over light from other frames, as it came out on a few small frames.
 ///
 /// Errors are those of traced frames in every mode: key frames are traced, and must reach a target like
@@ -159,15 +162,18 @@ impl Foretelling {
         }
     }
 
-    /// For each mode the fastest setting that is foretold to be off by at most `allowed`. Where the goal's
-    /// figure was found of a setting, that alone decides.
+    /// For each mode the fastest setting that is foretold to be off by at most `allowed`, or the nearest to
+    /// the truth of those that are hardly slower. Where the goal's figure was found of a setting, that
+    /// alone decides.
     pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Foretold> {
         let will_do = |f: &Foretold| {
             self.reached(f.samples) || (f.squared_error <= allowed && !self.missed(f.samples))
         };
         let best = |mode| {
-            let found = self.all(mode, range).filter(will_do);
-            found.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+            let found = || self.all(mode, range).filter(will_do);
+            let least = found().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
+            let alike = found().filter(|f| f.seconds <= ALIKE * least);
+            alike.min_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
         };
         self.modes.iter().filter_map(best).collect()
     }
@@ -277,6 +283,13 @@ pub(super) mod tests {
         let samples = |f: &Foretold| (f.samples.spp, f.samples.shadow);
         assert_eq!(found.iter().map(samples).collect::<Vec<_>>(), [(16, 1), (8, 4)]);
         assert!(found.iter().all(|f| f.squared_error <= allowed));
+        // Shadow samples that hardly cost anything are taken.
+        let cheap = Mode { seconds: [0.0, 2.0, 0.01, 0.0], ..foretelling.modes[1].clone() };
+        let cheap = Foretelling { modes: vec![cheap], ..foretelling.clone() };
+        assert_eq!(
+            cheap.fastest(&range(), allowed).iter().map(samples).collect::<Vec<_>>(),
+            [(8, 16)]
+        );
         assert!(foretelling.fastest(&range(), 0.1).is_empty());
         // A figure that rises as the root of the squared error.
         assert!((foretelling.allowed(Goal::Flip(0.02)) - 4.0).abs() < 1e-9);

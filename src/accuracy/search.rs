@@ -18,7 +18,7 @@ const BEYOND: f64 = 0.25;
 /// Numbers of bounces that are thought of.
 const BOUNCES: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 /// How often the likely choices are tried.
-const ROUNDS: u32 = 3;
+const ROUNDS: u32 = 4;
 /// The same where the goal's figure only goes somehow with the squared error.
 const ROUNDS_BY_FIGURE: u32 = 10;
 
