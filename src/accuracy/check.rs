@@ -44,7 +44,7 @@ impl Check {
     ) -> Result<Self> {
         let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
-        let samples = samples_of_reference(probe.goal, foretold.samples);
+        let samples = samples_of_reference(foretold.samples);
         let mut reference = reference(probe.stage.base, samples);
         reference.bounces = reference.bounces.max(foretold.bounces);
         let truth = patches.trace(probe.stage, &reference)?;
@@ -61,11 +61,11 @@ impl Check {
         })
     }
 
-    /// Wall seconds that a whole check of frames of `samples` is foretold to take, where no goal is.
+    /// Wall seconds that a whole check of frames of `samples` is foretold to take.
     pub fn seconds(foretelling: &Foretelling, samples: Samples) -> f64 {
         let whole = Effort::WHOLE;
         let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
-        pixels * foretelling.patch_seconds(samples_of_reference(None, samples))
+        pixels * foretelling.patch_seconds(samples_of_reference(samples))
     }
 
     /// The mean of the frames' squared errors.

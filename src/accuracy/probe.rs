@@ -214,12 +214,10 @@ pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
     all
 }
 
-/// Samples enough to hold `samples` against for `goal`. Of squared errors the reference's own is known and
-/// taken off. What it adds to other figures is not: four times the samples made FLIP 0.0137 of 0.0093.
-pub fn samples_of_reference(goal: Option<Goal>, samples: Samples) -> Samples {
-    let times = if goal.is_some_and(|goal| goal.most().is_some()) { 16 } else { 4 };
+/// Samples enough to hold `samples` against.
+pub fn samples_of_reference(samples: Samples) -> Samples {
     Samples {
-        spp: (times * samples.spp).clamp(8 * times, MAX_SAMPLES),
+        spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
         shadow: samples.shadow.max(4),
         sky: samples.sky.max(2),
     }

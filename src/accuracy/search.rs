@@ -46,7 +46,7 @@ impl<'a> Search<'a> {
     /// Runs the sweep.
     pub fn begin(probe: &'a Probe<'a>, effort: Effort) -> Result<Self> {
         let patches = probe.patches(effort)?;
-        let reference = samples_of_reference(probe.goal, Samples { spp: 8, shadow: 2, sky: 2 });
+        let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
         let begun = Instant::now();
         let truth =
             patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
@@ -111,9 +111,9 @@ impl<'a> Search<'a> {
 
     /// Traces the reference again where it is too coarse to hold `samples` against.
     fn sharpen(&mut self, samples: Samples) -> Result<()> {
-        let (stage, wanted) = (self.probe.stage, samples_of_reference(self.probe.goal, samples));
-        if 2 * self.reference.spp < wanted.spp || self.reference.shadow < samples.shadow {
-            self.reference = wanted;
+        if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
+            let stage = self.probe.stage;
+            self.reference = samples_of_reference(samples);
             self.truth = self.patches.trace(stage, &reference(stage.base, self.reference))?;
         }
         Ok(())
