@@ -46,7 +46,7 @@ pub struct Measured {
 pub struct Figure {
     /// Of the worst frame.
     pub figure: f64,
-    /// Squared error of the worst frame, the reference's own in it, display steps.
+    /// Squared error of the worst frame, the reference's own and rounding in it, display steps.
     pub squared_error: f64,
 }
 

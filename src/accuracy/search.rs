@@ -5,7 +5,7 @@ use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
 use super::foretell::{Figure, Foretelling, Line, Measured, Pace};
 use super::law::{Law, Point, Samples};
-use super::patches::{Patches, Seen};
+use super::patches::{Patches, Seen, rounded};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
 use crate::error::Result;
@@ -123,9 +123,11 @@ impl<'a> Search<'a> {
         let seen = self.traced(samples)?;
         let errors = squares(&self.patches, &self.truth, &seen);
         let of = |goal| -> Result<Figure> {
-            let squared_error = errors.iter().copied().fold(0.0, f64::max);
-            let figure = figure(goal, &self.patches, &self.truth, &seen)?;
-            Ok(Figure { figure, squared_error })
+            let worst = errors.iter().copied().fold(0.0, f64::max);
+            // As the file will have it: FLIP sees steps of 8 bits all over the picture.
+            let filed = if self.probe.rounds { rounded(&seen) } else { seen.clone() };
+            let figure = figure(goal, &self.patches, &self.truth, &filed)?;
+            Ok(Figure { figure, squared_error: worst + self.foretelling.rounding })
         };
         let goal = self.probe.goal.filter(|goal| goal.most().is_some());
         let figure = goal.map(of).transpose()?;

@@ -105,7 +105,7 @@ impl Foretelling {
     fn figure_of(&self, tried: &Measured) -> Option<f64> {
         let found = tried.figure?;
         let bias = self.bias.iter().copied().fold(0.0, f64::max);
-        let all = self.excess * found.squared_error + bias + self.rounding;
+        let all = self.excess * found.squared_error + bias;
         // Without a line: no figure rises faster than the squared error.
         let rise = self.line.map_or(1.0, |line| line.rise.min(1.0));
         Some(found.figure * (all / found.squared_error.max(1e-12)).powf(rise))
