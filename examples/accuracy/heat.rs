@@ -44,7 +44,7 @@ pub fn write(sweep: &Sweep) {
 /// The reference's frame of the same number, display values.
 fn reference(sweep: &Sweep) -> Image {
     let frames = sweep.json["frames"].as_array().unwrap();
-    let shown = frames.get(1).or(frames.first()).unwrap().as_u64().unwrap();
+    let shown = frames[frames.len() / 2].as_u64().unwrap();
     let begins = format!("reference_{shown:04}_");
     let entries = std::fs::read_dir(sweep.folder.join("sweep")).unwrap().flatten();
     let found = entries

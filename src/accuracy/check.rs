@@ -3,7 +3,7 @@
 use super::choice::Goal;
 use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
-use super::foretell::Foretelling;
+use super::foretell::{Foretelling, Foretold};
 use super::law::Samples;
 use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
 use crate::error::Result;
@@ -31,20 +31,22 @@ pub struct Check {
 }
 
 impl Check {
-    /// Looks at some finished frames, rendered with `samples`, at other pixels than the probe did, as
+    /// Looks at some finished frames, rendered as `foretold`, at other pixels than the probe did, as
     /// many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
     /// Those of tracing and of `image`.
     pub fn of(
         probe: &Probe,
-        samples: Samples,
+        foretold: &Foretold,
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<Self> {
         let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
-        let reference = reference(probe.stage.base, samples_of_reference(samples));
+        let samples = samples_of_reference(foretold.samples);
+        let mut reference = reference(probe.stage.base, samples);
+        reference.bounces = reference.bounces.max(foretold.bounces);
         let truth = patches.trace(probe.stage, &reference)?;
         let found =
             squares(&patches, &truth, &seen).into_iter().zip(doubts(&patches, &truth, &seen));

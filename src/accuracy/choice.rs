@@ -28,6 +28,17 @@ impl std::fmt::Display for Goal {
 }
 
 impl Goal {
+    /// Its figure in words: `figure` rises with the error, so it is what SSIM is less than 1. `None` for
+    /// PSNR, which is told of every setting.
+    pub fn in_words(self, figure: f64) -> Option<String> {
+        match self {
+            Self::Psnr(_) => None,
+            Self::Ssim(_) => Some(format!("SSIM {:.4}", 1.0 - figure)),
+            Self::Flip(_) => Some(format!("FLIP {figure:.4}")),
+            Self::MaxShare(_) => Some(format!("share {:.3} %", 100.0 * figure)),
+        }
+    }
+
     /// Whether `errors` reach it.
     pub fn is_met(self, errors: &Errors) -> bool {
         match self {
@@ -90,5 +101,14 @@ mod tests {
         assert_eq!(fastest(Goal::MaxShare(0.0)), Some(String::new()));
         assert_eq!(options(best_within(&measured, 1.3)), Some("--tolerance 0.5".into()));
         assert_eq!(options(best_within(&measured, 0.5)), None);
+    }
+
+    #[test]
+    fn a_figure_is_told_in_the_unit_that_it_was_asked_in() {
+        let words = |goal: Goal, figure| goal.in_words(figure).unwrap_or_default();
+        assert_eq!(words(Goal::Ssim(0.99), 0.0125), "SSIM 0.9875");
+        assert_eq!(words(Goal::Flip(0.01), 0.0125), "FLIP 0.0125");
+        assert_eq!(words(Goal::MaxShare(0.05), 0.0125), "share 1.250 %");
+        assert_eq!(Goal::Psnr(40.0).in_words(0.0125), None);
     }
 }

@@ -7,10 +7,14 @@ use super::choice::Goal;
 use super::law::{Law, Samples};
 use super::worst::worst;
 use crate::measure::psnr;
+use crate::scene::limits::MAX_BOUNCES;
 use crate::scene::{Policy, ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
 pub use line::Line;
+
+/// Times are not known to a tenth; so much longer may be taken by what is more accurate.
+const ALIKE: f64 = 1.1;
 
 /// A way to take over light from other frames, as it came out on a few small frames.
 ///
@@ -42,7 +46,7 @@ pub struct Measured {
 pub struct Figure {
     /// Of the worst frame.
     pub figure: f64,
-    /// Squared error of the worst frame, the reference's own in it, display steps.
+    /// Squared error of the worst frame, the reference's own and rounding in it, display steps.
     pub squared_error: f64,
 }
 
@@ -158,16 +162,18 @@ impl Foretelling {
         }
     }
 
-    /// For each mode the fastest setting that is foretold to be off by at most `allowed`. Where the goal's
-    /// figure was found of a setting, that decides.
+    /// For each mode the fastest setting that is foretold to be off by at most `allowed`, or the nearest to
+    /// the truth of those that are hardly slower. Where the goal's figure was found of a setting, that
+    /// alone decides.
     pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Foretold> {
-        let least = |found: &mut dyn Iterator<Item = Foretold>| {
-            found.min_by(|a, b| a.seconds.total_cmp(&b.seconds))
+        let will_do = |f: &Foretold| {
+            self.reached(f.samples) || (f.squared_error <= allowed && !self.missed(f.samples))
         };
         let best = |mode| {
-            let within = |f: &Foretold| f.squared_error <= allowed && !self.missed(f.samples);
-            least(&mut self.all(mode, range).filter(within))
-                .or_else(|| least(&mut self.all(mode, range).filter(|f| self.reached(f.samples))))
+            let found = || self.all(mode, range).filter(will_do);
+            let least = found().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
+            let alike = found().filter(|f| f.seconds <= ALIKE * least);
+            alike.min_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
         };
         self.modes.iter().filter_map(best).collect()
     }
@@ -191,6 +197,13 @@ impl Foretelling {
     /// The same with all errors of samples `factor` times as large.
     pub fn worse(&self, factor: f64) -> Self {
         Self { excess: self.excess * factor, ..self.clone() }
+    }
+
+    /// The same with twice the bounces, where rays ended for too few of them.
+    pub fn with_more_bounces(self) -> Self {
+        let is_cut = self.bias.iter().any(|bias| *bias > 0.0);
+        let bounces = if is_cut { (2 * self.bounces).min(MAX_BOUNCES) } else { self.bounces };
+        Self { bounces, ..self }
     }
 
     /// The setting with the least error foretold.
@@ -225,19 +238,21 @@ impl Foretelling {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::law::Causes;
+    use super::super::law::{Causes, Point};
     use super::*;
 
     pub(super) fn foretelling() -> Foretelling {
         let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
         let error =
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
-        let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)]
-            .map(|(n, m)| (samples(n, m), vec![error(samples(n, m)) + error(samples(4096, 16))]));
+        let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)].map(|(n, m)| {
+            let (samples, reference) = (samples(n, m), samples(4096, 16));
+            Point { samples, reference, errors: vec![error(samples) + error(reference)] }
+        });
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
         Foretelling {
-            law: Law::of(Causes { shadow: true, sky: false }, &points, &[samples(4096, 16); 5]),
+            law: Law::of(Causes { shadow: true, sky: false }, &points.each_ref()),
             measured: Vec::new(),
             bias: vec![0.5],
             rounding: 1.0 / 12.0,
@@ -268,9 +283,26 @@ pub(super) mod tests {
         let samples = |f: &Foretold| (f.samples.spp, f.samples.shadow);
         assert_eq!(found.iter().map(samples).collect::<Vec<_>>(), [(16, 1), (8, 4)]);
         assert!(found.iter().all(|f| f.squared_error <= allowed));
+        // Shadow samples that hardly cost anything are taken.
+        let cheap = Mode { seconds: [0.0, 2.0, 0.01, 0.0], ..foretelling.modes[1].clone() };
+        let cheap = Foretelling { modes: vec![cheap], ..foretelling.clone() };
+        assert_eq!(
+            cheap.fastest(&range(), allowed).iter().map(samples).collect::<Vec<_>>(),
+            [(8, 16)]
+        );
         assert!(foretelling.fastest(&range(), 0.1).is_empty());
         // A figure that rises as the root of the squared error.
         assert!((foretelling.allowed(Goal::Flip(0.02)) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bounces_are_more_where_rays_ended_for_too_few() {
+        let some = foretelling().with_more_bounces();
+        assert_eq!((some.bounces, some.clone().with_more_bounces().bounces), (8, 16));
+        let none = Foretelling { bias: vec![0.0], ..foretelling() };
+        assert_eq!(none.with_more_bounces().bounces, 4);
+        let most = Foretelling { bounces: MAX_BOUNCES - 1, ..foretelling() };
+        assert_eq!(most.with_more_bounces().bounces, MAX_BOUNCES);
     }
 
     #[test]

@@ -4,9 +4,19 @@ use crate::scene::{Policy, Settings};
 use crate::sequence::Pyramid;
 use std::collections::BTreeSet;
 
-/// Frames of a move of `count` that stand for all: the first, which is always traced whole, and two
-/// neighbours, so that flicker shows. All frames of a short move.
+/// Frames of a move of `count` that stand for all: pairs that follow one another, so that flicker shows,
+/// at its start, its middle and its end. The first and the last are always traced whole. All frames
+/// of a short move.
 pub fn chosen_frames(count: u32) -> Vec<u32> {
+    if count <= 6 {
+        return (1..=count).collect();
+    }
+    let middle = 1 + (count - 2) / 2;
+    vec![1, 2, middle, middle + 1, count - 1, count]
+}
+
+/// Fewer frames, where only times are wanted and soon: the first, and two neighbours.
+pub(super) fn timed_frames(count: u32) -> Vec<u32> {
     if count <= 4 {
         return (1..=count).collect();
     }
@@ -69,16 +79,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chosen_frames_hold_the_first_and_neighbours() {
+    fn chosen_frames_are_neighbours_from_the_first_to_the_last() {
         assert_eq!(chosen_frames(3), [1, 2, 3]);
-        assert_eq!(chosen_frames(24), [1, 8, 9]);
+        assert_eq!(chosen_frames(7), [1, 2, 3, 4, 6, 7]);
+        assert_eq!(chosen_frames(24), [1, 2, 12, 13, 23, 24]);
+        assert_eq!(timed_frames(24), [1, 8, 9]);
         for count in 1..200 {
             let frames = chosen_frames(count);
-            assert!(
-                frames[0] == 1 && frames.windows(2).all(|w| w[0] < w[1]),
-                "{count}: {frames:?}"
-            );
-            assert!(frames.iter().all(|f| *f <= count));
+            let rises = |frames: &[u32]| frames.windows(2).all(|w| w[0] < w[1]);
+            assert!(frames[0] == 1 && frames.last() == Some(&count), "{count}: {frames:?}");
+            assert!(rises(&frames), "{count}: {frames:?}");
+            let has = |frame: u32| frames.contains(&frame);
+            let follows = |f: &u32| has(f + 1) || (*f > 1 && has(f - 1));
+            assert!(count == 1 || frames.iter().all(follows), "{count}: {frames:?}");
+            // The gaps between pairs are alike.
+            let gaps: Vec<u32> =
+                frames.windows(2).map(|w| w[1] - w[0]).filter(|g| *g > 1).collect();
+            assert!(gaps.iter().all(|gap| gap.abs_diff(gaps[0]) <= 1), "{count}: {frames:?}");
+            let timed = timed_frames(count);
+            assert!(timed[0] == 1 && rises(&timed) && timed.iter().all(|f| *f <= count));
         }
     }
 

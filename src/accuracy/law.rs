@@ -58,8 +58,16 @@ pub struct Law {
     pub misfit: f64,
 }
 
-/// A measured error: samples, and for each frame the mean squared difference from the reference.
-pub type Point = (Samples, Vec<f64>);
+/// What some samples came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// The samples.
+    pub samples: Samples,
+    /// Those of the reference that they were held against.
+    pub reference: Samples,
+    /// For each frame the mean squared difference from it.
+    pub errors: Vec<f64>,
+}
 
 /// What is left of a squared error with `count` samples, where it falls by `power` from one power of two
 /// to the next. The mean over 6 samples is that of a block of 4 and of one of 2.
@@ -86,8 +94,8 @@ impl Powers {
 impl Law {
     /// The law that comes nearest to `points`, as shares of them. `references` are the samples of what
     /// each was held against, whose own error is part of the difference.
-    pub fn of(causes: Causes, points: &[Point], references: &[Samples]) -> Self {
-        let frames = points.first().map_or(0, |(_, errors)| errors.len());
+    pub fn of(causes: Causes, points: &[&Point]) -> Self {
+        let frames = points.first().map_or(0, |point| point.errors.len());
         let mut best = Self {
             causes,
             powers: Powers { camera: 1.0, light: 1.0, samples: 1.0 },
@@ -100,7 +108,7 @@ impl Law {
             for light in grid(1.0, if lit { 1.6 } else { 1.0 }) {
                 for samples in grid(0.8, if lit { 1.8 } else { 0.8 }) {
                     let powers = Powers { camera, light, samples };
-                    let law = Self::with(causes, powers, points, references);
+                    let law = Self::with(causes, powers, points);
                     if law.misfit < best.misfit {
                         best = law;
                     }
@@ -110,19 +118,19 @@ impl Law {
         best
     }
 
-    fn with(causes: Causes, powers: Powers, points: &[Point], references: &[Samples]) -> Self {
-        let rows = points.iter().zip(references).map(|((samples, _), reference)| {
-            let mut row = powers.regressors(causes, *samples);
-            let [camera, shadow, sky, _] = powers.regressors(causes, *reference);
+    fn with(causes: Causes, powers: Powers, points: &[&Point]) -> Self {
+        let rows = points.iter().map(|point| {
+            let mut row = powers.regressors(causes, point.samples);
+            let [camera, shadow, sky, _] = powers.regressors(causes, point.reference);
             // Both are biased the same way.
             row.iter_mut().zip([camera, shadow, sky]).for_each(|(x, own)| *x += own);
             row
         });
         let rows: Vec<Amplitudes> = rows.collect();
-        let count = points.first().map_or(0, |(_, errors)| errors.len());
+        let count = points.first().map_or(0, |point| point.errors.len());
         let (mut frames, mut squares) = (Vec::new(), 0.0);
         for frame in 0..count {
-            let measured: Vec<f64> = points.iter().map(|(_, errors)| errors[frame]).collect();
+            let measured: Vec<f64> = points.iter().map(|point| point.errors[frame]).collect();
             let (amplitudes, misfit) = fit(&rows, &measured);
             frames.push(amplitudes);
             squares += misfit * misfit;
@@ -137,11 +145,11 @@ impl Law {
         self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
     }
 
-    /// The law under which `samples` come to `measured`, frame by frame, held against `reference`.
-    pub fn through(&self, samples: Samples, measured: &[f64], reference: Samples) -> Self {
-        let own: Vec<f64> = self.errors(reference).collect();
+    /// The law under which `point` comes to what it did, frame by frame.
+    pub fn through(&self, point: &Point) -> Self {
+        let own: Vec<f64> = self.errors(point.reference).collect();
         let mut law = self.clone();
-        let told = self.errors(samples).zip(own).zip(measured);
+        let told = self.errors(point.samples).zip(own).zip(&point.errors);
         for (frame, ((foretold, own), measured)) in law.frames.iter_mut().zip(told) {
             let factor = measured / f64::max(foretold + own, 1e-12);
             frame.iter_mut().for_each(|amplitude| *amplitude *= factor);
@@ -182,12 +190,12 @@ mod tests {
             let s = Samples { spp, shadow, sky };
             let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];
             let error = |scale: f64| (truth(s, scale) + truth(REFERENCE, scale)) * off;
-            (s, vec![error(1.0), error(2.0)])
+            Point { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
         };
         let design =
             [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
         let points: Vec<Point> = design.into_iter().enumerate().map(point).collect();
-        let law = Law::of(LIT, &points, &[REFERENCE; 7]);
+        let law = Law::of(LIT, &points.iter().collect::<Vec<_>>());
         assert!(law.misfit < 0.05, "{law:?}");
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
             let s = Samples { spp, shadow, sky };
@@ -219,10 +227,11 @@ mod tests {
     fn an_effect_that_is_not_there_has_no_part() {
         let point = |spp: u32| {
             let s = Samples { spp, shadow: 16, sky: 16 };
-            (s, vec![9.0 / f64::from(spp) + 9.0 / 128.0])
+            let errors = vec![9.0 / f64::from(spp) + 9.0 / 128.0];
+            Point { samples: s, reference: REFERENCE, errors }
         };
         let points = [point(1), point(4), point(16)];
-        let law = Law::of(Causes { shadow: false, sky: false }, &points, &[REFERENCE; 3]);
+        let law = Law::of(Causes { shadow: false, sky: false }, &points.each_ref());
         let error =
             |shadow| law.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
         assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{law:?}");
@@ -234,9 +243,11 @@ mod tests {
         let s = Samples { spp: 8, shadow: 2, sky: 1 };
         let points = [1, 4, 16].map(|spp| {
             let s = Samples { spp, ..s };
-            (s, vec![truth(s, 1.0), truth(s, 2.0)])
+            let errors = vec![truth(s, 1.0), truth(s, 2.0)];
+            Point { samples: s, reference: REFERENCE, errors }
         });
-        let law = Law::of(LIT, &points, &[REFERENCE; 3]).through(s, &[3.0, 7.0], REFERENCE);
+        let point = Point { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
+        let law = Law::of(LIT, &points.each_ref()).through(&point);
         let [own, _] = [0, 1].map(|i| law.errors(REFERENCE).nth(i).expect("a frame"));
         let now: Vec<f64> = law.errors(s).collect();
         assert!((now[0] + own - 3.0).abs() < 1e-9 && now[1] > 6.0, "{now:?}");

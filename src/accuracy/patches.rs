@@ -49,6 +49,15 @@ struct Contrast {
 /// The patches of each frame, as displayed: one image a patch.
 pub type Seen = Vec<Vec<Image>>;
 
+/// The patches in steps of 8 bits.
+pub fn rounded(seen: &Seen) -> Seen {
+    let mut seen = seen.clone();
+    for rgb in seen.iter_mut().flatten().flat_map(|image| &mut image.rgb) {
+        *rgb = (*rgb * 255.0).round() / 255.0;
+    }
+    seen
+}
+
 impl Patches {
     /// Patches of `edge` pixels of each of `frames`, one in each cell of a grid, about `pixels` pixels
     /// of a frame, at places that `lot` draws.

@@ -5,19 +5,31 @@ use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
 use super::foretell::{Figure, Foretelling, Line, Measured, Pace};
 use super::law::{Law, Point, Samples};
-use super::patches::{Patches, Seen};
+use super::patches::{Patches, Seen, rounded};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
 use crate::error::Result;
-use crate::scene::Policy;
 use std::time::Instant;
 
 /// Share of what the goal allows that bounces and cut-off may take.
 const BIAS: f64 = 0.1;
+/// What samples may come to, of the least error that the sweep did, where no goal says.
+const BEYOND: f64 = 0.25;
+/// Numbers of bounces that are thought of.
+const BOUNCES: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 /// How often the likely choices are tried.
-const ROUNDS: u32 = 3;
+const ROUNDS: u32 = 4;
 /// The same where the goal's figure only goes somehow with the squared error.
-const ROUNDS_BY_FIGURE: u32 = 8;
+const ROUNDS_BY_FIGURE: u32 = 10;
+
+/// What samples that were traced came to.
+struct Found {
+    point: Point,
+    /// How far each frame's error may be off, a share.
+    doubts: Vec<f64>,
+    /// The goal's figure, unless that is the squared error.
+    figure: Option<Figure>,
+}
 
 /// What is known so far.
 pub(super) struct Search<'a> {
@@ -25,10 +37,7 @@ pub(super) struct Search<'a> {
     patches: Patches,
     truth: Seen,
     reference: Samples,
-    points: Vec<Point>,
-    references: Vec<Samples>,
-    doubts: Vec<Vec<f64>>,
-    figures: Vec<Option<Figure>>,
+    found: Vec<Found>,
     /// What it comes to.
     pub foretelling: Foretelling,
 }
@@ -44,7 +53,7 @@ impl<'a> Search<'a> {
         let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
         let causes = probe.causes();
         let foretelling = Foretelling {
-            law: Law::of(causes, &[], &[]),
+            law: Law::of(causes, &[]),
             measured: Vec::new(),
             bias: Vec::new(),
             rounding: if probe.rounds { 1.0 / 12.0 } else { 0.0 },
@@ -56,23 +65,12 @@ impl<'a> Search<'a> {
             pace: Some(Pace { samples: reference, seconds }),
             excess: 1.0,
         };
-        let mut search = Self {
-            probe,
-            patches,
-            truth,
-            reference,
-            points: Vec::new(),
-            references: Vec::new(),
-            doubts: Vec::new(),
-            figures: Vec::new(),
-            foretelling,
-        };
+        let mut search = Self { probe, patches, truth, reference, found: Vec::new(), foretelling };
         for samples in search.design() {
             search.measure(samples)?;
         }
         search.learn();
-        let allowed = probe.goal.map_or(f64::INFINITY, |goal| search.foretelling.allowed(goal));
-        let (bounces, bias) = search.bounces(BIAS * allowed)?;
+        let (bounces, bias) = search.bounces(BIAS * search.in_reach())?;
         (search.foretelling.bounces, search.foretelling.bias) = (bounces, bias);
         Ok(search)
     }
@@ -81,17 +79,10 @@ impl<'a> Search<'a> {
     pub fn try_likely(&mut self, goal: Goal) -> Result<()> {
         let is_squared = self.foretelling.most.is_none();
         for _ in 0..if is_squared { ROUNDS } else { ROUNDS_BY_FIGURE } {
-            let within = |allowed| self.foretelling.fastest(&self.probe.range(), allowed);
-            let mut likely = likely_of(within(self.foretelling.allowed(goal)));
-            if likely.is_empty() && !is_squared {
-                likely = likely_of(within(self.foretelling.next_step()));
-            }
-            let mut new: Vec<Samples> = Vec::new();
-            for samples in likely.iter().map(|found| found.samples) {
-                // Modes may agree on samples, not only neighbours among them.
-                if self.foretelling.tried(samples).is_none() && !new.contains(&samples) {
-                    new.push(samples);
-                }
+            let mut new = self.untried(self.foretelling.to_try(goal));
+            if new.is_empty() {
+                let between = self.foretelling.between();
+                new = between.map_or(Vec::new(), |allowed| self.untried(allowed));
             }
             if new.is_empty() {
                 break;
@@ -103,6 +94,19 @@ impl<'a> Search<'a> {
             self.learn();
         }
         Ok(())
+    }
+
+    /// The samples that would be chosen if squared errors up to `allowed` were, but for those that were
+    /// tried.
+    fn untried(&self, allowed: f64) -> Vec<Samples> {
+        let mut new: Vec<Samples> = Vec::new();
+        for found in likely_of(self.foretelling.fastest(&self.probe.range(), allowed)) {
+            // Modes may agree on samples, not only neighbours among them.
+            if self.foretelling.tried(found.samples).is_none() && !new.contains(&found.samples) {
+                new.push(found.samples);
+            }
+        }
+        new
     }
 
     /// Traces the reference again where it is too coarse to hold `samples` against.
@@ -118,46 +122,44 @@ impl<'a> Search<'a> {
     fn measure(&mut self, samples: Samples) -> Result<()> {
         let seen = self.traced(samples)?;
         let errors = squares(&self.patches, &self.truth, &seen);
-        self.doubts.push(doubts(&self.patches, &self.truth, &seen));
         let of = |goal| -> Result<Figure> {
-            let squared_error = errors.iter().copied().fold(0.0, f64::max);
-            let figure = figure(goal, &self.patches, &self.truth, &seen)?;
-            Ok(Figure { figure, squared_error })
+            let worst = errors.iter().copied().fold(0.0, f64::max);
+            // As the file will have it: FLIP sees steps of 8 bits all over the picture.
+            let filed = if self.probe.rounds { rounded(&seen) } else { seen.clone() };
+            let figure = figure(goal, &self.patches, &self.truth, &filed)?;
+            Ok(Figure { figure, squared_error: worst + self.foretelling.rounding })
         };
         let goal = self.probe.goal.filter(|goal| goal.most().is_some());
-        self.figures.push(goal.map(of).transpose()?);
-        self.points.push((samples, errors));
-        self.references.push(self.reference);
+        let figure = goal.map(of).transpose()?;
+        let doubts = doubts(&self.patches, &self.truth, &seen);
+        let point = Point { samples, reference: self.reference, errors };
+        self.found.push(Found { point, doubts, figure });
         Ok(())
     }
 
     /// Fits the law to all that was measured, and puts it through the last.
     fn learn(&mut self) {
-        let law = Law::of(self.probe.causes(), &self.points, &self.references);
-        let own = |reference: Samples| law.errors(reference).collect::<Vec<_>>();
-        let all = self.points.iter().zip(&self.references).zip(&self.doubts).zip(&self.figures);
-        self.foretelling.measured = all
-            .map(|((((samples, errors), reference), doubts), figure)| {
-                // The law tells the reference's part of the difference.
-                let parts =
-                    law.errors(*samples).zip(own(*reference)).map(|(s, r)| s / (s + r).max(1e-12));
-                let errors = errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-                Measured { samples: *samples, errors, doubts: doubts.clone(), figure: *figure }
-            })
-            .collect();
-        self.foretelling.doubts = self.doubts.last().cloned().unwrap_or_default();
-        let last = self.points.last().zip(self.references.last());
-        self.foretelling.law = match last {
-            Some(((samples, errors), reference)) => law.through(*samples, errors, *reference),
-            None => law,
+        let points: Vec<&Point> = self.found.iter().map(|found| &found.point).collect();
+        let law = Law::of(self.probe.causes(), &points);
+        let measured = |Found { point, doubts, figure }: &Found| {
+            // The law tells the reference's part of the difference.
+            let own = law.errors(point.samples).zip(law.errors(point.reference));
+            let parts = own.map(|(s, r)| s / (s + r).max(1e-12));
+            let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
+            Measured { samples: point.samples, errors, doubts: doubts.clone(), figure: *figure }
         };
+        self.foretelling.measured = self.found.iter().map(measured).collect();
+        let last = self.found.last();
+        self.foretelling.doubts = last.map_or(Vec::new(), |last| last.doubts.clone());
+        self.foretelling.law = last.map_or(law.clone(), |last| law.through(&last.point));
         self.foretelling.line = self.foretelling.most.and_then(|most| self.line(most));
     }
 
     /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
     /// say, cannot go on rising.
     fn line(&self, most: f64) -> Option<Line> {
-        let all = self.figures.iter().flatten().filter(|found| found.figure > 0.0);
+        let all =
+            self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
         let mut nearest: Vec<(f64, f64)> =
             all.map(|found| (found.squared_error, found.figure)).collect();
         let off = |found: &(f64, f64)| (found.1 / most).ln().abs();
@@ -190,34 +192,55 @@ impl<'a> Search<'a> {
         self.patches.trace(stage, &settings)
     }
 
-    /// The fewest bounces that miss at most `allowed`, the most there are otherwise; and what they
-    /// miss in each frame. The same random numbers with more bounces tell.
+    /// The squared error that the sweep leaves to hope for: what the goal allows. Where its figure alone
+    /// decides, what reached that, if anything did; else no less than a quarter of the least, which
+    /// goes for a budget too.
+    fn in_reach(&self) -> f64 {
+        let foretelling = &self.foretelling;
+        if let Some(goal @ Goal::Psnr(_)) = self.probe.goal {
+            return foretelling.allowed(goal);
+        }
+        let worst = |found: &Found| found.point.errors.iter().copied().fold(0.0, f64::max);
+        let least = BEYOND * self.found.iter().map(worst).fold(f64::INFINITY, f64::min);
+        let Some(most) = foretelling.most else { return least };
+        let reaches = |found: &&Found| found.figure.is_some_and(|f| f.figure <= most);
+        let reached = self.found.iter().filter(reaches).map(worst).fold(0.0, f64::max);
+        let line = foretelling.line.map(|line| line.squared_error(most));
+        match reached > 0.0 {
+            true => line.unwrap_or(f64::INFINITY).min(reached),
+            false => line.unwrap_or(0.0).max(least),
+        }
+    }
+
+    /// The fewest bounces that miss at most `allowed`, or no more than that beyond what the most miss; and
+    /// what they miss in each frame. The same random numbers with more bounces tell.
     fn bounces(&self, allowed: f64) -> Result<(u32, Vec<f64>)> {
-        let (base, plan) = (self.probe.stage.base, self.probe.plan());
-        let truth = self.traced(Samples { spp: 4, shadow: 1, sky: 1 })?;
-        let mut settings = base.clone();
-        (settings.spp, settings.shadow_samples, settings.sky_samples) = (4, 1, 1);
-        settings.reuse.policy = Policy::Off;
-        let is_free =
-            allowed.is_finite() && !self.probe.given.bounces && (plan.mirror || plan.glass);
+        let (probe, base, plan) = (self.probe, self.probe.stage.base, self.probe.plan());
         let mut tried = vec![base.bounces];
-        if is_free {
-            tried = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32].to_vec();
-            tried.push(base.bounces);
+        if !probe.given.bounces && (plan.mirror || plan.glass) {
+            tried.extend(BOUNCES);
             tried.sort_unstable();
             tried.dedup();
         }
-        let mut last = (base.bounces, Vec::new());
+        let mut settings = reference(base, Samples { spp: 4, shadow: 1, sky: 1 });
+        settings.seed = base.seed;
+        settings.bounces = tried.iter().copied().fold(settings.bounces, u32::max);
+        let truth = self.patches.trace(probe.stage, &settings)?;
+        settings.cutoff = base.cutoff;
+        let mut all: Vec<(u32, Vec<f64>)> = Vec::new();
         for bounces in tried {
             settings.bounces = bounces;
-            let seen = self.patches.trace(self.probe.stage, &settings)?;
+            let seen = self.patches.trace(probe.stage, &settings)?;
             let bias = squares(&self.patches, &truth, &seen);
-            let is_enough = bias.iter().all(|bias| *bias <= allowed);
-            last = (bounces, bias);
-            if is_enough {
-                break;
+            if bias.iter().all(|bias| *bias <= allowed) {
+                return Ok((bounces, bias));
             }
+            all.push((bounces, bias));
         }
-        Ok(last)
+        // What the cut-off leaves out no number of them brings.
+        let most = all.last().map_or(Vec::new(), |(_, bias)| bias.clone());
+        let is_as_good = |bias: &[f64]| bias.iter().zip(&most).all(|(b, m)| *b <= m + allowed);
+        let found = all.into_iter().find(|(_, bias)| is_as_good(bias));
+        Ok(found.unwrap_or((base.bounces, most)))
     }
 }

@@ -58,7 +58,7 @@ pub struct Picture {
 impl Sweep<'_> {
     /// The frame that pictures are shown of: one that is inferred, if any is.
     pub fn shown_frame(&self) -> u32 {
-        self.frames.get(1).or(self.frames.first()).copied().unwrap_or(1)
+        self.frames.get(self.frames.len() / 2).copied().unwrap_or(1)
     }
 
     /// How many display steps two of the best-sampled frames differ by, over √2: the error that is

@@ -1,7 +1,7 @@
 //! How long what may be chosen takes: tried on small frames, and the choice by it.
 
 use super::foretell::{Foretelling, Foretold};
-use super::frames::{Cut, chosen_frames};
+use super::frames::{Cut, timed_frames};
 use super::law::Samples;
 use super::modes::Spent;
 use super::probe::Probe;
@@ -115,8 +115,7 @@ impl Probe<'_> {
     fn small_within(&self, seconds: f64, foretold: &Foretold) -> f64 {
         let base = self.stage.base;
         let pixels = f64::from(base.width) * f64::from(base.height);
-        let frames =
-            self.cut(foretold.reuse).with_ancestors(&chosen_frames(self.stage.shot.frames));
+        let frames = self.cut(foretold.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
         let each = foretold.seconds / pixels * frames.len() as f64;
         (seconds / ((1.0 + LARGER) * each)).min(Effort::WHOLE.small)
     }
@@ -137,7 +136,7 @@ impl Probe<'_> {
     pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Spent> {
         let mut settings = settings.clone();
         (settings.width, settings.height) = self.small_size(pixels);
-        let frames = chosen_frames(self.stage.shot.frames);
+        let frames = timed_frames(self.stage.shot.frames);
         let trial = trial::run(self.stage, &settings, self.stage.intersector, &frames)?;
         Ok(Spent { wall: trial.seconds, cpu: trial.cpu_seconds })
     }

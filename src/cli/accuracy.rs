@@ -51,7 +51,8 @@ pub struct AccuracyArgs {
     /// Folder for the page and the figures
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Frames to look at, as in 1,8,9 [default: the first, and two neighbours]
+    /// Frames to look at, as in 1,8,9 [default: pairs at the start, the
+    /// middle and the end]
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..))]
     frames: Vec<u32>,

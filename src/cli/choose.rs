@@ -202,11 +202,8 @@ impl Chooser<'_> {
         });
         // A figure that goes with no error for sure: what was seen of it.
         let seen = foretelling.nearest().map(|(tried, figure)| {
-            let figure = match self.args.target {
-                Some(Goal::Ssim(_)) => format!("SSIM {:.4}", 1.0 - figure),
-                Some(Goal::MaxShare(_)) => format!("a share of {:.3} %", 100.0 * figure),
-                _ => format!("FLIP {figure:.4}"),
-            };
+            let in_words = |goal: Goal| goal.in_words(figure);
+            let figure = self.args.target.and_then(in_words).unwrap_or_default();
             format!(
                 "; of what was tried, --spp {} --shadow-samples {} --sky-samples {} came nearest, to \
                  {figure}",
@@ -265,13 +262,20 @@ impl Chooser<'_> {
 
     fn say_choice(&self, choice: &Choice) {
         self.tell(format!(
-            "for {}: {}\nforetold: PSNR {:.1} dB in the worst frame, {} a frame, {} in all",
+            "for {}: {}\nforetold: {}PSNR {:.1} dB in the worst frame, {} a frame, {} in all",
             choice.wanted,
             choice.options(),
+            self.figure(choice).map_or(String::new(), |figure| format!("{figure}, ")),
             choice.foretold.psnr(),
             duration(choice.foretold.seconds),
             duration(choice.seconds)
         ));
+    }
+
+    /// What is foretold of a choice in the target's own unit, unless that is PSNR.
+    fn figure(&self, choice: &Choice) -> Option<String> {
+        let figure = choice.foretelling.foretold_figure(&choice.foretold)?;
+        self.args.target?.in_words(figure)
     }
 
     fn tell(&self, text: String) {

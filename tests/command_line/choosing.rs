@@ -119,9 +119,15 @@ fn a_job_that_gets_longer_keeps_its_choice_or_its_tighter_one() {
 #[test]
 fn figures_that_need_neighbours_are_targets_too() {
     let job = Job::new();
-    for (target, figure) in [("ssim=0.9", ", SSIM 0.9"), ("flip=10%", ", FLIP 0.0")] {
+    let targets = [("ssim=0.9", "SSIM 0.9"), ("flip=10%", "FLIP 0.0"), ("max-share=30%", "share ")];
+    for (target, figure) in targets {
         let said = job.done(&format!("{LINE} --target {target} --overwrite")).err;
-        assert!(said.contains(figure), "{said}");
+        // Before and afterwards in the same unit.
+        let line = |begin: &str| said.lines().rfind(|line| line.starts_with(begin)).expect("said");
+        assert!(line("foretold: ").starts_with(&format!("foretold: {figure}")), "{said}");
+        let came = line("came out: ");
+        assert!(came.starts_with(&format!("came out: {figure}")), "{said}");
+        assert!(came.contains(&format!(" in the worst, foretold {figure}")), "{said}");
     }
 }
 
@@ -148,6 +154,30 @@ fn what_cannot_be_foretold_is_refused() {
     job.refused(&format!("{LINE} --budget 0s"), "a budget is at least 1s");
     job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
+}
+
+/// Between mirrors that face each other four bounces, which are the default, leave the picture dark in the
+/// middle: no time makes that up.
+#[test]
+fn a_budget_pays_for_the_bounces_that_a_scene_needs() {
+    let job = Job::new();
+    let scene = "[camera]\nframes = 2\npan = { from = [0, 1, 1], to = [0.2, 1, 1], target = [0, 1, -2] }\n\
+                 [[light]]\nquad = { centre = [0, 3.9, 0], normal = '-y', size = [1, 1], radiance = 12 }\n\
+                 [material.mirror]\nmirror = 0.95\n\
+                 [[mesh]]\nquad = { corner = [-5, 0, 3], edges = [[10, 0, 0], [0, 0, -6]] }\n\
+                 [[mesh]]\nquad = { corner = [-3, 0, -2], edges = [[6, 0, 0], [0, 4, 0]] }\n\
+                 material = 'mirror'\n\
+                 [[mesh]]\nquad = { corner = [3, 0, 2], edges = [[-6, 0, 0], [0, 4, 0]] }\n\
+                 material = 'mirror'\n";
+    std::fs::write(job.path("mirrors.toml"), scene).expect("written");
+    let line = LINE.replace("cube.obj", "mirrors.toml").replace("1..3", "1..2");
+    let bounces = |options: &str| {
+        job.done(&format!("{line} {options} --overwrite"));
+        header(&job)["settings"]["bounces"].as_u64().expect("a number")
+    };
+    assert!(bounces("--budget 4s") > 8);
+    assert!(bounces("--target psnr=35") > 8);
+    assert_eq!(bounces("--budget 4s --bounces 3"), 3);
 }
 
 /// Another tree takes another time, and may give other last bits.

@@ -62,6 +62,9 @@ impl Browser {
         for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.call(&format!("{domain}.enable"), json!({}));
         }
+        browser.call("Page.setLifecycleEventsEnabled", json!({"enabled": true}));
+        // Elements get the focus and its events, whichever window the machine thinks is in front.
+        browser.call("Emulation.setFocusEmulationEnabled", json!({"enabled": true}));
         browser
     }
 
@@ -97,8 +100,24 @@ impl Browser {
             json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
         self.call("Emulation.setDeviceMetricsOverride", metrics);
         let url = format!("file://{}", file.canonicalize().expect("a file").display());
-        self.call("Page.navigate", json!({"url": url}));
-        self.wait("document.readyState === 'complete'");
+        let navigated = self.call("Page.navigate", json!({"url": url}));
+        // Asked too early, the page that was there before would answer for the new one.
+        let loader = navigated["loaderId"].as_str().expect("a new page").to_string();
+        self.await_event(|event| {
+            event["method"] == "Page.lifecycleEvent"
+                && event["params"]["name"] == "load"
+                && event["params"]["loaderId"] == *loader
+        });
+    }
+
+    /// Waits for an event, which may have come already.
+    fn await_event(&mut self, is_it: impl Fn(&Value) -> bool) {
+        let start = Instant::now();
+        while !self.events.iter().any(&is_it) {
+            assert!(start.elapsed() < PATIENCE, "waited in vain for an event");
+            let event = self.hear();
+            self.events.push(event);
+        }
     }
 
     /// What the expression is in the page; a promise's outcome.

@@ -36,6 +36,11 @@ impl Line {
         Self { at_one: figure.ln() - self.rise * squared_error.ln(), ..self }
     }
 
+    /// The figure where the squared error is `squared_error`.
+    pub fn figure(&self, squared_error: f64) -> f64 {
+        (self.at_one + self.rise * squared_error.ln()).exp()
+    }
+
     /// The squared error at which the figure is `figure`.
     pub fn squared_error(&self, figure: f64) -> f64 {
         ((figure.ln() - self.at_one) / self.rise).exp()

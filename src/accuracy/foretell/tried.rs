@@ -2,10 +2,12 @@
 
 use super::super::choice::Goal;
 use super::super::law::Samples;
-use super::{Foretelling, Measured};
+use super::{Foretelling, Foretold, Measured};
 
 /// Where nothing that was tried reaches the goal, the squared error is to come down by so much at a time.
 const STEP: f64 = 4.0;
+/// Between squared errors less than so many times apart there is nothing to try.
+const CLOSE: f64 = 1.5;
 
 impl Goal {
     /// The largest figure that reaches it, as figures rise with the error; `None` for the squared error.
@@ -23,6 +25,12 @@ impl Foretelling {
     /// added to the squared error.
     pub fn figure(&self, samples: Samples) -> Option<f64> {
         self.figure_of(self.tried(samples)?)
+    }
+
+    /// The goal's figure that is foretold: as it was found if the samples were tried, else by the line.
+    pub fn foretold_figure(&self, foretold: &Foretold) -> Option<f64> {
+        let by_line = || self.line.map(|line| line.figure(foretold.squared_error));
+        self.figure(foretold.samples).or_else(by_line)
     }
 
     /// What `samples` came to, if they were tried, which nothing is twice.
@@ -61,8 +69,28 @@ impl Foretelling {
         self.errors_tried().filter(|(samples, _)| reached(samples)).fold(0.0, |m, (_, e)| m.max(e))
     }
 
-    /// A squared error to try where nothing reaches the goal: well below all that was tried.
-    pub fn next_step(&self) -> f64 {
+    /// A squared error to try. Where nothing reached the goal yet it is no less than a quarter of what was
+    /// tried: the line is only sure near to what it was put through, and what is far too good is dear
+    /// to try.
+    pub(in super::super) fn to_try(&self, goal: Goal) -> f64 {
+        let allowed = self.allowed(goal);
+        match self.most {
+            Some(_) if self.most_that_reached() <= 0.0 => allowed.max(self.next_step()),
+            _ => allowed,
+        }
+    }
+
+    /// A squared error half way, by factors, from the largest that reached the goal to the next larger one
+    /// that did not, unless they are close; `None` where there are not both.
+    pub(in super::super) fn between(&self) -> Option<f64> {
+        let low = self.most_that_reached();
+        let missed = self.errors_tried().filter(|(s, e)| *e > low && !self.reached(*s));
+        let high = missed.map(|(_, e)| e).fold(f64::INFINITY, f64::min);
+        (low > 0.0 && high.is_finite() && high > CLOSE * low).then(|| (low * high).sqrt())
+    }
+
+    /// A squared error well below all that was tried.
+    fn next_step(&self) -> f64 {
         self.errors_tried().fold(f64::INFINITY, |least, (_, e)| least.min(e)) / STEP
     }
 
@@ -77,7 +105,7 @@ impl Foretelling {
     fn figure_of(&self, tried: &Measured) -> Option<f64> {
         let found = tried.figure?;
         let bias = self.bias.iter().copied().fold(0.0, f64::max);
-        let all = self.excess * found.squared_error + bias + self.rounding;
+        let all = self.excess * found.squared_error + bias;
         // Without a line: no figure rises faster than the squared error.
         let rise = self.line.map_or(1.0, |line| line.rise.min(1.0));
         Some(found.figure * (all / found.squared_error.max(1e-12)).powf(rise))
@@ -132,8 +160,51 @@ mod tests {
         let (samples, figure) = none.nearest().expect("one");
         assert!(samples.spp > 1 && (figure - 0.5).abs() < 1e-9);
         // There is something further to try.
-        assert!(!none.fastest(&range(), none.next_step()).is_empty());
+        assert!(!none.fastest(&range(), none.to_try(Goal::Flip(0.02))).is_empty());
         assert_eq!(first(&without(&[(4, 1, 0.5), (16, 1, 0.5), (64, 4, 0.002)])), Some((64, 4)));
+    }
+
+    /// As `cornell` at `max-share=5%`: the line told so little that 96 camera samples were tried, and then
+    /// taken, where 32 do.
+    #[test]
+    fn what_is_tried_is_not_far_beyond_what_missed_nor_is_the_first_that_reaches_taken() {
+        let goal = Goal::Flip(0.02);
+        let flat = Line { at_one: 0.022f64.ln(), rise: 0.11 };
+        let missed = |all: &[(u32, u32, f64)]| Foretelling { line: Some(flat), ..tried(all) };
+        let error = |f: &Foretelling, spp| f.of(&f.modes[0], Samples { spp, shadow: 1, sky: 1 });
+        let none = missed(&[(4, 1, 0.03), (16, 1, 0.025)]);
+        let least = error(&none, 16).squared_error / STEP;
+        assert!(none.allowed(goal) < least && near(none.to_try(goal), least), "{none:?}");
+        assert_eq!(none.between(), None);
+        let some = missed(&[(4, 1, 0.03), (64, 1, 0.001)]);
+        let [high, low] = [4, 64].map(|spp| error(&some, spp).squared_error);
+        assert!(near(some.to_try(goal), some.allowed(goal)));
+        assert!(near(some.between().expect("between"), (low * high).sqrt()));
+        assert_eq!(missed(&[(32, 1, 0.03), (32, 4, 0.001)]).between(), None, "they are close");
+        // What reached is taken, although the line allows less.
+        let fewer = missed(&[(4, 1, 0.03), (64, 1, 0.001), (16, 1, 0.019)]);
+        assert!(error(&fewer, 16).squared_error > fewer.allowed(goal));
+        assert_eq!(first(&fewer), Some((16, 1)));
+    }
+
+    fn near(a: f64, b: f64) -> bool {
+        (a / b - 1.0).abs() < 1e-9
+    }
+
+    #[test]
+    fn a_figure_is_foretold_of_what_was_tried_and_of_what_was_not() {
+        let foretelling = tried(&[(16, 1, 0.019)]);
+        let of = |spp| {
+            let foretold =
+                foretelling.of(&foretelling.modes[0], Samples { spp, shadow: 1, sky: 1 });
+            foretelling.foretold_figure(&foretold).expect("a figure")
+        };
+        assert!((of(16) - 0.019).abs() < 1e-9);
+        // By the line, which is 0.02 at 4: 60/32 at 32 camera samples.
+        assert!((of(32) - 0.02 * (60f64 / 32.0 / 4.0).sqrt()).abs() < 1e-3, "{}", of(32));
+        let none = Foretelling { line: None, ..foretelling.clone() };
+        let foretold = none.of(&none.modes[0], Samples { spp: 32, shadow: 1, sky: 1 });
+        assert_eq!(none.foretold_figure(&foretold), None);
     }
 
     #[test]

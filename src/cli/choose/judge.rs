@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::{Choice, Chooser};
-use crate::accuracy::{Check, Effort, Goal, Timer};
+use crate::accuracy::{Check, Effort, Timer};
 use crate::cli::progress::duration;
 use crate::error::Result;
 use crate::film::{Encoding, Image};
@@ -35,23 +35,21 @@ impl Chooser<'_> {
                 return Ok(None);
             }
         };
-        let check = Check::of(&self.probe(), samples, effort, &|frame| self.image(frame))?;
+        let check = Check::of(&self.probe(), &choice.foretold, effort, &|frame| self.image(frame))?;
         let [mean, worst] = check.psnr();
         let looked = check.frames.len();
-        let figure = match self.args.target {
-            Some(Goal::Ssim(_)) => format!(", SSIM {:.4} in the worst", 1.0 - check.figure),
-            Some(Goal::Flip(_)) => format!(", FLIP {:.4} in the worst", check.figure),
-            Some(Goal::MaxShare(_)) => {
-                format!(", share {:.3} % in the worst", 100.0 * check.figure)
-            }
-            _ => String::new(),
-        };
-        let time = self.time(choice, rendered);
-        self.tell(format!(
-            "came out: PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked \
-             at{figure}; foretold {:.1} at worst{time}",
+        let psnr = format!(
+            "PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked at, foretold {:.1}",
             choice.foretold.psnr()
-        ));
+        );
+        let figure = self.args.target.and_then(|goal| goal.in_words(check.figure));
+        let figure = figure.map_or(String::new(), |came| {
+            let foretold = self.figure(choice);
+            let foretold = foretold.map_or(String::new(), |words| format!(", foretold {words}"));
+            format!("{came} in the worst{foretold}; ")
+        });
+        let time = self.time(choice, rendered);
+        self.tell(format!("came out: {figure}{psnr}{time}"));
         let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
             return Ok(None);
         };
@@ -103,7 +101,10 @@ impl Chooser<'_> {
         timer: Timer,
     ) -> Result<Option<Choice>> {
         // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
-        let foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
+        let mut foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
+        if !self.given().bounces {
+            foretelling = foretelling.with_more_bounces();
+        }
         let found = self.probe().fastest(&foretelling, allowed, timer)?;
         let foretold = match found {
             Some(foretold) if foretold.samples != choice.foretold.samples => foretold,
