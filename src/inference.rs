@@ -103,6 +103,10 @@ impl TracedPoints {
 pub trait Inference: Sync {
     /// Fills ratios and origins for all points.
     fn infer(&self, questions: &mut Questions);
+
+    /// Hears what came out for the same points, once those that had to be were traced: a ratio is NaN
+    /// only where no light was asked for.
+    fn hear(&self, _answered: &Questions) {}
 }
 
 /// Which light a channel of ratios belongs to.

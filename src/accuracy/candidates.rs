@@ -62,8 +62,9 @@ impl List<'_> {
         if self.base.reuse.policy != Policy::Surface {
             return;
         }
+        // Where it is left to the scene, a display step is one of those to compare with.
         let base = self.base.reuse.tolerance.unwrap_or(1.0);
-        for tolerance in [0.25, 0.5, 2.0, 4.0].map(|f| times(f, base)) {
+        for tolerance in [0.25, 0.5, 1.0, 2.0, 4.0].map(|f| times(f, base)) {
             let options = format!("--tolerance {tolerance}");
             self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = Some(tolerance));
         }

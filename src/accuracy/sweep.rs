@@ -56,7 +56,7 @@ pub struct Picture {
 }
 
 impl Sweep<'_> {
-    /// The frame that pictures are shown of: one that is inferred, if any is.
+    /// The frame that pictures are shown of: the one in the middle, which by default is inferred.
     pub fn shown_frame(&self) -> u32 {
         self.frames.get(self.frames.len() / 2).copied().unwrap_or(1)
     }

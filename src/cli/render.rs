@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::intersect;
 use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
+use crate::reuse::Evidence;
 use crate::scene::Settings;
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
@@ -241,8 +242,9 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
         duration(start.elapsed().as_secs_f64())
     ))?;
     reused(&stats::reuse_of(outcome)).map_or(Ok(()), result)?;
-    let fixed = job.request.settings.reuse.tolerance;
-    if let Some(least) = stats::tolerance_of(outcome).filter(|t| *t < 1.0 && fixed.is_none()) {
+    let is_left_open = job.request.settings.reuse.tolerance.is_none();
+    let is_strict = |t: &f32| *t < Evidence::default().tolerance && is_left_open;
+    if let Some(least) = stats::tolerance_of(outcome).filter(is_strict) {
         result(format!(
             "traced frames are so exact here that samples had to agree within {}/255",
             steps(least.into())
@@ -286,7 +288,11 @@ fn audit_line(audit: &AuditRow) -> Option<String> {
 
 /// Display steps in two digits or so.
 fn steps(x: f64) -> String {
-    if x < 0.095 { format!("{x:.2}") } else { format!("{x:.1}") }
+    match x {
+        ..0.0095 => format!("{x:.3}"),
+        ..0.095 => format!("{x:.2}"),
+        _ => format!("{x:.1}"),
+    }
 }
 
 /// Says which samples are no radiance; an exit code where that is a failure.

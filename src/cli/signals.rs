@@ -118,15 +118,23 @@ impl Interrupt {
         let _ = self.reason.set(reason);
         self.stop.store(true, Ordering::SeqCst);
         if !self.watched.load(Ordering::SeqCst) {
-            if !self.is_root {
-                std::thread::sleep(AFTER_RANK_0);
-                if self.watched.load(Ordering::SeqCst) {
-                    return;
-                }
+            if self.is_root {
+                self.exit();
             }
-            self.say_stopped();
-            std::process::exit(Exit::Stopped.code().into());
+            // Not on the thread that hears of the next signal.
+            let theirs = self.clone();
+            std::thread::spawn(move || {
+                std::thread::sleep(AFTER_RANK_0);
+                if !theirs.watched.load(Ordering::SeqCst) {
+                    theirs.exit();
+                }
+            });
         }
+    }
+
+    fn exit(&self) -> ! {
+        self.say_stopped();
+        std::process::exit(Exit::Stopped.code().into())
     }
 }
 

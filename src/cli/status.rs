@@ -79,6 +79,9 @@ fn manifests(sequence: &str) -> Result<Vec<PathBuf>> {
 fn of_pattern(sequence: &str) -> Result<PathBuf> {
     let pattern = FramePattern::parse(sequence, 1).map_err(|why| match sequence.contains('#') {
         true => why,
+        false if Path::new(sequence).exists() => {
+            Error::Usage(format!("{sequence} is neither a folder nor a sequence: no # in it"))
+        }
         false => Error::Usage(format!("there is no folder {sequence}")),
     })?;
     let path = manifest_path(&pattern);

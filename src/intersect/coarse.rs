@@ -113,7 +113,7 @@ impl CoarseTree {
         self.nodes[node].skip = self.nodes.len() as u32;
     }
 
-    /// Whether any ray of `bundle` may meet a triangle: never wrongly no.
+    /// Whether any ray of `bundle` may meet a triangle: never wrongly no, but for backs of the mesh that it leaves.
     pub fn may_meet(&self, bundle: &Bundle) -> bool {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {

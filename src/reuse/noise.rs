@@ -1,4 +1,4 @@
-//! How much noise a traced frame would have, by what is known of its light.
+//! How much noise a traced frame would have, by how much of each light arrives.
 
 use super::Lookup;
 use super::lookup::{steps_per_radiance, stratified_variance};
@@ -7,12 +7,20 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Units of the sums in a squared display step: whole numbers, whose sum is the same in any order.
 const UNITS: f64 = (1u64 << 20) as f64;
-/// What a point counts for at most, squared display steps: more than black and white are apart.
-const MOST: f64 = 1e5;
+/// What a point counts for at most, squared display steps: half of black to white.
+const MOST: f64 = 127.5 * 127.5;
 
-/// Answers as its lookup does, and sums the noise that tracing would have had at these points.
+/// Answers as its lookup does, and sums the noise that tracing all points would have.
 pub struct NoiseMeter<'a> {
     lookup: Lookup<'a>,
+    /// Of the points that the lookup knows.
+    known: Sums,
+    /// Of all.
+    all: Sums,
+}
+
+#[derive(Default)]
+struct Sums {
     variance: AtomicU64,
     points: AtomicU64,
 }
@@ -20,49 +28,73 @@ pub struct NoiseMeter<'a> {
 impl<'a> NoiseMeter<'a> {
     /// One that knows what `lookup` knows.
     pub fn new(lookup: Lookup<'a>) -> Self {
-        Self { lookup, variance: AtomicU64::new(0), points: AtomicU64::new(0) }
+        Self { lookup, known: Sums::default(), all: Sums::default() }
     }
 
-    /// Root mean square of the noise at the points asked about so far that light could reach, display
-    /// steps of 1/255; `None` where there was none. Noise of points that nothing is known of does not
-    /// count.
+    /// Root mean square of the noise at the points so far that light could reach, display steps of 1/255;
+    /// `None` where there was none.
+    ///
+    /// Where at least half of them are known, it is that of the known ones: few others, at the rims of
+    /// shadows, have most of the noise, and in a small picture one of them is most of that.
     pub fn rms(&self) -> Option<f64> {
-        let points = self.points.load(Ordering::Relaxed);
-        let variance = self.variance.load(Ordering::Relaxed) as f64 / UNITS;
-        (points > 0).then(|| (variance / points as f64).sqrt())
+        let [(known, by_known), (all, by_all)] = [&self.known, &self.all].map(Sums::mean);
+        let mean = if 2 * known >= all { by_known } else { by_all };
+        (all > 0).then(|| mean.sqrt())
+    }
+
+    /// Adds up the points with a ratio for each light that could reach them.
+    fn measure(&self, told: &Questions, sums: &Sums) {
+        let Questions { points, unshadowed, ratios, .. } = told;
+        let channels = self.lookup.rays.len();
+        let (mut variance, mut count) = (0, 0);
+        for (i, point) in points.iter().enumerate() {
+            let own = i * channels..(i + 1) * channels;
+            let (light, ratios) = (&unshadowed[own.clone()], &ratios[own]);
+            let is_told = light.iter().zip(ratios).all(|(l, ratio)| *l == 0.0 || !ratio.is_nan());
+            let of_point = self.variance(point.samples, light, ratios);
+            if light.iter().any(|light| *light != 0.0) && is_told && of_point.is_finite() {
+                count += 1;
+                variance += (of_point.min(MOST) * UNITS) as u64;
+            }
+        }
+        sums.variance.fetch_add(variance, Ordering::Relaxed);
+        sums.points.fetch_add(count, Ordering::Relaxed);
     }
 
     /// Variance of what tracing would show of a point, squared display steps.
     fn variance(&self, samples: u32, unshadowed: &[f32], ratios: &[f32]) -> f64 {
-        let known = || unshadowed.iter().zip(ratios).zip(self.lookup.rays);
-        let known = || known().filter(|((_, ratio), _)| !ratio.is_nan());
-        let seen: f32 = known().map(|((light, ratio), _)| light * ratio).sum();
-        let steps = steps_per_radiance(seen);
+        let lights = || unshadowed.iter().zip(ratios).zip(self.lookup.rays);
+        let lights = || lights().filter(|((_, ratio), _)| !ratio.is_nan());
         let of_light = |((light, ratio), rays): ((&f32, &f32), &u32)| {
-            let rays = (rays * samples).max(1) as f32;
-            f64::from(steps * light).powi(2) * f64::from(stratified_variance(*ratio, rays))
+            let rays = (*rays as f32 * samples as f32).max(1.0);
+            light * light * stratified_variance(*ratio, rays)
         };
-        known().map(of_light).sum()
+        let seen: f32 = lights().map(|((light, ratio), _)| light * ratio).sum();
+        let deviation = lights().map(of_light).sum::<f32>().sqrt();
+        // What is brighter than the display shows no noise there.
+        let [below, above] = [seen - deviation, seen + deviation].map(|v| v.clamp(0.0, 1.0));
+        let shown = f64::from(0.5 * (above - below) * steps_per_radiance(seen));
+        shown * shown
+    }
+}
+
+impl Sums {
+    /// How many points, and the mean variance.
+    fn mean(&self) -> (u64, f64) {
+        let points = self.points.load(Ordering::Relaxed);
+        let variance = self.variance.load(Ordering::Relaxed) as f64 / UNITS;
+        (points, variance / points.max(1) as f64)
     }
 }
 
 impl Inference for NoiseMeter<'_> {
     fn infer(&self, questions: &mut Questions) {
         self.lookup.infer(questions);
-        let Questions { points, unshadowed, ratios, .. } = questions;
-        let channels = self.lookup.rays.len();
-        let (mut variance, mut lit) = (0, 0);
-        for (i, point) in points.iter().enumerate() {
-            let own = i * channels..(i + 1) * channels;
-            let light = &unshadowed[own.clone()];
-            if light.iter().any(|light| *light != 0.0) {
-                lit += 1;
-                let of_point = self.variance(point.samples, light, &ratios[own]);
-                variance += (of_point.min(MOST) * UNITS) as u64;
-            }
-        }
-        self.variance.fetch_add(variance, Ordering::Relaxed);
-        self.points.fetch_add(lit, Ordering::Relaxed);
+        self.measure(questions, &self.known);
+    }
+
+    fn hear(&self, answered: &Questions) {
+        self.measure(answered, &self.all);
     }
 }
 
@@ -98,25 +130,46 @@ mod tests {
     }
 
     /// The noise of a wall where every other pixel would show `light`, and shows a `ratio` of it by `rays`
-    /// shadow rays.
-    fn noise(ratio: f32, rays: u32, light: f32) -> Option<f64> {
-        let traced = wall(ratio);
+    /// shadow rays. Nobody knows so many pixels `aside`: they are traced, and show another.
+    fn noise_with((aside, other): (usize, f32), ratio: f32, rays: u32, light: f32) -> Option<f64> {
+        let mut traced = wall(ratio);
         let reference = Reference::new(1, &camera(), &traced, 1);
+        traced.points.iter_mut().take(aside).for_each(|t| t.point.p.x += 100.0);
         let (references, rays) = ([&reference], [rays]);
         let evidence = Evidence::default();
         let lookup = Lookup { frame: 2, references: &references, rays: &rays, evidence };
         let meter = NoiseMeter::new(lookup);
-        for half in traced.points.chunks(100) {
+        for (from, part) in traced.points.chunks(100).enumerate() {
             let mut asked = Questions {
-                points: half.iter().map(|t| t.point).collect(),
-                unshadowed: (0..half.len()).map(|k| [light, 0.0][k % 2]).collect(),
-                ratios: vec![f32::NAN; half.len()],
-                origins: vec![Origin::default(); half.len()],
+                points: part.iter().map(|t| t.point).collect(),
+                unshadowed: (0..part.len()).map(|k| [light, 0.0][k % 2]).collect(),
+                ratios: vec![f32::NAN; part.len()],
+                origins: vec![Origin::default(); part.len()],
             };
             meter.infer(&mut asked);
-            assert!(light == 0.0 || asked.ratios[0] == ratio, "it answers as well");
+            let is_aside = 100 * from < aside;
+            let known = if is_aside { f32::NAN } else { ratio };
+            assert!(light == 0.0 || asked.ratios[0].total_cmp(&known).is_eq(), "it answers too");
+            let traced = if is_aside { other } else { ratio };
+            asked.ratios.iter_mut().step_by(2).for_each(|out| *out = traced);
+            meter.hear(&asked);
         }
         meter.rms()
+    }
+
+    fn noise(ratio: f32, rays: u32, light: f32) -> Option<f64> {
+        noise_with((0, 0.0), ratio, rays, light)
+    }
+
+    #[test]
+    fn what_had_to_be_traced_counts_where_little_is_known() {
+        let all = noise(0.25, 16, 1.0);
+        assert_eq!(noise_with((100, 0.5), 0.25, 16, 1.0), all);
+        assert_eq!(noise_with((256, 0.25), 0.25, 16, 1.0), all);
+        // 28 lit points of 128 are known, and the others have none.
+        let (few, all) = (noise_with((200, 1.0), 0.25, 16, 1.0), all.expect("lit"));
+        let expected = all * (28.0f64 / 128.0).sqrt();
+        assert!(few.is_some_and(|few| (few / expected - 1.0).abs() < 1e-3), "{few:?} {expected}");
     }
 
     #[test]
@@ -130,6 +183,9 @@ mod tests {
         // A fourth of the samples, √8 times the noise.
         let fewer = noise(0.25, 25, 1.0).expect("lit");
         assert!((fewer / got / 8f64.sqrt() - 1.0).abs() < 1e-3, "{fewer} {got}");
+        // Nor a light that is too bright for the display, of which less is enough.
+        assert_eq!(noise(0.25, 16, 100.0), Some(0.0));
+        assert_eq!(noise(0.25, 16, f32::INFINITY), None);
         // A light that is not stopped has none, and where none shines there is nothing to tell.
         assert_eq!(noise(1.0, 16, 1.0), Some(0.0));
         assert_eq!(noise(0.25, 16, 0.0), None);

@@ -125,9 +125,8 @@ impl<'a> Inferrer<'a> {
             Some(rendered) => Some(rendered),
             None => self.rendered(frame, is_due, None, self.progress)?,
         };
-        let Some(Rendered { film, mut rays, reuse, sources }) = rendered else { return Ok(None) };
+        let Some(Rendered { film, rays, reuse, sources }) = rendered else { return Ok(None) };
         let Some(allowed) = self.allowed(frame)? else { return Ok(None) };
-        rays += allowed.rays_of(frame);
         // In one order, however the frame was cut for tracing, and as they come back from a file.
         let sources = self.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources);
@@ -327,6 +326,9 @@ impl FrameMaker for Inferrer<'_> {
             Some(audit) => made.audit = audit,
             None => return Ok(None),
         }
+        // Not before: the audit costs a share of the frame, not of the look.
+        let looked = self.allowed(original)?.map(|allowed| allowed.rays_of(original));
+        made.rays += looked.unwrap_or_default();
         if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
             // Its own file is about to hold it.
             self.with_state(|s| s.saved.has_file(original));

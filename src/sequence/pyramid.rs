@@ -59,10 +59,10 @@ impl Pyramid {
         all
     }
 
-    /// The frame in the middle of the segment that `frame`, which is no key frame, lies in.
-    pub fn middle_of(&self, frame: u32) -> u32 {
+    /// The frame in the middle of the segment that `frame` lies in; `None` for a key frame.
+    pub fn middle_of(&self, frame: u32) -> Option<u32> {
         let (low, high) = self.ends(frame);
-        middle(low, high)
+        (!self.is_key(frame)).then(|| middle(low, high))
     }
 
     /// `frames` in the order that needs the fewest references at a time: segment by segment, each

@@ -187,14 +187,16 @@ impl Groups {
         gathered.all += all;
     }
 
-    /// Moves what was traced to `sources`, counts, and tells each pixel where its light is from.
+    /// Moves what was traced to `sources`, counts, tells each pixel where its light is from, and the
+    /// inference what came out.
     pub fn finish(
         &mut self,
-        channels: usize,
+        reuse: &Reuse,
         pixels: &mut BlockPixels,
         sources: &mut TracedPoints,
         counts: &mut ReuseCounts,
     ) {
+        let channels = reuse.channels.len();
         for (i, point) in self.asked.points.iter().enumerate() {
             if !self.lit[i] {
                 continue;
@@ -210,9 +212,17 @@ impl Groups {
             if self.traced[i] {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });
-                let gathered = &self.gathered[i * channels..(i + 1) * channels];
-                sources.ratios.extend(gathered.iter().map(|g| (g.open / g.all) as f32));
+                let own = i * channels..(i + 1) * channels;
+                let gathered = self.gathered[own.clone()].iter().map(|g| (g.open / g.all) as f32);
+                let ratios = &mut self.asked.ratios[own];
+                ratios.iter_mut().zip(gathered.clone()).for_each(|(ratio, traced)| {
+                    *ratio = if traced.is_nan() { *ratio } else { traced };
+                });
+                sources.ratios.extend(gathered);
             }
+        }
+        if let Some(inference) = reuse.inference {
+            inference.hear(&self.asked);
         }
     }
 }

@@ -108,7 +108,7 @@ pub(super) fn block<
         let Scratch { lit, shadow, .. } = scratch;
         renderer.light_points::<AREA, SKY>(input, lit, pixels, shadow, &mut counts);
         if let Some(reuse) = &input.reuse {
-            shadow.groups.finish(reuse.channels.len(), pixels, &mut left.sources, &mut left.reuse);
+            shadow.groups.finish(reuse, pixels, &mut left.sources, &mut left.reuse);
         }
         pixels.end_samples();
         first = last;

@@ -179,6 +179,29 @@ fn a_denser_and_longer_move_starts_warm() {
     assert!(warm_error < off, "{warm_error} warm, {off} traced");
 }
 
+/// Mirrors by themselves: traced frames have next to no noise.
+#[test]
+fn key_frames_made_of_references_are_as_strict_as_the_frames_between() {
+    let job = Job::new();
+    let scene = super::together::small(&job, "reflective_spheres");
+    let text = fs::read_to_string(job.path(&scene)).expect("a scene");
+    let longer = text.replace("frames = 16", "frames = 19");
+    assert_ne!(longer, text);
+    fs::write(job.path("long.toml"), longer).expect("written");
+    let line = "--size 64x48 --shadow-samples 64 --quiet --no-video";
+    job.done(&format!("render {scene} -o base/f_##.exr --frames 1..3 {line}"));
+    let warm = format!("render long.toml --references base {line}");
+    job.done(&format!("{warm} -o warm/f_##.exr --frames 1..2"));
+    let manifest = String::from_utf8(job.read("warm/f.manifest.jsonl")).expect("UTF-8");
+    let rows = manifest.lines().skip(1).map(|l| serde_json::from_str::<Value>(l).expect("JSON"));
+    let rows: Vec<Value> = rows.collect();
+    assert_eq!(rows.len(), 2);
+    for row in rows {
+        assert!(row["reuse"]["direct_inferred"].as_u64() > Some(0), "{row}");
+        assert!(row["tolerance"].as_f64().is_some_and(|t| t < 0.5), "{row}");
+    }
+}
+
 #[test]
 fn references_that_cannot_serve_are_refused_by_name() {
     let job = Job::new();

@@ -213,11 +213,12 @@ fn a_killed_rank_ends_the_job_and_the_same_command_goes_on() {
     }
 }
 
-/// What a rank sends for a frame does not grow with the number of ranks, from 2 to 64 of them, but for rank 0,
-/// which sends every order: of 64 ranks it sends the most. What rank 0 makes nobody is told of, since it keeps the table, and at one end of the path there is no neighbour: so
-/// of all ranks one has nothing to send, which is half of two and little of many. What the others send
-/// for a frame is the same within a fifth where all ranks get the same of the cores, and so are the messages
-/// for each of them; where some are quicker, work changes hands, and few ranks send up to a third more.
+/// What a rank sends for a frame does not grow with the number of ranks, from 2 to 64 of them, but for rank
+/// 0, which sends every order: of 64 ranks it sends the most. What rank 0 makes nobody is told of, since it
+/// keeps the table, and at one end of the path there is no neighbour: so of all ranks one has nothing to
+/// send, which is half of two and little of many. What the others send for a frame is the same within a
+/// fifth where all ranks get the same of the cores, and so are the messages for each of them; where some
+/// are quicker, work changes hands, and few ranks send up to a third more.
 /// Minutes, so only by name:
 /// `cargo test --release --features mpi --test command_line -- --ignored --nocapture bytes_sent`
 #[test]

@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::{Choice, Chooser};
-use crate::accuracy::{Check, Effort, Timer};
+use crate::accuracy::{Check, Effort, Foretold, Timer};
 use crate::cli::progress::duration;
 use crate::error::Result;
 use crate::film::{Encoding, Image};
@@ -106,12 +106,10 @@ impl Chooser<'_> {
             foretelling = foretelling.with_more_bounces();
         }
         let found = self.probe().fastest(&foretelling, allowed, timer)?;
-        let foretold = match found {
-            Some(foretold) if foretold.samples != choice.foretold.samples => foretold,
-            _ => {
-                self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
-                return Ok(None);
-            }
+        let set = |foretold: &Foretold| (foretold.samples, foretold.bounces);
+        let Some(foretold) = found.filter(|found| set(found) != set(&choice.foretold)) else {
+            self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
+            return Ok(None);
         };
         let tightened = choice.tightened + 1;
         let seconds = foretold.seconds * self.probe().frames_each(foretold.reuse);

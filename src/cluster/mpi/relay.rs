@@ -34,14 +34,15 @@ pub fn start() {
 /// Has rank 0 say `words`, and waits to be ended; false where rank 0 does not hear, so that this rank
 /// has to say them. Of several threads only the first to fail is told: for the others it is true.
 pub fn confess(words: Vec<u8>) -> bool {
-    if HAS_FAILED.swap(true, Ordering::SeqCst) {
-        std::thread::sleep(PATIENCE + GRACE);
-        return true;
+    let is_first = !HAS_FAILED.swap(true, Ordering::SeqCst);
+    if is_first {
+        *WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
     }
-    *WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
     let is_main = MAIN.get() == Some(&std::thread::current().id());
+    let patience = if is_first { PATIENCE } else { PATIENCE + GRACE };
     let start = Instant::now();
-    while start.elapsed() < PATIENCE {
+    while start.elapsed() < patience {
+        // Whoever failed first: nobody else may talk to MPI.
         if is_main {
             pass_on();
         }
@@ -51,7 +52,7 @@ pub fn confess(words: Vec<u8>) -> bool {
         }
         std::thread::sleep(NAP);
     }
-    false
+    !is_first
 }
 
 /// On the main thread: sends what another left to say, and looks for rank 0's answer.

@@ -2,8 +2,9 @@
 //!
 //! A tolerance of one display step is finer than an eye sees. But where a scene has little noise, traced
 //! frames are finer still, and inferred ones shall not be worse. So what evidence allows is at most in
-//! proportion to the noise that the segment's middle frame would have if it were traced, as the key frames
-//! foretell it. That depends on the key frames alone: whoever makes a frame of the segment finds the same.
+//! proportion to the noise that the segment's middle frame would have if it were traced. That is found out
+//! by making some of it from the key frames: whoever makes a frame of the segment finds the same. Key
+//! frames, where frames of other shots are supplied, are looked at themselves.
 
 use super::Inferrer;
 use crate::error::Result;
@@ -23,12 +24,12 @@ const SHARE: f64 = 0.25;
 /// Edge of these blocks, pixels.
 const BLOCK: u32 = 8;
 
-/// What is allowed in a segment.
+/// What is allowed in a segment, or in a key frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Allowed {
     /// What counts as evidence there.
     pub evidence: Evidence,
-    /// The frame that was looked at, and the rays that this took: they count for that frame, whoever
+    /// The original that was looked at, and the rays that this took: they count for that frame, whoever
     /// looked.
     looked_at: Option<(u32, RayCounts)>,
 }
@@ -44,25 +45,26 @@ impl Inferrer<'_> {
     /// What is allowed in an original, which is found out where nobody asked about its segment yet. `None`
     /// when the job shall stop.
     pub(super) fn allowed(&self, original: u32) -> Result<Option<Allowed>> {
-        if !self.calibrates || self.pyramid.is_key(original) {
+        let is_inferred = self.supplied.is_some() || !self.pyramid.is_key(original);
+        if !self.calibrates || !is_inferred {
             return Ok(Some(Allowed { evidence: self.evidence, looked_at: None }));
         }
-        let segment = self.pyramid.segment_of(original);
-        if let Some(found) = self.with_state(|s| s.allowed.get(&segment).copied()) {
+        let middle = self.pyramid.middle_of(original).unwrap_or(original);
+        if let Some(found) = self.with_state(|s| s.allowed.get(&middle).copied()) {
             return Ok(Some(found));
         }
-        let found = self.calibrate(self.pyramid.middle_of(original))?;
+        let found =
+            self.calibrate(self.schedule.original(middle), self.schedule.ancestors(middle))?;
         if let Some(found) = found {
-            self.with_state(|s| s.allowed.insert(segment, found));
+            self.with_state(|s| s.allowed.insert(middle, found));
         }
         Ok(found)
     }
 
-    /// Infers some of the pixels of `frame`, the middle of a segment, and sees how noisy they would be.
-    fn calibrate(&self, frame: u32) -> Result<Option<Allowed>> {
-        let Some(keys) = self.references(&self.schedule.ancestors(frame))? else {
-            return Ok(None);
-        };
+    /// Makes some of the pixels of `frame`, an original, from `references`, and sees how noisy they would be
+    /// if they were traced.
+    fn calibrate(&self, frame: u32, references: Vec<u32>) -> Result<Option<Allowed>> {
+        let Some(references) = self.references(&references)? else { return Ok(None) };
         let camera = self.camera(frame)?;
         let mask = blocks(&camera, mix(self.renderer.settings.seed ^ u64::from(frame)));
         let job = FrameJob {
@@ -74,7 +76,7 @@ impl Inferrer<'_> {
             beyond_crop: true,
         };
         let evidence = self.evidence;
-        self.with_lookup((frame, &camera), &keys, evidence, |lookup| {
+        self.with_lookup((frame, &camera), &references, evidence, |lookup| {
             let Some(lookup) = lookup else { return Some(Allowed { evidence, looked_at: None }) };
             let meter = NoiseMeter::new(lookup);
             let rays = self.render(job, Some(&meter), &Unheard)?.rays;
