@@ -186,8 +186,13 @@ fn conclude(job: &Frames, round: &Round, was_checking: bool) -> Result<Exit> {
         say_stopped(job, outcome, &reason.unwrap_or_else(|| interrupt.reason()));
         return Ok(Exit::Stopped);
     }
-    let done = finish(job, outcome, *start, *quiet)?;
-    Ok(judge_samples(job, outcome, *quiet).unwrap_or(done))
+    match finish(job, outcome, *start, *quiet) {
+        Err(Error::Stopped) => {
+            interrupt.say_stopped();
+            Ok(Exit::Stopped)
+        }
+        done => Ok(judge_samples(job, outcome, *quiet).unwrap_or(done?)),
+    }
 }
 
 /// Holds every rank to the best instruction set that all their machines have, unless one was
@@ -338,7 +343,8 @@ fn make_video(job: &Frames, fps: f64) -> Result<String> {
         fps,
         display: job.target.write.display,
     };
-    Ok(match video::make(&clip, &beside(pattern, &ending))? {
+    let (out, stop) = (beside(pattern, &ending), &job.site.interrupt.stop);
+    Ok(match job.site.interrupt.watched(|| video::make(&clip, &out, stop))? {
         Video::Made(path) => format!("video {}", path.display()),
         Video::NoFfmpeg { command } => {
             format!(

@@ -28,7 +28,7 @@ pub struct Interrupt {
     /// Set by the first signal or limit.
     pub stop: Arc<AtomicBool>,
     /// Whether somebody watches `stop`, so that work in hand can be finished cleanly. While
-    /// nobody does (loading, building, making the video), nothing is at risk and the first signal
+    /// nobody does (loading, building), nothing is at risk and the first signal
     /// ends the program.
     watched: Arc<AtomicBool>,
     is_root: bool,

@@ -15,9 +15,14 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdin, Command, Output, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Between two looks whether ffmpeg has ended, or shall.
+const NAP: Duration = Duration::from_millis(5);
 
 /// The frames of a video.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,17 +56,18 @@ pub enum Video {
     },
 }
 
-/// Makes `out` from the clip's frames.
+/// Makes `out` from the clip's frames, unless `stop` is set before it is done.
 ///
 /// # Errors
 /// [`Error::Usage`] for a clip without frames or a frame rate that is none; [`Error::Io`] where a
 /// frame is missing; [`Error::Io`] and
-/// [`Error::Input`] when an exr frame cannot be read or the video cannot be put in its place.
-pub fn make(clip: &Clip, out: &Path) -> Result<Video> {
-    make_with(OsStr::new("ffmpeg"), clip, out)
+/// [`Error::Input`] when an exr frame cannot be read or the video cannot be put in its place;
+/// [`Error::Stopped`].
+pub fn make(clip: &Clip, out: &Path, stop: &AtomicBool) -> Result<Video> {
+    make_with(OsStr::new("ffmpeg"), clip, out, stop)
 }
 
-fn make_with(program: &OsStr, clip: &Clip, out: &Path) -> Result<Video> {
+fn make_with(program: &OsStr, clip: &Clip, out: &Path, stop: &AtomicBool) -> Result<Video> {
     if clip.count == 0 || !(clip.fps.is_finite() && clip.fps > 0.0) {
         let (n, fps) = (clip.count, clip.fps);
         return Err(Error::Usage(format!("{n} frames at {fps} frames a second make no video")));
@@ -82,15 +88,19 @@ fn make_with(program: &OsStr, clip: &Clip, out: &Path) -> Result<Video> {
     }
     let (temporary, _) = Temporary::create(out)?;
     let run = match clip.pattern.format() {
-        Format::Exr => run_piped(program, clip, temporary.path())?,
+        Format::Exr => run_piped(program, clip, temporary.path(), stop)?,
         Format::Png | Format::Ppm => {
             let args = [input_args(clip), output_args(temporary.path())].concat();
-            let run = Command::new(program).args(args).stdin(Stdio::null()).output();
-            run.map_err(|e| Error::io("run", program, e))?
+            let mut child = start(program, args, Stdio::null())?;
+            watch(&mut child, stop).map_err(|e| Error::io("run", program, e))?
         }
     };
-    if !run.status.success() {
-        return Ok(Video::Failed { stderr: tail(&run.stderr) });
+    if !run.is_done {
+        // A signal to the whole group ended ffmpeg, too.
+        return match stop.load(Ordering::Relaxed) {
+            true => Err(Error::Stopped),
+            false => Ok(Video::Failed { stderr: tail(&run.stderr) }),
+        };
     }
     let synced = File::open(temporary.path()).and_then(|f| f.sync_all());
     synced.map_err(|e| temporary.error("sync", e))?;
@@ -159,8 +169,45 @@ fn plain_file(path: &Path) -> String {
     text.into_owned()
 }
 
+/// What came of running ffmpeg.
+struct Ran {
+    is_done: bool,
+    stderr: Vec<u8>,
+}
+
+fn start(program: &OsStr, args: Vec<String>, stdin: Stdio) -> Result<Child> {
+    let mut ffmpeg = Command::new(program);
+    ffmpeg.args(args).stdin(stdin).stdout(Stdio::null()).stderr(Stdio::piped());
+    ffmpeg.spawn().map_err(|e| Error::io("run", program, e))
+}
+
+/// Waits for `child`, which is ended when `stop` is set. What it says is read meanwhile, or a full pipe would
+/// stop it.
+fn watch(child: &mut Child, stop: &AtomicBool) -> io::Result<Ran> {
+    let said = child.stderr.take();
+    let read = move || {
+        let mut stderr = Vec::new();
+        // Half of its words are better than none.
+        let _ = said.map(|mut said| said.read_to_end(&mut stderr));
+        stderr
+    };
+    std::thread::scope(|scope| {
+        let reader = scope.spawn(read);
+        let status = loop {
+            if let Some(status) = child.try_wait()? {
+                break status;
+            }
+            if stop.load(Ordering::Relaxed) {
+                child.kill()?;
+            }
+            std::thread::sleep(NAP);
+        };
+        Ok(Ran { is_done: status.success(), stderr: reader.join().unwrap_or_default() })
+    })
+}
+
 /// Runs ffmpeg on display values that this process pipes to it.
-fn run_piped(program: &OsStr, clip: &Clip, out: &Path) -> Result<Output> {
+fn run_piped(program: &OsStr, clip: &Clip, out: &Path, stop: &AtomicBool) -> Result<Ran> {
     let first = read_image(clip.pattern.path(clip.first))?;
     let (width, height) = (first.width, first.height);
     let input = format!(
@@ -168,23 +215,19 @@ fn run_piped(program: &OsStr, clip: &Clip, out: &Path) -> Result<Output> {
          {width}x{height} -framerate {} -i pipe:0",
         clip.fps
     );
-    let mut ffmpeg = Command::new(program);
-    ffmpeg.args([words(&input), output_args(out)].concat());
-    ffmpeg.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let failed = |e| Error::io("run", program, e);
-    let mut child = ffmpeg.spawn().map_err(failed)?;
+    let args = [words(&input), output_args(out)].concat();
+    let mut child = start(program, args, Stdio::piped())?;
     let stdin = child.stdin.take();
-    // What ffmpeg says is read while it is fed, or a full pipe would stop both.
-    let (fed, output) = std::thread::scope(|scope| {
+    let (fed, ran) = std::thread::scope(|scope| {
         let feeder = scope.spawn(|| stdin.map_or(Ok(()), |stdin| feed(stdin, clip, first)));
-        let output = child.wait_with_output();
-        (feeder.join(), output)
+        let ran = watch(&mut child, stop);
+        (feeder.join(), ran)
     });
-    let output = output.map_err(failed)?;
+    let ran = ran.map_err(|e| Error::io("run", program, e))?;
     match fed {
         // When ffmpeg fails, the broken pipe is a consequence; its own words are the cause.
-        _ if !output.status.success() => Ok(output),
-        Ok(fed) => fed.map(|()| output),
+        _ if !ran.is_done => Ok(ran),
+        Ok(fed) => fed.map(|()| ran),
         Err(_) => Err(Error::Failed("feeding frames to ffmpeg failed".into())),
     }
 }

@@ -4,6 +4,7 @@ use super::job::{Job, Ran};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -75,26 +76,31 @@ fn a_signal_while_the_video_is_made_says_to_leave_overwrite_out() {
     let job = Job::new();
     fs::create_dir(job.path("bin")).expect("made");
     let slow = job.path("bin/ffmpeg");
-    fs::write(&slow, "#!/bin/sh\n[ \"$1\" = -version ] || sleep 5\n").expect("written");
+    let script = "#!/bin/sh\n[ \"$1\" = -version ] || { echo $$ > pid; exec sleep 60; }\n";
+    fs::write(&slow, script).expect("written");
     fs::set_permissions(&slow, fs::Permissions::from_mode(0o755)).expect("runs");
     let path = format!("{}:{}", job.path("bin").display(), env!("PATH"));
     let line = "render cube.obj --size 48x27 --spp 1 --frames 1..3 -o o/f_##.png";
     let mut command = job.command(&format!("{line} --overwrite"));
     let child = command.env("PATH", path).stderr(Stdio::piped()).stdout(Stdio::null()).spawn();
     let child = child.expect("it starts");
-    // The video's temporary name is there as soon as it is begun.
-    let is_begun =
-        || job.path("o").exists() && job.names("o").iter().any(|name| name.contains(".mp4.tmp"));
+    let written = || fs::read_to_string(job.path("pid")).ok().filter(|pid| pid.ends_with('\n'));
     let start = Instant::now();
-    while !is_begun() {
-        assert!(start.elapsed() < Duration::from_secs(60), "no video is begun");
+    let pid = loop {
+        match written() {
+            Some(pid) => break pid,
+            None => assert!(start.elapsed() < Duration::from_secs(60), "no video is begun"),
+        }
         std::thread::sleep(Duration::from_millis(5));
-    }
+    };
     send("TERM", &child);
     let ran = Ran::of(&child.wait_with_output().expect("it ends"));
     assert_eq!(ran.code, Some(75), "{}", ran.err);
     let how = "stopped by SIGTERM; the same command without --overwrite goes on from here";
     assert!(ran.err.contains(how), "{}", ran.err);
+    // Nobody goes on writing, and nothing half done is left.
+    assert!(!Path::new("/proc").join(pid.trim()).exists(), "ffmpeg runs on");
+    assert!(!job.names("o").iter().any(|name| name.contains(".mp4")), "{:?}", job.names("o"));
     assert!(job.done(&format!("{line} --no-video")).out.contains("0 rendered, 3 kept"));
 }
 
@@ -219,7 +225,7 @@ fn stops_in_time(limit: &str, variables: &[(&str, String)], reason: &str) {
 fn a_job_ends_by_its_time_limit_and_before_its_allocation() {
     stops_in_time("--time-limit 1s", &[], "stopped at the time limit of 1.0 s: 0 of 48 frames");
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a clock");
-    let end = ("SLURM_JOB_END_TIME", (now.as_secs() + 31).to_string());
+    let end = ("SLURM_JOB_END_TIME", (now.as_secs() + 33).to_string());
     let reason = "stopped shortly before the Slurm job ends";
     stops_in_time("--time-limit 1h", &[end], reason);
     Job::new().refused("render cube.obj --time-limit 25", "a time is written with its units");

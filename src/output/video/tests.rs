@@ -6,6 +6,7 @@ use crate::film::{Encoding, Film};
 use crate::math::Rgb;
 use crate::scene::ToneCurve;
 
+static GO_ON: AtomicBool = AtomicBool::new(false);
 const DISPLAY: Display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
 
 fn clip(pattern: &FramePattern) -> Clip<'_> {
@@ -42,7 +43,7 @@ fn shoot(folder: &Path, name: &str, size: (u32, u32), display: Display) -> Video
         let film = film(size.0, size.1, frame);
         write_image(pattern.path(frame), &film, &options).expect("written");
     }
-    make(&Clip { display, ..clip(&pattern) }, &folder.join("out.mp4")).expect("ran")
+    make(&Clip { display, ..clip(&pattern) }, &folder.join("out.mp4"), &GO_ON).expect("ran")
 }
 
 /// The video's frames as ffmpeg shows them on an sRGB display.
@@ -74,7 +75,8 @@ fn without_ffmpeg_the_command_is_told_and_nothing_is_left() {
     let folder = tempfile::tempdir().expect("a folder");
     let pattern = FramePattern::parse("f_####.png", 5).expect("a pattern");
     let out = folder.path().join("out.mp4");
-    let outcome = make_with(OsStr::new("no-such-ffmpeg"), &clip(&pattern), &out).expect("ran");
+    let outcome =
+        make_with(OsStr::new("no-such-ffmpeg"), &clip(&pattern), &out, &GO_ON).expect("ran");
     assert_eq!(outcome, Video::NoFfmpeg { command: shell_line(&command(&clip(&pattern), &out)) });
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
 }
@@ -85,7 +87,7 @@ fn a_clip_of_nothing_is_a_usage_error() {
     let out = Path::new("out.mp4");
     for (count, fps) in [(0, 24.0), (5, 0.0), (5, f64::NAN), (5, -1.0), (5, f64::INFINITY)] {
         let clip = Clip { count, fps, ..clip(&pattern) };
-        assert!(matches!(make(&clip, out), Err(Error::Usage(_))), "{count} {fps}");
+        assert!(matches!(make(&clip, out, &GO_ON), Err(Error::Usage(_))), "{count} {fps}");
     }
 }
 
@@ -99,7 +101,7 @@ fn a_failure_is_told_in_ffmpegs_words_and_leaves_nothing() {
     let pattern = FramePattern::parse(&pattern.to_string_lossy(), 5).expect("a pattern");
     let torn = |frame| std::fs::write(pattern.path(frame), "no png").expect("written");
     (3..8).for_each(torn);
-    let outcome = make(&clip(&pattern), &folder.path().join("out.mp4")).expect("ran");
+    let outcome = make(&clip(&pattern), &folder.path().join("out.mp4"), &GO_ON).expect("ran");
     let Video::Failed { stderr } = outcome else { panic!("{outcome:?}") };
     assert!(!stderr.trim().is_empty());
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 5);
@@ -169,7 +171,7 @@ fn one_frame_without_a_number_is_enough() {
             let pattern = FramePattern::parse(&text.to_string_lossy(), 1).expect("a pattern");
             write_image(&text, &film(16, 16, 1), &WriteOptions::default()).expect("written");
             let out = folder.path().join("out.mp4");
-            let made = make(&Clip { count: 1, ..clip(&pattern) }, &out).expect("ran");
+            let made = make(&Clip { count: 1, ..clip(&pattern) }, &out, &GO_ON).expect("ran");
             assert_eq!(made, Video::Made(out));
         }
     }
@@ -186,7 +188,7 @@ fn a_frame_of_another_size_or_missing_is_an_error() {
     let text = folder.path().join("f_####.png");
     let pattern = FramePattern::parse(&text.to_string_lossy(), 5).expect("a pattern");
     // ffmpeg would end there and call it a success.
-    let error = make(&clip(&pattern), &folder.path().join("gap.mp4")).expect_err("a gap");
+    let error = make(&clip(&pattern), &folder.path().join("gap.mp4"), &GO_ON).expect_err("a gap");
     assert!(error.to_string().contains("f_0005.png"), "{error}");
     assert!(!folder.path().join("gap.mp4").exists());
     shoot(folder.path(), "f_##.exr", (16, 16), DISPLAY);
@@ -195,9 +197,9 @@ fn a_frame_of_another_size_or_missing_is_an_error() {
     let options = WriteOptions::default();
     write_image(pattern.path(5), &film(8, 8, 5), &options).expect("written");
     let out = folder.path().join("second.mp4");
-    let error = make(&clip(&pattern), &out).expect_err("two sizes");
+    let error = make(&clip(&pattern), &out, &GO_ON).expect_err("two sizes");
     assert!(error.to_string().contains("is 8x8"), "{error}");
     std::fs::remove_file(pattern.path(5)).expect("removed");
-    assert!(matches!(make(&clip(&pattern), &out), Err(Error::Io { .. })));
+    assert!(matches!(make(&clip(&pattern), &out, &GO_ON), Err(Error::Io { .. })));
     assert!(!out.exists());
 }
