@@ -113,7 +113,7 @@ fn the_tolerance_is_what_the_segment_calls_for() {
     for (frame, made) in (1..).zip(&own) {
         let expected = match frame {
             1 | 9 => None,
-            10 => made.tolerance.filter(|t| *t < 0.5),
+            10 => Some(made.tolerance.filter(|t| *t < 0.5).expect("found")),
             _ => Some(found),
         };
         assert!(made.tolerance == expected, "frame {frame}: {:?}", made.tolerance);

@@ -180,15 +180,12 @@ fn conclude(job: &Frames, round: &Round, was_checking: bool) -> Result<Exit> {
         let seconds = start.elapsed().as_secs_f64();
         stats::write(path, &job.target.header, plan, outcome, ranks, seconds)?;
     }
-    if is_stopped {
-        // One that came after the frames is only known here.
-        let reason = round.reasons.iter().find(|reason| !reason.is_empty()).cloned();
-        say_stopped(job, outcome, &reason.unwrap_or_else(|| interrupt.reason()));
-        return Ok(Exit::Stopped);
-    }
-    match finish(job, outcome, *start, *quiet) {
+    let done = if is_stopped { Err(Error::Stopped) } else { finish(job, outcome, *start, *quiet) };
+    match done {
         Err(Error::Stopped) => {
-            interrupt.say_stopped();
+            // One that came after the frames is only known here.
+            let reason = round.reasons.iter().find(|reason| !reason.is_empty()).cloned();
+            say_stopped(job, outcome, &reason.unwrap_or_else(|| interrupt.reason()));
             Ok(Exit::Stopped)
         }
         done => Ok(judge_samples(job, outcome, *quiet).unwrap_or(done?)),

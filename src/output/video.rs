@@ -185,25 +185,26 @@ fn start(program: &OsStr, args: Vec<String>, stdin: Stdio) -> Result<Child> {
 /// stop it.
 fn watch(child: &mut Child, stop: &AtomicBool) -> io::Result<Ran> {
     let said = child.stderr.take();
-    let read = move || {
+    let reader = std::thread::spawn(move || {
         let mut stderr = Vec::new();
         // Half of its words are better than none.
         let _ = said.map(|mut said| said.read_to_end(&mut stderr));
         stderr
+    });
+    let mut is_killed = false;
+    let status = loop {
+        if let Some(status) = child.try_wait()? {
+            break status;
+        }
+        if stop.load(Ordering::Relaxed) {
+            child.kill()?;
+            is_killed = true;
+        }
+        std::thread::sleep(NAP);
     };
-    std::thread::scope(|scope| {
-        let reader = scope.spawn(read);
-        let status = loop {
-            if let Some(status) = child.try_wait()? {
-                break status;
-            }
-            if stop.load(Ordering::Relaxed) {
-                child.kill()?;
-            }
-            std::thread::sleep(NAP);
-        };
-        Ok(Ran { is_done: status.success(), stderr: reader.join().unwrap_or_default() })
-    })
+    // One that was killed may leave another behind, as a script does, that holds the pipe open.
+    let stderr = if is_killed { Vec::new() } else { reader.join().unwrap_or_default() };
+    Ok(Ran { is_done: status.success(), stderr })
 }
 
 /// Runs ffmpeg on display values that this process pipes to it.
@@ -219,7 +220,7 @@ fn run_piped(program: &OsStr, clip: &Clip, out: &Path, stop: &AtomicBool) -> Res
     let mut child = start(program, args, Stdio::piped())?;
     let stdin = child.stdin.take();
     let (fed, ran) = std::thread::scope(|scope| {
-        let feeder = scope.spawn(|| stdin.map_or(Ok(()), |stdin| feed(stdin, clip, first)));
+        let feeder = scope.spawn(|| stdin.map_or(Ok(()), |stdin| feed(stdin, clip, first, stop)));
         let ran = watch(&mut child, stop);
         (feeder.join(), ran)
     });
@@ -232,11 +233,14 @@ fn run_piped(program: &OsStr, clip: &Clip, out: &Path, stop: &AtomicBool) -> Res
     }
 }
 
-/// Writes every frame's display values; closes the pipe on return.
-fn feed(mut stdin: ChildStdin, clip: &Clip, first: Image) -> Result<()> {
+/// Writes every frame's display values, unless it shall stop; closes the pipe on return.
+fn feed(mut stdin: ChildStdin, clip: &Clip, first: Image, stop: &AtomicBool) -> Result<()> {
     let (width, height) = (first.width, first.height);
     let mut next = Some(first);
     for frame in clip.first..clip.first.saturating_add(clip.count) {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::Stopped);
+        }
         let path = clip.pattern.path(frame);
         let image = next.take().map_or_else(|| read_image(&path), Ok)?;
         if (image.width, image.height) != (width, height) {

@@ -13,6 +13,8 @@ const MOST: f64 = 127.5 * 127.5;
 /// Answers as its lookup does, and sums the noise that tracing all points would have.
 pub struct NoiseMeter<'a> {
     lookup: Lookup<'a>,
+    /// Camera samples of a pixel, whose shadow rays are stratified together.
+    spp: u32,
     /// Of the points that the lookup knows.
     known: Sums,
     /// Of all.
@@ -22,17 +24,17 @@ pub struct NoiseMeter<'a> {
 #[derive(Default)]
 struct Sums {
     variance: AtomicU64,
-    points: AtomicU64,
+    samples: AtomicU64,
 }
 
 impl<'a> NoiseMeter<'a> {
-    /// One that knows what `lookup` knows.
-    pub fn new(lookup: Lookup<'a>) -> Self {
-        Self { lookup, known: Sums::default(), all: Sums::default() }
+    /// One that knows what `lookup` knows, of frames of `spp` camera samples a pixel.
+    pub fn new(lookup: Lookup<'a>, spp: u32) -> Self {
+        Self { lookup, spp, known: Sums::default(), all: Sums::default() }
     }
 
     /// Root mean square of the noise at the points so far that light could reach, display steps of 1/255;
-    /// `None` where there was none.
+    /// `None` where there was none. Each camera sample counts as if all of its pixel were like it.
     ///
     /// Where at least half of them are known, it is that of the known ones: few others, at the rims of
     /// shadows, have most of the noise, and in a small picture one of them is most of that.
@@ -51,22 +53,23 @@ impl<'a> NoiseMeter<'a> {
             let own = i * channels..(i + 1) * channels;
             let (light, ratios) = (&unshadowed[own.clone()], &ratios[own]);
             let is_told = light.iter().zip(ratios).all(|(l, ratio)| *l == 0.0 || !ratio.is_nan());
-            let of_point = self.variance(point.samples, light, ratios);
+            let of_point = self.variance(light, ratios);
             if light.iter().any(|light| *light != 0.0) && is_told && of_point.is_finite() {
-                count += 1;
-                variance += (of_point.min(MOST) * UNITS) as u64;
+                let samples = u64::from(point.samples);
+                count += samples;
+                variance += samples * (of_point.min(MOST) * UNITS) as u64;
             }
         }
         sums.variance.fetch_add(variance, Ordering::Relaxed);
-        sums.points.fetch_add(count, Ordering::Relaxed);
+        sums.samples.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// Variance of what tracing would show of a point, squared display steps.
-    fn variance(&self, samples: u32, unshadowed: &[f32], ratios: &[f32]) -> f64 {
+    /// Variance of what tracing would show of a pixel of such points, squared display steps.
+    fn variance(&self, unshadowed: &[f32], ratios: &[f32]) -> f64 {
         let lights = || unshadowed.iter().zip(ratios).zip(self.lookup.rays);
         let lights = || lights().filter(|((_, ratio), _)| !ratio.is_nan());
         let of_light = |((light, ratio), rays): ((&f32, &f32), &u32)| {
-            let rays = (*rays as f32 * samples as f32).max(1.0);
+            let rays = (*rays as f32 * self.spp as f32).max(1.0);
             light * light * stratified_variance(*ratio, rays)
         };
         let seen: f32 = lights().map(|((light, ratio), _)| light * ratio).sum();
@@ -79,11 +82,11 @@ impl<'a> NoiseMeter<'a> {
 }
 
 impl Sums {
-    /// How many points, and the mean variance.
+    /// How many camera samples, and the mean variance.
     fn mean(&self) -> (u64, f64) {
-        let points = self.points.load(Ordering::Relaxed);
+        let samples = self.samples.load(Ordering::Relaxed);
         let variance = self.variance.load(Ordering::Relaxed) as f64 / UNITS;
-        (points, variance / points.max(1) as f64)
+        (samples, variance / samples.max(1) as f64)
     }
 }
 
@@ -138,7 +141,7 @@ mod tests {
         let (references, rays) = ([&reference], [rays]);
         let evidence = Evidence::default();
         let lookup = Lookup { frame: 2, references: &references, rays: &rays, evidence };
-        let meter = NoiseMeter::new(lookup);
+        let meter = NoiseMeter::new(lookup, 1);
         for (from, part) in traced.points.chunks(100).enumerate() {
             let mut asked = Questions {
                 points: part.iter().map(|t| t.point).collect(),

@@ -68,7 +68,7 @@ pub(super) struct State {
     again: Option<(u32, Made)>,
     pub(super) saved: Saved,
     most_memory: u64,
-    /// By segment: what was found out about its evidence.
+    /// By middle of a segment, or key frame: what was found out about its evidence.
     allowed: BTreeMap<u32, Allowed>,
     /// References for other ranks, until they are fetched.
     pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
@@ -102,7 +102,7 @@ impl<'a> Inferrer<'a> {
             stop,
             progress,
             evidence,
-            calibrates: tolerance.is_none(),
+            calibrates: tolerance.is_none() && !channels.is_empty(),
             supplied: None,
             terms: None,
             checkpoints: None,

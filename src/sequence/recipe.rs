@@ -1,8 +1,9 @@
 //! What each frame is made of: all that its bytes are a function of beside world and settings.
 //!
 //! That is its number and camera, and the numbers and cameras of all frames that it is inferred from,
-//! and of those that these are inferred from. A longer shot changes few of them, so that its finished
-//! frames can be told from those that must be made again.
+//! and of those that these are inferred from; and which frame is in the middle of its segment, where what
+//! is allowed there is found out. A longer shot changes few of them, so that its finished frames can be
+//! told from those that must be made again.
 
 use super::Pyramid;
 use super::schedule::{Schedule, bits};

@@ -85,7 +85,7 @@ impl Site<'_> {
         let ranks = self.world.gather(&rank.with_peak())?;
         // Whichever rank was asked to stop knows why.
         let reasons = self.world.gather(&self.interrupt.reason())?;
-        // A rank that was asked to stop when all its frames were finished has not stopped the job.
+        // A rank that was asked to stop when all its frames were finished has stopped no more than the video.
         let unfinished = self.world.from_root(|| Ok(outcome.unfinished))?;
         if unfinished == 0 && self.world.is_root() {
             checkpoint::clear(target);

@@ -30,7 +30,7 @@ pub(super) struct Allowed {
     /// What counts as evidence there.
     pub evidence: Evidence,
     /// The original that was looked at, and the rays that this took: they count for that frame, whoever
-    /// looked.
+    /// looked, if it lies in this segment.
     looked_at: Option<(u32, RayCounts)>,
 }
 
@@ -78,7 +78,7 @@ impl Inferrer<'_> {
         let evidence = self.evidence;
         self.with_lookup((frame, &camera), &references, evidence, |lookup| {
             let Some(lookup) = lookup else { return Some(Allowed { evidence, looked_at: None }) };
-            let meter = NoiseMeter::new(lookup);
+            let meter = NoiseMeter::new(lookup, self.renderer.settings.spp);
             let rays = self.render(job, Some(&meter), &Unheard)?.rays;
             let most = meter.rms().map_or(evidence.tolerance, |rms| OF_NOISE * rms as f32);
             let share = (most / evidence.tolerance).clamp(LEAST, 1.0);
