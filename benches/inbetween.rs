@@ -1,8 +1,8 @@
 //! Figures of inferred frames, as ratios: how accurate and how fast they are beside traced ones.
 //!
 //! Words pick sections: `cargo bench --bench inbetween -- cost flicker`. `--threads N` (2),
-//! `--size WxH`, `--scene NAME` change what is run; `--all` judges every frame in place of some, at
-//! the full size. What is compared takes turns, frame by frame.
+//! `--size WxH`, `--scene NAME`, and `--spp N` (1) for `quality`, change what is run; `--all` judges every
+//! frame in place of some, at the full size. What is compared takes turns, frame by frame.
 #![allow(clippy::print_stdout, reason = "a bench prints its figures")]
 
 #[path = "inbetween/accuracy.rs"]
@@ -24,6 +24,7 @@ pub struct Choice {
     threads: usize,
     size: Option<(u32, u32)>,
     scene: Option<String>,
+    spp: u32,
     all: bool,
 }
 
@@ -54,7 +55,7 @@ const SECTIONS: [Section; 8] = [
 
 fn main() {
     support::title("inbetween");
-    let mut choice = Choice { threads: 2, size: None, scene: None, all: false };
+    let mut choice = Choice { threads: 2, size: None, scene: None, spp: 1, all: false };
     let mut picked = Vec::new();
     let mut words = std::env::args().skip(1).filter(|word| word != "--bench");
     while let Some(word) = words.next() {
@@ -62,6 +63,7 @@ fn main() {
         match word.as_str() {
             "--all" => choice.all = true,
             "--threads" => choice.threads = value().parse().expect("a number of threads"),
+            "--spp" => choice.spp = value().parse().expect("a number of camera samples"),
             "--scene" => choice.scene = Some(value()),
             "--size" => choice.size = Some(size(&value())),
             name => match SECTIONS.iter().find(|(known, _)| *known == name) {

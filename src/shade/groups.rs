@@ -20,6 +20,8 @@ const NONE: u32 = u32::MAX;
 const MOST_WIDER: f32 = 3.0;
 /// Samples of a pixel lie on one surface where their normals differ by less: cosine.
 const SAME_SURFACE: f64 = 0.9;
+/// And one lies so little off the tangent plane of the others, footprints.
+const MOST_HEIGHT: f64 = 1.0;
 
 /// Light gathered in one channel of one surface point, in shares of what would arrive unshadowed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -227,9 +229,14 @@ impl Groups {
     }
 }
 
+/// Whether `b` lies on the surface of `a`, whose normal is the sum of its samples' ones: beyond a ridge there
+/// may be another slope of the same mesh that looks the same way.
 fn is_one_surface(a: &SurfacePoint, b: &SurfacePoint) -> bool {
+    let (n, samples) = (a.n.as_dvec3(), f64::from(a.samples));
+    let height = (b.p - a.p).dot(n) / samples;
     a.geom_id == b.geom_id
-        && a.n.as_dvec3().dot(b.n.as_dvec3()) > SAME_SURFACE * f64::from(a.samples)
+        && n.dot(b.n.as_dvec3()) > SAME_SURFACE * samples
+        && height.abs() <= MOST_HEIGHT * f64::from(a.footprint)
 }
 
 /// Until all are in, the normal of several samples is their sum.
@@ -273,5 +280,32 @@ impl LitPoint {
             direct,
             samples: 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Vec3};
+
+    fn at(x: f64, y: f64, n: Vec3) -> SurfacePoint {
+        let (p, footprint, cos) = (DVec3::new(x, y, 0.0), 0.5, 0.3);
+        SurfacePoint { p, n, geom_id: 0, footprint, cos, direct: true, samples: 1 }
+    }
+
+    #[test]
+    fn samples_of_a_pixel_are_one_surface_where_they_lie_on_one_plane() {
+        let mut group = at(0.0, 0.0, Vec3::Y);
+        // Seen along the surface, a pixel reaches far.
+        let beside = at(2.0, 0.0, Vec3::new(0.1, 1.0, 0.0).normalize());
+        assert!(is_one_surface(&group, &beside));
+        join(&mut group, &beside);
+        assert_eq!((group.samples, group.p.x), (2, 1.0));
+        assert!(is_one_surface(&group, &at(3.0, 0.4, Vec3::Y)));
+        // The next ridge, another side of this one, another mesh.
+        assert!(!is_one_surface(&group, &at(3.0, 1.0, Vec3::Y)));
+        assert!(!is_one_surface(&group, &at(3.0, -1.0, Vec3::Y)));
+        assert!(!is_one_surface(&group, &at(1.0, 0.0, Vec3::new(1.0, 1.0, 0.0).normalize())));
+        assert!(!is_one_surface(&group, &SurfacePoint { geom_id: 1, ..group }));
     }
 }
