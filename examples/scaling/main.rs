@@ -28,6 +28,7 @@ fn main() {
         ("a hundred times the latency", Change { latency: 100.0, ..NONE }),
         ("a tenth of the bandwidth", Change { bandwidth: 0.1, ..NONE }),
         ("stretches of the path 30 % heavier and lighter", Change { swing: 0.3, ..NONE }),
+        ("segments of 128, the default: half a one for each rank", Change { segment: 128, ..NONE }),
         ("a table that takes no time", Change { is_table_free: true, ..NONE }),
     ]
     .into_iter()

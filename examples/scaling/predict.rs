@@ -9,7 +9,8 @@ use tweenray::sequence::Pyramid;
 
 pub const FRAMES: u32 = 262_144;
 pub const MOST: u32 = 4096;
-const SEGMENT: u32 = 64;
+/// One for each of the most ranks.
+pub const SEGMENT: u32 = 64;
 const MEASURED: Pyramid = Pyramid { segment: SEGMENT, frames: SEGMENT + 1 };
 /// A frame of a film.
 pub const WORDS: &str = "--size 1280x720 --spp 4 --shadow-samples 16";
@@ -44,6 +45,8 @@ pub fn measure(stage: &Stage, fit: &Fit) -> Costs {
 /// What to play otherwise than the program does it on the given network.
 #[derive(Clone, Copy)]
 pub struct Change {
+    /// Frames of a segment.
+    pub segment: u32,
     pub tells_all: bool,
     pub latency: f64,
     pub bandwidth: f64,
@@ -53,13 +56,19 @@ pub struct Change {
     pub is_table_free: bool,
 }
 
-pub const NONE: Change =
-    Change { tells_all: false, latency: 1.0, bandwidth: 1.0, swing: 0.0, is_table_free: false };
+pub const NONE: Change = Change {
+    segment: SEGMENT,
+    tells_all: false,
+    latency: 1.0,
+    bandwidth: 1.0,
+    swing: 0.0,
+    is_table_free: false,
+};
 
 /// The job on `ranks`: efficiency, and what it came to.
 pub fn play(costs: &Costs, ranks: u32, change: Change) -> (f64, Played) {
     let start = Instant::now();
-    let shot = Pyramid { segment: SEGMENT, frames: FRAMES };
+    let shot = Pyramid { segment: change.segment, frames: FRAMES };
     let job = Job { pyramid: shot, most_strips: strips(HEIGHT), tells_all: change.tells_all };
     let seconds = costs.seconds(shot, change.swing);
     let plain = costs.model(&seconds);
