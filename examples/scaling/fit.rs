@@ -34,7 +34,7 @@ pub struct Fit {
     pub rows: Vec<Row>,
     pub costs: Costs,
     /// Cores that the ranks got together, of those that are shared with others.
-    pub cores: [f64; 3],
+    pub cores: f64,
     /// Seconds of a core that each rank adds.
     pub rank_seconds: f64,
     pub said: Vec<Said>,
@@ -75,8 +75,9 @@ pub fn fit(stage: &Stage) -> Fit {
     costs.weigh(stage, "--size 400x300 --spp 1 --shadow-samples 16");
     let rank_seconds = fit_overheads(&mut costs, &rows);
     let shares = rows[1..4].iter().map(|row| row.cpu[1] / row.wall[1]);
-    let cores = spread(shares.collect());
-    let said = rows.iter().map(|row| say(&costs, cores[1], rank_seconds, row.ranks)).collect();
+    // Two ranks never use more than two, whatever there is.
+    let cores = shares.fold(0.0, f64::max);
+    let said = rows.iter().map(|row| say(&costs, cores, rank_seconds, row.ranks)).collect();
     Fit { rows, costs, cores, rank_seconds, said }
 }
 

@@ -27,6 +27,7 @@ fn main() {
     let others: Vec<(&str, predict::Curve)> = [
         ("a hundred times the latency", Change { latency: 100.0, ..NONE }),
         ("a tenth of the bandwidth", Change { bandwidth: 0.1, ..NONE }),
+        ("twice the time for each note", Change { note: 2.0, ..NONE }),
         ("stretches of the path 30 % heavier and lighter", Change { swing: 0.3, ..NONE }),
         ("segments of 128, the default: half a one for each rank", Change { segment: 128, ..NONE }),
         ("a table that takes no time", Change { is_table_free: true, ..NONE }),

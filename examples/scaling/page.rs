@@ -1,7 +1,7 @@
 //! The page and its picture.
 
 use crate::costs::{BANDWIDTH, Costs, LATENCY};
-use crate::fit::{Fit, Row};
+use crate::fit::{Fit, Row, Said};
 use crate::plot;
 use crate::predict::{Curve, FRAMES, WORDS};
 use std::fmt::Write;
@@ -62,7 +62,7 @@ impl Page<'_> {
             ("changes", self.changes()),
             ("small", self.small()),
             ("fit", self.fit_table()),
-            ("cores", between(&self.fit.cores, 2)),
+            ("cores", format!("{:.2}", self.fit.cores)),
             ("each", format!("{:.0} ms", 1e3 * self.fit.rank_seconds)),
             ("fit-pack", format!("{:.1} ms", 1e3 * self.fit.costs.pack_seconds)),
             ("errors", self.errors()),
@@ -139,16 +139,18 @@ impl Page<'_> {
     }
 
     fn errors(&self) -> String {
-        let (Some(row), Some(said)) = (self.fit.rows.last(), self.fit.said.last()) else {
-            return String::new();
-        };
+        let rows: Vec<(&Row, &Said)> = self.fit.rows.iter().zip(&self.fit.said).collect();
+        let Some(((row, said), fitted)) = rows.split_last() else { return String::new() };
         let off = |said: f64, is: f64| format!("{:+.1} %", 100.0 * (said / is - 1.0));
+        let walls = fitted.iter().map(|(row, said)| off(said.wall, row.wall[1]));
         let text = format!(
-            "seconds of a core {}, wall time {}, references {}, notes {}",
+            "seconds of a core {}, wall time {}, references {}, notes {}. Wall times of 1 to 4, which were \
+             fitted: {}",
             off(said.cpu, row.cpu[1]),
             off(said.wall, row.wall[1]),
             off(said.references, row.references[1]),
-            off(said.notes, row.notes[1])
+            off(said.notes, row.notes[1]),
+            walls.collect::<Vec<_>>().join(", ")
         );
         println!("off for 8 ranks, fitted on 1 to 4: {text}");
         text

@@ -50,6 +50,8 @@ pub struct Change {
     pub tells_all: bool,
     pub latency: f64,
     pub bandwidth: f64,
+    /// Time of a note.
+    pub note: f64,
     /// By how much stretches of the path are heavier or lighter than the mean.
     pub swing: f64,
     /// Does the table take no time.
@@ -61,6 +63,7 @@ pub const NONE: Change = Change {
     tells_all: false,
     latency: 1.0,
     bandwidth: 1.0,
+    note: 1.0,
     swing: 0.0,
     is_table_free: false,
 };
@@ -77,6 +80,7 @@ pub fn play(costs: &Costs, ranks: u32, change: Change) -> (f64, Played) {
         reference_bytes: bytes,
         latency: plain.latency * change.latency,
         bandwidth: plain.bandwidth * change.bandwidth,
+        note_seconds: plain.note_seconds * change.note,
         table: if change.is_table_free { Table::Seconds(0.0) } else { Table::Measured },
         ..plain
     };
