@@ -4,8 +4,12 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// What a frame's bytes may depend on.
+const SOURCES: [&str; 4] = ["src", "ffi", "build.rs", "Cargo.lock"];
+
 fn main() {
-    println!("cargo::rerun-if-changed=build.rs");
+    SOURCES.iter().for_each(|source| println!("cargo::rerun-if-changed={source}"));
+    println!("cargo::rustc-env=TWEENRAY_SOURCES={:08x}", fingerprint());
     // embree4-sys found Embree, or failed with the list of places it looked in.
     let include = embree("INCLUDE");
     let lib = embree("LIB");
@@ -24,9 +28,32 @@ fn embree(key: &str) -> String {
     env::var(&name).unwrap_or_else(|_| panic!("embree4-sys did not set {name}"))
 }
 
+/// Tells builds of other sources apart: 32 bits of FNV-1a (Fowler, Noll and Vo, 1991).
+fn fingerprint() -> u32 {
+    let mut files = Vec::new();
+    SOURCES.iter().for_each(|source| list(Path::new(source), &mut files));
+    files.sort();
+    let mut hash = 0x811c_9dc5;
+    for file in files {
+        let text = fs::read(&file).expect("a readable source");
+        for byte in file.to_string_lossy().bytes().chain(text) {
+            hash = (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193);
+        }
+    }
+    hash
+}
+
+/// All files at and below `path`.
+fn list(path: &Path, files: &mut Vec<PathBuf>) {
+    match fs::read_dir(path) {
+        Ok(entries) => {
+            entries.for_each(|entry| list(&entry.expect("a readable folder").path(), files));
+        }
+        Err(_) => files.push(path.into()),
+    }
+}
+
 fn compile_shim(include: &str) {
-    // The folder itself: a new source file counts as a change.
-    println!("cargo::rerun-if-changed=ffi");
     let mut sources: Vec<PathBuf> = fs::read_dir("ffi")
         .expect("the folder ffi is part of the project")
         .map(|entry| entry.expect("a readable folder").path())

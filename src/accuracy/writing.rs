@@ -126,7 +126,7 @@ fn target(stage: &Stage, folder: &Path, keeps_light: bool) -> Result<Target> {
     let pattern = FramePattern::parse(&name.to_string_lossy(), stage.shot.frames)?;
     let header = Header {
         manifest: manifest::FORMAT,
-        tweenray: env!("CARGO_PKG_VERSION").into(),
+        tweenray: crate::output::VERSION.into(),
         scene: String::new(),
         scene_hash: String::new(),
         shot_hash: String::new(),

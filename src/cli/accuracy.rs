@@ -186,7 +186,7 @@ fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
         ("reference-spp", json!(args.reference_spp)),
         ("threads", json!(stage.pool.current_num_threads())),
         ("scene content", json!(hash)),
-        ("tweenray version", json!(env!("CARGO_PKG_VERSION"))),
+        ("tweenray version", json!(crate::output::VERSION)),
         ("tracer", json!(stage.intersector.describe())),
         ("machine", json!(machine::Machine::here().cpu)),
     ];

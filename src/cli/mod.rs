@@ -68,6 +68,8 @@ enum Command {
 
 const VERSION: &str = concat!(
     env!("CARGO_PKG_VERSION"),
+    "+",
+    env!("TWEENRAY_SOURCES"),
     " (built with Embree ",
     env!("TWEENRAY_EMBREE_VERSION"),
     ")"

@@ -116,7 +116,7 @@ impl Job {
             manifest: tables::manifest(self),
             settings: tables::settings(self),
             frames: tables::frames(self),
-            version: env!("CARGO_PKG_VERSION").into(),
+            version: crate::output::VERSION.into(),
             made: words::date(now()),
         })
     }

@@ -214,7 +214,7 @@ impl Request {
     pub fn header_before(&self, tracer: &str) -> Option<Header> {
         let header = Manifest::read(&manifest::manifest_path(&self.pattern)).ok()??.header;
         let is_same = header.scene_hash == self.scene_hash
-            && header.tweenray == env!("CARGO_PKG_VERSION")
+            && header.tweenray == crate::output::VERSION
             && header.tracer == tracer;
         (is_same && !self.overwrite).then_some(header)
     }
@@ -223,7 +223,7 @@ impl Request {
     pub fn target(&self, tracer: String) -> Target {
         let header = Header {
             manifest: manifest::FORMAT,
-            tweenray: env!("CARGO_PKG_VERSION").into(),
+            tweenray: crate::output::VERSION.into(),
             scene: self.scene_name.clone(),
             scene_hash: self.scene_hash.clone(),
             shot_hash: self.shot_hash.clone(),

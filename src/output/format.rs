@@ -101,6 +101,10 @@ impl WriteOptions {
     }
 }
 
+/// The version, and a fingerprint of the sources: two builds of one version may make other bytes, which must
+/// not be mixed in a sequence.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("TWEENRAY_SOURCES"));
+
 /// The program's name and version, as files name it.
 pub(super) const SOFTWARE: &str = concat!("tweenray ", env!("CARGO_PKG_VERSION"));
 

@@ -31,6 +31,6 @@ pub mod video;
 
 pub use atomic::Written;
 pub use display::Display;
-pub use format::{Format, WriteOptions, write_image};
+pub use format::{Format, VERSION, WriteOptions, write_image};
 pub use pattern::FramePattern;
 pub use read::{DEFAULT_MEMORY_LIMIT, read_image, read_image_within};

@@ -49,7 +49,7 @@ struct Reference {
 pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Result<()> {
     let (folder, truth) = (&args.output, outcome.truth);
     let document = Document {
-        tweenray: env!("CARGO_PKG_VERSION"),
+        tweenray: crate::output::VERSION,
         command,
         scene: args.scene.scene.display().to_string(),
         tracer: &outcome.tracer,

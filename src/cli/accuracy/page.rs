@@ -38,7 +38,7 @@ pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resul
         pictured: format!("Frame {}, as a display shows it in 8 bits.", outcome.shown_frame),
         tables: vec![tables::figures(outcome), tables::times(outcome)],
         command: shell_line(command),
-        version: env!("CARGO_PKG_VERSION").into(),
+        version: crate::output::VERSION.into(),
         made: date(now),
     })
 }

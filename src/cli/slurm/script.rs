@@ -89,7 +89,7 @@ impl Script<'_> {
              # Made by tweenray {} with: {}\n\
              # Send it with sbatch. Sent again after a failure it goes on where it was.\n",
             self.minutes,
-            env!("CARGO_PKG_VERSION"),
+            crate::output::VERSION,
             words.join(" ")
         )
     }
