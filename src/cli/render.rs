@@ -81,10 +81,7 @@ pub fn run(args: &RenderArgs) -> Exit {
     };
     let world = match World::join(tell_failure) {
         Ok(world) => world,
-        Err(error) => {
-            say::error(&error);
-            return Exit::of(&error);
-        }
+        Err(error) => return super::refused(&error),
     };
     let ended = render(&world, &interrupt, args);
     // Others still hear what stops rank 0's video.

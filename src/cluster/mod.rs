@@ -27,7 +27,7 @@ mod worker;
 
 pub use failure::FAULT;
 pub use frames::{Duty, Outcome, prepare, render};
-pub use launcher::default_threads;
+pub use launcher::{default_threads, is_follower};
 pub use nodes::rank_order;
 pub use traffic::{Sent, Traffic};
 
@@ -89,9 +89,9 @@ impl World {
     /// Errors: several processes were started, but they cannot know of each other, so each would
     /// render everything.
     pub fn join(tell: impl Fn(&Error) -> u8 + 'static) -> Result<Self> {
-        match launcher::detect(|name| std::env::var(name).ok()) {
-            Some(launcher) if launcher.ranks != Some(1) => Self::join_by(&launcher, Box::new(tell)),
-            _ => Ok(Self::solo()),
+        match launcher::several() {
+            Some(launcher) => Self::join_by(&launcher, Box::new(tell)),
+            None => Ok(Self::solo()),
         }
     }
 
