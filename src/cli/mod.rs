@@ -99,6 +99,10 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(command: &Command) -> Exit {
+    let is_alone = command.alone().map_or(Ok(()), cluster::alone);
+    if let Err(error) = is_alone {
+        return refused(&error);
+    }
     let result = match command {
         Command::Render(args) => return render::run(args),
         Command::Status(args) => status::run(args),
@@ -112,6 +116,18 @@ fn dispatch(command: &Command) -> Exit {
         Command::Schema(args) => schema::run(args),
     };
     ended(result)
+}
+
+impl Command {
+    /// The name of a command that writes files and is no work for several processes.
+    fn alone(&self) -> Option<&'static str> {
+        match self {
+            Self::Accuracy(_) => Some("accuracy"),
+            Self::Report(_) => Some("report"),
+            Self::Convert(_) => Some("convert"),
+            _ => None,
+        }
+    }
 }
 
 /// Says what is wrong with all processes that a launcher started, once.

@@ -44,6 +44,17 @@ pub fn is_follower() -> bool {
     here().is_some_and(|launcher| launcher.is_follower())
 }
 
+/// Whether this process is the only one, as `command` has to be, which does all of its work by itself.
+///
+/// # Errors
+/// A launcher started several.
+pub fn alone(command: &str) -> Result<()> {
+    match several() {
+        Some(launcher) => Err(launcher.crowd(command)),
+        None => Ok(()),
+    }
+}
+
 /// The launcher, where it started several processes as far as is known.
 pub(super) fn several() -> Option<Launcher> {
     here().filter(|launcher| launcher.ranks != Some(1))
@@ -82,6 +93,16 @@ fn allowed_cores() -> String {
 impl Launcher {
     fn is_follower(&self) -> bool {
         self.ranks != Some(1) && self.rank.is_some_and(|rank| rank > 0)
+    }
+
+    /// The error of a command that several processes would each run as a whole.
+    fn crowd(&self, command: &str) -> Error {
+        Error::Usage(format!(
+            "{} started {}, and each would do all that `tweenray {command}` does and write the same \
+             files\n  help: start it without a launcher; only `tweenray render` shares its work",
+            self.name,
+            self.processes()
+        ))
     }
 
     /// The error of a program without MPI among several processes.

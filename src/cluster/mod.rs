@@ -27,7 +27,7 @@ mod worker;
 
 pub use failure::FAULT;
 pub use frames::{Duty, Outcome, prepare, render};
-pub use launcher::{default_threads, is_follower};
+pub use launcher::{alone, default_threads, is_follower};
 pub use nodes::rank_order;
 pub use traffic::{Sent, Traffic};
 

@@ -25,6 +25,23 @@ fn a_mistyped_option_is_told_by_one_rank() {
     assert_eq!(help.map(|ran| ran.out.is_empty()), [false, true]);
 }
 
+/// Each process would do the whole of it, in the same files.
+#[test]
+fn what_is_no_work_for_several_processes_is_refused() {
+    let job = Job::new();
+    job.done(&format!("{LINE} -o o/f_##.png"));
+    for line in ["accuracy cube.obj -o a", "report o -o page.html", "convert cube.obj cube.ply"] {
+        let (first, second) = (as_rank(&job, line, "0"), as_rank(&job, line, "1"));
+        assert_eq!((first.code, second.code), (Some(2), Some(2)), "{line}");
+        let says = "error: mpirun of Open MPI started 2 processes, and each would do all";
+        assert!(first.err.contains(says), "{line}: {}", first.err);
+        assert_eq!(second.err, "", "{line}");
+    }
+    assert_eq!(job.names("."), ["cube.obj", "o"], "nothing is written");
+    let mut lonely = job.command("convert cube.obj cube.ply");
+    assert!(lonely.env("OMPI_COMM_WORLD_SIZE", "1").status().expect("it starts").success());
+}
+
 /// A launcher without MPI would have every rank render everything.
 #[cfg(not(feature = "mpi"))]
 #[test]
