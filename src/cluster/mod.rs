@@ -28,7 +28,7 @@ mod worker;
 pub use failure::FAULT;
 pub use frames::{Duty, Outcome, prepare, render};
 pub use launcher::{alone, default_threads, is_follower};
-pub use nodes::rank_order;
+pub use nodes::{check_rank_map, rank_order};
 pub use traffic::{Sent, Traffic};
 
 use crate::error::{Error, Result};

@@ -23,6 +23,17 @@ pub fn rank_order(world: &World, map: Option<&Path>) -> Result<Vec<u32>> {
     Ok(order)
 }
 
+/// Whether the file at `map` would do for a job of `ranks`.
+///
+/// # Errors
+/// Those of [`rank_order`].
+pub fn check_rank_map(map: &Path, ranks: u32) -> Result<()> {
+    match ranks {
+        1 => Ok(()),
+        _ => read(map, ranks).map(drop),
+    }
+}
+
 /// For each rank its node, numbered as they come in the file.
 fn read(path: &Path, size: u32) -> Result<Vec<u32>> {
     let text = fs::read_to_string(path)
