@@ -62,11 +62,16 @@ make_yardstick() {
   "$tweenray" render scene.toml "${options[@]}" --quiet -o 'whole/f_##.png'
 }
 
-# send NAME TIME: sends a job whose frames go to NAME, and sets `job`.
+# What processes get and use in the jobs that are to take long: a core each.
+shape=(--cpus 1)
+words=(--threads 1)
+
+# send NAME TIME: sends a job of this shape, with these words for `render`, whose frames go to NAME, and
+# sets `job`.
 send() {
-  "$tweenray" slurm scene.toml --nodes "$nodes" --cpus 1 --time "$2" --setup "$setup" \
+  "$tweenray" slurm scene.toml --nodes "$nodes" "${shape[@]}" --time "$2" --setup "$setup" \
     --sbatch "output=$1.log" --sbatch "job-name=tweenray-$1" \
-    -- "${options[@]}" --threads 1 -o "$1/f_##.png" >"$1.sh"
+    -- "${options[@]}" "${words[@]}" -o "$1/f_##.png" >"$1.sh"
   job=$(sbatch --parsable "$1.sh")
   jobs+=("$job")
 }
@@ -152,8 +157,21 @@ wrong_mpi() {
   say "wrong --mpi: refused"
 }
 
+# Whole nodes, which two processes each share out as they find them.
+whole_nodes() {
+  local frame
+  local shape=(--tasks-per-node 2) words=(--frames 1..8)
+  send nodes 10m
+  wait_for "$job" nodes
+  for frame in whole/f_0[1-8].png; do
+    cmp -s "$frame" "nodes/${frame##*/}" || die "nodes: ${frame##*/} differs"
+  done
+  say "nodes: done with two processes on each of $nodes whole nodes, and the bytes are the same"
+}
+
 wrong_mpi
 make_yardstick
+whole_nodes
 limits
 node_lost
 say "passed"

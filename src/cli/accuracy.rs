@@ -117,7 +117,8 @@ struct Outcome<'a> {
 /// Runs the command.
 pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let start = Instant::now();
-    let interrupt = Interrupt::listen(true)?;
+    let interrupt = Interrupt::new();
+    interrupt.listen(true)?;
     let Loaded { world, shot, settings: base, threads, time_limit, warnings, .. } =
         job::load(&args.scene, &args.settings)?;
     if !args.quiet {

@@ -27,7 +27,8 @@ mod status;
 mod values;
 mod verify;
 
-use crate::error::Result;
+use crate::cluster;
+use crate::error::{Error, Result};
 use clap::{Parser, Subcommand};
 use exit::Exit;
 use std::process::ExitCode;
@@ -78,13 +79,16 @@ const VERSION: &str = concat!(
 /// Runs the program with the process's arguments; the process ends with what this returns.
 pub fn run() -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
-        say::aside(format_args!("error: {}: {panic}", crate::cluster::FAULT));
+        say::aside(format_args!("error: {}: {panic}", cluster::FAULT));
     }));
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(wrong) => {
-            // Help and version are "errors" to clap.
-            let printed = say::told(wrong.print());
+            // Help and version are "errors" to clap. All processes of a job have the same words.
+            let printed = match cluster::is_follower() {
+                true => Ok(()),
+                false => say::told(wrong.print()),
+            };
             return match wrong.use_stderr() {
                 true => Exit::Usage,
                 false => ended(printed.map(|()| Exit::Done)),
@@ -97,6 +101,10 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(command: &Command) -> Exit {
+    let is_alone = command.alone().map_or(Ok(()), cluster::alone);
+    if let Err(error) = is_alone {
+        return refused(&error);
+    }
     let result = match command {
         Command::Render(args) => return render::run(args),
         Command::Status(args) => status::run(args),
@@ -110,6 +118,26 @@ fn dispatch(command: &Command) -> Exit {
         Command::Schema(args) => schema::run(args),
     };
     ended(result)
+}
+
+impl Command {
+    /// The name of a command that writes files and is no work for several processes.
+    fn alone(&self) -> Option<&'static str> {
+        match self {
+            Self::Accuracy(_) => Some("accuracy"),
+            Self::Report(_) => Some("report"),
+            Self::Convert(_) => Some("convert"),
+            _ => None,
+        }
+    }
+}
+
+/// Says what is wrong with all processes that a launcher started, once.
+fn refused(error: &Error) -> Exit {
+    if !cluster::is_follower() {
+        say::error(error);
+    }
+    Exit::of(error)
 }
 
 /// Says what went wrong, if anything did.

@@ -44,9 +44,7 @@ impl References {
         if folders.is_empty() {
             return Ok(Self { supply: None, hash: "none".into() });
         }
-        if settings.reuse.policy != Policy::Surface {
-            return Err(Error::Usage("--references needs --policy surface".into()));
-        }
+        refuse_policy(settings)?;
         // (Names as they are, which may be no text.)
         let names = || Ok(list(folders, pattern)?.into_iter().map(bytes_of).collect());
         let names: Vec<Vec<u8>> = world.from_root(names)?;
@@ -70,6 +68,22 @@ impl References {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.supply.is_none()
+    }
+}
+
+/// Whether `folders` hold frames that a job whose frames go to `pattern` could look into.
+pub fn check(folders: &[PathBuf], pattern: &FramePattern, settings: &Settings) -> Result<()> {
+    if folders.is_empty() {
+        return Ok(());
+    }
+    refuse_policy(settings)?;
+    list(folders, pattern).map(drop)
+}
+
+fn refuse_policy(settings: &Settings) -> Result<()> {
+    match settings.reuse.policy {
+        Policy::Surface => Ok(()),
+        _ => Err(Error::Usage("--references needs --policy surface".into())),
     }
 }
 

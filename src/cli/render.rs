@@ -72,14 +72,23 @@ const NOTHING_DONE: &str = " before the first frame; give the same command again
 
 /// Runs the command.
 pub fn run(args: &RenderArgs) -> Exit {
+    let interrupt = Interrupt::new();
+    let theirs = interrupt.clone();
+    let tell_failure = move |error: &Error| {
+        theirs.over();
+        say::error(error);
+        Exit::of(error).code()
+    };
     let world = match World::join(tell_failure) {
         Ok(world) => world,
-        Err(error) => {
-            say::error(&error);
-            return Exit::of(&error);
-        }
+        Err(error) => return super::refused(&error),
     };
-    let exit = render(&world, args).unwrap_or_else(|error| {
+    let ended = render(&world, &interrupt, args);
+    // Others still hear what stops rank 0's video.
+    if world.is_root() || !matches!(ended, Ok(Exit::Done)) {
+        interrupt.over();
+    }
+    let exit = ended.unwrap_or_else(|error| {
         if world.is_stranded() {
             world.fail(&error);
         } else if world.is_root() {
@@ -89,17 +98,13 @@ pub fn run(args: &RenderArgs) -> Exit {
     });
     // Rank 0 may make a video yet.
     world.part();
+    interrupt.over();
     exit
 }
 
-fn tell_failure(error: &Error) -> u8 {
-    say::error(error);
-    Exit::of(error).code()
-}
-
-fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
+fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
-    let interrupt = Interrupt::listen(world.is_root())?;
+    interrupt.listen(world.is_root())?;
     interrupt.goes_on(NOTHING_DONE.into());
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.output.time_limit);
@@ -127,7 +132,7 @@ fn render(world: &World, args: &RenderArgs) -> Result<Exit> {
     let tracer = world.same_everywhere("traces with", tracer)?;
     let clock = Clock { start, loaded, built };
     let (intersector, pool, order) = (&*intersector, &pool, &order[..]);
-    let site = Site { world, intersector, pool, order, interrupt: &interrupt, clock, quiet };
+    let site = Site { world, intersector, pool, order, interrupt, clock, quiet };
     let base = request.settings.clone();
     let choosing = Choosing { args, base: &base, site: &site };
     let mut choice = match choosing.first(&request, &tracer) {

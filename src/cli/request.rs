@@ -273,7 +273,8 @@ impl Derived {
     }
 }
 
-fn refuse_maps(maps: bool, settings: &Settings) -> Result<()> {
+/// Refuses maps of what no frame has.
+pub fn refuse_maps(maps: bool, settings: &Settings) -> Result<()> {
     match settings.reuse.policy {
         Policy::Off if maps => Err(Error::Usage(
             "--maps shows what is inferred; with --policy off every frame is traced".into(),
@@ -283,7 +284,7 @@ fn refuse_maps(maps: bool, settings: &Settings) -> Result<()> {
 }
 
 /// Reads the pictures that are uploaded for frames.
-fn uploads(
+pub fn uploads(
     files: &[(u32, PathBuf)],
     shot: &Shot,
     settings: &Settings,

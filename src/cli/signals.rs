@@ -31,7 +31,11 @@ pub struct Interrupt {
     /// nobody does (loading, building), nothing is at risk and the first signal
     /// ends the program.
     watched: Arc<AtomicBool>,
-    is_root: bool,
+    is_root: Arc<AtomicBool>,
+    /// Whether the exit code is known. Nothing is said then, and nothing changes the code: a launcher
+    /// sends SIGTERM to the other ranks as soon as one ends with an error. Locked while a signal
+    /// ends the program, so that only one of the two happens.
+    is_over: Arc<Mutex<bool>>,
     /// How to go on, to follow the reason.
     how: Arc<Mutex<String>>,
     /// Whether a person, or a system that waits no longer, has asked.
@@ -40,21 +44,36 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Starts to listen, on rank 0 or another.
-    pub fn listen(is_root: bool) -> Result<Self> {
-        let interrupt = Self {
+    /// Nothing is asked for, and nobody listens yet.
+    pub fn new() -> Self {
+        Self {
             stop: Arc::default(),
             watched: Arc::default(),
-            is_root,
+            is_root: Arc::default(),
+            is_over: Arc::default(),
             how: Arc::new(Mutex::new(GOES_ON.into())),
             asked: Arc::default(),
             reason: Arc::default(),
-        };
+        }
+    }
+
+    /// Starts to listen, on rank 0 or another.
+    pub fn listen(&self, is_root: bool) -> Result<()> {
+        self.is_root.store(is_root, Ordering::SeqCst);
         let mut signals = Signals::new([SIGINT, SIGTERM, SIGUSR1])
             .map_err(|e| Error::Failed(format!("cannot listen for signals: {e}")))?;
-        let theirs = interrupt.clone();
+        let theirs = self.clone();
         std::thread::spawn(move || signals.forever().for_each(|signal| theirs.on(signal)));
-        Ok(interrupt)
+        Ok(())
+    }
+
+    /// The exit code is known, and its reason may be told: from now on a signal or limit does nothing, but
+    /// for the second SIGINT or SIGTERM, which ends the program at once as ever.
+    pub fn over(&self) {
+        let mut is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
+        if !std::mem::replace(&mut *is_over, true) {
+            self.asked.store(false, Ordering::SeqCst);
+        }
     }
 
     /// Stops when `limit` has passed since `start`.
@@ -115,11 +134,15 @@ impl Interrupt {
     }
 
     fn stop(&self, reason: String) {
+        if *self.is_over.lock().unwrap_or_else(PoisonError::into_inner) {
+            return;
+        }
         let _ = self.reason.set(reason);
         self.stop.store(true, Ordering::SeqCst);
         if !self.watched.load(Ordering::SeqCst) {
-            if self.is_root {
+            if self.is_root.load(Ordering::SeqCst) {
                 self.exit();
+                return;
             }
             // Not on the thread that hears of the next signal.
             let theirs = self.clone();
@@ -132,9 +155,13 @@ impl Interrupt {
         }
     }
 
-    fn exit(&self) -> ! {
-        self.say_stopped();
-        std::process::exit(Exit::Stopped.code().into())
+    /// Ends the program, unless it ends by itself.
+    fn exit(&self) {
+        let is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
+        if !*is_over {
+            self.say_stopped();
+            std::process::exit(Exit::Stopped.code().into());
+        }
     }
 }
 
@@ -156,5 +183,26 @@ mod tests {
         assert_eq!(left("1000", 990), Some(0));
         assert_eq!(left("1000", 1001), None);
         assert_eq!(left("soon", 5), None);
+    }
+
+    /// (Else the test itself would end here, with code 75.)
+    #[test]
+    fn nothing_is_stopped_once_the_exit_code_is_known() {
+        let interrupt = Interrupt::new();
+        interrupt.is_root.store(true, Ordering::SeqCst);
+        interrupt.over();
+        interrupt.on(SIGTERM);
+        interrupt.on(SIGUSR1);
+        interrupt.stop(" at a limit".into());
+        assert!(!interrupt.stop.load(Ordering::SeqCst));
+        assert_eq!(interrupt.reason(), "");
+        // What was asked before counts no more: the launcher's signal is the first.
+        let interrupt = Interrupt::new();
+        interrupt.watched(|| interrupt.on(SIGTERM));
+        interrupt.over();
+        interrupt.on(SIGTERM);
+        assert_eq!(interrupt.reason(), " by SIGTERM");
+        // One that was on its way when the code became known.
+        interrupt.exit();
     }
 }

@@ -6,9 +6,12 @@ mod script;
 use super::args::SceneArgs;
 use super::exit::Exit;
 use super::render::{self, RenderArgs};
-use super::request::{frames, pattern};
-use super::{job, say, values};
+use super::request::{frames, pattern, refuse_maps, uploads};
+use super::{job, references, say, values};
+use crate::cluster;
 use crate::error::{Error, Result};
+use crate::import::Loaded;
+use crate::output::FramePattern;
 use crate::sequence::checkpoint;
 use clap::Args;
 use script::Script;
@@ -17,6 +20,10 @@ use std::time::Duration;
 
 /// How long before a limit ranks are asked to stop, unless told.
 const NOTICE: Duration = Duration::from_secs(60);
+/// The longest that Slurm takes.
+const MOST_NOTICE: Duration = Duration::from_secs(65_535);
+/// No queue allows more.
+const MOST_TIME: Duration = Duration::from_secs(366 * 86_400);
 
 /// Print a Slurm batch script that renders a sequence, over as many time limits as it takes
 ///
@@ -55,7 +62,7 @@ pub struct SlurmArgs {
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     notice: Option<Duration>,
     /// One more option of sbatch, as in partition=long or account=physics; repeatable
-    #[arg(long, value_name = "OPTION", value_parser = one_line)]
+    #[arg(long, value_name = "OPTION", value_parser = option)]
     sbatch: Vec<String>,
     /// A line of shell before the first process starts, as in 'module load openmpi' or 'export A=B';
     /// repeatable
@@ -76,6 +83,7 @@ pub fn run(args: &SlurmArgs) -> Result<Exit> {
     refuse_overwrite(output.overwrite, loaded.overwrite, scene)?;
     let frames = frames(output, &loaded)?;
     let pattern = pattern(scene, output, &loaded, frames)?;
+    check_files(&render, &loaded, &pattern, args.nodes * args.tasks_per_node)?;
     let references = checkpoint::folder(&pattern);
     let whole = frames.first == 1 && frames.last == loaded.shot.frames;
     let script = Script {
@@ -104,13 +112,31 @@ fn notice(time: Duration, asked: Option<Duration>) -> Result<Duration> {
     if time < Duration::from_secs(60) {
         return Err(Error::Usage("--time: Slurm counts in minutes: at least 1m".into()));
     }
-    let notice = asked.unwrap_or(NOTICE.min(time / 4));
-    match notice < time {
-        true => Ok(notice),
-        false => {
-            Err(Error::Usage("--notice is as long as --time: nothing would be rendered".into()))
-        }
+    if time > MOST_TIME {
+        return Err(Error::Usage("--time: no run takes longer than a year".into()));
     }
+    let notice = asked.unwrap_or(NOTICE.min(time / 4));
+    let wrong = match notice {
+        _ if notice >= time => "--notice is as long as --time: nothing would be rendered",
+        _ if notice > MOST_NOTICE => "--notice: Slurm takes 65535s at most",
+        _ => return Ok(notice),
+    };
+    Err(Error::Usage(wrong.into()))
+}
+
+/// Whether the files are there that the options name, so that the job need not wait to find it out.
+fn check_files(
+    render: &RenderArgs,
+    loaded: &Loaded,
+    pattern: &FramePattern,
+    ranks: u32,
+) -> Result<()> {
+    let RenderArgs { output, .. } = render;
+    let Loaded { shot, settings, .. } = loaded;
+    refuse_maps(output.maps, settings)?;
+    output.rank_map.iter().try_for_each(|map| cluster::check_rank_map(map, ranks))?;
+    references::check(&output.references, pattern, settings)?;
+    uploads(&output.upload, shot, settings).map(drop)
 }
 
 /// A requeued job would begin anew again and again.
@@ -124,6 +150,14 @@ fn refuse_overwrite(option: bool, in_scene: bool, scene: &SceneArgs) -> Result<(
         "with {place} every run of the job would begin anew, and none would get done\n  \
          help: leave it out, and remove what is to be replaced or choose another output with -o"
     )))
+}
+
+/// An option of sbatch, with its dashes or without.
+fn option(text: &str) -> std::result::Result<String, String> {
+    match text.trim_start_matches('-').trim().is_empty() {
+        true => Err("an option of sbatch is written NAME=VALUE or NAME".into()),
+        false => one_line(text),
+    }
 }
 
 /// Words that become lines of the script.

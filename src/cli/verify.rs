@@ -92,7 +92,8 @@ fn ray_id(text: &str) -> std::result::Result<RayId, String> {
 
 /// Runs the command.
 pub fn run(args: &VerifyArgs) -> Result<Exit> {
-    let interrupt = Interrupt::listen(true)?;
+    let interrupt = Interrupt::new();
+    interrupt.listen(true)?;
     let Loaded { world, shot, settings, warnings, .. } = job::load(&args.scene, &args.settings())?;
     let scene = world.into_scene(settings.rules.recentre)?;
     if !args.quiet {

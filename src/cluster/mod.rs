@@ -27,8 +27,8 @@ mod worker;
 
 pub use failure::FAULT;
 pub use frames::{Duty, Outcome, prepare, render};
-pub use launcher::default_threads;
-pub use nodes::rank_order;
+pub use launcher::{alone, default_threads, is_follower};
+pub use nodes::{check_rank_map, rank_order};
 pub use traffic::{Sent, Traffic};
 
 use crate::error::{Error, Result};
@@ -51,7 +51,7 @@ pub struct World {
     is_stranded: Cell<bool>,
     /// Says why the job ends, and gives its exit code.
     #[cfg_attr(not(feature = "mpi"), allow(dead_code))]
-    tell: fn(&Error) -> u8,
+    tell: Box<dyn Fn(&Error) -> u8>,
 }
 
 enum Ranks {
@@ -63,10 +63,10 @@ enum Ranks {
 impl World {
     /// A world of one process.
     pub fn solo() -> Self {
-        Self::of(Ranks::Solo, |_| 1)
+        Self::of(Ranks::Solo, Box::new(|_| 1))
     }
 
-    fn of(ranks: Ranks, tell: fn(&Error) -> u8) -> Self {
+    fn of(ranks: Ranks, tell: Box<dyn Fn(&Error) -> u8>) -> Self {
         Self {
             ranks,
             sent: Cell::default(),
@@ -88,15 +88,15 @@ impl World {
     ///
     /// Errors: several processes were started, but they cannot know of each other, so each would
     /// render everything.
-    pub fn join(tell: fn(&Error) -> u8) -> Result<Self> {
-        match launcher::detect(|name| std::env::var(name).ok()) {
-            Some(launcher) if launcher.ranks != Some(1) => Self::join_by(&launcher, tell),
-            _ => Ok(Self::solo()),
+    pub fn join(tell: impl Fn(&Error) -> u8 + 'static) -> Result<Self> {
+        match launcher::several() {
+            Some(launcher) => Self::join_by(&launcher, Box::new(tell)),
+            None => Ok(Self::solo()),
         }
     }
 
     #[cfg(feature = "mpi")]
-    fn join_by(launcher: &Launcher, tell: fn(&Error) -> u8) -> Result<Self> {
+    fn join_by(launcher: &Launcher, tell: Box<dyn Fn(&Error) -> u8>) -> Result<Self> {
         let session = mpi::Session::start(failure::of_panic)?;
         if session.size() == 1 && launcher.ranks.is_some_and(|n| n > 1) {
             return Err(launcher.stranger());
@@ -105,7 +105,7 @@ impl World {
     }
 
     #[cfg(not(feature = "mpi"))]
-    fn join_by(launcher: &Launcher, _: fn(&Error) -> u8) -> Result<Self> {
+    fn join_by(launcher: &Launcher, _: Box<dyn Fn(&Error) -> u8>) -> Result<Self> {
         Err(launcher.without_mpi())
     }
 

@@ -23,6 +23,17 @@ pub fn rank_order(world: &World, map: Option<&Path>) -> Result<Vec<u32>> {
     Ok(order)
 }
 
+/// Whether the file at `map` would do for a job of `ranks`.
+///
+/// # Errors
+/// Those of [`rank_order`].
+pub fn check_rank_map(map: &Path, ranks: u32) -> Result<()> {
+    match ranks {
+        1 => Ok(()),
+        _ => read(map, ranks).map(drop),
+    }
+}
+
 /// For each rank its node, numbered as they come in the file.
 fn read(path: &Path, size: u32) -> Result<Vec<u32>> {
     let text = fs::read_to_string(path)
@@ -33,6 +44,8 @@ fn read(path: &Path, size: u32) -> Result<Vec<u32>> {
 fn parse(text: &str, size: u32) -> std::result::Result<Vec<u32>, String> {
     let mut names: Vec<&str> = Vec::new();
     let mut nodes = vec![None; size as usize];
+    // Some editors put one there.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.split('#').next().unwrap_or_default();
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -67,6 +80,7 @@ mod tests {
     #[test]
     fn a_map_names_every_rank_once() {
         assert_eq!(parse("# two nodes\n0 a\n2 a # near\n\n1 b\n3 b\n", 4), Ok(vec![0, 1, 0, 1]));
+        assert_eq!(parse("\u{feff}0 a\r\n1 b\r\n", 2), Ok(vec![0, 1]));
         let wrong = |text: &str, says: &str| {
             let why = parse(text, 2).expect_err(text);
             assert!(why.contains(says), "{why}");

@@ -42,6 +42,9 @@ impl Job {
             "SLURM_STEP_NUM_TASKS",
             "PMIX_RANK",
             "SLURM_MPI_TYPE",
+            "OMPI_COMM_WORLD_RANK",
+            "PMI_RANK",
+            "SLURM_PROCID",
         ] {
             command.env_remove(name);
         }

@@ -1,10 +1,46 @@
 //! Several processes: refused without MPI, and the same bytes with it.
 
 use super::job::Job;
-#[cfg(not(feature = "mpi"))]
 use super::job::Ran;
 
 const LINE: &str = "render cube.obj --size 48x27 --spp 1 --frames 1..5 --no-video";
+
+/// Runs `line` as process `rank` of two.
+fn as_rank(job: &Job, line: &str, rank: &str) -> Ran {
+    let variables = [("OMPI_COMM_WORLD_SIZE", "2"), ("OMPI_COMM_WORLD_RANK", rank)];
+    Ran::of(&job.command(line).envs(variables).output().expect("it starts"))
+}
+
+/// All have the same words, and one tells what is wrong with them.
+#[test]
+fn a_mistyped_option_is_told_by_one_rank() {
+    let job = Job::new();
+    let line = "render cube.obj --thread 3";
+    let (first, second) = (as_rank(&job, line, "0"), as_rank(&job, line, "1"));
+    assert_eq!((first.code, second.code), (Some(2), Some(2)));
+    assert!(first.err.contains("unexpected argument '--thread'"), "{}", first.err);
+    assert_eq!((&*second.out, &*second.err), ("", ""));
+    let help = ["0", "1"].map(|rank| as_rank(&job, "render --help", rank));
+    assert_eq!(help.each_ref().map(|ran| ran.code), [Some(0); 2]);
+    assert_eq!(help.map(|ran| ran.out.is_empty()), [false, true]);
+}
+
+/// Each process would do the whole of it, in the same files.
+#[test]
+fn what_is_no_work_for_several_processes_is_refused() {
+    let job = Job::new();
+    job.done(&format!("{LINE} -o o/f_##.png"));
+    for line in ["accuracy cube.obj -o a", "report o -o page.html", "convert cube.obj cube.ply"] {
+        let (first, second) = (as_rank(&job, line, "0"), as_rank(&job, line, "1"));
+        assert_eq!((first.code, second.code), (Some(2), Some(2)), "{line}");
+        let says = "error: mpirun of Open MPI started 2 processes, and each would do all";
+        assert!(first.err.contains(says), "{line}: {}", first.err);
+        assert_eq!(second.err, "", "{line}");
+    }
+    assert_eq!(job.names("."), ["cube.obj", "o"], "nothing is written");
+    let mut lonely = job.command("convert cube.obj cube.ply");
+    assert!(lonely.env("OMPI_COMM_WORLD_SIZE", "1").status().expect("it starts").success());
+}
 
 /// A launcher without MPI would have every rank render everything.
 #[cfg(not(feature = "mpi"))]
@@ -22,7 +58,6 @@ fn a_launcher_without_mpi_is_refused() {
 
 #[cfg(feature = "mpi")]
 mod with_mpi {
-    use super::super::job::Ran;
     use super::super::launch::{mpirun, under_mpirun};
     use super::*;
     use std::fs;

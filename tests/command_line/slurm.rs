@@ -78,6 +78,31 @@ fn a_run_that_is_stopped_after_the_last_frame_is_followed_by_one_more() {
     assert_eq!(batch(&job, &script).code, Some(0));
 }
 
+/// Killed between the last frame and the video: the video is made, but not tried for ever.
+#[test]
+fn a_run_that_is_killed_after_the_last_frame_is_followed_by_one_more() {
+    let job = Job::new();
+    let script = job.done(&format!("{LINE} -- --size 8x8 --frames 1..2 -o o/f_##.png")).out;
+    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
+    stand_in(&job, "scontrol", &note);
+    stand_in(&job, "sleep", &format!("echo \"$@\" >> {}", job.path("naps").display()));
+    let killed = "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video; exit 137";
+    stand_in(&job, "srun", killed);
+    let ran = batch(&job, &script);
+    assert_eq!((ran.code, &*requeues(&job)), (Some(75), "requeue 7\n"), "{}", ran.err);
+    let ran = batch(&job, &script);
+    assert_eq!((ran.code, &*requeues(&job)), (Some(137), "requeue 7\n"), "{}", ran.err);
+    assert!(ran.err.contains("got no further"), "{}", ran.err);
+    assert_eq!(job.read("naps"), b"5\n30\n0\n");
+    // One that failed by itself is not asked again.
+    for code in [1, 2] {
+        std::fs::remove_dir_all(job.path("o")).expect("removed");
+        stand_in(&job, "srun", &killed.replace("137", &code.to_string()));
+        let ran = batch(&job, &script);
+        assert_eq!((ran.code, &*requeues(&job)), (Some(code), "requeue 7\n"), "{}", ran.err);
+    }
+}
+
 #[test]
 fn a_run_that_gets_no_further_is_the_last() {
     let job = Job::new();
@@ -132,6 +157,18 @@ fn a_script_holds_what_was_asked_for_and_mistakes_are_told_before_the_queue() {
         ("--nodes 0 --time 30m", "1..=100000"),
         ("--nodes 2 --time 30s", "at least 1m"),
         ("--nodes 2 --time 2m --notice 2m", "as long as --time"),
+        ("--nodes 2 --time 30m --notice 1d", "as long as --time"),
+        ("--nodes 2 --time 20d --notice 1d", "65535s at most"),
+        ("--nodes 2 --time 9999999d", "longer than a year"),
+        ("--nodes 2 --time 30m --sbatch=", "NAME=VALUE"),
+        ("--nodes 2 --time 30m --sbatch=--", "NAME=VALUE"),
+        ("--nodes 2 --time 30m -- --rank-map none", "none: cannot read the map of ranks"),
+        ("--nodes 2 --time 30m -- --rank-map cube.obj", "line 1: expected a rank"),
+        ("--nodes 2 --time 30m -- --references none", "none: cannot read the folder"),
+        ("--nodes 2 --time 30m -- --references .", "no exr frame is in there"),
+        ("--nodes 2 --time 30m -- --policy colour --references .", "needs --policy surface"),
+        ("--nodes 2 --time 30m -- --policy colour --upload 1=none.png", "none.png"),
+        ("--nodes 2 --time 30m -- --policy off --maps", "--maps"),
         ("--nodes 2 --time 30m -- --sp 4", "unexpected argument '--sp'"),
         ("--nodes 2 --time 30m -- --frames 900", "lies outside the shot"),
         ("--nodes 2 --time 30m -- --overwrite", "begin anew"),

@@ -45,8 +45,10 @@ for pause in 5 30 0; do
   now=$(so_far)
   is_all=$?
   echo "$now"
-  # Stopped with all frames there: the video is left, or a look at what came out.
-  if [ "$is_all" = 0 ] && [ "$code" != 75 ]; then exit "$code"; fi
+  # Where it was stopped or killed with all frames there, the video is left, or a look at what came out.
+  if [ "$is_all" = 0 ]; then
+    case $code in 0 | 1 | 2) exit "$code" ;; esac
+  fi
   if [ "$now/$(kept)" != "$before" ]; then
     scontrol requeue "$SLURM_JOB_ID" || exit $((code ? code : 1))
     echo "requeued after exit code $code"
