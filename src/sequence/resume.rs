@@ -5,7 +5,7 @@ mod refuse;
 use super::checkpoint;
 use super::recipe::{Recipe, Recipes};
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{Header, Manifest, MapRow, Row, Stray, manifest_path};
+use crate::output::manifest::{Header, Journal, Manifest, MapRow, Row, Stray, Turn, manifest_path};
 use crate::output::maps::Map;
 use crate::output::{Format, FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
@@ -42,6 +42,14 @@ impl Target {
     /// Whether frames have maps in files of their own.
     pub fn has_map_files(&self) -> bool {
         self.write.maps.is_some() && self.pattern.format() != Format::Exr
+    }
+
+    /// Where rank `rank` appends its rows: to the manifest itself, at `path`, or its part of that.
+    ///
+    /// # Errors
+    /// It cannot be opened, or is of other settings.
+    pub fn journal(&self, rank: u32, path: &Path) -> Result<Journal> {
+        if rank == 0 { Journal::of(path, &self.header) } else { Journal::open(path) }
     }
 
     /// Every file that frame `frame` has.
@@ -147,6 +155,7 @@ fn look_at(target: &Target, frame: u32) -> Result<Found> {
 
 fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) -> Result<Plan> {
     let path = manifest_path(&target.pattern);
+    let turn = Turn::take(&path)?;
     let found = match Manifest::read(&path) {
         Err(_) if target.overwrite => None,
         read => read?,
@@ -163,7 +172,8 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
         Manifest::create(&path, &target.header, &left_over(target, &manifest, frames))?;
         return Ok(Plan::all(frames));
     }
-    Manifest::merge_parts(&path)?;
+    drop(turn);
+    Manifest::merge_parts(&path, &target.header)?;
     let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
     let plan = match target.overwrite {
         true => Plan::all(frames),
@@ -185,11 +195,13 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
 /// Says in the manifest which of its frames are not of this shot, where that is new.
 fn mark_strays(target: &Target, before: &Header, rows: &BTreeMap<u32, Row>) -> Result<()> {
     let same_shot = before.shot_hash == target.header.shot_hash;
-    let marked: Vec<Row> = rows.values().map(|row| marked(target, row)).collect();
-    if same_shot && marked.iter().eq(rows.values()) {
+    if same_shot && rows.values().all(|row| marked(target, row) == *row) {
         return Ok(());
     }
-    Manifest::create(&manifest_path(&target.pattern), &target.header, &marked)
+    Manifest::rewrite(&manifest_path(&target.pattern), |found| {
+        let rows = found.rows.values().map(|row| marked(target, row)).collect();
+        (target.header.clone(), rows)
+    })
 }
 
 fn marked(target: &Target, row: &Row) -> Row {

@@ -21,6 +21,8 @@ mod regrouped;
 mod rendering;
 mod resumed;
 mod reuse;
+#[cfg(feature = "mpi")]
+mod side_by_side;
 mod slurm;
 mod sweeps;
 #[cfg(feature = "mpi")]
