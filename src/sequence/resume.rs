@@ -81,8 +81,8 @@ pub struct Plan {
 /// A frame whose camera is the same, but not what it is inferred from, is rendered again: a longer
 /// shot goes on where a shorter one ended.
 ///
-/// Errors: `Error::Usage` where frames of other settings, of another camera move, or of unknown
-/// origin, are in the way and `target` does not say to replace them.
+/// Errors: `Error::Usage` where frames or references of other settings, or frames of another camera
+/// move or of unknown origin, are in the way and `target` does not say to replace them.
 pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     prepare_with(target, frames, None)
 }
@@ -162,11 +162,15 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
     };
     let Some(manifest) = found else {
         refuse_strangers(target, frames)?;
+        if !target.overwrite {
+            checkpoint::refuse_others(target)?;
+        }
         Manifest::create(&path, &target.header, &[])?;
         return Ok(Plan::all(frames));
     };
     if !target.overwrite {
         refuse_others(target, &manifest, frames)?;
+        checkpoint::refuse_others(target)?;
     }
     if manifest.header.first_difference(&target.header).is_some() {
         Manifest::create(&path, &target.header, &left_over(target, &manifest, frames))?;
