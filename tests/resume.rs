@@ -292,6 +292,23 @@ fn references_of_other_settings_are_refused_and_overwrite_removes_them() {
     }
 }
 
+/// They only save time.
+#[test]
+fn references_that_cannot_be_written_do_not_end_the_job() {
+    let bed = Bed::new("png", None);
+    let run = bed.process(|maker, target, _| {
+        // In place of the folder.
+        fs::write(bed.path(".f.references"), "").expect("written");
+        let frames = [1, 9, 5, 3, 2];
+        maker.expect(&frames);
+        let journal = manifest_path(&target.pattern);
+        render_frames(target, &frames, (0, &journal), maker, &mut |_| Ok(())).expect("renders");
+        maker.stopped().expect("stops");
+    });
+    assert!(run.notes.len() == 1 && run.notes[0].contains(".f.references"), "{:?}", run.notes);
+    assert!(bed.frame(2) == undisturbed("png", None));
+}
+
 #[test]
 fn references_of_another_version_are_refused() {
     let bed = killed("png", None);

@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -62,6 +63,8 @@ pub struct Checkpoints<'a> {
     pub frames_hold_all: bool,
     rows: OnceLock<BTreeMap<u32, Row>>,
     notes: Mutex<Vec<String>>,
+    /// Whether somebody was told that nothing can be written.
+    has_told_unwritten: AtomicBool,
 }
 
 impl<'a> Checkpoints<'a> {
@@ -81,6 +84,7 @@ impl<'a> Checkpoints<'a> {
             frames_hold_all: whole && target.pattern.format() == Format::Exr,
             rows: OnceLock::new(),
             notes: Mutex::default(),
+            has_told_unwritten: AtomicBool::default(),
         }
     }
 
@@ -176,6 +180,15 @@ impl<'a> Checkpoints<'a> {
     /// What there is to tell: why references were not taken.
     pub fn notes(&self) -> Vec<String> {
         std::mem::take(&mut *self.notes.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Tells once why references do not get on disk.
+    pub(super) fn note_unwritten(&self, why: &Error) {
+        if !self.has_told_unwritten.swap(true, Ordering::Relaxed) {
+            self.note(format!(
+                "{why}; a job that goes on after a kill will have to trace it again"
+            ));
+        }
     }
 
     fn note(&self, note: String) {
