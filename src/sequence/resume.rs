@@ -138,11 +138,18 @@ pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
 
 fn look_at(target: &Target, frame: u32) -> Result<Found> {
     let paths = target.paths(frame);
-    let hash = |path: &PathBuf| match fs::read(path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        read => read
-            .map(|bytes| Some(blake3::hash(&bytes).to_hex().to_string()))
-            .map_err(|e| Error::io("read", path, e)),
+    let hash = |path: &PathBuf| {
+        // A pipe or a device has no end.
+        if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            let why = format!("{} is in the way: it is not a regular file", path.display());
+            return Err(Error::Usage(why));
+        }
+        match fs::read(path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            read => read
+                .map(|bytes| Some(blake3::hash(&bytes).to_hex().to_string()))
+                .map_err(|e| Error::io("read", path, e)),
+        }
     };
     let own = hash(&paths[0])?;
     let mut maps = Vec::new();
