@@ -207,8 +207,11 @@ pub fn folder(pattern: &FramePattern) -> PathBuf {
     shown.with_file_name(format!(".{name}"))
 }
 
-/// Removes all references of a job that is complete.
+/// Removes all references of a job that is complete, and what its killed runs left unfinished.
 pub fn clear(target: &Target) {
+    // Processes of other machines that were killed a moment before this job began leave files too young
+    // for its start.
+    let _ = atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE);
     let folder = folder(&target.pattern);
     files(&folder).iter().for_each(|(_, path)| _ = fs::remove_file(path));
     let _ = atomic::clean_temporaries(&folder, Duration::ZERO);

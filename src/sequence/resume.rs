@@ -19,8 +19,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
-/// younger one may belong to a process on another machine.
+/// Temporary files of other machines' processes are cleared away once they are this old: on a shared
+/// folder a younger one may belong to one that lives.
 pub(super) const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// Where the frames of a job go, and what they all share.
