@@ -14,6 +14,8 @@ mod launcher;
 mod pages;
 mod ranks;
 #[cfg(feature = "mpi")]
+mod ranks_killed;
+#[cfg(feature = "mpi")]
 mod read_once;
 mod references;
 #[cfg(feature = "mpi")]
