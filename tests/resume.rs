@@ -270,14 +270,59 @@ fn missing_and_damaged_references_are_made_again() {
 }
 
 #[test]
-fn references_of_other_jobs_are_removed_with_the_reason() {
-    let mut bed = killed("png", None);
-    (1..=17).for_each(|f| _ = fs::remove_file(bed.path(&format!("f_{f:02}.png"))));
-    bed.settings.seed = 7;
-    let run = bed.run(&[2], 1);
-    assert_eq!(run.frames, 5.0);
-    assert!(run.notes[0].contains("removed 2 references"), "{:?}", run.notes);
-    assert!(run.notes[0].contains("seed was 0, now it is 7"), "{:?}", run.notes);
+fn references_of_other_settings_are_refused_and_overwrite_removes_them() {
+    for has_manifest in [true, false] {
+        let mut bed = killed("png", None);
+        (1..=17).for_each(|f| _ = fs::remove_file(bed.path(&format!("f_{f:02}.png"))));
+        let manifest = bed.path("f.manifest.jsonl");
+        if !has_manifest {
+            fs::remove_file(&manifest).expect("removed");
+        }
+        let before = fs::read(&manifest).ok();
+        bed.settings.seed = 7;
+        let error = prepare(&bed.target(), ALL).expect_err("refused").to_string();
+        assert!(error.contains("seed was 0, now it is 7"), "{error}");
+        assert!(error.contains("2 references") && error.contains("--overwrite"), "{error}");
+        assert!(bed.reference(1).exists() && fs::read(&manifest).ok() == before);
+        let target = Target { overwrite: true, ..bed.target() };
+        let notes = prepare(&target, ALL).expect("ready").notes;
+        assert!(notes[0].contains("removed 2 references"), "{notes:?}");
+        assert!(notes[0].contains("seed was 0, now it is 7"), "{notes:?}");
+        assert!(!bed.reference(1).exists());
+    }
+}
+
+/// They only save time.
+#[test]
+fn references_that_cannot_be_written_do_not_end_the_job() {
+    let bed = Bed::new("png", None);
+    let run = bed.process(|maker, target, _| {
+        // In place of the folder.
+        fs::write(bed.path(".f.references"), "").expect("written");
+        let frames = [1, 9, 5, 3, 2];
+        maker.expect(&frames);
+        let journal = manifest_path(&target.pattern);
+        render_frames(target, &frames, (0, &journal), maker, &mut |_| Ok(())).expect("renders");
+        maker.stopped().expect("stops");
+    });
+    assert!(run.notes.len() == 1 && run.notes[0].contains(".f.references"), "{:?}", run.notes);
+    assert!(bed.frame(2) == undisturbed("png", None));
+}
+
+#[test]
+fn references_of_another_version_are_refused() {
+    let bed = killed("png", None);
+    let mut bytes = fs::read(bed.reference(9)).expect("there");
+    let start = b"{\"checkpoint\":";
+    assert!(bytes.starts_with(start));
+    bytes[start.len()] = b'9';
+    fs::write(bed.reference(9), bytes).expect("written");
+    let error = prepare(&bed.target(), ALL).expect_err("refused").to_string();
+    assert!(error.contains("1 reference ") && error.contains("another version"), "{error}");
+}
+
+#[test]
+fn references_of_another_move_are_removed_with_the_reason() {
     let mut bed = killed("png", None);
     (1..=17).for_each(|f| _ = fs::remove_file(bed.path(&format!("f_{f:02}.png"))));
     bed.shot.vfov_degrees += 1.0;

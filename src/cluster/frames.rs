@@ -126,7 +126,7 @@ fn together(
     let rank = world.rank();
     let journal = match rank {
         0 => manifest,
-        rank => part_path(&manifest, rank),
+        rank => part_path(&manifest, &target.header, rank),
     };
     let start = Instant::now();
     let before = world.sent();
@@ -168,7 +168,7 @@ fn join(
         return Ok(Outcome { own, ..Outcome::default() });
     }
     if world.size() > 1 {
-        Manifest::merge_parts(&manifest_path(&target.pattern))?;
+        Manifest::merge_parts(&manifest_path(&target.pattern), &target.header)?;
     }
     let ranks = by_rank.into_iter().enumerate();
     let mut frames: Vec<(u32, FrameReport)> =

@@ -111,7 +111,7 @@ impl Desk<'_> {
         for frame in frames {
             let journal = match &mut self.journal {
                 Some(journal) => journal,
-                none => none.insert(Journal::open(self.path)?),
+                none => none.insert(self.target.journal(self.rank, self.path)?),
             };
             let place = (self.rank, journal);
             let report = sequence::render_frame(self.target, *frame, place, self.maker)?;

@@ -1,13 +1,14 @@
 //! Files that exist are whole: written under a temporary name in the same folder, synced, renamed,
 //! and the folder synced.
 //!
-//! The temporary name of `frame_0001.png` is `.frame_0001.png.tmp-<pid>-<n>`. A failed write
+//! The temporary name of `frame_0001.png` is `.frame_0001.png.tmp-<machine>-<pid>-<n>`. A failed write
 //! removes it; what a killed run leaves behind, [`clean_temporaries`] removes.
 
 use crate::error::{Error, Result};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -63,9 +64,9 @@ pub fn make_room(path: impl AsRef<Path>) -> Result<()> {
 
 /// Removes temporary files of dead runs from `folder` (not below it) and returns their paths.
 ///
-/// A file is left alone when the process in its name lives on this machine, or when it changed
-/// less than `min_age` ago: on a folder that several machines share, it may belong to a process
-/// elsewhere, and a minute is ample. A folder that does not exist holds no such files.
+/// A file of a process of this machine is removed when that is dead; one of another machine, on a folder
+/// that several share, when it did not change for `min_age`: a minute is ample. A folder that does not
+/// exist holds no such files.
 ///
 /// # Errors
 /// [`Error::Io`] when the folder cannot be read or a file cannot be removed.
@@ -79,11 +80,12 @@ pub fn clean_temporaries(folder: impl AsRef<Path>, min_age: Duration) -> Result<
     for entry in entries {
         let entry = entry.map_err(|e| Error::io("read the folder", folder, e))?;
         let name = entry.file_name();
-        let dead = name.to_str().and_then(process_of).is_some_and(|pid| !is_alive(pid));
+        let Some((machine, process)) = name.to_str().and_then(maker_of) else { continue };
         let age = entry.metadata().and_then(|m| m.modified()).map(|t| t.elapsed());
         // A time in the future counts as just now; a file that has gone meanwhile is no matter.
-        let old = age.is_ok_and(|age| age.unwrap_or_default() >= min_age);
-        if dead && old {
+        let is_old = || age.is_ok_and(|age| age.unwrap_or_default() >= min_age);
+        let is_left = if is_here(machine) { !is_alive(process) } else { is_old() };
+        if is_left {
             match fs::remove_file(entry.path()) {
                 Err(e) if e.kind() == io::ErrorKind::NotFound => {}
                 Err(e) => return Err(Error::io("remove", entry.path(), e)),
@@ -95,12 +97,35 @@ pub fn clean_temporaries(folder: impl AsRef<Path>, min_age: Duration) -> Result<
     Ok(removed)
 }
 
-/// The process id in a temporary file's name; `None` for any other name.
-fn process_of(name: &str) -> Option<u32> {
+/// The machine and the process in a temporary file's name; `None` for any other name.
+fn maker_of(name: &str) -> Option<(&str, u32)> {
     let (_, tail) = name.strip_prefix('.')?.rsplit_once(".tmp-")?;
+    let (machine, tail) = tail.split_once('-')?;
     let (pid, n) = tail.split_once('-')?;
     n.parse::<u64>().ok()?;
-    pid.parse().ok()
+    Some((machine, pid.parse().ok()?))
+}
+
+fn is_here(machine: &str) -> bool {
+    machine == this_machine() && machine != UNKNOWN
+}
+
+const UNKNOWN: &str = "0";
+
+/// Stands for all processes that can see each other: those of one machine since it was started, and of one
+/// container.
+fn this_machine() -> &'static str {
+    static MACHINE: OnceLock<String> = OnceLock::new();
+    MACHINE.get_or_init(|| {
+        let boot = fs::read("/proc/sys/kernel/random/boot_id");
+        let processes = fs::read_link("/proc/self/ns/pid");
+        let (Ok(boot), Ok(processes)) = (boot, processes) else { return UNKNOWN.into() };
+        let hash = blake3::Hasher::new()
+            .update(&boot)
+            .update(processes.as_os_str().as_encoded_bytes())
+            .finalize();
+        hash.to_hex()[..8].to_string()
+    })
 }
 
 /// Whether a process lives here. Without `/proc` only this one is known to. One that was killed stays in
@@ -153,7 +178,7 @@ impl Temporary {
             let n = COUNTER.fetch_add(1, Ordering::Relaxed);
             let mut hidden = std::ffi::OsString::from(".");
             hidden.push(name);
-            hidden.push(format!(".tmp-{}-{n}", std::process::id()));
+            hidden.push(format!(".tmp-{}-{}-{n}", this_machine(), std::process::id()));
             let path = target.with_file_name(hidden);
             // Another machine's process of the same id may hold the name: take the next one.
             match OpenOptions::new().write(true).create_new(true).open(&path) {
@@ -338,16 +363,19 @@ mod tests {
     #[test]
     fn leftovers_of_dead_runs_are_removed_and_nothing_else() {
         let folder = tempfile::tempdir().expect("a folder");
-        let own = format!(".frame_0001.png.tmp-{}-3", std::process::id());
+        let here = this_machine();
+        let own = format!(".frame_0001.png.tmp-{here}-{}-3", std::process::id());
         // No Linux process has an id beyond 2^22.
-        let dead = ".frame_0001.png.tmp-4194999-12";
-        let others = [".frame.png.tmp-x-1", ".frame.png.tmp-4194999", "a.tmp-4194999-1", ".hidden"];
-        for name in others.iter().chain([&dead, &own.as_str()]) {
+        let dead = format!(".frame_0001.png.tmp-{here}-4194999-12");
+        let elsewhere = ".frame_0002.png.tmp-elsewhere-1-12";
+        let others = [".frame.png.tmp-a-x-1", ".frame.png.tmp-4194999-1", "a.tmp-a-1-1", ".hidden"];
+        for name in others.iter().chain([&dead.as_str(), &own.as_str(), &elsewhere]) {
             fs::write(folder.path().join(name), b"").expect("written");
         }
         let clean = |age| clean_temporaries(folder.path(), age).expect("readable");
-        assert!(clean(Duration::from_secs(60)).is_empty());
-        assert_eq!(clean(Duration::ZERO), [folder.path().join(dead)]);
+        // Of who is dead here nothing is waited for.
+        assert_eq!(clean(Duration::from_secs(60)), [folder.path().join(dead)]);
+        assert_eq!(clean(Duration::ZERO), [folder.path().join(elsewhere)]);
         assert_eq!(names(folder.path()).len(), others.len() + 1);
         let none = clean_temporaries("no/such/folder", Duration::ZERO).expect("nothing there");
         assert!(none.is_empty());

@@ -9,19 +9,29 @@
 //! part file of its own, which rank 0 takes in at the end or at the next start: `O_APPEND` rows of
 //! many writers in one file would be enough on a local disk, but NFS does not keep them apart.
 //!
-//! Not done: no lock keeps two jobs from writing the same sequence at once. With equal settings
-//! they write equal bytes; with others the second is refused when it starts.
+//! Several jobs may write the same sequence at once. With equal settings they write equal bytes, and
+//! no row is lost however they meet ([`Journal`]); with others the second is refused when it starts.
+
+mod journal;
+mod parts;
+#[cfg(test)]
+mod tests;
+
+pub use journal::Journal;
+pub use parts::part_path;
 
 use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
 use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Version of the file format.
@@ -155,13 +165,6 @@ pub struct Manifest {
     pub rows: BTreeMap<u32, Row>,
 }
 
-/// Appends rows to a manifest or to a rank's part of it.
-#[derive(Debug)]
-pub struct Journal {
-    path: PathBuf,
-    file: File,
-}
-
 impl Header {
     /// The settings as the header keeps them.
     pub fn settings(settings: &Settings) -> Value {
@@ -185,6 +188,15 @@ impl Header {
                 now: value(&now, name),
             })
             .find(|d| d.before != d.now)
+    }
+
+    /// Stands for everything that is compared.
+    fn key(&self) -> String {
+        let mut hash = blake3::Hasher::new();
+        for (name, value) in self.entries() {
+            hash.update(format!("{name}\0{value}\0").as_bytes());
+        }
+        hash.finalize().to_hex()[..16].to_string()
     }
 
     /// Everything that is compared, as text, the user's own settings first.
@@ -240,7 +252,11 @@ impl Manifest {
     /// Errors: `Error::Failed` when the header cannot be understood; rows that cannot are dropped,
     /// so that their frames are rendered again.
     pub fn read(path: &Path) -> Result<Option<Self>> {
-        let Some(bytes) = read_if_there(path)? else { return Ok(None) };
+        read_if_there(path)?.map(|bytes| Self::of(path, &bytes)).transpose()
+    }
+
+    /// What `bytes`, read at `path`, say.
+    fn of(path: &Path, bytes: &[u8]) -> Result<Self> {
         let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
         let header = header_of(first).map_err(|why| {
             Error::Failed(format!(
@@ -249,8 +265,8 @@ impl Manifest {
                 path.display()
             ))
         })?;
-        let rows = rows_in(&bytes).map(|row: Row| (row.frame, row)).collect();
-        Ok(Some(Self { header, rows }))
+        let rows = rows_in(bytes).map(|row: Row| (row.frame, row)).collect();
+        Ok(Self { header, rows })
     }
 
     /// Reads the manifest at `path` with the rows that ranks of a running job still keep to
@@ -260,75 +276,61 @@ impl Manifest {
     pub fn as_of_now(path: &Path) -> Result<Option<Self>> {
         // Parts first: a job that ends in between moves rows from them into the manifest.
         let mut pending = Vec::new();
-        for part in parts(path)? {
-            pending.extend(rows_in::<Row>(&read_if_there(&part)?.unwrap_or_default()));
+        for part in parts::parts(path)? {
+            let rows = part.rows()?;
+            pending.push((part, rows));
         }
         let Some(mut manifest) = Self::read(path)? else { return Ok(None) };
-        manifest.rows.extend(pending.into_iter().map(|row| (row.frame, row)));
+        let own = pending.into_iter().filter(|(part, _)| part.is_of(&manifest.header));
+        let rows: Vec<Row> = own.flat_map(|(_, rows)| rows).collect();
+        manifest.rows.extend(rows.into_iter().map(|row| (row.frame, row)));
         Ok(Some(manifest))
     }
 
-    /// Starts the manifest at `path` anew with `header`, in place of any older one and its parts.
-    /// `rows` are frames that stay.
+    /// Starts the manifest at `path` anew with `header`, in place of one of other settings and its
+    /// parts. `rows` are frames that stay.
     pub fn create(path: &Path, header: &Header, rows: &[Row]) -> Result<()> {
-        // Parts go first: after a crash in between, frames without a row are rendered again,
-        // while rows of the old settings under the new header would be wrong.
-        for part in parts(path)? {
-            remove(&part)?;
-        }
         let mut lines = line_of(path, header)?;
         for row in rows {
             lines.extend(line_of(path, row)?);
         }
-        atomic::write(path, |w| w.write_all(&lines)).map(drop)
+        atomic::write(path, |w| w.write_all(&lines))?;
+        Self::remove_strange_parts(path, header)
     }
 
-    /// Takes the rows of all part files into the manifest at `path` and removes the parts.
-    pub fn merge_parts(path: &Path) -> Result<()> {
-        let parts = parts(path)?;
-        let mut lines = Vec::new();
-        for part in &parts {
-            for row in rows_in::<Row>(&read_if_there(part)?.unwrap_or_default()) {
-                lines.extend(line_of(path, &row)?);
-            }
-        }
-        if !lines.is_empty() {
-            Journal::open(path)?.append_bytes(&lines)?;
-        }
-        parts.iter().try_for_each(|part| remove(part))
+    /// Replaces the manifest at `path`, if there is one, by what `change` makes of it: the same settings, and
+    /// rows of the same frames. Rows that a running job appends meanwhile stay.
+    pub fn rewrite(path: &Path, change: impl FnOnce(Self) -> (Header, Vec<Row>)) -> Result<()> {
+        let _turn = Turn::take(path)?;
+        let io = |e| Error::io("read", path, e);
+        let mut file = match File::open(path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+            file => file.map_err(io)?,
+        };
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(io)?;
+        let (header, rows) = change(Self::of(path, &bytes)?);
+        Self::create(path, &header, &rows)?;
+        let mut late = bytes.split_off(whole_lines(&bytes));
+        file.read_to_end(&mut late).map_err(io)?;
+        late.truncate(whole_lines(&late));
+        if late.is_empty() { Ok(()) } else { Journal::of(path, &header)?.append_bytes(&late) }
     }
 }
 
-impl Journal {
-    /// The lines at `path` that can be understood; none where there is no file.
-    pub fn lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
-        Ok(rows_in(&read_if_there(path)?.unwrap_or_default()).collect())
-    }
+/// A job's turn to decide what becomes of a manifest: held while it reads one and replaces it. Where the
+/// file system has no locks nobody waits.
+#[derive(Debug)]
+pub struct Turn(#[allow(dead_code, reason = "closing it ends the turn")] File);
 
-    /// Opens the manifest or part at `path` for appending; a torn last line is cut off.
-    pub fn open(path: &Path) -> Result<Self> {
-        let bytes = read_if_there(path)?.unwrap_or_default();
-        let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1);
-        let file = OpenOptions::new()
-            .append(true)
-            .create(true)
-            .open(path)
-            .map_err(|e| Error::io("open", path, e))?;
-        if whole < bytes.len() {
-            file.set_len(whole as u64).map_err(|e| Error::io("mend", path, e))?;
-        }
-        Ok(Self { path: path.to_path_buf(), file })
-    }
-
-    /// Appends a row, as one line of JSON: one write, then a sync.
-    pub fn append(&mut self, row: &impl Serialize) -> Result<()> {
-        let line = line_of(&self.path, row)?;
-        self.append_bytes(&line)
-    }
-
-    fn append_bytes(&mut self, lines: &[u8]) -> Result<()> {
-        let written = self.file.write_all(lines).and_then(|()| self.file.sync_data());
-        written.map_err(|e| Error::io("write", &self.path, e))
+impl Turn {
+    /// Waits for the turn at the manifest at `path`, in a folder that is there.
+    pub fn take(path: &Path) -> Result<Self> {
+        let folder = folder_of(path);
+        let file = File::open(folder).map_err(|e| Error::io("open", folder, e))?;
+        // Of the folder, since the manifest itself is replaced. The system ends it with the process.
+        while flock(&file, FlockOperation::LockExclusive) == Err(Errno::INTR) {}
+        Ok(Self(file))
     }
 }
 
@@ -353,28 +355,6 @@ pub fn beside(pattern: &FramePattern, ending: &str) -> PathBuf {
     pattern.folder().join(format!("{prefix}{ending}"))
 }
 
-/// Where rank `rank` (not 0) appends its rows of the manifest at `path`.
-pub fn part_path(path: &Path, rank: u32) -> PathBuf {
-    path.with_extension(format!("rank{rank:04}.jsonl"))
-}
-
-fn parts(path: &Path) -> Result<Vec<PathBuf>> {
-    let folder = folder_of(path);
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned() + ".rank";
-    let is_part = |name: &str| {
-        let number = name.strip_prefix(&stem).and_then(|n| n.strip_suffix(".jsonl"));
-        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
-    };
-    let entries = fs::read_dir(folder).map_err(|e| Error::io("read", folder, e))?;
-    let mut parts: Vec<_> = entries
-        .filter_map(io::Result::ok)
-        .filter(|entry| entry.file_name().to_str().is_some_and(is_part))
-        .map(|entry| entry.path())
-        .collect();
-    parts.sort();
-    Ok(parts)
-}
-
 /// The header, or why it is none.
 fn header_of(line: &[u8]) -> std::result::Result<Header, String> {
     let value: Value = serde_json::from_slice(line).map_err(|e| e.to_string())?;
@@ -384,6 +364,18 @@ fn header_of(line: &[u8]) -> std::result::Result<Header, String> {
         }
         _ => serde_json::from_value(value).map_err(|e| e.to_string()),
     }
+}
+
+/// The header of what lies at `path`, if that is a manifest.
+fn header_at(path: &Path) -> Option<Header> {
+    let mut line = Vec::new();
+    BufReader::new(File::open(path).ok()?).read_until(b'\n', &mut line).ok()?;
+    header_of(&line).ok()
+}
+
+/// How many bytes the lines take that are whole.
+fn whole_lines(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1)
 }
 
 fn rows_in<T: DeserializeOwned>(bytes: &[u8]) -> impl Iterator<Item = T> + '_ {
@@ -409,8 +401,4 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(Error::io("read", path, e)),
     }
-}
-
-fn remove(path: &Path) -> Result<()> {
-    fs::remove_file(path).map_err(|e| Error::io("remove", path, e))
 }

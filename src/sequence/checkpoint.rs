@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -62,6 +63,8 @@ pub struct Checkpoints<'a> {
     pub frames_hold_all: bool,
     rows: OnceLock<BTreeMap<u32, Row>>,
     notes: Mutex<Vec<String>>,
+    /// Whether somebody was told that nothing can be written.
+    has_told_unwritten: AtomicBool,
 }
 
 impl<'a> Checkpoints<'a> {
@@ -81,6 +84,7 @@ impl<'a> Checkpoints<'a> {
             frames_hold_all: whole && target.pattern.format() == Format::Exr,
             rows: OnceLock::new(),
             notes: Mutex::default(),
+            has_told_unwritten: AtomicBool::default(),
         }
     }
 
@@ -122,8 +126,7 @@ impl<'a> Checkpoints<'a> {
     /// What [`write`](Self::write) put there, if it is on disk, whole and this job's.
     pub fn read_bytes(&self, frame: u32) -> Option<Arc<[u8]>> {
         let path = self.path(frame);
-        let file = fs::File::open(&path).ok()?;
-        let mut source = BufReader::new(file);
+        let mut source = opened(&path)?;
         let head = read_head(&mut source);
         if let Some(why) = refusal(self.target, head.as_ref(), frame) {
             self.note(format!("{} {why}; its frame is traced again", path.display()));
@@ -132,7 +135,7 @@ impl<'a> Checkpoints<'a> {
         let mut bytes = Vec::new();
         source.read_to_end(&mut bytes).ok()?;
         let hash = blake3::hash(&bytes).to_hex();
-        if head.is_none_or(|head| head.blake3 != hash.as_str()) {
+        if !matches!(head, Some(FirstLine::Head(head)) if head.blake3 == hash.as_str()) {
             self.note(format!("{} is damaged; its frame is traced again", path.display()));
             return None;
         }
@@ -179,6 +182,15 @@ impl<'a> Checkpoints<'a> {
         std::mem::take(&mut *self.notes.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
+    /// Tells once why references do not get on disk.
+    pub(super) fn note_unwritten(&self, why: &Error) {
+        if !self.has_told_unwritten.swap(true, Ordering::Relaxed) {
+            self.note(format!(
+                "{why}; a job that goes on after a kill will have to trace it again"
+            ));
+        }
+    }
+
     fn note(&self, note: String) {
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note);
     }
@@ -195,13 +207,33 @@ pub fn folder(pattern: &FramePattern) -> PathBuf {
     shown.with_file_name(format!(".{name}"))
 }
 
-/// Removes all references of a job that is complete.
+/// Removes all references of a job that is complete, and what its killed runs left unfinished.
 pub fn clear(target: &Target) {
+    // Processes of other machines that were killed a moment before this job began leave files too young
+    // for its start.
+    let _ = atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE);
     let folder = folder(&target.pattern);
     files(&folder).iter().for_each(|(_, path)| _ = fs::remove_file(path));
     let _ = atomic::clean_temporaries(&folder, Duration::ZERO);
     // Where a reader holds it open on a network file system, it stays until the next job.
     let _ = fs::remove_dir(folder);
+}
+
+/// Refuses references of other settings, another scene or another version: they may be dear, and a word
+/// mistyped must not cost them.
+pub(super) fn refuse_others(target: &Target) -> Result<()> {
+    let folder = folder(&target.pattern);
+    let heads: Vec<FirstLine> =
+        files(&folder).iter().filter_map(|(_, path)| read_head(&mut opened(path)?)).collect();
+    let why = |head: &FirstLine| of_others(target, head);
+    let Some(first) = heads.iter().find_map(why) else { return Ok(()) };
+    let count = heads.iter().filter_map(why).count();
+    Err(Error::Usage(format!(
+        "{} holds {} of an earlier job that cannot serve this one: the first {first}\n  \
+         help: set it back, choose another output with -o, or let go of what was traced with --overwrite",
+        folder.display(),
+        counted(count, "reference"),
+    )))
 }
 
 /// Removes references that cannot serve the job at `target`; says so.
@@ -210,7 +242,7 @@ pub(super) fn sweep(target: &Target) -> Result<Vec<String>> {
     atomic::clean_temporaries(&folder, LEFTOVER_AGE)?;
     let mut removed = Vec::new();
     for (frame, path) in files(&folder) {
-        let head = fs::File::open(&path).ok().and_then(|f| read_head(&mut BufReader::new(f)));
+        let head = opened(&path).and_then(|mut file| read_head(&mut file));
         if let Some(why) = refusal(target, head.as_ref(), frame) {
             fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
             removed.push(why);
@@ -230,26 +262,57 @@ fn files(folder: &Path) -> Vec<(u32, PathBuf)> {
     found
 }
 
-fn read_head(source: &mut impl BufRead) -> Option<Head> {
+/// The first line of a file, as far as it can be understood.
+#[allow(clippy::large_enum_variant, reason = "most are the large one")]
+enum FirstLine {
+    Head(Head),
+    /// Of another version of the files.
+    OtherVersion,
+}
+
+fn opened(path: &Path) -> Option<BufReader<fs::File>> {
+    let is_file = fs::metadata(path).is_ok_and(|found| found.is_file());
+    is_file.then(|| fs::File::open(path).ok()).flatten().map(BufReader::new)
+}
+
+fn read_head(source: &mut impl BufRead) -> Option<FirstLine> {
+    #[derive(Deserialize)]
+    struct Version {
+        checkpoint: u32,
+    }
     let mut line = Vec::new();
     source.take(LONGEST_HEAD).read_until(b'\n', &mut line).ok()?;
-    serde_json::from_slice(&line).ok()
+    let Version { checkpoint } = serde_json::from_slice(&line).ok()?;
+    match checkpoint {
+        FORMAT => serde_json::from_slice(&line).ok().map(FirstLine::Head),
+        _ => Some(FirstLine::OtherVersion),
+    }
+}
+
+/// Why a file is of a job that has nothing to do with the one at `target`.
+fn of_others(target: &Target, line: &FirstLine) -> Option<String> {
+    let FirstLine::Head(head) = line else {
+        return Some("is of another version of tweenray".into());
+    };
+    let d = head.header.first_difference(&target.header)?;
+    Some(format!("is of other settings: {} was {}, now it is {}", d.name, d.before, d.now))
 }
 
 /// Why a file cannot be the reference of `frame` in the job at `target`.
-fn refusal(target: &Target, head: Option<&Head>, frame: u32) -> Option<String> {
-    let Some(head) = head.filter(|head| head.frame == frame) else {
+fn refusal(target: &Target, line: Option<&FirstLine>, frame: u32) -> Option<String> {
+    let others = line.and_then(|line| of_others(target, line));
+    if others.is_some() {
+        return others;
+    }
+    let Some(FirstLine::Head(head)) = line.filter(|line| line.is_of(frame)) else {
         return Some("is damaged".into());
     };
-    if head.checkpoint != FORMAT {
-        return Some("is of another version of tweenray".into());
-    }
-    if let Some(d) = head.header.first_difference(&target.header) {
-        return Some(format!(
-            "is of other settings: {} was {}, now it is {}",
-            d.name, d.before, d.now
-        ));
-    }
     let recipe = target.recipes.get(frame).map(|recipe| recipe.whole.to_string());
     (recipe.as_deref() != Some(&head.recipe)).then(|| "is of another camera move".into())
+}
+
+impl FirstLine {
+    fn is_of(&self, frame: u32) -> bool {
+        matches!(self, Self::Head(head) if head.frame == frame)
+    }
 }

@@ -232,7 +232,7 @@ impl FrameMaker for ColourMaker<'_> {
         let Some((made, known)) = self.frame(frame)? else { return Ok(None) };
         self.made(known);
         self.forget(frame);
-        self.put_away(false)?;
+        self.put_away(false);
         Ok(Some(made))
     }
 
@@ -248,7 +248,8 @@ impl FrameMaker for ColourMaker<'_> {
     }
 
     fn stopped(&self) -> Result<()> {
-        self.put_away(true)
+        self.put_away(true);
+        Ok(())
     }
 
     fn notes(&self) -> Vec<String> {

@@ -134,7 +134,7 @@ impl<'a> Inferrer<'a> {
             let own = camera.to_scene(&self.renderer.scene.recentring);
             let reference = Reference::new(frame, &own, &sources, self.channels.len());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
-            self.leave(frame, &camera, &sources, kept.as_ref())?;
+            self.leave(frame, &camera, &sources, kept.as_ref());
         }
         let tolerance = reuse.is_inferred().then_some(allowed.evidence.tolerance);
         Ok(Some(Made { film, rays, reuse, tolerance, audit: None, reference: kept }))
@@ -246,7 +246,7 @@ impl<'a> Inferrer<'a> {
 
     fn hand_out(&self, original: u32, made: Made) -> Result<Made> {
         self.with_state(|s| s.hand_out(&self.schedule, original, &made));
-        self.tend(false)?;
+        self.tend(false);
         Ok(made)
     }
 
@@ -345,7 +345,8 @@ impl FrameMaker for Inferrer<'_> {
     }
 
     fn stopped(&self) -> Result<()> {
-        self.tend(true)
+        self.tend(true);
+        Ok(())
     }
 
     fn notes(&self) -> Vec<String> {

@@ -177,7 +177,7 @@ pub fn render_frames(
     if frames.is_empty() {
         return Ok(());
     }
-    let mut journal = Journal::open(journal)?;
+    let mut journal = target.journal(rank, journal)?;
     for &frame in frames {
         let Some(report) = render_frame(target, frame, (rank, &mut journal), maker)? else {
             return maker.stopped();

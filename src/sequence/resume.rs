@@ -5,7 +5,7 @@ mod refuse;
 use super::checkpoint;
 use super::recipe::{Recipe, Recipes};
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{Header, Manifest, MapRow, Row, Stray, manifest_path};
+use crate::output::manifest::{Header, Journal, Manifest, MapRow, Row, Stray, Turn, manifest_path};
 use crate::output::maps::Map;
 use crate::output::{Format, FramePattern, WriteOptions, atomic};
 use crate::scene::FrameRange;
@@ -19,8 +19,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Temporary files of dead jobs are cleared away once they are this old: on a shared folder a
-/// younger one may belong to a process on another machine.
+/// Temporary files of other machines' processes are cleared away once they are this old: on a shared
+/// folder a younger one may belong to one that lives.
 pub(super) const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// Where the frames of a job go, and what they all share.
@@ -42,6 +42,14 @@ impl Target {
     /// Whether frames have maps in files of their own.
     pub fn has_map_files(&self) -> bool {
         self.write.maps.is_some() && self.pattern.format() != Format::Exr
+    }
+
+    /// Where rank `rank` appends its rows: to the manifest itself, at `path`, or its part of that.
+    ///
+    /// # Errors
+    /// It cannot be opened, or is of other settings.
+    pub fn journal(&self, rank: u32, path: &Path) -> Result<Journal> {
+        if rank == 0 { Journal::of(path, &self.header) } else { Journal::open(path) }
     }
 
     /// Every file that frame `frame` has.
@@ -73,8 +81,8 @@ pub struct Plan {
 /// A frame whose camera is the same, but not what it is inferred from, is rendered again: a longer
 /// shot goes on where a shorter one ended.
 ///
-/// Errors: `Error::Usage` where frames of other settings, of another camera move, or of unknown
-/// origin, are in the way and `target` does not say to replace them.
+/// Errors: `Error::Usage` where frames or references of other settings, or frames of another camera
+/// move or of unknown origin, are in the way and `target` does not say to replace them.
 pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     prepare_with(target, frames, None)
 }
@@ -130,11 +138,18 @@ pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
 
 fn look_at(target: &Target, frame: u32) -> Result<Found> {
     let paths = target.paths(frame);
-    let hash = |path: &PathBuf| match fs::read(path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        read => read
-            .map(|bytes| Some(blake3::hash(&bytes).to_hex().to_string()))
-            .map_err(|e| Error::io("read", path, e)),
+    let hash = |path: &PathBuf| {
+        // A pipe or a device has no end.
+        if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            let why = format!("{} is in the way: it is not a regular file", path.display());
+            return Err(Error::Usage(why));
+        }
+        match fs::read(path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            read => read
+                .map(|bytes| Some(blake3::hash(&bytes).to_hex().to_string()))
+                .map_err(|e| Error::io("read", path, e)),
+        }
     };
     let own = hash(&paths[0])?;
     let mut maps = Vec::new();
@@ -147,23 +162,29 @@ fn look_at(target: &Target, frame: u32) -> Result<Found> {
 
 fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) -> Result<Plan> {
     let path = manifest_path(&target.pattern);
+    let turn = Turn::take(&path)?;
     let found = match Manifest::read(&path) {
         Err(_) if target.overwrite => None,
         read => read?,
     };
     let Some(manifest) = found else {
         refuse_strangers(target, frames)?;
+        if !target.overwrite {
+            checkpoint::refuse_others(target)?;
+        }
         Manifest::create(&path, &target.header, &[])?;
         return Ok(Plan::all(frames));
     };
     if !target.overwrite {
         refuse_others(target, &manifest, frames)?;
+        checkpoint::refuse_others(target)?;
     }
     if manifest.header.first_difference(&target.header).is_some() {
         Manifest::create(&path, &target.header, &left_over(target, &manifest, frames))?;
         return Ok(Plan::all(frames));
     }
-    Manifest::merge_parts(&path)?;
+    drop(turn);
+    Manifest::merge_parts(&path, &target.header)?;
     let rows = Manifest::read(&path)?.map(|m| m.rows).unwrap_or_default();
     let plan = match target.overwrite {
         true => Plan::all(frames),
@@ -185,11 +206,13 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
 /// Says in the manifest which of its frames are not of this shot, where that is new.
 fn mark_strays(target: &Target, before: &Header, rows: &BTreeMap<u32, Row>) -> Result<()> {
     let same_shot = before.shot_hash == target.header.shot_hash;
-    let marked: Vec<Row> = rows.values().map(|row| marked(target, row)).collect();
-    if same_shot && marked.iter().eq(rows.values()) {
+    if same_shot && rows.values().all(|row| marked(target, row) == *row) {
         return Ok(());
     }
-    Manifest::create(&manifest_path(&target.pattern), &target.header, &marked)
+    Manifest::rewrite(&manifest_path(&target.pattern), |found| {
+        let rows = found.rows.values().map(|row| marked(target, row)).collect();
+        (target.header.clone(), rows)
+    })
 }
 
 fn marked(target: &Target, row: &Row) -> Row {

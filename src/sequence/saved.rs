@@ -6,7 +6,6 @@
 
 use super::checkpoint::Checkpoints;
 use super::{Inferrer, SaveCost};
-use crate::error::Result;
 use crate::inference::TracedPoints;
 use crate::reuse::Reference;
 use crate::scene::Camera;
@@ -46,11 +45,12 @@ pub(super) trait Keeps {
     fn bytes(&self, left: &Self::Left) -> Option<Arc<[u8]>>;
 
     /// Puts what frames left on disk where that is due, all of it where the job shall stop, and removes
-    /// what no frame to come needs.
-    fn put_away(&self, stopping: bool) -> Result<()> {
+    /// what no frame to come needs. Where it cannot be written the job goes on without: it only saves time
+    /// after a kill.
+    fn put_away(&self, stopping: bool) {
         let Some((checkpoints, every)) = self.checkpoints().and_then(|c| Some((c, c.every?)))
         else {
-            return Ok(());
+            return;
         };
         let start = Instant::now();
         let every = if stopping { Duration::ZERO } else { every };
@@ -60,7 +60,10 @@ pub(super) trait Keeps {
                 break;
             }
             let Some(bytes) = self.bytes(&left) else { continue };
-            checkpoints.write(frame, &bytes)?;
+            if let Err(why) = checkpoints.write(frame, &bytes) {
+                checkpoints.note_unwritten(&why);
+                continue;
+            }
             self.with_saved(|saved, _| {
                 saved.on_disk.insert(frame);
                 saved.cost.bytes += bytes.len() as u64;
@@ -69,7 +72,6 @@ pub(super) trait Keeps {
         let over = self.with_saved(|saved, is_needed| saved.over(is_needed));
         over.into_iter().for_each(|frame| checkpoints.remove(frame));
         self.with_saved(|saved, _| saved.cost.seconds += start.elapsed().as_secs_f64());
-        Ok(())
     }
 }
 
@@ -169,11 +171,11 @@ impl Inferrer<'_> {
         camera: &Camera,
         traced: &TracedPoints,
         kept: Option<&Arc<[u8]>>,
-    ) -> Result<()> {
+    ) {
         let saves = |c: &&Checkpoints| c.every.is_some() && self.pyramid.is_key(frame);
         let saved = self.checkpoints.filter(saves);
         let Some(terms) = self.exchange.as_ref().or(saved.map(|c| c.terms)) else {
-            return Ok(());
+            return;
         };
         let start = Instant::now();
         // A cropped frame's file holds less.
@@ -181,22 +183,22 @@ impl Inferrer<'_> {
             Some(bytes) => Some(Arc::clone(bytes)),
             None => self.encode(terms, frame, camera, None, traced),
         };
-        let Some(bytes) = bytes else { return Ok(()) };
+        let Some(bytes) = bytes else { return };
         if self.exchange.is_some() {
             self.with_state(|s| s.exports.insert(frame, Arc::clone(&bytes)));
         }
         if saved.is_none() {
-            return Ok(());
+            return;
         }
         self.with_state(|s| {
             s.saved.add(frame, bytes);
             s.saved.cost.seconds += start.elapsed().as_secs_f64();
         });
-        self.tend(false)
+        self.tend(false);
     }
 
     /// What is due goes to disk, all of it where the job shall stop.
-    pub(super) fn tend(&self, stopping: bool) -> Result<()> {
-        self.put_away(stopping)
+    pub(super) fn tend(&self, stopping: bool) {
+        self.put_away(stopping);
     }
 }

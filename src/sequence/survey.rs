@@ -2,13 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::output::FramePattern;
-use crate::output::manifest::{Manifest, Row, Stray, folder_of};
+use crate::output::manifest::{Manifest, MapRow, Row, Stray, folder_of};
 use crate::scene::FrameRange;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::fs;
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Frames of a sequence by how they stand; each list ascends.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -82,23 +82,37 @@ fn stands(
     let Some(row) = manifest.rows.get(&frame) else {
         return Ok(if path.exists() { Stands::Damaged } else { Stands::Missing });
     };
-    let Some(hash) = hash_of(&path)? else { return Ok(Stands::Missing) };
+    if !path.try_exists().map_err(|e| Error::io("read", &path, e))? {
+        return Ok(Stands::Missing);
+    }
+    let is_whole = is_whole(&path, Some(row.bytes), &row.blake3)?;
     let same_name = path.file_name().is_some_and(|name| name == row.file.as_str());
-    let maps = row.maps.iter().map(|map| (folder.join(&map.file), &map.blake3));
-    let is_whole = |(path, hash): (PathBuf, &String)| Ok(hash_of(&path)?.as_ref() == Some(hash));
-    let with_maps = maps.map(is_whole).collect::<Result<Vec<bool>>>()?;
+    let maps = row.maps.iter().map(|map| is_whole_map(folder, map));
+    let with_maps = maps.collect::<Result<Vec<bool>>>()?;
     Ok(match row.stray {
         Some(stray) => Stands::Stray(stray),
-        None if same_name && hash == row.blake3 && with_maps.iter().all(|m| *m) => Stands::Done,
+        None if same_name && is_whole && with_maps.iter().all(|m| *m) => Stands::Done,
         None => Stands::Damaged,
     })
 }
 
-/// BLAKE3 of a file, hexadecimal; `None` where there is none.
-fn hash_of(path: &Path) -> Result<Option<String>> {
+fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
+    is_whole(&folder.join(&map.file), None, &map.blake3)
+}
+
+/// Whether a regular file of so many bytes with this hash lies there. Anything else is not read: a pipe or a
+/// device has no end.
+fn is_whole(path: &Path, bytes: Option<u64>, hash: &str) -> Result<bool> {
+    let found = match fs::metadata(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
+        found => found.map_err(|e| Error::io("read", path, e))?,
+    };
+    if !found.is_file() || bytes.is_some_and(|bytes| bytes != found.len()) {
+        return Ok(false);
+    }
     match fs::read(path) {
-        Ok(bytes) => Ok(Some(blake3::hash(&bytes).to_hex().to_string())),
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+        Ok(bytes) => Ok(blake3::hash(&bytes).to_hex().as_str() == hash),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
         Err(e) => Err(Error::io("read", path, e)),
     }
 }

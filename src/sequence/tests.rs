@@ -191,7 +191,7 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     let plan = prepare(&target, FOUR).expect("prepared");
     let maker = Plain { settings: settings(), stop_before: 0, made: RefCell::default() };
     let manifest = manifest_path(&target.pattern);
-    let part = crate::output::manifest::part_path(&manifest, 1);
+    let part = crate::output::manifest::part_path(&manifest, &target.header, 1);
     let quiet = &mut |_: &FrameReport| Ok(());
     render_frames(&target, &plan.render[..2], (0, &manifest), &maker, quiet).expect("runs");
     render_frames(&target, &plan.render[2..3], (1, &part), &maker, quiet).expect("runs");

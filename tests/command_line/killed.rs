@@ -17,11 +17,11 @@ const JOBS: [(&str, &str); 5] = [
 ];
 
 /// Numbers without a pattern, the same in each run (Marsaglia, 2003: xorshift).
-struct Moments(u64);
+pub struct Moments(pub u64);
 
 impl Moments {
     /// A moment before `end`.
-    fn before(&mut self, end: Duration) -> Duration {
+    pub fn before(&mut self, end: Duration) -> Duration {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
@@ -37,7 +37,7 @@ fn line(options: &str, ending: &str, folder: &str) -> String {
 }
 
 /// The files that a user sees, but for the manifest, with what they hold and which file they are.
-fn visible(job: &Job, folder: &str) -> BTreeMap<String, (Vec<u8>, u64)> {
+pub fn visible(job: &Job, folder: &str) -> BTreeMap<String, (Vec<u8>, u64)> {
     let is_visible = |name: &String| !name.starts_with('.') && !name.ends_with(".jsonl");
     let names = if job.path(folder).exists() { job.names(folder) } else { Vec::new() };
     let look = |name: String| {

@@ -14,6 +14,8 @@ mod launcher;
 mod pages;
 mod ranks;
 #[cfg(feature = "mpi")]
+mod ranks_killed;
+#[cfg(feature = "mpi")]
 mod read_once;
 mod references;
 #[cfg(feature = "mpi")]
@@ -21,6 +23,8 @@ mod regrouped;
 mod rendering;
 mod resumed;
 mod reuse;
+#[cfg(feature = "mpi")]
+mod side_by_side;
 mod slurm;
 mod sweeps;
 #[cfg(feature = "mpi")]

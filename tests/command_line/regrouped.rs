@@ -7,34 +7,81 @@ use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-const LINE: &str = "render cube.obj --size 64x36 --spp 2 --segment 8 --frames 1..20 --no-video \
+const LINE: &str = "render cube.obj --size 192x108 --spp 4 --segment 8 --frames 1..20 --no-video \
     --threads 1 --checkpoint 0s";
 
 /// Signals to all ranks, or one.
-fn send(job: &Job, signal: &str, pids: &str) {
+pub fn send(job: &Job, signal: &str, pids: &str) {
     let kill = format!("kill -{signal} $(cat {pids}) 2>/dev/null; true");
     let shell = Command::new("sh").args(["-c", &kill]).current_dir(job.path(".")).status();
     assert!(shell.expect("a shell").success());
 }
 
 /// Starts a job; `None` where there is no mpirun.
-fn start(job: &Job, ranks: u32, line: &str) -> Option<Child> {
-    (0..ranks).for_each(|rank| _ = fs::remove_file(job.path(format!("pid.{rank}"))));
+pub fn start(job: &Job, ranks: u32, line: &str) -> Option<Child> {
+    // Those of more ranks before it, too: their numbers may be other processes' by now.
+    for name in job.names(".").into_iter().filter(|name| name.starts_with("pid.")) {
+        fs::remove_file(job.path(name)).expect("removed");
+    }
     let mut command = launched(job, ranks, line);
     let errors = fs::File::create(job.path("errors")).expect("a file");
     command.stdout(Stdio::null()).stderr(errors).spawn().ok()
 }
 
-/// Ends the whole job as a lost machine would; whether it had ended by itself.
-fn kill_after(job: &Job, child: &mut Child, moment: Duration) -> bool {
-    std::thread::sleep(moment);
-    if child.try_wait().expect("a child").is_some() {
-        return true;
+/// The frames that are there.
+fn frames(job: &Job, folder: &str, ending: &str) -> usize {
+    let is_frame = |name: &String| {
+        // Maps have a second underscore, unfinished files a dot before their name.
+        name.starts_with("f_") && name.ends_with(ending) && name.matches('_').count() == 1
+    };
+    let names = if job.path(folder).exists() { job.names(folder) } else { Vec::new() };
+    names.into_iter().filter(is_frame).count()
+}
+
+/// Ends the whole job as a lost machine would, once there are more frames than before; whether it had not
+/// ended by itself.
+fn kill_at(job: &Job, child: &mut Child, (folder, ending): (&str, &str)) -> bool {
+    let before = frames(job, folder, ending);
+    while frames(job, folder, ending) <= before {
+        if child.try_wait().expect("a child").is_some() {
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(1));
     }
     send(job, "KILL", "pid.*");
     child.kill().expect("killed");
     child.wait().expect("dead");
-    false
+    true
+}
+
+/// Kills and requeues a job, each time with as many ranks and threads as `groups` says, and lets it end with the
+/// last; `None` where there is no mpirun. `line` gives the command for so many threads and a folder. After
+/// each kill what is there has the bytes of an undisturbed job.
+fn regroup(
+    job: &Job,
+    groups: &[(u32, u32)],
+    (ending, all): (&str, usize),
+    line: &dyn Fn(u32, &str) -> String,
+) -> Option<()> {
+    job.done(&line(2, "whole"));
+    let (last, groups) = groups.split_last().expect("groups");
+    let mut landed = 0;
+    for (ranks, threads) in groups {
+        let mut child = start(job, *ranks, &line(*threads, "k"))?;
+        let is_killed = kill_at(job, &mut child, ("k", ending));
+        let words = fs::read_to_string(job.path("errors")).expect("text");
+        assert!(!words.contains("damaged"), "{words}");
+        assert_same(job, "k", ending, false);
+        landed += usize::from(is_killed && (1..all).contains(&frames(job, "k", ending)));
+    }
+    assert!(landed >= 4, "{landed} kills in the middle of the job");
+    let ran = under_mpirun(job, last.0, &line(last.1, "k"))?;
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert_same(job, "k", ending, true);
+    let left = job.path("k/.f.references");
+    assert!(!left.exists(), "references are left: {:?}", job.names("k/.f.references"));
+    job.done(&format!("status k --frames 1..{all}"));
+    Some(())
 }
 
 fn assert_same(job: &Job, folder: &str, ending: &str, all: bool) {
@@ -51,30 +98,14 @@ fn a_killed_job_goes_on_with_any_number_of_ranks() {
     for (ending, more) in [
         ("png", ""),
         ("exr", ""),
-        ("exr", "--crop 8,4,50,30"),
+        ("exr", "--crop 16,8,170,100"),
         ("png", "--maps"),
         ("png", "--policy colour"),
     ] {
         let job = Job::new();
-        let line = |out: &str| format!("{LINE} {more} -o {out}/f_##.{ending}");
-        job.done(&line("whole"));
-        // Later and later, so that any part of the job is met.
-        for (ranks, tenths) in [(3, 2), (2, 4), (4, 5), (1, 5), (3, 7)] {
-            let Some(mut child) = start(&job, ranks, &line("k")) else { return };
-            let done = kill_after(&job, &mut child, Duration::from_millis(100 * tenths));
-            let words = fs::read_to_string(job.path("errors")).expect("text");
-            assert!(!words.contains("damaged"), "{words}");
-            assert_same(&job, "k", ending, false);
-            if done {
-                break;
-            }
-        }
-        let Some(ran) = under_mpirun(&job, 2, &line("k")) else { return };
-        assert_eq!(ran.code, Some(0), "{}", ran.err);
-        assert_same(&job, "k", ending, true);
-        let left = job.path("k/.f.references");
-        assert!(!left.exists(), "{more}: references are left: {:?}", job.names("k/.f.references"));
-        job.done("status k --frames 1..20");
+        let line = |_, out: &str| format!("{LINE} {more} -o {out}/f_##.{ending}");
+        let groups = [(3, 1), (2, 1), (4, 1), (1, 1), (3, 1), (2, 1)];
+        let Some(()) = regroup(&job, &groups, (ending, 20), &line) else { return };
     }
 }
 
@@ -87,26 +118,12 @@ fn scenes_that_are_killed_and_regrouped_are_the_same() {
         let scene = small(&job, name);
         let line = |threads: u32, out: &str| {
             format!(
-                "render {scene} --size 96x54 --spp 2 --shadow-samples 16 --frames 1..16 --no-video \
+                "render {scene} --size 192x108 --spp 2 --shadow-samples 16 --frames 1..16 --no-video \
                  --segment {segment} --audit 0.1 --checkpoint 0s --threads {threads} -o {out}/f_##.png"
             )
         };
-        job.done(&line(2, "whole"));
-        let runs = [(2, 1, 5), (4, 1, 8), (1, 2, 6), (3, 2, 9), (8, 1, 12), (2, 2, 10)];
-        for (ranks, threads, tenths) in runs {
-            let Some(mut child) = start(&job, ranks, &line(threads, "k")) else { return };
-            let done = kill_after(&job, &mut child, Duration::from_millis(100 * tenths));
-            let words = fs::read_to_string(job.path("errors")).expect("text");
-            assert!(!words.contains("damaged"), "{words}");
-            assert_same(&job, "k", "png", false);
-            if done {
-                break;
-            }
-        }
-        let Some(ran) = under_mpirun(&job, 16, &line(1, "k")) else { return };
-        assert_eq!(ran.code, Some(0), "{}", ran.err);
-        assert_same(&job, "k", "png", true);
-        job.done("status k --frames 1..16");
+        let groups = [(2, 1), (4, 1), (1, 2), (3, 2), (8, 1), (2, 2), (16, 1)];
+        let Some(()) = regroup(&job, &groups, ("png", 16), &line) else { return };
     }
 }
 

@@ -89,6 +89,25 @@ fn status_says_what_is_done_and_what_is_not() {
     assert_eq!(job.run("status o/f_##.exr").code, Some(2), "frames of another kind");
 }
 
+/// What lies in a frame's place and is no file is not read: pipes and devices have no end.
+#[test]
+fn what_is_no_file_is_damaged() {
+    let job = Job::new();
+    let line = "render cube.obj --size 16x9 --spp 1 --frames 1..5 --no-video -o o/f_##.png";
+    job.done(line);
+    for frame in 1..=4 {
+        fs::remove_file(job.path(format!("o/f_0{frame}.png"))).expect("removed");
+    }
+    let made = std::process::Command::new("mkfifo").arg(job.path("o/f_01.png")).status();
+    assert!(made.expect("mkfifo").success());
+    std::os::unix::fs::symlink("/dev/zero", job.path("o/f_02.png")).expect("a link");
+    fs::create_dir(job.path("o/f_03.png")).expect("a folder");
+    let ran = job.run("status o --frames 1..5");
+    assert_eq!(ran.code, Some(3), "{}", ran.err);
+    assert!(ran.out.contains("3 damaged: 1..3") && ran.out.contains("1 missing: 4"), "{}", ran.out);
+    job.refused(line, "o/f_01.png is in the way: it is not a regular file");
+}
+
 /// A folder that is mistyped is told as such.
 #[test]
 fn a_folder_that_is_not_there_is_named() {

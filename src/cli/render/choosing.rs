@@ -7,7 +7,7 @@ use crate::cli::choose::{Choice, Chooser};
 use crate::cli::request::Request;
 use crate::cli::stats;
 use crate::error::{Error, Result};
-use crate::output::manifest::{Header, Manifest, Row, manifest_path};
+use crate::output::manifest::{Header, Manifest, manifest_path};
 use crate::scene::Settings;
 use crate::sequence::Target;
 use serde::de::DeserializeOwned;
@@ -153,9 +153,9 @@ impl Choosing<'_> {
 /// Writes into the manifest what is known of the choice now.
 fn keep(target: &Target, choice: &Choice) -> Result<()> {
     let path = manifest_path(&target.pattern);
-    Manifest::merge_parts(&path)?;
-    let Some(manifest) = Manifest::read(&path)? else { return Ok(()) };
-    let header = Header { chosen: Some(choice.value()), ..manifest.header };
-    let rows: Vec<Row> = manifest.rows.into_values().collect();
-    Manifest::create(&path, &header, &rows)
+    Manifest::merge_parts(&path, &target.header)?;
+    Manifest::rewrite(&path, |found| {
+        let header = Header { chosen: Some(choice.value()), ..found.header };
+        (header, found.rows.into_values().collect())
+    })
 }

@@ -1,0 +1,116 @@
+//! Jobs that meet in one folder.
+
+use super::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+fn header(seed: u32) -> Header {
+    let settings = serde_json::json!({ "seed": seed });
+    Header { manifest: FORMAT, settings, ..Header::default() }
+}
+
+fn row(frame: u32) -> Row {
+    let line = format!(
+        "{{\"frame\":{frame},\"file\":\"f\",\"view\":\"v\",\"recipe\":\"r\",\"blake3\":\"b\",\"bytes\":1,\
+         \"seconds\":1.0,\"rays\":{}}}",
+        serde_json::to_string(&RayCounts::default()).expect("JSON")
+    );
+    serde_json::from_str(&line).expect("a row")
+}
+
+fn frames(path: &Path) -> Vec<u32> {
+    let manifest = Manifest::read(path).expect("readable").expect("there");
+    manifest.rows.into_keys().collect()
+}
+
+fn names(folder: &Path) -> usize {
+    fs::read_dir(folder).expect("a folder").count()
+}
+
+#[test]
+fn rows_that_come_after_their_part_was_taken_in_are_not_lost() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("f.manifest.jsonl");
+    Manifest::create(&path, &header(0), &[]).expect("created");
+    let part = part_path(&path, &header(0), 3);
+    let mut journal = Journal::open(&part).expect("opened");
+    journal.append(&row(1)).expect("written");
+    Manifest::merge_parts(&path, &header(0)).expect("merged");
+    assert!(!part.exists());
+    journal.append(&row(2)).expect("written");
+    let now = Manifest::as_of_now(&path).expect("read").expect("there");
+    assert!(now.rows.into_keys().eq([1, 2]));
+    Manifest::merge_parts(&path, &header(0)).expect("merged");
+    assert_eq!((frames(&path), names(folder.path())), (vec![1, 2], 1));
+}
+
+#[test]
+fn rows_do_not_get_under_another_header() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("f.manifest.jsonl");
+    Manifest::create(&path, &header(0), &[]).expect("created");
+    let mut own = Journal::of(&path, &header(0)).expect("opened");
+    let mut part = Journal::open(&part_path(&path, &header(0), 1)).expect("opened");
+    own.append(&row(1)).expect("written");
+    Manifest::create(&path, &header(7), &[]).expect("replaced");
+    let error = own.append(&row(2)).expect_err("refused").to_string();
+    assert!(error.contains("seed is 7 there, not 0"), "{error}");
+    part.append(&row(3)).expect("written");
+    Manifest::merge_parts(&path, &header(7)).expect("merged");
+    assert!(frames(&path).is_empty());
+    let now = Manifest::as_of_now(&path).expect("read").expect("there");
+    assert!(now.rows.is_empty());
+}
+
+#[test]
+fn a_torn_line_spoils_no_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("f.manifest.jsonl");
+    Manifest::create(&path, &header(0), &[row(1)]).expect("created");
+    let mut text = fs::read_to_string(&path).expect("text");
+    text += "{\"frame\":2,";
+    fs::write(&path, text).expect("torn");
+    Journal::of(&path, &header(0)).expect("opened").append(&row(3)).expect("written");
+    assert_eq!(frames(&path), [1, 3]);
+}
+
+/// Four ranks append as fast as they can, rank 0 to the manifest, while others take in, rewrite and survey.
+#[test]
+fn no_order_of_events_loses_a_row() {
+    const ROWS: u32 = 150;
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = &folder.path().join("f.manifest.jsonl");
+    Manifest::create(path, &header(0), &[]).expect("created");
+    let running = &AtomicU32::new(4);
+    std::thread::scope(|scope| {
+        for rank in 0..4 {
+            scope.spawn(move || {
+                let header = header(0);
+                let mut journal = match rank {
+                    0 => Journal::of(path, &header),
+                    rank => Journal::open(&part_path(path, &header, rank)),
+                }
+                .expect("opened");
+                for n in 1..=ROWS {
+                    journal.append(&row(rank * ROWS + n)).expect("written");
+                }
+                running.fetch_sub(1, Ordering::Relaxed);
+            });
+        }
+        for number in 0..3 {
+            scope.spawn(move || {
+                while running.load(Ordering::Relaxed) > 0 {
+                    match number {
+                        2 => Manifest::rewrite(path, |found| {
+                            (found.header, found.rows.into_values().collect())
+                        }),
+                        _ => Manifest::merge_parts(path, &header(0)),
+                    }
+                    .expect("done");
+                }
+            });
+        }
+    });
+    Manifest::merge_parts(path, &header(0)).expect("merged");
+    assert!(frames(path).into_iter().eq(1..=4 * ROWS));
+    assert_eq!(names(folder.path()), 1);
+}
