@@ -22,6 +22,8 @@ pub struct Costs {
     pub write_seconds: f64,
     pub pack_seconds: f64,
     pub reference_bytes: u64,
+    /// What other frames' references hold, of a key frame's.
+    pub between_share: f64,
     pub discovery_bytes: u64,
     pub strips_bytes: u64,
     pub note_bytes: u64,
@@ -56,6 +58,7 @@ impl Costs {
             write_seconds,
             pack_seconds: 0.0,
             reference_bytes: 0,
+            between_share: ran.traced_share(),
             discovery_bytes: 0,
             strips_bytes: 0,
             note_bytes: 400,
@@ -107,6 +110,7 @@ impl Costs {
             // Not told apart from packing by what was measured.
             unpack_seconds: self.pack_seconds,
             reference_bytes: self.reference_bytes,
+            between_share: self.between_share,
             strips_bytes: self.strips_bytes,
             note_bytes: self.note_bytes,
             latency: LATENCY,

@@ -94,7 +94,8 @@ fn fit_overheads(costs: &mut Costs, rows: &[Row]) -> f64 {
     let run: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
     let each = (rise / run).max(0.0);
     let users = |f: u32| SHOT.all().any(|g| SHOT.ancestors(g).contains(&f));
-    let sources = SHOT.all().filter(|f| users(*f)).count() as f64;
+    let weight = |f: u32| if SHOT.is_key(f) { 1.0 } else { costs.between_share };
+    let sources: f64 = SHOT.all().filter(|f| users(*f)).map(weight).sum();
     costs.pack_seconds = ((y - each * x) / sources).max(0.0);
     each
 }

@@ -54,6 +54,7 @@ impl Page<'_> {
             ("spread", spread_of(costs)),
             ("reference", megabytes(costs.reference_bytes)),
             ("discoveries", megabytes(costs.discovery_bytes)),
+            ("share", format!("{:.1} %", 100.0 * self.costs.between_share)),
             ("pack", format!("{:.0} ms", 1e3 * costs.pack_seconds)),
             ("clerk", format!("{:.1} %", 100.0 * costs.clerk_share)),
             ("latency", format!("{:.0} µs", 1e6 * LATENCY)),

@@ -185,6 +185,19 @@ impl Ran {
         bytes / messages.max(1)
     }
 
+    /// Share of their surface points that frames had to trace, of those that could infer some.
+    pub fn traced_share(&self) -> f64 {
+        let frames = self.stats["frames"].as_array().unwrap();
+        let count = |f: &Value, what: &str| f["reuse"][what].as_f64().unwrap();
+        let points = |f: &Value| [count(f, "direct"), count(f, "specular")].iter().sum::<f64>();
+        let known = |f: &Value| {
+            [count(f, "direct_inferred"), count(f, "specular_inferred")].iter().sum::<f64>()
+        };
+        let between: Vec<&Value> = frames.iter().filter(|f| known(f) > 0.0).collect();
+        let sum = |of: &dyn Fn(&Value) -> f64| between.iter().map(|f| of(f)).sum::<f64>();
+        1.0 - sum(&known) / sum(&points).max(1.0)
+    }
+
     /// Wall seconds of each frame, by number: to make it, and to write it.
     pub fn frames(&self) -> Vec<(f64, f64)> {
         let frames = self.stats["frames"].as_array().unwrap();

@@ -32,12 +32,14 @@ pub struct Model<'a> {
     pub seconds: &'a dyn Fn(u32) -> f64,
     /// Those of them that go into writing, which is not shared among strips.
     pub write_seconds: f64,
-    /// Seconds of a core to make a reference ready to travel.
+    /// Seconds of a core to make a key frame's reference ready to travel.
     pub pack_seconds: f64,
-    /// Seconds of a core to take in a reference that came.
+    /// Seconds of a core to take one in that came.
     pub unpack_seconds: f64,
-    /// Bytes of a reference on its way.
+    /// Bytes of one on its way.
     pub reference_bytes: u64,
+    /// Share of these that other frames' references take: they hold what had to be traced there.
+    pub between_share: f64,
     /// Bytes of all strips of a frame together.
     pub strips_bytes: u64,
     /// Bytes of a note.

@@ -3,12 +3,14 @@
 use super::super::board::{Board, Errand, Order, Step, What};
 use super::super::note::Kind;
 use super::{Job, Model, Played, Table};
+use crate::sequence::Pyramid;
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
 
 /// A job half-way.
 pub struct Play<'a> {
     pub(super) model: &'a Model<'a>,
+    pyramid: Pyramid,
     pub(super) ranks: u32,
     tells_all: bool,
     board: Board,
@@ -97,6 +99,7 @@ impl<'a> Play<'a> {
         let order: Vec<u32> = (0..ranks).collect();
         Self {
             model,
+            pyramid: job.pyramid,
             ranks,
             tells_all: job.tells_all,
             board: Board::new(job, &frames, &order),
@@ -159,7 +162,8 @@ impl<'a> Play<'a> {
             Mail::Look => self.look(),
             Mail::Do { rank, errand } => self.accept(rank, errand),
             Mail::Send { from, to, original } => {
-                let at = self.carry(from, to, Kind::Reference, self.model.reference_bytes);
+                let bytes = self.model.reference_bytes as f64 * self.weight(original);
+                let at = self.carry(from, to, Kind::Reference, bytes as u64);
                 self.post(at, Mail::Reference { rank: to, original });
             }
             Mail::Reference { rank, original } => {
@@ -249,13 +253,14 @@ impl<'a> Play<'a> {
         };
         let desk = &mut self.desks[rank as usize];
         let Some(Errand { order, needs, .. }) = desk.errands.remove(at) else { return };
-        let mut unpacked = 0;
+        let mut unpacked = Vec::new();
         for need in needs {
             desk.arrived.remove(&need);
-            unpacked += u32::from(desk.has.insert(need));
+            unpacked.extend(desk.has.insert(need).then_some(need));
         }
         desk.is_busy = true;
-        let seconds = self.cost(&order) + f64::from(unpacked) * self.model.unpack_seconds;
+        let unpacked: f64 = unpacked.into_iter().map(|need| self.weight(need)).sum();
+        let seconds = self.cost(&order) + unpacked * self.model.unpack_seconds;
         self.played.busy_seconds += seconds;
         self.number += 1;
         let what = Ending { rank, order, began: self.now };
@@ -263,11 +268,18 @@ impl<'a> Play<'a> {
         self.in_hand.push(Reverse(timed));
     }
 
+    /// What an original's reference weighs, of a key frame's.
+    fn weight(&self, original: u32) -> f64 {
+        if self.pyramid.is_key(original) { 1.0 } else { self.model.between_share }
+    }
+
     /// Seconds of a core for an order.
     fn cost(&self, order: &Order) -> f64 {
         let all = (self.model.seconds)(order.original);
         let write = self.model.write_seconds.min(all);
-        let pack = if order.is_source && self.ranks > 1 { self.model.pack_seconds } else { 0.0 };
+        let is_packed = order.is_source && self.ranks > 1;
+        let weight = if is_packed { self.weight(order.original) } else { 0.0 };
+        let pack = weight * self.model.pack_seconds;
         match order.what {
             What::Strip { of, .. } => (all - write) / f64::from(of),
             What::Whole { strips: 0, .. } => all + pack,

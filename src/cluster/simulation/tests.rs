@@ -14,6 +14,7 @@ fn with(seconds: &dyn Fn(u32) -> f64) -> Model<'_> {
         pack_seconds: 0.01,
         unpack_seconds: 0.005,
         reference_bytes: 1_000_000,
+        between_share: 1.0,
         strips_bytes: 2_000_000,
         note_bytes: 400,
         latency: 1e-5,
