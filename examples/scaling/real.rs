@@ -188,7 +188,8 @@ impl Ran {
     /// Share of their surface points that frames had to trace, of those that could infer some.
     pub fn traced_share(&self) -> f64 {
         let frames = self.stats["frames"].as_array().unwrap();
-        let count = |f: &Value, what: &str| f["reuse"][what].as_f64().unwrap();
+        // Nothing is told where no light is worth a lookup.
+        let count = |f: &Value, what: &str| f["reuse"][what].as_f64().unwrap_or(0.0);
         let points = |f: &Value| [count(f, "direct"), count(f, "specular")].iter().sum::<f64>();
         let known = |f: &Value| {
             [count(f, "direct_inferred"), count(f, "specular_inferred")].iter().sum::<f64>()
