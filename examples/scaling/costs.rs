@@ -20,6 +20,7 @@ pub struct Costs {
     /// The measured shot.
     pub pyramid: Pyramid,
     pub write_seconds: f64,
+    /// To make a key frame's reference ready to travel.
     pub pack_seconds: f64,
     pub reference_bytes: u64,
     /// What other frames' references hold, of a key frame's.
@@ -66,15 +67,18 @@ impl Costs {
         }
     }
 
-    /// Bytes of references and of the paper's discoveries, by two ranks that make a few frames.
+    /// What references take to be made ready, by a rank that puts two of key frames on disk; bytes of
+    /// references and of the paper's discoveries, by two ranks that make a few frames.
     pub fn weigh(&mut self, stage: &Stage, words: &str) {
-        let line =
-            |words: String| Line { ranks: 2, threads: 1, frames: self.pyramid.frames, words };
-        let ran = stage.run(&line(format!("{words} --segment 2 --frames 1..5")));
+        let frames = self.pyramid.frames;
+        let line = |ranks, words: String| Line { ranks, threads: 1, frames, words };
+        let ran = stage.run(&line(1, format!("{words} --segment 2 --frames 1..3 --checkpoint 0s")));
+        self.pack_seconds = ran.checkpoint_seconds() / 2.0;
+        let ran = stage.run(&line(2, format!("{words} --segment 2 --frames 1..5")));
         self.reference_bytes = ran.size("references");
         // A reference holds what was traced, so strips hold as much and the colours beside it.
         self.strips_bytes = 2 * self.reference_bytes;
-        let ran = stage.run(&line(format!("{words} --policy colour --frames 1..9")));
+        let ran = stage.run(&line(2, format!("{words} --policy colour --frames 1..9")));
         self.discovery_bytes = ran.size("discoveries");
     }
 
@@ -107,7 +111,7 @@ impl Costs {
             seconds,
             write_seconds: self.write_seconds,
             pack_seconds: self.pack_seconds,
-            // Not told apart from packing by what was measured.
+            // Assumed.
             unpack_seconds: self.pack_seconds,
             reference_bytes: self.reference_bytes,
             between_share: self.between_share,

@@ -73,7 +73,7 @@ pub fn fit(stage: &Stage) -> Fit {
     let mut costs = costs.unwrap();
     costs.note_bytes = note_bytes;
     costs.weigh(stage, "--size 400x300 --spp 1 --shadow-samples 16");
-    let rank_seconds = fit_overheads(&mut costs, &rows);
+    let rank_seconds = fit_rank_seconds(&costs, &rows);
     let shares = rows[1..4].iter().map(|row| row.cpu[1] / row.wall[1]);
     // Two ranks never use more than two, whatever there is.
     let cores = shares.fold(0.0, f64::max);
@@ -81,23 +81,16 @@ pub fn fit(stage: &Stage) -> Fit {
     Fit { rows, costs, cores, rank_seconds, said }
 }
 
-/// What two to four ranks take more than one is the line a + b n: b is each rank's own, a is spent on
-/// making references ready to travel, once each. Least squares.
-fn fit_overheads(costs: &mut Costs, rows: &[Row]) -> f64 {
-    let alone = rows[0].cpu[1];
-    let points = rows[1..4].iter().map(|row| (f64::from(row.ranks), row.cpu[1] - alone));
-    let points: Vec<(f64, f64)> = points.collect();
-    let count = points.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let rise: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    let run: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-    let each = (rise / run).max(0.0);
+/// What two to four ranks take more than one, and do not spend on making references ready to travel, each
+/// of them adds. Least squares.
+fn fit_rank_seconds(costs: &Costs, rows: &[Row]) -> f64 {
     let users = |f: u32| SHOT.all().any(|g| SHOT.ancestors(g).contains(&f));
     let weight = |f: u32| if SHOT.is_key(f) { 1.0 } else { costs.between_share };
-    let sources: f64 = SHOT.all().filter(|f| users(*f)).map(weight).sum();
-    costs.pack_seconds = ((y - each * x) / sources).max(0.0);
-    each
+    let packing = costs.pack_seconds * SHOT.all().filter(|f| users(*f)).map(weight).sum::<f64>();
+    let more = |row: &Row| row.cpu[1] - rows[0].cpu[1] - packing;
+    let rise: f64 = rows[1..4].iter().map(|row| f64::from(row.ranks) * more(row)).sum();
+    let run: f64 = rows[1..4].iter().map(|row| f64::from(row.ranks).powi(2)).sum();
+    (rise / run).max(0.0)
 }
 
 fn say(costs: &Costs, cores: f64, rank_seconds: f64, ranks: u32) -> Said {

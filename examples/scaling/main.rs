@@ -22,7 +22,7 @@ fn main() {
     println!("real ranks, oversubscribed");
     let fit = fit::fit(&stage);
     println!("frames of the large job");
-    let costs = predict::measure(&stage, &fit);
+    let costs = predict::measure(&stage, fit.costs.note_bytes);
     let ours = curve(&costs, "tweenray", &[1, 4, 16, 64, 256, 1024, 2048, MOST], NONE);
     let others: Vec<(&str, predict::Curve)> = [
         ("a hundred times the latency", Change { latency: 100.0, ..NONE }),

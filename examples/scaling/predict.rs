@@ -1,7 +1,7 @@
 //! The large job, played on 1 to 4,096 ranks.
 
 use crate::costs::Costs;
-use crate::fit::{Fit, strips};
+use crate::fit::strips;
 use crate::real::{Line, Stage};
 use std::time::Instant;
 use tweenray::cluster::simulation::{Job, Model, Played, Table};
@@ -26,16 +26,13 @@ pub struct Curve {
 }
 
 /// What the large job's frames take, measured on one segment.
-pub fn measure(stage: &Stage, fit: &Fit) -> Costs {
+pub fn measure(stage: &Stage, note_bytes: u64) -> Costs {
     let line = Line { ranks: 1, threads: 1, frames: MEASURED.frames, words: WORDS.into() };
     let ran = stage.run(&line);
     let cpu = ran.cpu - stage.start_of(&line);
     let mut costs = Costs::of(&ran, MEASURED, cpu);
     costs.weigh(stage, WORDS);
-    // What goes into making a reference ready grows with its bytes.
-    let larger = costs.reference_bytes as f64 / fit.costs.reference_bytes.max(1) as f64;
-    costs.pack_seconds = fit.costs.pack_seconds * larger;
-    costs.note_bytes = fit.costs.note_bytes;
+    costs.note_bytes = note_bytes;
     let line = Line { ranks: 2, threads: 1, frames: 65, words: CLERK_WORDS.into() };
     costs.clerk_share = stage.clerk_share(&line);
     println!("  clerks take {:.2} % of a core", 100.0 * costs.clerk_share);

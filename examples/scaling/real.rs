@@ -172,6 +172,12 @@ impl Ran {
         self.stats["total_seconds"].as_f64().unwrap()
     }
 
+    /// Seconds that it took to make references ready and put them on disk.
+    pub fn checkpoint_seconds(&self) -> f64 {
+        let ranks = self.stats["ranks"].as_array().unwrap();
+        ranks.iter().map(|rank| rank["checkpoint_seconds"].as_f64().unwrap()).sum()
+    }
+
     /// Messages and bytes of a kind, of all ranks.
     pub fn sent(&self, kind: &str) -> (u64, u64) {
         let ranks = self.stats["ranks"].as_array().unwrap();

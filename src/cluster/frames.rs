@@ -138,10 +138,9 @@ fn together(
         scope.spawn(move || worker::work(maker, target, (rank, &journal), &to_do, &tell));
         let ran = clerk.run(&told);
         let seconds = start.elapsed().as_secs_f64();
-        let ran = ran.and_then(|()| match stop.load(Ordering::Relaxed) {
-            true => maker.stopped(),
-            false => Ok(()),
-        });
+        if ran.is_ok() && stop.load(Ordering::Relaxed) {
+            maker.stopped();
+        }
         let ran = ran.and_then(|()| world.settle(&mut || clerk.hear()));
         if ran.is_err() {
             // Whatever the other thread traces now is for nobody.

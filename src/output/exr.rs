@@ -9,6 +9,7 @@
 //! The files hold at most one attribute that the crate `exr` keeps in a hash map, whose order differs
 //! from run to run: the same film is the same bytes.
 
+use super::Regular;
 use super::format::SOFTWARE;
 use crate::error::{Error, Result};
 use crate::film::Film;
@@ -23,8 +24,7 @@ use exr::prelude::{
     LayerAttributes, LineOrder, ReadChannels, ReadLayers, Text, Vec2,
 };
 use rayon::prelude::*;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Seek};
+use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
 /// Type of the program's own attribute, which other programs pass by.
@@ -167,14 +167,8 @@ fn own_attribute((name, bytes): (&str, &[u8])) -> (Text, AttributeValue) {
 /// [`Error::Io`] when the file cannot be read; [`Error::Input`] when it is no exr file or larger than
 /// `limit` bytes.
 pub fn read_attribute(path: &Path, name: &str, limit: u64) -> Result<Option<Vec<u8>>> {
-    let io = |e| Error::io("read", path, e);
-    // Before it is opened: opening a pipe waits for a writer.
-    let about = std::fs::metadata(path).map_err(io)?;
-    if !about.is_file() {
-        return Err(Error::input(path, "not a regular file"));
-    }
-    super::read::check_memory(path, about.len(), limit)?;
-    let source = BufReader::new(File::open(path).map_err(io)?);
+    let Regular { source, bytes } = Regular::at(path)?;
+    super::read::check_memory(path, bytes, limit)?;
     let meta = MetaData::read_from_buffered(source, false);
     let meta = meta.map_err(|e| Error::input(path, format!("not a readable exr file: {e}")))?;
     let all = meta.headers.into_iter().flat_map(|header| header.own_attributes.other);

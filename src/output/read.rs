@@ -4,7 +4,7 @@
 //! code values, hdr and exr as linear radiance. Grey becomes three equal channels; alpha is left
 //! out, and so are colour profiles.
 
-use super::exr;
+use super::{Regular, exr};
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
@@ -32,11 +32,7 @@ pub fn read_image(path: impl AsRef<Path>) -> Result<Image> {
 pub fn read_image_within(path: impl AsRef<Path>, limit: u64) -> Result<Image> {
     let path = path.as_ref();
     let io = |e| Error::io("read", path, e);
-    // Before it is opened: opening a pipe waits for a writer.
-    if !std::fs::metadata(path).map_err(io)?.is_file() {
-        return Err(Error::input(path, "not a regular file"));
-    }
-    let mut source = BufReader::new(File::open(path).map_err(io)?);
+    let mut source = Regular::at(path)?.source;
     let mut magic = Vec::new();
     source.by_ref().take(4).read_to_end(&mut magic).map_err(io)?;
     source.rewind().map_err(io)?;

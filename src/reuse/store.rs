@@ -142,11 +142,7 @@ impl Kept<'_> {
         if order.len().checked_mul(4 * columns).is_none_or(|n| n > MOST_BYTES) {
             return None;
         }
-        let words: Vec<Vec<u32>> = order.par_iter().map(|i| self.words(*i, channels)).collect();
-        let mut raw = Vec::with_capacity(4 * columns * order.len());
-        for (column, byte) in (0..columns).flat_map(|c| (0..4).map(move |b| (c, b))) {
-            raw.extend(words.iter().map(|point| point[column].to_le_bytes()[byte]));
-        }
+        let raw = self.planes(&order, channels);
         let json = serde_json::to_vec(&head).ok()?;
         let mut body = (json.len() as u32).to_le_bytes().to_vec();
         body.extend(json);
@@ -171,18 +167,38 @@ impl Kept<'_> {
         order
     }
 
-    fn words(&self, i: usize, channels: usize) -> Vec<u32> {
+    /// The words of points, column by column, each column in four planes of bytes.
+    fn planes(&self, order: &[usize], channels: usize) -> Vec<u8> {
+        let count = order.len();
+        let mut raw = vec![0; 4 * (WORDS + channels) * count];
+        let columns = raw.par_chunks_exact_mut((4 * count).max(1)).enumerate();
+        columns.for_each(|(column, planes)| {
+            for (at, i) in order.iter().enumerate() {
+                let bytes = self.word(*i, column, channels).to_le_bytes();
+                bytes.iter().enumerate().for_each(|(b, byte)| planes[b * count + at] = *byte);
+            }
+        });
+        raw
+    }
+
+    fn word(&self, i: usize, column: usize, channels: usize) -> u32 {
         let TracedPoint { x, y, point } = &self.traced.points[i];
-        let p = point.p.as_vec3();
-        let floats = [p.x, p.y, p.z, point.n.x, point.n.y, point.n.z, point.footprint, point.cos];
         let flag = if point.direct { DIRECT } else { 0 };
-        let mut words = vec![*x, *y, point.geom_id, point.samples.min(DIRECT - 1) | flag];
-        words.extend(floats.map(f32::to_bits));
-        let ratios = &self.traced.ratios[i * channels..(i + 1) * channels];
-        // One NaN, whatever its bits were.
-        let bits = |r: &f32| if r.is_nan() { f32::NAN.to_bits() } else { r.to_bits() };
-        words.extend(ratios.iter().map(bits));
-        words
+        match column {
+            0 => *x,
+            1 => *y,
+            2 => point.geom_id,
+            3 => point.samples.min(DIRECT - 1) | flag,
+            4..7 => (point.p[column - 4] as f32).to_bits(),
+            7..10 => point.n[column - 7].to_bits(),
+            10 => point.footprint.to_bits(),
+            11 => point.cos.to_bits(),
+            _ => match self.traced.ratios[i * channels + column - WORDS] {
+                // One NaN, whatever its bits were.
+                ratio if ratio.is_nan() => f32::NAN.to_bits(),
+                ratio => ratio.to_bits(),
+            },
+        }
     }
 }
 

@@ -12,14 +12,14 @@ use super::Target;
 use super::resume::LEFTOVER_AGE;
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{self, Header, Manifest, Row, manifest_path};
-use crate::output::{Format, FramePattern, atomic, exr};
+use crate::output::{Format, FramePattern, Regular, atomic, exr};
 use crate::reuse::Reference;
 use crate::reuse::store::{ATTRIBUTE, Terms, decode};
 use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -105,8 +105,8 @@ impl<'a> Checkpoints<'a> {
     fn in_frame(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
         let row = self.row(frame)?;
         let path = self.target.pattern.folder().join(&row.file);
-        let whole = blake3::hash(&fs::read(&path).ok()?).to_hex().as_str() == row.blake3;
-        let bytes = whole.then(|| exr::read_attribute(&path, ATTRIBUTE, LARGEST_FRAME))?;
+        let is_whole = Regular::at(&path).and_then(|file| file.hash(&path)).ok()? == row.blake3;
+        let bytes = is_whole.then(|| exr::read_attribute(&path, ATTRIBUTE, LARGEST_FRAME))?;
         self.decode(&path, bytes.ok()??.into())
     }
 
@@ -126,7 +126,7 @@ impl<'a> Checkpoints<'a> {
     /// What [`write`](Self::write) put there, if it is on disk, whole and this job's.
     pub fn read_bytes(&self, frame: u32) -> Option<Arc<[u8]>> {
         let path = self.path(frame);
-        let mut source = opened(&path)?;
+        let mut source = Regular::at(&path).ok()?.source;
         let head = read_head(&mut source);
         if let Some(why) = refusal(self.target, head.as_ref(), frame) {
             self.note(format!("{} {why}; its frame is traced again", path.display()));
@@ -224,7 +224,7 @@ pub fn clear(target: &Target) {
 pub(super) fn refuse_others(target: &Target) -> Result<()> {
     let folder = folder(&target.pattern);
     let heads: Vec<FirstLine> =
-        files(&folder).iter().filter_map(|(_, path)| read_head(&mut opened(path)?)).collect();
+        files(&folder).iter().filter_map(|(_, path)| head_of(path)).collect();
     let why = |head: &FirstLine| of_others(target, head);
     let Some(first) = heads.iter().find_map(why) else { return Ok(()) };
     let count = heads.iter().filter_map(why).count();
@@ -242,7 +242,7 @@ pub(super) fn sweep(target: &Target) -> Result<Vec<String>> {
     atomic::clean_temporaries(&folder, LEFTOVER_AGE)?;
     let mut removed = Vec::new();
     for (frame, path) in files(&folder) {
-        let head = opened(&path).and_then(|mut file| read_head(&mut file));
+        let head = head_of(&path);
         if let Some(why) = refusal(target, head.as_ref(), frame) {
             fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
             removed.push(why);
@@ -270,9 +270,8 @@ enum FirstLine {
     OtherVersion,
 }
 
-fn opened(path: &Path) -> Option<BufReader<fs::File>> {
-    let is_file = fs::metadata(path).is_ok_and(|found| found.is_file());
-    is_file.then(|| fs::File::open(path).ok()).flatten().map(BufReader::new)
+fn head_of(path: &Path) -> Option<FirstLine> {
+    read_head(&mut Regular::at(path).ok()?.source)
 }
 
 fn read_head(source: &mut impl BufRead) -> Option<FirstLine> {

@@ -247,9 +247,8 @@ impl FrameMaker for ColourMaker<'_> {
         self.with_state(|s| s.to_come.extend(frames));
     }
 
-    fn stopped(&self) -> Result<()> {
+    fn stopped(&self) {
         self.put_away(true);
-        Ok(())
     }
 
     fn notes(&self) -> Vec<String> {

@@ -5,7 +5,7 @@ mod exchange;
 
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
-use super::saved::Saved;
+use super::saved::{Keeps, Saved};
 use super::schedule::{Schedule, Stock};
 use super::shared::Laid;
 use super::supplied::{Supply, with_supplied};
@@ -246,7 +246,7 @@ impl<'a> Inferrer<'a> {
 
     fn hand_out(&self, original: u32, made: Made) -> Result<Made> {
         self.with_state(|s| s.hand_out(&self.schedule, original, &made));
-        self.tend(false);
+        self.put_away(false);
         Ok(made)
     }
 
@@ -344,9 +344,8 @@ impl FrameMaker for Inferrer<'_> {
         self.with_state(|s| s.references.expect(&self.schedule, frames));
     }
 
-    fn stopped(&self) -> Result<()> {
-        self.tend(true);
-        Ok(())
+    fn stopped(&self) {
+        self.put_away(true);
     }
 
     fn notes(&self) -> Vec<String> {

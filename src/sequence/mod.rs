@@ -68,12 +68,7 @@ pub trait FrameMaker {
 
     /// Hears that no more frames will be asked for although some are not made: puts away what it
     /// takes to go on later.
-    ///
-    /// # Errors
-    /// That cannot be written.
-    fn stopped(&self) -> Result<()> {
-        Ok(())
-    }
+    fn stopped(&self) {}
 
     /// What there is to tell about the frames made so far; each is told once.
     fn notes(&self) -> Vec<String> {
@@ -180,7 +175,8 @@ pub fn render_frames(
     let mut journal = target.journal(rank, journal)?;
     for &frame in frames {
         let Some(report) = render_frame(target, frame, (rank, &mut journal), maker)? else {
-            return maker.stopped();
+            maker.stopped();
+            return Ok(());
         };
         done(&report)?;
     }

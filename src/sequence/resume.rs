@@ -7,14 +7,13 @@ use super::recipe::{Recipe, Recipes};
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Header, Journal, Manifest, MapRow, Row, Stray, Turn, manifest_path};
 use crate::output::maps::Map;
-use crate::output::{Format, FramePattern, WriteOptions, atomic};
+use crate::output::{Format, FramePattern, Lying, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
 use refuse::{by_file, refuse_other_view, refuse_others, refuse_strangers, refuse_taken};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -138,17 +137,12 @@ pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
 
 fn look_at(target: &Target, frame: u32) -> Result<Found> {
     let paths = target.paths(frame);
-    let hash = |path: &PathBuf| {
-        // A pipe or a device has no end.
-        if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+    let hash = |path: &PathBuf| match Lying::at(path)? {
+        Lying::Nothing => Ok(None),
+        Lying::File(file) => file.hash(path).map(Some),
+        Lying::Other => {
             let why = format!("{} is in the way: it is not a regular file", path.display());
-            return Err(Error::Usage(why));
-        }
-        match fs::read(path) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            read => read
-                .map(|bytes| Some(blake3::hash(&bytes).to_hex().to_string()))
-                .map_err(|e| Error::io("read", path, e)),
+            Err(Error::Usage(why))
         }
     };
     let own = hash(&paths[0])?;

@@ -194,11 +194,6 @@ impl Inferrer<'_> {
             s.saved.add(frame, bytes);
             s.saved.cost.seconds += start.elapsed().as_secs_f64();
         });
-        self.tend(false);
-    }
-
-    /// What is due goes to disk, all of it where the job shall stop.
-    pub(super) fn tend(&self, stopping: bool) {
-        self.put_away(stopping);
+        self.put_away(false);
     }
 }

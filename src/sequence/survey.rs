@@ -1,13 +1,11 @@
 //! How a sequence on disk stands, by its manifest alone: nothing is changed.
 
 use crate::error::{Error, Result};
-use crate::output::FramePattern;
 use crate::output::manifest::{Manifest, MapRow, Row, Stray, folder_of};
+use crate::output::{FramePattern, Lying};
 use crate::scene::FrameRange;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::fs;
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// Frames of a sequence by how they stand; each list ascends.
@@ -82,10 +80,9 @@ fn stands(
     let Some(row) = manifest.rows.get(&frame) else {
         return Ok(if path.exists() { Stands::Damaged } else { Stands::Missing });
     };
-    if !path.try_exists().map_err(|e| Error::io("read", &path, e))? {
+    let Some(is_whole) = is_whole(&path, Some(row.bytes), &row.blake3)? else {
         return Ok(Stands::Missing);
-    }
-    let is_whole = is_whole(&path, Some(row.bytes), &row.blake3)?;
+    };
     let same_name = path.file_name().is_some_and(|name| name == row.file.as_str());
     let maps = row.maps.iter().map(|map| is_whole_map(folder, map));
     let with_maps = maps.collect::<Result<Vec<bool>>>()?;
@@ -97,22 +94,16 @@ fn stands(
 }
 
 fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
-    is_whole(&folder.join(&map.file), None, &map.blake3)
+    Ok(is_whole(&folder.join(&map.file), None, &map.blake3)? == Some(true))
 }
 
-/// Whether a regular file of so many bytes with this hash lies there. Anything else is not read: a pipe or a
-/// device has no end.
-fn is_whole(path: &Path, bytes: Option<u64>, hash: &str) -> Result<bool> {
-    let found = match fs::metadata(path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
-        found => found.map_err(|e| Error::io("read", path, e))?,
+/// Whether what lies there is a file of so many bytes with this hash; `None` where nothing does.
+fn is_whole(path: &Path, bytes: Option<u64>, hash: &str) -> Result<Option<bool>> {
+    let file = match Lying::at(path)? {
+        Lying::Nothing => return Ok(None),
+        Lying::Other => return Ok(Some(false)),
+        Lying::File(file) => file,
     };
-    if !found.is_file() || bytes.is_some_and(|bytes| bytes != found.len()) {
-        return Ok(false);
-    }
-    match fs::read(path) {
-        Ok(bytes) => Ok(blake3::hash(&bytes).to_hex().as_str() == hash),
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
-        Err(e) => Err(Error::io("read", path, e)),
-    }
+    let is_as_long = bytes.is_none_or(|bytes| bytes == file.bytes);
+    Ok(Some(is_as_long && file.hash(path)? == hash))
 }

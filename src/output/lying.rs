@@ -1,0 +1,91 @@
+//! What lies at a path, before anything is read of it.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufReader, ErrorKind};
+use std::path::Path;
+
+/// What lies at a path.
+pub enum Lying {
+    /// Nothing.
+    Nothing,
+    /// A regular file, opened.
+    File(Regular),
+    /// A folder, a pipe, a device: opening one may wait for ever, and reading one need not end.
+    Other,
+}
+
+/// A regular file, opened for reading.
+pub struct Regular {
+    /// Its contents.
+    pub source: BufReader<File>,
+    /// How many bytes there are.
+    pub bytes: u64,
+}
+
+impl Lying {
+    /// What lies at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where that cannot be found out, or the file not opened.
+    pub fn at(path: &Path) -> Result<Self> {
+        let about = match std::fs::metadata(path) {
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Self::Nothing),
+            about => about.map_err(|e| Error::io("read", path, e))?,
+        };
+        if !about.is_file() {
+            return Ok(Self::Other);
+        }
+        match File::open(path) {
+            Ok(file) => {
+                let source = BufReader::new(file);
+                Ok(Self::File(Regular { source, bytes: about.len() }))
+            }
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(Self::Nothing),
+            Err(e) => Err(Error::io("read", path, e)),
+        }
+    }
+}
+
+impl Regular {
+    /// The file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where there is none, [`Error::Input`] where something else lies there.
+    pub fn at(path: &Path) -> Result<Self> {
+        match Lying::at(path)? {
+            Lying::File(file) => Ok(file),
+            Lying::Nothing => Err(Error::io("read", path, ErrorKind::NotFound.into())),
+            Lying::Other => Err(Error::input(path, "not a regular file")),
+        }
+    }
+
+    /// BLAKE3 of what is left to read, in hexadecimal. `path` is for messages.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn hash(self, path: &Path) -> Result<String> {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(self.source).map_err(|e| Error::io("read", path, e))?;
+        Ok(hasher.finalize().to_hex().to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_told_from_nothing_and_from_what_is_no_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("frame.png");
+        assert!(matches!(Lying::at(&path), Ok(Lying::Nothing)));
+        assert!(matches!(Lying::at(folder.path()), Ok(Lying::Other)));
+        assert!(matches!(Lying::at(Path::new("/dev/zero")), Ok(Lying::Other)));
+        std::fs::write(&path, "twelve bytes").expect("written");
+        let file = Regular::at(&path).expect("a file");
+        assert_eq!(file.bytes, 12);
+        let hash = file.hash(&path).expect("read");
+        assert_eq!(hash, blake3::hash(b"twelve bytes").to_hex().as_str());
+    }
+}
