@@ -22,6 +22,8 @@ pub struct Outcome {
     pub frames: Vec<(u32, FrameReport)>,
     /// Frames that the job did not get to; known on rank 0.
     pub unfinished: usize,
+    /// What there is to tell about the frames; what several ranks have to tell, once. Known on rank 0.
+    pub notes: Vec<String>,
     /// What this rank did.
     pub own: Duty,
 }
@@ -88,7 +90,7 @@ pub fn render(
         1 => alone(target, plan, maker, done)?,
         _ => together(world, order, target, plan, maker, stop, done)?,
     };
-    join(world, target, plan, &mine, own)
+    join(world, target, plan, (mine, maker.notes()), own)
 }
 
 fn alone(
@@ -159,21 +161,33 @@ fn join(
     world: &World,
     target: &Target,
     plan: &Plan,
-    mine: &[FrameReport],
+    mine: (Vec<FrameReport>, Vec<String>),
     own: Duty,
 ) -> Result<Outcome> {
-    let by_rank = world.gather(&mine.to_vec())?;
+    let by_rank = world.gather(&mine)?;
     if !world.is_root() {
         return Ok(Outcome { own, ..Outcome::default() });
     }
     if world.size() > 1 {
         Manifest::merge_parts(&manifest_path(&target.pattern), &target.header)?;
     }
-    let ranks = by_rank.into_iter().enumerate();
-    let mut frames: Vec<(u32, FrameReport)> =
-        ranks.flat_map(|(rank, list)| list.into_iter().map(move |r| (rank as u32, r))).collect();
-    frames.sort_by_key(|(_, report)| report.frame);
-    Ok(Outcome { unfinished: plan.render.len() - frames.len(), frames, own })
+    let (frames, notes) = pooled(by_rank);
+    Ok(Outcome { unfinished: plan.render.len() - frames.len(), frames, notes, own })
+}
+
+/// What ranks finished, in the order of the frames and with the rank, and what they have to tell.
+fn pooled(by_rank: Vec<(Vec<FrameReport>, Vec<String>)>) -> (Vec<(u32, FrameReport)>, Vec<String>) {
+    let (mut frames, mut notes) = (Vec::new(), Vec::new());
+    for (rank, (list, told)) in (0..).zip(by_rank) {
+        frames.extend(list.into_iter().map(|report| (rank, report)));
+        for note in told {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+    }
+    frames.sort_by_key(|(_, report): &(u32, FrameReport)| report.frame);
+    (frames, notes)
 }
 
 #[cfg(test)]
@@ -187,5 +201,11 @@ mod tests {
             let parts: Vec<u32> = (0..ranks).flat_map(|r| own_part(frames, r, ranks)).collect();
             assert!(parts.into_iter().eq(first..=last), "{first} {last} {ranks}");
         }
+    }
+    #[test]
+    fn what_ranks_have_to_tell_is_told_once() {
+        let told = |notes: &[&str]| (Vec::new(), notes.iter().map(|n| (*n).to_string()).collect());
+        let (_, notes) = pooled(vec![told(&["a", "b"]), told(&[]), told(&["b", "c"])]);
+        assert_eq!(notes, ["a", "b", "c"]);
     }
 }

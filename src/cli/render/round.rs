@@ -145,7 +145,8 @@ impl Frames<'_> {
         let work = || cluster::render(world, order, target, plan, &*maker, stop, &done);
         let outcome = interrupt.watched(work);
         watch.finish();
-        tell(quiet, &maker.notes(), |n| say::note(n));
+        let notes = outcome.as_ref().map_or_else(|_| maker.notes(), |o| o.notes.clone());
+        tell(quiet, &notes, |n| say::note(n));
         if let (Err(error), true) = (&outcome, world.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.
             world.fail(error);
