@@ -9,6 +9,11 @@ use crate::scene::{Light, Scene};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+/// Points of a pixel lie on one surface where their normals differ by less: cosine.
+const SAME_SURFACE: f32 = 0.9;
+/// And one lies so little off the tangent plane of the other, footprints.
+const MOST_HEIGHT: f64 = 1.0;
+
 /// A surface point whose light is wanted: where one or more camera samples of a pixel end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurfacePoint {
@@ -26,6 +31,32 @@ pub struct SurfacePoint {
     pub direct: bool,
     /// Camera samples that it stands for.
     pub samples: u32,
+}
+
+impl SurfacePoint {
+    /// Whether `other` is of the same mesh and faces the same way.
+    pub fn faces_as(&self, other: &Self) -> bool {
+        self.geom_id == other.geom_id && self.n.dot(other.n) > SAME_SURFACE
+    }
+
+    /// Whether `other`, seen in the same pixel, lies on the same surface: beyond a ridge there may be another
+    /// slope of the mesh that faces the same way.
+    pub fn is_one_surface(&self, other: &Self) -> bool {
+        let height = (other.p - self.p).dot(self.n.as_dvec3());
+        self.faces_as(other) && height.abs() <= MOST_HEIGHT * f64::from(self.footprint)
+    }
+
+    /// Takes in more camera samples of the same pixel and surface; their share of all.
+    pub fn join(&mut self, other: &Self) -> f32 {
+        let samples = self.samples.saturating_add(other.samples);
+        let share = other.samples as f32 / samples as f32;
+        self.p += (other.p - self.p) * f64::from(share);
+        self.n = (self.n + (other.n - self.n) * share).normalize_or(self.n);
+        self.footprint += (other.footprint - self.footprint) * share;
+        self.cos += (other.cos - self.cos) * share;
+        self.samples = samples;
+        share
+    }
 }
 
 /// Where an inferred point's light comes from.
@@ -171,5 +202,30 @@ impl Channels {
     /// The sky's channel, if its ratio is kept.
     pub fn sky(&self) -> Option<usize> {
         self.sky
+    }
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, y: f64, n: Vec3) -> SurfacePoint {
+        let (p, footprint, cos) = (DVec3::new(x, y, 0.0), 0.5, 0.3);
+        SurfacePoint { p, n, geom_id: 0, footprint, cos, direct: true, samples: 1 }
+    }
+
+    #[test]
+    fn samples_of_a_pixel_are_one_surface_where_they_lie_on_one_plane() {
+        let mut group = at(0.0, 0.0, Vec3::Y);
+        // Seen along the surface, a pixel reaches far.
+        let beside = at(2.0, 0.0, Vec3::new(0.1, 1.0, 0.0).normalize());
+        assert!(group.is_one_surface(&beside));
+        group.join(&beside);
+        assert_eq!((group.samples, group.p.x), (2, 1.0));
+        assert!(group.is_one_surface(&at(3.0, 0.4, Vec3::Y)));
+        // The next ridge, another side of this one, another mesh.
+        assert!(!group.is_one_surface(&at(3.0, 1.0, Vec3::Y)));
+        assert!(!group.is_one_surface(&at(3.0, -1.0, Vec3::Y)));
+        assert!(!group.is_one_surface(&at(1.0, 0.0, Vec3::new(1.0, 1.0, 0.0).normalize())));
+        assert!(!group.is_one_surface(&SurfacePoint { geom_id: 1, ..group }));
     }
 }

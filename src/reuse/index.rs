@@ -1,6 +1,6 @@
 //! Samples found by place: a hash grid over cells as large as the samples are apart.
 
-use super::reference::Point;
+use crate::inference::SurfacePoint;
 use crate::math::DVec3;
 use crate::sampling::mix;
 use std::ops::Range;
@@ -45,14 +45,14 @@ impl Cells {
 impl Index {
     /// Indexes those of `points` whose numbers are `members`. Returns these sorted by cell too: so the
     /// samples must lie, from number `first` on.
-    pub fn new(points: &[Point], members: &[u32], first: u32) -> (Self, Vec<u32>) {
+    pub fn new(points: &[SurfacePoint], members: &[u32], first: u32) -> (Self, Vec<u32>) {
         if members.is_empty() {
             return Default::default();
         }
         let key = |i: &u32| {
             let point = &points[*i as usize];
             let level = level_of(point.footprint);
-            key_of(level, point.geom_id, cell_of(point.p.as_dvec3(), edge_of(level)))
+            key_of(level, point.geom_id, cell_of(point.p, edge_of(level)))
         };
         let mut keyed: Vec<(Key, u32)> = members.iter().map(|i| (key(i), *i)).collect();
         keyed.sort_unstable();
@@ -147,8 +147,16 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
 
-    fn point(p: Vec3) -> Point {
-        Point { p, n: Vec3::Y, geom_id: 3, samples: 1, footprint: 0.12 }
+    fn point(p: Vec3) -> SurfacePoint {
+        SurfacePoint {
+            p: p.as_dvec3(),
+            n: Vec3::Y,
+            geom_id: 3,
+            samples: 1,
+            footprint: 0.12,
+            cos: 1.0,
+            direct: true,
+        }
     }
 
     #[test]
@@ -162,7 +170,7 @@ mod tests {
     #[test]
     fn everything_within_half_a_cell_is_found_and_nothing_of_another_mesh() {
         let place = |i: usize| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32);
-        let points: Vec<Point> =
+        let points: Vec<SurfacePoint> =
             (0..1000).map(|i| point(place(i) * 0.1 - Vec3::splat(0.45))).collect();
         let all: Vec<u32> = (0..1000).collect();
         let (index, sorted) = Index::new(&points, &all, 7);
@@ -176,7 +184,7 @@ mod tests {
             let mut found = found_in(level, 3);
             let reach = 0.5 * edge_of(level);
             for (i, s) in points.iter().enumerate() {
-                let near = (s.p.as_dvec3() - p).abs().max_element() <= reach;
+                let near = (s.p - p).abs().max_element() <= reach;
                 assert!(!near || found.contains(&(i as u32)), "{p} misses {i}");
             }
             found.sort_unstable();

@@ -7,11 +7,10 @@
 mod gather;
 
 use super::index::Index;
-use crate::inference::TracedPoints;
+use crate::inference::{SurfacePoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Camera;
 use gather::Gathered;
-pub(super) use gather::Point;
 use half::bf16;
 use wide::f32x4;
 
@@ -72,13 +71,13 @@ impl Change {
 impl Sample {
     pub const UNIT: f32 = 32767.0;
 
-    fn of(point: &Point, first: Known) -> Self {
+    fn of(point: &SurfacePoint, first: Known) -> Self {
         // Normals of files may be a little longer than 1.
         let n = point.n.clamp(Vec3::NEG_ONE, Vec3::ONE);
         // To the nearest, without a call of `round`.
         let n = (n * Self::UNIT + Vec3::splat(32768.5)).to_array().map(|x| x as i32 - 32768);
         Self {
-            p: point.p,
+            p: point.p.as_vec3(),
             n: n.map(|x| x as i16),
             samples: point.samples.min(u32::from(u16::MAX)) as u16,
             geom_id: point.geom_id,

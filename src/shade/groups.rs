@@ -18,10 +18,6 @@ const NONE: u32 = u32::MAX;
 /// Behind mirrors and glass neighbours may end far from one another, where a shadow's edge is not
 /// told by samples that far away: a footprint counts as at most this many of a flat mirror's.
 const MOST_WIDER: f32 = 3.0;
-/// Samples of a pixel lie on one surface where their normals differ by less: cosine.
-const SAME_SURFACE: f64 = 0.9;
-/// And one lies so little off the tangent plane of the others, footprints.
-const MOST_HEIGHT: f64 = 1.0;
 
 /// Light gathered in one channel of one surface point, in shares of what would arrive unshadowed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -94,7 +90,7 @@ impl Groups {
             let own = point.surface_point(input);
             let head = &mut heads[point.place.pixel as usize];
             let mut at = if own.direct { *head } else { NONE };
-            while at != NONE && !is_one_surface(&points[at as usize], &own) {
+            while at != NONE && !points[at as usize].is_one_surface(&own) {
                 at = next[at as usize];
             }
             if at == NONE {
@@ -104,12 +100,9 @@ impl Groups {
                 // Behind mirrors nothing joins.
                 next.push(if own.direct { std::mem::replace(head, at) } else { NONE });
             } else {
-                join(&mut points[at as usize], &own);
+                points[at as usize].join(&own);
             }
             of_lit.push(at);
-        }
-        for point in points.iter_mut().filter(|p| p.samples > 1) {
-            point.n = point.n.normalize_or(point.n);
         }
     }
 
@@ -229,27 +222,6 @@ impl Groups {
     }
 }
 
-/// Whether `b` lies on the surface of `a`, whose normal is the sum of its samples' ones: beyond a ridge there
-/// may be another slope of the same mesh that looks the same way.
-fn is_one_surface(a: &SurfacePoint, b: &SurfacePoint) -> bool {
-    let (n, samples) = (a.n.as_dvec3(), f64::from(a.samples));
-    let height = (b.p - a.p).dot(n) / samples;
-    a.geom_id == b.geom_id
-        && n.dot(b.n.as_dvec3()) > SAME_SURFACE * samples
-        && height.abs() <= MOST_HEIGHT * f64::from(a.footprint)
-}
-
-/// Until all are in, the normal of several samples is their sum.
-fn join(group: &mut SurfacePoint, own: &SurfacePoint) {
-    let n = group.samples as f32;
-    let share = 1.0 / (n + 1.0);
-    group.p += (own.p - group.p) * f64::from(share);
-    group.n += own.n;
-    group.footprint += (own.footprint - group.footprint) * share;
-    group.cos += (own.cos - group.cos) * share;
-    group.samples += 1;
-}
-
 /// Cells left, right, above and below in the block.
 fn neighbours(cell: usize) -> impl Iterator<Item = usize> {
     let edge = BLOCK as usize;
@@ -280,32 +252,5 @@ impl LitPoint {
             direct,
             samples: 1,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::{DVec3, Vec3};
-
-    fn at(x: f64, y: f64, n: Vec3) -> SurfacePoint {
-        let (p, footprint, cos) = (DVec3::new(x, y, 0.0), 0.5, 0.3);
-        SurfacePoint { p, n, geom_id: 0, footprint, cos, direct: true, samples: 1 }
-    }
-
-    #[test]
-    fn samples_of_a_pixel_are_one_surface_where_they_lie_on_one_plane() {
-        let mut group = at(0.0, 0.0, Vec3::Y);
-        // Seen along the surface, a pixel reaches far.
-        let beside = at(2.0, 0.0, Vec3::new(0.1, 1.0, 0.0).normalize());
-        assert!(is_one_surface(&group, &beside));
-        join(&mut group, &beside);
-        assert_eq!((group.samples, group.p.x), (2, 1.0));
-        assert!(is_one_surface(&group, &at(3.0, 0.4, Vec3::Y)));
-        // The next ridge, another side of this one, another mesh.
-        assert!(!is_one_surface(&group, &at(3.0, 1.0, Vec3::Y)));
-        assert!(!is_one_surface(&group, &at(3.0, -1.0, Vec3::Y)));
-        assert!(!is_one_surface(&group, &at(1.0, 0.0, Vec3::new(1.0, 1.0, 0.0).normalize())));
-        assert!(!is_one_surface(&group, &SurfacePoint { geom_id: 1, ..group }));
     }
 }

@@ -2,29 +2,14 @@
 
 use super::{Change, NONE, View};
 use crate::inference::{SurfacePoint, TracedPoints};
-use crate::math::Vec3;
 use rayon::prelude::*;
 
 /// How far away samples lie beside one another at most, pixels.
 const BESIDE: isize = 3;
-/// Normals of one surface within a pixel: cosine.
-const SAME_SURFACE: f32 = 0.9;
-
-/// A surface point, or the mean of several of one pixel and surface.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::reuse) struct Point {
-    pub p: Vec3,
-    pub n: Vec3,
-    pub geom_id: u32,
-    /// Camera samples whose shadow rays it gathers.
-    pub samples: u32,
-    /// Distance to its neighbours, scene units.
-    pub footprint: f32,
-}
 
 /// A frame's points before they are laid out.
 pub(super) struct Gathered {
-    pub points: Vec<Point>,
+    pub points: Vec<SurfacePoint>,
     /// For each of them the ratio in each channel; NaN where unknown.
     pub ratios: Vec<f32>,
     /// For each pixel, row by row, the point that is seen there directly.
@@ -54,12 +39,14 @@ impl Gathered {
     }
 
     fn take(&mut self, pixel: usize, point: &SurfacePoint, ratios: &[f32]) {
-        let own = Point::of(point);
+        // As it comes back from a file.
+        let own = SurfacePoint { p: point.p.as_vec3().as_dvec3(), ..*point };
         let slot = self.slots[pixel] as usize;
         let there = self.points.get(slot).copied().filter(|_| point.direct);
         if there.is_some_and(|there| there.is_one_surface(&own)) {
+            let share = self.points[slot].join(&own);
             let known = &mut self.ratios[slot * self.channels..][..self.channels];
-            self.points[slot].join(&own, known, ratios);
+            known.iter_mut().zip(ratios).for_each(|(known, other)| join(known, *other, share));
             return;
         }
         let at = self.points.len() as u32;
@@ -107,7 +94,7 @@ impl Gathered {
             let x = x.checked_add_signed(dx * k).filter(|x| *x < width)?;
             let y = y.checked_add_signed(dy * k).filter(|y| *y < height)?;
             let other = self.slots[y * width + x];
-            let is_one = other != NONE && self.points[other as usize].is_one_surface(own);
+            let is_one = other != NONE && self.points[other as usize].faces_as(own);
             is_one.then_some(other as usize)
         })
     }
@@ -128,37 +115,19 @@ impl Gathered {
     /// By how much a ratio rises from one point to another, per footprint.
     fn rise(&self, from: usize, to: usize, channel: usize) -> f32 {
         let (a, b) = (&self.points[from], &self.points[to]);
-        let depth = (a.p.as_dvec3() - self.view.eye).dot(self.view.forward);
+        let depth = (a.p - self.view.eye).dot(self.view.forward);
         let footprint = (depth * self.view.pixel_size) as f32;
-        let per_footprint = footprint / a.p.distance(b.p).max(footprint);
+        let per_footprint = footprint / (a.p.distance(b.p) as f32).max(footprint);
         let [a, b] = [from, to].map(|i| self.ratios[i * self.channels + channel]);
         (b - a) * per_footprint
     }
 }
 
-impl Point {
-    fn of(point: &SurfacePoint) -> Self {
-        let SurfacePoint { p, n, geom_id, samples, footprint, .. } = *point;
-        Self { p: p.as_vec3(), n, geom_id, samples, footprint }
-    }
-
-    fn is_one_surface(&self, other: &Self) -> bool {
-        self.geom_id == other.geom_id && self.n.dot(other.n) > SAME_SURFACE
-    }
-
-    /// Takes in more camera samples of the same pixel and surface.
-    fn join(&mut self, other: &Self, ratios: &mut [f32], others: &[f32]) {
-        let samples = self.samples.saturating_add(other.samples);
-        let share = other.samples as f32 / samples as f32;
-        self.p += (other.p - self.p) * share;
-        self.n = (self.n + (other.n - self.n) * share).normalize_or(self.n);
-        for (own, other) in ratios.iter_mut().zip(others) {
-            match (own.is_nan(), other.is_nan()) {
-                (true, _) => *own = *other,
-                (false, false) => *own += (other - *own) * share,
-                (false, true) => {}
-            }
-        }
-        self.samples = samples;
+/// Takes in a ratio with its share of the samples; NaN where one is unknown.
+fn join(known: &mut f32, other: f32, share: f32) {
+    match (known.is_nan(), other.is_nan()) {
+        (true, _) => *known = other,
+        (false, false) => *known += (other - *known) * share,
+        (false, true) => {}
     }
 }
