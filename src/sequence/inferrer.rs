@@ -250,14 +250,10 @@ impl<'a> Inferrer<'a> {
         Ok(made)
     }
 
-    /// With what `frame` does not share with its original: its motion, and its record, which is the
-    /// original's to keep.
+    /// With what `frame` does not share with its original: its motion.
     fn finished(&self, frame: u32, mut made: Made) -> Result<Made> {
         let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
         let camera = self.camera(frame)?;
-        if self.schedule.original(frame) != frame {
-            made.reference = self.kept(frame, &camera, &TracedPoints::default());
-        }
         let film = &mut made.film;
         self.pool.install(|| self.renderer.note_motion(&camera, previous.as_ref(), film));
         Ok(made)

@@ -126,7 +126,7 @@ impl Made {
             reuse,
             tolerance: self.tolerance,
             audit: None,
-            reference: None,
+            reference: self.reference.clone(),
         }
     }
 }
