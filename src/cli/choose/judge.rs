@@ -4,7 +4,7 @@ use super::budget::Budget;
 use super::{Choice, Chooser};
 use crate::accuracy::{Check, Effort, Foretold, Timer};
 use crate::cli::progress::duration;
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
 use crate::output::{Display, read_image};
@@ -37,9 +37,9 @@ impl Chooser<'_> {
         };
         let check = Check::of(&self.probe(), &choice.foretold, effort, &|frame| self.image(frame))?;
         let [mean, worst] = check.psnr();
-        let looked = check.frames.len();
+        let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
-            "PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked at, foretold {:.1}",
+            "PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} looked at, foretold {:.1}",
             choice.foretold.psnr()
         );
         let figure = self.args.target.and_then(|goal| goal.in_words(check.figure));
