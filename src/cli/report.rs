@@ -3,19 +3,23 @@
 mod charts;
 mod film;
 mod find;
+mod standing;
 mod tables;
 
 use super::exit::Exit;
 use super::say;
 use crate::error::{Error, Result};
 use crate::output::atomic;
-use crate::output::manifest::{Manifest, Row};
+use crate::output::manifest::{Manifest, Row, folder_of};
 use crate::output::video::shell_line;
 use crate::page::job::JobPage;
 use crate::page::words;
+use crate::scene::FrameRange;
 use crate::sequence::audit_row;
+use crate::sequence::survey::survey_of;
 use crate::stats::{AuditSums, RayCounts, ReuseCounts};
 use clap::Args;
+use standing::Standing;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -58,7 +62,8 @@ const MOST_SHOWN: usize = 300;
 struct Job {
     manifest: Manifest,
     folder: PathBuf,
-    /// Rows of these settings, by frame.
+    standing: Standing,
+    /// Rows of the frames whose files are whole, by frame.
     rows: Vec<Row>,
 }
 
@@ -73,28 +78,31 @@ pub fn run(args: &ReportArgs) -> Result<Exit> {
         return Err(Error::Usage(message));
     }
     atomic::make_room(&out)?;
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let rows = manifest.rows.values().filter(|row| row.stray.is_none()).cloned().collect();
-    let job = Job { manifest, folder, rows };
+    let mut job = Job::of(manifest, &path)?;
     let html = job.page(args)?.to_html()?;
     atomic::write(&out, |w| w.write_all(html.as_bytes()))?;
     if !args.quiet {
-        say::result(format!(
-            "{} ({} of {} frames, {})",
-            out.display(),
-            job.rows.len(),
-            job.manifest.header.shot_frames,
-            words::bytes(html.len() as u64)
-        ))?;
+        let (count, size) = (job.standing.count(), words::bytes(html.len() as u64));
+        let gaps: String = job.standing.gaps().iter().map(|gap| format!("\n  {gap}")).collect();
+        say::result(format!("{} ({count}, {size}){gaps}", out.display()))?;
     }
     Ok(Exit::Done)
 }
 
 impl Job {
-    fn page(&self, args: &ReportArgs) -> Result<JobPage> {
-        let header = &self.manifest.header;
+    fn of(manifest: Manifest, path: &Path) -> Result<Self> {
+        let whole_move = |last| Ok(FrameRange { first: 1, last });
+        let standing = Standing::new(survey_of(&manifest, path, whole_move)?, &manifest);
+        let rows = { manifest.rows.values() }.filter(|row| standing.is_whole(row.frame)).cloned();
+        let rows = rows.collect();
+        Ok(Self { manifest, folder: folder_of(path).to_path_buf(), standing, rows })
+    }
+
+    fn page(&mut self, args: &ReportArgs) -> Result<JobPage> {
         let every = args.every.map_or(self.rows.len().div_ceil(MOST_SHOWN).max(1), |n| n as usize);
-        let film = film::pictures(self, every, args.width)?;
+        let (film, unreadable) = film::pictures(self, every, args.width);
+        self.standing.unreadable = unreadable;
+        let header = &self.manifest.header;
         let shown = match every {
             1 => String::new(),
             n => format!("The player has one frame in {n} (--every)."),
@@ -102,6 +110,7 @@ impl Job {
         Ok(JobPage {
             title: header.scene.clone(),
             state: self.state(),
+            gaps: self.standing.gaps(),
             facts: self.facts(),
             maps: film::maps_of(&film),
             film,
@@ -119,28 +128,6 @@ impl Job {
             version: crate::output::VERSION.into(),
             made: words::date(now()),
         })
-    }
-
-    fn state(&self) -> String {
-        let all = self.manifest.header.shot_frames;
-        let there = self.rows.len() as u32;
-        let other = self.manifest.rows.len() - self.rows.len();
-        let left = match other {
-            0 => String::new(),
-            n => format!(" {n} more are left from a job of other settings and not shown."),
-        };
-        if there == all {
-            return format!("All {all} frames of the move are there.{left}");
-        }
-        let last = self.rows.iter().filter_map(|row| row.ended).fold(0.0, f64::max);
-        let ago = match now() - last {
-            _ if last == 0.0 => String::new(),
-            s => format!("; the last one is {} old", words::seconds(s.max(0.0))),
-        };
-        format!(
-            "{there} of the move's {all} frames are there{ago}: the job still runs, was stopped, or \
-             was not asked for more.{left}"
-        )
     }
 
     fn facts(&self) -> Vec<(String, String)> {

@@ -26,6 +26,8 @@ pub struct JobPage {
     pub title: String,
     /// How far it is.
     pub state: String,
+    /// What is the matter with frames that are not there and whole.
+    pub gaps: Vec<String>,
     /// What one wants to know first: name and value.
     pub facts: Vec<(String, String)>,
     /// Frames in the player.
@@ -74,6 +76,7 @@ struct Html<'a> {
     timeline: Option<Plot>,
     title: &'a str,
     state: &'a str,
+    gaps: &'a [String],
     facts: &'a [(String, String)],
     shown: &'a str,
     maps: &'a [(String, String)],
@@ -107,6 +110,7 @@ impl JobPage {
             timeline: self.timeline.as_ref().map(Timeline::plot),
             title: &self.title,
             state: &self.state,
+            gaps: &self.gaps,
             facts: &self.facts,
             shown: &self.shown,
             maps: &self.maps,
