@@ -14,7 +14,7 @@ use crate::output::manifest::{Manifest, Row, folder_of};
 use crate::output::video::shell_line;
 use crate::page::job::JobPage;
 use crate::page::words;
-use crate::scene::FrameRange;
+use crate::scene::{FrameRange, Policy, ReuseSettings, Settings};
 use crate::sequence::audit_row;
 use crate::sequence::survey::survey_of;
 use crate::stats::{AuditSums, RayCounts, ReuseCounts};
@@ -29,8 +29,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// frames that are there, so it can be made while the job runs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Maps need a render with --maps. The page is put beside the frames: out/frame.report.html for
-out/frame_####.png.
+Maps need a render with --maps that inferred something. The page is put beside the frames:
+out/frame.report.html for out/frame_####.png.
 
 Examples:
   tweenray report out/demo
@@ -61,6 +61,8 @@ const MOST_SHOWN: usize = 300;
 /// A job as its manifest tells.
 struct Job {
     manifest: Manifest,
+    /// Its settings; where another version wrote others, the default.
+    settings: Settings,
     folder: PathBuf,
     standing: Standing,
     /// Rows of the frames whose files are whole, by frame.
@@ -95,7 +97,9 @@ impl Job {
         let standing = Standing::new(survey_of(&manifest, path, whole_move)?, &manifest);
         let rows = { manifest.rows.values() }.filter(|row| standing.is_whole(row.frame)).cloned();
         let rows = rows.collect();
-        Ok(Self { manifest, folder: folder_of(path).to_path_buf(), standing, rows })
+        let settings = serde_json::from_value(manifest.header.settings.clone());
+        let settings = settings.unwrap_or_default();
+        Ok(Self { manifest, settings, folder: folder_of(path).to_path_buf(), standing, rows })
     }
 
     fn page(&mut self, args: &ReportArgs) -> Result<JobPage> {
@@ -119,6 +123,7 @@ impl Job {
             effects: tables::effects(self),
             effects_note: tables::EFFECTS_NOTE.into(),
             audit: tables::audit(self),
+            no_audit: self.why_no_audit().into(),
             timeline: charts::timeline(self),
             ranks: tables::ranks(self),
             command: shell_line(&header.command),
@@ -149,6 +154,20 @@ impl Job {
             facts.push(("Error of inferred frames".into(), format!("{rmse}/255 ({low}–{high})")));
         }
         facts
+    }
+
+    /// What stands in place of an audit.
+    fn why_no_audit(&self) -> &'static str {
+        let ReuseSettings { policy, audit, .. } = self.settings.reuse;
+        match policy {
+            Policy::Colour => {
+                "Policy colour has no audit: nothing is known of how far its frames are off."
+            }
+            _ if self.rows.is_empty() => "No frame was audited yet.",
+            _ if !self.reuse().is_inferred() => "No frame was audited: none is inferred.",
+            _ if audit <= 0.0 => "No frame was audited: --audit 0.",
+            _ => "No frame was audited.",
+        }
     }
 
     fn rays(&self) -> RayCounts {

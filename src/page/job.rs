@@ -1,6 +1,8 @@
 //! The page of a render.
 
-use super::{Chart, Picture, Plot, SCRIPT, STYLE, Table, Timeline, json_for_script, set};
+use super::{
+    Chart, Picture, Plot, SCRIPT, STYLE, Table, Timeline, json_for_script, set, with_options,
+};
 use crate::error::Result;
 use askama::Template;
 use serde::Serialize;
@@ -44,6 +46,8 @@ pub struct JobPage {
     pub effects_note: String,
     /// What the audits found.
     pub audit: Table,
+    /// Why they found nothing, where there was none.
+    pub no_audit: String,
     /// When each rank rendered what, where the manifest tells.
     pub timeline: Option<Timeline>,
     /// What each rank did.
@@ -83,6 +87,7 @@ struct Html<'a> {
     effects: &'a Table,
     effects_note: &'a str,
     audit: &'a Table,
+    no_audit: String,
     ranks: &'a Table,
     command: &'a str,
     manifest: &'a Table,
@@ -117,6 +122,7 @@ impl JobPage {
             effects: &self.effects,
             effects_note: &self.effects_note,
             audit: &self.audit,
+            no_audit: with_options(&self.no_audit),
             ranks: &self.ranks,
             command: &self.command,
             manifest: &self.manifest,
@@ -134,10 +140,11 @@ mod tests {
 
     #[test]
     fn a_page_without_a_frame_stands_and_text_is_escaped() {
-        let page = JobPage { title: "<b>&".into(), ..JobPage::default() };
+        let no_audit = "No frame was audited: --audit 0.".into();
+        let page = JobPage { title: "<b>&".into(), no_audit, ..JobPage::default() };
         let html = page.to_html().expect("set");
         assert!(html.contains("There is no frame to show yet") && !html.contains("<b>&"));
-        assert!(html.contains("No frame was audited"));
+        assert!(html.contains("No frame was audited: <code>--audit</code> 0."));
     }
 
     #[test]

@@ -65,6 +65,37 @@ fn a_report_shows_what_is_whole_and_names_the_rest() {
     assert!(job.done("report o").out.starts_with("o/f.report.html (4 of "));
 }
 
+/// Maps that would be dark, and an audit that there cannot be, are not offered.
+#[test]
+fn a_report_offers_the_maps_that_say_something() {
+    let job = Job::new();
+    let line = "render cube.obj --size 24x16 --spp 1 --frames 1..4 --no-video --maps -q -o";
+    let report = |options: &str, pattern: &str| {
+        job.done(&format!("{line} {pattern} {options}"));
+        job.done("report o -o p.html -q");
+        std::fs::remove_dir_all(job.path("o")).expect("removed");
+        text(&job, "p.html")
+    };
+    let maps = |page: &str| {
+        let names = ["provenance", "frame", "distance", "audit"];
+        names.map(|name| page.contains(&format!("data-map=\"{name}\"")))
+    };
+    for pattern in ["o/f_##.png", "o/f_##.exr"] {
+        let page = report("--audit 0.5", pattern);
+        assert_eq!(maps(&page), [true; 4], "{pattern}");
+        let page = report("--audit 0", pattern);
+        assert_eq!(maps(&page), [true, true, true, false], "{pattern}");
+        assert!(page.contains("No frame was audited: <code>--audit</code> 0."));
+        let page = report("--policy colour", pattern);
+        assert_eq!(maps(&page), [true, true, true, false], "{pattern}");
+        assert!(page.contains("Policy colour has no audit") && !page.contains("none is inferred"));
+        // Every frame is a key frame.
+        let page = report("--segment 1", pattern);
+        assert_eq!(maps(&page), [false; 4], "{pattern}");
+        assert!(page.contains("No frame was audited: none is inferred."));
+    }
+}
+
 #[test]
 fn a_move_of_one_frame_is_told_as_one() {
     let job = Job::new();

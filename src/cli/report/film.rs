@@ -9,7 +9,7 @@ use crate::output::maps::{self, Map};
 use crate::output::{Display, read_image};
 use crate::page::job::Shown;
 use crate::page::{Picture, words};
-use crate::scene::{Settings, ToneCurve};
+use crate::scene::ToneCurve;
 use crate::sequence::survey::is_whole_map;
 use rayon::iter::Either;
 use rayon::prelude::*;
@@ -17,15 +17,22 @@ use std::collections::BTreeMap;
 
 /// One frame in `every`, at most `width` pixels wide, and the numbers of those that cannot be read.
 pub fn pictures(job: &Job, every: usize, width: u32) -> (Vec<Shown>, Vec<u32>) {
-    let settings = serde_json::from_value(job.manifest.header.settings.clone());
-    // Of another version's settings the pictures are all that is needed.
-    let settings: Settings = settings.unwrap_or_default();
+    let maps = offered(job);
     let chosen: Vec<&Row> = job.rows.iter().step_by(every).collect();
     // One frame that was whole and is no more, a running job's say, is no reason for no page.
-    chosen.into_par_iter().partition_map(|row| match shown(job, row, &settings, width) {
+    chosen.into_par_iter().partition_map(|row| match shown(job, row, &maps, width) {
         Ok(shown) => Either::Left(shown),
         Err(_) => Either::Right(row.frame),
     })
+}
+
+/// The maps that say anything of the job.
+fn offered(job: &Job) -> Vec<Map> {
+    let says = |map: &Map| match map {
+        Map::Audit => job.audited().is_some(),
+        Map::Provenance | Map::Frame | Map::Distance => job.reuse().is_inferred(),
+    };
+    Map::ALL.into_iter().filter(says).collect()
 }
 
 /// The maps that the film has, with their meanings.
@@ -35,8 +42,9 @@ pub fn maps_of(film: &[Shown]) -> Vec<(String, String)> {
     maps.map(|map| (map.name().into(), map.meaning().into())).collect()
 }
 
-fn shown(job: &Job, row: &Row, settings: &Settings, width: u32) -> Result<Shown> {
+fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<Shown> {
     let path = job.folder.join(&row.file);
+    let settings = &job.settings;
     let display = Display { exposure: settings.exposure, tone: settings.tone };
     let image = read_image(&path)?;
     let picture = match image.encoding {
@@ -47,11 +55,11 @@ fn shown(job: &Job, row: &Row, settings: &Settings, width: u32) -> Result<Shown>
     let mut pictures = BTreeMap::new();
     if image.encoding == Encoding::Linear {
         let painted = maps::of_exr(&path, &display, settings.reuse.farthest())?;
-        for (map, film) in painted {
+        for (map, film) in painted.into_iter().filter(|(map, _)| wanted.contains(map)) {
             pictures.insert(map.name().to_string(), Picture::jpeg(&paint(&film), width)?);
         }
     } else {
-        for map in Map::ALL {
+        for map in wanted {
             let path = map.path(&path);
             let is_it = |kept: &&MapRow| path.file_name().is_some_and(|n| n == kept.file.as_str());
             let Some(kept) = row.maps.iter().find(is_it) else { continue };
