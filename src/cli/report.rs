@@ -6,6 +6,7 @@ mod find;
 mod standing;
 mod tables;
 
+use super::choose::Choice;
 use super::exit::Exit;
 use super::say;
 use crate::error::{Error, Result};
@@ -107,6 +108,7 @@ impl Job {
         let (film, unreadable) = film::pictures(self, every, args.width);
         self.standing.unreadable = unreadable;
         let header = &self.manifest.header;
+        let choice = Choice::of(header);
         let shown = match every {
             1 => String::new(),
             n => format!("The player has one frame in {n} (--every)."),
@@ -126,7 +128,16 @@ impl Job {
             no_audit: self.why_no_audit().into(),
             timeline: charts::timeline(self),
             ranks: tables::ranks(self),
-            command: shell_line(&header.command),
+            command: match &choice {
+                Some(choice) => shell_line(&choice.spelled_out(&header.command)),
+                None => shell_line(&header.command),
+            },
+            command_note: match &choice {
+                Some(_) => "It started the sequence; what was chosen stands in place of --target or --budget.",
+                None => "It started the sequence.",
+            }
+            .into(),
+            chosen: choice.map(|choice| tables::chosen(self, &choice)).unwrap_or_default(),
             manifest: tables::manifest(self),
             settings: tables::settings(self),
             frames: tables::frames(self),

@@ -54,6 +54,10 @@ pub struct JobPage {
     pub ranks: Table,
     /// The command that gives the same frames; empty where unknown.
     pub command: String,
+    /// What is to be said of it.
+    pub command_note: String,
+    /// How its settings were chosen, where the program chose them.
+    pub chosen: Table,
     /// The manifest's head.
     pub manifest: Table,
     /// All settings.
@@ -90,6 +94,8 @@ struct Html<'a> {
     no_audit: String,
     ranks: &'a Table,
     command: &'a str,
+    command_note: String,
+    chosen: &'a Table,
     manifest: &'a Table,
     settings: &'a Table,
     frames: &'a Table,
@@ -125,6 +131,8 @@ impl JobPage {
             no_audit: with_options(&self.no_audit),
             ranks: &self.ranks,
             command: &self.command,
+            command_note: with_options(&self.command_note),
+            chosen: &self.chosen,
             manifest: &self.manifest,
             settings: &self.settings,
             frames: &self.frames,

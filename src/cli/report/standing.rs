@@ -78,7 +78,7 @@ impl Job {
             n => format!("{n} of the move's {all} are there"),
         };
         if self.standing.unmade.is_empty() {
-            return format!("{there}. The command below makes the others again.");
+            return format!("{there}. The same job, run again, makes the others.");
         }
         let ended = |row: &Row| row.ended;
         let ago = match self.rows.iter().filter_map(ended).reduce(f64::max) {
