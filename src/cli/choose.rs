@@ -150,7 +150,7 @@ impl Choice {
         let mut words = Vec::new();
         let mut left = command.iter();
         while let Some(word) = left.next() {
-            if !["--target", "--budget"].iter().any(|name| is_option(word, name)) {
+            if !asks_for_choice(std::slice::from_ref(word)) {
                 words.push(word.clone());
                 continue;
             }
@@ -178,6 +178,11 @@ impl Choice {
         let figure = self.foretelling.foretold_figure(&self.foretold)?;
         values::goal(&self.wanted).ok()?.in_words(figure)
     }
+}
+
+/// Whether a command leaves settings to the program.
+pub fn asks_for_choice(command: &[String]) -> bool {
+    command.iter().any(|word| is_option(word, "--target") || is_option(word, "--budget"))
 }
 
 /// Whether a word of a command is the option `name`, with its value or before it.

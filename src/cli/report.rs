@@ -6,12 +6,12 @@ mod find;
 mod standing;
 mod tables;
 
-use super::choose::Choice;
+use super::choose::{Choice, asks_for_choice};
 use super::exit::Exit;
 use super::say;
 use crate::error::{Error, Result};
 use crate::output::atomic;
-use crate::output::manifest::{Manifest, Row, folder_of};
+use crate::output::manifest::{Header, Manifest, Row, folder_of};
 use crate::output::video::shell_line;
 use crate::page::job::JobPage;
 use crate::page::words;
@@ -132,11 +132,7 @@ impl Job {
                 Some(choice) => shell_line(&choice.spelled_out(&header.command)),
                 None => shell_line(&header.command),
             },
-            command_note: match &choice {
-                Some(_) => "It started the sequence; what was chosen stands in place of --target or --budget.",
-                None => "It started the sequence.",
-            }
-            .into(),
+            command_note: command_note(header, choice.is_some()),
             chosen: choice.map(|choice| tables::chosen(self, &choice)).unwrap_or_default(),
             manifest: tables::manifest(self),
             settings: tables::settings(self),
@@ -199,6 +195,24 @@ impl Job {
         let mut sums = audits.next()?;
         audits.for_each(|more| sums += more);
         Some(sums)
+    }
+}
+
+/// What the command that is shown is good for; where it left settings to the program, whether these
+/// are spelled out in it.
+fn command_note(header: &Header, is_spelled_out: bool) -> String {
+    let same = "The same scene, settings and version give the same bytes, on any number of ranks and \
+                threads.";
+    if !asks_for_choice(&header.command) {
+        return format!("It started the sequence. {same}");
+    }
+    match is_spelled_out {
+        true => format!(
+            "It started the sequence; what was chosen stands in place of --target or --budget. {same}"
+        ),
+        false => {
+            "It started the sequence, and chose settings by measured times: those below.".into()
+        }
     }
 }
 

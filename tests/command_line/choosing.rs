@@ -68,6 +68,15 @@ fn a_report_spells_out_what_was_chosen() {
         assert_eq!(job.read("again/f_02.png"), frame, "{wish}");
         std::fs::remove_dir_all(job.path("again")).expect("removed");
     }
+    // Of a choice that cannot be read, nothing is promised.
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    let (first, rows) = manifest.split_once('\n').expect("lines");
+    let mut unknown: Value = serde_json::from_str(first).expect("JSON");
+    unknown["chosen"] = 7.into();
+    std::fs::write(job.path("o/f.manifest.jsonl"), format!("{unknown}\n{rows}")).expect("written");
+    job.done("report o -o p.html -q");
+    let page = String::from_utf8(job.read("p.html")).expect("UTF-8");
+    assert!(page.contains("chose settings by measured times") && !page.contains("same bytes"));
 }
 
 /// A job that was stopped while it was held against what came out has all its frames, and is not done.

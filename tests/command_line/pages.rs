@@ -65,6 +65,22 @@ fn a_report_shows_what_is_whole_and_names_the_rest() {
     assert!(job.done("report o").out.starts_with("o/f.report.html (4 of "));
 }
 
+#[test]
+fn frames_of_other_settings_are_named_and_not_shown() {
+    let job = Job::new();
+    let line = "render cube.obj --size 24x16 --no-video -q -o o/f_##.png --frames";
+    job.done(&format!("{line} 1..4 --spp 1"));
+    job.done(&format!("{line} 1..2 --spp 2 --overwrite"));
+    let said = job.done("report o").out;
+    assert!(said.starts_with("o/f.report.html (2 of "), "{said}");
+    assert!(said.contains("2 of other settings: 3..4"), "{said}");
+    let page = text(&job, "o/f.report.html");
+    assert!(
+        page.contains("was not asked for more.") && page.contains("<li>2 of other settings: 3..4")
+    );
+    assert!(!page.contains("f_03.png"));
+}
+
 /// Maps that would be dark, and an audit that there cannot be, are not offered.
 #[test]
 fn a_report_offers_the_maps_that_say_something() {

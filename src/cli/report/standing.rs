@@ -10,9 +10,9 @@ use crate::sequence::survey::Survey;
 /// How a job's frames stand.
 pub struct Standing {
     survey: Survey,
-    /// Frames that the manifest does not know.
-    unmade: Vec<u32>,
-    /// Those of them that lie there all the same.
+    /// Whether this sequence has made every frame, whatever became of it.
+    is_made: bool,
+    /// Frames that lie there and are not in the manifest.
     unknown: Vec<u32>,
     /// Whole by their hash, and yet no picture could be read from them.
     pub unreadable: Vec<u32>,
@@ -21,11 +21,13 @@ pub struct Standing {
 impl Standing {
     pub fn new(mut survey: Survey, manifest: &Manifest) -> Self {
         let is_known = |frame: &u32| manifest.rows.contains_key(frame);
-        let unmade = (1..=survey.total).filter(|frame| !is_known(frame)).collect();
+        let made = manifest.rows.values().filter(|row| row.stray.is_none());
+        let made = made.filter(|row| row.frame <= survey.total).count();
         // A running job puts a frame in its place before it says so in the manifest.
         let (damaged, unknown) = survey.damaged.iter().copied().partition(is_known);
         survey.damaged = damaged;
-        Self { survey, unmade, unknown, unreadable: Vec::new() }
+        let is_made = made == survey.total as usize;
+        Self { survey, is_made, unknown, unreadable: Vec::new() }
     }
 
     /// Whether the frame's file is as it was written; of its maps, one may not be.
@@ -77,7 +79,7 @@ impl Job {
             1 => format!("Of the move's {all} 1 is there"),
             n => format!("{n} of the move's {all} are there"),
         };
-        if self.standing.unmade.is_empty() {
+        if self.standing.is_made {
             return format!("{there}. The same job, run again, makes the others.");
         }
         let ended = |row: &Row| row.ended;
