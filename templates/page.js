@@ -22,5 +22,8 @@ for (const button of $$("button[data-copy]")) {
 // Whether a key is meant for the element that has the focus, not for the page.
 function keyIsTaken(event) {
   const at = event.target;
-  return event.ctrlKey || event.altKey || event.metaKey || at.matches("input, select, textarea, summary");
+  if (event.ctrlKey || event.altKey || event.metaKey) return true;
+  // A slider keeps the focus after a click, and has no use for letters and the blank.
+  if (at.matches("input[type=range]")) return /^(Arrow|Home$|End$|Page)/.test(event.key);
+  return at.matches("input, select, textarea, summary");
 }

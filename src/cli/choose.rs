@@ -14,6 +14,7 @@ use crate::output::manifest::Header;
 use crate::scene::{FrameRange, Policy, Settings};
 use budget::Budget;
 use clap::Args;
+pub use judge::Judgement;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::time::{Duration, Instant};
@@ -51,6 +52,9 @@ pub struct Choice {
     pub tightened: u32,
     /// What was held against what came out: the shot's hash, and frames of it.
     checked: Option<(String, FrameRange)>,
+    /// How good these came out, in words, if they were looked at.
+    #[serde(default)]
+    pub came_out: Option<String>,
 }
 
 /// Who chooses.
@@ -121,14 +125,69 @@ impl Choice {
         self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
     }
 
-    /// The choice whose `frames` were.
-    pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
-        Self { checked: Some((shot.into(), frames)), ..self }
+    /// The choice whose `frames` were, and came out so.
+    pub fn checked(self, shot: &str, frames: FrameRange, came_out: Option<String>) -> Self {
+        Self { checked: Some((shot.into(), frames)), came_out, ..self }
     }
 
-    fn options(&self) -> String {
+    /// The choice that a manifest's header holds, if this version can read it.
+    pub fn of(header: &Header) -> Option<Self> {
+        serde_json::from_value(header.chosen.clone()?).ok()
+    }
+
+    /// The options that stand for it.
+    pub fn options(&self) -> String {
         options(&self.foretold)
     }
+
+    /// The command that gives the same frames whatever the clock says: what was chosen in place of the
+    /// wish. Options that are given stay.
+    pub fn spelled_out(&self, command: &[String]) -> Vec<String> {
+        let options = self.options();
+        let options: Vec<&str> = options.split(' ').collect();
+        let is_given = |name: &str| command.iter().any(|word| is_option(word, name));
+        let chosen = options.chunks(2).filter(|pair| !is_given(pair[0])).flatten();
+        let mut words = Vec::new();
+        let mut left = command.iter();
+        while let Some(word) = left.next() {
+            if !asks_for_choice(std::slice::from_ref(word)) {
+                words.push(word.clone());
+                continue;
+            }
+            words.extend(chosen.clone().map(ToString::to_string));
+            if !word.contains('=') {
+                left.next();
+            }
+        }
+        words
+    }
+
+    /// What is foretold of it, in words.
+    pub fn foretold_in_words(&self) -> String {
+        format!(
+            "{}PSNR {:.1} dB in the worst frame, {} a frame, {} in all",
+            self.figure().map_or(String::new(), |figure| format!("{figure}, ")),
+            self.foretold.psnr(),
+            duration(self.foretold.seconds),
+            duration(self.seconds)
+        )
+    }
+
+    /// What is foretold of it in the target's own unit, unless that is PSNR.
+    fn figure(&self) -> Option<String> {
+        let figure = self.foretelling.foretold_figure(&self.foretold)?;
+        values::goal(&self.wanted).ok()?.in_words(figure)
+    }
+}
+
+/// Whether a command leaves settings to the program.
+pub fn asks_for_choice(command: &[String]) -> bool {
+    command.iter().any(|word| is_option(word, "--target") || is_option(word, "--budget"))
+}
+
+/// Whether a word of a command is the option `name`, with its value or before it.
+fn is_option(word: &str, name: &str) -> bool {
+    word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
 }
 
 /// The options that stand for a choice.
@@ -185,6 +244,7 @@ impl Chooser<'_> {
             seconds,
             tightened: 0,
             checked: None,
+            came_out: None,
         };
         self.say_choice(&choice);
         self.tell(format!("the probe took {}", duration(start.elapsed().as_secs_f64())));
@@ -223,8 +283,7 @@ impl Chooser<'_> {
     }
 
     fn before(&self, tracer: &str) -> Option<Choice> {
-        let value = self.request.header_before(tracer)?.chosen?;
-        let before: Choice = serde_json::from_value(value).ok()?;
+        let before = Choice::of(&self.request.header_before(tracer)?)?;
         let is_same = before.wanted == self.args.words()
             && before.base == Header::settings(self.stage.base)
             && before.given == self.given();
@@ -262,20 +321,11 @@ impl Chooser<'_> {
 
     fn say_choice(&self, choice: &Choice) {
         self.tell(format!(
-            "for {}: {}\nforetold: {}PSNR {:.1} dB in the worst frame, {} a frame, {} in all",
+            "for {}: {}\nforetold: {}",
             choice.wanted,
             choice.options(),
-            self.figure(choice).map_or(String::new(), |figure| format!("{figure}, ")),
-            choice.foretold.psnr(),
-            duration(choice.foretold.seconds),
-            duration(choice.seconds)
+            choice.foretold_in_words()
         ));
-    }
-
-    /// What is foretold of a choice in the target's own unit, unless that is PSNR.
-    fn figure(&self, choice: &Choice) -> Option<String> {
-        let figure = choice.foretelling.foretold_figure(&choice.foretold)?;
-        self.args.target?.in_words(figure)
     }
 
     fn tell(&self, text: String) {

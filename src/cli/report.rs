@@ -3,19 +3,24 @@
 mod charts;
 mod film;
 mod find;
+mod standing;
 mod tables;
 
+use super::choose::{Choice, asks_for_choice};
 use super::exit::Exit;
 use super::say;
 use crate::error::{Error, Result};
 use crate::output::atomic;
-use crate::output::manifest::{Manifest, Row};
+use crate::output::manifest::{Header, Manifest, Row, folder_of};
 use crate::output::video::shell_line;
 use crate::page::job::JobPage;
 use crate::page::words;
+use crate::scene::{FrameRange, Policy, ReuseSettings, Settings};
 use crate::sequence::audit_row;
+use crate::sequence::survey::survey_of;
 use crate::stats::{AuditSums, RayCounts, ReuseCounts};
 use clap::Args;
+use standing::Standing;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -25,8 +30,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// frames that are there, so it can be made while the job runs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Maps need a render with --maps. The page is put beside the frames: out/frame.report.html for
-out/frame_####.png.
+Maps need a render with --maps that inferred something. The page is put beside the frames:
+out/frame.report.html for out/frame_####.png.
 
 Examples:
   tweenray report out/demo
@@ -57,8 +62,11 @@ const MOST_SHOWN: usize = 300;
 /// A job as its manifest tells.
 struct Job {
     manifest: Manifest,
+    /// Its settings; where another version wrote others, the default.
+    settings: Settings,
     folder: PathBuf,
-    /// Rows of these settings, by frame.
+    standing: Standing,
+    /// Rows of the frames whose files are whole, by frame.
     rows: Vec<Row>,
 }
 
@@ -73,28 +81,34 @@ pub fn run(args: &ReportArgs) -> Result<Exit> {
         return Err(Error::Usage(message));
     }
     atomic::make_room(&out)?;
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let rows = manifest.rows.values().filter(|row| row.stray.is_none()).cloned().collect();
-    let job = Job { manifest, folder, rows };
+    let mut job = Job::of(manifest, &path)?;
     let html = job.page(args)?.to_html()?;
     atomic::write(&out, |w| w.write_all(html.as_bytes()))?;
     if !args.quiet {
-        say::result(format!(
-            "{} ({} of {} frames, {})",
-            out.display(),
-            job.rows.len(),
-            job.manifest.header.shot_frames,
-            words::bytes(html.len() as u64)
-        ))?;
+        let (count, size) = (job.standing.count(), words::bytes(html.len() as u64));
+        let gaps: String = job.standing.gaps().iter().map(|gap| format!("\n  {gap}")).collect();
+        say::result(format!("{} ({count}, {size}){gaps}", out.display()))?;
     }
     Ok(Exit::Done)
 }
 
 impl Job {
-    fn page(&self, args: &ReportArgs) -> Result<JobPage> {
-        let header = &self.manifest.header;
+    fn of(manifest: Manifest, path: &Path) -> Result<Self> {
+        let whole_move = |last| Ok(FrameRange { first: 1, last });
+        let standing = Standing::new(survey_of(&manifest, path, whole_move)?, &manifest);
+        let rows = { manifest.rows.values() }.filter(|row| standing.is_whole(row.frame)).cloned();
+        let rows = rows.collect();
+        let settings = serde_json::from_value(manifest.header.settings.clone());
+        let settings = settings.unwrap_or_default();
+        Ok(Self { manifest, settings, folder: folder_of(path).to_path_buf(), standing, rows })
+    }
+
+    fn page(&mut self, args: &ReportArgs) -> Result<JobPage> {
         let every = args.every.map_or(self.rows.len().div_ceil(MOST_SHOWN).max(1), |n| n as usize);
-        let film = film::pictures(self, every, args.width)?;
+        let (film, unreadable) = film::pictures(self, every, args.width);
+        self.standing.unreadable = unreadable;
+        let header = &self.manifest.header;
+        let choice = Choice::of(header);
         let shown = match every {
             1 => String::new(),
             n => format!("The player has one frame in {n} (--every)."),
@@ -102,6 +116,7 @@ impl Job {
         Ok(JobPage {
             title: header.scene.clone(),
             state: self.state(),
+            gaps: self.standing.gaps(),
             facts: self.facts(),
             maps: film::maps_of(&film),
             film,
@@ -110,37 +125,21 @@ impl Job {
             effects: tables::effects(self),
             effects_note: tables::EFFECTS_NOTE.into(),
             audit: tables::audit(self),
+            no_audit: self.why_no_audit().into(),
             timeline: charts::timeline(self),
             ranks: tables::ranks(self),
-            command: shell_line(&header.command),
+            command: match &choice {
+                Some(choice) => shell_line(&choice.spelled_out(&header.command)),
+                None => shell_line(&header.command),
+            },
+            command_note: command_note(header, choice.is_some()),
+            chosen: choice.map(|choice| tables::chosen(self, &choice)).unwrap_or_default(),
             manifest: tables::manifest(self),
             settings: tables::settings(self),
             frames: tables::frames(self),
             version: crate::output::VERSION.into(),
             made: words::date(now()),
         })
-    }
-
-    fn state(&self) -> String {
-        let all = self.manifest.header.shot_frames;
-        let there = self.rows.len() as u32;
-        let other = self.manifest.rows.len() - self.rows.len();
-        let left = match other {
-            0 => String::new(),
-            n => format!(" {n} more are left from a job of other settings and not shown."),
-        };
-        if there == all {
-            return format!("All {all} frames of the move are there.{left}");
-        }
-        let last = self.rows.iter().filter_map(|row| row.ended).fold(0.0, f64::max);
-        let ago = match now() - last {
-            _ if last == 0.0 => String::new(),
-            s => format!("; the last one is {} old", words::seconds(s.max(0.0))),
-        };
-        format!(
-            "{there} of the move's {all} frames are there{ago}: the job still runs, was stopped, or \
-             was not asked for more.{left}"
-        )
     }
 
     fn facts(&self) -> Vec<(String, String)> {
@@ -164,6 +163,20 @@ impl Job {
         facts
     }
 
+    /// What stands in place of an audit.
+    fn why_no_audit(&self) -> &'static str {
+        let ReuseSettings { policy, audit, .. } = self.settings.reuse;
+        match policy {
+            Policy::Colour => {
+                "Policy colour has no audit: nothing is known of how far its frames are off."
+            }
+            _ if self.rows.is_empty() => "No frame was audited yet.",
+            _ if !self.reuse().is_inferred() => "No frame was audited: none is inferred.",
+            _ if audit <= 0.0 => "No frame was audited: --audit 0.",
+            _ => "No frame was audited.",
+        }
+    }
+
     fn rays(&self) -> RayCounts {
         let mut sum = RayCounts::default();
         self.rows.iter().for_each(|row| sum += row.rays);
@@ -182,6 +195,24 @@ impl Job {
         let mut sums = audits.next()?;
         audits.for_each(|more| sums += more);
         Some(sums)
+    }
+}
+
+/// What the command that is shown is good for; where it left settings to the program, whether these
+/// are spelled out in it.
+fn command_note(header: &Header, is_spelled_out: bool) -> String {
+    let same = "The same scene, settings and version give the same bytes, on any number of ranks and \
+                threads.";
+    if !asks_for_choice(&header.command) {
+        return format!("It started the sequence. {same}");
+    }
+    match is_spelled_out {
+        true => format!(
+            "It started the sequence; what was chosen stands in place of --target or --budget. {same}"
+        ),
+        false => {
+            "It started the sequence, and chose settings by measured times: those below.".into()
+        }
     }
 }
 

@@ -102,22 +102,27 @@ fn words(survey: &Survey) -> String {
     let state = if survey.complete { "complete" } else { "not complete" };
     let of = counted(survey.total as usize, "frame");
     let mut lines = format!("{}: {state}, {} of {of} done\n", survey.frames, survey.done.len());
-    for (kind, frames) in [
+    for kind in not_done(survey) {
+        lines += &format!("  {kind}\n");
+    }
+    lines
+}
+
+/// Words for each kind of frame that is not done: `2 missing: 3, 7`.
+pub fn not_done(survey: &Survey) -> Vec<String> {
+    let kinds = [
         ("missing", &survey.missing),
         ("damaged", &survey.damaged),
         ("of other settings", &survey.other_settings),
         ("of another camera move", &survey.other_move),
         ("beyond the end of the move", &survey.beyond),
-    ] {
-        if !frames.is_empty() {
-            lines += &format!("  {} {kind}: {}\n", frames.len(), runs(frames));
-        }
-    }
-    lines
+    ];
+    let there = kinds.into_iter().filter(|(_, frames)| !frames.is_empty());
+    there.map(|(kind, frames)| format!("{} {kind}: {}", frames.len(), runs(frames))).collect()
 }
 
 /// `1..5, 9, 11..12`.
-fn runs(frames: &[u32]) -> String {
+pub fn runs(frames: &[u32]) -> String {
     let runs = frames.chunk_by(|a, b| a + 1 == *b);
     let text = runs.map(|run| match run {
         [one] => one.to_string(),

@@ -261,7 +261,7 @@ impl Manifest {
         let header = header_of(first).map_err(|why| {
             Error::Failed(format!(
                 "{} is not a manifest that this version of tweenray can read: {why}\n  \
-                 help: choose another output, or replace the sequence with --overwrite",
+                 help: tweenray render makes the sequence anew with --overwrite, or beside it with another output",
                 path.display()
             ))
         })?;

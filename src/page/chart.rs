@@ -114,20 +114,22 @@ impl Chart {
     }
 
     fn draw_line(&self, out: &mut String, x: &Axis, y: &Axis, colour: usize, line: &Series) {
-        let mut path = String::new();
-        let mut pen_is_down = false;
-        for (frame, value) in self.frames.iter().zip(&line.values) {
-            let Some(value) = value else {
-                pen_is_down = false;
-                continue;
-            };
-            let (px, py) = (10.0 * x.at(f64::from(*frame)), 1000.0 - 10.0 * y.at(*value));
-            // A lone point is a dot: a line of no length with round ends.
-            let verb = if pen_is_down { "L" } else { "M" };
-            let _ = write!(path, "{verb}{px:.1} {py:.1}h0");
-            pen_is_down = true;
+        let figures = self.frames.iter().zip(&line.values);
+        let figures: Vec<(u32, f64)> = figures.filter_map(|(f, v)| Some((*f, (*v)?))).collect();
+        let (mut lines, mut dots) = (String::new(), String::new());
+        // No line over frames that are not there or have no figure.
+        for run in figures.chunk_by(|a, b| a.0 + 1 == b.0) {
+            let path = if run.len() == 1 { &mut dots } else { &mut lines };
+            for (k, (frame, value)) in run.iter().enumerate() {
+                let (px, py) = (10.0 * x.at(f64::from(*frame)), 1000.0 - 10.0 * y.at(*value));
+                // A dot is a line of no length with round ends.
+                let verb = if k == 0 { "M" } else { "L" };
+                let _ = write!(path, "{verb}{px:.1} {py:.1}h0");
+            }
         }
-        let _ = write!(out, "<path class=\"line c{colour}\" d=\"{path}\"/>");
+        for (class, path) in [("line", lines), ("line dot", dots)] {
+            let _ = write!(out, "<path class=\"{class} c{colour}\" d=\"{path}\"/>");
+        }
     }
 }
 
@@ -151,6 +153,14 @@ mod tests {
         let plot = chart.plot();
         assert_eq!(plot.drawing.matches("<rect").count(), 4);
         assert_eq!(plot.drawing.matches('M').count(), 2);
+        // Frame 3 is not there.
+        let lines = vec![series(&[Some(1.0), Some(1.5), Some(2.0)])];
+        let gap = Chart { lines, ..chart.clone() }.plot();
+        assert_eq!((gap.drawing.matches('M').count(), gap.drawing.matches('L').count()), (2, 1));
+        assert_eq!(
+            gap.drawing.split("line dot").nth(1).map(|dots| dots.matches('M').count()),
+            Some(1)
+        );
         // The stack of frame 1 ends at the top, its lower half in the middle.
         assert!(plot.drawing.contains("y=\"500.0\"") && plot.drawing.contains("y=\"0.0\""));
         let html = askama::Template::render(&plot).expect("set");

@@ -1,6 +1,8 @@
 //! The page of a render.
 
-use super::{Chart, Picture, Plot, SCRIPT, STYLE, Table, Timeline, json_for_script, set};
+use super::{
+    Chart, Picture, Plot, SCRIPT, STYLE, Table, Timeline, json_for_script, set, with_options,
+};
 use crate::error::Result;
 use askama::Template;
 use serde::Serialize;
@@ -26,6 +28,8 @@ pub struct JobPage {
     pub title: String,
     /// How far it is.
     pub state: String,
+    /// What is the matter with frames that are not there and whole.
+    pub gaps: Vec<String>,
     /// What one wants to know first: name and value.
     pub facts: Vec<(String, String)>,
     /// Frames in the player.
@@ -42,12 +46,18 @@ pub struct JobPage {
     pub effects_note: String,
     /// What the audits found.
     pub audit: Table,
+    /// Why they found nothing, where there was none.
+    pub no_audit: String,
     /// When each rank rendered what, where the manifest tells.
     pub timeline: Option<Timeline>,
     /// What each rank did.
     pub ranks: Table,
     /// The command that gives the same frames; empty where unknown.
     pub command: String,
+    /// What is to be said of it.
+    pub command_note: String,
+    /// How its settings were chosen, where the program chose them.
+    pub chosen: Table,
     /// The manifest's head.
     pub manifest: Table,
     /// All settings.
@@ -74,14 +84,18 @@ struct Html<'a> {
     timeline: Option<Plot>,
     title: &'a str,
     state: &'a str,
+    gaps: &'a [String],
     facts: &'a [(String, String)],
     shown: &'a str,
     maps: &'a [(String, String)],
     effects: &'a Table,
     effects_note: &'a str,
     audit: &'a Table,
+    no_audit: String,
     ranks: &'a Table,
     command: &'a str,
+    command_note: String,
+    chosen: &'a Table,
     manifest: &'a Table,
     settings: &'a Table,
     frames: &'a Table,
@@ -107,14 +121,18 @@ impl JobPage {
             timeline: self.timeline.as_ref().map(Timeline::plot),
             title: &self.title,
             state: &self.state,
+            gaps: &self.gaps,
             facts: &self.facts,
             shown: &self.shown,
             maps: &self.maps,
             effects: &self.effects,
             effects_note: &self.effects_note,
             audit: &self.audit,
+            no_audit: with_options(&self.no_audit),
             ranks: &self.ranks,
             command: &self.command,
+            command_note: with_options(&self.command_note),
+            chosen: &self.chosen,
             manifest: &self.manifest,
             settings: &self.settings,
             frames: &self.frames,
@@ -130,10 +148,11 @@ mod tests {
 
     #[test]
     fn a_page_without_a_frame_stands_and_text_is_escaped() {
-        let page = JobPage { title: "<b>&".into(), ..JobPage::default() };
+        let no_audit = "No frame was audited: --audit 0.".into();
+        let page = JobPage { title: "<b>&".into(), no_audit, ..JobPage::default() };
         let html = page.to_html().expect("set");
         assert!(html.contains("There is no frame to show yet") && !html.contains("<b>&"));
-        assert!(html.contains("No frame was audited"));
+        assert!(html.contains("No frame was audited: <code>--audit</code> 0."));
     }
 
     #[test]

@@ -52,8 +52,9 @@ pub fn change(ratio: f64) -> String {
     let more = (ratio - 1.0) * 100.0;
     let digits = if more.abs() < 9.95 { 1 } else { 0 };
     let text = format!("{:.digits$}", more.abs());
-    let sign = if more < 0.0 { "−" } else { "+" };
-    format!("{sign}{} %", trimmed(&text, ' '))
+    let text = trimmed(&text, ' ');
+    let sign = if more < 0.0 && text != "0" { "−" } else { "+" };
+    format!("{sign}{text} %")
 }
 
 /// `1.3 GB`, `27 MB`.
@@ -137,6 +138,7 @@ mod tests {
             assert_eq!(short(x), text);
         }
         assert_eq!((change(1.063), change(0.5)), ("+6.3 %".into(), "−50 %".into()));
+        assert_eq!((change(0.9999), change(0.9)), ("+0 %".into(), "−10 %".into()));
         assert_eq!((change(1.0), change(3.5)), ("+0 %".into(), "+250 %".into()));
         assert_eq!((seconds(0.0041), seconds(0.41)), ("4.1 ms".into(), "0.41 s".into()));
         assert_eq!((steps(7.4e-8), steps(0.012)), ("0".into(), "0.012".into()));

@@ -23,6 +23,9 @@ pub struct Survey {
     pub missing: Vec<u32>,
     /// There, but not as they were written, or not in the manifest.
     pub damaged: Vec<u32>,
+    /// Those of the damaged ones that are whole themselves: a map of theirs is not.
+    #[serde(skip)]
+    pub without_map: Vec<u32>,
     /// There, but of other settings.
     pub other_settings: Vec<u32>,
     /// There, but of another camera move, or made for a shorter or longer one.
@@ -37,16 +40,30 @@ pub struct Survey {
 /// Errors: there is no manifest, or none that can be read; `range`'s.
 pub fn survey(path: &Path, range: impl Fn(u32) -> Result<FrameRange>) -> Result<Survey> {
     let missing = || Error::Usage(format!("there is no manifest {}", path.display()));
-    let manifest = Manifest::as_of_now(path)?.ok_or_else(missing)?;
+    survey_of(&Manifest::as_of_now(path)?.ok_or_else(missing)?, path, range)
+}
+
+/// [`survey`] by a manifest that was read at `path`.
+///
+/// # Errors
+/// A frame that cannot be read; `range`'s.
+pub fn survey_of(
+    manifest: &Manifest,
+    path: &Path,
+    range: impl Fn(u32) -> Result<FrameRange>,
+) -> Result<Survey> {
     let folder = folder_of(path);
     let FrameRange { first, last } = range(manifest.header.shot_frames)?;
     let files = folder.join(&manifest.header.files).display().to_string();
     let pattern = FramePattern::parse(&files, last - first + 1)?;
-    let stand = |frame| Ok((frame, stands(&pattern, folder, frame, &manifest)?));
+    let stand = |frame| Ok((frame, stands(&pattern, folder, frame, manifest)?));
     let frames: Vec<Result<(u32, Stands)>> = (first..=last).into_par_iter().map(stand).collect();
     let frames = frames.into_iter().collect::<Result<Vec<_>>>()?;
-    let all = |wanted| frames.iter().filter(|(_, s)| *s == wanted).map(|(f, _)| *f).collect();
-    let done: Vec<u32> = all(Stands::Done);
+    let any = |wanted: &[Stands]| -> Vec<u32> {
+        frames.iter().filter(|(_, s)| wanted.contains(s)).map(|(f, _)| *f).collect()
+    };
+    let all = |wanted| any(&[wanted]);
+    let done = all(Stands::Done);
     let beyond = manifest.rows.values().filter(|row| row.frame > manifest.header.shot_frames);
     let is_there = |row: &&Row| folder.join(&row.file).exists();
     Ok(Survey {
@@ -55,7 +72,8 @@ pub fn survey(path: &Path, range: impl Fn(u32) -> Result<FrameRange>) -> Result<
         total: last - first + 1,
         done,
         missing: all(Stands::Missing),
-        damaged: all(Stands::Damaged),
+        damaged: any(&[Stands::Damaged, Stands::WithoutMap]),
+        without_map: all(Stands::WithoutMap),
         other_settings: all(Stands::Stray(Stray::OtherSettings)),
         other_move: all(Stands::Stray(Stray::OtherMove)),
         beyond: beyond.filter(is_there).map(|row| row.frame).collect(),
@@ -67,6 +85,7 @@ enum Stands {
     Done,
     Missing,
     Damaged,
+    WithoutMap,
     Stray(Stray),
 }
 
@@ -88,12 +107,17 @@ fn stands(
     let with_maps = maps.collect::<Result<Vec<bool>>>()?;
     Ok(match row.stray {
         Some(stray) => Stands::Stray(stray),
-        None if same_name && is_whole && with_maps.iter().all(|m| *m) => Stands::Done,
-        None => Stands::Damaged,
+        None if !same_name || !is_whole => Stands::Damaged,
+        None if with_maps.iter().all(|m| *m) => Stands::Done,
+        None => Stands::WithoutMap,
     })
 }
 
-fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
+/// Whether a frame's map in `folder` is there as it was written.
+///
+/// # Errors
+/// It is there and cannot be read.
+pub fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
     Ok(is_whole(&folder.join(&map.file), None, &map.blake3)? == Some(true))
 }
 

@@ -42,6 +42,43 @@ fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
     assert_eq!(job.read("p/f_02.png"), before);
 }
 
+/// The report's command is one that gives the same frames whatever the clock says.
+#[test]
+fn a_report_spells_out_what_was_chosen() {
+    let job = Job::new();
+    for wish in ["--target psnr=34", "--target=psnr=34", "--budget 3s"] {
+        let line = LINE.replace("o/f", "'o/f").replace(".png", ".png'");
+        job.done(&format!("{LINE} {wish} --spp 3 --overwrite"));
+        job.done("report o -o p.html -q");
+        let page = String::from_utf8(job.read("p.html")).expect("UTF-8").replace("&#39;", "'");
+        let command = page.split("<pre id=\"command\">").nth(1).expect("a command");
+        let command = command.split("</pre>").next().expect("its end");
+        let begin = format!("tweenray {line} --shadow-samples ");
+        assert!(command.starts_with(&begin), "{command}");
+        assert!(command.ends_with(" --spp 3 --overwrite"), "{command}");
+        for row in ["Wanted", "Chosen", "Foretold", "Came out"] {
+            assert!(page.contains(&format!("<th scope=\"row\">{row}</th>")), "{row}");
+        }
+        let is_looked_at = page.contains(" in the worst of 3 frames looked at");
+        assert!(is_looked_at || wish.starts_with("--budget"), "{page}");
+        let frame = job.read("o/f_02.png");
+        let again =
+            command.trim_start_matches("tweenray ").replace('\'', "").replace("o/", "again/");
+        assert!(job.done(&again).out.contains("3 rendered"));
+        assert_eq!(job.read("again/f_02.png"), frame, "{wish}");
+        std::fs::remove_dir_all(job.path("again")).expect("removed");
+    }
+    // Of a choice that cannot be read, nothing is promised.
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    let (first, rows) = manifest.split_once('\n').expect("lines");
+    let mut unknown: Value = serde_json::from_str(first).expect("JSON");
+    unknown["chosen"] = 7.into();
+    std::fs::write(job.path("o/f.manifest.jsonl"), format!("{unknown}\n{rows}")).expect("written");
+    job.done("report o -o p.html -q");
+    let page = String::from_utf8(job.read("p.html")).expect("UTF-8");
+    assert!(page.contains("chose settings by measured times") && !page.contains("same bytes"));
+}
+
 /// A job that was stopped while it was held against what came out has all its frames, and is not done.
 #[test]
 fn a_check_that_was_interrupted_is_made_when_the_job_goes_on() {

@@ -3,6 +3,16 @@
 use super::job::Job;
 use serde_json::Value;
 
+/// A picture, not a move.
+const ONE: &str = r#"
+[camera]
+still = { eye = [0, 2, 6], target = [0, 0, 0] }
+[[mesh]]
+file = "cube.obj"
+[[light]]
+point = { position = [0, 4, 3], intensity = 20 }
+"#;
+
 fn text(job: &Job, name: &str) -> String {
     String::from_utf8(job.read(name)).expect("UTF-8")
 }
@@ -23,6 +33,104 @@ fn a_report_names_the_command_and_follows_the_job() {
     assert!(job.done("report o -q").out.is_empty());
     // The frames of the job are no less kept for it.
     assert!(job.done(&format!("{line} 1..3")).out.contains("3 kept"));
+}
+
+#[test]
+fn a_report_shows_what_is_whole_and_names_the_rest() {
+    let job = Job::new();
+    let line = "render cube.obj --size 24x16 --spp 1 --frames 1..4 --no-video --maps -q -o";
+    job.done(&format!("{line} o/f_##.png"));
+    let pictures = |page: &str| page.matches("data:image/jpeg").count();
+    job.done("report o -o whole.html");
+    let each = pictures(&text(&job, "whole.html")) / 4;
+    std::fs::remove_file(job.path("o/f_01.png")).expect("removed");
+    std::fs::copy(job.path("o/f_03.png"), job.path("o/f_02.png")).expect("another picture");
+    std::fs::write(job.path("o/f_03.png"), &job.read("o/f_03.png")[..90]).expect("truncated");
+    std::fs::write(job.path("o/f_04_frame.png"), b"torn").expect("written");
+    let said = job.done("report o").out;
+    assert!(said.starts_with("o/f.report.html (0 of "), "{said}");
+    let page = text(&job, "o/f.report.html");
+    let status = job.run("status o").out;
+    let damaged = "3 damaged: 2..4";
+    let map = "1 damaged in a map alone, and shown without that map: 4";
+    for gap in [damaged, map] {
+        assert!(said.contains(gap) && page.contains(&format!("<li>{gap}</li>")), "{gap}: {said}");
+    }
+    assert!(status.contains(damaged) && said.contains(" missing: 1, 5.."), "{status}{said}");
+    assert!(page.contains("No frame of the move is there"));
+    assert!(page.contains("Frame 4: ") && page.contains("its map frame is missing or damaged"));
+    assert_eq!(pictures(&page), each - 1, "frame 4 and its other maps");
+    // The missing and the damaged ones are made again.
+    job.done(&format!("{line} o/f_##.png"));
+    assert!(job.done("report o").out.starts_with("o/f.report.html (4 of "));
+}
+
+#[test]
+fn frames_of_other_settings_are_named_and_not_shown() {
+    let job = Job::new();
+    let line = "render cube.obj --size 24x16 --no-video -q -o o/f_##.png --frames";
+    job.done(&format!("{line} 1..4 --spp 1"));
+    job.done(&format!("{line} 1..2 --spp 2 --overwrite"));
+    let said = job.done("report o").out;
+    assert!(said.starts_with("o/f.report.html (2 of "), "{said}");
+    assert!(said.contains("2 of other settings: 3..4"), "{said}");
+    let page = text(&job, "o/f.report.html");
+    assert!(
+        page.contains("was not asked for more.") && page.contains("<li>2 of other settings: 3..4")
+    );
+    assert!(!page.contains("f_03.png"));
+}
+
+/// Maps that would be dark, and an audit that there cannot be, are not offered.
+#[test]
+fn a_report_offers_the_maps_that_say_something() {
+    let job = Job::new();
+    let line = "render cube.obj --size 24x16 --spp 1 --frames 1..4 --no-video --maps -q -o";
+    let report = |options: &str, pattern: &str| {
+        job.done(&format!("{line} {pattern} {options}"));
+        job.done("report o -o p.html -q");
+        std::fs::remove_dir_all(job.path("o")).expect("removed");
+        text(&job, "p.html")
+    };
+    let maps = |page: &str| {
+        let names = ["provenance", "frame", "distance", "audit"];
+        names.map(|name| page.contains(&format!("data-map=\"{name}\"")))
+    };
+    for pattern in ["o/f_##.png", "o/f_##.exr"] {
+        let page = report("--audit 0.5", pattern);
+        assert_eq!(maps(&page), [true; 4], "{pattern}");
+        let page = report("--audit 0", pattern);
+        assert_eq!(maps(&page), [true, true, true, false], "{pattern}");
+        assert!(page.contains("No frame was audited: <code>--audit</code> 0."));
+        let page = report("--policy colour", pattern);
+        assert_eq!(maps(&page), [true, true, true, false], "{pattern}");
+        assert!(page.contains("Policy colour has no audit") && !page.contains("none is inferred"));
+        // Every frame is a key frame.
+        let page = report("--segment 1", pattern);
+        assert_eq!(maps(&page), [false; 4], "{pattern}");
+        assert!(page.contains("No frame was audited: none is inferred."));
+    }
+}
+
+#[test]
+fn a_move_of_one_frame_is_told_as_one() {
+    let job = Job::new();
+    std::fs::write(job.path("one.toml"), ONE).expect("written");
+    job.done("render one.toml --size 24x16 --spp 1 --no-video -q -o o/f.png");
+    assert!(job.done("report o").out.starts_with("o/f.report.html (1 of 1 frame, "));
+    assert!(text(&job, "o/f.report.html").contains("The move&#39;s only frame is there."));
+}
+
+/// What is said of a manifest that nobody can read is of use to whom it is said.
+#[test]
+fn a_torn_manifest_is_refused_with_what_can_be_done() {
+    let job = Job::new();
+    std::fs::create_dir(job.path("o")).expect("a folder");
+    std::fs::write(job.path("o/f.manifest.jsonl"), b"{\"manif").expect("written");
+    for line in ["report o", "status o"] {
+        let said = job.run(line).err;
+        assert!(said.contains("help: tweenray render makes the sequence anew"), "{said}");
+    }
 }
 
 #[test]

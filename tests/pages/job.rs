@@ -99,6 +99,19 @@ fn player_maps_charts_and_keys() {
     browser.wait(&format!("{pixel} === '{plain}'"));
     browser.click("[data-map='']", (0.5, 0.5));
     browser.wait("document.querySelector('#screen').dataset.map === ''");
+
+    // With the focus on the scrubber its own keys move it, the others are the page's.
+    browser.value("document.querySelector('#scrub').focus()");
+    browser.press("Home");
+    browser.wait(&shown(1));
+    browser.press("ArrowRight");
+    browser.wait(&shown(2));
+    browser.press("m");
+    browser.wait("document.querySelector('#screen').dataset.map === 'provenance'");
+    browser.press(" ");
+    browser.wait("document.querySelector('#play').textContent === 'Pause'");
+    browser.press(" ");
+    browser.wait("document.querySelector('#play').textContent === 'Play'");
     browser.was_quiet();
     look(&mut browser, &page, "report");
 }

@@ -44,9 +44,10 @@ fn look(browser: &mut Browser, page: &Path, name: &str) {
         assert!(sticks_out <= 0.0, "{name} is {sticks_out} pixels too wide at {width}");
         let ground = browser.text("getComputedStyle(document.body).backgroundColor");
         assert_eq!(ground == "rgb(255, 255, 255)", !dark, "{name}: {ground}");
-        if let Some(folder) = std::env::var_os("TWEENRAY_SCREENSHOTS") {
+        if let Some(folder) = std::env::var_os("TWEENRAY_SCREENSHOTS").map(PathBuf::from) {
+            std::fs::create_dir_all(&folder).expect("a folder for screenshots");
             let scheme = if dark { "-dark" } else { "" };
-            browser.screenshot(&PathBuf::from(folder).join(format!("{name}-{width}{scheme}.png")));
+            browser.screenshot(&folder.join(format!("{name}-{width}{scheme}.png")));
         }
     }
     browser.was_quiet();

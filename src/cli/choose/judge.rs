@@ -4,7 +4,7 @@ use super::budget::Budget;
 use super::{Choice, Chooser};
 use crate::accuracy::{Check, Effort, Foretold, Timer};
 use crate::cli::progress::duration;
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
 use crate::output::{Display, read_image};
@@ -13,8 +13,16 @@ use crate::scene::Settings;
 /// How often a target that was missed is tightened.
 const ROUNDS: u32 = 2;
 
+/// What came of a choice.
+pub struct Judgement {
+    /// How good the frames are, in words; `None` where there was no time to look.
+    pub came_out: Option<String>,
+    /// A tighter choice, where the target was missed.
+    pub tighter: Option<Choice>,
+}
+
 impl Chooser<'_> {
-    /// Says what came out; a tighter choice where the target was missed.
+    /// Says what came out, and chooses tighter where the target was missed.
     ///
     /// # Errors
     /// Those of reading frames and tracing.
@@ -24,7 +32,7 @@ impl Chooser<'_> {
         audit: Option<&AuditRow>,
         rendered: Option<f64>,
         timer: Timer,
-    ) -> Result<Option<Choice>> {
+    ) -> Result<Judgement> {
         let samples = choice.foretold.samples;
         let budget = Budget::of(self);
         let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
@@ -32,24 +40,36 @@ impl Chooser<'_> {
             Some(Ok(effort)) => effort,
             Some(Err(least)) => {
                 self.tell_unchecked(choice, least, rendered);
-                return Ok(None);
+                return Ok(Judgement { came_out: None, tighter: None });
             }
         };
         let check = Check::of(&self.probe(), &choice.foretold, effort, &|frame| self.image(frame))?;
         let [mean, worst] = check.psnr();
-        let looked = check.frames.len();
+        let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
-            "PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} frames looked at, foretold {:.1}",
+            "PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} looked at, foretold {:.1}",
             choice.foretold.psnr()
         );
         let figure = self.args.target.and_then(|goal| goal.in_words(check.figure));
         let figure = figure.map_or(String::new(), |came| {
-            let foretold = self.figure(choice);
+            let foretold = choice.figure();
             let foretold = foretold.map_or(String::new(), |words| format!(", foretold {words}"));
             format!("{came} in the worst{foretold}; ")
         });
         let time = self.time(choice, rendered);
         self.tell(format!("came out: {figure}{psnr}{time}"));
+        let tighter = self.tighter_if_missed(choice, &check, audit, timer)?;
+        Ok(Judgement { came_out: Some(format!("{figure}{psnr}")), tighter })
+    }
+
+    /// A tighter choice, where the target was missed and one may be had.
+    fn tighter_if_missed(
+        &self,
+        choice: &Choice,
+        check: &Check,
+        audit: Option<&AuditRow>,
+        timer: Timer,
+    ) -> Result<Option<Choice>> {
         let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
             return Ok(None);
         };
@@ -113,9 +133,15 @@ impl Chooser<'_> {
         };
         let tightened = choice.tightened + 1;
         let seconds = foretold.seconds * self.probe().frames_each(foretold.reuse);
-        let checked = None;
-        let tighter =
-            Choice { foretold, foretelling, seconds, tightened, checked, ..choice.clone() };
+        let tighter = Choice {
+            foretold,
+            foretelling,
+            seconds,
+            tightened,
+            checked: None,
+            came_out: None,
+            ..choice.clone()
+        };
         self.warn(format!("{} was missed; rendered again, tightened", choice.wanted));
         self.say_choice(&tighter);
         Ok(Some(tighter))

@@ -3,7 +3,7 @@
 use super::RenderArgs;
 use super::round::{Frames, Round, Site};
 use crate::accuracy::{Stage, Timer, Timing};
-use crate::cli::choose::{Choice, Chooser};
+use crate::cli::choose::{Choice, Chooser, Judgement};
 use crate::cli::request::Request;
 use crate::cli::stats;
 use crate::error::{Error, Result};
@@ -59,9 +59,10 @@ impl Choosing<'_> {
             }
             let audit = stats::audit_of(&round.plan, &round.outcome);
             let seconds = round.plan.kept.is_empty().then_some(round.seconds);
-            let tighter = chooser.judge(&choice, audit.as_ref(), seconds, timer)?;
+            let Judgement { came_out, tighter } =
+                chooser.judge(&choice, audit.as_ref(), seconds, timer)?;
             if tighter.is_none() {
-                keep(job.target, &choice.clone().checked(shot, frames))?;
+                keep(job.target, &choice.clone().checked(shot, frames, came_out))?;
             }
             Ok(tighter.into_iter().collect())
         };

@@ -4,24 +4,35 @@ use super::Job;
 use crate::error::Result;
 use crate::film::{Encoding, Film, Image};
 use crate::math::Rgb;
-use crate::output::manifest::Row;
+use crate::output::manifest::{MapRow, Row};
 use crate::output::maps::{self, Map};
 use crate::output::{Display, read_image};
 use crate::page::job::Shown;
 use crate::page::{Picture, words};
-use crate::scene::{Settings, ToneCurve};
+use crate::scene::ToneCurve;
+use crate::sequence::survey::is_whole_map;
+use rayon::iter::Either;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::Path;
 
-/// One frame in `every`, at most `width` pixels wide. Frames whose files are gone are left out.
-pub fn pictures(job: &Job, every: usize, width: u32) -> Result<Vec<Shown>> {
-    let settings = serde_json::from_value(job.manifest.header.settings.clone());
-    // Of another version's settings the pictures are all that is needed.
-    let settings: Settings = settings.unwrap_or_default();
-    let there = job.rows.iter().filter(|row| job.folder.join(&row.file).is_file());
-    let chosen: Vec<&Row> = there.step_by(every).collect();
-    chosen.into_par_iter().map(|row| shown(job, row, &settings, width)).collect()
+/// One frame in `every`, at most `width` pixels wide, and the numbers of those that cannot be read.
+pub fn pictures(job: &Job, every: usize, width: u32) -> (Vec<Shown>, Vec<u32>) {
+    let maps = offered(job);
+    let chosen: Vec<&Row> = job.rows.iter().step_by(every).collect();
+    // One frame that was whole and is no more, a running job's say, is no reason for no page.
+    chosen.into_par_iter().partition_map(|row| match shown(job, row, &maps, width) {
+        Ok(shown) => Either::Left(shown),
+        Err(_) => Either::Right(row.frame),
+    })
+}
+
+/// The maps that say anything of the job.
+fn offered(job: &Job) -> Vec<Map> {
+    let says = |map: &Map| match map {
+        Map::Audit => job.audited().is_some(),
+        Map::Provenance | Map::Frame | Map::Distance => job.reuse().is_inferred(),
+    };
+    Map::ALL.into_iter().filter(says).collect()
 }
 
 /// The maps that the film has, with their meanings.
@@ -31,35 +42,35 @@ pub fn maps_of(film: &[Shown]) -> Vec<(String, String)> {
     maps.map(|map| (map.name().into(), map.meaning().into())).collect()
 }
 
-fn shown(job: &Job, row: &Row, settings: &Settings, width: u32) -> Result<Shown> {
+fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<Shown> {
     let path = job.folder.join(&row.file);
+    let settings = &job.settings;
     let display = Display { exposure: settings.exposure, tone: settings.tone };
     let image = read_image(&path)?;
     let picture = match image.encoding {
         Encoding::Srgb => Picture::jpeg(&image, width)?,
         Encoding::Linear => Picture::jpeg(&code(&image, &display), width)?,
     };
+    let mut text = text(row);
     let mut pictures = BTreeMap::new();
     if image.encoding == Encoding::Linear {
         let painted = maps::of_exr(&path, &display, settings.reuse.farthest())?;
-        for (map, film) in painted {
+        for (map, film) in painted.into_iter().filter(|(map, _)| wanted.contains(map)) {
             pictures.insert(map.name().to_string(), Picture::jpeg(&paint(&film), width)?);
         }
     } else {
-        for map in Map::ALL {
+        for map in wanted {
             let path = map.path(&path);
-            if is_known(row, &path) {
-                pictures.insert(map.name().into(), Picture::jpeg(&read_image(&path)?, width)?);
+            let is_it = |kept: &&MapRow| path.file_name().is_some_and(|n| n == kept.file.as_str());
+            let Some(kept) = row.maps.iter().find(is_it) else { continue };
+            if job.standing.lacks_map(row.frame) && !is_whole_map(&job.folder, kept)? {
+                text += &format!("; its map {} is missing or damaged", map.name());
+                continue;
             }
+            pictures.insert(map.name().into(), Picture::jpeg(&read_image(&path)?, width)?);
         }
     }
-    Ok(Shown { number: row.frame, text: text(row), picture, maps: pictures })
-}
-
-/// Whether the file at `path` is one of the frame's own maps.
-fn is_known(row: &Row, path: &Path) -> bool {
-    row.maps.iter().any(|map| path.file_name().is_some_and(|name| name == map.file.as_str()))
-        && path.is_file()
+    Ok(Shown { number: row.frame, text, picture, maps: pictures })
 }
 
 /// Linear radiance as it is displayed.

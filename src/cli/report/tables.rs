@@ -1,6 +1,8 @@
 //! What the manifest holds, as tables.
 
 use super::Job;
+use crate::cli::choose::Choice;
+use crate::error::counted;
 use crate::output::manifest::{AuditRow, Header, Row};
 use crate::page::Table;
 use crate::page::words::{bytes, count, date, percent, seconds, short, steps};
@@ -109,6 +111,27 @@ pub fn ranks(job: &Job) -> Table {
         let speed = format!("{} M", short(rays as f64 * 1e-6 / busy.max(1e-9)));
         let name = format!("Rank {rank}");
         table.rows.push(vec![name, count(frames), seconds(busy), count(rays), speed]);
+    }
+    table
+}
+
+/// How the settings were chosen, and what came of it.
+pub fn chosen(job: &Job, choice: &Choice) -> Table {
+    let mut table = Table::new("Chosen", &["", ""]);
+    let frames = job.rows.len();
+    let busy: f64 = job.rows.iter().map(|row| row.seconds).sum();
+    let came_out = choice.came_out.as_deref().unwrap_or("not looked at");
+    let time = match frames {
+        0 => String::new(),
+        _ => format!("; {} a frame", seconds(busy / frames as f64)),
+    };
+    let mut row = |name: &str, value: String| table.rows.push(vec![name.into(), value]);
+    row("Wanted", choice.wanted.clone());
+    row("Chosen", choice.options());
+    row("Foretold", choice.foretold_in_words());
+    row("Came out", format!("{came_out}{time}"));
+    if choice.tightened > 0 {
+        row("Chosen anew, since the target was missed", counted(choice.tightened as usize, "time"));
     }
     table
 }
