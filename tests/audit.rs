@@ -9,9 +9,12 @@ mod shots;
 use shots::{Quiet, Set, Stage, Trial};
 use std::sync::atomic::AtomicBool;
 use tweenray::film::Provenance;
+use tweenray::math::Rgb;
 use tweenray::measure::Interval;
-use tweenray::scene::Settings;
+use tweenray::reuse::audit::rmse;
+use tweenray::scene::{Rect, Settings};
 use tweenray::sequence::{FrameMaker, Inferrer, Made, Pyramid};
+use tweenray::stats::AuditSums;
 
 const SHOTS: u32 = 60;
 const SMALL: Trial = Trial { edge: 40, frames: 5, spp: 1, share: 0.1, best: 128 };
@@ -36,6 +39,37 @@ fn intervals_hold_the_true_error() {
     assert!(shown >= least && inferred >= least && traced >= least, "{shown} {inferred} {traced}");
     // An interval that held everything would say nothing.
     assert!(width / f64::from(SHOTS) < 3.0, "{width}");
+}
+
+/// With a light that is not kept any pixel may be off, but for those that nobody rendered.
+#[test]
+fn a_crop_is_audited_by_its_own_pixels() {
+    let mut set = Set::load("cornell");
+    set.scene.sky.radiance = Rgb::ONE;
+    set.scene.sky.lights = true;
+    let stage = set.stage(2);
+    let trial = Trial { edge: 96, share: 0.1, ..SMALL };
+    let crop = Rect { x0: 10, y0: 30, x1: 60, y1: 75 };
+    let settings = Settings {
+        shadow_samples: 1,
+        sky_samples: 16,
+        crop: Some(crop),
+        ..stage.settings(&trial, 2)
+    };
+    let mut sums = AuditSums::default();
+    for made in frames(&stage, &settings, &trial) {
+        let (Some(audit), Some(map)) = (made.audit, made.film.audit) else { continue };
+        assert_eq!(audit.pixels, 50 * 45);
+        for (i, _) in map.iter().enumerate().filter(|(_, x)| !x.is_nan()) {
+            let (x, y) = (i as u32 % 96, i as u32 / 96);
+            assert!((10..60).contains(&x) && (30..75).contains(&y), "{x},{y}");
+        }
+        sums += audit;
+    }
+    // The lamp's one sample is traced in either case.
+    let rmse = rmse(&sums).unwrap();
+    let ratio = rmse.shown.estimate / rmse.traced.estimate;
+    assert!((0.8..1.2).contains(&ratio), "{rmse:?}");
 }
 
 fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {

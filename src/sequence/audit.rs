@@ -62,14 +62,10 @@ impl Inferrer<'_> {
             judged = self.judge(frame, camera, f64::from(most), rendered)?;
         }
         let shown = self.shown(&rendered.film)?;
-        let pixels = 0..shown.rgb.len() as u32;
         let lot = Lot { seed: self.renderer.settings.seed, frame, number: 0 };
-        let drawn = audit::draw(&shown.foretold(), pixels, count, lot);
+        let drawn = audit::draw(&shown.foretold(), shown.pixels(), count, lot);
         let (traces, rays) = self.trace_twice(camera, frame, AUDIT, &drawn)?;
         let mut sums = audit::sums(&shown, &drawn, [&traces[0], &traces[1]]);
-        if let Some(crop) = &self.renderer.settings.crop {
-            sums.pixels = u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0);
-        }
         sums.rays = rays;
         sums.rays += judged.rays;
         sums.tiles_traced = judged.tiles_traced;
@@ -97,6 +93,7 @@ impl Inferrer<'_> {
             rgb: &film.rgb,
             sources: film.sources.as_deref()?,
             width: film.width,
+            crop: r.settings.crop,
             display: Display { exposure: r.settings.exposure, tone: r.settings.tone },
             everywhere: !is_all_kept(&self.channels, r.scene, &r.plan),
         })
