@@ -1,5 +1,5 @@
 //! Audits a made frame: traces the pixels that [`crate::reuse::audit`] draws, and with a bound on the
-//! error the tiles that exceed it.
+//! error the tiles that exceed it where tracing is better.
 //!
 //! Three draws that know nothing of one another. Judges, some in every tile, say which tiles are
 //! traced; the audit proper then says how good the picture is that came of it. Were they the same
@@ -14,8 +14,8 @@ use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Lot, Shown, Squares};
 use crate::reuse::{is_all_kept, of_frame, of_traced_pixel};
 use crate::scene::Camera;
-use crate::shade::FrameJob;
-use crate::stats::{AuditSums, RayCounts};
+use crate::shade::{FrameJob, Reuse};
+use crate::stats::{AuditSums, RayCounts, ReuseCounts};
 
 /// Added to a frame's number (at most a million) for the random numbers of the audit's two traces.
 const AUDIT: [u32; 2] = [1 << 30, 1 << 31];
@@ -118,8 +118,8 @@ impl Inferrer<'_> {
         Some(([a, b], rays))
     }
 
-    /// Traces the tiles of `rendered` whose error by their judges exceeds `most`, display steps.
-    /// Gives the judges' rays and the number of tiles.
+    /// Traces the tiles of `rendered` whose error by their judges exceeds `most`, display steps, and
+    /// that of tracing. Gives the judges' rays and the number of tiles.
     fn judge(
         &self,
         frame: u32,
@@ -140,21 +140,26 @@ impl Inferrer<'_> {
             tiles.push(tile);
         }
         let ([a, b], rays) = self.trace_twice(camera, frame, JUDGES, &drawn)?;
-        let error = |tile: &Tile| {
-            let of = |k: usize| {
+        let is_better_traced = |tile: &Tile| {
+            let (mut error, mut trace) = (0.0, 0.0);
+            for k in tile.judges.clone() {
                 let Drawn { index, weight } = drawn[k];
                 let shown_rgb = shown.rgb[index as usize];
-                weight * Squares::of(&shown.display, shown_rgb, a[k], b[k]).error
-            };
-            tile.judges.clone().map(of).sum::<f64>() / tile.inferred.len() as f64
+                let squares = Squares::of(&shown.display, shown_rgb, a[k], b[k]);
+                error += weight * squares.error;
+                trace += weight * squares.trace;
+            }
+            // Where few shadow rays are cast a trace may be further off than what was inferred.
+            error > most * most * tile.inferred.len() as f64 && trace < error
         };
-        tiles.retain(|tile| error(tile) > most * most);
+        tiles.retain(is_better_traced);
         let sums = AuditSums { rays, tiles_traced: tiles.len() as u64, ..AuditSums::default() };
         self.replace(frame, camera, &tiles, rendered)?;
         Some(sums)
     }
 
-    /// Traces the inferred pixels of `tiles` and puts them in place.
+    /// Traces the inferred pixels of `tiles` and puts them in place; what was inferred there counts as
+    /// traced.
     fn replace(
         &self,
         frame: u32,
@@ -173,7 +178,8 @@ impl Inferrer<'_> {
             camera,
             stream: frame,
             with_gbuffer: false,
-            reuse: None,
+            // Nothing is looked up, but points are counted.
+            reuse: Some(Reuse { channels: &self.channels, inference: None }),
             mask: Some(&mask),
             beyond_crop: false,
         };
@@ -187,6 +193,12 @@ impl Inferrer<'_> {
             }
         }
         rendered.rays += traced.rays;
+        // In an inferred pixel all points are. (Of more than four camera samples in a block that was
+        // inferred in part, some that were two points may count as one.)
+        let ReuseCounts { direct, specular, .. } = traced.reuse;
+        let counts = &mut rendered.reuse;
+        counts.direct_inferred = counts.direct_inferred.saturating_sub(direct);
+        counts.specular_inferred = counts.specular_inferred.saturating_sub(specular);
         Some(())
     }
 }
