@@ -49,6 +49,10 @@ fn the_words_of_reuse_are_checked() {
     job.refused("render cube.obj --tolerance -1", "from 0 to 255");
     job.refused("render cube.obj --audit 1.5", "from 0 to 1");
     job.refused("render cube.obj --max-rmse nan", "from 0 to 255");
+    for policy in ["colour", "off"] {
+        let line = format!("render cube.obj --max-rmse 2 --policy {policy}");
+        job.refused(&line, "--max-rmse needs --policy surface");
+    }
     job.refused("inspect cube.obj --colour-epsilon -1", "from 0 to 1e30");
     job.refused("inspect cube.obj --distance-epsilon x", "not a number");
     let help = job.done("render --help").out;
