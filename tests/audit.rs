@@ -117,7 +117,9 @@ fn a_bound_has_bad_tiles_traced_and_is_repeatable() {
     let set = Set::load("cornell");
     let stage = set.stage(2);
     let trial = Trial { edge: 96, ..SMALL };
-    let plain = stage.settings(&trial, 0);
+    // Much is inferred that tracing knows better.
+    let mut plain = Settings { shadow_samples: 64, ..stage.settings(&trial, 2) };
+    plain.reuse.tolerance = Some(20.0);
     let tiles = |most: f32| {
         let mut settings = plain.clone();
         settings.reuse.max_rmse = Some(most);
@@ -129,8 +131,8 @@ fn a_bound_has_bad_tiles_traced_and_is_repeatable() {
     let (none, same) = tiles(200.0);
     assert_eq!(none, 0);
     assert!(same.iter().zip(&unbound).all(|(a, b)| a.film.rgb == b.film.rgb));
-    let (some, bound) = tiles(2.0);
-    let (again, repeated) = tiles(2.0);
+    let (some, bound) = tiles(0.5);
+    let (again, repeated) = tiles(0.5);
     assert_eq!(some, again);
     assert!((1..20).contains(&some), "{some} of 27 tiles");
     for ((bound, repeated), unbound) in bound.iter().zip(&repeated).zip(&unbound) {
@@ -144,6 +146,7 @@ fn a_bound_has_bad_tiles_traced_and_is_repeatable() {
             }
         }
     }
+    assert!(tiles(0.0).0 > some);
 }
 
 /// With four shadow samples tracing is mostly worse than inferring, however low the bound.
@@ -187,5 +190,5 @@ fn a_bound_makes_no_frame_worse_and_counts_what_it_traces() {
         assert!(direct <= here && direct + specular >= here, "{direct}, {specular} of {here}");
         replaced += here;
     }
-    assert!(replaced > 0 && after < 1.02 * before, "{replaced} pixels: {after}, {before} before");
+    assert!(replaced > 0 && after < 1.05 * before, "{replaced} pixels: {after}, {before} before");
 }

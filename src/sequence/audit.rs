@@ -28,6 +28,10 @@ const TILE: u32 = 32;
 /// tenth of a tile's pixels wrong and nothing foretold them, the eleven that are drawn blindly
 /// would miss all in a third of the cases, 0.9^11; where they are foretold, in next to none.
 const PER_TILE: f64 = 32.0;
+/// Where few shadow rays are cast a trace is often further off than what was inferred, so a tile is
+/// traced where that is better by so many standard errors. Without, noise would choose many tiles where
+/// it is worse; from 1 on, a single judge that finds much would not be enough.
+const SURE: f64 = 0.7;
 
 impl Inferrer<'_> {
     /// Audits `rendered`, which is frame `frame`; traces tiles in it where the settings bound the
@@ -141,16 +145,17 @@ impl Inferrer<'_> {
         }
         let ([a, b], rays) = self.trace_twice(camera, frame, JUDGES, &drawn)?;
         let is_better_traced = |tile: &Tile| {
-            let (mut error, mut trace) = (0.0, 0.0);
+            let (mut error, mut gain, mut spread) = (0.0, 0.0, 0.0);
             for k in tile.judges.clone() {
                 let Drawn { index, weight } = drawn[k];
                 let shown_rgb = shown.rgb[index as usize];
                 let squares = Squares::of(&shown.display, shown_rgb, a[k], b[k]);
+                let by_tracing = weight * (squares.error - squares.trace);
                 error += weight * squares.error;
-                trace += weight * squares.trace;
+                gain += by_tracing;
+                spread += by_tracing * by_tracing;
             }
-            // Where few shadow rays are cast a trace may be further off than what was inferred.
-            error > most * most * tile.inferred.len() as f64 && trace < error
+            error > most * most * tile.inferred.len() as f64 && gain > SURE * spread.sqrt()
         };
         tiles.retain(is_better_traced);
         let sums = AuditSums { rays, tiles_traced: tiles.len() as u64, ..AuditSums::default() };
