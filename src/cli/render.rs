@@ -370,3 +370,24 @@ fn make_video(job: &Frames, fps: f64) -> Result<String> {
         Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::AuditSums;
+
+    #[test]
+    fn the_last_line_says_where_not_even_tracing_meets_the_bound() {
+        let audit = AuditRow {
+            rmse: Some([1.5, 1.2, 1.8]),
+            rmse_inferred_pixels: None,
+            rmse_traced: Some([2.7, 2.0, 3.0]),
+            sums: AuditSums::default(),
+        };
+        let says = |most| audit_line(&audit, most).expect("a line").contains("neither meets");
+        assert!(says(Some(1.0)));
+        assert!(!says(Some(2.0)), "what is inferred does");
+        assert!(!says(Some(0.0)), "whichever is better was asked for");
+        assert!(!says(None));
+    }
+}
