@@ -337,6 +337,12 @@ impl Plan {
         if let [first, ..] = outdated[..] {
             let frames = counted(outdated.len(), "frame");
             let now = target.header.shot_frames;
+            // Under policy colour the whole move is one segment.
+            let has_segments = target.header.settings["reuse"]["policy"] == "surface";
+            let help = match has_segments {
+                true => "\n  help: with a smaller --segment from the start more frames stay",
+                false => "",
+            };
             plan.notes.push(match before == now {
                 true => format!(
                     "the camera move has changed: {frames} from frame {first} on, inferred from other \
@@ -344,8 +350,7 @@ impl Plan {
                 ),
                 false => format!(
                     "the move has {now} frames, not {before}: {frames} from frame {first} on, inferred \
-                     from its last one before, will be rendered again\n  \
-                     help: with a smaller --segment from the start more frames stay"
+                     from its last one before, will be rendered again{help}"
                 ),
             });
         }
