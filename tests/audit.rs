@@ -9,9 +9,13 @@ mod shots;
 use shots::{Quiet, Set, Stage, Trial};
 use std::sync::atomic::AtomicBool;
 use tweenray::film::Provenance;
+use tweenray::math::Rgb;
 use tweenray::measure::Interval;
-use tweenray::scene::Settings;
+use tweenray::output::Display;
+use tweenray::reuse::audit::rmse;
+use tweenray::scene::{Rect, Settings};
 use tweenray::sequence::{FrameMaker, Inferrer, Made, Pyramid};
+use tweenray::stats::AuditSums;
 
 const SHOTS: u32 = 60;
 const SMALL: Trial = Trial { edge: 40, frames: 5, spp: 1, share: 0.1, best: 128 };
@@ -36,6 +40,37 @@ fn intervals_hold_the_true_error() {
     assert!(shown >= least && inferred >= least && traced >= least, "{shown} {inferred} {traced}");
     // An interval that held everything would say nothing.
     assert!(width / f64::from(SHOTS) < 3.0, "{width}");
+}
+
+/// With a light that is not kept any pixel may be off, but for those that nobody rendered.
+#[test]
+fn a_crop_is_audited_by_its_own_pixels() {
+    let mut set = Set::load("cornell");
+    set.scene.sky.radiance = Rgb::ONE;
+    set.scene.sky.lights = true;
+    let stage = set.stage(2);
+    let trial = Trial { edge: 96, share: 0.1, ..SMALL };
+    let crop = Rect { x0: 10, y0: 30, x1: 60, y1: 75 };
+    let settings = Settings {
+        shadow_samples: 1,
+        sky_samples: 16,
+        crop: Some(crop),
+        ..stage.settings(&trial, 2)
+    };
+    let mut sums = AuditSums::default();
+    for made in frames(&stage, &settings, &trial) {
+        let (Some(audit), Some(map)) = (made.audit, made.film.audit) else { continue };
+        assert_eq!(audit.pixels, 50 * 45);
+        for (i, _) in map.iter().enumerate().filter(|(_, x)| !x.is_nan()) {
+            let (x, y) = (i as u32 % 96, i as u32 / 96);
+            assert!((10..60).contains(&x) && (30..75).contains(&y), "{x},{y}");
+        }
+        sums += audit;
+    }
+    // The lamp's one sample is traced in either case.
+    let rmse = rmse(&sums).unwrap();
+    let ratio = rmse.shown.estimate / rmse.traced.estimate;
+    assert!((0.8..1.2).contains(&ratio), "{rmse:?}");
 }
 
 fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {
@@ -82,7 +117,9 @@ fn a_bound_has_bad_tiles_traced_and_is_repeatable() {
     let set = Set::load("cornell");
     let stage = set.stage(2);
     let trial = Trial { edge: 96, ..SMALL };
-    let plain = stage.settings(&trial, 0);
+    // Much is inferred that tracing knows better.
+    let mut plain = Settings { shadow_samples: 64, ..stage.settings(&trial, 2) };
+    plain.reuse.tolerance = Some(20.0);
     let tiles = |most: f32| {
         let mut settings = plain.clone();
         settings.reuse.max_rmse = Some(most);
@@ -94,8 +131,8 @@ fn a_bound_has_bad_tiles_traced_and_is_repeatable() {
     let (none, same) = tiles(200.0);
     assert_eq!(none, 0);
     assert!(same.iter().zip(&unbound).all(|(a, b)| a.film.rgb == b.film.rgb));
-    let (some, bound) = tiles(2.0);
-    let (again, repeated) = tiles(2.0);
+    let (some, bound) = tiles(0.5);
+    let (again, repeated) = tiles(0.5);
     assert_eq!(some, again);
     assert!((1..20).contains(&some), "{some} of 27 tiles");
     for ((bound, repeated), unbound) in bound.iter().zip(&repeated).zip(&unbound) {
@@ -109,7 +146,49 @@ fn a_bound_has_bad_tiles_traced_and_is_repeatable() {
             }
         }
     }
-    // A replaced tile's pixels are the traced frame's own.
-    let all: u64 = tiles(1e-6).0;
-    assert!(all > some);
+    assert!(tiles(0.0).0 > some);
+}
+
+/// With four shadow samples tracing is mostly worse than inferring, however low the bound.
+#[test]
+fn a_bound_makes_no_frame_worse_and_counts_what_it_traces() {
+    let set = Set::load("cornell");
+    let stage = set.stage(2);
+    let trial = Trial { edge: 96, ..SMALL };
+    let plain = stage.settings(&trial, 0);
+    let mut strict = plain.clone();
+    strict.reuse.max_rmse = Some(0.0);
+    let best = Settings { shadow_samples: 256, ..plain.clone() };
+    let shot = stage.shot(&trial, 0);
+    let order = Pyramid { segment: 64, frames: shot.frames }.order(&[1, 2, 3, 4, 5]);
+    let made = frames(&stage, &plain, &trial).into_iter().zip(frames(&stage, &strict, &trial));
+    let (mut before, mut after, mut replaced) = (0.0, 0.0, 0);
+    for (frame, (plain_made, strict_made)) in order.into_iter().zip(made) {
+        let camera = shot.camera(frame, 96, 96).unwrap();
+        let traced = stage.render(&plain, &camera, frame);
+        let truth = stage.render(&best, &camera, frame | 5 << 27);
+        let display = Display { exposure: plain.exposure, tone: plain.tone };
+        let error = |rgb: Rgb, i: usize| {
+            let (a, b) = (display.code(rgb), display.code(truth.rgb[i]));
+            (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>()
+        };
+        let mut here = 0;
+        let sources = |m: &Made| m.film.sources.clone().unwrap();
+        for (i, (a, b)) in sources(&plain_made).iter().zip(sources(&strict_made)).enumerate() {
+            before += error(plain_made.film.rgb[i], i);
+            after += error(strict_made.film.rgb[i], i);
+            if a.provenance != b.provenance {
+                assert_eq!(strict_made.film.rgb[i], traced.rgb[i], "the traced frame's own");
+                here += 1;
+            }
+        }
+        let (a, b) = (plain_made.reuse, strict_made.reuse);
+        assert_eq!((a.direct, a.specular), (b.direct, b.specular));
+        let direct = a.direct_inferred - b.direct_inferred;
+        let specular = a.specular_inferred - b.specular_inferred;
+        // One camera sample sees one point directly, and none or more in the mirror.
+        assert!(direct <= here && direct + specular >= here, "{direct}, {specular} of {here}");
+        replaced += here;
+    }
+    assert!(replaced > 0 && after < 1.05 * before, "{replaced} pixels: {after}, {before} before");
 }

@@ -102,7 +102,8 @@ pub struct ReuseArgs {
     #[arg(long, value_name = "POLICY", help_heading = "Reuse",
         value_parser = values::choice::<Policy>(&["surface", "colour", "off"]))]
     pub policy: Option<Policy>,
-    /// Frames from one key frame to the next [default: 128]
+    /// Frames from one key frame to the next; a move that may get longer wants a smaller number than
+    /// it has frames [default: 128]
     #[arg(long, value_name = "FRAMES", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SEGMENT))]
     pub segment: Option<u32>,
@@ -116,7 +117,8 @@ pub struct ReuseArgs {
     #[arg(long, value_name = "SHARE", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
     pub audit: Option<f32>,
-    /// Trace what is inferred with a larger measured error, display steps of 1/255 [default: no bound]
+    /// Surface policy: trace what is inferred with a larger measured error, display steps of 1/255,
+    /// where tracing is better [default: no bound]
     #[arg(long, value_name = "STEPS", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
     pub max_rmse: Option<f32>,

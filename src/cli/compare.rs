@@ -7,7 +7,7 @@ use crate::measure::{self, Comparison, Space, Summary};
 use crate::output::{self, FramePattern, manifest};
 use clap::Args;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -158,9 +158,20 @@ fn in_folder(folder: &Path) -> Result<Named> {
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         ["png", "exr", "ppm", "hdr", "jpg", "jpeg"].contains(&ending.to_ascii_lowercase().as_str())
     };
-    let files = entries.filter_map(|entry| entry.ok().map(|e| e.path())).filter(|p| image(p));
+    let files: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|e| e.path())).collect();
+    let maps = maps(&files);
     let named = |path: PathBuf| Some((path.file_name()?.to_str()?.to_string(), path));
-    Ok(files.filter_map(named).collect())
+    let named = files.into_iter().filter(|p| image(p)).filter_map(named);
+    Ok(named.filter(|(name, _)| !maps.contains(name)).collect())
+}
+
+/// What manifests among `files` call maps, which are no frames. One that cannot be read says nothing.
+fn maps(files: &[PathBuf]) -> BTreeSet<String> {
+    let is_manifest = |path: &&PathBuf| path.to_string_lossy().ends_with(manifest::ENDING);
+    let read = |path: &PathBuf| manifest::Manifest::as_of_now(path).ok().flatten();
+    let found = files.iter().filter(is_manifest).filter_map(read);
+    let rows = found.flat_map(|manifest| manifest.rows.into_values());
+    rows.flat_map(|row| row.maps).map(|map| map.file).collect()
 }
 
 impl Report {

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::intersect::{Hit, Intersector, Ray};
-use crate::math::DVec3;
+use crate::math::{Bounds3, DVec3};
 use crate::scene::{Camera, Light, Scene, Settings, Shot};
 use crate::stats::RayCounts;
 
@@ -24,6 +24,7 @@ pub fn findings(
     intersector: &dyn Intersector,
 ) -> Result<Vec<String>> {
     let mut warnings: Vec<String> = no_light(scene, settings).into_iter().collect();
+    warnings.extend(empty_regions(scene));
     let mut inside = Vec::new();
     let mut blank = Vec::new();
     let frames = sampled_frames(shot.frames);
@@ -51,6 +52,17 @@ pub fn findings(
         warnings.push(format!("nothing is visible in some frames ({})", list(&blank)));
     }
     Ok(warnings)
+}
+
+/// Boxes of `[[reuse.traced]]` in which there is nothing to trace.
+fn empty_regions(scene: &Scene) -> impl Iterator<Item = String> {
+    let bounds = scene.bounds;
+    let misses = move |region: &Bounds3| {
+        region.min.cmpgt(bounds.max).any() || region.max.cmplt(bounds.min).any()
+    };
+    let regions = scene.traced_regions.iter().enumerate();
+    let missing = regions.filter(move |(_, region)| misses(region));
+    missing.map(|(i, _)| format!("box {} of [[reuse.traced]] holds nothing of the scene", i + 1))
 }
 
 /// Up to [`FRAMES`] frames of `1..=count`.

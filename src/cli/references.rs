@@ -23,7 +23,7 @@ pub struct References {
     pub hash: String,
 }
 
-/// On which terms this job's frames and others serve one another.
+/// On which terms this job's frames and others serve one another, in a world with the hash `world`.
 pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Terms {
     let channels = reuse::channels(scene, &EffectPlan::of(scene, settings), settings);
     Terms::of(world, &channels, settings)
@@ -119,7 +119,8 @@ fn list(folders: &[PathBuf], pattern: &FramePattern) -> Result<Vec<PathBuf>> {
                 folder.display()
             )));
         }
-        let io = |e| as_input(Error::io("read the folder", folder, e));
+        let named = folder.display();
+        let io = |e| Error::Usage(format!("--references {named}: cannot read the folder: {e}"));
         let entries = fs::read_dir(folder).map_err(io)?;
         let paths = entries.map(|e| e.map(|e| e.path())).collect::<std::io::Result<Vec<_>>>();
         let is_exr = |p: &PathBuf| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
@@ -127,8 +128,7 @@ fn list(folders: &[PathBuf], pattern: &FramePattern) -> Result<Vec<PathBuf>> {
         let mut paths: Vec<_> =
             paths.map_err(io)?.into_iter().filter(|p| is_exr(p) && is_shown(p)).collect();
         if paths.is_empty() {
-            let folder = folder.display();
-            return Err(Error::Usage(format!("--references {folder}: no exr frame is in there")));
+            return Err(Error::Usage(format!("--references {named}: no exr frame is in there")));
         }
         paths.sort();
         all.append(&mut paths);

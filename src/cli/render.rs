@@ -18,7 +18,7 @@ use crate::intersect;
 use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
 use crate::reuse::Evidence;
-use crate::scene::Settings;
+use crate::scene::{Policy, Settings};
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
 use clap::{Args, Command, FromArgMatches};
@@ -248,8 +248,9 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
         job.plan.kept.len(),
         duration(start.elapsed().as_secs_f64())
     ))?;
-    reused(&stats::reuse_of(outcome)).map_or(Ok(()), result)?;
-    let is_left_open = job.request.settings.reuse.tolerance.is_none();
+    let settings = &job.request.settings.reuse;
+    reused(settings.policy, &stats::reuse_of(outcome)).map_or(Ok(()), result)?;
+    let is_left_open = settings.tolerance.is_none();
     let is_strict = |t: &f32| *t < Evidence::default().tolerance && is_left_open;
     if let Some(least) = stats::tolerance_of(outcome).filter(is_strict) {
         result(format!(
@@ -257,7 +258,8 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
             steps(least.into())
         ))?;
     }
-    if let Some(line) = stats::audit_of(job.plan, outcome).and_then(|audit| audit_line(&audit)) {
+    let audit = stats::audit_of(job.plan, outcome);
+    if let Some(line) = audit.and_then(|audit| audit_line(&audit, settings.max_rmse)) {
         result(line)?;
     }
     match job.request.fps {
@@ -268,24 +270,36 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
 }
 
 /// How much of the job was reused, where anything could be.
-fn reused(counts: &ReuseCounts) -> Option<String> {
+fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
     let all = percent(counts.share()?, 1);
     let mirrored = counts.specular_share().map_or(String::new(), |share| {
         format!("; of those in mirrors and glass {}", percent(share, 1))
     });
-    Some(format!("{all} of the lit surface points were reused{mirrored}"))
+    let what = match policy {
+        // It takes over pixels, whatever they show.
+        Policy::Colour => "pixels",
+        Policy::Surface | Policy::Off => "lit surface points",
+    };
+    Some(format!("{all} of the {what} were reused{mirrored}"))
 }
 
-/// How good the inferred frames are, in words.
-fn audit_line(audit: &AuditRow) -> Option<String> {
+/// How good the inferred frames are, in words; also where not even tracing could meet the bound `most`,
+/// display steps.
+fn audit_line(audit: &AuditRow, most: Option<f32>) -> Option<String> {
     let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
     let tiles = match audit.sums.tiles_traced {
         0 => String::new(),
         1 => "; 1 tile exceeded --max-rmse and was traced".into(),
         n => format!("; {n} tiles exceeded --max-rmse and were traced"),
     };
+    // 0 asks for whichever is better.
+    let is_out_of_reach = most.is_some_and(|most| most > 0.0 && rmse.min(traced) > most.into());
+    let help = match is_out_of_reach {
+        true => "; neither meets --max-rmse: more --shadow-samples or --sky-samples are needed",
+        false => "",
+    };
     Some(format!(
-        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255{tiles}",
+        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255{tiles}{help}",
         steps(rmse),
         steps(low),
         steps(high),
@@ -355,4 +369,25 @@ fn make_video(job: &Frames, fps: f64) -> Result<String> {
         }
         Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::AuditSums;
+
+    #[test]
+    fn the_last_line_says_where_not_even_tracing_meets_the_bound() {
+        let audit = AuditRow {
+            rmse: Some([1.5, 1.2, 1.8]),
+            rmse_inferred_pixels: None,
+            rmse_traced: Some([2.7, 2.0, 3.0]),
+            sums: AuditSums::default(),
+        };
+        let says = |most| audit_line(&audit, most).expect("a line").contains("neither meets");
+        assert!(says(Some(1.0)));
+        assert!(!says(Some(2.0)), "what is inferred does");
+        assert!(!says(Some(0.0)), "whichever is better was asked for");
+        assert!(!says(None));
+    }
 }

@@ -13,7 +13,9 @@ use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{Recipes, Target, check_upload, fingerprint, world_fingerprint};
+use crate::sequence::{
+    Recipes, Target, check_upload, fingerprint, light_fingerprint, world_fingerprint,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -64,6 +66,7 @@ pub struct Request {
     pub time_limit: Option<Duration>,
     scene_name: String,
     scene_hash: String,
+    light_hash: String,
     shot_hash: String,
 }
 
@@ -86,6 +89,7 @@ struct Read {
     exchange: Option<u32>,
     uploads: Vec<(u32, Image)>,
     scene_hash: String,
+    light_hash: String,
     shot_hash: String,
     /// (Only rank 0 tells of them, which reads by itself.)
     #[serde(skip)]
@@ -101,6 +105,7 @@ impl Read {
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
         let scene_hash = world_fingerprint(&world);
+        let light_hash = light_fingerprint(&world);
         let shot_hash = fingerprint(&world, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
@@ -122,6 +127,7 @@ impl Read {
             exchange: loaded.exchange,
             uploads,
             scene_hash,
+            light_hash,
             shot_hash,
             warnings,
         })
@@ -136,7 +142,7 @@ impl Request {
         world.agree(machine::best_isa())?;
         let read = world.from_node(|| Read::by(scene, settings, output));
         let read = world.agree(read)?;
-        let derived = world.agree(Derived::of(&read, output))?;
+        let derived = world.agree(Derived::of(&read, settings, output))?;
         let Derived { terms, recipes } = derived;
         let on = (&read.scene, &read.settings, &terms);
         let references = References::survey(world, &output.references, &read.pattern, on)?;
@@ -163,6 +169,7 @@ impl Request {
             warnings: read.warnings,
             scene_name: scene.scene.display().to_string(),
             scene_hash: read.scene_hash,
+            light_hash: read.light_hash,
             shot_hash: read.shot_hash,
             recipes,
         })
@@ -203,9 +210,9 @@ impl Request {
     ///
     /// Errors: those of [`Recipes::new`].
     pub fn terms_and_recipes(&self, settings: &Settings) -> Result<(Terms, Recipes)> {
-        let Self { scene, shot, pattern, scene_hash, .. } = self;
+        let Self { scene, shot, pattern, light_hash, .. } = self;
         let Derived { terms, recipes } =
-            Derived::new((scene, shot), settings, pattern, scene_hash)?;
+            Derived::new((scene, shot), settings, pattern, light_hash)?;
         Ok((terms, recipes))
     }
 
@@ -254,19 +261,20 @@ struct Derived {
 }
 
 impl Derived {
-    fn of(read: &Read, output: &OutputArgs) -> Result<Self> {
-        let Read { scene, shot, settings, pattern, scene_hash, .. } = read;
+    fn of(read: &Read, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
+        refuse_max_rmse(settings.reuse.max_rmse, &read.settings)?;
+        let Read { scene, shot, settings, pattern, light_hash, .. } = read;
         refuse_maps(output.maps, settings)?;
-        Self::new((scene, shot), settings, pattern, scene_hash)
+        Self::new((scene, shot), settings, pattern, light_hash)
     }
 
     fn new(
         (scene, shot): (&Scene, &Shot),
         settings: &Settings,
         pattern: &FramePattern,
-        scene_hash: &str,
+        light_hash: &str,
     ) -> Result<Self> {
-        let terms = references::terms(scene_hash, scene, settings);
+        let terms = references::terms(light_hash, scene, settings);
         let with_motion = pattern.format() == Format::Exr;
         let recipes = Recipes::new(shot, settings, !terms.lights.is_empty(), with_motion)?;
         Ok(Self { terms, recipes })
@@ -280,6 +288,21 @@ pub fn refuse_maps(maps: bool, settings: &Settings) -> Result<()> {
             "--maps shows what is inferred; with --policy off every frame is traced".into(),
         )),
         _ => Ok(()),
+    }
+}
+
+/// Refuses a bound, given as an option, that nobody would hold: only policy surface has an audit.
+pub fn refuse_max_rmse(option: Option<f32>, settings: &Settings) -> Result<()> {
+    let policy = match settings.reuse.policy {
+        Policy::Surface => return Ok(()),
+        Policy::Colour => "colour",
+        Policy::Off => "off",
+    };
+    match option {
+        Some(_) => Err(Error::Usage(format!(
+            "--max-rmse needs --policy surface: under policy {policy} no error is measured"
+        ))),
+        None => Ok(()),
     }
 }
 

@@ -37,6 +37,9 @@ use std::path::{Path, PathBuf};
 /// Version of the file format.
 pub const FORMAT: u32 = 2;
 
+/// What a manifest's name ends in.
+pub const ENDING: &str = ".manifest.jsonl";
+
 /// What every frame of a sequence shares: together with its recipe, all that its bytes depend on.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
@@ -179,7 +182,7 @@ impl Header {
         let names = now.iter().chain(&before).map(|(name, _)| name);
         let value = |entries: &[(String, String)], name: &str| {
             let found = entries.iter().find(|(n, _)| n == name);
-            found.map_or_else(|| "unknown to that version".to_string(), |(_, v)| v.clone())
+            found.map_or_else(|| "not set".to_string(), |(_, v)| v.clone())
         };
         names
             .map(|name| Difference {
@@ -199,9 +202,11 @@ impl Header {
         hash.finalize().to_hex()[..16].to_string()
     }
 
-    /// Everything that is compared, as text, the user's own settings first.
+    /// Everything that is compared, as text, the user's own settings first; before these the file
+    /// format, since some settings are set for one format only.
     fn entries(&self) -> Vec<(String, String)> {
-        let mut entries = Vec::new();
+        let ending = Path::new(&self.files).extension().unwrap_or_default();
+        let mut entries = vec![("file format".into(), ending.to_string_lossy().to_lowercase())];
         let s = &self.settings;
         entries.push(("size".into(), format!("{}x{}", plain(&s["width"]), plain(&s["height"]))));
         entries.push(("crop".into(), crop(&s["crop"])));
@@ -342,7 +347,7 @@ pub fn file_name(pattern: &FramePattern) -> String {
 
 /// Where the manifest of a sequence lies: `out/frame.manifest.jsonl` for `out/frame_####.png`.
 pub fn manifest_path(pattern: &FramePattern) -> PathBuf {
-    beside(pattern, ".manifest.jsonl")
+    beside(pattern, ENDING)
 }
 
 /// A file beside the frames, named by what comes before their number, then `ending`.

@@ -19,6 +19,7 @@ use crate::math::Rgb;
 use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
 use crate::sampling::mix;
+use crate::scene::Rect;
 use crate::stats::{AuditSums, DrawnSum};
 use rayon::prelude::*;
 
@@ -38,6 +39,8 @@ pub struct Shown<'a> {
     pub sources: &'a [PixelSource],
     /// Columns.
     pub width: u32,
+    /// The pixels that were rendered; `None` for all.
+    pub crop: Option<Rect>,
     /// How radiance is shown.
     pub display: Display,
     /// Whether also pixels without any kept light may be off: where some lights are not kept.
@@ -65,6 +68,14 @@ pub struct Lot {
 }
 
 impl Shown<'_> {
+    /// The pixels that were rendered, row by row: what lies beyond the crop is black and no picture.
+    pub fn pixels(&self) -> impl Iterator<Item = u32> + Clone {
+        let (crop, width) = (self.crop, self.width);
+        let is_inside =
+            move |x, y| crop.is_none_or(|c| (c.x0..c.x1).contains(&x) && (c.y0..c.y1).contains(&y));
+        (0..self.rgb.len() as u32).filter(move |i| is_inside(i % width, i / width))
+    }
+
     /// Whether the pixel may be off at all.
     fn is_lit(&self, i: usize) -> bool {
         self.everywhere || self.sources[i].provenance != Provenance::Background
@@ -203,7 +214,7 @@ pub fn difference(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> f32 {
 pub fn sums(shown: &Shown, drawn: &[Drawn], traces: [&[Rgb]; 2]) -> AuditSums {
     let [a, b] = traces;
     let mut sums = AuditSums {
-        pixels: shown.rgb.len() as u64,
+        pixels: shown.pixels().count() as u64,
         inferred_pixels: (0..shown.rgb.len()).filter(|i| shown.is_inferred(*i)).count() as u64,
         drawn: drawn.len() as u64,
         ..AuditSums::default()
@@ -337,8 +348,14 @@ mod tests {
         sources[24].provenance = Provenance::Background;
         let mut rgb = vec![Rgb::splat(0.5); 25];
         rgb[7] = Rgb::splat(5.0);
-        let mut shown =
-            Shown { rgb: &rgb, sources: &sources, width: 5, display: SRGB, everywhere: false };
+        let mut shown = Shown {
+            rgb: &rgb,
+            sources: &sources,
+            width: 5,
+            crop: None,
+            display: SRGB,
+            everywhere: false,
+        };
         let foretold = shown.foretold();
         let risky: Vec<usize> = (0..25).filter(|i| foretold[*i] > 0.0).collect();
         assert_eq!(risky, [6, 8, 11, 12, 13, 16, 17, 18], "7 is white whatever its light");

@@ -15,8 +15,8 @@ pub struct ReuseSettings {
     /// Share of an in-between frame's cost that goes into tracing inferred pixels again, to measure
     /// how far off they are.
     pub audit: f32,
-    /// Root mean square error of inferred pixels above which they are traced, display steps of 1/255;
-    /// `None` for no bound.
+    /// Root mean square error of inferred pixels above which they are traced where that is better,
+    /// display steps of 1/255; `None` for no bound.
     pub max_rmse: Option<f32>,
     /// Colour policy: cached colours agree within this, linear colour difference in any channel.
     pub colour_epsilon: f32,

@@ -1,5 +1,5 @@
 //! Audits a made frame: traces the pixels that [`crate::reuse::audit`] draws, and with a bound on the
-//! error the tiles that exceed it.
+//! error the tiles that exceed it where tracing is better.
 //!
 //! Three draws that know nothing of one another. Judges, some in every tile, say which tiles are
 //! traced; the audit proper then says how good the picture is that came of it. Were they the same
@@ -14,8 +14,8 @@ use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Lot, Shown, Squares};
 use crate::reuse::{is_all_kept, of_frame, of_traced_pixel};
 use crate::scene::Camera;
-use crate::shade::FrameJob;
-use crate::stats::{AuditSums, RayCounts};
+use crate::shade::{FrameJob, Reuse};
+use crate::stats::{AuditSums, RayCounts, ReuseCounts};
 
 /// Added to a frame's number (at most a million) for the random numbers of the audit's two traces.
 const AUDIT: [u32; 2] = [1 << 30, 1 << 31];
@@ -28,6 +28,10 @@ const TILE: u32 = 32;
 /// tenth of a tile's pixels wrong and nothing foretold them, the eleven that are drawn blindly
 /// would miss all in a third of the cases, 0.9^11; where they are foretold, in next to none.
 const PER_TILE: f64 = 32.0;
+/// Where few shadow rays are cast a trace is often further off than what was inferred, so a tile is
+/// traced where that is better by so many standard errors. Without, noise would choose many tiles where
+/// it is worse; from 1 on, a single judge that finds much would not be enough.
+const SURE: f64 = 0.7;
 
 impl Inferrer<'_> {
     /// Audits `rendered`, which is frame `frame`; traces tiles in it where the settings bound the
@@ -62,14 +66,10 @@ impl Inferrer<'_> {
             judged = self.judge(frame, camera, f64::from(most), rendered)?;
         }
         let shown = self.shown(&rendered.film)?;
-        let pixels = 0..shown.rgb.len() as u32;
         let lot = Lot { seed: self.renderer.settings.seed, frame, number: 0 };
-        let drawn = audit::draw(&shown.foretold(), pixels, count, lot);
+        let drawn = audit::draw(&shown.foretold(), shown.pixels(), count, lot);
         let (traces, rays) = self.trace_twice(camera, frame, AUDIT, &drawn)?;
         let mut sums = audit::sums(&shown, &drawn, [&traces[0], &traces[1]]);
-        if let Some(crop) = &self.renderer.settings.crop {
-            sums.pixels = u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0);
-        }
         sums.rays = rays;
         sums.rays += judged.rays;
         sums.tiles_traced = judged.tiles_traced;
@@ -97,6 +97,7 @@ impl Inferrer<'_> {
             rgb: &film.rgb,
             sources: film.sources.as_deref()?,
             width: film.width,
+            crop: r.settings.crop,
             display: Display { exposure: r.settings.exposure, tone: r.settings.tone },
             everywhere: !is_all_kept(&self.channels, r.scene, &r.plan),
         })
@@ -121,8 +122,8 @@ impl Inferrer<'_> {
         Some(([a, b], rays))
     }
 
-    /// Traces the tiles of `rendered` whose error by their judges exceeds `most`, display steps.
-    /// Gives the judges' rays and the number of tiles.
+    /// Traces the tiles of `rendered` whose error by their judges exceeds `most`, display steps, and
+    /// that of tracing. Gives the judges' rays and the number of tiles.
     fn judge(
         &self,
         frame: u32,
@@ -143,21 +144,27 @@ impl Inferrer<'_> {
             tiles.push(tile);
         }
         let ([a, b], rays) = self.trace_twice(camera, frame, JUDGES, &drawn)?;
-        let error = |tile: &Tile| {
-            let of = |k: usize| {
+        let is_better_traced = |tile: &Tile| {
+            let (mut error, mut gain, mut spread) = (0.0, 0.0, 0.0);
+            for k in tile.judges.clone() {
                 let Drawn { index, weight } = drawn[k];
                 let shown_rgb = shown.rgb[index as usize];
-                weight * Squares::of(&shown.display, shown_rgb, a[k], b[k]).error
-            };
-            tile.judges.clone().map(of).sum::<f64>() / tile.inferred.len() as f64
+                let squares = Squares::of(&shown.display, shown_rgb, a[k], b[k]);
+                let by_tracing = weight * (squares.error - squares.trace);
+                error += weight * squares.error;
+                gain += by_tracing;
+                spread += by_tracing * by_tracing;
+            }
+            error > most * most * tile.inferred.len() as f64 && gain > SURE * spread.sqrt()
         };
-        tiles.retain(|tile| error(tile) > most * most);
+        tiles.retain(is_better_traced);
         let sums = AuditSums { rays, tiles_traced: tiles.len() as u64, ..AuditSums::default() };
         self.replace(frame, camera, &tiles, rendered)?;
         Some(sums)
     }
 
-    /// Traces the inferred pixels of `tiles` and puts them in place.
+    /// Traces the inferred pixels of `tiles` and puts them in place; what was inferred there counts as
+    /// traced.
     fn replace(
         &self,
         frame: u32,
@@ -176,7 +183,8 @@ impl Inferrer<'_> {
             camera,
             stream: frame,
             with_gbuffer: false,
-            reuse: None,
+            // Nothing is looked up, but points are counted.
+            reuse: Some(Reuse { channels: &self.channels, inference: None }),
             mask: Some(&mask),
             beyond_crop: false,
         };
@@ -190,6 +198,12 @@ impl Inferrer<'_> {
             }
         }
         rendered.rays += traced.rays;
+        // In an inferred pixel all points are. (Of more than four camera samples in a block that was
+        // inferred in part, some that were two points may count as one.)
+        let ReuseCounts { direct, specular, .. } = traced.reuse;
+        let counts = &mut rendered.reuse;
+        counts.direct_inferred = counts.direct_inferred.saturating_sub(direct);
+        counts.specular_inferred = counts.specular_inferred.saturating_sub(specular);
         Some(())
     }
 }

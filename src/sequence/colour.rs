@@ -10,9 +10,9 @@
 //!
 //! Over several ranks every frame's discoveries go to all of them, as in the paper.
 //!
-//! Not done: first
-//! hits of inferred pixels are not known: their records say that nothing is hit. What a scene names
-//! as always traced may be inferred: an inferred pixel does not know what it shows.
+//! Not done: first hits of inferred pixels are not known: their records say that nothing is hit.
+//! What a scene names as always traced may be inferred: an inferred pixel does not know what it
+//! shows.
 
 mod exchange;
 mod pixels;

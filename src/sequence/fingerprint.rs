@@ -15,30 +15,42 @@ pub fn fingerprint(world: &World, shot: &Shot) -> String {
 
 /// BLAKE3 of everything in `world` that reaches a pixel, hexadecimal.
 pub fn world_fingerprint(world: &World) -> String {
+    fingerprint_of(world, true)
+}
+
+/// The same, but for what is to be traced in every frame: that changes nothing of what was traced,
+/// so frames that name other things serve one another as references.
+pub fn light_fingerprint(world: &World) -> String {
+    fingerprint_of(world, false)
+}
+
+fn fingerprint_of(world: &World, with_traced: bool) -> String {
     let mut hash = Hash(blake3::Hasher::new());
     hash.text(&world.meshes.len());
-    world.meshes.iter().for_each(|mesh| hash.mesh(mesh));
+    world.meshes.iter().for_each(|mesh| hash.mesh(mesh, with_traced));
     world.textures.iter().for_each(|texture| hash.texture(texture));
     for sphere in &world.spheres {
-        hash.text(&(sphere.centre, sphere.radius, sphere.material, sphere.always_traced));
+        let always_traced = sphere.always_traced && with_traced;
+        hash.text(&(sphere.centre, sphere.radius, sphere.material, always_traced));
     }
     for material in &world.materials {
         // Names are for people.
         hash.text(&crate::scene::Material { name: String::new(), ..material.clone() });
     }
-    hash.text(&(&world.lights, &world.sky, &world.traced_regions));
+    let regions = if with_traced { &world.traced_regions[..] } else { &[] };
+    hash.text(&(&world.lights, &world.sky, regions));
     hash.0.finalize().to_hex().to_string()
 }
 
 struct Hash(blake3::Hasher);
 
 impl Hash {
-    fn mesh(&mut self, mesh: &WorldMesh) {
+    fn mesh(&mut self, mesh: &WorldMesh, with_traced: bool) {
         self.array(&mesh.positions);
         self.array(&mesh.triangles);
         self.attribute(mesh.normals.as_ref());
         self.attribute(mesh.uvs.as_ref());
-        self.text(&(mesh.material, mesh.always_traced));
+        self.text(&(mesh.material, mesh.always_traced && with_traced));
     }
 
     fn attribute<T: bytemuck::NoUninit>(&mut self, attribute: Option<&Corners<T>>) {
@@ -73,7 +85,7 @@ impl Hash {
 mod tests {
     use super::*;
     use crate::math::{Bounds3, DVec3, Rgb, Vec3};
-    use crate::scene::{CameraPath, Easing, Material, Pose};
+    use crate::scene::{CameraPath, Easing, Light, Material, Pose};
 
     fn world() -> World {
         World {
@@ -120,5 +132,17 @@ mod tests {
             assert_ne!(base, fingerprint(&changed, &shot()));
         }
         assert_ne!(base, fingerprint(&world(), &Shot { vfov_degrees: 41.0, ..shot() }));
+    }
+
+    #[test]
+    fn what_is_always_traced_is_nothing_to_the_light() {
+        let base = light_fingerprint(&world());
+        assert_eq!(base, world_fingerprint(&world()));
+        let mut named = world();
+        named.meshes[0].always_traced = true;
+        named.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }];
+        assert_eq!(base, light_fingerprint(&named));
+        named.lights.push(Light::Point { position: DVec3::Y, intensity: Rgb::ONE });
+        assert_ne!(base, light_fingerprint(&named));
     }
 }

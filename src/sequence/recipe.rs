@@ -5,10 +5,9 @@
 //! is allowed there is found out. A longer shot changes few of them, so that its finished frames can be
 //! told from those that must be made again.
 
-use super::Pyramid;
 use super::schedule::{Schedule, bits};
 use crate::error::Result;
-use crate::scene::{Camera, Policy, Settings, Shot};
+use crate::scene::{Camera, Settings, Shot};
 use rayon::prelude::*;
 use std::fmt;
 
@@ -42,7 +41,7 @@ impl Recipes {
     ) -> Result<Self> {
         let camera = |frame| shot.camera(frame, settings.width, settings.height);
         let cameras = (1..=shot.frames).into_par_iter().map(camera).collect::<Result<Vec<_>>>()?;
-        let schedule = schedule(shot, settings, keeps_light)?;
+        let schedule = Schedule::of_shot(shot, settings, keeps_light)?;
         let sources = sources(&schedule, &cameras);
         let recipe = |frame: u32| {
             let at = frame as usize - 1;
@@ -58,18 +57,6 @@ impl Recipes {
     /// That of `frame`, if the shot has it.
     pub fn get(&self, frame: u32) -> Option<&Recipe> {
         self.0.get(frame.checked_sub(1)? as usize)
-    }
-}
-
-/// Which frames the makers infer from which.
-fn schedule(shot: &Shot, settings: &Settings, keeps_light: bool) -> Result<Schedule> {
-    let frames = shot.frames;
-    let segment = settings.reuse.segment;
-    match settings.reuse.policy {
-        Policy::Surface if keeps_light => Schedule::new(Pyramid { segment, frames }, shot),
-        Policy::Surface => Schedule::new(Pyramid { segment: 1, frames }, shot),
-        Policy::Colour => Ok(Schedule::without_copies(Pyramid::whole(frames))),
-        Policy::Off => Ok(Schedule::without_copies(Pyramid { segment: 1, frames })),
     }
 }
 
@@ -118,7 +105,7 @@ impl fmt::Display for Tag {
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::{CameraPath, Easing, KeyPose, Pose, ReuseSettings};
+    use crate::scene::{CameraPath, Easing, KeyPose, Policy, Pose, ReuseSettings};
 
     /// A key pose a frame, as a program exports them.
     fn shot(frames: u32) -> Shot {

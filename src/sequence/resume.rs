@@ -190,7 +190,7 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
             let files = by_file(&rows);
             let states =
                 found.iter().map(|found| Ok((found.frame, state(target, found, (&rows, &files))?)));
-            Plan::of(states.collect::<Result<_>>()?, &target.pattern)
+            Plan::of(states.collect::<Result<_>>()?, target, manifest.header.shot_frames)
         }
     };
     mark_strays(target, &manifest.header, &rows)?;
@@ -302,7 +302,9 @@ impl Plan {
         Self { render: (frames.first..=frames.last).collect(), ..Self::default() }
     }
 
-    fn of(states: Vec<(u32, State)>, pattern: &FramePattern) -> Self {
+    /// `before`: how many frames the shot had when its manifest was written.
+    fn of(states: Vec<(u32, State)>, target: &Target, before: u32) -> Self {
+        let pattern = &target.pattern;
         let mut plan = Self::default();
         let mut outdated = Vec::new();
         let mut damaged: BTreeMap<Damage, Vec<u32>> = BTreeMap::new();
@@ -333,11 +335,24 @@ impl Plan {
         });
         plan.notes.extend(notes);
         if let [first, ..] = outdated[..] {
-            plan.notes.push(format!(
-                "the camera move has changed: {} from frame {first} on, inferred from other frames \
-                 before, will be rendered again",
-                counted(outdated.len(), "frame")
-            ));
+            let frames = counted(outdated.len(), "frame");
+            let now = target.header.shot_frames;
+            // Under policy colour the whole move is one segment.
+            let has_segments = target.header.settings["reuse"]["policy"] == "surface";
+            let help = match has_segments {
+                true => "\n  help: with a smaller --segment from the start more frames stay",
+                false => "",
+            };
+            plan.notes.push(match before == now {
+                true => format!(
+                    "the camera move has changed: {frames} from frame {first} on, inferred from other \
+                     frames before, will be rendered again"
+                ),
+                false => format!(
+                    "the move has {now} frames, not {before}: {frames} from frame {first} on, inferred \
+                     from its last one before, will be rendered again{help}"
+                ),
+            });
         }
         plan
     }

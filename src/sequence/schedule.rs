@@ -7,7 +7,7 @@
 
 use super::pyramid::Pyramid;
 use crate::error::Result;
-use crate::scene::{Camera, Shot};
+use crate::scene::{Camera, Policy, Settings, Shot};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// What the frames of a shot are made of.
@@ -19,6 +19,20 @@ pub struct Schedule {
 }
 
 impl Schedule {
+    /// Which frames of `shot` the makers infer from which; `keeps_light`: some light is worth a lookup.
+    ///
+    /// Errors: those of the shot's cameras.
+    pub fn of_shot(shot: &Shot, settings: &Settings, keeps_light: bool) -> Result<Self> {
+        let frames = shot.frames;
+        let segment = settings.reuse.segment;
+        match settings.reuse.policy {
+            Policy::Surface if keeps_light => Self::new(Pyramid { segment, frames }, shot),
+            Policy::Surface => Self::new(Pyramid { segment: 1, frames }, shot),
+            Policy::Colour => Ok(Self::without_copies(Pyramid::whole(frames))),
+            Policy::Off => Ok(Self::without_copies(Pyramid { segment: 1, frames })),
+        }
+    }
+
     /// That of `shot`, cut as `pyramid` says.
     ///
     /// Errors: those of the shot's cameras.

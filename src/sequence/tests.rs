@@ -231,7 +231,9 @@ fn a_longer_shot_keeps_what_is_made_of_the_same_and_renders_the_rest_again() {
     // 1, 2 and 3 are a whole segment; 4 was a key frame at the end and is one in between now.
     let plan = prepare(&long, all).expect("a longer shot is no other scene");
     assert_eq!((plan.kept, plan.render), (vec![1, 2, 3], vec![4, 5, 6, 7, 8, 9]));
-    assert!(plan.notes[0].contains("1 frame from frame 4 on"), "{:?}", plan.notes);
+    let note = &plan.notes[0];
+    assert!(note.contains("9 frames, not 4: 1 frame from frame 4 on"), "{note}");
+    assert!(note.contains("--segment"), "{note}");
     // The job was killed before frame 4: it is still the old one, and known as such.
     assert_eq!(strays(&long), [4]);
     assert_eq!(prepare(&long, all).expect("goes on").kept, [1, 2, 3]);

@@ -55,6 +55,17 @@ fn sequences_are_paired_by_number_or_by_name() {
 }
 
 #[test]
+fn maps_of_a_folders_frames_are_no_frames() {
+    let job = Job::new();
+    let render = "render cube.obj --size 16x12 --spp 1 --frames 1..2 --no-video";
+    job.done(&format!("{render} -o a/f_#.png --maps"));
+    job.done(&format!("{render} -o b/f_#.png"));
+    assert!(job.names("a").contains(&"f_1_audit.png".into()));
+    let ran = job.done("compare a b");
+    assert!(!ran.err.contains("only A has") && !ran.out.contains("audit"), "{}", ran.err);
+}
+
+#[test]
 fn what_cannot_be_compared_is_bad_input() {
     let job = Job::new();
     picture(&job, "a.ppm", 0);

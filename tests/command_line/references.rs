@@ -209,7 +209,7 @@ fn references_that_cannot_serve_are_refused_by_name() {
     scene(&job, "scene.toml", &pan(3, 1.0));
     job.done("render scene.toml -o base/f_#.exr --frames 1");
     let line = "render scene.toml -o o/f_#.exr --frames 1 --references";
-    job.refused(&format!("{line} nowhere"), "nowhere");
+    job.refused(&format!("{line} nowhere"), "--references nowhere: cannot read the folder");
     fs::create_dir(job.path("empty")).expect("made");
     job.refused(&format!("{line} empty"), "no exr frame is in there");
     job.refused(&format!("{line} base --policy off"), "--references needs --policy surface");
@@ -221,6 +221,12 @@ fn references_that_cannot_serve_are_refused_by_name() {
     scene(&job, "other.toml", &pan(5, 2.0));
     job.done("render other.toml -o other/f_#.exr --frames 2 --references base");
     let text = fs::read_to_string(job.path("scene.toml")).expect("there");
+    // Nor does it matter what is always traced.
+    let named =
+        text.replace("[reuse]", "[[reuse.traced]]\nmin = [-9, -9, -9]\nmax = [0, 9, 9]\n[reuse]");
+    let named = named.replace("file = 'cube.obj'", "file = 'cube.obj'\nreuse = false");
+    fs::write(job.path("named.toml"), named).expect("ok");
+    job.done("render named.toml -o named/f_#.exr --frames 1 --references base");
     fs::write(job.path("lamp.toml"), text.replace("radiance = 20", "radiance = 21")).expect("ok");
     job.refused("render lamp.toml -o l/f_#.exr --references base", "f_1.exr: cannot serve");
     job.done("render scene.toml -o off/f_#.exr --frames 1 --policy off");

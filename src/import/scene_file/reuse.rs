@@ -27,8 +27,8 @@ pub(super) struct Reuse {
     tolerance: Option<Steps>,
     /// Share of a frame's cost that goes into measuring its error.
     audit: Share,
-    /// What is inferred with a larger measured root mean square error is traced, display steps of
-    /// 1/255. Absent: no bound.
+    /// Surface policy: what is inferred with a larger measured root mean square error, display steps
+    /// of 1/255, is traced where that is better. Absent: no bound.
     max_rmse: Option<Steps>,
     /// Colour policy: cached colours agree within this linear difference.
     colour_epsilon: Amount,

@@ -62,6 +62,20 @@ fn rows_do_not_get_under_another_header() {
 }
 
 #[test]
+fn of_two_formats_that_is_told_first_and_what_one_lacks_is_not_set() {
+    let png = Header { files: "f_####.png".into(), ..header(0) };
+    let settings = serde_json::json!({ "seed": 0, "reuse": { "maps": false } });
+    let exr = Header { files: "f_####.exr".into(), settings, ..header(0) };
+    let told = |before: &Header, now: &Header| {
+        let d = before.first_difference(now).expect("they differ");
+        format!("{} was {}, now it is {}", d.name, d.before, d.now)
+    };
+    assert_eq!(told(&png, &exr), "file format was png, now it is exr");
+    let other = Header { files: "f_####.png".into(), ..exr };
+    assert_eq!(told(&png, &other), "maps was not set, now it is false");
+}
+
+#[test]
 fn a_torn_line_spoils_no_other() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("f.manifest.jsonl");
