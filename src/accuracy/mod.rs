@@ -48,7 +48,7 @@ mod writing;
 
 pub use candidates::candidates;
 pub use check::{Check, Checked};
-pub use choice::{Goal, best_within, fastest_reaching};
+pub use choice::{Goal, best_within, fastest_reaching, is_by_few_turns};
 pub use effort::Effort;
 pub use errors::Errors;
 pub use foretell::{Foretelling, Foretold, Range};

@@ -6,6 +6,7 @@ mod tables;
 use super::{AccuracyArgs, Outcome};
 use crate::accuracy::{
     Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching,
+    is_by_few_turns,
 };
 use crate::error::Result;
 use crate::measure::Median;
@@ -74,11 +75,13 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     }
     let same = fastest_reaching(&outcome.measured, Goal::Psnr(e.psnr));
     let other = same.filter(|row| row.knob != Knob::Default);
-    if let Some(row) = other.filter(|row| beyond_noise(&row.time_ratio)) {
+    let may_be_faster = |row: &&Row| beyond_noise(&row.time_ratio) || is_by_few_turns(row);
+    if let Some(row) = other.filter(may_be_faster) {
         lines.push(format!(
-            "{} is as near in {} of the time.",
+            "{} is as near in {} of the time{}.",
             row.options,
-            percent(median_of(row) / time)
+            percent(median_of(row) / time),
+            if is_by_few_turns(row) { ", by so few turns" } else { "" }
         ));
     }
     lines

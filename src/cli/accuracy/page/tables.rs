@@ -1,7 +1,7 @@
 //! All figures.
 
 use super::{median_of, name_of, with_ends};
-use crate::accuracy::{Goal, fastest_reaching};
+use crate::accuracy::{Goal, fastest_reaching, is_by_few_turns};
 use crate::cli::accuracy::Outcome;
 use crate::measure::Median;
 use crate::page::Table;
@@ -33,7 +33,9 @@ pub fn goals(outcome: &Outcome) -> Table {
                     Goal::Flip(_) => short(e.flip),
                     Goal::MaxShare(_) => percent(e.share_over_2),
                 };
-                [wanted, name_of(&row.options), short(median_of(row)), reached]
+                let few = if is_by_few_turns(row) { ", by so few turns" } else { "" };
+                let name = name_of(&row.options) + few;
+                [wanted, name, short(median_of(row)), reached]
             }
         };
         table.rows.push(cells.into());
