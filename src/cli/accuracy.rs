@@ -19,6 +19,7 @@ use crate::import::Loaded;
 use crate::intersect;
 use crate::output::atomic;
 use crate::output::manifest::Header;
+use crate::reuse;
 use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
 use crate::scene::{Scene, Settings};
 use crate::sequence::fingerprint;
@@ -224,7 +225,9 @@ fn candidates(
     groups: &[Group],
     otherwise: bool,
 ) -> Vec<Candidate> {
-    let mut all = accuracy::candidates(base, &EffectPlan::of(scene, base), frames, groups);
+    let plan = |settings: &Settings| EffectPlan::of(scene, settings);
+    let looks_up = |s: &Settings| !reuse::channels(scene, &plan(s), s).is_empty();
+    let mut all = accuracy::candidates(base, &plan(base), frames, &looks_up, groups);
     all.retain(|c| otherwise || c.settings.rules.recentre == base.rules.recentre);
     all
 }
