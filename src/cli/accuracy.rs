@@ -1,6 +1,7 @@
 //! `tweenray accuracy`: what accuracy costs in time, on the user's own scene.
 
 mod files;
+mod given;
 mod line;
 mod measure;
 mod page;
@@ -92,6 +93,8 @@ pub struct AccuracyArgs {
 /// Everything that came out so far.
 struct Outcome<'a> {
     base: &'a Settings,
+    /// What has a part in the scene.
+    plan: EffectPlan,
     truth: &'a Truth,
     measured: Measured,
     pictures: Vec<Picture>,
@@ -101,6 +104,8 @@ struct Outcome<'a> {
     frames: &'a [u32],
     shown_frame: u32,
     shot_frames: u32,
+    /// Turns that were asked for.
+    turns: u32,
     threads: usize,
     tracer: String,
     /// Load of the machine over the last minute, before and after.
