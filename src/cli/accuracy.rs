@@ -22,11 +22,10 @@ use crate::output::atomic;
 use crate::output::manifest::Header;
 use crate::reuse;
 use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
-use crate::scene::{Scene, Settings};
+use crate::scene::{FrameRange, Scene, Settings};
 use crate::sequence::fingerprint;
 use clap::Args;
 use measure::Job;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -146,7 +145,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let candidates = candidates(&scene, &base, shot.frames, &groups, otherwise.is_some());
     let threads = args.threads.or(threads);
     let threads = threads.map_or_else(cluster::default_threads, |n| n as usize);
-    let pool = thread_pool(threads)?;
+    let pool = machine::thread_pool(threads)?;
     let building = Instant::now();
     let intersector = pool.install(|| intersect::build(&scene, &base, threads))?;
     let stage = Stage {
@@ -201,11 +200,6 @@ fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
     terms
 }
 
-fn thread_pool(threads: usize) -> Result<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
-}
-
 fn frames(args: &AccuracyArgs, count: u32) -> Result<Vec<u32>> {
     if args.frames.is_empty() {
         return Ok(accuracy::chosen_frames(count));
@@ -213,12 +207,9 @@ fn frames(args: &AccuracyArgs, count: u32) -> Result<Vec<u32>> {
     let mut frames = args.frames.clone();
     frames.sort_unstable();
     frames.dedup();
-    match frames.iter().find(|f| **f > count) {
-        Some(frame) => Err(Error::Usage(format!(
-            "frame {frame} lies outside the shot, which has frames 1..{count}"
-        ))),
-        None => Ok(frames),
-    }
+    let is_there = |f: &u32| values::in_shot(FrameRange { first: *f, last: *f }, count);
+    frames.iter().try_for_each(is_there).map_err(Error::Usage)?;
+    Ok(frames)
 }
 
 /// Without the other rounding of the scene, the candidate that needs it is left out: some scenes
