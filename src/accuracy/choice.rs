@@ -1,7 +1,9 @@
 //! The measured table asked the other way round: which setting for this error, for this time.
 
 use super::errors::Errors;
+use super::foretell::ROUNDING;
 use super::table::{Measured, Row};
+use crate::measure::psnr;
 
 /// An error that is to be reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +40,16 @@ impl Goal {
             Self::Flip(_) => Some(format!("FLIP {figure:.4}")),
             Self::MaxShare(_) => Some(format!("share {:.3} %", 100.0 * figure)),
         }
+    }
+
+    /// Whether rounding to 8 bits alone is more than it allows.
+    pub fn is_beyond_8_bits(self) -> bool {
+        matches!(self, Self::Psnr(least) if least > Self::most_of_8_bits())
+    }
+
+    /// The highest PSNR that rounding to 8 bits leaves, dB.
+    pub fn most_of_8_bits() -> f64 {
+        psnr(ROUNDING / (255.0 * 255.0))
     }
 
     /// Whether `errors` reach it.
@@ -132,6 +144,13 @@ mod tests {
             row.time_ratio = crate::measure::median(&turns[..3]);
         }
         assert_eq!(fastest(&measured), ("--tolerance 2".into(), true));
+    }
+
+    #[test]
+    fn rounding_alone_decides_of_psnr_only() {
+        assert!((Goal::most_of_8_bits() - 58.92).abs() < 0.01);
+        assert!(Goal::Psnr(59.0).is_beyond_8_bits() && !Goal::Psnr(58.9).is_beyond_8_bits());
+        assert!(!Goal::Ssim(0.9999).is_beyond_8_bits() && !Goal::Flip(1e-6).is_beyond_8_bits());
     }
 
     #[test]
