@@ -54,15 +54,14 @@ fn noise_of(rows: &[Row], time: fn(&Row) -> &Spread, pair: &[usize]) -> Option<u
     // Too few turns tell nothing: then both stay.
     let errors = compared(&near.rmse_of_turns, &fast.rmse_of_turns)?;
     let times = compared(&time(fast).turns, &time(near).turns)?;
-    if !errors.differs_from(1.0) {
-        return match near.knob {
-            // Neither is better for sure, so the default stays.
-            Knob::Default if !times.differs_from(1.0) => Some(pair[0]),
-            Knob::Default if fast.has_pixels_of_default() => None,
-            _ => Some(pair[1]),
-        };
+    // The default leaves for noise in neither: only what is surely better beats it.
+    let [errors, times] = [errors, times].map(|ratio| ratio.differs_from(1.0));
+    match (errors, times) {
+        (true, true) => None,
+        (false, true) => (near.knob != Knob::Default).then_some(pair[1]),
+        (true, false) => (fast.knob != Knob::Default).then_some(pair[0]),
+        (false, false) => Some(pair[usize::from(near.knob != Knob::Default)]),
     }
-    (!times.differs_from(1.0)).then_some(pair[0])
 }
 
 /// `a` over `b`, turn by turn; `None` where too few turns tell.
@@ -119,9 +118,20 @@ mod tests {
         }
         rows[2].rmse_of_turns = vec![1.9, 2.1, 1.95, 2.05, 1.99, 2.0, 2.0];
         assert_eq!(fronts(&rows), [true, false, false], "neither is surely better");
+        rows[2].seconds.turns = vec![0.98; 6];
+        assert_eq!(fronts(&rows), [false, false, true], "surely faster, and no farther");
+        rows[2].errors.mse *= 1.01;
+        assert_eq!(fronts(&rows), [true, false, true], "surely faster, and nobody knows how far");
         rows.truncate(2);
         assert_eq!(fronts(&rows), [true, false]);
         rows[1].seconds.turns = vec![0.99; 6];
         assert_eq!(fronts(&rows), [true, true], "the same pixels in surely less time");
+        // Surely nearer, but by its times perhaps three times as slow.
+        rows[1].errors.mse *= 0.5;
+        rows[1].rmse_of_turns = vec![1.4; 7];
+        rows[1].change = None;
+        rows[1].seconds.median.interval.estimate = 3.0;
+        rows[1].seconds.turns = vec![0.9, 9.0, 3.0, 4.0, 2.0, 3.0];
+        assert_eq!(fronts(&rows), [true, true], "it does not surely beat the default");
     }
 }
