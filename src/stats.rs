@@ -29,6 +29,20 @@ pub struct RayCounts {
 }
 
 impl RayCounts {
+    /// Each kind by name, with its rays.
+    pub fn by_kind(&self) -> [(&'static str, u64); 8] {
+        [
+            ("camera", self.camera),
+            ("mirror", self.mirror),
+            ("glass", self.glass),
+            ("shadow of area lights", self.shadow_area),
+            ("shadow of other lights", self.shadow_delta),
+            ("shadow of the sky", self.shadow_sky),
+            ("second tries", self.retry),
+            ("invalid", self.invalid),
+        ]
+    }
+
     /// All rays that were traced, second tries included.
     pub fn total(&self) -> u64 {
         self.camera

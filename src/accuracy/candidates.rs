@@ -7,14 +7,16 @@ use crate::scene::{BuildQuality, HitRules, IntersectorKind, Policy, Recheck, Set
 
 /// The default first, then each knob of `groups` alone, then combinations. What `plan` says has no
 /// part in the scene is left out, and so is what equals something before it, and what makes no
-/// difference in a move of `frames` frames.
+/// difference in a move of `frames` frames. `looks_up` says whether under some settings any light is
+/// worth a lookup in other frames.
 pub fn candidates(
     base: &Settings,
     plan: &EffectPlan,
     frames: u32,
+    looks_up: &dyn Fn(&Settings) -> bool,
     groups: &[Group],
 ) -> Vec<Candidate> {
-    let mut list = List { base, frames, all: Vec::new() };
+    let mut list = List { base, frames, looks_up, all: Vec::new() };
     list.add(Knob::Default, String::new(), |_| ());
     let takes = |group| groups.contains(&group);
     if takes(Group::Reuse) {
@@ -41,6 +43,7 @@ pub fn candidates(
 struct List<'a> {
     base: &'a Settings,
     frames: u32,
+    looks_up: &'a dyn Fn(&Settings) -> bool,
     all: Vec<Candidate>,
 }
 
@@ -53,7 +56,17 @@ impl List<'_> {
         }
     }
 
+    /// Whether anything is taken over from other frames by lookups under `settings`.
+    fn reuses(&self, settings: &Settings) -> bool {
+        self.frames > 1 && (self.looks_up)(settings)
+    }
+
     fn reuse(&mut self) {
+        // Colours are taken over whatever lights the scene, where that was asked for.
+        let has_part = self.reuses(self.base) || self.base.reuse.policy == Policy::Colour;
+        if self.frames < 2 || !has_part {
+            return;
+        }
         for (name, policy) in
             [("off", Policy::Off), ("surface", Policy::Surface), ("colour", Policy::Colour)]
         {
@@ -157,24 +170,26 @@ impl List<'_> {
         for spp in with_base(base.spp) {
             // Without soft light there is but one number of shadow samples: none.
             for k in if lit == 1 { 0..3 } else { 1..2 } {
+                let mut options = format!("--spp {spp}");
+                let mut settings = Settings { spp, ..base.clone() };
+                // Samples of what is not there would only make twins.
+                if plan.area_lights {
+                    options += &format!(" --shadow-samples {}", shadow[k]);
+                    settings.shadow_samples = shadow[k];
+                }
+                if plan.sky_light {
+                    options += &format!(" --sky-samples {}", sky[k]);
+                    settings.sky_samples = sky[k];
+                }
+                // So would policies where there is nothing to take over.
+                if !self.reuses(&settings) {
+                    self.add(Knob::Combination, options, |s| *s = settings);
+                    continue;
+                }
                 for (name, policy) in [("off", Policy::Off), ("surface", Policy::Surface)] {
-                    let mut options = format!("--spp {spp}");
-                    if plan.area_lights {
-                        options += &format!(" --shadow-samples {}", shadow[k]);
-                    }
-                    if plan.sky_light {
-                        options += &format!(" --sky-samples {}", sky[k]);
-                    }
-                    options += &format!(" --policy {name}");
+                    let options = format!("{options} --policy {name}");
                     self.add(Knob::Combination, options, |s| {
-                        s.spp = spp;
-                        // Samples of what is not there would only make twins.
-                        if plan.area_lights {
-                            s.shadow_samples = shadow[k];
-                        }
-                        if plan.sky_light {
-                            s.sky_samples = sky[k];
-                        }
+                        *s = settings.clone();
                         s.reuse.policy = policy;
                     });
                 }
@@ -200,14 +215,15 @@ mod tests {
     #[test]
     fn no_candidate_twice_and_none_for_effects_that_are_not_there() {
         let base = Settings::default();
-        let all = candidates(&base, &EffectPlan::EVERYTHING, 100, &Group::ALL);
+        let yes = |_: &Settings| true;
+        let all = candidates(&base, &EffectPlan::EVERYTHING, 100, &yes, &Group::ALL);
         assert_eq!((all[0].knob, &all[0].settings), (Knob::Default, &base));
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| a.settings != b.settings), "{}", a.options);
         }
         let one = Settings { shadow_samples: 1, ..Settings::default() };
         let no_sky = EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING };
-        let list = candidates(&one, &no_sky, 100, &Group::ALL);
+        let list = candidates(&one, &no_sky, 100, &yes, &Group::ALL);
         for (i, a) in list.iter().enumerate() {
             assert!(list[..i].iter().all(|b| a.options != b.options), "{}", a.options);
         }
@@ -218,7 +234,7 @@ mod tests {
             sky_light: false,
             ..EffectPlan::EVERYTHING
         };
-        let few = candidates(&base, &nothing, 10, &Group::ALL);
+        let few = candidates(&base, &nothing, 10, &yes, &Group::ALL);
         let has = |knob| few.iter().any(|c| c.knob == knob);
         assert!(!has(Knob::Bounces) && !has(Knob::ShadowSamples) && !has(Knob::SkySamples));
         assert!(has(Knob::CameraSamples) && has(Knob::Policy) && has(Knob::Retry));
@@ -234,7 +250,29 @@ mod tests {
         assert!(few.len() < all.len());
         let segments = |list: &[Candidate]| list.iter().filter(|c| c.knob == Knob::Segment).count();
         assert_eq!((segments(&all), segments(&few)), (2, 0));
-        assert_eq!(candidates(&base, &nothing, 10, &[]).len(), 1);
+        assert_eq!(candidates(&base, &nothing, 10, &yes, &[]).len(), 1);
         assert_eq!((times(10.0, 0.001), times(0.1, 0.001)), (0.01, 0.0001));
+    }
+
+    #[test]
+    fn nothing_of_reuse_where_there_is_nothing_to_take_over() {
+        let base = Settings::default();
+        let everything = &EffectPlan::EVERYTHING;
+        let of_reuse = |list: &[Candidate]| {
+            let tells = |c: &&Candidate| {
+                c.knob.group() == Some(Group::Reuse) || c.options.contains("--policy")
+            };
+            list.iter().filter(tells).count()
+        };
+        let yes = |_: &Settings| true;
+        assert!(of_reuse(&candidates(&base, everything, 2, &yes, &Group::ALL)) > 10);
+        let one_frame = candidates(&base, everything, 1, &yes, &Group::ALL);
+        assert_eq!(of_reuse(&one_frame), 0);
+        let dark = candidates(&base, everything, 100, &|_| false, &Group::ALL);
+        assert_eq!(of_reuse(&dark), 0);
+        assert!(dark.iter().any(|c| c.knob == Knob::Combination), "samples are still combined");
+        // What is not worth a lookup by default may be with more samples.
+        let many = |s: &Settings| s.shadow_samples > base.shadow_samples;
+        assert!(of_reuse(&candidates(&base, everything, 9, &many, &Group::ALL)) > 0);
     }
 }

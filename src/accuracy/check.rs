@@ -9,13 +9,14 @@ use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
+use serde::{Deserialize, Serialize};
 
 /// What was found in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checked {
     /// The frame.
     pub frame: u32,
-    /// Its mean squared error, display steps.
+    /// Its mean squared error, the reference's own left aside, display steps.
     pub squared_error: f64,
     /// By how much that may be off, a share.
     pub doubt: f64,
@@ -30,6 +31,17 @@ pub struct Check {
     pub figure: f64,
 }
 
+/// What a check says of a goal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Verdict {
+    /// Every frame looked at came to it.
+    Reached,
+    /// Some did not, but by no more than what so few pixels leave open.
+    Open,
+    /// Some surely did not.
+    Missed,
+}
+
 impl Check {
     /// Looks at some finished frames, rendered as `foretold`, at other pixels than the probe did, as
     /// many as `effort` says; `image` gives a frame as displayed.
@@ -38,6 +50,7 @@ impl Check {
     /// Those of tracing and of `image`.
     pub fn of(
         probe: &Probe,
+        foretelling: &Foretelling,
         foretold: &Foretold,
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
@@ -48,8 +61,14 @@ impl Check {
         let mut reference = reference(probe.stage.base, samples);
         reference.bounces = reference.bounces.max(foretold.bounces);
         let truth = patches.trace(probe.stage, &reference)?;
-        let found =
-            squares(&patches, &truth, &seen).into_iter().zip(doubts(&patches, &truth, &seen));
+        let own = foretelling.own_part(foretold.samples, samples);
+        // Rounding is all the frame's; of the rest a part is the reference's.
+        let of_frame = |error: f64| {
+            let rounding = error.min(foretelling.rounding);
+            rounding + own * (error - rounding)
+        };
+        let found = squares(&patches, &truth, &seen).into_iter().map(of_frame);
+        let found = found.zip(doubts(&patches, &truth, &seen));
         let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| Checked {
             frame,
             squared_error,
@@ -79,11 +98,24 @@ impl Check {
         self.frames.iter().copied().max_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
     }
 
-    /// By which factor squared errors are too large for `goal`, of which `allowed` is the squared error;
-    /// 1 and less where it is reached. The reference's own error, about a sixth, and half of what so few
-    /// pixels leave open are to the good of a frame.
+    /// What came of `goal`, of which `allowed` is the squared error.
+    pub fn verdict(&self, goal: Goal, allowed: f64) -> Verdict {
+        let is_reached = match goal {
+            Goal::Psnr(_) => self.worst().is_none_or(|worst| worst.squared_error <= allowed),
+            _ => self.excess(goal, allowed) <= 1.0,
+        };
+        match () {
+            () if is_reached => Verdict::Reached,
+            () if self.excess(goal, allowed) <= 1.0 => Verdict::Open,
+            () => Verdict::Missed,
+        }
+    }
+
+    /// By which factor squared errors are surely too large for `goal`, of which `allowed` is the squared
+    /// error; 1 and less where it is not surely missed. Half of what so few pixels leave open is to the
+    /// good of a frame.
     pub fn excess(&self, goal: Goal, allowed: f64) -> f64 {
-        let sure = |f: &Checked| f.squared_error / (1.15 * (1.0 + 0.5 * f.doubt));
+        let sure = |f: &Checked| f.squared_error / (1.0 + 0.5 * f.doubt);
         match goal {
             Goal::Psnr(_) => self.frames.iter().map(sure).fold(0.0, f64::max) / allowed,
             // The figure itself decides; it rises no faster than the squared error.
@@ -113,8 +145,15 @@ mod tests {
             figure: 0.03,
         };
         let goal = Goal::Psnr(45.0);
-        assert!(check(&[1.9, 2.0, 2.5]).excess(goal, 2.0) <= 1.0);
-        assert!(check(&[1.9, 2.0, 2.6]).excess(goal, 2.0) > 1.0);
+        let verdict = |errors: &[f64]| check(errors).verdict(goal, 2.0);
+        assert_eq!(verdict(&[1.9, 2.0, 2.0]), Verdict::Reached);
+        // Only where more than the figure that is printed is too large.
+        assert_eq!(verdict(&[1.9, 2.0, 2.1]), Verdict::Open);
+        assert_eq!(verdict(&[1.9, 2.0, 2.3]), Verdict::Missed);
+        assert!(check(&[1.9, 2.0, 2.1]).excess(goal, 2.0) <= 1.0);
+        assert!(check(&[1.9, 2.0, 2.3]).excess(goal, 2.0) > 1.0);
+        assert_eq!(check(&[9.0]).verdict(Goal::Flip(0.03), 2.0), Verdict::Reached);
+        assert_eq!(check(&[1.0]).verdict(Goal::Flip(0.02), 2.0), Verdict::Missed);
         assert!((check(&[9.0]).excess(Goal::Flip(0.02), 2.0) - 1.5).abs() < 1e-9);
         assert!((check(&[1.0]).excess(Goal::Ssim(0.97), 2.0) - 1.0).abs() < 1e-9);
     }

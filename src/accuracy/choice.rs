@@ -1,7 +1,9 @@
 //! The measured table asked the other way round: which setting for this error, for this time.
 
 use super::errors::Errors;
+use super::foretell::ROUNDING;
 use super::table::{Measured, Row};
+use crate::measure::psnr;
 
 /// An error that is to be reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +24,8 @@ impl std::fmt::Display for Goal {
             Self::Psnr(least) => write!(f, "psnr={least}"),
             Self::Ssim(least) => write!(f, "ssim={least}"),
             Self::Flip(most) => write!(f, "flip={most}"),
-            Self::MaxShare(most) => write!(f, "max-share={}%", 100.0 * most),
+            // Of 0.07 a hundred times is 7, not 7.000000000000001.
+            Self::MaxShare(most) => write!(f, "max-share={}%", (100.0 * most) as f32),
         }
     }
 }
@@ -39,6 +42,16 @@ impl Goal {
         }
     }
 
+    /// Whether rounding to 8 bits alone is more than it allows.
+    pub fn is_beyond_8_bits(self) -> bool {
+        matches!(self, Self::Psnr(least) if least > Self::most_of_8_bits())
+    }
+
+    /// The highest PSNR that rounding to 8 bits leaves, dB.
+    pub fn most_of_8_bits() -> f64 {
+        psnr(ROUNDING / (255.0 * 255.0))
+    }
+
     /// Whether `errors` reach it.
     pub fn is_met(self, errors: &Errors) -> bool {
         match self {
@@ -51,15 +64,23 @@ impl Goal {
 }
 
 /// The fastest setting that reached `goal`, among those that may be recommended. Where the default does,
-/// only what is surely faster takes its place: not what chance made so.
+/// only what is surely faster takes its place: not what chance made so. Where [`is_by_few_turns`], nothing
+/// can be sure, and the estimate decides.
 pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
     let default_reaches = goal.is_met(&measured.default_row().errors);
     let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
     let reach = reach.filter(|row| match row.time_ratio {
-        Some(ratio) if default_reaches => ratio.differs_from(1.0) && ratio.interval.estimate < 1.0,
+        Some(ratio) if default_reaches && ratio.is_sure() => {
+            ratio.differs_from(1.0) && ratio.interval.estimate < 1.0
+        }
         _ => true,
     });
     reach.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
+}
+
+/// Whether `row` was timed in too few turns for any difference from the default's time to be sure.
+pub fn is_by_few_turns(row: &Row) -> bool {
+    row.time_ratio.is_some_and(|ratio| !ratio.is_sure())
 }
 
 /// The setting nearest to the truth that took at most `most` seconds a frame, among those that may be
@@ -101,6 +122,43 @@ mod tests {
         assert_eq!(fastest(Goal::MaxShare(0.0)), Some(String::new()));
         assert_eq!(options(best_within(&measured, 1.3)), Some("--tolerance 0.5".into()));
         assert_eq!(options(best_within(&measured, 0.5)), None);
+    }
+
+    #[test]
+    fn few_turns_go_by_the_estimate() {
+        let mut measured = measured(&[
+            (Knob::Default, "", 1.0, 2.0),
+            (Knob::CutOff, "--cutoff 0.01", 0.9, 2.0),
+            (Knob::Tolerance, "--tolerance 2", 0.5, 2.0),
+        ]);
+        // Of six turns one was fast by chance.
+        let turns = [0.3, 1.1, 1.2, 1.1, 1.1, 1.2];
+        measured.rows[2].time_ratio = crate::measure::median(&turns);
+        let goal = Goal::Psnr(20.0);
+        let fastest = |m: &Measured| {
+            let row = fastest_reaching(m, goal).expect("all reach");
+            (row.options.clone(), is_by_few_turns(row))
+        };
+        assert_eq!(fastest(&measured), ("--cutoff 0.01".into(), false));
+        for row in &mut measured.rows[1..] {
+            row.time_ratio = crate::measure::median(&turns[..3]);
+        }
+        assert_eq!(fastest(&measured), ("--tolerance 2".into(), true));
+    }
+
+    #[test]
+    fn rounding_alone_decides_of_psnr_only() {
+        assert!((Goal::most_of_8_bits() - 58.92).abs() < 0.01);
+        assert!(Goal::Psnr(59.0).is_beyond_8_bits() && !Goal::Psnr(58.9).is_beyond_8_bits());
+        assert!(!Goal::Ssim(0.9999).is_beyond_8_bits() && !Goal::Flip(1e-6).is_beyond_8_bits());
+    }
+
+    #[test]
+    fn a_share_is_told_as_it_was_asked_for() {
+        for percent in [0.1, 0.3, 5.0, 7.0, 29.0] {
+            let told = Goal::MaxShare(0.01 * percent).to_string();
+            assert_eq!(told, format!("max-share={percent}%"));
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub struct Effort {
 }
 
 /// What a whole probe takes, camera samples of a picture of one sample a pixel: measured on our scenes.
-const PROBE: f64 = 9e6;
+const PROBE_WORK: f64 = 9e6;
 
 /// Steps in which a check's work is made less.
 const STEPS: u32 = 64;
@@ -29,7 +29,7 @@ impl Effort {
 
     /// What a probe can do in about `seconds`, where tracing takes `each` seconds a camera sample.
     pub fn within(seconds: f64, each: f64) -> Self {
-        Self::WHOLE.part(seconds / (PROBE * each.max(1e-12)))
+        Self::WHOLE.part(seconds / (PROBE_WORK * each.max(1e-12)))
     }
 
     /// The most that a check can look at in `seconds`, in a job of `frames` frames of `pixels` pixels,

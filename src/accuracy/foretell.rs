@@ -13,6 +13,9 @@ use serde::{Deserialize, Serialize};
 
 pub use line::Line;
 
+/// What rounding to 8 bits adds to a squared error, display steps.
+pub const ROUNDING: f64 = 1.0 / 12.0;
+
 /// Times are not known to a tenth; so much longer may be taken by what is more accurate.
 const ALIKE: f64 = 1.1;
 
@@ -141,6 +144,14 @@ impl Foretelling {
             // Nothing but what was tried tells.
             _ => self.most_that_reached(),
         }
+    }
+
+    /// Which part of the squared difference between frames of `samples` and of `reference` is the former's
+    /// own error.
+    pub fn own_part(&self, samples: Samples, reference: Samples) -> f64 {
+        let sum = |samples| self.law.errors(samples).sum::<f64>();
+        let (own, of_reference) = (sum(samples), sum(reference));
+        if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
 
     /// What is foretold of `samples` in `mode`, of the worst frame.

@@ -47,10 +47,10 @@ mod worst;
 mod writing;
 
 pub use candidates::candidates;
-pub use check::{Check, Checked};
-pub use choice::{Goal, best_within, fastest_reaching};
+pub use check::{Check, Checked, Verdict};
+pub use choice::{Goal, best_within, fastest_reaching, is_by_few_turns};
 pub use effort::Effort;
-pub use errors::Errors;
+pub use errors::{Errors, displayed_rgb};
 pub use foretell::{Foretelling, Foretold, Range};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};

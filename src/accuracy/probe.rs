@@ -25,9 +25,9 @@ const WIDE: (u32, u32, u32) = (4, 48, 9_300);
 /// Pixels of the picture that tells how fast tracing is.
 const PILOT: f64 = 12_000.0;
 /// Draws the patches: of the probe, and of the check.
-pub const PROBE: u64 = 1;
-/// See [`PROBE`].
-pub const CHECK: u64 = 2;
+pub const DRAW_OF_PROBE: u64 = 1;
+/// See [`DRAW_OF_PROBE`].
+pub const DRAW_OF_CHECK: u64 = 2;
 
 /// What the user set already, which is not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -121,11 +121,11 @@ impl Probe<'_> {
             true => {
                 let (frames, edge, pixels) = WIDE;
                 let frames = spread(self.frames, frames, 0.5);
-                Ok(Patches::grid(self.stage.base, &frames, edge, pixels, PROBE))
+                Ok(Patches::grid(self.stage.base, &frames, edge, pixels, DRAW_OF_PROBE))
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.5);
-                Patches::by_contrast(self.stage, &frames, effort, PROBE)
+                Patches::by_contrast(self.stage, &frames, effort, DRAW_OF_PROBE)
             }
         }
     }
@@ -144,13 +144,13 @@ impl Probe<'_> {
             true => {
                 let (frames, edge, pixels) = WIDE;
                 let frames = spread(self.frames, frames, 0.1);
-                let patches = Patches::grid(base, &frames, edge, pixels, CHECK);
+                let patches = Patches::grid(base, &frames, edge, pixels, DRAW_OF_CHECK);
                 (frames, patches)
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.1);
                 let count = checked_pixels(effort);
-                let patches = Patches::by_contrast_of(base, &frames, image, count, CHECK)?;
+                let patches = Patches::by_contrast_of(base, &frames, image, count, DRAW_OF_CHECK)?;
                 (frames, patches)
             }
         })

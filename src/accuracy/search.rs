@@ -3,7 +3,7 @@
 use super::choice::Goal;
 use super::effort::Effort;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Figure, Foretelling, Line, Measured, Pace};
+use super::foretell::{Figure, Foretelling, Line, Measured, Pace, ROUNDING};
 use super::law::{Law, Point, Samples};
 use super::patches::{Patches, Seen, rounded};
 use super::probe::{Probe, reference, samples_of_reference};
@@ -56,7 +56,7 @@ impl<'a> Search<'a> {
             law: Law::of(causes, &[]),
             measured: Vec::new(),
             bias: Vec::new(),
-            rounding: if probe.rounds { 1.0 / 12.0 } else { 0.0 },
+            rounding: if probe.rounds { ROUNDING } else { 0.0 },
             bounces: probe.stage.base.bounces,
             modes: Vec::new(),
             line: None,

@@ -4,7 +4,7 @@ use super::knobs::{Group, Knob};
 use super::oracle::OracleCrop;
 use super::table::{Change, Measured, Row};
 use super::writing::Writing;
-use crate::measure::Median;
+use crate::measure::{Interval, Median};
 use crate::page::words::{bytes, change, count, percent, seconds, short};
 
 /// What turning `knob` does, one sentence for each of its settings; empty where it was not turned.
@@ -38,6 +38,9 @@ fn time(row: &Row) -> String {
         (is, format!("({low} to {high})"))
     };
     let (is, ends) = told(&wall);
+    if !wall.has_interval() {
+        return format!("too few turns to tell the time ({is})");
+    }
     if !wall.is_sure() {
         return format!("too few turns to tell the time {ends}");
     }
@@ -86,15 +89,26 @@ fn pixels(c: &Change) -> String {
     )
 }
 
-/// What `writing` takes where a frame takes `frame_seconds` to make.
-pub fn about_writing(writing: &Writing, frame_seconds: f64) -> Vec<String> {
-    let w = writing;
+/// What `writing` takes where a frame takes `making` to make, seconds.
+pub fn about_writing(writing: &Writing, making: Interval) -> Vec<String> {
+    let (w, frame_seconds) = (writing, making.estimate);
+    let sync = match w.sync_ends {
+        [low, _] if low <= 0.0 => "the sync is no more than noise in that".into(),
+        _ if w.sync_seconds >= 0.95 * w.frame_seconds => "about all of it for the sync".to_string(),
+        [low, high] => {
+            let [is, low, high] = [w.sync_seconds, low, high].map(seconds);
+            format!("{is} of it for the sync ({low} to {high})")
+        }
+    };
+    let [low, high] = w.frame_ends;
+    let [least, most] = [low / making.high, high / making.low].map(|share| change(1.0 + share));
     let mut all = vec![format!(
-        "A frame as png ({}): {} to encode, write and sync, {} of them for the sync. {} time. No setting \
-         spares the sync: a frame that is there is whole.",
+        "A frame as png ({}): {} to encode, write and sync ({} to {}), {sync}. {} time ({least} to {most}). \
+         No setting spares the sync: a frame that is there is whole.",
         bytes(w.frame_bytes),
         seconds(w.frame_seconds),
-        seconds(w.sync_seconds),
+        seconds(low),
+        seconds(high),
         change(1.0 + w.frame_seconds / frame_seconds)
     )];
     if let Some((taken, size)) = w.checkpoint {
@@ -132,6 +146,32 @@ pub fn about_oracle(crop: &OracleCrop) -> String {
 mod tests {
     use super::super::table::tests::measured;
     use super::*;
+
+    #[test]
+    fn what_a_sync_takes_has_an_interval_and_is_no_more_than_all() {
+        let making = Interval { estimate: 0.1, low: 0.08, high: 0.2 };
+        let writing = |sync_seconds, sync_ends| Writing {
+            frame_seconds: 0.01,
+            frame_ends: [0.008, 0.02],
+            sync_seconds,
+            sync_ends,
+            frame_bytes: 1000,
+            checkpoint: None,
+            keys: 1,
+            frames: 1,
+        };
+        let told = |w: Writing| about_writing(&w, making).concat();
+        let some = told(writing(0.004, [0.002, 0.006]));
+        assert!(
+            some.contains("10 ms to encode, write and sync (8 ms to 20 ms), 4 ms of it"),
+            "{some}"
+        );
+        assert!(some.contains("for the sync (2 ms to 6 ms). +10 % time (+4 % to +25 %)"), "{some}");
+        let all = told(writing(0.01, [0.008, 0.02]));
+        assert!(all.contains("about all of it for the sync"), "{all}");
+        let noise = told(writing(0.001, [-0.002, 0.003]));
+        assert!(noise.contains("the sync is no more than noise"), "{noise}");
+    }
 
     #[test]
     fn differences_within_noise_are_called_that() {

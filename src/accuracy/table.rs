@@ -55,6 +55,13 @@ pub struct Row {
     pub on_cpu_front: bool,
 }
 
+impl Row {
+    /// Whether its pixels were compared with the default's and are the same.
+    pub fn has_pixels_of_default(&self) -> bool {
+        self.change.is_some_and(|change| change.pixels > 0 && change.differing == 0)
+    }
+}
+
 /// A median, and what it is the median of.
 #[derive(Debug, Clone, Serialize)]
 pub struct Spread {

@@ -5,7 +5,7 @@ use super::stage::{Stage, Unheard};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::measure::median;
+use crate::measure::{Interval, median};
 use crate::output::manifest::{self, Header};
 use crate::output::{FramePattern, WriteOptions, atomic, write_image};
 use crate::reuse::{self, store::Terms};
@@ -28,8 +28,12 @@ const KEY_TIMES: usize = 5;
 pub struct Writing {
     /// Wall seconds to encode, write and sync a frame as png.
     pub frame_seconds: f64,
-    /// By how much writing its bytes takes longer for being synced.
+    /// Ends of its interval.
+    pub frame_ends: [f64; 2],
+    /// By how much writing its bytes takes longer for being synced, at most all of the above.
     pub sync_seconds: f64,
+    /// Ends of its interval; noise where it holds 0.
+    pub sync_ends: [f64; 2],
     /// Size of the file.
     pub frame_bytes: u64,
     /// Wall seconds to encode, write and sync the reference of a key frame, and its bytes; `None`
@@ -58,12 +62,17 @@ pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
     let bytes = fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
     let synced = || atomic::write(&path, |w| w.write_all(&bytes)).map(drop);
     let plain = || fs::write(&path, &bytes).map_err(|e| Error::io("write", &path, e));
-    let [frame_seconds, synced, plain] = in_turns([&write, &synced, &plain])?;
+    let [written, synced, plain] = in_turns([&write, &synced, &plain])?;
+    // Of the same turn, since a disk that is shared changes its speed.
+    let sync: Vec<f64> = synced.iter().zip(&plain).map(|(synced, plain)| synced - plain).collect();
+    let (frame, sync) = (interval(&written), interval(&sync));
     fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
     let keys = Cut::of(stage.base, frames, checkpoint.is_some()).keys();
     Ok(Writing {
-        frame_seconds,
-        sync_seconds: (synced - plain).clamp(0.0, frame_seconds),
+        frame_seconds: frame.estimate,
+        frame_ends: [frame.low, frame.high],
+        sync_seconds: sync.estimate.clamp(0.0, frame.estimate),
+        sync_ends: [sync.low, sync.high],
         frame_bytes: bytes.len() as u64,
         checkpoint,
         keys,
@@ -71,8 +80,13 @@ pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
     })
 }
 
-/// The median seconds of each.
-fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[f64; 3]> {
+fn interval(seconds: &[f64]) -> Interval {
+    const NOTHING: Interval = Interval { estimate: 0.0, low: 0.0, high: 0.0 };
+    median(seconds).map_or(NOTHING, |median| median.interval)
+}
+
+/// The seconds of each, turn by turn.
+fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[Vec<f64>; 3]> {
     let mut seconds = [const { Vec::new() }; 3];
     for _ in 0..TIMES {
         for (work, seconds) in works.iter().zip(&mut seconds) {
@@ -81,7 +95,7 @@ fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[f64; 3]> {
             seconds.push(start.elapsed().as_secs_f64());
         }
     }
-    Ok(seconds.map(|s| median(&s).map_or(0.0, |m| m.interval.estimate)))
+    Ok(seconds)
 }
 
 fn renderer<'a>(stage: &Stage<'a>) -> Renderer<'a> {

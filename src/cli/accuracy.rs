@@ -1,6 +1,7 @@
 //! `tweenray accuracy`: what accuracy costs in time, on the user's own scene.
 
 mod files;
+mod given;
 mod line;
 mod measure;
 mod page;
@@ -19,12 +20,12 @@ use crate::import::Loaded;
 use crate::intersect;
 use crate::output::atomic;
 use crate::output::manifest::Header;
+use crate::reuse;
 use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
-use crate::scene::{Scene, Settings};
+use crate::scene::{FrameRange, Scene, Settings};
 use crate::sequence::fingerprint;
 use clap::Args;
 use measure::Job;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -91,6 +92,8 @@ pub struct AccuracyArgs {
 /// Everything that came out so far.
 struct Outcome<'a> {
     base: &'a Settings,
+    /// What has a part in the scene.
+    plan: EffectPlan,
     truth: &'a Truth,
     measured: Measured,
     pictures: Vec<Picture>,
@@ -100,6 +103,8 @@ struct Outcome<'a> {
     frames: &'a [u32],
     shown_frame: u32,
     shot_frames: u32,
+    /// Turns that were asked for.
+    turns: u32,
     threads: usize,
     tracer: String,
     /// Load of the machine over the last minute, before and after.
@@ -140,7 +145,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let candidates = candidates(&scene, &base, shot.frames, &groups, otherwise.is_some());
     let threads = args.threads.or(threads);
     let threads = threads.map_or_else(cluster::default_threads, |n| n as usize);
-    let pool = thread_pool(threads)?;
+    let pool = machine::thread_pool(threads)?;
     let building = Instant::now();
     let intersector = pool.install(|| intersect::build(&scene, &base, threads))?;
     let stage = Stage {
@@ -195,11 +200,6 @@ fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
     terms
 }
 
-fn thread_pool(threads: usize) -> Result<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
-}
-
 fn frames(args: &AccuracyArgs, count: u32) -> Result<Vec<u32>> {
     if args.frames.is_empty() {
         return Ok(accuracy::chosen_frames(count));
@@ -207,12 +207,9 @@ fn frames(args: &AccuracyArgs, count: u32) -> Result<Vec<u32>> {
     let mut frames = args.frames.clone();
     frames.sort_unstable();
     frames.dedup();
-    match frames.iter().find(|f| **f > count) {
-        Some(frame) => Err(Error::Usage(format!(
-            "frame {frame} lies outside the shot, which has frames 1..{count}"
-        ))),
-        None => Ok(frames),
-    }
+    let is_there = |f: &u32| values::in_shot(FrameRange { first: *f, last: *f }, count);
+    frames.iter().try_for_each(is_there).map_err(Error::Usage)?;
+    Ok(frames)
 }
 
 /// Without the other rounding of the scene, the candidate that needs it is left out: some scenes
@@ -224,7 +221,9 @@ fn candidates(
     groups: &[Group],
     otherwise: bool,
 ) -> Vec<Candidate> {
-    let mut all = accuracy::candidates(base, &EffectPlan::of(scene, base), frames, groups);
+    let plan = |settings: &Settings| EffectPlan::of(scene, settings);
+    let looks_up = |s: &Settings| !reuse::channels(scene, &plan(s), s).is_empty();
+    let mut all = accuracy::candidates(base, &plan(base), frames, &looks_up, groups);
     all.retain(|c| otherwise || c.settings.rules.recentre == base.rules.recentre);
     all
 }

@@ -1,20 +1,21 @@
 //! `render --target` and `--budget`: settings that the program chooses for a scene.
 
 mod budget;
+mod folder;
 mod judge;
 
 use super::args::SettingArgs;
-use super::progress::duration;
 use super::request::Request;
-use super::{say, values};
-use crate::accuracy::{Foretelling, Foretold, Given, Goal, Probe, Stage, Timer};
+use super::{say, spelled, values};
+use crate::accuracy::{Foretelling, Foretold, Given, Goal, Probe, Stage, Timer, Verdict};
+use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
 use crate::output::manifest::Header;
+use crate::page::words::seconds;
 use crate::scene::{FrameRange, Policy, Settings};
 use budget::Budget;
 use clap::Args;
-pub use judge::Judgement;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::time::{Duration, Instant};
@@ -28,7 +29,7 @@ pub struct ChoiceArgs {
     #[arg(long, value_name = "FIGURE=VALUE", value_parser = values::goal, conflicts_with = "budget")]
     pub target: Option<Goal>,
     /// Choose the most accurate ones foretold to fit this time: 90s, 10m, 1h30m
-    #[arg(long, value_name = "TIME", value_parser = values::budget)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = values::budget)]
     pub budget: Option<Duration>,
 }
 
@@ -55,6 +56,18 @@ pub struct Choice {
     /// How good these came out, in words, if they were looked at.
     #[serde(default)]
     pub came_out: Option<String>,
+    /// What came of the target then.
+    #[serde(default)]
+    verdict: Option<Verdict>,
+}
+
+/// What is to be done once frames were held against what was wanted.
+#[derive(Serialize, Deserialize)]
+pub enum Judged {
+    /// All frames are rendered again, under a tighter choice.
+    Again(Choice),
+    /// Nothing: the choice with what came of it.
+    Done(Choice),
 }
 
 /// Who chooses.
@@ -92,6 +105,13 @@ impl ChoiceArgs {
             () if request.maps && settings.reuse.policy == Policy::Off => Some("--policy off"),
             () => None,
         };
+        if let Some(goal) = self.target.filter(|goal| goal.is_beyond_8_bits() && rounds(request)) {
+            let most = Goal::most_of_8_bits();
+            return Err(Error::Usage(format!(
+                "{goal} is out of reach of frames of 8 bits, which hold {most:.1} dB at most\n  \
+                 help: ask for less, or for png files of 16 bits (--png-bits 16) or exr"
+            )));
+        }
         obstacle.map_or(Ok(()), |option| {
             Err(Error::Usage(format!(
                 "what {option} does is not foretold, so --target and --budget cannot go with it"
@@ -102,7 +122,7 @@ impl ChoiceArgs {
     fn words(&self) -> String {
         match (self.target, self.budget) {
             (Some(goal), _) => goal.to_string(),
-            (_, Some(budget)) => format!("{} s", budget.as_secs()),
+            (_, Some(budget)) => values::time_in_words(budget),
             _ => String::new(),
         }
     }
@@ -125,9 +145,9 @@ impl Choice {
         self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
     }
 
-    /// The choice whose `frames` were, and came out so.
-    pub fn checked(self, shot: &str, frames: FrameRange, came_out: Option<String>) -> Self {
-        Self { checked: Some((shot.into(), frames)), came_out, ..self }
+    /// The choice whose `frames` were.
+    pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
+        Self { checked: Some((shot.into(), frames)), ..self }
     }
 
     /// The choice that a manifest's header holds, if this version can read it.
@@ -135,9 +155,19 @@ impl Choice {
         serde_json::from_value(header.chosen.clone()?).ok()
     }
 
-    /// The options that stand for it.
+    /// What came of the target, if there was one and it was looked at.
+    pub fn verdict(&self) -> Option<String> {
+        let came = match self.verdict? {
+            Verdict::Reached => "reached",
+            Verdict::Open => "not told apart from the target by so few pixels",
+            Verdict::Missed => "missed",
+        };
+        Some(format!("{}: {came}", self.wanted))
+    }
+
+    /// All options that stand for it, whether they have a part in the scene or not.
     pub fn options(&self) -> String {
-        options(&self.foretold)
+        spelled::options(&self.foretold.settings(&Settings::default()), &EffectPlan::EVERYTHING)
     }
 
     /// The command that gives the same frames whatever the clock says: what was chosen in place of the
@@ -165,11 +195,11 @@ impl Choice {
     /// What is foretold of it, in words.
     pub fn foretold_in_words(&self) -> String {
         format!(
-            "{}PSNR {:.1} dB in the worst frame, {} a frame, {} in all",
+            "{}PSNR {} in the worst frame, {} a frame, {} in all",
             self.figure().map_or(String::new(), |figure| format!("{figure}, ")),
-            self.foretold.psnr(),
-            duration(self.foretold.seconds),
-            duration(self.seconds)
+            decibels(self.foretold.psnr()),
+            seconds(self.foretold.seconds),
+            seconds(self.seconds)
         )
     }
 
@@ -190,20 +220,14 @@ fn is_option(word: &str, name: &str) -> bool {
     word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
 }
 
-/// The options that stand for a choice.
-fn options(foretold: &Foretold) -> String {
-    let Foretold { samples, bounces, reuse, .. } = foretold;
-    let reuse = match reuse.policy {
-        Policy::Off => "--policy off".into(),
-        _ => match reuse.tolerance {
-            Some(tolerance) => format!("--policy surface --tolerance {tolerance}"),
-            None => "--policy surface".into(),
-        },
-    };
-    format!(
-        "--spp {} --shadow-samples {} --sky-samples {} --bounces {bounces} {reuse}",
-        samples.spp, samples.shadow, samples.sky
-    )
+/// Whether frames are rounded to 8 bits.
+fn rounds(request: &Request) -> bool {
+    request.pattern.format() != Format::Exr && request.settings.png_bits == 8
+}
+
+/// `41.3 dB`
+fn decibels(psnr: f64) -> String {
+    if psnr.is_finite() { format!("{psnr:.1} dB") } else { "∞ dB".into() }
 }
 
 impl Chooser<'_> {
@@ -213,10 +237,12 @@ impl Chooser<'_> {
     /// Those of the probe; a target that nothing is foretold to reach.
     pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
-            self.tell(format!("for {}, as chosen before: {}", before.wanted, before.options()));
+            let options = self.options(&before.foretold);
+            self.tell(format!("for {}, as chosen before: {options}", before.wanted));
             self.warn_if_long(&before);
             return Ok(before);
         }
+        self.check_folder(tracer)?;
         let start = Instant::now();
         let budget = Budget::of(self);
         let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
@@ -232,7 +258,7 @@ impl Chooser<'_> {
         };
         let foretold = found.ok_or_else(|| self.out_of_reach(&foretelling))?;
         let writing = budget.as_ref().map_or(0.0, |budget| budget.writing);
-        let seconds = foretold.seconds * probe.frames_each(foretold.reuse) + writing;
+        let all = foretold.seconds * probe.frames_each(foretold.reuse) + writing;
         let left = budget.as_ref().map(|b| b.left(&foretelling, foretold.samples) + writing);
         let choice = Choice {
             wanted: self.args.words(),
@@ -241,14 +267,15 @@ impl Chooser<'_> {
             allowed,
             foretold,
             foretelling,
-            seconds,
+            seconds: all,
             tightened: 0,
             checked: None,
             came_out: None,
+            verdict: None,
         };
         self.say_choice(&choice);
-        self.tell(format!("the probe took {}", duration(start.elapsed().as_secs_f64())));
-        if left.is_some_and(|left| seconds > left) {
+        self.tell(format!("the probe took {}", seconds(start.elapsed().as_secs_f64())));
+        if left.is_some_and(|left| all > left) {
             self.warn("no setting is foretold to fit this time; the fastest is taken".into());
         }
         Ok(choice)
@@ -257,27 +284,24 @@ impl Chooser<'_> {
     /// What to say where no setting will do.
     fn out_of_reach(&self, foretelling: &Foretelling) -> Error {
         let best = foretelling.best(&self.probe().range()).map(|best| {
-            let seconds = duration(best.seconds * self.probe().frames_each(best.reuse));
-            format!("; {} would come to {:.1} dB, in {seconds}", options(&best), best.psnr())
+            let took = seconds(best.seconds * self.probe().frames_each(best.reuse));
+            let psnr = decibels(best.psnr());
+            format!("; {} would come to {psnr}, in {took}", self.options(&best))
         });
         // A figure that goes with no error for sure: what was seen of it.
         let seen = foretelling.nearest().map(|(tried, figure)| {
             let in_words = |goal: Goal| goal.in_words(figure);
             let figure = self.args.target.and_then(in_words).unwrap_or_default();
-            format!(
-                "; of what was tried, --spp {} --shadow-samples {} --sky-samples {} came nearest, to \
-                 {figure}",
-                tried.spp, tried.shadow, tried.sky
-            )
+            let tried = spelled::samples(tried.spp, tried.shadow, tried.sky, &self.plan());
+            format!("; of what was tried, {tried} came nearest, to {figure}")
         });
         let nearest = seen.or(best).unwrap_or_default();
-        let bits = match self.rounds() {
-            true => ", --png-bits 16 (8 bits hold 58.9 dB at most)",
-            false => "",
+        let fewer = match self.given() == Given::default() {
+            true => "",
+            false => ", or give fewer options",
         };
         Error::Usage(format!(
-            "no setting is foretold to reach {}{nearest}\n  \
-             help: ask for less, or give fewer options{bits}",
+            "no setting is foretold to reach {}{nearest}\n  help: ask for less{fewer}",
             self.args.words()
         ))
     }
@@ -301,9 +325,13 @@ impl Chooser<'_> {
         }
     }
 
-    /// Whether frames are rounded to 8 bits.
-    fn rounds(&self) -> bool {
-        self.request.pattern.format() != Format::Exr && self.stage.base.png_bits == 8
+    fn plan(&self) -> EffectPlan {
+        EffectPlan::of(self.stage.scene, self.stage.base)
+    }
+
+    /// The options that stand for what was chosen, as far as they have a part in the scene.
+    fn options(&self, foretold: &Foretold) -> String {
+        spelled::options(&foretold.settings(self.stage.base), &self.plan())
     }
 
     /// Who looks at the scene for this job.
@@ -313,7 +341,7 @@ impl Chooser<'_> {
             frames: self.request.frames,
             goal: self.args.target,
             given: self.given(),
-            rounds: self.rounds(),
+            rounds: rounds(self.request),
             seconds: None,
             ranks: self.ranks,
         }
@@ -323,7 +351,7 @@ impl Chooser<'_> {
         self.tell(format!(
             "for {}: {}\nforetold: {}",
             choice.wanted,
-            choice.options(),
+            self.options(&choice.foretold),
             choice.foretold_in_words()
         ));
     }

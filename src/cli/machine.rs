@@ -1,6 +1,7 @@
 //! The machine and this process, from `/proc`; what is not there is absent, never guessed.
 
 use crate::error::{Error, Result};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::ffi::OsStr;
 use std::fs;
@@ -31,6 +32,12 @@ impl Machine {
             system: std::env::consts::OS,
         }
     }
+}
+
+/// A pool of so many threads of its own.
+pub fn thread_pool(threads: usize) -> Result<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
 }
 
 /// Instruction sets that Embree has kernels for, narrow to wide.

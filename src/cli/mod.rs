@@ -22,6 +22,7 @@ mod say;
 mod schema;
 mod signals;
 mod slurm;
+mod spelled;
 mod stats;
 mod status;
 mod values;

@@ -4,7 +4,7 @@ mod choosing;
 mod round;
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
-use super::choose::{Choice, ChoiceArgs};
+use super::choose::{Choice, ChoiceArgs, Judged};
 use super::exit::Exit;
 use super::machine;
 use super::progress::{duration, percent};
@@ -22,7 +22,6 @@ use crate::scene::{Policy, Settings};
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
 use clap::{Args, Command, FromArgMatches};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use round::{Clock, Frames, Round, Site};
 use std::time::Instant;
 
@@ -123,7 +122,7 @@ fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exi
         Some(threads) => threads,
         None => world.default_threads()?,
     };
-    let pool = world.agree(thread_pool(threads))?;
+    let pool = world.agree(machine::thread_pool(threads))?;
     let loaded = Instant::now();
     let build = || intersect::build(&request.scene, &request.settings, threads);
     let intersector = world.agree(pool.install(build))?;
@@ -156,19 +155,27 @@ fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exi
         target.overwrite |= is_again;
         let round = site.render(&request, &target)?;
         let job = Frames { request: &request, target: &target, plan: &round.plan, site: &site };
-        let tighter = match round.unfinished {
+        let judged = match round.unfinished {
             0 => choosing.next(&job, &round, choice.take()),
             _ => Ok(None),
         };
-        let tighter = match tighter {
+        let judged = match judged {
             // All frames are there, but were not all held against what was wanted.
             Err(Error::Stopped) => return conclude(&job, &round, true),
             other => other?,
         };
-        if tighter.is_none() {
-            return conclude(&job, &round, false);
-        }
-        (choice, is_again) = (tighter, true);
+        let verdict = match judged {
+            Some(Judged::Again(tighter)) => {
+                (choice, is_again) = (Some(tighter), true);
+                continue;
+            }
+            Some(Judged::Done(choice)) => choice.verdict(),
+            None => None,
+        };
+        let exit = conclude(&job, &round, false)?;
+        // Last, where it is seen.
+        verdict.filter(|_| !quiet).map_or(Ok(()), say::result)?;
+        return Ok(exit);
     }
 }
 
@@ -212,11 +219,6 @@ fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> 
         }
     }
     Ok(())
-}
-
-fn thread_pool(threads: usize) -> Result<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
 }
 
 fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {

@@ -99,7 +99,10 @@ pub fn goal(text: &str) -> Result<Goal, String> {
     let (figure, value) = text.split_once('=').ok_or(wrong)?;
     let share = |text: &str| match text.strip_suffix('%') {
         Some(percent) => within(0.0..=100.0)(percent).map(|p| 0.01 * p),
-        None => within(0.0..=1.0)(text),
+        None => within(0.0..=1.0)(text).map_err(|wrong| match within(1.0..=100.0)(text) {
+            Ok(percent) => format!("{wrong}, or per cent with their sign: {percent}%"),
+            Err(_) => wrong,
+        }),
     };
     let inner = |x: f64| match x > 0.0 && x < 1.0 {
         true => Ok(x),
@@ -126,6 +129,14 @@ pub fn budget(text: &str) -> Result<Duration, String> {
         return Err("nothing is rendered in no time: a budget is at least 1s".into());
     }
     Ok(time)
+}
+
+/// `1 h 30 min`, `2 min`, `90 s` as `1 min 30 s`: exactly, to the second.
+pub fn time_in_words(time: Duration) -> String {
+    let s = time.as_secs();
+    let parts = [(s / 3600, "h"), (s % 3600 / 60, "min"), (s % 60, "s")];
+    let told = parts.iter().filter(|(n, _)| *n > 0).map(|(n, unit)| format!("{n} {unit}"));
+    told.collect::<Vec<_>>().join(" ")
 }
 
 /// A time, or `off`.
@@ -215,6 +226,8 @@ mod tests {
         assert_eq!(goal("psnr=45"), Ok(Goal::Psnr(45.0)));
         assert_eq!(goal("max-share=25%"), Ok(Goal::MaxShare(0.25)));
         assert_eq!(goal("ssim=0.99"), Ok(Goal::Ssim(0.99)));
+        let share = goal("max-share=5").expect_err("five whole");
+        assert!(share.ends_with("sign: 5%"), "{share}");
         for text in
             ["psnr", "psnr=", "psnr=nan", "psnr=999", "ssim=1", "flip=0", "mse=1", "flip=x%"]
         {
@@ -225,6 +238,9 @@ mod tests {
     #[test]
     fn a_budget_is_some_time() {
         assert_eq!(budget("1m30s"), Ok(Duration::from_secs(90)));
+        let words = |text| budget(text).map(time_in_words).unwrap_or_default();
+        assert_eq!((words("2m"), words("90s")), ("2 min".into(), "1 min 30 s".into()));
+        assert_eq!((words("1h"), words("6s")), ("1 h".into(), "6 s".into()));
         for text in ["0s", "0h0m", "-1s", "", "5"] {
             assert!(budget(text).is_err(), "{text}");
         }

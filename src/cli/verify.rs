@@ -7,7 +7,7 @@ use super::args::{SceneArgs, SettingArgs, TracingArgs};
 use super::exit::Exit;
 use super::progress::duration;
 use super::signals::Interrupt;
-use super::{job, say, values};
+use super::{job, machine, say, values};
 use crate::cluster;
 use crate::error::{Error, Result};
 use crate::import::Loaded;
@@ -17,7 +17,7 @@ use crate::scene::{IntersectorKind, Scene, Settings};
 use crate::verify::{self, Check, Kind, RayId, Tally};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 use std::io::IsTerminal;
 use std::sync::atomic::Ordering;
 
@@ -102,8 +102,7 @@ pub fn run(args: &VerifyArgs) -> Result<Exit> {
     }
     refuse_the_pointless(&scene, &settings)?;
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
+    let pool = machine::thread_pool(threads)?;
     let product = pool.install(|| intersect::build(&scene, &settings, threads))?;
     let oracle = Oracle::new(&scene);
     let check = Check::new(&scene, &settings, &shot, &*product, &oracle);

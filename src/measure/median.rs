@@ -20,6 +20,11 @@ impl Median {
         self.confidence >= 0.9
     }
 
+    /// Whether it has an interval at all: one value gives none.
+    pub fn has_interval(&self) -> bool {
+        self.confidence > 0.0
+    }
+
     /// Whether the interval, if it is a sure one, leaves `value` out.
     pub fn differs_from(&self, value: f64) -> bool {
         self.is_sure() && !(self.interval.low..=self.interval.high).contains(&value)

@@ -1,6 +1,6 @@
 //! Error against time, both axes logarithmic, with the points that no other one beats.
 
-use super::axis::Axis;
+use super::axis::{Axis, Tick};
 use super::escaped;
 use super::plot::Plot;
 use std::fmt::Write;
@@ -55,14 +55,25 @@ impl Scatter {
         for point in &self.points {
             self.draw_point(&mut drawing, &mut over, &x, &y, point);
         }
+        let mut y_ticks = y.ticks(&self.units[1]);
+        if self.points.iter().all(|p| p.y <= 0.0) {
+            y_ticks.clear();
+        }
+        let mut hint = self.hint.clone();
+        if self.points.iter().any(|p| p.y <= 0.0) {
+            // No error at all has no place on a logarithmic axis, and must not be read off it.
+            y_ticks.retain(|tick| tick.at > 5.0);
+            y_ticks.push(Tick { at: 0.0, label: "none".into() });
+            hint += "; at the bottom: none at all";
+        }
         Plot {
             caption: self.caption.clone(),
-            hint: self.hint.clone(),
+            hint,
             kind: "scatter",
             drawing,
             over,
             x: x.ticks(&self.units[0]),
-            y: y.ticks(&self.units[1]),
+            y: y_ticks,
             legend: self.legend.clone(),
             data: format!("data-metric=\"{}\"", escaped(&self.metric)),
         }
@@ -143,5 +154,14 @@ mod tests {
         assert!(plot.over.contains("&quot;2&quot; &lt;b&gt;"), "{}", plot.over);
         // No error at all stands at the bottom.
         assert!(plot.over.contains("bottom:0%"), "{}", plot.over);
+        let at_the_bottom = |plot: &Plot| -> Vec<String> {
+            plot.y.iter().filter(|t| t.at < 5.0).map(|t| t.label.clone()).collect()
+        };
+        assert_eq!(at_the_bottom(&plot), ["none"]);
+        assert!(plot.hint.ends_with("at the bottom: none at all"), "{}", plot.hint);
+        let none = Scatter { points: vec![point(0, 1.0, 0.0, true)], ..Scatter::default() }.plot();
+        assert_eq!(none.y.iter().map(|t| &*t.label).collect::<Vec<_>>(), ["none"]);
+        let some = Scatter { points: vec![point(0, 1.0, 1.0, true)], ..Scatter::default() }.plot();
+        assert!(at_the_bottom(&some).is_empty() && some.hint.is_empty());
     }
 }

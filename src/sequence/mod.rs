@@ -29,7 +29,9 @@ pub use fingerprint::{fingerprint, light_fingerprint, world_fingerprint};
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use recipe::{Recipe, Recipes, Tag};
-pub use resume::{Found, Plan, Target, is_worth_a_look, look, prepare, prepare_with};
+pub use resume::{
+    Found, Plan, Target, is_worth_a_look, look, prepare, prepare_with, refuse_strangers,
+};
 pub use schedule::Schedule;
 pub use shared::{Laid, Left, Shared, Strip};
 pub use supplied::{Card, Supply};

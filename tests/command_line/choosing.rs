@@ -130,7 +130,7 @@ fn a_budget_that_more_frames_exceed_is_warned_of() {
     let ran = job.done(&line);
     assert!(ran.err.contains("as chosen before"), "{}", ran.err);
     assert!(ran.err.contains("warning: 2 frames are left and the job is foretold"), "{}", ran.err);
-    assert!(ran.err.contains(", not 2.0 s; --overwrite"), "{}", ran.err);
+    assert!(ran.err.contains(", not 2 s; --overwrite"), "{}", ran.err);
     assert!(ran.err.contains("; in all "), "{}", ran.err);
     let ran = job.done(&line);
     assert!(!ran.err.contains("warning: "), "nothing is left: {}", ran.err);
@@ -171,11 +171,16 @@ fn figures_that_need_neighbours_are_targets_too() {
 #[test]
 fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
     let job = Job::new();
-    job.refused(&format!("{LINE} --target psnr=70"), "--png-bits 16");
-    job.refused(
-        &format!("{LINE} --target psnr=50 --spp 1"),
-        "is foretold to reach psnr=50; --spp 1",
-    );
+    let said = |line: &str, words: &str| {
+        job.refused(line, words);
+        job.run(line).err
+    };
+    // Known without a look at the scene.
+    let bits = said(&format!("{LINE} --target psnr=70"), "--png-bits 16");
+    assert!(!bits.contains("probe:"), "{bits}");
+    let samples =
+        said(&format!("{LINE} --target psnr=50 --spp 1"), "is foretold to reach psnr=50; --spp 1");
+    assert!(!samples.contains("bits") && samples.contains("give fewer options"), "{samples}");
     assert!(!job.path("o/f_01.png").exists());
 }
 
@@ -188,9 +193,56 @@ fn what_cannot_be_foretold_is_refused() {
     job.refused(&format!("{LINE} --target mse=1"), "psnr=45, ssim=0.99");
     job.refused(&format!("{LINE} --target psnr=45 --budget 1m"), "cannot be used with");
     job.refused(&format!("{LINE} --budget never"), "90s, 25m or 1h30m");
+    job.refused(&format!("{LINE} --budget -3s"), "90s, 25m or 1h30m");
+    job.refused(&format!("{LINE} --target max-share=5"), "per cent with their sign: 5%");
     job.refused(&format!("{LINE} --budget 0s"), "a budget is at least 1s");
     job.refused(&format!("{LINE} --target psnr=45 --crop 0,0,8,8"), "--crop");
     job.refused(&format!("{LINE} --target psnr=45 --policy colour"), "--policy colour");
+}
+
+/// A probe may take long: what would be refused after it is refused before.
+#[test]
+fn frames_of_something_else_are_in_the_way_before_the_probe() {
+    let job = Job::new();
+    job.done(&format!("{LINE} --target psnr=30"));
+    let manifest = job.read("o/f.manifest.jsonl");
+    for (options, why) in [
+        ("--target psnr=31", "holds 3 frames made for psnr=30; --overwrite replaces them"),
+        ("--budget 2m", "made for psnr=30; "),
+        ("--target psnr=30 --seed 3", "made for psnr=30 too, but seed was 0, now it is 3; "),
+        ("--target psnr=30 --spp 9", "made for psnr=30 too, but other options were given; "),
+    ] {
+        let line = format!("{LINE} {options}");
+        job.refused(&line, why);
+        assert!(!job.run(&line).err.contains("probe:"), "{options}");
+    }
+    assert_eq!(job.read("o/f.manifest.jsonl"), manifest);
+    // Frames without a manifest, and a folder that is none.
+    std::fs::remove_file(job.path("o/f.manifest.jsonl")).expect("removed");
+    for folder in ["o", "cube.obj"] {
+        let ran = job
+            .run(&format!("{} --target psnr=30", LINE.replace("-o o/", &format!("-o {folder}/"))));
+        assert!(ran.code != Some(0) && !ran.err.contains("probe:"), "{}", ran.err);
+    }
+}
+
+/// The last line says what came of a target, and says so again when nothing is left to do.
+#[test]
+fn a_target_ends_with_its_verdict() {
+    let job = Job::new();
+    let line = format!("{LINE} --target psnr=34");
+    let last = |out: &str| out.lines().last().expect("a line").to_string();
+    let verdict = last(&job.done(&line).out);
+    let known = ["reached", "not told apart from the target by so few pixels", "missed"];
+    assert!(known.iter().any(|word| verdict == format!("psnr=34: {word}")), "{verdict}");
+    assert_eq!(last(&job.done(&line).out), verdict);
+    // As a job leaves it that missed.
+    let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
+    let (first, rows) = manifest.split_once('\n').expect("lines");
+    let mut missed: Value = serde_json::from_str(first).expect("JSON");
+    missed["chosen"]["verdict"] = "Missed".into();
+    std::fs::write(job.path("o/f.manifest.jsonl"), format!("{missed}\n{rows}")).expect("written");
+    assert_eq!(last(&job.done(&line).out), "psnr=34: missed");
 }
 
 /// Between mirrors that face each other four bounces, which are the default, leave the picture dark in the
@@ -229,8 +281,12 @@ fn a_choice_serves_only_the_tree_that_it_was_made_with() {
         let ran = job.run(&format!("{line} {option}"));
         // The frames that are there are of the first tree.
         assert_eq!(ran.code, Some(2), "{}", ran.err);
-        assert!(ran.err.contains("probe:") && ran.err.contains("--overwrite"), "{}", ran.err);
-        assert!(!ran.err.contains("as chosen before"), "{}", ran.err);
+        assert!(ran.err.contains("made for psnr=30 too, but "), "{}", ran.err);
+        let name = option.trim_start_matches("--").split(' ').next().expect("a name");
+        assert!(ran.err.contains(&format!("{name} was ")), "{}", ran.err);
+        for word in ["probe:", "as chosen before"] {
+            assert!(!ran.err.contains(word), "{}", ran.err);
+        }
     }
     assert!(job.done(&line).err.contains("as chosen before"));
 }

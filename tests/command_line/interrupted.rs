@@ -61,13 +61,18 @@ fn a_signal_while_the_scene_is_read_says_to_give_the_same_command_again() {
     let text = "mesh = [{ terrain = { vertices = 1500, size = 12 } }]\n";
     fs::write(job.path("large.toml"), text).expect("written");
     let line = "render large.toml --threads 1 --no-video --overwrite -o o/f_##.png";
-    let child = job.command(line).stderr(Stdio::piped()).spawn().expect("it starts");
-    wait_for_ears(&child);
-    send("TERM", &child);
-    let ran = Ran::of(&child.wait_with_output().expect("it ends"));
-    assert_eq!(ran.code, Some(75), "{}", ran.err);
+    // On a busy machine the scene may be read before the signal comes.
+    let mut told = (0..10).map(|_| {
+        let child = job.command(line).stderr(Stdio::piped()).spawn().expect("it starts");
+        wait_for_ears(&child);
+        send("TERM", &child);
+        let ran = Ran::of(&child.wait_with_output().expect("it ends"));
+        assert_eq!(ran.code, Some(75), "{}", ran.err);
+        ran.err
+    });
     let says = "stopped by SIGTERM before the first frame; give the same command again\n";
-    assert_eq!(ran.err, says);
+    let is_late = |err: &String| err.ends_with("the same command goes on from here\n");
+    assert_eq!(told.find(|err| !is_late(err)).as_deref(), Some(says));
 }
 
 /// All frames are there, and the same command would replace them.

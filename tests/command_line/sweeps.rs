@@ -97,6 +97,11 @@ fn a_sweep_that_is_stopped_has_a_page_that_says_so_and_goes_on() {
     assert!(err.contains("going on: "), "{err}");
     assert!(!err.contains("reference: ") && !err.contains("turn 1"), "{err}");
     assert!(!page().contains("not complete"));
+    // Its commands render what was measured.
+    let given = "tweenray render cube.obj --size 32x24 --shadow-samples 2";
+    for command in [format!("{given}\""), format!("{given} --build-quality high\"")] {
+        assert!(page().contains(&command), "{command}");
+    }
     assert_eq!((json(&job, "o")["trials"][0].clone(), json(&job, "o")["runs"].clone()), {
         (trials[1].clone(), 2.into())
     });

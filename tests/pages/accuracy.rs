@@ -94,10 +94,22 @@ fn plot_points_slider_and_heat_map() {
     let csv = std::fs::read_to_string(folder.path().join("a/accuracy.csv")).expect("there");
     let columns = csv.lines().next().expect("a head").split(',').count();
     assert!(csv.lines().all(|line| line.split(',').count() == columns), "{csv}");
+    // With the page's intervals and rays by kind.
+    let cell = |line: usize, name: &str| {
+        let all: Vec<&str> =
+            csv.lines().map(|line| line.split(',').collect::<Vec<_>>()).nth(line).expect("a line");
+        let at = csv.lines().next().expect("a head").split(',').position(|head| head == name);
+        all[at.expect("a column")].parse::<f64>().expect("a figure")
+    };
+    let cpu = ["cpu_seconds_low", "cpu_seconds", "cpu_seconds_high"].map(|name| cell(1, name));
+    assert!(cpu[0] <= cpu[1] && cpu[1] <= cpu[2], "{cpu:?}");
     let json = std::fs::read(folder.path().join("a/accuracy.json")).expect("there");
     let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
     let rows = json["rows"].as_array().expect("rows");
     assert_eq!(rows.len() as f64, points);
+    for kind in ["camera", "shadow_area", "retry"] {
+        assert_eq!(Some(cell(1, &format!("rays_{kind}"))), rows[0]["rays"][kind].as_f64());
+    }
     assert_eq!(rows.len(), csv.lines().count() - 1);
     let error = |options: &str| {
         let row = rows.iter().find(|row| row["options"] == options).expect("a row");

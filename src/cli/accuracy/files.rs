@@ -81,10 +81,12 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
     atomic::write(folder.join("accuracy.csv"), |w| w.write_all(csv.as_bytes())).map(drop)
 }
 
-const HEAD: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,time_ratio,\
-    time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
+/// What the page's tables have, a column each. Rays by kind are those of a turn, as in the JSON.
+const HEAD: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,cpu_seconds_low,\
+    cpu_seconds_high,time_ratio,time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
     error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame,\
-    build_seconds,memory_bytes,on_front\n";
+    rays_camera,rays_mirror,rays_glass,rays_shadow_area,rays_shadow_delta,rays_shadow_sky,rays_retry,\
+    rays_invalid,build_seconds,memory_bytes,on_front,on_cpu_front\n";
 
 fn csv(rows: &[Row]) -> String {
     HEAD.to_string() + &rows.iter().map(line).collect::<String>()
@@ -98,7 +100,7 @@ fn line(row: &Row) -> String {
     let knob = serde_json::to_value(row.knob).unwrap_or_default();
     let mut cells = vec![knob.as_str().unwrap_or_default().to_string(), row.options.clone()];
     cells.extend(ends(&row.seconds.median));
-    cells.push(number(row.cpu_seconds.median.interval.estimate));
+    cells.extend(ends(&row.cpu_seconds.median));
     cells.extend(ratio(&row.time_ratio));
     cells.extend(ratio(&row.cpu_ratio));
     cells.push(number(row.seconds.median.confidence));
@@ -108,8 +110,10 @@ fn line(row: &Row) -> String {
     cells.extend(ratio(&row.error_ratio));
     cells.push(row.change.map_or(String::new(), |c| c.over_2.to_string()));
     cells.push(number(row.rays_per_frame));
+    cells.extend(row.rays.by_kind().map(|(_, n)| n.to_string()));
     cells.push(number(row.build_seconds.median.interval.estimate));
     cells.push(row.memory_bytes.to_string());
     cells.push(row.on_front.to_string());
+    cells.push(row.on_cpu_front.to_string());
     cells.join(",") + "\n"
 }

@@ -7,6 +7,7 @@ use crate::cli::exit::Exit;
 use crate::cli::progress::duration;
 use crate::cli::signals::Interrupt;
 use crate::cli::{machine, say};
+use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
 use crate::output::atomic;
 use crate::scene::Settings;
@@ -173,6 +174,8 @@ impl Job<'_> {
             trials: [sweep.done(ledger), sweep.trials()],
             settings: sweep.candidates.len(),
             base: sweep.stage.base,
+            plan: EffectPlan::of(sweep.stage.scene, sweep.stage.base),
+            turns: sweep.turns,
         })
     }
 

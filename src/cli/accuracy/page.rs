@@ -3,10 +3,13 @@
 mod plots;
 mod tables;
 
+use super::given::{Given, given, with_given};
 use super::{AccuracyArgs, Outcome};
 use crate::accuracy::{
     Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching,
+    is_by_few_turns,
 };
+use crate::cli::spelled;
 use crate::error::Result;
 use crate::measure::Median;
 use crate::output::video::shell_line;
@@ -21,22 +24,23 @@ const MOST_PICTURES: usize = 14;
 /// The page of `outcome`, measured by `command`.
 pub fn page(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Result<AccuracyPage> {
     let scene = args.scene.scene.display().to_string();
+    let given = given(command);
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |t| t.as_secs_f64());
     Ok(AccuracyPage {
         title: scene.clone(),
         summary: summary(outcome),
-        facts: facts(outcome),
+        facts: facts(outcome, &given),
         warnings: warnings(outcome),
         scatters: plots::METRICS
             .iter()
             .filter_map(|metric| plots::scatter(outcome, metric))
             .collect(),
-        details: details(outcome, &scene),
+        details: details(outcome, &scene, &given),
         goals: tables::goals(outcome),
         knobs: knobs(outcome),
         pictures: pictures(outcome)?,
         pictured: format!("Frame {}, as a display shows it in 8 bits.", outcome.shown_frame),
-        tables: vec![tables::figures(outcome), tables::times(outcome)],
+        tables: vec![tables::figures(outcome), tables::times(outcome), tables::rays(outcome)],
         command: shell_line(command),
         version: crate::output::VERSION.into(),
         made: date(now),
@@ -74,29 +78,37 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     }
     let same = fastest_reaching(&outcome.measured, Goal::Psnr(e.psnr));
     let other = same.filter(|row| row.knob != Knob::Default);
-    if let Some(row) = other.filter(|row| beyond_noise(&row.time_ratio)) {
+    let may_be_faster = |row: &&Row| beyond_noise(&row.time_ratio) || is_by_few_turns(row);
+    if let Some(row) = other.filter(may_be_faster) {
         lines.push(format!(
-            "{} is as near in {} of the time.",
+            "{} is as near in {} of the time{}.",
             row.options,
-            percent(median_of(row) / time)
+            percent(median_of(row) / time),
+            if is_by_few_turns(row) { ", by so few turns" } else { "" }
         ));
     }
     lines
 }
 
-fn facts(outcome: &Outcome) -> Vec<(String, String)> {
+fn facts(outcome: &Outcome, given: &[Given]) -> Vec<(String, String)> {
     let frames: Vec<String> = outcome.frames.iter().map(u32::to_string).collect();
-    let confidence = outcome.measured.default_row().seconds.median.confidence;
     let load = outcome.load.map(|l| l.map_or("?".into(), short));
     let base = outcome.base;
-    let turns = outcome.measured.default_row().seconds.turns.len();
+    let default = spelled::options(base, &outcome.plan);
+    let times = &outcome.measured.default_row().seconds;
+    let intervals = match times.median.has_interval() {
+        true => format!("of {}", percent(times.median.confidence)),
+        false => "none: one turn gives none".into(),
+    };
+    let turns = times.turns.len();
     let fact = |name: &str, value: String| (name.to_string(), value);
     vec![
+        fact("Default", shell_line(&with_given(given, &default))),
         fact("Size", format!("{} × {}", base.width, base.height)),
         fact("Frames looked at", format!("{} of {}", frames.join(", "), outcome.shot_frames)),
         fact("Settings compared", count(outcome.measured.rows.len() as u64)),
         fact("Turns timed", format!("{turns}, after a warm-up")),
-        fact("Intervals", format!("of {}", percent(confidence))),
+        fact("Intervals", intervals),
         fact("Reference", reference(outcome)),
         fact("Threads", outcome.threads.to_string()),
         fact("Machine's load", format!("{} before, {} after", load[0], load[1])),
@@ -163,28 +175,49 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
             short(before)
         ));
     }
-    let seconds = &outcome.measured.default_row().seconds;
-    let turns = seconds.turns.len();
-    if turns < 6 {
-        warnings.push(format!(
-            "With --turns {turns} the intervals hold the truth in {} of cases, not in 95 %.",
-            percent(seconds.median.confidence)
-        ));
-    }
+    let times = &outcome.measured.default_row().seconds;
+    warnings.extend(few_turns(times.turns.len(), outcome.turns, times.median.confidence));
     warnings
+}
+
+/// What to be wary of where `turns` were timed, of `asked`.
+fn few_turns(turns: usize, asked: u32, confidence: f64) -> Option<String> {
+    let so_far = turns < asked as usize;
+    Some(match turns {
+        6.. => return None,
+        1 if so_far => "So far 1 turn is timed, which gives no interval.".into(),
+        1 => "One turn is timed, which gives no interval; more --turns go on.".into(),
+        _ => {
+            let hold = format!("the intervals hold the truth in {}", percent(confidence));
+            match so_far {
+                true => format!("So far {turns} turns are timed: {hold} of cases, not in 95 %."),
+                false => format!("With --turns {turns} {hold} of cases, not in 95 %."),
+            }
+        }
+    })
 }
 
 fn with_ends(m: &Median, word: fn(f64) -> String) -> String {
     let i = m.interval;
+    if !m.has_interval() {
+        return word(i.estimate);
+    }
     format!("{} ({}–{})", word(i.estimate), word(i.low), word(i.high))
 }
 
-fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
+/// How far a ratio is from 1, with its ends.
+fn with_changes(ratio: &Median) -> String {
+    let i = ratio.interval;
+    let [is, low, high] = [i.estimate, i.low, i.high].map(change);
+    if ratio.has_interval() { format!("{is} ({low} to {high})") } else { is }
+}
+
+fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
     let detail = |(id, row): (usize, &Row)| {
         let e = &row.errors;
         let mut figures = vec![
             ("Seconds a frame", with_ends(&row.seconds.median, short)),
-            ("CPU seconds", short(row.cpu_seconds.median.interval.estimate)),
+            ("CPU seconds", with_ends(&row.cpu_seconds.median, short)),
         ];
         if let Some(ratio) = &row.time_ratio {
             let word = match ratio.differs_from(1.0) {
@@ -192,9 +225,7 @@ fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
                 false if ratio.is_sure() => ", within noise",
                 false => ", too few turns to tell",
             };
-            let i = ratio.interval;
-            let [is, low, high] = [i.estimate, i.low, i.high].map(change);
-            figures.push(("Time against default", format!("{is} ({low} to {high}){word}")));
+            figures.push(("Time against default", with_changes(ratio) + word));
         }
         figures.extend([
             ("RMSE", format!("{}/255", short(e.rmse_steps))),
@@ -206,8 +237,10 @@ fn details(outcome: &Outcome, scene: &str) -> Vec<Detail> {
             ("Memory", bytes(row.memory_bytes)),
         ]);
         let figures = figures.into_iter().map(|(name, value)| (name.to_string(), value)).collect();
-        let options = if row.options.is_empty() { "" } else { " " };
-        let command = format!("tweenray render {scene}{options}{}", row.options);
+        let words = ["tweenray", "render", scene].map(String::from);
+        let command: Vec<String> =
+            words.into_iter().chain(with_given(given, &row.options)).collect();
+        let command = shell_line(&command);
         Detail { id, name: name_of(&row.options), figures, command }
     };
     outcome.measured.rows.iter().enumerate().map(detail).collect()
@@ -235,7 +268,8 @@ pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
         all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
     }
     if let Some(writing) = &outcome.writing {
-        let sentences = about_writing(writing, median_of(outcome.measured.default_row()));
+        let sentences =
+            about_writing(writing, outcome.measured.default_row().seconds.median.interval);
         all.push(KnobText { name: "Writing to disk".into(), sentences });
     }
     all
@@ -259,4 +293,23 @@ fn pictures(outcome: &Outcome) -> Result<Vec<Named>> {
     let truth = Picture::png(&outcome.truth.frames[&outcome.shown_frame])?;
     all.insert(1.min(all.len()), Named { name: "reference".into(), id: None, picture: truth });
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::few_turns;
+
+    #[test]
+    fn a_sweep_that_was_stopped_is_told_what_it_has_and_not_what_it_was_asked_for() {
+        let told = |turns, asked| few_turns(turns, asked, 0.75).unwrap_or_default();
+        assert!(
+            told(3, 6)
+                .starts_with("So far 3 turns are timed: the intervals hold the truth in 75 %")
+        );
+        assert!(told(3, 3).starts_with("With --turns 3 the intervals hold"));
+        for one in [told(1, 6), told(1, 1)] {
+            assert!(one.contains("gives no interval") && !one.contains('%'), "{one}");
+        }
+        assert_eq!(few_turns(6, 9, 0.97), None);
+    }
 }

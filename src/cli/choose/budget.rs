@@ -2,17 +2,17 @@
 
 use super::{Choice, Chooser};
 use crate::accuracy::{Check, Effort, Foretelling, Samples};
-use crate::cli::progress::duration;
 use crate::film::Film;
 use crate::math::Rgb;
 use crate::output::{WriteOptions, write_image};
+use crate::page::words::seconds;
 use crate::sampling::mix;
 use crate::scene::Settings;
 use std::time::Instant;
 
 /// Shares of what is left when the probe begins: for the probe's sweep, and for the check at most.
-const PROBE: f64 = 0.15;
-const CHECK: f64 = 0.07;
+const PROBE_SHARE: f64 = 0.15;
+const CHECK_SHARE: f64 = 0.07;
 /// Kept back of what is left for rendering: times foretold are off by some per cent either way.
 const RESERVE: f64 = 0.05;
 /// What a video takes: to start its program, and by the pixel; measured.
@@ -42,7 +42,7 @@ impl Budget {
         let (frames, pixels) = (f64::from(count), there_is.1 as f64);
         let [start, each] = VIDEO;
         let is_video = request.fps.is_some() && frames > 1.0;
-        let check = CHECK * (seconds - started.elapsed().as_secs_f64()).max(0.0);
+        let check = CHECK_SHARE * (seconds - started.elapsed().as_secs_f64()).max(0.0);
         let ending = request.pattern.path(request.frames.first);
         let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
         Some(Self {
@@ -61,7 +61,7 @@ impl Budget {
 
     /// Seconds for the probe's sweep.
     pub fn probe_seconds(&self) -> f64 {
-        PROBE * (self.seconds - self.gone()).max(0.0)
+        PROBE_SHARE * (self.seconds - self.gone()).max(0.0)
     }
 
     /// Seconds that are left, as of now, for tracing frames of `samples`.
@@ -107,7 +107,7 @@ impl Chooser<'_> {
         let rendering = foretold.seconds * self.probe().frames_each(foretold.reuse);
         let all = budget.gone() + share * (rendering + budget.writing) + budget.video;
         if left > 0 && all > budget.seconds {
-            let [all, asked] = [all, budget.seconds].map(duration);
+            let [all, asked] = [all, budget.seconds].map(seconds);
             let frames = if left == 1 { "1 frame is" } else { &format!("{left} frames are") };
             self.warn(format!(
                 "{frames} left and the job is foretold to take {all}, not {asked}; --overwrite \

@@ -1,54 +1,47 @@
 //! What came of the settings that were chosen, and tighter ones where a target was missed.
 
 use super::budget::Budget;
-use super::{Choice, Chooser};
-use crate::accuracy::{Check, Effort, Foretold, Timer};
-use crate::cli::progress::duration;
+use super::{Choice, Chooser, Judged, decibels};
+use crate::accuracy::{Check, Effort, Foretold, Timer, Verdict, displayed_rgb};
 use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
-use crate::output::{Display, read_image};
-use crate::scene::Settings;
+use crate::output::read_image;
+use crate::page::words::seconds;
 
 /// How often a target that was missed is tightened.
 const ROUNDS: u32 = 2;
 
-/// What came of a choice.
-pub struct Judgement {
-    /// How good the frames are, in words; `None` where there was no time to look.
-    pub came_out: Option<String>,
-    /// A tighter choice, where the target was missed.
-    pub tighter: Option<Choice>,
-}
-
 impl Chooser<'_> {
-    /// Says what came out, and chooses tighter where the target was missed.
+    /// Says what came out of `choice`, and makes a tighter one where the target was missed.
     ///
     /// # Errors
     /// Those of reading frames and tracing.
     pub fn judge(
         &self,
-        choice: &Choice,
+        choice: Choice,
         audit: Option<&AuditRow>,
         rendered: Option<f64>,
         timer: Timer,
-    ) -> Result<Judgement> {
+    ) -> Result<Judged> {
         let samples = choice.foretold.samples;
         let budget = Budget::of(self);
         let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
             None => Effort::WHOLE,
             Some(Ok(effort)) => effort,
             Some(Err(least)) => {
-                self.tell_unchecked(choice, least, rendered);
-                return Ok(Judgement { came_out: None, tighter: None });
+                self.tell_unchecked(&choice, least, rendered);
+                return Ok(Judged::Done(choice));
             }
         };
-        let check = Check::of(&self.probe(), &choice.foretold, effort, &|frame| self.image(frame))?;
-        let [mean, worst] = check.psnr();
+        let (foretelling, foretold) = (&choice.foretelling, &choice.foretold);
+        let image = |frame| self.image(frame);
+        let check = Check::of(&self.probe(), foretelling, foretold, effort, &image)?;
+        let [mean, worst] = check.psnr().map(decibels);
         let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
-            "PSNR {mean:.1} dB, {worst:.1} in the worst of {looked} looked at, foretold {:.1}",
-            choice.foretold.psnr()
+            "PSNR {mean}, {worst} in the worst of {looked} looked at, foretold {}",
+            decibels(foretold.psnr())
         );
         let figure = self.args.target.and_then(|goal| goal.in_words(check.figure));
         let figure = figure.map_or(String::new(), |came| {
@@ -56,41 +49,46 @@ impl Chooser<'_> {
             let foretold = foretold.map_or(String::new(), |words| format!(", foretold {words}"));
             format!("{came} in the worst{foretold}; ")
         });
-        let time = self.time(choice, rendered);
+        let time = self.time(&choice, rendered);
         self.tell(format!("came out: {figure}{psnr}{time}"));
-        let tighter = self.tighter_if_missed(choice, &check, audit, timer)?;
-        Ok(Judgement { came_out: Some(format!("{figure}{psnr}")), tighter })
+        let came_out = Some(format!("{figure}{psnr}"));
+        self.weigh(Choice { came_out, ..choice }, &check, audit, timer)
     }
 
-    /// A tighter choice, where the target was missed and one may be had.
-    fn tighter_if_missed(
+    /// `choice` with its verdict, or a tighter one where the target was missed and one may be had.
+    fn weigh(
         &self,
-        choice: &Choice,
+        choice: Choice,
         check: &Check,
         audit: Option<&AuditRow>,
         timer: Timer,
-    ) -> Result<Option<Choice>> {
+    ) -> Result<Judged> {
         let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
-            return Ok(None);
+            return Ok(Judged::Done(choice));
         };
         let excess = check.excess(goal, allowed).max(audited_excess(audit, allowed));
         if excess <= 1.0 {
-            return Ok(None);
+            let verdict = Some(check.verdict(goal, allowed));
+            return Ok(Judged::Done(Choice { verdict, ..choice }));
         }
+        let missed = |choice| Judged::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
         if choice.tightened >= ROUNDS {
             self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
-            return Ok(None);
+            return Ok(missed(choice));
         }
         // So much more than foretold.
         let factor = excess * allowed / choice.foretold.squared_error.max(1e-9);
-        self.tighter(choice, allowed, factor, timer)
+        Ok(match self.tighter(&choice, allowed, factor, timer)? {
+            Some(tighter) => Judged::Again(tighter),
+            None => missed(choice),
+        })
     }
 
     /// Says that there is no time for a look at what came out, which would take `least` seconds.
     fn tell_unchecked(&self, choice: &Choice, least: f64, rendered: Option<f64>) {
         self.tell(format!(
             "came out: not looked at, which would take {} or more{}",
-            duration(least),
+            seconds(least),
             self.time(choice, rendered)
         ));
     }
@@ -99,14 +97,14 @@ impl Chooser<'_> {
     /// budget.
     fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
         let foretold = choice.seconds;
-        let rendering = rendered.map_or(String::new(), |seconds| {
-            let [came, said] = [seconds, foretold].map(duration);
-            format!("; {came}, foretold {said} ({})", beyond(seconds, foretold))
+        let rendering = rendered.map_or(String::new(), |took| {
+            let [came, said] = [took, foretold].map(seconds);
+            format!("; rendering took {came}, foretold {said} ({})", beyond(took, foretold))
         });
         let all = self.started.elapsed().as_secs_f64();
         let budget = self.args.budget.map_or(String::new(), |budget| {
             let budget = budget.as_secs_f64();
-            let [came, asked] = [all, budget].map(duration);
+            let [came, asked] = [all, budget].map(seconds);
             format!("; in all {came} of {asked} ({})", beyond(all, budget))
         });
         rendering + &budget
@@ -133,14 +131,17 @@ impl Chooser<'_> {
         };
         let tightened = choice.tightened + 1;
         let seconds = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let (checked, verdict, came_out) = (None, None, None);
+        let before = choice.clone();
         let tighter = Choice {
             foretold,
             foretelling,
             seconds,
             tightened,
-            checked: None,
-            came_out: None,
-            ..choice.clone()
+            checked,
+            verdict,
+            came_out,
+            ..before
         };
         self.warn(format!("{} was missed; rendered again, tightened", choice.wanted));
         self.say_choice(&tighter);
@@ -151,11 +152,7 @@ impl Chooser<'_> {
     fn image(&self, frame: u32) -> Result<Image> {
         let mut image = read_image(self.request.pattern.path(frame))?;
         if image.encoding == Encoding::Linear {
-            let Settings { exposure, tone, .. } = *self.stage.base;
-            let display = Display { exposure, tone };
-            for rgb in &mut image.rgb {
-                *rgb = crate::math::Rgb::from_array(display.code(*rgb).map(|v| v as f32));
-            }
+            image.rgb = displayed_rgb(&image.rgb, self.stage.base);
             image.encoding = Encoding::Srgb;
         }
         Ok(image)

@@ -3,7 +3,7 @@
 use super::RenderArgs;
 use super::round::{Frames, Round, Site};
 use crate::accuracy::{Stage, Timer, Timing};
-use crate::cli::choose::{Choice, Chooser, Judgement};
+use crate::cli::choose::{Choice, Chooser, Judged};
 use crate::cli::request::Request;
 use crate::cli::stats;
 use crate::error::{Error, Result};
@@ -42,31 +42,34 @@ impl Choosing<'_> {
         self.answer(request, |chooser, timer| chooser.choose(tracer, timer)).map(Some)
     }
 
-    /// A tighter choice where `choice` was not enough. All ranks call it.
+    /// What came of `choice`, and a tighter one where it was not enough; `None` where nothing was chosen.
+    /// All ranks call it.
     pub fn next(
         &self,
         job: &Frames,
         round: &Round,
         choice: Option<Choice>,
-    ) -> Result<Option<Choice>> {
+    ) -> Result<Option<Judged>> {
         let Some(choice) = choice else { return Ok(None) };
         let (shot, frames) = (&job.target.header.shot_hash, job.request.frames);
-        // A list of one or none: to other ranks, nothing would look like no answer.
-        let judge = |chooser: &Chooser, timer: Timer| -> Result<Vec<Choice>> {
+        let judge = |chooser: &Chooser, timer: Timer| {
+            let choice = choice.clone();
             // A job that was stopped while it was held against what came out is not done with that.
             if round.plan.render.is_empty() && choice.is_checked(shot, frames) {
-                return Ok(Vec::new());
+                return Ok(Judged::Done(choice));
             }
             let audit = stats::audit_of(&round.plan, &round.outcome);
             let seconds = round.plan.kept.is_empty().then_some(round.seconds);
-            let Judgement { came_out, tighter } =
-                chooser.judge(&choice, audit.as_ref(), seconds, timer)?;
-            if tighter.is_none() {
-                keep(job.target, &choice.clone().checked(shot, frames, came_out))?;
-            }
-            Ok(tighter.into_iter().collect())
+            Ok(match chooser.judge(choice, audit.as_ref(), seconds, timer)? {
+                Judged::Done(choice) => {
+                    let choice = choice.checked(shot, frames);
+                    keep(job.target, &choice)?;
+                    Judged::Done(choice)
+                }
+                again => again,
+            })
         };
-        Ok(self.answer(job.request, judge)?.into_iter().next())
+        self.answer(job.request, judge).map(Some)
     }
 
     /// Rank 0's answer to `question`, for all ranks, which meanwhile time what it wants timed. All ranks

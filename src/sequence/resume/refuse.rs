@@ -56,7 +56,9 @@ pub(super) fn refuse_taken(
 }
 
 /// Refuses frames that no manifest vouches for: they may be somebody's work.
-pub(super) fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
+///
+/// Errors: `Error::Usage` with the first of them.
+pub fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
     let mut in_the_way = (frames.first..=frames.last).flat_map(|f| target.paths(f));
     match in_the_way.find(|path| path.exists()) {
         Some(path) if !target.overwrite => Err(Error::Usage(format!(

@@ -1,11 +1,12 @@
 //! All figures.
 
-use super::{median_of, name_of, with_ends};
-use crate::accuracy::{Goal, fastest_reaching};
+use super::{median_of, name_of, with_changes, with_ends};
+use crate::accuracy::{Goal, fastest_reaching, is_by_few_turns};
 use crate::cli::accuracy::Outcome;
 use crate::measure::Median;
 use crate::page::Table;
-use crate::page::words::{bytes, change, count, percent, short};
+use crate::page::words::{bytes, count, percent, seconds, short};
+use crate::stats::RayCounts;
 
 /// The fastest setting for errors that one may want.
 pub fn goals(outcome: &Outcome) -> Table {
@@ -33,7 +34,9 @@ pub fn goals(outcome: &Outcome) -> Table {
                     Goal::Flip(_) => short(e.flip),
                     Goal::MaxShare(_) => percent(e.share_over_2),
                 };
-                [wanted, name_of(&row.options), short(median_of(row)), reached]
+                let few = if is_by_few_turns(row) { ", by so few turns" } else { "" };
+                let name = name_of(&row.options) + few;
+                [wanted, name, short(median_of(row)), reached]
             }
         };
         table.rows.push(cells.into());
@@ -52,9 +55,12 @@ pub fn figures(outcome: &Outcome) -> Table {
         "FLIP",
         "off > 2/255",
         "flicker /255",
+        "error against default",
+        "off > 2/255 from default",
         "rays a frame",
         "memory",
         "front",
+        "front by CPU time",
     ];
     let mut table = Table::new("Errors", &head);
     for row in &outcome.measured.rows {
@@ -68,9 +74,12 @@ pub fn figures(outcome: &Outcome) -> Table {
             short(e.flip),
             percent(e.share_over_2),
             e.flicker.map_or("–".into(), short),
+            row.error_ratio.as_ref().map_or("–".into(), with_changes),
+            row.change.map_or("–".into(), |change| count(change.over_2)),
             count(row.rays_per_frame.round() as u64),
             bytes(row.memory_bytes),
-            if row.on_front { "yes" } else { "" }.into(),
+            yes(row.on_front),
+            yes(row.on_cpu_front),
         ]);
     }
     table
@@ -86,6 +95,7 @@ pub fn times(outcome: &Outcome) -> Table {
         "CPU seconds",
         "against default",
         "beyond noise",
+        "to build the tree",
     ];
     let mut table = Table::new("Times, with their intervals", &head);
     for row in &outcome.measured.rows {
@@ -99,6 +109,7 @@ pub fn times(outcome: &Outcome) -> Table {
             with_ends(&row.cpu_seconds.median, short),
             cpu,
             cpu_beyond,
+            seconds(row.build_seconds.median.interval.estimate),
         ]);
     }
     table
@@ -107,12 +118,28 @@ pub fn times(outcome: &Outcome) -> Table {
 /// A ratio to the default's, and whether it is more than noise.
 fn against(ratio: Option<&Median>) -> [String; 2] {
     let Some(ratio) = ratio else { return ["–".into(), "–".into()] };
-    let i = ratio.interval;
-    let [is, low, high] = [i.estimate, i.low, i.high].map(change);
     let beyond = match ratio.is_sure() {
         true if ratio.differs_from(1.0) => "yes",
         true => "no",
         false => "too few turns",
     };
-    [format!("{is} ({low} to {high})"), beyond.into()]
+    [with_changes(ratio), beyond.into()]
+}
+
+/// Every setting's rays.
+pub fn rays(outcome: &Outcome) -> Table {
+    let of = |rays: &RayCounts| rays.by_kind().map(|(_, n)| count(n));
+    let kinds = RayCounts::default().by_kind().map(|(kind, _)| kind);
+    let head: Vec<&str> = std::iter::once("").chain(kinds).collect();
+    let caption =
+        "Rays of a turn by kind: of the frames looked at and those that they are inferred from";
+    let mut table = Table::new(caption, &head);
+    for row in &outcome.measured.rows {
+        table.rows.push(std::iter::once(name_of(&row.options)).chain(of(&row.rays)).collect());
+    }
+    table
+}
+
+fn yes(is_so: bool) -> String {
+    if is_so { "yes" } else { "" }.into()
 }

@@ -1,0 +1,56 @@
+//! Settings as the options that set them.
+
+use crate::effects::EffectPlan;
+use crate::scene::{Policy, Settings};
+
+/// The options that decide a picture's error and time, as `settings` have them; those of what `plan`
+/// says has no part in the scene are left out.
+pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
+    let reuse = &settings.reuse;
+    let policy = match (reuse.policy, reuse.tolerance) {
+        (Policy::Off, _) => " --policy off".into(),
+        (Policy::Colour, _) => " --policy colour".into(),
+        (Policy::Surface, None) => " --policy surface".into(),
+        (Policy::Surface, Some(tolerance)) => format!(" --policy surface --tolerance {tolerance}"),
+    };
+    samples(settings.spp, settings.shadow_samples, settings.sky_samples, plan)
+        + &match plan.mirror || plan.glass {
+            true => format!(" --bounces {}", settings.bounces),
+            false => String::new(),
+        }
+        + &policy
+}
+
+/// The same of samples alone.
+pub fn samples(spp: u32, shadow: u32, sky: u32, plan: &EffectPlan) -> String {
+    let mut options = format!("--spp {spp}");
+    if plan.area_lights {
+        options += &format!(" --shadow-samples {shadow}");
+    }
+    if plan.sky_light {
+        options += &format!(" --sky-samples {sky}");
+    }
+    options
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_has_a_part_is_spelled_out() {
+        let mut settings = Settings::default();
+        let all = options(&settings, &EffectPlan::EVERYTHING);
+        let every = "--spp 4 --shadow-samples 16 --sky-samples 16 --bounces 4 --policy surface";
+        assert_eq!(all, every);
+        settings.reuse.tolerance = Some(0.5);
+        let bare = EffectPlan {
+            mirror: false,
+            glass: false,
+            area_lights: false,
+            sky_light: false,
+            ..EffectPlan::EVERYTHING
+        };
+        assert_eq!(options(&settings, &bare), "--spp 4 --policy surface --tolerance 0.5");
+    }
+}
