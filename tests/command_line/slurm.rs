@@ -124,6 +124,17 @@ fn a_run_that_gets_no_further_is_the_last() {
     stand_in(&job, "srun", &second);
     assert_eq!(batch(&job, &script).code, Some(0));
     std::fs::remove_dir_all(job.path("o")).expect("removed");
+    // Where that took the run's time there is one more run, and not another.
+    std::fs::remove_file(&tried).expect("removed");
+    stand_in(&job, "sleep", "");
+    let late = format!("rm {tried} 2>/dev/null && exit 75; touch {tried}; exit 14");
+    stand_in(&job, "srun", &late);
+    for last in [false, true] {
+        let ran = batch(&job, &script);
+        assert_eq!((ran.code, ran.err.contains("got no further")), (Some(75), last), "{}", ran.err);
+        assert_eq!(requeues(&job), "requeue 7\n");
+    }
+    assert!(!job.names(".").iter().any(|name| name.contains("lost")));
     // Slurm may forbid it.
     job.done("render cube.obj --size 8x8 --frames 1 --no-video -o alone/f_##.png");
     stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\"; rm o/f_02.png; exit 9");
