@@ -25,7 +25,7 @@ rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder"
 cat >scene.toml <<'END'
-camera = { frames = 48, orbit = { target = [0, 0.5, 0], eye = [0, 2.6, 7], degrees = 90 } }
+camera = { frames = 96, orbit = { target = [0, 0.5, 0], eye = [0, 2.6, 7], degrees = 90 } }
 sky = { radiance = [0.4, 0.5, 0.7], lights = true }
 light = [{ quad = { centre = [-4, 6, 4], normal = [4, -5, -4], size = [2, 2], radiance = 35 } }]
 material.silver = { mirror = 0.9 }
@@ -33,7 +33,8 @@ material.sand = { diffuse = [0.5, 0.42, 0.3] }
 mesh = [{ terrain = { vertices = 60, size = 12 }, material = "sand" }]
 sphere = [{ centre = [0, 1.4, 0], radius = 1, material = "silver" }]
 END
-options=(--size 320x180 --segment 8 --no-video)
+# A key frame takes a small part of a limit, and with a tolerance that is given the time goes with the samples.
+options=(--size 320x180 --segment 8 --tolerance 1 --no-video)
 
 # seconds COMMAND...: how long it takes.
 seconds() {
@@ -45,8 +46,14 @@ seconds() {
 # trial SPP: how long the sequence takes on the nodes, seconds.
 trial() {
   local line=(srun --nodes="$nodes" --ntasks-per-node=1 --cpus-per-task=1 --mpi=pmix "$tweenray" render)
-  line+=(scene.toml "${options[@]}" --quiet --threads 1 --spp "$1" -o "trial$1/f_##.png")
-  seconds bash -c "$setup"$'\n''exec "$@"' bash "${line[@]}" || die "srun --mpi=pmix does not run here"
+  line+=(scene.toml "${options[@]}" --quiet --threads 1 --spp "$1" --overwrite -o "trial$1/f_##.png")
+  local try
+  # A process of the step before may still speak to the new ones, which crashes MPI as it starts.
+  for try in 1 2 3; do
+    seconds bash -c "$setup"$'\n''exec "$@"' bash "${line[@]}" && return
+    sleep 5
+  done
+  die "srun --mpi=pmix does not run here"
 }
 
 # An undisturbed run, as large as two and a half limits take on the nodes: measured there, since they

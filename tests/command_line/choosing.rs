@@ -59,6 +59,8 @@ fn a_report_spells_out_what_was_chosen() {
         for row in ["Wanted", "Chosen", "Foretold", "Came out"] {
             assert!(page.contains(&format!("<th scope=\"row\">{row}</th>")), "{row}");
         }
+        let has_verdict = page.contains("<th scope=\"row\">Verdict</th>");
+        assert_eq!(has_verdict, wish.starts_with("--target"), "{page}");
         let is_looked_at = page.contains(" in the worst of 3 frames looked at");
         assert!(is_looked_at || wish.starts_with("--budget"), "{page}");
         let frame = job.read("o/f_02.png");

@@ -70,9 +70,11 @@ fn a_run_that_is_stopped_after_the_last_frame_is_followed_by_one_more() {
     stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video; exit 75");
     let ran = batch(&job, &script);
     assert_eq!((ran.code, &*requeues(&job)), (Some(75), "requeue 7\n"), "{}", ran.err);
-    // One that is stopped there again gets no further.
+    // One that is stopped there again gets no further, and so does the one after it.
     let ran = batch(&job, &script);
-    assert_eq!((ran.code, &*requeues(&job)), (Some(75), "requeue 7\n"), "{}", ran.err);
+    assert_eq!(ran.code, Some(75), "{}", ran.err);
+    let ran = batch(&job, &script);
+    assert_eq!((ran.code, requeues(&job)), (Some(75), "requeue 7\n".repeat(2)), "{}", ran.err);
     assert!(ran.err.contains("got no further"), "{}", ran.err);
     stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video");
     assert_eq!(batch(&job, &script).code, Some(0));
@@ -109,7 +111,7 @@ fn a_run_that_gets_no_further_is_the_last() {
     let script = job.done(&format!("{LINE} -- --size 8x8 --frames 1..2 -o o/f_##.png")).out;
     let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
     stand_in(&job, "scontrol", &note);
-    for code in [0, 2, 75] {
+    for code in [0, 2] {
         stand_in(&job, "srun", &format!("exit {code}"));
         let ran = batch(&job, &script);
         assert_eq!(ran.code, Some(if code == 0 { 1 } else { code }), "{}", ran.err);
@@ -124,17 +126,20 @@ fn a_run_that_gets_no_further_is_the_last() {
     stand_in(&job, "srun", &second);
     assert_eq!(batch(&job, &script).code, Some(0));
     std::fs::remove_dir_all(job.path("o")).expect("removed");
-    // Where that took the run's time there is one more run, and not another.
+    // Where there was no time left there is one more run, and not another.
     std::fs::remove_file(&tried).expect("removed");
     stand_in(&job, "sleep", "");
     let late = format!("rm {tried} 2>/dev/null && exit 75; touch {tried}; exit 14");
-    stand_in(&job, "srun", &late);
-    for last in [false, true] {
-        let ran = batch(&job, &script);
-        assert_eq!((ran.code, ran.err.contains("got no further")), (Some(75), last), "{}", ran.err);
-        assert_eq!(requeues(&job), "requeue 7\n");
+    for (srun, requeued) in [("exit 75", 1), (&late, 2)] {
+        stand_in(&job, "srun", srun);
+        for last in [false, true] {
+            let ran = batch(&job, &script);
+            let is_last = ran.err.contains("got no further");
+            assert_eq!((ran.code, is_last), (Some(75), last), "{}", ran.err);
+            assert_eq!(requeues(&job), "requeue 7\n".repeat(requeued));
+        }
     }
-    assert!(!job.names(".").iter().any(|name| name.contains("lost")));
+    assert!(!job.names(".").iter().any(|name| name.contains("idle")));
     // Slurm may forbid it.
     job.done("render cube.obj --size 8x8 --frames 1 --no-video -o alone/f_##.png");
     stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\"; rm o/f_02.png; exit 9");

@@ -130,6 +130,9 @@ pub fn chosen(job: &Job, choice: &Choice) -> Table {
     row("Chosen", choice.options());
     row("Foretold", choice.foretold_in_words());
     row("Came out", format!("{came_out}{time}"));
+    if let Some(verdict) = choice.verdict() {
+        row("Verdict", verdict);
+    }
     if choice.tightened > 0 {
         row("Chosen anew, since the target was missed", counted(choice.tightened as usize, "time"));
     }

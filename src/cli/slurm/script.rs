@@ -31,14 +31,13 @@ pub struct Script<'a> {
 
 /// What the script does, after its own words are set. A run that ends early for whatever reason, a
 /// lost process too, is followed by another as long as it got further: each leaves at least one frame or
-/// reference more, so there is an end.
+/// reference more, so there is an end. One that was stopped before it got further is followed by one more.
 const BODY: &str = r#"
 # What is there of the sequence; succeeds once that is all of it.
 so_far() { "$tweenray" "${status[@]}" 2>&1; }
 kept() { ls "$references" 2>/dev/null; }
-# There while the run before this one lost its time to a start that failed.
-lost=.tweenray-$SLURM_JOB_ID.lost
-has_failed=no
+# There while the run before this one had too little time to get any further.
+idle=.tweenray-$SLURM_JOB_ID.idle
 
 echo "== $(date '+%F %T') job $SLURM_JOB_ID on $SLURM_JOB_NODELIST, run $((${SLURM_RESTART_COUNT:-0} + 1))"
 before=$(so_far)/$(kept)
@@ -50,26 +49,25 @@ for pause in 5 30 0; do
   echo "$now"
   # Where it was stopped or killed with all frames there, the video is left, or a look at what came out.
   if [ "$is_all" = 0 ]; then
-    case $code in 0 | 1 | 2) rmdir "$lost" 2>/dev/null; exit "$code" ;; esac
+    case $code in 0 | 1 | 2) rmdir "$idle" 2>/dev/null; exit "$code" ;; esac
   fi
   if [ "$now/$(kept)" != "$before" ]; then
-    rmdir "$lost" 2>/dev/null
+    rmdir "$idle" 2>/dev/null
     scontrol requeue "$SLURM_JOB_ID" || exit $((code ? code : 1))
     echo "requeued after exit code $code"
     exit 75
   fi
   # Processes that could not be started may be so a little later: nodes clear up after the run before.
   case $code in 0 | 2 | 75) break ;; esac
-  has_failed=yes
   sleep "$pause"
 done
-# What was left of the limit after a start that failed may be too little to get anywhere.
-if [ "$has_failed/$code" = yes/75 ] && mkdir "$lost" 2>/dev/null; then
+# It may have had but little time: a start that failed took it, or the signal came a minute early.
+if [ "$code" = 75 ] && mkdir "$idle" 2>/dev/null; then
   scontrol requeue "$SLURM_JOB_ID" || exit "$code"
-  echo "requeued, since a start that failed took this run's time"
+  echo "this run got no further for want of time: requeued once more"
   exit 75
 fi
-rmdir "$lost" 2>/dev/null
+rmdir "$idle" 2>/dev/null
 echo "this run got no further and ended with exit code $code: not requeued" >&2
 exit $((code ? code : 1))
 "#;
