@@ -5,8 +5,9 @@ use super::table::{Row, Spread};
 use crate::measure::{Median, median};
 
 /// The rows on the front, by `time`, the fastest first: those that may be recommended and that no other
-/// such row beats; the default only by what surely beats it, and never by what has its pixels. Of two neighbours on it, of which the one is not surely faster or the other not surely
-/// nearer to the truth, only the better one stays: the difference is noise.
+/// such row beats; the default only by what surely beats it, and never by what has its pixels. Of two
+/// neighbours on it, of which the one is not surely faster or the other not surely nearer to the truth,
+/// only the better one stays: the difference is noise.
 pub fn of(rows: &[Row], time: fn(&Row) -> &Spread) -> Vec<usize> {
     let seconds = |k: &usize| time(&rows[*k]).median.interval.estimate;
     let mut front: Vec<usize> = (0..rows.len()).filter(|k| is_unbeaten(rows, time, *k)).collect();

@@ -180,7 +180,7 @@ impl Choice {
         let mut words = Vec::new();
         let mut left = command.iter();
         while let Some(word) = left.next() {
-            if !asks_for_choice(std::slice::from_ref(word)) {
+            if !is_wish(word) {
                 words.push(word.clone());
                 continue;
             }
@@ -212,7 +212,11 @@ impl Choice {
 
 /// Whether a command leaves settings to the program.
 pub fn asks_for_choice(command: &[String]) -> bool {
-    command.iter().any(|word| is_option(word, "--target") || is_option(word, "--budget"))
+    command.iter().any(|word| is_wish(word))
+}
+
+fn is_wish(word: &str) -> bool {
+    is_option(word, "--target") || is_option(word, "--budget")
 }
 
 /// Whether a word of a command is the option `name`, with its value or before it.

@@ -14,7 +14,7 @@ use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
 use crate::sequence::{
-    Recipes, Target, check_upload, fingerprint, light_fingerprint, world_fingerprint,
+    Recipes, Target, check_upload, light_fingerprint, shot_fingerprint, world_fingerprint,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -105,8 +105,8 @@ impl Read {
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
         let scene_hash = world_fingerprint(&world);
-        let light_hash = light_fingerprint(&world);
-        let shot_hash = fingerprint(&world, &shot);
+        let light_hash = light_fingerprint(&world, &scene_hash);
+        let shot_hash = shot_fingerprint(&scene_hash, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
         warnings.extend(job::collapsed(&scene, path));

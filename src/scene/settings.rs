@@ -54,6 +54,13 @@ pub struct Settings {
     pub flag_bad: bool,
 }
 
+impl Settings {
+    /// The part of the image that is rendered.
+    pub fn region(&self) -> Rect {
+        self.crop.unwrap_or(Rect { x0: 0, y0: 0, x1: self.width, y1: self.height })
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {

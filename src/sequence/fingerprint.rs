@@ -8,8 +8,13 @@ use std::fmt::Debug;
 
 /// BLAKE3 of everything in `world` and `shot` that reaches a pixel, hexadecimal.
 pub fn fingerprint(world: &World, shot: &Shot) -> String {
+    shot_fingerprint(&world_fingerprint(world), shot)
+}
+
+/// [`fingerprint`] of a world with the hash `world`.
+pub fn shot_fingerprint(world: &str, shot: &Shot) -> String {
     let mut hash = Hash(blake3::Hasher::new());
-    hash.text(&(world_fingerprint(world), shot));
+    hash.text(&(world, shot));
     hash.0.finalize().to_hex().to_string()
 }
 
@@ -19,9 +24,13 @@ pub fn world_fingerprint(world: &World) -> String {
 }
 
 /// The same, but for what is to be traced in every frame: that changes nothing of what was traced,
-/// so frames that name other things serve one another as references.
-pub fn light_fingerprint(world: &World) -> String {
-    fingerprint_of(world, false)
+/// so frames that name other things serve one another as references. `whole` is the hash with all: that of
+/// most worlds, and a large one takes a while to hash.
+pub fn light_fingerprint(world: &World, whole: &str) -> String {
+    let names_any = world.meshes.iter().any(|mesh| mesh.always_traced)
+        || world.spheres.iter().any(|sphere| sphere.always_traced)
+        || !world.traced_regions.is_empty();
+    if names_any { fingerprint_of(world, false) } else { whole.into() }
 }
 
 fn fingerprint_of(world: &World, with_traced: bool) -> String {
@@ -136,8 +145,10 @@ mod tests {
 
     #[test]
     fn what_is_always_traced_is_nothing_to_the_light() {
+        let light_fingerprint = |world: &World| light_fingerprint(world, &world_fingerprint(world));
         let base = light_fingerprint(&world());
         assert_eq!(base, world_fingerprint(&world()));
+        assert_eq!(base, fingerprint_of(&world(), false));
         let mut named = world();
         named.meshes[0].always_traced = true;
         named.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }];

@@ -24,6 +24,12 @@ fn batch(job: &Job, text: &str) -> Ran {
     Ran::of(&command.output().expect("a shell"))
 }
 
+/// Slurm's own program requeues nothing, and [`requeues`] tells what it was asked.
+fn note_requeues(job: &Job) {
+    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
+    stand_in(job, "scontrol", &note);
+}
+
 fn requeues(job: &Job) -> String {
     fs::read_to_string(job.path("requeues")).unwrap_or_default()
 }
@@ -42,8 +48,7 @@ fn a_script_goes_on_until_the_sequence_is_complete() {
         until [[ $(there) != \"$before\" ]] || ! kill -0 $pid; do sleep 0.01; done\n\
         kill -USR1 $pid; wait $pid";
     stand_in(&job, "srun", limited);
-    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
-    stand_in(&job, "scontrol", &note);
+    note_requeues(&job);
     let mut codes = Vec::new();
     while codes.last() != Some(&Some(0)) {
         let ran = batch(&job, &script);
@@ -65,8 +70,7 @@ fn a_script_goes_on_until_the_sequence_is_complete() {
 fn a_run_that_is_stopped_after_the_last_frame_is_followed_by_one_more() {
     let job = Job::new();
     let script = job.done(&format!("{LINE} -- --size 8x8 --frames 1..2 -o o/f_##.png")).out;
-    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
-    stand_in(&job, "scontrol", &note);
+    note_requeues(&job);
     stand_in(&job, "srun", "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video; exit 75");
     let ran = batch(&job, &script);
     assert_eq!((ran.code, &*requeues(&job)), (Some(75), "requeue 7\n"), "{}", ran.err);
@@ -85,8 +89,7 @@ fn a_run_that_is_stopped_after_the_last_frame_is_followed_by_one_more() {
 fn a_run_that_is_killed_after_the_last_frame_is_followed_by_one_more() {
     let job = Job::new();
     let script = job.done(&format!("{LINE} -- --size 8x8 --frames 1..2 -o o/f_##.png")).out;
-    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
-    stand_in(&job, "scontrol", &note);
+    note_requeues(&job);
     stand_in(&job, "sleep", &format!("echo \"$@\" >> {}", job.path("naps").display()));
     let killed = "while [[ $1 == --* ]]; do shift; done\n\"$@\" --no-video; exit 137";
     stand_in(&job, "srun", killed);
@@ -109,8 +112,7 @@ fn a_run_that_is_killed_after_the_last_frame_is_followed_by_one_more() {
 fn a_run_that_gets_no_further_is_the_last() {
     let job = Job::new();
     let script = job.done(&format!("{LINE} -- --size 8x8 --frames 1..2 -o o/f_##.png")).out;
-    let note = format!("echo \"$@\" >> {}", job.path("requeues").display());
-    stand_in(&job, "scontrol", &note);
+    note_requeues(&job);
     for code in [0, 2] {
         stand_in(&job, "srun", &format!("exit {code}"));
         let ran = batch(&job, &script);

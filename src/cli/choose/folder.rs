@@ -34,8 +34,7 @@ impl Chooser<'_> {
 
     /// For what frames with the header `before` were made, and where only that is the same, what is not.
     fn made_for(&self, before: &Header, tracer: &str) -> String {
-        let chosen = before.chosen.clone().unwrap_or_default();
-        let Ok(chosen) = serde_json::from_value::<Choice>(chosen) else {
+        let Some(chosen) = Choice::of(before) else {
             return "whose settings were not chosen".into();
         };
         if chosen.wanted != self.args.words() {

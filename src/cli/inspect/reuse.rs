@@ -96,8 +96,7 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
 
 /// Bytes that what is known of a frame's pixels takes at most under policy colour.
 fn pixel_bytes(settings: &Settings) -> u64 {
-    let full = Rect { x0: 0, y0: 0, x1: settings.width, y1: settings.height };
-    let Rect { x0, y0, x1, y1 } = settings.crop.unwrap_or(full);
+    let Rect { x0, y0, x1, y1 } = settings.region();
     u64::from(x1 - x0) * u64::from(y1 - y0) * size_of::<colour::Entry>() as u64
 }
 

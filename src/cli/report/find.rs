@@ -1,9 +1,8 @@
 //! Which manifest is meant.
 
 use crate::error::{Error, Result};
+use crate::output::manifest::ENDING;
 use std::path::{Path, PathBuf};
-
-const ENDING: &str = ".manifest.jsonl";
 
 /// The manifest that `place` is or holds.
 ///

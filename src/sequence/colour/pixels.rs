@@ -53,7 +53,6 @@ pub(super) fn fill(
 
 /// The pixels that are wanted, row by row.
 fn pixels_of(settings: &Settings) -> impl Iterator<Item = (u32, u32)> + use<> {
-    let full = Rect { x0: 0, y0: 0, x1: settings.width, y1: settings.height };
-    let Rect { x0, y0, x1, y1 } = settings.crop.unwrap_or(full);
+    let Rect { x0, y0, x1, y1 } = settings.region();
     (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
 }
