@@ -73,16 +73,34 @@ pub struct Origin {
     pub distance: f32,
 }
 
+/// What other frames suggest about one light at a point, and of what kind that suggestion is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Ratio; NaN where no other frame knows it.
+    pub ratio: f32,
+    /// Class of the estimate, by what its samples and those beside them look like.
+    pub class: u8,
+}
+
+impl Estimate {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self { ratio: f32::NAN, class: 0 };
+}
+
 /// Points in a batch with the answers about them.
 #[derive(Debug, Default)]
 pub struct Questions {
     /// What is asked about.
     pub points: Vec<SurfacePoint>,
+    /// For each point the pixel that shows it: column, row.
+    pub pixels: Vec<[u32; 2]>,
     /// For each point and channel what the pixel would show of that light without shadows:
     /// luminance, exposure applied; 0 where none can arrive.
     pub unshadowed: Vec<f32>,
     /// For each point the ratio in each channel; NaN where it is unknown and must be traced.
     pub ratios: Vec<f32>,
+    /// For each point and channel what other frames suggest; room for whoever answers.
+    pub estimates: Vec<Estimate>,
     /// For each point where its ratios come from.
     pub origins: Vec<Origin>,
 }
@@ -136,7 +154,7 @@ pub trait Inference: Sync {
     fn infer(&self, questions: &mut Questions);
 
     /// Hears what came out for the same points, once those that had to be were traced: a ratio is NaN
-    /// only where no light was asked for.
+    /// only where no light was asked for. The estimates are as `infer` left them.
     fn hear(&self, _answered: &Questions) {}
 }
 

@@ -46,7 +46,6 @@ impl FrameMaker for Lemon {
             film: Film::new(SETTINGS.0, SETTINGS.1, false),
             rays: RayCounts::default(),
             reuse: ReuseCounts::default(),
-            tolerance: None,
             audit: None,
             reference: None,
         }))

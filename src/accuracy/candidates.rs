@@ -76,10 +76,10 @@ impl List<'_> {
             return;
         }
         // Where it is left to the scene, a display step is one of those to compare with.
-        let base = self.base.reuse.tolerance.unwrap_or(1.0);
+        let base = self.base.reuse.tolerance;
         for tolerance in [0.25, 0.5, 1.0, 2.0, 4.0].map(|f| times(f, base)) {
             let options = format!("--tolerance {tolerance}");
-            self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = Some(tolerance));
+            self.add(Knob::Tolerance, options, |s| s.reuse.tolerance = tolerance);
         }
         // A segment longer than the move is one as long as it.
         let cut = |segment: u32| segment.min(self.frames);
@@ -88,8 +88,8 @@ impl List<'_> {
             let options = format!("--segment {segment}");
             self.add(Knob::Segment, options, |s| s.reuse.segment = segment);
         }
-        for audit in [0.0, 0.1] {
-            self.add(Knob::Audit, format!("--audit {audit}"), |s| s.reuse.audit = audit);
+        for probes in [0.003, 0.03] {
+            self.add(Knob::Probes, format!("--probes {probes}"), |s| s.reuse.probes = probes);
         }
     }
 

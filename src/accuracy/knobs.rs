@@ -52,7 +52,7 @@ pub enum Knob {
     /// Frames from key frame to key frame.
     Segment,
     /// How much of a frame is audited.
-    Audit,
+    Probes,
     /// Camera samples.
     CameraSamples,
     /// Shadow samples.
@@ -88,7 +88,7 @@ impl Knob {
     pub fn group(self) -> Option<Group> {
         Some(match self {
             Self::Default => return None,
-            Self::Policy | Self::Tolerance | Self::Segment | Self::Audit => Group::Reuse,
+            Self::Policy | Self::Tolerance | Self::Segment | Self::Probes => Group::Reuse,
             Self::CameraSamples | Self::ShadowSamples | Self::SkySamples => Group::Samples,
             Self::Bounces | Self::CutOff => Group::Specular,
             Self::Recheck
@@ -109,7 +109,7 @@ impl Knob {
             Self::Policy => "Reuse policy",
             Self::Tolerance => "Tolerance of reuse",
             Self::Segment => "Frames per segment",
-            Self::Audit => "Audit",
+            Self::Probes => "Probes",
             Self::CameraSamples => "Camera samples",
             Self::ShadowSamples => "Shadow samples",
             Self::SkySamples => "Sky samples",
@@ -128,10 +128,10 @@ impl Knob {
     }
 
     /// Whether it trades error for time, so that its settings may be recommended. Rules of
-    /// intersection guard against rare wrong pixels, which no mean error shows; an audit changes no
-    /// pixel, and another tree next to none.
+    /// intersection guard against rare wrong pixels, which no mean error shows, and another tree changes
+    /// next to none.
     pub fn is_ranked(self) -> bool {
-        !matches!(self.group(), Some(Group::Intersection | Group::Tree)) && self != Self::Audit
+        !matches!(self.group(), Some(Group::Intersection | Group::Tree))
     }
 }
 

@@ -21,6 +21,7 @@
 mod candidates;
 mod check;
 mod choice;
+mod draw;
 mod effort;
 mod errors;
 mod figures;

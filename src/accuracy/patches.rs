@@ -10,7 +10,7 @@ use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
-use crate::reuse::audit::{self, Lot};
+use super::draw::{DrawSeed, draw};
 use crate::sampling::mix;
 use crate::scene::Settings;
 use crate::shade::Renderer;
@@ -120,10 +120,10 @@ impl Patches {
         let (width, height) = (settings.width, settings.height);
         let draw = |frame: &u32| {
             let contrast = contrast(*frame)?;
-            let lot = Lot { seed: lot, frame: *frame, number: 0 };
+            let lot = DrawSeed { seed: lot, frame: *frame, number: 0 };
             let among = 0..contrast.each.len() as u32;
             let mut drawn = Drawn { frame: *frame, ..Drawn::default() };
-            for d in audit::draw(&contrast.each, among, f64::from(count), lot) {
+            for d in draw(&contrast.each, among, f64::from(count), lot) {
                 // One pixel of those that a pixel of the small picture stands for.
                 let random = mix(mix(lot.seed ^ u64::from(*frame)) ^ u64::from(d.index));
                 let within = |k: u32, of: u32, length: u32, random: u64| {

@@ -38,7 +38,6 @@ pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     settings.bounces = most(|s| s.bounces, 16);
     settings.cutoff = cutoff.min(1e-5);
     settings.reuse.policy = Policy::Off;
-    settings.reuse.audit = 0.0;
     settings
 }
 

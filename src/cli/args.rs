@@ -107,21 +107,16 @@ pub struct ReuseArgs {
     #[arg(long, value_name = "FRAMES", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SEGMENT))]
     pub segment: Option<u32>,
-    /// By how many display steps (1/255) samples may disagree beyond their noise and still stand for
-    /// one another: less is more exact and slower [default: 1, and less where traced frames are more
-    /// exact than that]
+    /// By how many display steps (1/255) inferred pixels may be off where traced ones are not: root mean
+    /// square over any tile of 32 x 32 pixels. Less is more exact and slower [default: 0.25]
     #[arg(long, value_name = "STEPS", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
     pub tolerance: Option<f32>,
-    /// Share of a frame's cost that goes into measuring its error [default: 0.03]
+    /// Share of the pixels of an in-between frame that are traced though other frames may know them: what
+    /// they find decides what is inferred [default: 0.01]
     #[arg(long, value_name = "SHARE", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
-    pub audit: Option<f32>,
-    /// Surface policy: trace what is inferred with a larger measured error, display steps of 1/255,
-    /// where tracing is better [default: no bound]
-    #[arg(long, value_name = "STEPS", help_heading = "Reuse",
-        allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
-    pub max_rmse: Option<f32>,
+    pub probes: Option<f32>,
     /// Colour policy: cached colours agree within this linear difference [default: 0.02]
     #[arg(long, value_name = "DIFFERENCE", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::AMOUNT))]
@@ -199,9 +194,8 @@ impl ReuseArgs {
     fn apply(&self, s: &mut ReuseSettings) {
         put(&mut s.policy, self.policy);
         put(&mut s.segment, self.segment);
-        put(&mut s.audit, self.audit);
-        s.tolerance = self.tolerance.or(s.tolerance);
-        s.max_rmse = self.max_rmse.or(s.max_rmse);
+        put(&mut s.tolerance, self.tolerance);
+        put(&mut s.probes, self.probes);
         put(&mut s.colour_epsilon, self.colour_epsilon);
         put(&mut s.distance_epsilon, self.distance_epsilon);
     }

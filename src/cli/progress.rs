@@ -148,7 +148,6 @@ mod tests {
             bytes: 1,
             rays,
             reuse: Default::default(),
-            tolerance: None,
             audit: None,
             bad: Default::default(),
         };

@@ -17,7 +17,6 @@ use crate::error::{Error, Result};
 use crate::intersect;
 use crate::output::manifest::{AuditRow, beside};
 use crate::output::video::{self, Clip, Video};
-use crate::reuse::Evidence;
 use crate::scene::{Policy, Settings};
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
@@ -252,16 +251,8 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
     ))?;
     let settings = &job.request.settings.reuse;
     reused(settings.policy, &stats::reuse_of(outcome)).map_or(Ok(()), result)?;
-    let is_left_open = settings.tolerance.is_none();
-    let is_strict = |t: &f32| *t < Evidence::default().tolerance && is_left_open;
-    if let Some(least) = stats::tolerance_of(outcome).filter(is_strict) {
-        result(format!(
-            "traced frames are so exact here that samples had to agree within {}/255",
-            steps(least.into())
-        ))?;
-    }
     let audit = stats::audit_of(job.plan, outcome);
-    if let Some(line) = audit.and_then(|audit| audit_line(&audit, settings.max_rmse)) {
+    if let Some(line) = audit.and_then(|audit| audit_line(&audit)) {
         result(line)?;
     }
     match job.request.fps {
@@ -285,23 +276,11 @@ fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
     Some(format!("{all} of the {what} were reused{mirrored}"))
 }
 
-/// How good the inferred frames are, in words; also where not even tracing could meet the bound `most`,
-/// display steps.
-fn audit_line(audit: &AuditRow, most: Option<f32>) -> Option<String> {
+/// How good the inferred frames are, in words.
+fn audit_line(audit: &AuditRow) -> Option<String> {
     let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
-    let tiles = match audit.sums.tiles_traced {
-        0 => String::new(),
-        1 => "; 1 tile exceeded --max-rmse and was traced".into(),
-        n => format!("; {n} tiles exceeded --max-rmse and were traced"),
-    };
-    // 0 asks for whichever is better.
-    let is_out_of_reach = most.is_some_and(|most| most > 0.0 && rmse.min(traced) > most.into());
-    let help = match is_out_of_reach {
-        true => "; neither meets --max-rmse: more --shadow-samples or --sky-samples are needed",
-        false => "",
-    };
     Some(format!(
-        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255{tiles}{help}",
+        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255",
         steps(rmse),
         steps(low),
         steps(high),

@@ -165,14 +165,14 @@ impl Job {
 
     /// What stands in place of an audit.
     fn why_no_audit(&self) -> &'static str {
-        let ReuseSettings { policy, audit, .. } = self.settings.reuse;
+        let ReuseSettings { policy, probes, .. } = self.settings.reuse;
         match policy {
             Policy::Colour => {
                 "Policy colour has no audit: nothing is known of how far its frames are off."
             }
             _ if self.rows.is_empty() => "No frame was audited yet.",
             _ if !self.reuse().is_inferred() => "No frame was audited: none is inferred.",
-            _ if audit <= 0.0 => "No frame was audited: --audit 0.",
+            _ if probes <= 0.0 => "No frame was audited: --probes 0.",
             _ => "No frame was audited.",
         }
     }

@@ -142,7 +142,7 @@ impl Request {
         world.agree(machine::best_isa())?;
         let read = world.from_node(|| Read::by(scene, settings, output));
         let read = world.agree(read)?;
-        let derived = world.agree(Derived::of(&read, settings, output))?;
+        let derived = world.agree(Derived::of(&read, output))?;
         let Derived { terms, recipes } = derived;
         let on = (&read.scene, &read.settings, &terms);
         let references = References::survey(world, &output.references, &read.pattern, on)?;
@@ -261,8 +261,7 @@ struct Derived {
 }
 
 impl Derived {
-    fn of(read: &Read, settings: &SettingArgs, output: &OutputArgs) -> Result<Self> {
-        refuse_max_rmse(settings.reuse.max_rmse, &read.settings)?;
+    fn of(read: &Read, output: &OutputArgs) -> Result<Self> {
         let Read { scene, shot, settings, pattern, light_hash, .. } = read;
         refuse_maps(output.maps, settings)?;
         Self::new((scene, shot), settings, pattern, light_hash)
@@ -288,21 +287,6 @@ pub fn refuse_maps(maps: bool, settings: &Settings) -> Result<()> {
             "--maps shows what is inferred; with --policy off every frame is traced".into(),
         )),
         _ => Ok(()),
-    }
-}
-
-/// Refuses a bound, given as an option, that nobody would hold: only policy surface has an audit.
-pub fn refuse_max_rmse(option: Option<f32>, settings: &Settings) -> Result<()> {
-    let policy = match settings.reuse.policy {
-        Policy::Surface => return Ok(()),
-        Policy::Colour => "colour",
-        Policy::Off => "off",
-    };
-    match option {
-        Some(_) => Err(Error::Usage(format!(
-            "--max-rmse needs --policy surface: under policy {policy} no error is measured"
-        ))),
-        None => Ok(()),
     }
 }
 

@@ -6,7 +6,7 @@ mod script;
 use super::args::SceneArgs;
 use super::exit::Exit;
 use super::render::{self, RenderArgs};
-use super::request::{frames, pattern, refuse_maps, refuse_max_rmse, uploads};
+use super::request::{frames, pattern, refuse_maps, uploads};
 use super::{job, references, say, values};
 use crate::cluster;
 use crate::error::{Error, Result};
@@ -134,7 +134,6 @@ fn check_files(
     let RenderArgs { output, .. } = render;
     let Loaded { shot, settings, .. } = loaded;
     refuse_maps(output.maps, settings)?;
-    refuse_max_rmse(render.settings.reuse.max_rmse, settings)?;
     output.rank_map.iter().try_for_each(|map| cluster::check_rank_map(map, ranks))?;
     references::check(&output.references, pattern, settings)?;
     uploads(&output.upload, shot, settings).map(drop)

@@ -1,17 +1,18 @@
 //! Settings as the options that set them.
 
 use crate::effects::EffectPlan;
-use crate::scene::{Policy, Settings};
+use crate::scene::{Policy, ReuseSettings, Settings};
 
 /// The options that decide a picture's error and time, as `settings` have them; those of what `plan`
 /// says has no part in the scene are left out.
 pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
     let reuse = &settings.reuse;
-    let policy = match (reuse.policy, reuse.tolerance) {
-        (Policy::Off, _) => " --policy off".into(),
-        (Policy::Colour, _) => " --policy colour".into(),
-        (Policy::Surface, None) => " --policy surface".into(),
-        (Policy::Surface, Some(tolerance)) => format!(" --policy surface --tolerance {tolerance}"),
+    let is_usual = reuse.tolerance == ReuseSettings::default().tolerance;
+    let policy = match reuse.policy {
+        Policy::Off => " --policy off".into(),
+        Policy::Colour => " --policy colour".into(),
+        Policy::Surface if is_usual => " --policy surface".into(),
+        Policy::Surface => format!(" --policy surface --tolerance {}", reuse.tolerance),
     };
     samples(settings.spp, settings.shadow_samples, settings.sky_samples, plan)
         + &match plan.mirror || plan.glass {
@@ -43,7 +44,7 @@ mod tests {
         let all = options(&settings, &EffectPlan::EVERYTHING);
         let every = "--spp 4 --shadow-samples 16 --sky-samples 16 --bounces 4 --policy surface";
         assert_eq!(all, every);
-        settings.reuse.tolerance = Some(0.5);
+        settings.reuse.tolerance = 0.5;
         let bare = EffectPlan {
             mirror: false,
             glass: false,

@@ -92,11 +92,6 @@ pub fn reuse_of(outcome: &Outcome) -> ReuseCounts {
     sum
 }
 
-/// The least tolerance that a frame rendered now was inferred with, display steps.
-pub fn tolerance_of(outcome: &Outcome) -> Option<f32> {
-    outcome.frames.iter().filter_map(|(_, report)| report.tolerance).reduce(f32::min)
-}
-
 /// What the audits of all frames asked for found together, rendered now or kept; `None` where none
 /// was audited.
 pub fn audit_of(plan: &Plan, outcome: &Outcome) -> Option<AuditRow> {

@@ -135,6 +135,17 @@ impl GBuffer {
         self.motion.extend(more.motion);
     }
 
+    /// One pixel's record.
+    pub fn get(&self, index: usize) -> GPixel {
+        GPixel {
+            depth: self.depth[index],
+            position: self.position[index],
+            normal: self.normal[index],
+            albedo: self.albedo[index],
+            mesh_id: self.mesh_id[index],
+        }
+    }
+
     /// Writes one pixel's record, which tells no motion.
     pub fn set(&mut self, index: usize, p: &GPixel) {
         self.depth[index] = p.depth;

@@ -98,9 +98,6 @@ pub struct Row {
     /// How much of it was inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
-    /// By how much samples that it is inferred from may disagree, display steps of 1/255.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f32>,
     /// How good the inferred part of it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,

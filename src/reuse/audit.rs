@@ -18,13 +18,8 @@ use crate::film::{PixelSource, Provenance};
 use crate::math::Rgb;
 use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
-use crate::sampling::mix;
-use crate::scene::Rect;
 use crate::stats::{AuditSums, DrawnSum};
-use rayon::prelude::*;
 
-/// Share of the draw that all pixels have alike.
-const EQUAL: f64 = 1.0 / 3.0;
 /// A squared error that may have gone unseen in the pixels that were not drawn: one display step.
 const UNSEEN: f64 = 1.0;
 /// Display steps.
@@ -37,14 +32,8 @@ pub struct Shown<'a> {
     pub rgb: &'a [Rgb],
     /// Where each pixel's light comes from.
     pub sources: &'a [PixelSource],
-    /// Columns.
-    pub width: u32,
-    /// The pixels that were rendered; `None` for all.
-    pub crop: Option<Rect>,
     /// How radiance is shown.
     pub display: Display,
-    /// Whether also pixels without any kept light may be off: where some lights are not kept.
-    pub everywhere: bool,
 }
 
 /// A pixel that was drawn.
@@ -56,116 +45,11 @@ pub struct Drawn {
     pub weight: f64,
 }
 
-/// What a draw depends on beside the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Lot {
-    /// The job's seed.
-    pub seed: u64,
-    /// The frame.
-    pub frame: u32,
-    /// Which of the frame's draws.
-    pub number: u32,
-}
-
 impl Shown<'_> {
-    /// The pixels that were rendered, row by row: what lies beyond the crop is black and no picture.
-    pub fn pixels(&self) -> impl Iterator<Item = u32> + Clone {
-        let (crop, width) = (self.crop, self.width);
-        let is_inside =
-            move |x, y| crop.is_none_or(|c| (c.x0..c.x1).contains(&x) && (c.y0..c.y1).contains(&y));
-        (0..self.rgb.len() as u32).filter(move |i| is_inside(i % width, i / width))
-    }
-
-    /// Whether the pixel may be off at all.
-    fn is_lit(&self, i: usize) -> bool {
-        self.everywhere || self.sources[i].provenance != Provenance::Background
-    }
-
     /// Whether the pixel was inferred.
-    pub fn is_inferred(&self, i: usize) -> bool {
+    fn is_inferred(&self, i: usize) -> bool {
         !matches!(self.sources[i].provenance, Provenance::Background | Provenance::Traced)
     }
-
-    /// For each pixel its variance, foretold, in any unit; negative where it cannot be off.
-    pub fn foretold(&self) -> Vec<f32> {
-        let width = self.width as usize;
-        let mut all = vec![0.0; self.rgb.len()];
-        let start = || vec![0.0; width + 2];
-        all.par_chunks_mut(width).enumerate().for_each_init(start, |near, (y, row)| {
-            self.note_risks(y, &mut near[1..=width]);
-            for (x, (out, near)) in row.iter_mut().zip(near.windows(3)).enumerate() {
-                let i = y * width + x;
-                let risk = near[0].max(near[1]).max(near[2]);
-                *out = if self.is_lit(i) { self.variance(i, risk) } else { -1.0 };
-            }
-        });
-        all
-    }
-
-    /// The greatest risk in row `y` and those beside it, column by column. With the columns beside it
-    /// that is a pixel's own, since a penumbra's rim shows no doubt.
-    fn note_risks(&self, y: usize, most: &mut [f32]) {
-        most.fill(0.0);
-        let width = self.width as usize;
-        let rows = y.saturating_sub(1)..(y + 2).min(self.sources.len() / width);
-        for row in rows {
-            for (most, source) in most.iter_mut().zip(&self.sources[row * width..]) {
-                *most = if source.risk.is_finite() { most.max(source.risk) } else { *most };
-            }
-        }
-    }
-
-    /// What radiance off by `risk` does to the shown value. A square root stands in for the
-    /// transfer function, which would cost more than the draw.
-    fn variance(&self, i: usize, risk: f32) -> f32 {
-        if risk <= 0.0 {
-            return 0.0;
-        }
-        let shown = |by: f32| self.display.tone(self.rgb[i] + Rgb::splat(by)).max_element().sqrt();
-        let apart = shown(0.5 * risk) - shown(-0.5 * risk);
-        apart * apart
-    }
-}
-
-/// Draws about `count` of the pixels `among`, whose variance is `foretold` for the whole picture
-/// (see [`Shown::foretold`]): a function of these and the lot alone.
-pub fn draw(
-    foretold: &[f32],
-    among: impl Iterator<Item = u32> + Clone,
-    count: f64,
-    lot: Lot,
-) -> Vec<Drawn> {
-    let lit = || {
-        let all = among.clone().map(|i| (i, f64::from(foretold[i as usize])));
-        all.filter(|(_, variance)| *variance >= 0.0)
-    };
-    let (number, sum) = lit().fold((0.0, 0.0), |(n, sum), (_, v)| (n + 1.0, sum + v));
-    let equal = if sum > 0.0 { EQUAL } else { 1.0 };
-    let (each, by_variance) =
-        (count * equal / number, count * (1.0 - equal) / f64::max(sum, 1e-300));
-    let mut drawn: Vec<Drawn> = Vec::new();
-    let (mut reached, mut next) = (0.0, place(lot, 0));
-    let mut unit = 0;
-    for (index, variance) in lit() {
-        let chance = (each + by_variance * variance).min(1.0);
-        reached += chance;
-        while next < reached {
-            match drawn.last_mut().filter(|last| last.index == index) {
-                Some(last) => last.weight += 1.0 / chance,
-                None => drawn.push(Drawn { index, weight: 1.0 / chance }),
-            }
-            unit += 1;
-            next = f64::from(unit) + place(lot, unit);
-        }
-    }
-    drawn
-}
-
-/// A place in [0, 1).
-fn place(lot: Lot, unit: u32) -> f64 {
-    let words = [lot.seed, u64::from(lot.frame) << 32 | u64::from(lot.number), u64::from(unit)];
-    let v = words.into_iter().fold(0, |v, word| mix(v ^ word));
-    (v >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// What two traces `a` and `b` tell about a pixel that is `shown`, squares of a display step, the
@@ -210,19 +94,16 @@ pub fn difference(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> f32 {
     ((0..3).map(|k| i[k] - m[k]).sum::<f64>() * STEPS / 3.0) as f32
 }
 
-/// The sums of a frame, `drawn` from it and traced twice each.
+/// The sums over the pixels `drawn` from a frame, as they are `shown` and in the two `traces` of the frame.
+/// How many pixels the frame has is left out, and so is who was inferred of those that were not drawn.
 pub fn sums(shown: &Shown, drawn: &[Drawn], traces: [&[Rgb]; 2]) -> AuditSums {
     let [a, b] = traces;
-    let mut sums = AuditSums {
-        pixels: shown.pixels().count() as u64,
-        inferred_pixels: (0..shown.rgb.len()).filter(|i| shown.is_inferred(*i)).count() as u64,
-        drawn: drawn.len() as u64,
-        ..AuditSums::default()
-    };
-    for (k, Drawn { index, weight }) in drawn.iter().enumerate() {
+    let mut sums = AuditSums { drawn: drawn.len() as u64, ..AuditSums::default() };
+    for Drawn { index, weight } in drawn {
         let i = *index as usize;
-        let squares = Squares::of(&shown.display, shown.rgb[i], a[k], b[k]);
+        let squares = Squares::of(&shown.display, shown.rgb[i], a[i], b[i]);
         if shown.is_inferred(i) {
+            sums.inferred_pixels += 1;
             sums.inferred.add(squares.error, *weight, UNSEEN);
         }
         sums.shown.add(squares.error, *weight, UNSEEN);
@@ -259,16 +140,16 @@ pub fn rmse(sums: &AuditSums) -> Option<Rmse> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::mix;
     use crate::scene::ToneCurve;
 
     const SRGB: Display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
     const LINEAR: Display = Display { exposure: 1.0, tone: ToneCurve::Linear };
-    const LOT: Lot = Lot { seed: 5, frame: 3, number: 0 };
 
     /// Noise of mean 0 and variance 1: the sum of twelve uniform numbers less 6.
     fn noise(k: u32) -> f32 {
-        let lot = Lot { seed: 1, frame: k, number: 7 };
-        ((0..12).map(|u| place(lot, u)).sum::<f64>() - 6.0) as f32
+        let uniform = |u: u32| (mix(u64::from(k) << 32 | u64::from(u)) >> 11) as f64;
+        ((0..12).map(|u| uniform(u) / (1u64 << 53) as f64).sum::<f64>() - 6.0) as f32
     }
 
     fn mean(n: u32, of: impl Fn(u32) -> f64) -> f64 {
@@ -300,67 +181,5 @@ mod tests {
             let estimate = mean(n, |k| both(k).trace);
             assert!((estimate / own - 1.0).abs() < 0.03, "{truth}: {estimate} of {own}");
         }
-    }
-
-    fn foretold() -> Vec<f32> {
-        // A quarter of the pixels cannot be off, every tenth of the others is risky.
-        let one = |i: u32| if i % 4 == 0 { -1.0 } else { f32::from(u8::from(i % 10 == 1)) };
-        (0..4000).map(one).collect()
-    }
-
-    #[test]
-    fn a_draw_has_its_size_favours_risk_and_hits_no_background() {
-        let foretold = foretold();
-        let drawn = draw(&foretold, 0..4000, 150.0, LOT);
-        assert_eq!(drawn, draw(&foretold, 0..4000, 150.0, LOT));
-        assert_ne!(drawn, draw(&foretold, 0..4000, 150.0, Lot { frame: 4, ..LOT }));
-        assert_ne!(drawn, draw(&foretold, 0..4000, 150.0, Lot { number: 1, ..LOT }));
-        assert!((140..=151).contains(&drawn.len()), "{}", drawn.len());
-        assert!(drawn.iter().all(|d| foretold[d.index as usize] >= 0.0));
-        let risky = drawn.iter().filter(|d| foretold[d.index as usize] > 0.0).count();
-        assert!((85..=125).contains(&risky), "{risky} of {}", drawn.len());
-        assert!(draw(&foretold, 0..0, 10.0, LOT).is_empty());
-        assert!(draw(&foretold, 0..4000, 0.0, LOT).is_empty());
-        let all = draw(&foretold, 0..4000, 1e9, LOT);
-        assert_eq!(all.len(), 3000);
-        assert!(all.iter().all(|d| d.weight == 1.0));
-    }
-
-    /// Weighted by one over their chance, the drawn pixels stand for all: any figure's total is
-    /// right on average.
-    #[test]
-    fn totals_are_unbiased_over_draws() {
-        let foretold = foretold();
-        let figure = |i: u32| f64::from(i % 7) + if i % 10 == 1 { 30.0 } else { 0.0 };
-        let total: f64 = (0..4000).filter(|i| i % 4 != 0).map(figure).sum();
-        let estimate = mean(2000, |frame| {
-            let drawn = draw(&foretold, 0..4000, 33.3, Lot { frame, ..LOT });
-            drawn.iter().map(|d| d.weight * figure(d.index)).sum()
-        });
-        assert!((estimate / total - 1.0).abs() < 0.01, "{estimate} of {total}");
-    }
-
-    #[test]
-    fn a_penumbras_rim_is_risky_too_and_darkness_hides() {
-        let mut sources =
-            vec![PixelSource { provenance: Provenance::Both, ..PixelSource::default() }; 25];
-        sources[12].risk = 0.1;
-        sources[24].provenance = Provenance::Background;
-        let mut rgb = vec![Rgb::splat(0.5); 25];
-        rgb[7] = Rgb::splat(5.0);
-        let mut shown = Shown {
-            rgb: &rgb,
-            sources: &sources,
-            width: 5,
-            crop: None,
-            display: SRGB,
-            everywhere: false,
-        };
-        let foretold = shown.foretold();
-        let risky: Vec<usize> = (0..25).filter(|i| foretold[*i] > 0.0).collect();
-        assert_eq!(risky, [6, 8, 11, 12, 13, 16, 17, 18], "7 is white whatever its light");
-        assert!(foretold[24] < 0.0);
-        shown.everywhere = true;
-        assert_eq!(shown.foretold()[24], 0.0);
     }
 }

@@ -1,10 +1,11 @@
 //! What is worth a lookup: decided from a fixed table of costs, never from measured times, so that
 //! every machine decides alike.
 
+use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
 use crate::inference::{Channel, Channels};
 use crate::scene::{Light, Scene, Settings};
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, ReuseCounts};
 
 /// A camera ray with the look at its surface: the unit.
 const CAMERA_RAY: f64 = 1.0;
@@ -126,12 +127,18 @@ fn shadow_rays(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> u64 {
     scene.lights.iter().map(one).sum::<u64>() + sky
 }
 
-/// Whether every light whose shadow rays are drawn at random is among `channels`: then what none of
-/// these reaches has no noise.
-pub fn is_all_kept(channels: &Channels, scene: &Scene, plan: &EffectPlan) -> bool {
-    let sampled = Channels::of(scene, |channel| match channel {
-        Channel::Area(_) => plan.area_lights,
-        Channel::Sky => plan.sky_light,
-    });
-    channels.len() == sampled.len()
+/// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
+/// was found at probes. They have `points` surface points, all of which were traced.
+pub fn is_worth_looking(
+    evidence: &Evidence,
+    findings: &[Finding],
+    points: &ReuseCounts,
+    scene: &Scene,
+    plan: &EffectPlan,
+    settings: &Settings,
+) -> bool {
+    let usable = findings.iter().filter(|finding| evidence.may_use(finding)).count() as f64;
+    let all = (points.direct + points.specular) as f64;
+    let rays = SHADOW_RAY * shadow_rays(scene, plan, settings) as f64 * f64::from(settings.spp);
+    usable * rays > LOOKUP * all
 }

@@ -122,7 +122,7 @@ pub(super) fn edge_of(level: i32) -> f64 {
     f64::from_bits(((level + 1023) as u64) << 52)
 }
 
-fn cell_of(p: DVec3, edge: f64) -> [i64; 3] {
+pub(super) fn cell_of(p: DVec3, edge: f64) -> [i64; 3] {
     (p / edge).to_array().map(|c| {
         // Towards zero, then down: without SSE 4.1 `floor` is a call.
         let towards_zero = c as i64;
@@ -130,7 +130,7 @@ fn cell_of(p: DVec3, edge: f64) -> [i64; 3] {
     })
 }
 
-fn key_of(level: i32, geom_id: u32, cell: [i64; 3]) -> Key {
+pub(super) fn key_of(level: i32, geom_id: u32, cell: [i64; 3]) -> Key {
     cell.into_iter().fold(key_of_level(level, geom_id), further)
 }
 

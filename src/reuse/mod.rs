@@ -9,18 +9,19 @@
 
 pub mod audit;
 pub mod colour;
+mod class;
 mod cost;
+pub mod evidence;
 mod index;
 mod lookup;
-mod noise;
-mod plane;
+mod probe;
 mod reference;
 pub mod store;
 mod taps;
 
 pub use cost::{
-    LookupReason, channels, is_all_kept, lookup_reasons, of_frame, of_traced_pixel, rays_of,
+    LookupReason, channels, is_worth_looking, lookup_reasons, of_frame, of_traced_pixel, rays_of,
 };
-pub use lookup::{Evidence, Lookup};
-pub use noise::NoiseMeter;
+pub use lookup::{Judged, Lookup};
+pub use probe::{Probe, ProbeDraw};
 pub use reference::Reference;

@@ -6,12 +6,12 @@
 
 mod gather;
 
+use super::evidence::Finding;
 use super::index::Index;
 use crate::inference::{SurfacePoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Camera;
 use gather::Gathered;
-use half::bf16;
 use wide::f32x4;
 
 /// No sample.
@@ -26,8 +26,6 @@ pub(super) struct Sample {
     pub p: Vec3,
     /// A unit of length is [`Sample::UNIT`].
     n: [i16; 3],
-    /// Camera samples whose shadow rays it gathers; this many stand for more.
-    pub samples: u16,
     pub geom_id: u32,
     /// Of the first channel.
     first: Known,
@@ -39,33 +37,58 @@ pub(super) struct Sample {
 struct Known {
     /// NaN where unknown.
     ratio: f32,
-    slope: bf16,
-    bend: bf16,
+    bend: Level,
+    wide: Level,
+    far: Level,
 }
 
-/// What four samples know about a light: ratio, and [`Change`].
+/// A size from 0 to 1 in a byte, a sixteenth of it at most lost; 255 is NaN.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Level(u8);
+
+impl Level {
+    const UNKNOWN: Self = Self(u8::MAX);
+    /// Exponent and the mantissa's first four bits of an f32, of the number whose byte would be 0: 2⁻¹⁶.
+    const ZERO: u32 = (127 - 16) << 4;
+
+    fn of(x: f32) -> Self {
+        if x.is_nan() {
+            return Self::UNKNOWN;
+        }
+        let level = (x.max(0.0).to_bits() >> 19).saturating_sub(Self::ZERO);
+        Self(level.min(254) as u8)
+    }
+
+    fn get(self) -> f32 {
+        match self {
+            Self(0) => 0.0,
+            Self::UNKNOWN => f32::NAN,
+            Self(level) => f32::from_bits((u32::from(level) + Self::ZERO) << 19),
+        }
+    }
+}
+
+/// What four samples know about a light: ratio, and [`Contrast`].
 pub(super) struct Known4 {
     pub ratio: f32x4,
-    pub slope: f32x4,
     pub bend: f32x4,
+    pub wide: f32x4,
+    pub far: f32x4,
 }
 
-/// How a ratio changes around a sample; NaN where too few samples beside it are known.
+/// How a ratio changes around a sample on its surface; NaN where too few samples are known.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Change {
-    /// By how much at most towards one beside it, per footprint.
-    pub slope: f32,
-    /// By how much that differs at most on opposite sides: nothing on a plane, however steep.
+pub(super) struct Contrast {
+    /// By how much it is off the mean of those on opposite sides of it, at most: nothing on a plane.
     pub bend: f32,
+    /// By how much it differs at most from those of the 5 x 5 pixels around it.
+    pub wide: f32,
+    /// The same of any of these and the 5 x 5 pixels around it: 9 x 9 in all.
+    pub far: f32,
 }
 
-impl Change {
-    pub const UNKNOWN: Self = Self { slope: f32::NAN, bend: f32::NAN };
-
-    /// The larger of both; of NaN and a number the number.
-    pub fn max(self, other: Self) -> Self {
-        Self { slope: self.slope.max(other.slope), bend: self.bend.max(other.bend) }
-    }
+impl Contrast {
+    pub const UNKNOWN: Self = Self { bend: f32::NAN, wide: f32::NAN, far: f32::NAN };
 }
 
 impl Sample {
@@ -79,7 +102,6 @@ impl Sample {
         Self {
             p: point.p.as_vec3(),
             n: n.map(|x| x as i16),
-            samples: point.samples.min(u32::from(u16::MAX)) as u16,
             geom_id: point.geom_id,
             first,
         }
@@ -93,17 +115,18 @@ impl Sample {
 }
 
 impl Known {
-    const NOTHING: Self = Self { ratio: f32::NAN, slope: bf16::NAN, bend: bf16::NAN };
+    const NOTHING: Self = Self {
+        ratio: f32::NAN,
+        bend: Level::UNKNOWN,
+        wide: Level::UNKNOWN,
+        far: Level::UNKNOWN,
+    };
 
-    fn of(ratio: f32, change: Change) -> Self {
-        let Change { slope, bend } = change;
-        Self { ratio, slope: bf16::from_f32(slope), bend: bf16::from_f32(bend) }
+    fn of(ratio: f32, contrast: Contrast) -> Self {
+        let [bend, wide, far] =
+            [contrast.bend, contrast.wide, contrast.far].map(Level::of);
+        Self { ratio, bend, wide, far }
     }
-}
-
-/// `x` as it is: the crate's own way looks at what kind of NaN it may be.
-fn widened(x: bf16) -> f32 {
-    f32::from_bits(u32::from(x.to_bits()) << 16)
 }
 
 /// A camera, made ready to see many points.
@@ -171,6 +194,8 @@ pub struct Reference {
     channels: usize,
     /// Samples that are no pixel's own.
     pub(super) index: Index,
+    /// What the frame's probes found.
+    findings: Vec<Finding>,
 }
 
 impl Reference {
@@ -178,10 +203,10 @@ impl Reference {
     pub fn new(frame: u32, camera: &Camera, traced: &TracedPoints, channels: usize) -> Self {
         let view = View::of(camera);
         let gathered = Gathered::of(traced, channels, &view);
-        let changes = gathered.changes();
+        let contrasts = gathered.contrasts();
         let known = |i: u32, channel: usize| {
             let at = i as usize * channels + channel;
-            Known::of(gathered.ratios[at], changes[at])
+            Known::of(gathered.ratios[at], contrasts[at])
         };
         let mut order = Vec::with_capacity(gathered.points.len());
         let mut slots = vec![NONE; view.slots()];
@@ -203,7 +228,17 @@ impl Reference {
         let samples = samples.collect();
         let more = order.iter().flat_map(|i| (1..channels).map(|channel| known(*i, channel)));
         let more = more.collect();
-        Self { frame, view, slots, samples, more, channels, index }
+        Self { frame, view, slots, samples, more, channels, index, findings: Vec::new() }
+    }
+
+    /// The same with what the frame's probes found.
+    pub fn with_findings(self, findings: Vec<Finding>) -> Self {
+        Self { findings, ..self }
+    }
+
+    /// What the frame's probes found.
+    pub fn findings(&self) -> &[Finding] {
+        &self.findings
     }
 
     /// Number of references that are frames of another shot: they count as earlier than all.
@@ -232,7 +267,8 @@ impl Reference {
     /// Bytes that it holds.
     pub fn memory(&self) -> u64 {
         let samples = size_of_val(&self.samples[..]) + size_of_val(&self.more[..]);
-        (samples + size_of_val(&self.slots[..])) as u64 + self.index.memory()
+        let findings = size_of_val(&self.findings[..]);
+        (samples + size_of_val(&self.slots[..]) + findings) as u64 + self.index.memory()
     }
 
     /// The sample of what is seen directly at a pixel; [`NONE`] outside the image too.
@@ -244,19 +280,15 @@ impl Reference {
 
     /// What samples know in a channel.
     pub(super) fn known(&self, samples: &[u32; 4], channel: usize) -> Known4 {
-        let [mut ratio, mut slope, mut bend] = [[0.0; 4]; 3];
+        let [mut ratio, mut bend, mut wide, mut far] = [[0.0; 4]; 4];
         for (k, sample) in samples.iter().enumerate() {
             let own = self.known_by(*sample, channel);
             ratio[k] = own.ratio;
-            slope[k] = widened(own.slope);
-            bend[k] = widened(own.bend);
+            bend[k] = own.bend.get();
+            wide[k] = own.wide.get();
+            far[k] = own.far.get();
         }
-        Known4 { ratio: ratio.into(), slope: slope.into(), bend: bend.into() }
-    }
-
-    /// A sample's ratio in a channel; NaN where unknown.
-    pub(super) fn ratio(&self, sample: u32, channel: usize) -> f32 {
-        self.known_by(sample, channel).ratio
+        Known4 { ratio: ratio.into(), bend: bend.into(), wide: wide.into(), far: far.into() }
     }
 
     #[inline]
@@ -264,6 +296,27 @@ impl Reference {
         match channel {
             0 => &self.samples[sample as usize].first,
             _ => &self.more[sample as usize * (self.channels - 1) + channel - 1],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_fills_half_a_line_of_the_cache() {
+        assert_eq!(size_of::<Sample>(), 32);
+    }
+
+    #[test]
+    fn levels_lose_a_sixteenth_at_most() {
+        assert!(Level::of(f32::NAN).get().is_nan());
+        assert_eq!([0.0, 1.0, 0.5, 1e-9].map(|x| Level::of(x).get()), [0.0, 0.9375, 0.5, 0.0]);
+        for k in 1..10_000 {
+            let x = k as f32 / 10_000.0;
+            let got = Level::of(x).get();
+            assert!(got <= x && got >= x * (1.0 - 1.0 / 16.0), "{x}: {got}");
         }
     }
 }

@@ -12,6 +12,8 @@
 //! what was really read, and every number must be one that tracing could have left.
 
 use super::Reference;
+use super::class::CLASSES;
+use super::evidence::Finding;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
@@ -27,9 +29,13 @@ use std::path::Path;
 /// The attribute of an exr file that holds it.
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// How the bytes begin: the last letter is the layout's version.
-const MAGIC: &[u8; 8] = b"twrayrf1";
+const MAGIC: &[u8; 8] = b"twrayrf2";
 /// Words of a point beside its ratios.
 const WORDS: usize = 12;
+/// Bytes of a finding.
+const FINDING: usize = 8 * 4;
+/// Largest squared error of a finding: from black to white, display steps.
+const MOST_ERROR: f32 = 255.0 * 255.0;
 /// Bytes deflated together.
 const PART: usize = 1 << 20;
 /// Most bytes of points that are written or read.
@@ -65,6 +71,7 @@ struct Head {
     /// Settings as text; told, never used.
     settings: String,
     points: usize,
+    findings: usize,
 }
 
 impl Terms {
@@ -122,6 +129,8 @@ pub struct Kept<'a> {
     pub crop: Option<Rect>,
     /// Scene space.
     pub traced: &'a TracedPoints,
+    /// What the frame's probes found, scene space.
+    pub findings: &'a [Finding],
     /// Settings in words.
     pub settings: &'a str,
 }
@@ -137,12 +146,11 @@ impl Kept<'_> {
             frame: self.frame,
             settings: self.settings.into(),
             points: order.len(),
+            findings: self.findings.len(),
         };
-        let columns = WORDS + channels;
-        if order.len().checked_mul(4 * columns).is_none_or(|n| n > MOST_BYTES) {
-            return None;
-        }
-        let raw = self.planes(&order, channels);
+        size_of_record(head.points, channels, head.findings)?;
+        let mut raw = self.planes(&order, channels);
+        raw.extend(self.findings.iter().flat_map(finding_bytes));
         let json = serde_json::to_vec(&head).ok()?;
         let mut body = (json.len() as u32).to_le_bytes().to_vec();
         body.extend(json);
@@ -229,16 +237,64 @@ pub fn decode(
         return Err(refuse(why));
     }
     let camera = take(&mut body, CAMERA).and_then(camera_of).ok_or_else(damaged)?;
-    let traced = points_of(body, head.points, terms.lights.len(), &camera).ok_or_else(damaged)?;
+    let (traced, findings) =
+        record_of(body, &head, terms.lights.len(), &camera).ok_or_else(damaged)?;
     let camera = camera.to_scene(recentring);
     let reference = Reference::new(Reference::SUPPLIED, &camera, &traced, terms.lights.len());
-    Ok((reference, *hash))
+    Ok((reference.with_findings(findings), *hash))
 }
 
-fn points_of(body: &[u8], count: usize, channels: usize, camera: &Camera) -> Option<TracedPoints> {
+/// Bytes of `points` with `channels` ratios each, and `findings`; `None` where they are too many.
+fn size_of_record(points: usize, channels: usize, findings: usize) -> Option<usize> {
+    let of_points = points.checked_mul(4 * (WORDS + channels))?;
+    let of_findings = findings.checked_mul(FINDING)?;
+    of_points.checked_add(of_findings).filter(|n| *n <= MOST_BYTES)
+}
+
+fn record_of(
+    body: &[u8],
+    head: &Head,
+    channels: usize,
+    camera: &Camera,
+) -> Option<(TracedPoints, Vec<Finding>)> {
+    let raw = inflated(body, size_of_record(head.points, channels, head.findings)?)?;
+    let (points, findings) = raw.split_at_checked(4 * (WORDS + channels) * head.points)?;
+    let findings: Option<Vec<Finding>> = findings.chunks_exact(FINDING).map(finding_of).collect();
+    Some((points_of(points, head.points, channels, camera)?, findings?))
+}
+
+fn finding_bytes(finding: &Finding) -> [u8; FINDING] {
+    let Finding { p, footprint, geom_id, class, error, noise } = *finding;
+    let floats = [p.x, p.y, p.z, footprint, error, noise].map(f32::to_bits);
+    let mut bytes = [0; FINDING];
+    let words = floats.into_iter().chain([geom_id, u32::from(class)]);
+    for (to, word) in bytes.chunks_exact_mut(4).zip(words) {
+        to.copy_from_slice(&word.to_le_bytes());
+    }
+    bytes
+}
+
+/// What [`finding_bytes`] made bytes of, if probes can have found it.
+fn finding_of(mut bytes: &[u8]) -> Option<Finding> {
+    let mut words = [0; FINDING / 4];
+    for word in &mut words {
+        *word = take_u32(&mut bytes)? as u32;
+    }
+    let [x, y, z, footprint, error, noise, geom_id, class] = words;
+    let [x, y, z, footprint, error, noise] = [x, y, z, footprint, error, noise].map(f32::from_bits);
+    let class = u8::try_from(class).ok().filter(|class| usize::from(*class) < CLASSES)?;
+    let finding = Finding { p: Vec3::new(x, y, z), footprint, geom_id, class, error, noise };
+    let is_sound = finding.p.is_finite()
+        && footprint.is_finite()
+        && footprint > 0.0
+        && finding.p.abs().max_element() / footprint < MOST_CELLS
+        && error.abs() <= MOST_ERROR
+        && (0.0..=MOST_ERROR).contains(&noise);
+    is_sound.then_some(finding)
+}
+
+fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Option<TracedPoints> {
     let columns = WORDS + channels;
-    let expected = count.checked_mul(4 * columns).filter(|n| *n <= MOST_BYTES)?;
-    let raw = inflated(body, expected)?;
     let word = |i: usize, column: usize| {
         let byte = |b: usize| raw[(4 * column + b) * count + i];
         u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])

@@ -6,7 +6,7 @@ mod image;
 pub(super) use image::ALWAYS;
 
 use super::index::{Cells, level_of};
-use super::lookup::{Evidence, Lookup};
+use super::lookup::Lookup;
 use super::reference::{NONE, Reference, Sample};
 use crate::inference::SurfacePoint;
 use crate::math::Vec3;
@@ -14,20 +14,19 @@ use wide::{CmpGe, CmpGt, CmpLe, f32x4};
 
 /// Lanes of four that one point's answer is made of, at most.
 const MOST: usize = 8;
+/// With this sum of weights, of 1 that a whole reference gives, no further reference is asked.
+pub(super) const ENOUGH_WEIGHT: f64 = 0.6;
+/// Least cosine between normals; samples count by the square of what is above it.
+const LEAST_COS: f32 = 0.8;
+/// A sample lies on the point's surface up to this height above its tangent plane, footprints, and
+/// further by this share of its distance along the plane.
+const HEIGHT: f32 = 0.7;
+const SLOPE: f32 = 0.35;
 /// Levels of the index that are asked: a point's own, the finer and the coarser one.
 const LEVELS: usize = 3;
 
 /// Three coordinates of four places.
 type Vec3x4 = [f32x4; 3];
-
-/// A sample that lies on the point's surface.
-#[derive(Clone, Copy)]
-pub(super) struct Tap {
-    pub reference: u32,
-    pub sample: u32,
-    /// From the point to the sample, footprints.
-    pub apart: Vec3,
-}
 
 /// Up to four samples of one reference that lie on the point's surface; the others have no weight.
 #[derive(Clone, Copy)]
@@ -40,10 +39,7 @@ pub(super) struct Taps4 {
     /// Weight in means: more alike than the weights, since that averages more of tracing's noise.
     pub share: f32x4,
     /// From the point to the sample, footprints.
-    pub apart: Vec3x4,
     pub distance: f32x4,
-    /// Camera samples whose shadow rays each gathers.
-    pub camera_samples: f32x4,
 }
 
 /// The samples about a point.
@@ -69,11 +65,9 @@ pub(super) struct Place {
 struct Near4 {
     /// All bits set where they are.
     is_near: f32x4,
-    apart: Vec3x4,
     distance: f32x4,
     /// 1 with the point's own normal, 0 where they are as far apart as can be.
     alike: f32x4,
-    camera_samples: f32x4,
 }
 
 impl Taps4 {
@@ -82,13 +76,16 @@ impl Taps4 {
         samples: [0; 4],
         weight: f32x4::ZERO,
         share: f32x4::ZERO,
-        apart: [f32x4::ZERO; 3],
         distance: f32x4::ZERO,
-        camera_samples: f32x4::ZERO,
     };
 
     /// Those of `samples` that are `near` and have a weight; `None` where there is none.
-    fn new(reference: u32, mut samples: [u32; 4], weight: f32x4, near: &Near4) -> Option<Self> {
+    fn new(
+        reference: u32,
+        mut samples: [u32; 4],
+        weight: f32x4,
+        near: &Near4,
+    ) -> Option<Self> {
         let weight = weight & near.is_near & weight.cmp_gt(f32x4::ZERO);
         let some = weight.cmp_gt(f32x4::ZERO).move_mask();
         let any = *samples.get(some.trailing_zeros() as usize)?;
@@ -98,22 +95,17 @@ impl Taps4 {
         // To the power of 3/4.
         let root = weight.sqrt();
         let share = root * root.sqrt();
-        let Near4 { apart, distance, camera_samples, .. } = *near;
-        Some(Self { reference, samples, weight, share, apart, distance, camera_samples })
+        Some(Self { reference, samples, weight, share, distance: near.distance })
     }
 
     /// Writes lane `from` of `other` into lane `to`.
     fn set(&mut self, to: usize, other: &Self, from: usize) {
         self.samples[to] = other.samples[from];
-        let rows = |t: &Self| {
-            let [x, y, z] = t.apart;
-            [t.weight, t.share, x, y, z, t.distance, t.camera_samples].map(f32x4::to_array)
-        };
+        let rows = |t: &Self| [t.weight, t.share, t.distance].map(f32x4::to_array);
         let (mut own, others) = (rows(self), rows(other));
         own.iter_mut().zip(others).for_each(|(own, other)| own[to] = other[from]);
-        let [weight, share, x, y, z, distance, camera_samples] = own.map(f32x4::from);
-        (self.weight, self.share, self.apart) = (weight, share, [x, y, z]);
-        (self.distance, self.camera_samples) = (distance, camera_samples);
+        let [weight, share, distance] = own.map(f32x4::from);
+        (self.weight, self.share, self.distance) = (weight, share, distance);
     }
 }
 
@@ -160,19 +152,6 @@ impl Taps {
     pub fn fours(&self) -> &[Taps4] {
         &self.list[..self.len]
     }
-
-    /// One by one.
-    pub fn iter(&self) -> impl Iterator<Item = Tap> {
-        self.fours().iter().flat_map(|four| {
-            let ([x, y, z], weight) = (four.apart.map(f32x4::to_array), four.weight.to_array());
-            let lanes = (0..4).filter(move |k| weight[*k] > 0.0);
-            lanes.map(move |k| Tap {
-                reference: four.reference,
-                sample: four.samples[k],
-                apart: Vec3::new(x[k], y[k], z[k]),
-            })
-        })
-    }
 }
 
 impl Place {
@@ -188,17 +167,15 @@ impl Place {
         &self,
         reference: &Reference,
         samples: &[u32; 4],
-        evidence: &Evidence,
         (footprint, reach): (f32, f32),
     ) -> Near4 {
-        let [mut x, mut y, mut z, mut nx, mut ny, mut nz, mut camera_samples] = [[0.0; 4]; 7];
+        let [mut x, mut y, mut z, mut nx, mut ny, mut nz] = [[0.0; 4]; 6];
         for (k, sample) in samples.iter().enumerate() {
             // A lane that stays 0 has no normal like any.
             let found = reference.samples.get(*sample as usize);
             if let Some(s) = found.filter(|s| s.geom_id == self.geom_id) {
                 [x[k], y[k], z[k]] = [s.p.x, s.p.y, s.p.z];
                 [nx[k], ny[k], nz[k]] = s.normal();
-                camera_samples[k] = f32::from(s.samples);
             }
         }
         let by = f32x4::splat(1.0 / footprint);
@@ -213,19 +190,16 @@ impl Place {
         let n = [f32x4::splat(self.n.x), f32x4::splat(self.n.y), f32x4::splat(self.n.z)];
         let cos = dot([nx.into(), ny.into(), nz.into()], n) * f32x4::splat(1.0 / Sample::UNIT);
         let distance = dot(apart, apart).sqrt();
-        let allowed = f32x4::splat(evidence.slope) * distance + f32x4::splat(evidence.height);
-        let least = f32x4::splat(evidence.least_cos);
+        let allowed = f32x4::splat(SLOPE) * distance + f32x4::splat(HEIGHT);
+        let least = f32x4::splat(LEAST_COS);
         let is_near = cos.cmp_ge(least)
             & distance.cmp_le(f32x4::splat(reach))
             & dot(apart, n).abs().cmp_le(allowed);
-        let alike = (cos - least) * f32x4::splat(1.0 / (1.0 - evidence.least_cos));
-        let [x, y, z] = apart;
+        let alike = (cos - least) * f32x4::splat(1.0 / (1.0 - LEAST_COS));
         Near4 {
             is_near,
-            apart: [x & is_near, y & is_near, z & is_near],
             distance: distance & is_near,
             alike: alike.fast_min(f32x4::ONE) & is_near,
-            camera_samples: f32x4::from(camera_samples) & is_near,
         }
     }
 }
@@ -235,24 +209,24 @@ impl Lookup<'_> {
     pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
         found.iter().flatten().for_each(|four| taps.push(four));
-        if taps.weight >= self.evidence.enough_weight {
+        if taps.weight >= ENOUGH_WEIGHT {
             return;
         }
         let place = Place::of(point);
         for (number, reference) in self.references.iter().enumerate().skip(ALWAYS) {
-            if taps.weight >= self.evidence.enough_weight {
+            if taps.weight >= ENOUGH_WEIGHT {
                 return;
             }
             let image = self.image(reference, point);
             let four = image.and_then(|image| self.screen_taps(number, &place, &image));
             four.iter().for_each(|four| taps.pack(four));
         }
-        if !point.direct && taps.weight < self.evidence.enough_weight {
+        if !point.direct && taps.weight < ENOUGH_WEIGHT {
             let own = level_of(point.footprint);
             let cells =
                 [own, own - 1, own + 1].map(|level| Cells::around(level, point.geom_id, point.p));
             for number in 0..self.references.len() {
-                if taps.weight >= self.evidence.enough_weight {
+                if taps.weight >= ENOUGH_WEIGHT {
                     return;
                 }
                 self.index_taps(number, (&place, point.footprint), &cells, taps);
@@ -275,7 +249,7 @@ impl Lookup<'_> {
             while let Some(first) = members.next() {
                 let mut samples = [first, NONE, NONE, NONE];
                 samples[1..].iter_mut().zip(&mut members).for_each(|(to, sample)| *to = sample);
-                let near = place.near(reference, &samples, &self.evidence, (footprint, reach));
+                let near = place.near(reference, &samples, (footprint, reach));
                 let weight = f32x4::splat(0.5) - near.distance * f32x4::splat(0.5 / reach);
                 if let Some(four) = Taps4::new(number as u32, samples, weight, &near) {
                     taps.pack(&four);

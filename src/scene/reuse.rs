@@ -9,15 +9,12 @@ pub struct ReuseSettings {
     pub policy: Policy,
     /// Frames from one key frame to the next.
     pub segment: u32,
-    /// By how much samples that stand for one another may disagree beyond their noise, display steps
-    /// of 1/255; `None` for one step, and less where traced frames are more exact than that.
-    pub tolerance: Option<f32>,
-    /// Share of an in-between frame's cost that goes into tracing inferred pixels again, to measure
-    /// how far off they are.
-    pub audit: f32,
-    /// Root mean square error of inferred pixels above which they are traced where that is better,
-    /// display steps of 1/255; `None` for no bound.
-    pub max_rmse: Option<f32>,
+    /// By how much inferred pixels may be off where traced ones are not, display steps of 1/255: root
+    /// mean square over a tile of 32 x 32 pixels.
+    pub tolerance: f32,
+    /// Share of the pixels of an in-between frame that are traced although other frames may know them, to
+    /// measure how far off these are. More in the frames that are inferred from key frames alone.
+    pub probes: f32,
     /// Colour policy: cached colours agree within this, linear colour difference in any channel.
     pub colour_epsilon: f32,
     /// Colour policy: cached distances agree within this, a share of the distance.
@@ -29,9 +26,8 @@ impl Default for ReuseSettings {
         Self {
             policy: Policy::Surface,
             segment: 128,
-            tolerance: None,
-            audit: 0.03,
-            max_rmse: None,
+            tolerance: 0.25,
+            probes: 0.01,
             colour_epsilon: 0.02,
             distance_epsilon: 0.02,
         }

@@ -140,7 +140,6 @@ impl<'a> ColourMaker<'a> {
                 film: traced.film,
                 rays: traced.rays,
                 reuse,
-                tolerance: None,
                 audit: None,
                 reference: None,
             },

@@ -1,7 +1,7 @@
 //! The maker that infers frames from others of their segment and traces what cannot be inferred.
 
-mod calibrate;
 mod exchange;
+mod probing;
 
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
@@ -13,11 +13,12 @@ use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
+use crate::reuse::evidence::Finding;
 use crate::reuse::store::{Kept, Terms};
-use crate::reuse::{self, Evidence, Lookup, Reference};
+use crate::reuse::{self, Judged, Lookup, Reference};
 use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
-use calibrate::Allowed;
+use probing::Probed;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -38,10 +39,6 @@ pub struct Inferrer<'a> {
     pub progress: &'a dyn Progress,
     /// Which frames depend on which.
     pub pyramid: Pyramid,
-    /// What counts as evidence, where that is not left to the scene.
-    pub evidence: Evidence,
-    /// Whether evidence is made stricter where traced frames are more exact than its tolerance.
-    pub calibrates: bool,
     /// Frames of other shots that all frames, key frames too, are inferred from.
     pub supplied: Option<&'a Supply>,
     /// On which terms frames serve later jobs as references; `None` where none is kept.
@@ -54,8 +51,6 @@ pub struct Inferrer<'a> {
     laid: Laid,
     pub(super) schedule: Schedule,
     pub(super) channels: Channels,
-    /// Shadow rays of a camera sample, by channel.
-    rays: Vec<u32>,
     state: Mutex<State>,
 }
 
@@ -68,8 +63,8 @@ pub(super) struct State {
     again: Option<(u32, Made)>,
     pub(super) saved: Saved,
     most_memory: u64,
-    /// By middle of a segment, or key frame: what was found out about its evidence.
-    allowed: BTreeMap<u32, Allowed>,
+    /// The frame whose probes were rendered last.
+    probed: Option<(u32, Arc<Probed>)>,
     /// References for other ranks, until they are fetched.
     pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
 }
@@ -86,12 +81,7 @@ impl<'a> Inferrer<'a> {
         progress: &'a dyn Progress,
         pyramid: Pyramid,
     ) -> Result<Self> {
-        let tolerance = renderer.settings.reuse.tolerance;
-        let by_default = Evidence::default();
-        let evidence =
-            Evidence { tolerance: tolerance.unwrap_or(by_default.tolerance), ..by_default };
         let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
-        let rays = channels.iter().map(|c| reuse::rays_of(c, renderer.settings)).collect();
         // Where nothing is worth a lookup every frame is a key frame.
         let pyramid = if channels.is_empty() { Pyramid { segment: 1, ..pyramid } } else { pyramid };
         Ok(Self {
@@ -101,8 +91,6 @@ impl<'a> Inferrer<'a> {
             with_gbuffer: false,
             stop,
             progress,
-            evidence,
-            calibrates: tolerance.is_none() && !channels.is_empty(),
             supplied: None,
             terms: None,
             checkpoints: None,
@@ -111,7 +99,6 @@ impl<'a> Inferrer<'a> {
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
-            rays,
             state: Mutex::default(),
         })
     }
@@ -121,26 +108,37 @@ impl<'a> Inferrer<'a> {
     fn frame(&self, frame: u32) -> Result<Option<Made>> {
         let camera = self.camera(frame)?;
         let is_due = self.with_state(|s| s.references.is_due(frame));
+        let Some(references) = self.references(&self.schedule.ancestors(frame))? else {
+            return Ok(None);
+        };
         let rendered = match self.laid.take(frame) {
             Some(rendered) => Some(rendered),
             None => self.rendered(frame, is_due, None, self.progress)?,
         };
-        let Some(Rendered { film, rays, reuse, sources }) = rendered else { return Ok(None) };
-        let Some(allowed) = self.allowed(frame)? else { return Ok(None) };
+        let Some(mut rendered) = rendered else { return Ok(None) };
+        let Some(probed) = self.probes(frame, &camera, &references)? else { return Ok(None) };
+        let mut audit = None;
+        let mut findings = &[][..];
+        if let Some(probed) = &probed {
+            let shown = self.show_probes(frame, &camera, &references, probed, &mut rendered)?;
+            let Some(shown) = shown else { return Ok(None) };
+            (audit, findings) = (shown, &probed.findings);
+        }
+        let Rendered { film, rays, reuse, sources } = rendered;
         // In one order, however the frame was cut for tracing, and as they come back from a file.
         let sources = self.pool.install(|| sources.in_rows());
-        let kept = self.kept(frame, &camera, &sources);
+        let kept = self.kept(frame, &camera, &sources, findings);
         if is_due {
             let own = camera.to_scene(&self.renderer.scene.recentring);
             let reference = Reference::new(frame, &own, &sources, self.channels.len());
+            let reference = reference.with_findings(findings.to_vec());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
-            self.leave(frame, &camera, &sources, kept.as_ref());
+            self.leave(frame, &camera, (&sources, findings), kept.as_ref());
         }
-        let tolerance = reuse.is_inferred().then_some(allowed.evidence.tolerance);
-        Ok(Some(Made { film, rays, reuse, tolerance, audit: None, reference: kept }))
+        Ok(Some(Made { film, rays, reuse, audit, reference: kept }))
     }
 
-    /// Renders the pixels of an original that `mask` names, or all.
+    /// Renders the pixels of an original that `mask` names, or all, but for its probes.
     fn rendered(
         &self,
         frame: u32,
@@ -151,19 +149,37 @@ impl<'a> Inferrer<'a> {
         let Some(references) = self.references(&self.schedule.ancestors(frame))? else {
             return Ok(None);
         };
-        let Some(Allowed { evidence, .. }) = self.allowed(frame)? else { return Ok(None) };
         let camera = self.camera(frame)?;
+        let Some(probed) = self.probes(frame, &camera, &references)? else { return Ok(None) };
+        let others = probed.as_ref().map(|probed| probed.others(mask));
         let job = FrameJob {
             camera: &camera,
             stream: frame,
             with_gbuffer: self.with_gbuffer,
             reuse: None,
-            mask,
+            mask: others.as_deref().or(mask),
             beyond_crop: is_due,
         };
-        self.with_lookup((frame, &camera), &references, evidence, |lookup| {
-            let inference = lookup.as_ref().map(|lookup| lookup as &dyn Inference);
-            self.render(job, inference, progress)
+        let Some(probed) = probed.filter(|probed| probed.is_worth_looking) else {
+            return Ok(self.render(job, None, progress));
+        };
+        self.with_lookup((frame, &camera), &references, |lookup| {
+            let evidence = |_| &probed.evidence;
+            let judged = lookup.as_ref().map(|lookup| Judged { lookup, evidence: &evidence });
+            self.render(job, judged.as_ref().map(|judged| judged as &dyn Inference), progress)
+        })
+    }
+
+    /// The probes of an original; the inner `None` where nothing can be inferred, the outer one when the
+    /// job shall stop.
+    fn probes(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        references: &[Arc<Reference>],
+    ) -> Result<Option<Option<Arc<Probed>>>> {
+        self.with_lookup((frame, camera), references, |lookup| {
+            lookup.map_or(Some(None), |lookup| self.probe(frame, camera, &lookup).map(Some))
         })
     }
 
@@ -173,7 +189,6 @@ impl<'a> Inferrer<'a> {
         &self,
         (frame, camera): (u32, &Camera),
         references: &[Arc<Reference>],
-        evidence: Evidence,
         act: impl FnOnce(Option<Lookup>) -> T,
     ) -> Result<T> {
         let own = camera.to_scene(&self.renderer.scene.recentring);
@@ -181,7 +196,7 @@ impl<'a> Inferrer<'a> {
         let nearest = |supply: &Supply| self.pool.install(|| supply.nearest(&own));
         let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
         let references = with_supplied(references, &supplied);
-        let lookup = Lookup { frame, references: &references, rays: &self.rays, evidence };
+        let lookup = Lookup { frame, references: &references, channels: self.channels.len() };
         Ok(act((!references.is_empty()).then_some(lookup)))
     }
 
@@ -197,8 +212,15 @@ impl<'a> Inferrer<'a> {
     }
 
     /// What the file of `frame` keeps for later jobs.
-    fn kept(&self, frame: u32, camera: &Camera, traced: &TracedPoints) -> Option<Arc<[u8]>> {
-        self.encode(self.terms.as_ref()?, frame, camera, self.renderer.settings.crop, traced)
+    fn kept(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        traced: &TracedPoints,
+        findings: &[Finding],
+    ) -> Option<Arc<[u8]>> {
+        let crop = self.renderer.settings.crop;
+        self.encode(self.terms.as_ref()?, frame, camera, crop, (traced, findings))
     }
 
     pub(super) fn encode(
@@ -207,10 +229,10 @@ impl<'a> Inferrer<'a> {
         frame: u32,
         camera: &Camera,
         crop: Option<Rect>,
-        traced: &TracedPoints,
+        (traced, findings): (&TracedPoints, &[Finding]),
     ) -> Option<Arc<[u8]>> {
         let settings = &WriteOptions::of(self.renderer.settings, None).settings;
-        let kept = Kept { terms, frame, camera, crop, traced, settings };
+        let kept = Kept { terms, frame, camera, crop, traced, findings, settings };
         self.pool.install(|| kept.encode()).map(Into::into)
     }
 
@@ -307,8 +329,7 @@ impl FrameMaker for Inferrer<'_> {
             }
             (s.early.remove(&original), s.copy_of(original))
         });
-        let mut made = match made {
-            // Audited when it was new.
+        let made = match made {
             (_, Some(copy)) => {
                 return self.finished(frame, self.hand_out(original, copy)?).map(Some);
             }
@@ -318,13 +339,6 @@ impl FrameMaker for Inferrer<'_> {
                 None => return Ok(None),
             },
         };
-        match self.audit(original, &mut made)? {
-            Some(audit) => made.audit = audit,
-            None => return Ok(None),
-        }
-        // Not before: the audit costs a share of the frame, not of the look.
-        let looked = self.allowed(original)?.map(|allowed| allowed.rays_of(original));
-        made.rays += looked.unwrap_or_default();
         if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
             // Its own file is about to hold it.
             self.with_state(|s| s.saved.has_file(original));

@@ -8,7 +8,6 @@
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
-mod audit;
 pub mod checkpoint;
 mod colour;
 mod fingerprint;
@@ -105,9 +104,6 @@ pub struct Made {
     pub rays: RayCounts,
     /// How much of it was inferred.
     pub reuse: ReuseCounts,
-    /// By how much samples that it is inferred from may disagree, display steps of 1/255; `None` where
-    /// it is not inferred so.
-    pub tolerance: Option<f32>,
     /// How good the inferred part is, where that was looked at.
     pub audit: Option<AuditSums>,
     /// What its exr file keeps for later jobs, see [`crate::reuse::store`].
@@ -126,7 +122,6 @@ impl Made {
             film: self.film.clone(),
             rays: RayCounts::default(),
             reuse,
-            tolerance: self.tolerance,
             audit: None,
             reference: self.reference.clone(),
         }
@@ -149,9 +144,6 @@ pub struct FrameReport {
     /// How much was inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
-    /// By how much samples that it is inferred from may disagree, display steps of 1/255.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f32>,
     /// How good the inferred part is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,
@@ -202,7 +194,7 @@ pub fn render_frame(
     let row = Row { audit, rank, ..write_frame(target, frame, &made, start)? };
     journal.append(&row)?;
     let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
-    let Row { bytes, bad, rays, reuse, tolerance, .. } = row;
+    let Row { bytes, bad, rays, reuse, .. } = row;
     Ok(Some(FrameReport {
         frame,
         trace_seconds,
@@ -210,7 +202,6 @@ pub fn render_frame(
         bytes,
         rays,
         reuse,
-        tolerance,
         audit,
         bad,
     }))
@@ -267,7 +258,6 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         rank: 0,
         rays: *rays,
         reuse: *reuse,
-        tolerance: made.tolerance,
         audit: None,
         bad: film.bad,
         maps,

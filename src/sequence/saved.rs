@@ -8,6 +8,7 @@ use super::checkpoint::Checkpoints;
 use super::{Inferrer, SaveCost};
 use crate::inference::TracedPoints;
 use crate::reuse::Reference;
+use crate::reuse::evidence::Finding;
 use crate::scene::Camera;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -169,7 +170,7 @@ impl Inferrer<'_> {
         &self,
         frame: u32,
         camera: &Camera,
-        traced: &TracedPoints,
+        left: (&TracedPoints, &[Finding]),
         kept: Option<&Arc<[u8]>>,
     ) {
         let saves = |c: &&Checkpoints| c.every.is_some() && self.pyramid.is_key(frame);
@@ -181,7 +182,7 @@ impl Inferrer<'_> {
         // A cropped frame's file holds less.
         let bytes = match kept.filter(|_| self.renderer.settings.crop.is_none()) {
             Some(bytes) => Some(Arc::clone(bytes)),
-            None => self.encode(terms, frame, camera, None, traced),
+            None => self.encode(terms, frame, camera, None, left),
         };
         let Some(bytes) = bytes else { return };
         if self.exchange.is_some() {

@@ -31,7 +31,6 @@ impl FrameMaker for Plain {
             film,
             rays,
             reuse: ReuseCounts::default(),
-            tolerance: None,
             audit: None,
             reference: None,
         }))

@@ -66,7 +66,6 @@ impl FrameMaker for Tracer<'_> {
             film,
             rays,
             reuse: ReuseCounts::default(),
-            tolerance: None,
             audit: None,
             reference: None,
         }))

@@ -65,6 +65,9 @@ impl Groups {
         self.asked.ratios.resize(count * channels, f32::NAN);
         self.asked.origins.clear();
         self.asked.origins.resize(count, Origin::default());
+        self.asked.pixels.clear();
+        let place = |pixel: &u32| <[u32; 2]>::from(pixels.place(*pixel));
+        self.asked.pixels.extend(self.pixels.iter().map(place));
         self.gathered.clear();
         self.gathered.resize(count * channels, Gathered::default());
         for flags in [&mut self.traced, &mut self.lit] {

@@ -52,8 +52,6 @@ pub struct AuditSums {
     pub shown: DrawnSum,
     /// Squared error that the same pixels would have, had all been traced.
     pub traced: DrawnSum,
-    /// Tiles that were traced because their error was too large.
-    pub tiles_traced: u64,
     /// Rays cast to find all this out; no ray that the picture is made of.
     pub rays: RayCounts,
 }
@@ -66,7 +64,6 @@ impl AddAssign for AuditSums {
         self.inferred += o.inferred;
         self.shown += o.shown;
         self.traced += o.traced;
-        self.tiles_traced += o.tiles_traced;
         self.rays += o.rays;
     }
 }

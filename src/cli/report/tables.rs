@@ -64,7 +64,7 @@ pub fn effects(job: &Job) -> Table {
 
 /// The audits: all frames together, then the worst frames.
 pub fn audit(job: &Job) -> Table {
-    let head = ["", "as shown", "inferred pixels alone", "traced", "pixels drawn", "tiles traced"];
+    let head = ["", "as shown", "inferred pixels alone", "traced", "pixels drawn"];
     let mut table = Table::new("What the audits found", &head);
     let Some(all) = job.audited() else { return table };
     table.rows.push(audit_cells("All frames", &audit_row(&all)));
@@ -92,7 +92,6 @@ fn audit_cells(name: &str, audit: &AuditRow) -> Vec<String> {
         figure(audit.rmse_inferred_pixels),
         figure(audit.rmse_traced),
         count(audit.sums.drawn),
-        count(audit.sums.tiles_traced),
     ]
 }
 

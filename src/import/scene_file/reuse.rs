@@ -21,15 +21,12 @@ pub(super) struct Reuse {
     policy: Policy,
     /// Frames from one key frame to the next.
     segment: Int<1, { limits::MAX_SEGMENT as i64 }>,
-    /// By how much samples may disagree beyond their noise and still stand for one another, display
-    /// steps of 1/255: less is more exact and slower. Absent: 1, and less where traced frames are more
-    /// exact than that.
-    tolerance: Option<Steps>,
-    /// Share of a frame's cost that goes into measuring its error.
-    audit: Share,
-    /// Surface policy: what is inferred with a larger measured root mean square error, display steps
-    /// of 1/255, is traced where that is better. Absent: no bound.
-    max_rmse: Option<Steps>,
+    /// By how much inferred pixels may be off where traced ones are not, display steps of 1/255: root mean
+    /// square over any tile of 32 x 32 pixels. Less is more exact and slower.
+    tolerance: Steps,
+    /// Share of the pixels of an in-between frame that are traced though other frames may know them: what
+    /// they find decides what is inferred.
+    probes: Share,
     /// Colour policy: cached colours agree within this linear difference.
     colour_epsilon: Amount,
     /// Colour policy: cached distances agree within this share of the distance.
@@ -54,9 +51,8 @@ impl Default for Reuse {
         Self {
             policy: r.policy,
             segment: Int::clamped(r.segment.into()),
-            tolerance: r.tolerance.map(|x| Steps(shortest(x))),
-            audit: Share(shortest(r.audit)),
-            max_rmse: r.max_rmse.map(|x| Steps(shortest(x))),
+            tolerance: Steps(shortest(r.tolerance)),
+            probes: Share(shortest(r.probes)),
             colour_epsilon: Amount(shortest(r.colour_epsilon)),
             distance_epsilon: Amount(shortest(r.distance_epsilon)),
             traced: Vec::new(),
@@ -85,9 +81,8 @@ impl Reuse {
         ReuseSettings {
             policy: self.policy,
             segment: self.segment.u32(),
-            tolerance: self.tolerance.map(|x| x.0 as f32),
-            audit: self.audit.0 as f32,
-            max_rmse: self.max_rmse.map(|x| x.0 as f32),
+            tolerance: self.tolerance.0 as f32,
+            probes: self.probes.0 as f32,
             colour_epsilon: self.colour_epsilon.0 as f32,
             distance_epsilon: self.distance_epsilon.0 as f32,
         }

@@ -1,11 +1,12 @@
 //! Traced points on their way into a reference: one sample for each pixel and surface.
 
-use super::{Change, NONE, View};
+use super::{Contrast, NONE, View};
 use crate::inference::{SurfacePoint, TracedPoints};
 use rayon::prelude::*;
 
-/// How far away samples lie beside one another at most, pixels.
-const BESIDE: isize = 3;
+/// Pixels around one in the ring of the 3 x 3, and in that of the 5 x 5.
+const NEAR: usize = 8;
+const WIDE: usize = 16;
 
 /// A frame's points before they are laid out.
 pub(super) struct Gathered {
@@ -61,66 +62,85 @@ impl Gathered {
         self.ratios.extend_from_slice(ratios);
     }
 
-    /// How the ratios change around each point: towards the nearest of its surface to the left,
-    /// the right, above and below, if that is no further than a few pixels.
-    pub fn changes(&self) -> Vec<Change> {
+    /// How the ratios change around each pixel's own point.
+    pub fn contrasts(&self) -> Vec<Contrast> {
+        let mut contrasts = vec![Contrast::UNKNOWN; self.ratios.len()];
+        self.fill(&mut contrasts, |own, near, wide, channel| {
+            let ratio = |at: &u32| match *at {
+                NONE => f32::NAN,
+                at => self.ratios[at as usize * self.channels + channel],
+            };
+            contrast(ratio(&own), near.map(|at| ratio(&at)), wide.map(|at| ratio(&at)))
+        });
+        let before = contrasts.clone();
+        self.fill(&mut contrasts, |own, near, wide, channel| {
+            let of = |at: u32| before[at as usize * self.channels + channel];
+            let others = near.iter().chain(wide).filter(|at| **at != NONE);
+            // What is not known there is not larger.
+            let far = others.map(|at| of(*at).wide).fold(of(own).wide, f32::max);
+            Contrast { far, ..of(own) }
+        });
+        contrasts
+    }
+
+    /// Fills `out` for each pixel's own point and channel with what `of` makes of its number and those of
+    /// the points around it.
+    fn fill(
+        &self,
+        out: &mut [Contrast],
+        of: impl Fn(u32, &[u32; NEAR], &[u32; WIDE], usize) -> Contrast + Sync,
+    ) {
         let (channels, width) = (self.channels, self.view.size[0] as usize);
         let rows = self.slots.par_chunks(width).enumerate().map(|(y, row)| {
-            let mut changes = Vec::new();
+            let mut found = Vec::new();
             for (x, own) in row.iter().enumerate().filter(|(_, own)| **own != NONE) {
-                let axes = [(1, 0), (0, 1)]
-                    .map(|(dx, dy)| [self.beside(x, y, (dx, dy)), self.beside(x, y, (-dx, -dy))]);
-                let own = *own as usize;
-                changes.extend((0..channels).map(|channel| self.change_along(&axes, own, channel)));
+                let (near, wide) = self.around(x, y);
+                found.extend((0..channels).map(|channel| of(*own, &near, &wide, channel)));
             }
-            changes
+            found
         });
-        let rows: Vec<Vec<Change>> = rows.collect();
-        let mut changes = vec![Change::UNKNOWN; self.ratios.len()];
+        let rows: Vec<Vec<Contrast>> = rows.collect();
         for (row, found) in self.slots.chunks(width).zip(rows) {
             let own = row.iter().filter(|own| **own != NONE);
             for (own, found) in own.zip(found.chunks(channels.max(1))) {
-                changes[*own as usize * channels..][..channels].copy_from_slice(found);
+                out[*own as usize * channels..][..channels].copy_from_slice(found);
             }
         }
-        changes
     }
 
-    /// The nearest point of the surface seen at (`x`, `y`) in a direction.
-    fn beside(&self, x: usize, y: usize, (dx, dy): (isize, isize)) -> Option<usize> {
-        let [width, height] = self.view.size.map(|size| size as usize);
-        let own = &self.points[self.slots[y * width + x] as usize];
-        (1..=BESIDE).find_map(|k| {
-            let x = x.checked_add_signed(dx * k).filter(|x| *x < width)?;
-            let y = y.checked_add_signed(dy * k).filter(|y| *y < height)?;
-            let other = self.slots[y * width + x];
+    /// The points of the same surface around the one seen at (`x`, `y`): those of the 3 x 3 pixels first,
+    /// then the other ones of the 5 x 5.
+    fn around(&self, x: usize, y: usize) -> ([u32; NEAR], [u32; WIDE]) {
+        let [width, height] = self.view.size.map(|size| size as isize);
+        let own = &self.points[self.slots[y * width as usize + x] as usize];
+        let mut rings = ([NONE; NEAR], [NONE; WIDE]);
+        let (mut near, mut wide) = (rings.0.iter_mut(), rings.1.iter_mut());
+        for (dx, dy) in (-2..=2).flat_map(|dy| (-2..=2).map(move |dx: isize| (dx, dy))) {
+            let (x, y) = (x as isize + dx, y as isize + dy);
+            let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+            let place = match dx.abs().max(dy.abs()) {
+                0 => continue,
+                1 => near.next(),
+                _ => wide.next(),
+            };
+            let other = if is_inside { self.slots[(y * width + x) as usize] } else { NONE };
             let is_one = other != NONE && self.points[other as usize].faces_as(own);
-            is_one.then_some(other as usize)
-        })
-    }
-
-    /// How a ratio changes from point `own` to those on both sides of it along two
-    /// axes.
-    fn change_along(&self, axes: &[[Option<usize>; 2]; 2], own: usize, channel: usize) -> Change {
-        let mut change = Change::UNKNOWN;
-        for axis in axes {
-            let [there, back] =
-                axis.map(|other| other.map_or(f32::NAN, |other| self.rise(own, other, channel)));
-            let slope = there.abs().max(back.abs());
-            change = change.max(Change { slope, bend: (there + back).abs() });
+            if let (Some(place), true) = (place, is_one) {
+                *place = other;
+            }
         }
-        change
+        rings
     }
+}
 
-    /// By how much a ratio rises from one point to another, per footprint.
-    fn rise(&self, from: usize, to: usize, channel: usize) -> f32 {
-        let (a, b) = (&self.points[from], &self.points[to]);
-        let depth = (a.p - self.view.eye).dot(self.view.forward);
-        let footprint = (depth * self.view.pixel_size) as f32;
-        let per_footprint = footprint / (a.p.distance(b.p) as f32).max(footprint);
-        let [a, b] = [from, to].map(|i| self.ratios[i * self.channels + channel]);
-        (b - a) * per_footprint
-    }
+/// How a ratio changes from those in the rings around it, which lie row by row.
+fn contrast(own: f32, near: [f32; NEAR], wide: [f32; WIDE]) -> Contrast {
+    let bend = (0..NEAR / 2).map(|k| 0.5 * (near[k] + near[NEAR - 1 - k] - 2.0 * own).abs());
+    let apart = near.iter().chain(&wide).map(|other| (other - own).abs());
+    let known = apart.clone().filter(|apart| !apart.is_nan()).count();
+    let wide = apart.fold(0.0, f32::max);
+    let wide = if 2 * known >= NEAR + WIDE { wide } else { f32::NAN };
+    Contrast { bend: bend.fold(f32::NAN, f32::max), wide, far: wide }
 }
 
 /// Takes in a ratio with its share of the samples; NaN where one is unknown.

@@ -9,6 +9,12 @@ use wide::f32x4;
 /// References that are asked about every point.
 pub(in crate::reuse) const ALWAYS: usize = 2;
 
+/// By how much a sample's area on the surface may exceed the point's.
+const COARSEST: f64 = 6.0;
+/// Samples lie within two footprints, and further where the reference looks along the surface: as far
+/// as at this cosine.
+const GRAZING: f32 = 0.3;
+
 /// Where a point is seen in a reference.
 #[derive(Clone, Copy)]
 pub(super) struct Image {
@@ -71,14 +77,14 @@ impl Lookup<'_> {
         let footprint = depth * view.pixel_size;
         let own = f64::from(point.footprint);
         let own_cos = if point.direct { f64::from(point.cos).max(0.02) } else { 1.0 };
-        if footprint * footprint * own_cos > self.evidence.coarser * own * own * f64::from(cos) {
+        if footprint * footprint * own_cos > COARSEST * own * own * f64::from(cos) {
             return None;
         }
         // One up, so that rounding towards zero is rounding down.
         let (left, top) = ((x + 1.0) as i32 - 1, (y + 1.0) as i32 - 1);
         let seen_at = |dx, dy| reference.seen_at(left + dx, top + dy);
         let samples = [seen_at(0, 0), seen_at(1, 0), seen_at(0, 1), seen_at(1, 1)];
-        let reach = 2.0 / cos.max(self.evidence.grazing as f32);
+        let reach = 2.0 / cos.max(GRAZING);
         let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
         Some(Image { fx, fy, footprint: footprint as f32, reach, samples })
     }
@@ -87,7 +93,7 @@ impl Lookup<'_> {
     pub(super) fn screen_taps(&self, number: usize, place: &Place, image: &Image) -> Option<Taps4> {
         let Image { fx, fy, footprint, reach, samples } = *image;
         let reference = self.references[number];
-        let near = place.near(reference, &samples, &self.evidence, (footprint, reach));
+        let near = place.near(reference, &samples, (footprint, reach));
         let across = f32x4::from([1.0 - fx, fx, 1.0 - fx, fx]);
         let down = f32x4::from([1.0 - fy, 1.0 - fy, fy, fy]);
         let weight = across * down * near.alike * near.alike;

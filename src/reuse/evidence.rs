@@ -1,0 +1,229 @@
+//! Evidence: what probes found, and which estimates may be used for it.
+//!
+//! A probe is a pixel that is estimated from other frames *and* traced twice, independently. With the
+//! estimate S and the traces A and B, (S - A)(S - B) is on average the squared error of the estimate, and
+//! (A - B)²/2 that of a trace. Estimates are sorted into classes ([`super::class`]); a class may be used
+//! where probes of it, in the frame itself and in those that it is inferred from, found it no further from
+//! the truth than a trace, or off by less than can be seen. Errors come in regions, a shadow here, a
+//! thicket there: so what was found in a region of the surface outweighs what was found elsewhere.
+//!
+//! Every figure is a sum over findings in a fixed order.
+
+use super::class::{CLASSES, family};
+use super::index::{cell_of, edge_of, key_of, level_of};
+use crate::inference::{Estimate, SurfacePoint};
+use crate::math::{Vec3, srgb_encode};
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// Display steps.
+const STEPS: f64 = 255.0;
+/// Edge of a region, footprints: a power of two, as an exponent.
+const REGION: i32 = 5;
+/// Findings elsewhere count as many as this in a region: it has to gainsay them.
+const PRIOR: f64 = 8.0;
+/// A class with fewer findings takes in those of its family, as many as this.
+const FEW: f64 = 16.0;
+/// A class's error must be below its bound by so many standard errors.
+const SURE: f64 = 1.0;
+/// Of a tile's error that nobody sees, the share that a class may use up: errors are rare and large, so a
+/// mean below it leaves tiles that are above.
+const UNSEEN_SHARE: f64 = 0.5;
+
+/// What a probe found at a surface point, all lights together that other frames know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// The point, scene space.
+    pub p: Vec3,
+    /// Its footprint, scene units.
+    pub footprint: f32,
+    /// Its mesh, or the spheres' number.
+    pub geom_id: u32,
+    /// Class of the estimate.
+    pub class: u8,
+    /// Squared error of the estimate, squares of a display step of the pixel; may be negative.
+    pub error: f32,
+    /// That of a trace.
+    pub noise: f32,
+}
+
+/// What a light of a point showed: estimate and both traces.
+#[derive(Debug, Clone, Copy)]
+pub struct Compared {
+    /// What the pixel would show of the light without shadows: luminance, exposure applied.
+    pub unshadowed: f32,
+    /// What other frames suggest.
+    pub estimate: Estimate,
+    /// Traced ratios.
+    pub traced: [f32; 2],
+}
+
+/// What was found at `point`, which makes up `share` of its pixel, from what its lights showed; `None`
+/// where other frames know none of them.
+pub fn finding_at(point: &SurfacePoint, share: f32, lights: &[Compared]) -> Option<Finding> {
+    let is_known = |l: &&Compared| {
+        l.unshadowed != 0.0 && !l.estimate.ratio.is_nan() && !l.traced.iter().any(|r| r.is_nan())
+    };
+    let lights = || lights.iter().filter(is_known);
+    let class = lights().next()?.estimate.class;
+    let sum = |ratio: &dyn Fn(&Compared) -> f32| lights().map(|l| l.unshadowed * ratio(l)).sum();
+    let estimated = shown(sum(&|l| l.estimate.ratio));
+    let [a, b] = [0, 1].map(|k| shown(sum(&|l| l.traced[k])));
+    let share = f64::from(share) * f64::from(share);
+    Some(Finding {
+        p: point.p.as_vec3(),
+        footprint: point.footprint,
+        geom_id: point.geom_id,
+        class,
+        error: (share * (estimated - a) * (estimated - b)) as f32,
+        noise: (share * 0.5 * (a - b) * (a - b)) as f32,
+    })
+}
+
+/// Display steps that `radiance` is shown as.
+fn shown(radiance: f32) -> f64 {
+    STEPS * srgb_encode(f64::from(radiance.clamp(0.0, 1.0)))
+}
+
+/// A set of classes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ClassSet([u64; CLASSES.div_ceil(64)]);
+
+impl ClassSet {
+    /// Whether `class` is in it.
+    pub fn has(&self, class: u8) -> bool {
+        self.0[usize::from(class) / 64] >> (class % 64) & 1 == 1
+    }
+
+    fn set(&mut self, class: u8, is_in: bool) {
+        let bit = 1 << (class % 64);
+        let word = &mut self.0[usize::from(class) / 64];
+        *word = if is_in { *word | bit } else { *word & !bit };
+    }
+}
+
+/// Which classes may be used where.
+#[derive(Debug, Clone, Default)]
+pub struct Evidence {
+    /// Where a region has no finding.
+    elsewhere: ClassSet,
+    regions: HashMap<u64, ClassSet, BuildHasherDefault<Mixed>>,
+}
+
+/// Sums over findings.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    count: f64,
+    error: f64,
+    noise: f64,
+    /// Of the squared errors' squares.
+    squares: f64,
+}
+
+impl Sums {
+    fn add(&mut self, finding: &Finding) {
+        let (error, noise) = (f64::from(finding.error), f64::from(finding.noise));
+        self.count += 1.0;
+        self.error += error;
+        self.noise += noise;
+        self.squares += error * error;
+    }
+
+    /// With `prior` findings more that are like those of `other`.
+    fn with(&self, other: &Self, prior: f64) -> Self {
+        let by = if other.count > 0.0 { prior / other.count } else { 0.0 };
+        Self {
+            count: self.count + by * other.count,
+            error: self.error + by * other.error,
+            noise: self.noise + by * other.noise,
+            squares: self.squares + by * other.squares,
+        }
+    }
+
+    /// Standard error of the mean error.
+    fn doubt(&self) -> f64 {
+        self.squares.sqrt() / self.count
+    }
+
+    /// Whether the error is at most tracing's noise or `unseen`, by `margin`.
+    fn may_be_used(&self, margin: f64, unseen: f64) -> bool {
+        let [error, noise] = [self.error, self.noise].map(|sum| sum / self.count);
+        self.count > 0.0 && error + margin <= noise.max(unseen)
+    }
+}
+
+impl Evidence {
+    /// What `findings` amount to. An error of `tolerance` display steps (root mean square over a tile)
+    /// is not seen.
+    pub fn of<'f>(findings: impl Iterator<Item = &'f Finding> + Clone, tolerance: f32) -> Self {
+        let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
+        let mut families = [Sums::default(); CLASSES];
+        let mut classes = [Sums::default(); CLASSES];
+        let mut regions: HashMap<(u64, u8), Sums, BuildHasherDefault<Mixed>> = HashMap::default();
+        for finding in findings {
+            families[usize::from(family(finding.class))].add(finding);
+            classes[usize::from(finding.class)].add(finding);
+            for level in -1..=1 {
+                let region = region(finding.geom_id, finding.footprint, finding.p, level);
+                regions.entry((region, finding.class)).or_default().add(finding);
+            }
+        }
+        let mut own = Self::default();
+        let mut margins = [0.0; CLASSES];
+        for class in 0..CLASSES as u8 {
+            let at = usize::from(class);
+            if classes[at].count < FEW {
+                classes[at] = classes[at].with(&families[usize::from(family(class))], PRIOR);
+            }
+            margins[at] = SURE * classes[at].doubt();
+            own.elsewhere.set(class, classes[at].may_be_used(margins[at], unseen));
+        }
+        for ((region, class), sums) in &regions {
+            let at = usize::from(*class);
+            let sums = sums.with(&classes[at], PRIOR);
+            let set = own.regions.entry(*region).or_insert(own.elsewhere);
+            set.set(*class, sums.may_be_used(margins[at], unseen));
+        }
+        own
+    }
+
+    /// Whether the estimates that `finding` is about may be used.
+    pub fn may_use(&self, finding: &Finding) -> bool {
+        let region = region(finding.geom_id, finding.footprint, finding.p, 0);
+        self.regions.get(&region).unwrap_or(&self.elsewhere).has(finding.class)
+    }
+
+    /// The classes that may be used at a point.
+    pub fn at(&self, point: &SurfacePoint) -> ClassSet {
+        let region = region(point.geom_id, point.footprint, point.p.as_vec3(), 0);
+        self.regions.get(&region).copied().unwrap_or(self.elsewhere)
+    }
+}
+
+/// The region of a point, `further` levels coarser than its footprint asks for.
+fn region(geom_id: u32, footprint: f32, p: Vec3, further: i32) -> u64 {
+    let level = level_of(footprint) + REGION + further;
+    key_of(level, geom_id, cell_of(p.as_dvec3(), edge_of(level)))
+}
+
+/// Passes on keys that are mixed already.
+#[derive(Default)]
+struct Mixed(u64);
+
+impl Hasher for Mixed {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u8(*byte));
+    }
+
+    fn write_u8(&mut self, byte: u8) {
+        self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        self.0 ^= word;
+    }
+}

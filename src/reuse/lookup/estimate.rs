@@ -1,0 +1,141 @@
+//! What the samples about a point suggest of each light: weighted means, lane by lane, and the features
+//! that class them.
+
+use super::{LEAST_WEIGHT, Lookup};
+use crate::inference::Estimate;
+use crate::reuse::class::Features;
+use crate::reuse::taps::{ENOUGH_WEIGHT, Taps, sum};
+use wide::{CmpEq, CmpGt, CmpLt, f32x4};
+
+/// Weighted sums over the taps that know a light, and the largest contrasts, lane by lane.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    weight: f32x4,
+    share: f32x4,
+    mean: f32x4,
+    squares: f32x4,
+    bend: Largest,
+    wide: Largest,
+    far: Largest,
+}
+
+/// The largest of numbers none of which is negative; NaN once one is.
+#[derive(Clone, Copy, Default)]
+struct Largest(f32x4);
+
+impl Largest {
+    fn note(&mut self, other: f32x4) {
+        // Neither is less than a NaN.
+        self.0 = other.cmp_lt(self.0).blend(self.0, other + (self.0 - self.0));
+    }
+
+    fn get(self) -> f32 {
+        let [a, b, c, d] = self.0.to_array();
+        let most = a.max(b).max(c.max(d));
+        if (a + b + c + d).is_nan() { f32::NAN } else { most }
+    }
+}
+
+/// What the taps suggest of one light.
+#[derive(Clone, Copy)]
+pub(super) struct Mean {
+    /// Weighted mean of the ratios of the taps that know it.
+    ratio: f32,
+    /// Their standard deviation.
+    spread: f32,
+    /// The largest of the taps' own, see [`Contrast`](crate::reuse::reference::Contrast).
+    bend: f32,
+    wide: f32,
+    far: f32,
+    /// Sum of the weights.
+    weight: f32,
+}
+
+impl Lookup<'_> {
+    /// Estimates each light at a point where the pixel would show `shown` of them without shadows.
+    /// `means` is room.
+    pub(super) fn estimate_all(
+        &self,
+        taps: &Taps,
+        is_direct: bool,
+        shown: &[f32],
+        means: &mut Vec<Option<Mean>>,
+        estimates: &mut [Estimate],
+    ) {
+        means.clear();
+        means.extend((0..shown.len()).map(|channel| self.mean(taps, channel)));
+        let seen = means.iter().zip(shown).map(|(mean, s)| mean.map_or(0.0, |m| s * m.ratio));
+        let steps = steps_per_radiance(seen.sum());
+        // Lights err together: what is beside a shadow's edge is beside that of the next lamp too.
+        let mut features = Features {
+            spread: 0.0,
+            bend: 0.0,
+            wide: 0.0,
+            far: 0.0,
+            is_whole: true,
+            is_direct,
+        };
+        for (mean, shown) in means.iter().zip(shown).filter(|(_, shown)| **shown != 0.0) {
+            let Some(mean) = mean else { continue };
+            let by = steps * shown;
+            features.spread += by * mean.spread;
+            features.bend += by * mean.bend;
+            features.wide += by * mean.wide;
+            features.far += by * mean.far;
+            features.is_whole &= f64::from(mean.weight) >= ENOUGH_WEIGHT;
+        }
+        let class = features.class();
+        for (estimate, mean) in estimates.iter_mut().zip(&*means) {
+            *estimate = mean.map_or(Estimate::UNKNOWN, |m| Estimate { ratio: m.ratio, class });
+        }
+    }
+
+    /// `None` where too few of the taps know the light.
+    fn mean(&self, taps: &Taps, channel: usize) -> Option<Mean> {
+        let mut first = f32::NAN;
+        let mut sums = Sums::default();
+        for four in taps.fours() {
+            let own = self.references[four.reference as usize].known(&four.samples, channel);
+            let known = own.ratio.cmp_eq(own.ratio);
+            let weight = four.weight & known;
+            if first.is_nan() {
+                let lane = weight.cmp_gt(f32x4::ZERO).move_mask().trailing_zeros() as usize;
+                first = own.ratio.to_array().get(lane).copied().unwrap_or(first);
+            }
+            // From the first, so that equal ones give just that, and no variance.
+            let further = (own.ratio - f32x4::splat(first)) & known;
+            let share = four.share & known;
+            sums.weight += weight;
+            sums.share += share;
+            sums.mean += share * further;
+            sums.squares += share * further * further;
+            sums.bend.note(own.bend);
+            sums.wide.note(own.wide);
+            sums.far.note(own.far);
+        }
+        let weight = sum(sums.weight);
+        if f64::from(weight) < LEAST_WEIGHT {
+            return None;
+        }
+        let share = 1.0 / sum(sums.share);
+        let mean = sum(sums.mean) * share;
+        Some(Mean {
+            // Rounding may leave it a little outside.
+            ratio: (first + mean).clamp(0.0, 1.0),
+            spread: (sum(sums.squares) * share - mean * mean).max(0.0).sqrt(),
+            bend: sums.bend.get(),
+            wide: sums.wide.get(),
+            far: sums.far.get(),
+            weight,
+        })
+    }
+}
+
+/// How many display steps of 1/255 a unit of radiance makes where `radiance` is shown: the slope of
+/// the sRGB curve, as a power of 1/2.4.
+fn steps_per_radiance(radiance: f32) -> f32 {
+    let shown = f64::from(radiance).clamp(0.003, 1.0);
+    // Nearly x^(-7/12), by square roots, which are the same on every machine.
+    let root = shown.sqrt();
+    (255.0 * 1.055 / 2.4 / (root * root.sqrt().sqrt().sqrt())) as f32
+}

@@ -1,0 +1,141 @@
+//! Probes: the pixels that are estimated and traced, and what is noted about them.
+
+use super::Lookup;
+use super::evidence::{Compared, Finding, finding_at};
+use crate::inference::{Estimate, Inference, Origin, Questions, SurfacePoint};
+use crate::sampling::mix;
+use std::sync::{Mutex, PoisonError};
+
+/// Which pixels of a frame are probes: one at a random place in each square cell of the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProbeDraw {
+    /// The job's seed.
+    pub seed: u64,
+    /// The frame.
+    pub frame: u32,
+    /// Edge of a cell, blocks of pixels.
+    pub cell: u32,
+    /// Edge of a block of pixels that is probed as one, pixels.
+    pub block: u32,
+}
+
+impl ProbeDraw {
+    /// The draw whose probes are about `share` of all pixels.
+    pub fn of(seed: u64, frame: u32, share: f64, block: u32) -> Self {
+        let cell = (1.0 / share.max(1e-6)).sqrt().round().max(1.0) as u32;
+        Self { seed, frame, cell, block }
+    }
+
+    /// How many pixels a probe stands for.
+    pub fn weight(&self) -> f64 {
+        f64::from(self.cell) * f64::from(self.cell)
+    }
+
+    fn words(&self, x: u32, y: u32) -> u64 {
+        let edge = self.cell * self.block;
+        let cell = u64::from(y / edge) << 32 | u64::from(x / edge);
+        mix(self.seed ^ mix(u64::from(self.frame) ^ mix(cell)))
+    }
+
+    /// Whether the pixel is a probe.
+    pub fn has(&self, x: u32, y: u32) -> bool {
+        let word = self.words(x, y);
+        let cell = u64::from(self.cell);
+        let at = [word % cell, (word >> 32) % cell];
+        let own = [x, y].map(|p| u64::from(p / self.block % self.cell));
+        own == at
+    }
+
+    /// Which half of the probes a probe belongs to: what one half finds is held against the other.
+    pub fn half(&self, x: u32, y: u32) -> usize {
+        (self.words(x, y) >> 63) as usize
+    }
+
+    /// For each pixel of an image, row by row, whether it is a probe.
+    pub fn mask(&self, width: u32, height: u32) -> Vec<bool> {
+        (0..height).flat_map(|y| (0..width).map(move |x| self.has(x, y))).collect()
+    }
+}
+
+/// Notes estimates and traces of probes; answers nothing, so that all is traced.
+pub struct Probe<'a> {
+    /// What estimates; `None` to note the traces alone.
+    pub lookup: Option<&'a Lookup<'a>>,
+    /// How many lights' ratios are kept.
+    pub channels: usize,
+    notes: Mutex<Vec<Note>>,
+}
+
+/// A surface point of a probe.
+struct Note {
+    pixel: [u32; 2],
+    point: SurfacePoint,
+    lights: Vec<Compared>,
+}
+
+impl<'a> Probe<'a> {
+    /// Nothing noted.
+    pub fn new(lookup: Option<&'a Lookup<'a>>, channels: usize) -> Self {
+        Self { lookup, channels, notes: Mutex::default() }
+    }
+
+    /// The notes in the image's order; those of a pixel as they were made.
+    fn sorted(self) -> Vec<Note> {
+        let mut notes = self.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
+        notes.sort_by_key(|note| (note.pixel[1], note.pixel[0]));
+        notes
+    }
+
+    /// What `self`, which estimated, and `other`, which traced the same probes once more with other random
+    /// numbers, found: pixel by pixel, for frames of `spp` camera samples.
+    pub fn findings(self, other: Self, spp: u32) -> Vec<([u32; 2], Vec<Finding>)> {
+        let mut all: Vec<([u32; 2], Vec<Finding>)> = Vec::new();
+        for (mut own, again) in self.sorted().into_iter().zip(other.sorted()) {
+            let is_same = own.pixel == again.pixel && own.point.p == again.point.p;
+            if !is_same {
+                // Camera samples do not depend on random numbers of the light: it cannot be.
+                debug_assert!(is_same, "{:?} {:?}", own.pixel, again.pixel);
+                continue;
+            }
+            for (own, again) in own.lights.iter_mut().zip(&again.lights) {
+                own.traced[1] = again.traced[0];
+            }
+            if all.last().is_none_or(|(pixel, _)| *pixel != own.pixel) {
+                all.push((own.pixel, Vec::new()));
+            }
+            let share = own.point.samples as f32 / spp as f32;
+            if let Some((_, findings)) = all.last_mut() {
+                findings.extend(finding_at(&own.point, share, &own.lights));
+            }
+        }
+        all
+    }
+}
+
+impl Inference for Probe<'_> {
+    fn infer(&self, questions: &mut Questions) {
+        questions.estimates.clear();
+        if let Some(lookup) = self.lookup {
+            lookup.estimate(questions);
+            // Nothing of what is shown comes from there.
+            questions.origins.fill(Origin::default());
+        }
+    }
+
+    fn hear(&self, answered: &Questions) {
+        let Questions { points, pixels, unshadowed, ratios, estimates, .. } = answered;
+        let channels = self.channels;
+        let light = |at: usize| Compared {
+            unshadowed: unshadowed[at],
+            estimate: estimates.get(at).copied().unwrap_or(Estimate::UNKNOWN),
+            traced: [ratios[at]; 2],
+        };
+        let note = |(i, point): (usize, &SurfacePoint)| Note {
+            pixel: pixels[i],
+            point: *point,
+            lights: (i * channels..(i + 1) * channels).map(light).collect(),
+        };
+        let notes = points.iter().enumerate().map(note);
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).extend(notes);
+    }
+}

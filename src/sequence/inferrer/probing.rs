@@ -1,0 +1,216 @@
+//! Probes of a frame: rendered before the frame, so that what they find decides what is inferred in it.
+//!
+//! Each probe is estimated and traced twice. What that finds, and what the probes of the frames found that
+//! the frame is inferred from, is the [`Evidence`]. The probes show their first trace, and both are
+//! sources for other frames. They are the frame's audit, too: half of them are inferred by the evidence
+//! of the other half, with random numbers of their own, and held against their traces. An error that the
+//! evidence was blind to is seen so; were a probe judged by itself, what stays inferred would be those
+//! that were lucky.
+
+use super::Inferrer;
+use crate::error::Result;
+use crate::film::{Film, PixelSource, Provenance};
+use crate::inference::Inference;
+use crate::output::Display;
+use crate::reuse::audit::{self, Drawn, Shown};
+use crate::reuse::evidence::{Evidence, Finding};
+use crate::reuse::{Judged, Lookup, Probe, ProbeDraw, Reference, is_worth_looking};
+use crate::scene::Camera;
+use crate::sequence::strips::Unheard;
+use crate::shade::{FrameJob, Rendered};
+use crate::stats::{AuditSums, RayCounts};
+use std::sync::Arc;
+
+/// Added to a frame's number (at most a million) for the random numbers of the probes' two traces, and of
+/// what is traced where they are inferred. The first, which is shown, is the one that the frame would have
+/// had if it were traced.
+const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
+/// How many times the usual share of the pixels is probed where no, or one, other frame has probes.
+const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
+/// Where a frame is small, as many pixels are probed as if it had this many.
+const LEAST: f64 = 25_000.0;
+/// Largest share that is probed.
+const MOST: f64 = 0.25;
+
+/// A frame's probes.
+pub(super) struct Probed {
+    draw: ProbeDraw,
+    /// For each pixel whether it is a probe.
+    mask: Vec<bool>,
+    traces: [Rendered; 2],
+    /// What they found: what frames that are inferred from this one learn.
+    pub findings: Vec<Finding>,
+    /// What may be inferred in the frame.
+    pub evidence: Evidence,
+    /// What may be inferred in each half of the probes, by the findings of the other half.
+    crossed: [Evidence; 2],
+    /// Whether looking up saves more than it costs.
+    pub is_worth_looking: bool,
+}
+
+impl Probed {
+    /// The pixels of `mask`, or all, that are no probes.
+    pub fn others(&self, mask: Option<&[bool]>) -> Vec<bool> {
+        let wanted = |i: usize| mask.is_none_or(|mask| mask[i]);
+        self.mask.iter().enumerate().map(|(i, is_probe)| !is_probe && wanted(i)).collect()
+    }
+}
+
+impl Inferrer<'_> {
+    /// Renders the probes of `frame`, seen by `camera`, where `lookup` can estimate. `None` when the job
+    /// shall stop.
+    pub(super) fn probe(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        lookup: &Lookup,
+    ) -> Option<Arc<Probed>> {
+        if let Some((_, probed)) = self.with_state(|s| s.probed.clone()).filter(|p| p.0 == frame) {
+            return Some(probed);
+        }
+        let r = &self.renderer;
+        let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
+        let first = FIRST[known.min(FIRST.len() - 1)];
+        let pixels = f64::from(camera.width) * f64::from(camera.height);
+        let usual = f64::from(r.settings.reuse.probes);
+        let share = (first * usual * (LEAST / pixels).max(1.0)).min(MOST);
+        // Behind mirrors and glass a pixel's footprint is told by the pixels beside it.
+        let block = if r.plan.mirror || r.plan.glass { 2 } else { 1 };
+        let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
+        let mask = draw.mask(camera.width, camera.height);
+        let trace = |stream: u32, lookup| {
+            let probe = Probe::new(lookup, self.channels.len());
+            let with_gbuffer = self.with_gbuffer && stream == STREAMS[0];
+            let job = self.job(camera, frame | stream, with_gbuffer, Some(&mask));
+            let rendered = self.render(job, Some(&probe as &dyn Inference), &Unheard)?;
+            Some((rendered, probe))
+        };
+        let (first, own) = trace(STREAMS[0], Some(lookup))?;
+        let (second, again) = trace(STREAMS[1], None)?;
+        let found = own.findings(again, r.settings.spp);
+        let before = || lookup.references.iter().flat_map(|r| r.findings());
+        let tolerance = r.settings.reuse.tolerance;
+        let of_half = |half: usize| {
+            let is_in = move |pixel: &[u32; 2]| draw.half(pixel[0], pixel[1]) == half;
+            let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
+            Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), tolerance)
+        };
+        let crossed = [of_half(0), of_half(1)];
+        let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
+        let evidence = Evidence::of(before().chain(&findings), tolerance);
+        let is_worth_looking =
+            is_worth_looking(&evidence, &findings, &first.reuse, r.scene, &r.plan, r.settings);
+        let traces = [first, second];
+        let probed =
+            Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
+        let probed = Arc::new(probed);
+        self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
+        Some(probed)
+    }
+
+    /// A job that leaves sources, all over the image.
+    fn job<'j>(
+        &self,
+        camera: &'j Camera,
+        stream: u32,
+        with_gbuffer: bool,
+        mask: Option<&'j [bool]>,
+    ) -> FrameJob<'j> {
+        FrameJob { camera, stream, with_gbuffer, reuse: None, mask, beyond_crop: true }
+    }
+
+    /// Puts the probes of `frame` in `rendered`, which is the rest of it. Gives what they say about the
+    /// inferred pixels; the inner `None` where there are none. The outer one when the job shall stop.
+    pub(super) fn show_probes(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        references: &[Arc<Reference>],
+        probed: &Probed,
+        rendered: &mut Rendered,
+    ) -> Result<Option<Option<AuditSums>>> {
+        let [first, second] = &probed.traces;
+        let is_inferred = rendered.reuse.is_inferred();
+        let audit = match is_inferred {
+            true => self.audit(frame, camera, references, probed)?,
+            false => Some((RayCounts::default(), None)),
+        };
+        let Some((rays, inferred)) = audit else { return Ok(None) };
+        let film = &mut rendered.film;
+        let places = probed.mask.iter().enumerate().filter(|(_, is_probe)| **is_probe);
+        let places: Vec<usize> = places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
+        for &i in &places {
+            film.rgb[i] = first.film.rgb[i];
+            if let (Some(to), Some(from)) = (&mut film.sources, &first.film.sources) {
+                to[i] = from[i];
+            }
+            if let (Some(to), Some(from)) = (&mut film.gbuffer, &first.film.gbuffer) {
+                to.set(i, &from.get(i));
+            }
+        }
+        film.bad += first.film.bad;
+        rendered.rays += first.rays;
+        rendered.reuse += first.reuse;
+        for trace in &probed.traces {
+            rendered.sources.append(trace.sources.clone());
+        }
+        let Some(inferred) = inferred else { return Ok(Some(None)) };
+        let drawn = |i: usize| Drawn { index: i as u32, weight: probed.draw.weight() };
+        let drawn: Vec<Drawn> = places.iter().map(|i| drawn(*i)).collect();
+        let shown = self.shown(&inferred);
+        let traces = [&first.film.rgb[..], &second.film.rgb[..]];
+        let mut sums = audit::sums(&shown, &drawn, traces);
+        sums.pixels = (0..film.rgb.len()).filter(|i| self.is_shown(film, *i)).count() as u64;
+        let of_rest = film.sources.iter().flatten().filter(|s| is_inferred_source(s)).count();
+        sums.inferred_pixels = of_rest as u64 + sums.inferred_pixels;
+        sums.rays = rays;
+        sums.rays += second.rays;
+        let mut map = vec![f32::NAN; film.rgb.len()];
+        for &i in &places {
+            let [a, b] = traces.map(|rgb| rgb[i]);
+            map[i] = audit::difference(&shown.display, inferred.rgb[i], a, b);
+        }
+        film.audit = Some(map);
+        Ok(Some(Some(sums)))
+    }
+
+    /// The probes inferred by one another's evidence, and the rays that this took.
+    fn audit(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        references: &[Arc<Reference>],
+        probed: &Probed,
+    ) -> Result<Option<(RayCounts, Option<Film>)>> {
+        self.with_lookup((frame, camera), references, |lookup| {
+            let Some(lookup) = lookup else { return Some((RayCounts::default(), None)) };
+            let evidence =
+                |[x, y]: [u32; 2]| &probed.crossed[probed.draw.half(x, y)];
+            let judged = Judged { lookup: &lookup, evidence: &evidence };
+            let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
+            let inferred = self.render(job, Some(&judged), &Unheard)?;
+            Some((inferred.rays, Some(inferred.film)))
+        })
+    }
+
+    fn shown<'f>(&self, film: &'f Film) -> Shown<'f> {
+        let settings = self.renderer.settings;
+        Shown {
+            rgb: &film.rgb,
+            sources: film.sources.as_deref().unwrap_or_default(),
+            display: Display { exposure: settings.exposure, tone: settings.tone },
+        }
+    }
+
+    /// Whether a pixel lies in the crop.
+    fn is_shown(&self, film: &Film, i: usize) -> bool {
+        let (x, y) = (i as u32 % film.width, i as u32 / film.width);
+        let crop = self.renderer.settings.crop;
+        crop.is_none_or(|c| (c.x0..c.x1).contains(&x) && (c.y0..c.y1).contains(&y))
+    }
+}
+
+fn is_inferred_source(source: &PixelSource) -> bool {
+    !matches!(source.provenance, Provenance::Background | Provenance::Traced)
+}
+
