@@ -9,6 +9,10 @@ use crate::math::{DVec3, orthonormal_basis};
 /// Rays around the given one that are tried for a gap: on the band's rim and half-way to it.
 const AROUND: u32 = 16;
 
+/// How far past an edge a gap is looked for, shares of the band: from some ulp down to what is far less
+/// than f32 can tell, and far more than the rounding of f64.
+const PAST_EDGE: [f64; 4] = [1.0 / 4.0, 1.0 / 32.0, 1e-3, 1e-5];
+
 /// A ray with its line, and the scene to look it up in.
 pub struct Closely<'a> {
     check: &'a Check<'a>,
@@ -88,7 +92,12 @@ impl<'a> Closely<'a> {
             let slipped = missed.class == Class::Missed
                 && self.is_at_vertex(true_hit.prim)
                 && self.faces(hit.prim);
-            Some(if slipped { Difference { class: Class::PastVertex, ..missed } } else { missed })
+            if !slipped {
+                return Some(missed);
+            }
+            let closed = self.check.is_closed(true_hit.prim.geom_id);
+            let class = if closed { Class::PastVertex } else { Class::PastOpenVertex };
+            Some(Difference { class, ..missed })
         }
     }
 
@@ -201,8 +210,9 @@ impl<'a> Closely<'a> {
         prim != self.ray.exclude && t.is_some_and(certain)
     }
 
-    /// Ways aside: around on two circles, and straight off the edges of the triangles near by, which
-    /// finds the gap beside a sliver.
+    /// Ways aside: around on two circles; straight off the edges of the triangles near by, which finds the
+    /// gap beside a sliver; and to these edges and just past them, which finds a gap that is narrower than
+    /// the band, such as f32 leaves where a vertex lies on another triangle's edge.
     fn offsets(&self, radius: f64, near: &[PrimRef]) -> Vec<DVec3> {
         let along = self.ray.dir.normalize();
         let (s, t) = orthonormal_basis(along);
@@ -218,8 +228,29 @@ impl<'a> Closely<'a> {
                     offsets.extend([aside * radius, aside * -radius]);
                 }
             }
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let Some(aside) = (to - from).cross(along).try_normalize() else { continue };
+                let onto = self.nearest_of(from, to, along);
+                let past = PAST_EDGE.map(|share| aside * (share * radius));
+                offsets.extend(past.iter().flat_map(|past| [onto + *past, onto - *past]));
+            }
         }
+        offsets.retain(|by| by.length() <= radius * (1.0 + 1e-9));
         offsets
+    }
+
+    /// From the ray's line to the nearest point of a segment, across; `along` is the line's unit
+    /// direction.
+    fn nearest_of(&self, from: DVec3, to: DVec3, along: DVec3) -> DVec3 {
+        let across = |p: DVec3| {
+            let r = p - self.line.start;
+            r - along * r.dot(along)
+        };
+        let (p, q) = (across(from), across(to));
+        let edge = q - p;
+        let share = -p.dot(edge) / edge.length_squared();
+        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+        p + edge * share
     }
 
     /// Everything that passes the ray within twice the band, spheres included.

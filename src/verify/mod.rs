@@ -13,7 +13,7 @@ mod tally;
 
 pub use judge::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
-pub use tally::{PAST_VERTEX_LIMIT, Row, Tally, Worst};
+pub use tally::{OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally, Worst};
 
 use crate::intersect::{CourtHit, Hit, Intersector, Oracle, Ray};
 use crate::math::DVec3;
@@ -51,8 +51,8 @@ pub struct Check<'a> {
     pub product: &'a dyn Intersector,
     /// The one that is right.
     pub oracle: &'a Oracle<'a>,
-    /// For each mesh, once somebody asks, whether it is closed and wound inwards.
-    inwards: Vec<OnceLock<bool>>,
+    /// For each mesh, once somebody asks, the sign of its volume if it is closed.
+    volumes: Vec<OnceLock<Option<f64>>>,
 }
 
 /// One ray, traced by both.
@@ -115,18 +115,27 @@ impl<'a> Check<'a> {
         product: &'a dyn Intersector,
         oracle: &'a Oracle<'a>,
     ) -> Self {
-        let inwards = scene.meshes.iter().map(|_| OnceLock::new()).collect();
-        Self { scene, settings, shot, product, oracle, inwards }
+        let volumes = scene.meshes.iter().map(|_| OnceLock::new()).collect();
+        Self { scene, settings, shot, product, oracle, volumes }
     }
 
     /// Whether the mesh is closed and its faces wind clockwise seen from outside, so that their
     /// backs are its outside.
     fn is_inwards(&self, geom_id: u32) -> bool {
+        self.volume(geom_id).is_some_and(|volume| volume < 0.0)
+    }
+
+    /// Whether every edge of the mesh has a partner that runs the other way.
+    fn is_closed(&self, geom_id: u32) -> bool {
+        self.volume(geom_id).is_some()
+    }
+
+    fn volume(&self, geom_id: u32) -> Option<f64> {
         let mesh = &self.scene.meshes[geom_id as usize];
-        *self.inwards[geom_id as usize].get_or_init(|| {
+        *self.volumes[geom_id as usize].get_or_init(|| {
             let positions = mesh.positions[..mesh.vertex_count].iter().map(|p| p.as_dvec3());
             let positions: Vec<DVec3> = positions.collect();
-            closed_volume(&positions, &mesh.triangles).is_some_and(|volume| volume < 0.0)
+            closed_volume(&positions, &mesh.triangles)
         })
     }
 
