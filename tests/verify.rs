@@ -213,9 +213,10 @@ fn slipping_past_every_vertex_is_explained_but_fails() {
     assert!((shares[0] / shares[1] - 1.0).abs() < 0.3, "{shares:?}");
 }
 
-/// Past the vertices of an open mesh more rays may slip, since less tells of it; but far from all.
+/// Past the vertices of an open mesh more rays may slip, since less tells of it; they are counted by
+/// themselves.
 #[test]
-fn slipping_past_every_vertex_of_an_open_mesh_fails_too() {
+fn slipping_past_vertices_of_an_open_mesh_has_a_class_of_its_own() {
     let mut outer = shapes::sphere(DVec3::ZERO, 2.0, 60, 40);
     outer.triangles.truncate(4000);
     let mut world = shapes::world_of(outer);
@@ -224,10 +225,9 @@ fn slipping_past_every_vertex_of_an_open_mesh_fails_too() {
     let found = tally(&scene, &Liar(Oracle::new(&scene), Lie::PastVertex), 4096);
     let slipped = found.count(Class::PastOpenVertex);
     assert_eq!((found.unexplained(), found.count(Class::PastVertex)), (0, 0), "{found:?}");
-    assert_eq!(found.open_vertex_allowed(), 122);
-    assert!(slipped > found.open_vertex_allowed() && !found.passed(), "{found:?}");
+    assert!(slipped > 50, "{found:?}");
     let ours = tally(&scene, &embree(&scene, HitRules::default()), 4096);
-    assert!(ours.passed() && ours.count(Class::PastOpenVertex) > 0, "{ours:?}");
+    assert!(ours.passed() && ours.count(Class::PastOpenVertex) < slipped, "{ours:?}");
 }
 
 /// Between two sheets that nearly touch is a gap narrower than the band, such as f32 leaves where a vertex
@@ -245,7 +245,6 @@ fn a_ray_on_the_border_of_a_mesh_may_go_by() {
     let scene = shapes::scene_of(sheet);
     let (settings, shot, oracle) = (Settings::default(), shot(), Oracle::new(&scene));
     let check = Check::new(&scene, &settings, &shot, &oracle, &oracle);
-    let counts = &mut RayCounts::default();
     let mut told = 0;
     for k in 0..64 {
         let share = (f64::from(k) + 0.5) / 64.0;

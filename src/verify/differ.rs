@@ -9,10 +9,6 @@ use crate::math::{DVec3, orthonormal_basis};
 /// Rays around the given one that are tried for a gap: on the band's rim and half-way to it.
 const AROUND: u32 = 16;
 
-/// How far past an edge a gap is looked for, shares of the band: from some ulp down to what is far less
-/// than f32 can tell, and far more than the rounding of f64.
-const PAST_EDGE: [f64; 4] = [1.0 / 4.0, 1.0 / 32.0, 1e-3, 1e-5];
-
 /// A ray with its line, and the scene to look it up in.
 pub struct Closely<'a> {
     check: &'a Check<'a>,
@@ -179,9 +175,9 @@ impl<'a> Closely<'a> {
         Difference { class, ulps: clearest }
     }
 
-    /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, or since
-    /// a ray within the band passes everything by. Between triangles that share an edge there is
-    /// no such ray.
+    /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, where the
+    /// surface ends, or since a ray within the band passes everything by. Between triangles that share
+    /// an edge there is no such ray.
     fn gap(&self, limit: f64) -> Option<Class> {
         let hits = self.check.oracle.all_hits(&self.ray);
         let nearer = hits.iter().filter(|h| h.hit.t <= limit);
@@ -192,6 +188,9 @@ impl<'a> Closely<'a> {
         }
         if others.iter().any(|h| !self.pass(h.hit.prim).in_band()) {
             return None;
+        }
+        if others.iter().all(|h| self.is_at_border(h.hit.prim)) {
+            return Some(Class::EdgeBand);
         }
         let near = self.near();
         let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
@@ -210,9 +209,8 @@ impl<'a> Closely<'a> {
         prim != self.ray.exclude && t.is_some_and(certain)
     }
 
-    /// Ways aside: around on two circles; straight off the edges of the triangles near by, which finds the
-    /// gap beside a sliver; and to these edges and just past them, which finds a gap that is narrower than
-    /// the band, such as f32 leaves where a vertex lies on another triangle's edge.
+    /// Ways aside: around on two circles, and straight off the edges of the triangles near by, which
+    /// finds the gap beside a sliver.
     fn offsets(&self, radius: f64, near: &[PrimRef]) -> Vec<DVec3> {
         let along = self.ray.dir.normalize();
         let (s, t) = orthonormal_basis(along);
@@ -228,29 +226,20 @@ impl<'a> Closely<'a> {
                     offsets.extend([aside * radius, aside * -radius]);
                 }
             }
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                let Some(aside) = (to - from).cross(along).try_normalize() else { continue };
-                let onto = self.nearest_of(from, to, along);
-                let past = PAST_EDGE.map(|share| aside * (share * radius));
-                offsets.extend(past.iter().flat_map(|past| [onto + *past, onto - *past]));
-            }
         }
-        offsets.retain(|by| by.length() <= radius * (1.0 + 1e-9));
         offsets
     }
 
-    /// From the ray's line to the nearest point of a segment, across; `along` is the line's unit
-    /// direction.
-    fn nearest_of(&self, from: DVec3, to: DVec3, along: DVec3) -> DVec3 {
-        let across = |p: DVec3| {
-            let r = p - self.line.start;
-            r - along * r.dot(along)
-        };
-        let (p, q) = (across(from), across(to));
-        let edge = q - p;
-        let share = -p.dot(edge) / edge.length_squared();
-        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
-        p + edge * share
+    /// Whether the ray passes within the band of an edge of the triangle that no other triangle has. Where
+    /// two sheets touch without a common edge, at a T-junction say, rounding may let a ray pass between
+    /// them although they overlap by less than an ulp.
+    fn is_at_border(&self, prim: PrimRef) -> bool {
+        let Some([a, b, c]) = self.check.oracle.corners(prim) else { return false };
+        let borders = self.check.borders_of(prim);
+        let band = BAND_ULPS * self.line.ulp(&[a, b, c]);
+        let edges = [(a, b), (b, c), (c, a)].into_iter().enumerate();
+        let mut borders = edges.filter(|(k, _)| borders >> k & 1 == 1);
+        borders.any(|(_, (from, to))| self.line.segment_distance(from, to) <= band)
     }
 
     /// Everything that passes the ray within twice the band, spheres included.

@@ -150,3 +150,25 @@ fn worse(a: Option<Worst>, b: Option<Worst>) -> Option<Worst> {
         (a, b) => a.or(b),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_past_a_vertex_than_the_limit_fails() {
+        for (class, allowed) in [(Class::PastVertex, 4), (Class::PastOpenVertex, 122)] {
+            let with = |slipped: u64| {
+                let mut tally = Tally::default();
+                for index in 0..4096 {
+                    let difference = Difference { class, ulps: 0.5 };
+                    let id = RayId { kind: Kind::Vertex, index };
+                    tally.add(id, (index < slipped).then_some(difference));
+                }
+                tally
+            };
+            assert!(with(allowed).passed() && with(allowed).unexplained() == 0, "{class:?}");
+            assert!(!with(allowed + 1).passed(), "{class:?}");
+        }
+    }
+}
