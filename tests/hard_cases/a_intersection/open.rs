@@ -13,8 +13,11 @@ use tweenray::math::DVec3;
 use tweenray::scene::{CameraPath, Easing, HitRules, Pose, Scene, Settings, Shot, WorldMesh};
 use tweenray::verify::{Check, Class, Kind, OPEN_VERTEX_LIMIT, Tally};
 
+/// Makes a mesh.
+type Make = fn() -> WorldMesh;
+
 /// The open meshes by name, each within some units of the origin.
-const MESHES: [(&str, fn() -> WorldMesh); 9] = [
+const MESHES: [(&str, Make); 9] = [
     ("field with holes", || thinned(sheet(), |k| suite::rng(63, k).random_ratio(9, 10))),
     ("cut sphere", || cut(false)),
     ("cut sphere, inside out", || cut(true)),
