@@ -140,7 +140,7 @@ impl EffectPlan {
             textures: decide(
                 "textures",
                 used.textured > 0,
-                format!("{} in use", counted(used.textured, "textured material")),
+                format!("{} in use{}", counted(used.textured, "textured material"), bare(scene)),
             ),
             smooth_normals: decide(
                 "smooth normals",
@@ -156,6 +156,19 @@ impl EffectPlan {
 /// reach its pixel to be counted there.
 fn is_something(colour: Rgb) -> bool {
     colour != Rgb::ZERO
+}
+
+/// How many meshes have a textured material but no texture coordinates, where any have.
+fn bare(scene: &Scene) -> String {
+    let is_textured = |id: u32| scene.materials[id as usize].texture.is_some();
+    let bare = scene.meshes.iter().filter(|m| m.uvs.is_none() && is_textured(m.surface.material));
+    match bare.count() {
+        0 => String::new(),
+        count => format!(
+            "; {count} of {} meshes have one but no coordinates: one flat colour",
+            scene.meshes.len()
+        ),
+    }
 }
 
 /// How many materials that some surface uses call for what.

@@ -139,6 +139,51 @@ fn a_glass_sphere_in_a_furnace_vanishes() {
     }
 }
 
+/// A bright lamp before a dark sky: a pixel's colour is the lamp's times the share of its samples that see
+/// it, clamped or not, and the share is the same.
+#[test]
+fn a_clamped_sample_counts_as_much_as_the_clamp_lets_it() {
+    let (radiance, exposure, clamp) = (Rgb::new(40.0, 20.0, 0.25), 0.5, 1.5);
+    let corners = [(-1.0, -0.7), (0.9, -0.8), (1.0, 0.8), (-0.8, 0.9)];
+    let corners = corners.map(|(x, y)| DVec3::new(x, y, 0.0));
+    let mut world = World::default();
+    world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: true }));
+    let mut job = job(world, pose((0.1, 0.2, 5.0), (0.0, 0.0, 0.0)), 48, 36);
+    // More than a chunk of samples holds of a block.
+    (job.settings.spp, job.settings.exposure) = (16, exposure);
+    let plain = render(&job).0;
+    job.settings.clamp = Some(clamp);
+    let clamped = render(&job).0;
+    let shown = (radiance * exposure).min(Rgb::splat(clamp)) / exposure;
+    let mut edges = 0;
+    for ((x, y, a), b) in common::pixels(&plain).zip(&clamped.rgb) {
+        let share = a.x / radiance.x;
+        edges += u32::from(share > 0.0 && share < 1.0);
+        assert!((share * 16.0 - (share * 16.0).round()).abs() < 1e-4, "{x},{y}: {a}");
+        assert!(b.abs_diff_eq(shown * share, 1e-5), "{x},{y}: {b}, share {share}");
+    }
+    assert!(edges > 50, "{edges} pixels at the lamp's edge");
+}
+
+/// What counts is the whole of a sample, not each light's part of it; and a sample that is no radiance
+/// stays what it is.
+#[test]
+fn the_clamp_is_of_a_sample_s_sum() {
+    let mut world = sphere_world(
+        Material { mirror: Rgb::splat(0.5), ..Material::diffuse("satin", Rgb::splat(0.5)) },
+        false,
+    );
+    world.sky = Sky { radiance: Rgb::splat(1.6), lights: false, ambient: Rgb::splat(0.8) };
+    let mut job = job(world, pose((0.0, 0.0, 1.5), (0.0, 0.0, 0.0)), 16, 12);
+    let middle = |job: &common::Job| render(job).0.rgb[6 * 16 + 8];
+    assert!(middle(&job).abs_diff_eq(Rgb::splat(1.2), 1e-5), "{}", middle(&job));
+    job.settings.clamp = Some(1.0);
+    assert_eq!(middle(&job), Rgb::ONE);
+    job.world.sky.radiance.y = f32::NAN;
+    let film = render(&job).0;
+    assert!(film.rgb[6 * 16 + 8].y.is_nan() && film.bad.total() > 0);
+}
+
 #[test]
 fn an_empty_scene_is_sky() {
     for kind in BOTH {

@@ -8,7 +8,7 @@ use common::{job, pose, render};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector};
 use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::ray::Ray;
-use tweenray::scene::{HitRules, Light, Material, Recheck, Scene, World};
+use tweenray::scene::{HitRules, Light, Material, Recheck, Scene, World, WorldMesh};
 use tweenray::stats::RayCounts;
 
 fn tessellated_sphere() -> Scene {
@@ -89,6 +89,61 @@ fn no_ray_from_afar_leaks_through_a_vertex_on_the_bounds() {
     let without = leaks(HitRules { retry: false, ..HitRules::default() });
     assert!(without > 10, "the case is not hard: {without} leak without a second try");
     assert_eq!(leaks(HitRules::default()), 0, "{without} leak without a second try");
+}
+
+/// The square from -1 to 1 in x and y, of 2 · 50² triangles whose fronts face +z.
+fn sheet() -> Scene {
+    let cells = 50;
+    let at = |i: u32| f64::from(i) * 2.0 / f64::from(cells) - 1.0;
+    let row = cells + 1;
+    let positions = (0..row * row).map(|k| DVec3::new(at(k % row), at(k / row), 0.0)).collect();
+    let cell = |k: u32| k / cells * row + k % cells;
+    let triangles = (0..cells * cells)
+        .map(cell)
+        .flat_map(|k| [[k, k + 1, k + row], [k + 1, k + row + 1, k + row]])
+        .collect();
+    let mut world = World::default();
+    world.materials.push(Material::diffuse("white", Rgb::ONE));
+    world.meshes.push(WorldMesh {
+        name: "sheet".into(),
+        positions,
+        triangles,
+        normals: None,
+        uvs: None,
+        material: 0,
+        always_traced: false,
+    });
+    world.into_scene(true).unwrap()
+}
+
+/// Seen edge on, all triangles of a sheet lie within the band of one another. From its back, every hit
+/// asks for a second try, and turned the ray meets a neighbour: nearer, but beside where it was asked for.
+#[test]
+fn a_true_hit_is_not_given_up_for_a_neighbour_seen_edge_on() {
+    let scene = sheet();
+    let mesh = &scene.meshes[0];
+    let intersector = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
+    let mut counts = RayCounts::default();
+    let (mut rays, mut wrong) = (0, 0);
+    for prim in (0..mesh.triangles.len()).step_by(41) {
+        let [a, b, c] = mesh.corners(prim);
+        let middle = (a + b + c) / 3.0;
+        for k in (0..64).map(f64::from) {
+            let height = -2e-5 - 1e-6 * k;
+            let away = DVec3::new((1.7 * k).cos(), (1.7 * k).sin(), height);
+            let ray = Ray::new(middle + away * 1e6, -away * 1e6);
+            // In a block of backs alone nothing is tried again: one that meets the front beside it.
+            let front = Ray::new(DVec3::new(0.0, 0.0, 3.0), middle - DVec3::new(0.0, 0.0, 3.0));
+            let mut hits = [None; 2];
+            intersector.intersect_batch(&[ray, front], &mut hits, &mut counts);
+            hits[1] = intersector.intersect(&ray, &mut counts);
+            rays += hits.len();
+            let is_it = |hit: &Hit| hit.prim.prim_id as usize == prim;
+            wrong += hits.iter().filter(|hit| !hit.as_ref().is_some_and(is_it)).count();
+        }
+    }
+    assert_eq!(wrong, 0, "of {rays} rays at the middles of triangles");
+    assert!(counts.retry as usize > rays / 2, "the case is not hard: {} tries", counts.retry);
 }
 
 #[test]

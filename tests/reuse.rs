@@ -12,7 +12,7 @@ mod moves;
 
 use moves::{Set, psnr_of};
 use tweenray::film::Film;
-use tweenray::math::DVec3;
+use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{CameraPath, Easing, KeyPose, Policy, Pose, ReuseSettings, Settings};
 use tweenray::sequence::Made;
 use tweenray::stats::ReuseCounts;
@@ -155,6 +155,28 @@ fn inferred_frames_flicker_no_more_than_traced_ones() {
     for (k, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
         assert!(ours <= theirs, "from frame {} to {}: {ours} against {theirs}", k + 1, k + 2);
     }
+}
+
+/// With one sample a pixel the clamp of the sample is that of the picture: in traced and inferred frames.
+#[test]
+fn a_sample_is_clamped_alike_in_traced_and_inferred_frames() {
+    const MOST: f32 = 0.25;
+    let set = Set::load("cornell", |_| ());
+    let stage = set.stage(2);
+    let shot = set.shot(FRAMES);
+    let settings = with_segment(set.settings((64, 64), 1, 16));
+    let plain = stage.frames(&settings, &shot, &segment());
+    let clamped = Settings { clamp: Some(MOST * settings.exposure), ..settings };
+    let mut inferred = 0;
+    for (frame, (a, b)) in
+        segment().iter().zip(plain.iter().zip(stage.frames(&clamped, &shot, &segment())))
+    {
+        let limited = a.film.rgb.iter().map(|c| c.min(Rgb::splat(MOST)));
+        assert!(limited.eq(b.film.rgb.iter().copied()), "frame {frame}");
+        assert!(a.film.rgb.iter().any(|c| c.max_element() > MOST));
+        inferred += b.reuse.direct_inferred;
+    }
+    assert!(inferred > 1000, "{inferred}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Options that stand over the scene file: what to render and how.
 
-use super::values::{self, FrameRequest};
+use super::values::{self, Clamp, FrameRequest};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
     BuildQuality, Filter, IntersectorKind, Interval, Policy, Recheck, Rect, ReuseSettings,
@@ -56,6 +56,10 @@ pub struct SettingArgs {
     /// Factor on radiance before the tone curve [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = values::within_f32(limits::FACTOR))]
     pub exposure: Option<f32>,
+    /// Clamp each camera sample's radiance, times the exposure, to this before averaging: smooth edges
+    /// of bright lamps, but less light than is true, in exr too; "off" [default: off]
+    #[arg(long, value_name = "MAX", allow_negative_numbers = true, value_parser = values::clamp)]
+    pub clamp: Option<Clamp>,
     /// Tone curve of png and ppm files; exr stays linear [default: srgb]
     #[arg(long, value_name = "CURVE",
         value_parser = values::choice::<ToneCurve>(&["srgb", "linear", "reinhard", "filmic"]))]
@@ -177,6 +181,7 @@ impl SettingArgs {
         put(&mut s.spp, self.spp);
         put(&mut s.filter, self.filter);
         put(&mut s.exposure, self.exposure);
+        put(&mut s.clamp, self.clamp.map(|Clamp(most)| most));
         put(&mut s.tone, self.tone);
         put(&mut s.png_bits, self.png_bits);
         put(&mut s.flag_bad, self.flag_bad);

@@ -144,6 +144,19 @@ pub fn time_or_off(text: &str) -> Result<Interval, String> {
     Interval::parse(text)
 }
 
+/// The most that a camera sample may be; `None` is `off`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clamp(pub Option<f32>);
+
+/// A factor, or `off`.
+pub fn clamp(text: &str) -> Result<Clamp, String> {
+    if text.trim() == "off" {
+        return Ok(Clamp(None));
+    }
+    let most = within_f32(crate::scene::limits::FACTOR)(text);
+    most.map(|most| Clamp(Some(most))).map_err(|message| format!("{message}, or \"off\""))
+}
+
 /// A parser of numbers in `range`.
 pub fn within(
     range: RangeInclusive<f64>,

@@ -21,6 +21,7 @@ mod source;
 mod texture;
 mod tidy;
 mod turntable;
+mod untextured;
 
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};

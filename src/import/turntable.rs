@@ -6,7 +6,7 @@
 
 use super::framing::{self, Lens};
 use super::scene_file::to_y_up;
-use super::{LoadOptions, Loaded, Model, Stage, emission};
+use super::{LoadOptions, Loaded, Model, Stage, emission, untextured};
 use crate::error::{Diagnostic, Result};
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::{
@@ -36,6 +36,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     )?;
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
+    }
+    for found in untextured::find(&world, 0) {
+        warnings.push(Diagnostic::new(path, found.message()).help(found.help()));
     }
     let mut settings = Settings::default();
     if let Some((width, height)) = options.size {

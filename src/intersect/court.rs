@@ -165,7 +165,7 @@ impl Line {
     }
 
     /// Distance between the line and a segment.
-    fn segment_distance(&self, from: DVec3, to: DVec3) -> f64 {
+    pub fn segment_distance(&self, from: DVec3, to: DVec3) -> f64 {
         let along = (self.end - self.start).normalize();
         // Across the line, so that only the plane perpendicular to it is left.
         let across = |p: DVec3| {

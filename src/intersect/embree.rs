@@ -204,9 +204,9 @@ impl<'s> EmbreeIntersector<'s> {
                 counts.retry += 1;
                 let again = self.query(ray, turn, &[]);
                 let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
-                let again = again.and_then(|again| self.recheck(ray, &again));
-                if again.is_some_and(|again| hit.is_none_or(|hit| again.t < hit.t)) {
-                    return again;
+                let again = again.and_then(|again| self.locate(ray, &again));
+                if let Some(again) = again.filter(|again| again.lies_before(hit.map(|h| h.t))) {
+                    return Some(again.hit);
                 }
             }
         }

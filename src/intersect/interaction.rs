@@ -4,6 +4,7 @@ use super::triangle::{self, PlaneHit};
 use super::{Hit, PrimRef, Ray};
 use crate::math::{DVec3, Vec2};
 use crate::scene::{Mesh, Scene, Surface};
+use std::f64::consts::{PI, TAU};
 
 /// A hit expanded, scene space, f64.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +15,8 @@ pub struct SurfaceInteraction {
     pub ng: DVec3,
     /// Unit shading normal, on the same side as `ng`.
     pub ns: DVec3,
-    /// Texture coordinates; zero without.
+    /// Texture coordinates: the mesh's, or an exact sphere's longitude and latitude; zero without, and
+    /// on spheres without a texture.
     pub uv: Vec2,
     /// What it is made of.
     pub surface: Surface,
@@ -256,11 +258,23 @@ fn on_sphere(scene: &Scene, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
         p,
         ng,
         ns: ng,
-        uv: Vec2::ZERO,
+        uv: sphere_uv(scene, sphere.surface, ng),
         surface: sphere.surface,
         prim: hit.prim,
         offset,
     }
+}
+
+/// Longitude and latitude of the unit vector `n` as texture coordinates, poles on y: the image's middle
+/// faces +z, its side edges meet at -z, and seen from outside it is not mirrored. Zero where no texture
+/// asks for them, since they cost two arcs.
+fn sphere_uv(scene: &Scene, surface: Surface, n: DVec3) -> Vec2 {
+    if scene.materials[surface.material as usize].texture.is_none() {
+        return Vec2::ZERO;
+    }
+    let u = 0.75 - libm::atan2(n.z, n.x) / TAU;
+    let v = 1.0 - libm::atan2(libm::hypot(n.x, n.z), n.y) / PI;
+    Vec2::new(u as f32, v as f32)
 }
 
 /// Unit normal of a triangle with edges `e1`, `e2` of any size.

@@ -89,6 +89,8 @@ impl WriteOptions {
             s.exposure,
             s.tone,
         );
+        let clamp = s.clamp.map_or_else(String::new, |most| format!(", clamp {most}"));
+        let text = text + &clamp;
         let display = Display { exposure: s.exposure, tone: s.tone };
         Self { display, png_bits: s.png_bits, frame, settings: text, maps: None, attribute: None }
     }

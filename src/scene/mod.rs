@@ -36,7 +36,7 @@ pub use settings::{
 };
 pub use time::{Interval, parse_time};
 pub(crate) use weld::weld;
-pub(crate) use winding::closed_volume;
+pub(crate) use winding::{borders, closed_volume};
 
 use crate::math::{Bounds3, DVec3};
 use serde::{Deserialize, Serialize};

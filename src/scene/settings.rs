@@ -29,6 +29,10 @@ pub struct Settings {
     pub seed: u64,
     /// Factor on radiance before the tone curve.
     pub exposure: f32,
+    /// The most that each channel of a camera sample's radiance, times the exposure, may be before a
+    /// pixel's samples are averaged; `None` leaves it as it is. It makes pictures darker than the truth.
+    #[serde(default)]
+    pub clamp: Option<f32>,
     /// Tone curve of 8- and 16-bit files.
     pub tone: ToneCurve,
     /// Bits a channel of png files: 8 or 16.
@@ -55,6 +59,11 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// [`Self::clamp`] as radiance.
+    pub fn most_radiance(&self) -> Option<f32> {
+        self.clamp.map(|most| (most / self.exposure).max(f32::MIN_POSITIVE))
+    }
+
     /// The part of the image that is rendered.
     pub fn region(&self) -> Rect {
         self.crop.unwrap_or(Rect { x0: 0, y0: 0, x1: self.width, y1: self.height })
@@ -75,6 +84,7 @@ impl Default for Settings {
             cutoff: 1e-3,
             seed: 0,
             exposure: 1.0,
+            clamp: None,
             tone: ToneCurve::Srgb,
             png_bits: 8,
             intersector: IntersectorKind::Embree,

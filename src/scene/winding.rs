@@ -99,6 +99,24 @@ pub(crate) fn closed_volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> Opti
     Some(volume.sum())
 }
 
+/// Of each triangle, which edges (bit 0 the first, from corner 0 to 1) no other triangle has: where the
+/// surface ends.
+pub(crate) fn borders(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u8> {
+    let welded = welded(positions, triangles);
+    let edges_of = |t: &[u32; 3]| {
+        [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| (a.min(b), a.max(b)))
+    };
+    let mut uses = HashMap::with_capacity(triangles.len() * 3);
+    for edge in welded.iter().flat_map(edges_of) {
+        *uses.entry(edge).or_insert(0u32) += 1;
+    }
+    let bits = |t: &[u32; 3]| {
+        let alone = edges_of(t).map(|edge| u8::from(uses[&edge] == 1));
+        alone[0] | alone[1] << 1 | alone[2] << 2
+    };
+    welded.iter().map(bits).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,6 +143,13 @@ mod tests {
     #[test]
     fn an_open_mesh_has_no_answer() {
         assert_eq!(strays(&corners(), &TETRAHEDRON[..3]), None);
+    }
+
+    #[test]
+    fn borders_are_the_edges_of_one_triangle() {
+        assert_eq!(borders(&corners(), &TETRAHEDRON), [0; 4]);
+        // Without the last face its edges 2-0, 0-3 and 3-2 are left to one triangle each.
+        assert_eq!(borders(&corners(), &TETRAHEDRON[..3]), [1, 4, 2]);
     }
 
     #[test]

@@ -98,6 +98,7 @@ pub(super) fn block<
     let mut first = 0;
     while first < renderer.settings.spp {
         let last = (first + samples_per_chunk).min(renderer.settings.spp);
+        pixels.start_samples(first..last);
         camera_rays(renderer, input, pixels, first..last, scratch);
         counts.camera += scratch.rays.len() as u64;
         if NESTED {

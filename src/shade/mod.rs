@@ -200,7 +200,8 @@ impl Renderer<'_> {
         let share = 1.0 / tiles.len().max(1) as f64;
         let part = Part { crop, mask: job.mask, width: camera.width };
         let kernel = self.kernel();
-        let start = || (BlockPixels::new(job.with_gbuffer), Scratch::default());
+        let most = self.settings.most_radiance();
+        let start = || (BlockPixels::new(job.with_gbuffer, most), Scratch::default());
         let one = |state: &mut (BlockPixels, Scratch), tile: &Rect| {
             let done = self.tile(&input, tile, &part, kernel, state, stop)?;
             progress.tile_done(share, &done.rays);

@@ -7,6 +7,7 @@ use crate::math::Rgb;
 use crate::sampling::{PixelFilter, PixelSampler};
 use crate::scene::Rect;
 use crate::stats::Fault;
+use std::ops::Range;
 
 /// Edge of a block in pixels.
 pub(super) const BLOCK: u32 = 8;
@@ -22,6 +23,12 @@ pub(super) struct BlockPixels {
     film_samplers: Vec<PixelSampler>,
     samplers: Vec<PixelSampler>,
     sums: Vec<Rgb>,
+    /// The most that each channel of a sample's radiance may be.
+    most: Option<f32>,
+    /// Where there is such a limit: sums of the present chunk's samples, pixel by pixel.
+    samples: Vec<Rgb>,
+    /// The present chunk's samples.
+    chunk: Range<u32>,
     /// Light of the present chunk of samples that is no radiance: pixel, sample, fault.
     suspects: Vec<(u32, u32, Fault)>,
     /// Pixels with such a sample, once a sample.
@@ -73,13 +80,17 @@ struct Record {
 }
 
 impl BlockPixels {
-    /// No block yet; with or without G-buffer records.
-    pub fn new(with_records: bool) -> Self {
+    /// No block yet; with or without G-buffer records, and with a limit to each channel of a camera
+    /// sample's radiance or none.
+    pub fn new(with_records: bool, most: Option<f32>) -> Self {
         Self {
             places: Vec::new(),
             film_samplers: Vec::new(),
             samplers: Vec::new(),
             sums: Vec::new(),
+            most,
+            samples: Vec::new(),
+            chunk: 0..0,
             suspects: Vec::new(),
             bad: Vec::new(),
             records: Vec::new(),
@@ -180,8 +191,40 @@ impl BlockPixels {
     /// is, and noted.
     #[inline]
     pub fn add(&mut self, pixel: u32, sample: u32, radiance: Rgb) {
-        self.sums[pixel as usize] += radiance;
+        let sum = match self.most {
+            None => &mut self.sums[pixel as usize],
+            Some(_) => {
+                let at = pixel * self.chunk_len() + sample - self.chunk.start;
+                &mut self.samples[at as usize]
+            }
+        };
+        *sum += radiance;
         self.check(pixel, sample, radiance);
+    }
+
+    fn chunk_len(&self) -> u32 {
+        self.chunk.end - self.chunk.start
+    }
+
+    /// Starts a chunk of camera samples.
+    pub fn start_samples(&mut self, chunk: Range<u32>) {
+        self.chunk = chunk;
+        if self.most.is_some() {
+            let count = self.chunk_len() as usize * self.places.len();
+            self.samples.clear();
+            self.samples.resize(count, Rgb::ZERO);
+        }
+    }
+
+    /// Adds the chunk's samples, whole by now, to their pixels, none of them above the limit.
+    fn add_clamped(&mut self, most: f32) {
+        let samples = self.samples.chunks(self.chunk_len().max(1) as usize);
+        for (sum, samples) in self.sums.iter_mut().zip(samples) {
+            // What is no radiance stays what it is.
+            let clamped =
+                |light: &Rgb| if light.is_finite() { light.min(Rgb::splat(most)) } else { *light };
+            *sum += samples.iter().map(clamped).fold(Rgb::ZERO, |all, light| all + light);
+        }
     }
 
     /// Notes a sample whose light, or weight of light, is no radiance.
@@ -203,6 +246,9 @@ impl BlockPixels {
 
     /// Ends a chunk of camera samples: each bad one counts once, by its worst fault.
     pub fn end_samples(&mut self) {
+        if let Some(most) = self.most {
+            self.add_clamped(most);
+        }
         if self.suspects.is_empty() {
             return;
         }

@@ -26,7 +26,8 @@ impl Renderer<'_> {
     ) -> Option<(Vec<Rgb>, RayCounts)> {
         let input = self.input(camera, stream, None);
         let kernel = self.kernel();
-        let start = || (BlockPixels::new(false), Scratch::default());
+        let most = self.settings.most_radiance();
+        let start = || (BlockPixels::new(false, most), Scratch::default());
         let one = |state: &mut (BlockPixels, Scratch), group: &[(u32, u32)]| {
             if stop.load(Ordering::Relaxed) {
                 return None;

@@ -88,7 +88,12 @@ impl<'a> Closely<'a> {
             let slipped = missed.class == Class::Missed
                 && self.is_at_vertex(true_hit.prim)
                 && self.faces(hit.prim);
-            Some(if slipped { Difference { class: Class::PastVertex, ..missed } } else { missed })
+            if !slipped {
+                return Some(missed);
+            }
+            let closed = self.check.is_closed(true_hit.prim.geom_id);
+            let class = if closed { Class::PastVertex } else { Class::PastOpenVertex };
+            Some(Difference { class, ..missed })
         }
     }
 
@@ -170,9 +175,9 @@ impl<'a> Closely<'a> {
         Difference { class, ulps: clearest }
     }
 
-    /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, or since
-    /// a ray within the band passes everything by. Between triangles that share an edge there is
-    /// no such ray.
+    /// Whether nothing before `limit` is hit for certain: by what lies at the ray's ends, where the
+    /// surface ends, or since a ray within the band passes everything by. Between triangles that share
+    /// an edge there is no such ray.
     fn gap(&self, limit: f64) -> Option<Class> {
         let hits = self.check.oracle.all_hits(&self.ray);
         let nearer = hits.iter().filter(|h| h.hit.t <= limit);
@@ -183,6 +188,9 @@ impl<'a> Closely<'a> {
         }
         if others.iter().any(|h| !self.pass(h.hit.prim).in_band()) {
             return None;
+        }
+        if others.iter().all(|h| self.is_at_border(h.hit.prim)) {
+            return Some(Class::EdgeBand);
         }
         let near = self.near();
         let width = others.iter().map(|h| self.pass(h.hit.prim).ulp).fold(0.0, f64::max);
@@ -220,6 +228,18 @@ impl<'a> Closely<'a> {
             }
         }
         offsets
+    }
+
+    /// Whether the ray passes within the band of an edge of the triangle that no other triangle has. Where
+    /// two sheets touch without a common edge, at a T-junction say, rounding may let a ray pass between
+    /// them although they overlap by less than an ulp.
+    fn is_at_border(&self, prim: PrimRef) -> bool {
+        let Some([a, b, c]) = self.check.oracle.corners(prim) else { return false };
+        let borders = self.check.borders_of(prim);
+        let band = BAND_ULPS * self.line.ulp(&[a, b, c]);
+        let edges = [(a, b), (b, c), (c, a)].into_iter().enumerate();
+        let mut borders = edges.filter(|(k, _)| borders >> k & 1 == 1);
+        borders.any(|(_, (from, to))| self.line.segment_distance(from, to) <= band)
     }
 
     /// Everything that passes the ray within twice the band, spheres included.

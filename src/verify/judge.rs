@@ -23,6 +23,10 @@ pub enum Class {
     /// mode leaves open and no second try can see. (An inside there would have given it away, and
     /// nothing at all, too.) Explained, but only so many: [`super::PAST_VERTEX_LIMIT`].
     PastVertex,
+    /// The same past a vertex of a mesh that is not closed: whoever goes through its one side need not
+    /// come upon a back behind, so nothing calls for a second try. Explained, but only so many:
+    /// [`super::OPEN_VERTEX_LIMIT`].
+    PastOpenVertex,
     /// A hit that is not on its triangle.
     Phantom,
     /// A hit that the product does not have, or has something behind it for.
@@ -37,11 +41,12 @@ pub enum Class {
 
 impl Class {
     /// All classes.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Tie,
         Self::EdgeBand,
         Self::RayEnd,
         Self::PastVertex,
+        Self::PastOpenVertex,
         Self::Phantom,
         Self::Missed,
         Self::WrongDistance,
@@ -51,7 +56,8 @@ impl Class {
 
     /// Whether such a difference is no fault of the product.
     pub fn is_explained(self) -> bool {
-        matches!(self, Self::Tie | Self::EdgeBand | Self::RayEnd | Self::PastVertex)
+        let past = matches!(self, Self::PastVertex | Self::PastOpenVertex);
+        past || matches!(self, Self::Tie | Self::EdgeBand | Self::RayEnd)
     }
 
     /// Whether rays of `kind` can show it.

@@ -13,11 +13,11 @@ mod tally;
 
 pub use judge::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
-pub use tally::{PAST_VERTEX_LIMIT, Row, Tally, Worst};
+pub use tally::{OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally, Worst};
 
-use crate::intersect::{CourtHit, Hit, Intersector, Oracle, Ray};
+use crate::intersect::{CourtHit, Hit, Intersector, Oracle, PrimRef, Ray};
 use crate::math::DVec3;
-use crate::scene::{Scene, Settings, Shot, closed_volume};
+use crate::scene::{Mesh, Scene, Settings, Shot, borders, closed_volume};
 use crate::stats::RayCounts;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -51,8 +51,10 @@ pub struct Check<'a> {
     pub product: &'a dyn Intersector,
     /// The one that is right.
     pub oracle: &'a Oracle<'a>,
-    /// For each mesh, once somebody asks, whether it is closed and wound inwards.
-    inwards: Vec<OnceLock<bool>>,
+    /// For each mesh, once somebody asks, the sign of its volume if it is closed.
+    volumes: Vec<OnceLock<Option<f64>>>,
+    /// For each mesh, once somebody asks, which edges of its triangles are borders.
+    borders: Vec<OnceLock<Vec<u8>>>,
 }
 
 /// One ray, traced by both.
@@ -115,19 +117,34 @@ impl<'a> Check<'a> {
         product: &'a dyn Intersector,
         oracle: &'a Oracle<'a>,
     ) -> Self {
-        let inwards = scene.meshes.iter().map(|_| OnceLock::new()).collect();
-        Self { scene, settings, shot, product, oracle, inwards }
+        let volumes = scene.meshes.iter().map(|_| OnceLock::new()).collect();
+        let borders = scene.meshes.iter().map(|_| OnceLock::new()).collect();
+        Self { scene, settings, shot, product, oracle, volumes, borders }
     }
 
     /// Whether the mesh is closed and its faces wind clockwise seen from outside, so that their
     /// backs are its outside.
     fn is_inwards(&self, geom_id: u32) -> bool {
+        self.volume(geom_id).is_some_and(|volume| volume < 0.0)
+    }
+
+    /// Whether every edge of the mesh has a partner that runs the other way.
+    fn is_closed(&self, geom_id: u32) -> bool {
+        self.volume(geom_id).is_some()
+    }
+
+    fn volume(&self, geom_id: u32) -> Option<f64> {
         let mesh = &self.scene.meshes[geom_id as usize];
-        *self.inwards[geom_id as usize].get_or_init(|| {
-            let positions = mesh.positions[..mesh.vertex_count].iter().map(|p| p.as_dvec3());
-            let positions: Vec<DVec3> = positions.collect();
-            closed_volume(&positions, &mesh.triangles).is_some_and(|volume| volume < 0.0)
-        })
+        *self.volumes[geom_id as usize]
+            .get_or_init(|| closed_volume(&positions_of(mesh), &mesh.triangles))
+    }
+
+    /// Which edges of a triangle no other triangle has, a bit each.
+    fn borders_of(&self, prim: PrimRef) -> u8 {
+        let mesh = &self.scene.meshes[prim.geom_id as usize];
+        let borders = self.borders[prim.geom_id as usize]
+            .get_or_init(|| borders(&positions_of(mesh), &mesh.triangles));
+        borders[prim.prim_id as usize]
     }
 
     /// Shoots `rays` of each kind on the current pool's threads. `progress` hears how many more
@@ -232,4 +249,8 @@ impl<'a> Check<'a> {
         let answers = product.into_iter().zip(oracle);
         Some(answers.map(|(product, oracle)| Answers::Hits { product, oracle }).collect())
     }
+}
+
+fn positions_of(mesh: &Mesh) -> Vec<DVec3> {
+    mesh.positions[..mesh.vertex_count].iter().map(|p| p.as_dvec3()).collect()
 }

@@ -10,6 +10,12 @@ use std::collections::BTreeMap;
 /// was measured (0 to 2 of 8,000 on a scene), and a tenth of what a missing second try lets through.
 pub const PAST_VERTEX_LIMIT: f64 = 1e-3;
 
+/// Share of the rays aimed at vertices that may slip past one of an open mesh
+/// ([`Class::PastOpenVertex`]). Embree's robust mode loses 1 to 2.5 % of rays at vertices, by how many
+/// triangles meet there, and of these the second try gets to see what goes on to a back or to nothing:
+/// measured were up to 1.6 %. So a rate above this is not Embree's own.
+pub const OPEN_VERTEX_LIMIT: f64 = 0.03;
+
 const KINDS: usize = Kind::ALL.len();
 const CLASSES: usize = Class::ALL.len();
 
@@ -98,9 +104,17 @@ impl Tally {
         ((PAST_VERTEX_LIMIT * self.rays(Kind::Vertex) as f64) as u64).max(1)
     }
 
+    /// How many may be [`Class::PastOpenVertex`]: [`OPEN_VERTEX_LIMIT`] of the vertex rays, but one at
+    /// least.
+    pub fn open_vertex_allowed(&self) -> u64 {
+        ((OPEN_VERTEX_LIMIT * self.rays(Kind::Vertex) as f64) as u64).max(1)
+    }
+
     /// Whether every difference is explained, and no limit exceeded.
     pub fn passed(&self) -> bool {
-        self.unexplained() == 0 && self.count(Class::PastVertex) <= self.past_vertex_allowed()
+        self.unexplained() == 0
+            && self.count(Class::PastVertex) <= self.past_vertex_allowed()
+            && self.count(Class::PastOpenVertex) <= self.open_vertex_allowed()
     }
 
     /// Every class with what was found of it.
@@ -134,5 +148,27 @@ fn worse(a: Option<Worst>, b: Option<Worst>) -> Option<Worst> {
             Some(if a_first { a } else { b })
         }
         (a, b) => a.or(b),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_past_a_vertex_than_the_limit_fails() {
+        for (class, allowed) in [(Class::PastVertex, 4), (Class::PastOpenVertex, 122)] {
+            let with = |slipped: u64| {
+                let mut tally = Tally::default();
+                for index in 0..4096 {
+                    let difference = Difference { class, ulps: 0.5 };
+                    let id = RayId { kind: Kind::Vertex, index };
+                    tally.add(id, (index < slipped).then_some(difference));
+                }
+                tally
+            };
+            assert!(with(allowed).passed() && with(allowed).unexplained() == 0, "{class:?}");
+            assert!(!with(allowed + 1).passed(), "{class:?}");
+        }
     }
 }

@@ -39,6 +39,7 @@ fn mistakes_are_answered_with_what_was_meant() {
     job.refused("render cube.obj --crop 0,0,9999,9", "does not lie in the image");
     job.refused("render cube.obj --exposure nan", "from 1e-30 to 1e30");
     job.refused("render cube.obj --exposure -1", "from 1e-30 to 1e30");
+    job.refused("render cube.obj --clamp 0", "from 1e-30 to 1e30, or \"off\"");
     job.refused("render cube.obj --scale -1", "from 1e-30 to 1e30");
     job.refused("render cube.obj --cutoff -0.5", "from 0 to 1");
     job.refused("render cube.obj --fps 0", "from 1 to 1000");

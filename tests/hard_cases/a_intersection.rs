@@ -8,6 +8,7 @@ mod garbage;
 mod holes;
 mod invariance;
 mod isa;
+mod open;
 mod ranges;
 mod refused;
 mod scale;
@@ -49,6 +50,7 @@ cases! {
     23 in_plane_ray "Embree 298: it hits or not" => coincident::in_plane;
     24 isa_agreement "Embree 423: answers differ by processor" => isa::agreement;
     25 unrelated_mesh "Embree 181: a far mesh changes near hits" => scale::unrelated_mesh;
+    63 open_meshes "no public test" => open::open_meshes;
 }
 
 /// Leaks of closed spheres at the origin and far away, by both ways to trace. `aim` gives the

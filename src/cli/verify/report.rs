@@ -3,7 +3,9 @@
 use super::{VerifyArgs, replay_command};
 use crate::cli::say;
 use crate::error::{Error, Result};
-use crate::verify::{BAND_ULPS, Check, Class, Kind, PAST_VERTEX_LIMIT, Row, Tally};
+use crate::verify::{
+    BAND_ULPS, Check, Class, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -25,6 +27,9 @@ struct Report {
     /// Share of the vertex rays that may be past-vertex, and how many that makes.
     past_vertex_limit: f64,
     past_vertex_allowed: u64,
+    /// The same for vertices of open meshes.
+    open_vertex_limit: f64,
+    open_vertex_allowed: u64,
     classes: Vec<ClassReport>,
 }
 
@@ -54,6 +59,8 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
         unexplained: tally.unexplained(),
         past_vertex_limit: PAST_VERTEX_LIMIT,
         past_vertex_allowed: tally.past_vertex_allowed(),
+        open_vertex_limit: OPEN_VERTEX_LIMIT,
+        open_vertex_allowed: tally.open_vertex_allowed(),
         classes: classes.collect(),
     };
     if args.json {
@@ -70,6 +77,7 @@ pub fn meaning(class: Class) -> &'static str {
         Class::Tie => "another triangle at the same place",
         Class::EdgeBand => "within the band of an edge",
         Class::PastVertex => "past a vertex, onto a front",
+        Class::PastOpenVertex => "past an open mesh's vertex",
         Class::RayEnd => "at the ray's own start or end",
         Class::Phantom => "phantom hit",
         Class::Missed => "missed hit",
@@ -120,8 +128,9 @@ impl Report {
             0 if !self.complete => writeln!(text, "\nnot complete: stopped before the end"),
             0 => writeln!(
                 text,
-                "\nFAILED: more than {} slipped past a vertex, {PAST_VERTEX_LIMIT} of the vertex rays",
-                self.past_vertex_allowed
+                "\nFAILED: more slipped past a vertex than the {} ({PAST_VERTEX_LIMIT} of the vertex rays) \
+                 that may past one of a closed mesh, or the {} ({OPEN_VERTEX_LIMIT}) past one of an open",
+                self.past_vertex_allowed, self.open_vertex_allowed
             ),
             n => writeln!(text, "\nFAILED: {n} unexplained"),
         };

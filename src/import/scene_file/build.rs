@@ -5,9 +5,9 @@ use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
 use super::report::Source;
-use super::{SceneFile, shapes};
+use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
-use crate::import::{self, Model, emission};
+use crate::import::{self, Model, emission, untextured};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -97,7 +97,8 @@ impl<'a> Builder<'a> {
         let mut piece = match shape {
             Shape::File(file) => self.read_model(file, mesh, over.is_some())?,
             generated => {
-                let mesh = self.generate(&generated, mesh)?;
+                let textured = over.is_some_and(|id| self.is_textured(id));
+                let mesh = self.generate(&generated, mesh, textured)?;
                 World { meshes: vec![mesh], ..World::default() }
             }
         };
@@ -114,7 +115,15 @@ impl<'a> Builder<'a> {
         self.world.meshes[meshes..].iter_mut().for_each(|m| m.always_traced = !mesh.reuse);
         self.world.spheres[spheres..].iter_mut().for_each(|s| s.always_traced = !mesh.reuse);
         self.light_up(meshes, spheres, &mesh.span);
+        for found in untextured::find(&self.world, meshes) {
+            let warning = self.source.fault(&mesh.span, found.message()).help(found.help());
+            self.warnings.push(warning);
+        }
         Ok(())
+    }
+
+    fn is_textured(&self, id: MaterialId) -> bool {
+        self.world.materials[id as usize].texture.is_some()
     }
 
     fn add_sphere(&mut self, sphere: &At<Sphere>) -> Result<()> {
@@ -155,7 +164,8 @@ impl<'a> Builder<'a> {
         Ok(world)
     }
 
-    fn generate(&mut self, shape: &Shape<'_>, mesh: &Mesh) -> Result<WorldMesh> {
+    /// A generated mesh, with texture coordinates where it is `textured`.
+    fn generate(&mut self, shape: &Shape<'_>, mesh: &Mesh, textured: bool) -> Result<WorldMesh> {
         let mut made = match shape {
             Shape::Cuboid(c) => shapes::cuboid("box".into(), c.corners(self.source)?, 0),
             Shape::Quad(q) => shapes::quad("quad".into(), q.corners(self.source)?, 0),
@@ -172,6 +182,15 @@ impl<'a> Builder<'a> {
             }
             Shape::File(file) => return Err(self.at_span(&file.span, "a file is not generated")),
         };
+        if textured {
+            made.uvs = match shape {
+                Shape::Cuboid(_) => Some(mapping::cuboid(&shapes::FACES)),
+                Shape::Quad(_) => Some(mapping::quad()),
+                Shape::UvSphere(s) => Some(mapping::uv_sphere(s.meridians.u32(), s.bands.u32())),
+                Shape::Terrain(t) => Some(mapping::terrain(t.vertices.u32())),
+                Shape::File(_) => None,
+            };
+        }
         if mesh.normals != Normals::Auto {
             import::apply_normals(&mut made, mesh.policy());
         }

@@ -10,6 +10,7 @@ mod build;
 mod camera;
 mod generated;
 mod light;
+mod mapping;
 mod material;
 mod mesh;
 mod number;

@@ -52,6 +52,10 @@ pub(super) struct Settings {
     seed: Int<0, { limits::MAX_SEED as i64 }>,
     /// Factor on radiance before the tone curve.
     exposure: Positive,
+    /// The most that a camera sample's radiance, times the exposure, may be in each channel before a
+    /// pixel's samples are averaged: with 1 the edges of bright lamps are smooth. It takes light away, in
+    /// exr files too. Absent: no limit.
+    clamp: Option<Positive>,
     /// Tone curve of png and ppm files: "srgb" and "linear" clip, "reinhard" and "filmic" compress
     /// highlights. exr files stay linear.
     tone: ToneCurve,
@@ -115,6 +119,7 @@ impl Default for Settings {
             cutoff: Share(shortest(s.cutoff)),
             seed: Int::clamped(s.seed as i64),
             exposure: Positive(shortest(s.exposure)),
+            clamp: None,
             tone: s.tone,
             png_bits: PngBits(s.png_bits),
             intersector: s.intersector,
@@ -162,6 +167,7 @@ impl Settings {
             cutoff: self.cutoff.0 as f32,
             seed: self.seed.u64(),
             exposure: self.exposure.0 as f32,
+            clamp: self.clamp.map(|most| most.0 as f32),
             tone: self.tone,
             png_bits: self.png_bits.0,
             intersector: self.intersector,

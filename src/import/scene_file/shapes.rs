@@ -8,14 +8,17 @@ pub(super) fn quad(name: String, corners: [DVec3; 4], material: MaterialId) -> W
     flat(name, corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], material)
 }
 
+/// Corners of a box's faces -x, +x, -y, +y, -z, +z, counter-clockwise seen from outside: bit 0 of a
+/// number says which end of x, bit 1 of y, bit 2 of z.
+pub(super) const FACES: [[u32; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
 /// Twelve triangles that face outwards.
 pub(super) fn cuboid(name: String, (min, max): (DVec3, DVec3), material: MaterialId) -> WorldMesh {
     // Bit 0 of a vertex's index says x, bit 1 y, bit 2 z.
     let pick =
         |index: usize, axis: usize| if index >> axis & 1 == 0 { min[axis] } else { max[axis] };
     let positions = (0..8).map(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
-    const FACES: [[u32; 4]; 6] =
-        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let triangles = FACES.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
     flat(name, positions, triangles, material)
 }

@@ -167,13 +167,24 @@ impl EmbreeIntersector<'_> {
             let hit_again = self.trace::<W>(&again[..tried], Lanes::MAX, &mut found_again);
             for (k, lane) in lanes[..tried].iter().enumerate() {
                 let is_hit = hit_again >> k & 1 == 1;
-                if is_hit && is_well_before(&rays[*lane], found_again[k].t, found[*lane].t) {
+                if is_hit && self.is_nearer(&rays[*lane], &found_again[k], &found[*lane]) {
                     found[*lane] = found_again[k];
                     hit |= 1 << *lane;
                 }
             }
         }
         hit
+    }
+
+    /// Whether what a turned ray found lies before what the ray found as it was asked for.
+    fn is_nearer(&self, ray: &Ray, again: &PacketHit, former: &PacketHit) -> bool {
+        if former.prim == PrimRef::NONE {
+            return true;
+        }
+        // The ray is the one that Embree saw: none of its shift is left.
+        let locate = || self.locate(ray, &Candidate { hit: *again, shift: 0.0 });
+        is_well_before(ray, again.t, former.t)
+            && locate().is_some_and(|again| again.lies_before(Some(former.t.into())))
     }
 
     pub(super) fn occluded_packets<const W: usize>(

@@ -12,6 +12,23 @@ use crate::scene::Recheck;
 /// rounding of measuring it. That is what rounding the ray to f32 explains.
 const EDGE_BAND: f64 = 7.99 * ROUNDING;
 
+/// A hit in f64, and how sure its place along the ray is.
+pub(super) struct Located {
+    pub hit: Hit,
+    /// How far along the ray, in `t`, the hit may lie from where it is said to be. Zero where the ray
+    /// passes inside of the triangle; beside it, what the edge band across the ray comes to along it.
+    slack: f64,
+}
+
+impl Located {
+    /// Whether a hit that a turned ray found lies before one at `t` of the ray as it was asked for. Seen
+    /// edge on, the neighbours of a triangle all lie within the band: turned, a ray meets another of them,
+    /// and that is no sign that the first was wrong.
+    pub fn lies_before(&self, t: Option<f64>) -> bool {
+        t.is_none_or(|t| self.hit.t + self.slack < t)
+    }
+}
+
 impl EmbreeIntersector<'_> {
     /// Whether the rules want `hit`, one of a block, recomputed before anybody looks at its triangle.
     #[inline(always)]
@@ -28,19 +45,30 @@ impl EmbreeIntersector<'_> {
     /// The hit in f64, or `None` for a phantom.
     #[inline]
     pub(super) fn recheck(&self, ray: &Ray, candidate: &Candidate) -> Option<Hit> {
+        self.locate(ray, candidate).map(|located| located.hit)
+    }
+
+    /// The hit in f64 and how sure its place is, or `None` for a phantom.
+    #[inline]
+    pub(super) fn locate(&self, ray: &Ray, candidate: &Candidate) -> Option<Located> {
+        let sure = |hit| Located { hit, slack: 0.0 };
         let hit = &candidate.hit;
         let Some(mesh) = self.scene.meshes.get(hit.prim.geom_id as usize) else {
-            return self.recheck_sphere(ray, hit.prim);
+            return self.recheck_sphere(ray, hit.prim).map(sure);
         };
         if self.rules.recheck == Recheck::Off {
-            return Some(self.as_it_is(hit, candidate.shift));
+            return Some(sure(self.as_it_is(hit, candidate.shift)));
         }
         let corners = mesh.corners(hit.prim.prim_id as usize);
         // A ray in the triangle's plane hits nothing, nor is a triangle without an inside hit.
         let met = triangle::meet_plane(ray, &corners)?;
-        let met = if met.is_inside() { met } else { beside(ray, &corners, met, candidate.shift)? };
+        let (met, slack) = match met.is_inside() {
+            true => (met, 0.0),
+            false => beside(ray, &corners, met, candidate.shift)?,
+        };
         let PlaneHit { t, u, v } = met;
-        (ray.tnear..=ray.tfar).contains(&t).then_some(Hit { t, u, v, prim: hit.prim, rough: false })
+        let hit = Hit { t, u, v, prim: hit.prim, rough: false };
+        (ray.tnear..=ray.tfar).contains(&t).then_some(Located { hit, slack })
     }
 
     /// Embree's own numbers. Unless the recheck is off they are computed again when the surface is
@@ -76,15 +104,22 @@ fn is_risky(ray: &Ray, hit: &PacketHit, edge: f64) -> bool {
 }
 
 /// Where a ray that meets its triangle's plane at `met`, outside, is nearest to the triangle, if that
-/// is within the edge band. `None` for a phantom. The ray's origin was moved by `shift` along it.
-fn beside(ray: &Ray, corners: &[DVec3; 3], met: PlaneHit, shift: f64) -> Option<PlaneHit> {
+/// is within the edge band, and what the band comes to along the ray. `None` for a phantom. The ray's
+/// origin was moved by `shift` along it.
+fn beside(ray: &Ray, corners: &[DVec3; 3], met: PlaneHit, shift: f64) -> Option<(PlaneHit, f64)> {
     let (nearest, distance) = triangle::nearest_on_outline(ray, corners)?;
     let largest = |p: DVec3| p.abs().max_element();
     let reach = corners.iter().fold(largest(ray.at(shift)), |reach, c| reach.max(largest(*c)));
-    if distance > EDGE_BAND * reach {
+    let band = EDGE_BAND * reach;
+    if distance > band {
         return None;
     }
     // The plane's own t, unless the ray grazes it: then that point may be far away.
-    let apart = (met.t - nearest.t).abs() * ray.dir.length();
-    Some(PlaneHit { t: if apart <= EDGE_BAND * reach { met.t } else { nearest.t }, ..nearest })
+    let length = ray.dir.length();
+    let apart = (met.t - nearest.t).abs() * length;
+    let t = if apart <= band { met.t } else { nearest.t };
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    // 1 over the cosine to the normal; infinite in the plane.
+    let slope = normal.length() * length / normal.dot(ray.dir).abs();
+    Some((PlaneHit { t, ..nearest }, band * (1.0 + slope) / length))
 }

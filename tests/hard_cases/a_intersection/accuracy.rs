@@ -158,9 +158,9 @@ pub fn small_triangle_far(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let world = shapes::world_of(plane(100));
     let rays = size.of(100_000, 1_000_000);
-    let traced = |rules: HitRules, one_by_one: bool| {
+    let traced = |rules: HitRules, set: Option<&str>, one_by_one: bool| {
         let scene = world.clone().into_scene(rules.recentre).unwrap();
-        let embree = EmbreeIntersector::new(&scene, rules, None, 4).unwrap();
+        let embree = EmbreeIntersector::new(&scene, rules, set, 4).unwrap();
         let single = OneByOne(&embree);
         let tracer: &dyn Intersector = if one_by_one { &single } else { &embree };
         let aim = |i: u64| {
@@ -194,12 +194,15 @@ pub fn small_triangle_far(size: Size) -> Outcome {
         let sum = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
         suite::trace(tracer, rays, make, judge, sum, || [0, 0])
     };
-    for one_by_one in [false, true] {
-        let [missed, other] = traced(HitRules::default(), one_by_one);
-        outcome.count(rays, missed + other);
-        outcome.show(format!("{missed} missed, {other} on another triangle"));
+    for set in super::isa::sets_here() {
+        for one_by_one in [false, true] {
+            let [missed, other] = traced(HitRules::default(), Some(set), one_by_one);
+            outcome.count(rays, missed + other);
+            let way = if one_by_one { "one by one" } else { "packets" };
+            outcome.show(format!("{set}, {way}: {missed} missed, {other} on another triangle"));
+        }
     }
-    let [missed, other] = traced(stock(true), false);
+    let [missed, other] = traced(stock(true), None, false);
     let share = |count: u64| 100.0 * count as f64 / rays as f64;
     outcome.show(format!("stock ROBUST: {:.2} % missed", share(missed)));
     outcome.at_least("stock ROBUST: % on another triangle", share(other), 1.0);

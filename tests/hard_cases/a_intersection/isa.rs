@@ -13,7 +13,13 @@ use tweenray::math::DVec3;
 use tweenray::scene::{HitRules, Recheck, Scene};
 use tweenray::stats::RayCounts;
 
-const SETS: [&str; 3] = ["sse4.2", "avx2", "avx512"];
+const SETS: [&str; 4] = ["sse4.2", "avx", "avx2", "avx512"];
+
+/// The instruction sets that the processor has, of those that Embree is built for.
+pub(super) fn sets_here() -> Vec<&'static str> {
+    SETS.into_iter().filter(|set| runs_here(set)).collect()
+}
+
 /// ulps from an edge within which a ray may be said to meet either triangle.
 const BAND: f64 = 4.0;
 
@@ -51,7 +57,7 @@ impl Differences {
 pub fn agreement(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let scene = shapes::scene_of(shapes::sphere(DVec3::ZERO, 1.0, 400, 200));
-    let sets: Vec<&str> = SETS.into_iter().filter(|set| runs_here(set)).collect();
+    let sets = sets_here();
     outcome.show(format!("instruction sets here: {}", sets.join(", ")));
     let oracle = Oracle::new(&scene);
     for kind in ["random", "edge-aimed"] {
@@ -89,6 +95,8 @@ fn runs_here(set: &str) -> bool {
     let has = match set {
         #[cfg(target_arch = "x86_64")]
         "sse4.2" => is_x86_feature_detected!("sse4.2"),
+        #[cfg(target_arch = "x86_64")]
+        "avx" => is_x86_feature_detected!("avx"),
         #[cfg(target_arch = "x86_64")]
         "avx2" => is_x86_feature_detected!("avx2"),
         #[cfg(target_arch = "x86_64")]

@@ -3,6 +3,7 @@
 mod bad;
 mod good;
 mod schema;
+mod textures;
 
 use super::*;
 use crate::error::{Diagnostic, Error};

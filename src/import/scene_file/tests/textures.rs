@@ -1,0 +1,117 @@
+//! Texture coordinates of the shapes, in closed form, and what is said of meshes without.
+
+use super::*;
+use crate::math::{DVec3, Vec2};
+use crate::scene::WorldMesh;
+
+/// A job whose one mesh is `mesh`, of a material with a texture.
+fn textured(mesh: &str) -> Loaded {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("white.ppm"), b"P6 1 1 255\n\xff\xff\xff").expect("written");
+    std::fs::write(at("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").expect("written");
+    let text = format!(
+        "sky.radiance = 1\n[material.paper]\ntexture = 'white.ppm'\n[[mesh]]\nmaterial = 'paper'\n{mesh}\n"
+    );
+    std::fs::write(at("scene.toml"), text).expect("written");
+    load(&at("scene.toml"), &LoadOptions::default()).expect("a scene")
+}
+
+/// Calls `check(position, uv, outward normal)` for each corner of each triangle, and sees to it that
+/// no image is mirrored.
+fn each_corner(mesh: &WorldMesh, mut check: impl FnMut(DVec3, Vec2, DVec3)) {
+    let uvs = mesh.uvs.as_ref().expect("texture coordinates");
+    for (prim, triangle) in mesh.triangles.iter().enumerate() {
+        let corners = triangle.map(|i| mesh.positions[i as usize]);
+        let at = uvs.get(prim, *triangle);
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).normalize();
+        let (e1, e2) = (at[1] - at[0], at[2] - at[0]);
+        assert!(e1.x * e2.y - e1.y * e2.x > 0.0, "triangle {prim} shows a mirrored image: {at:?}");
+        for (p, uv) in corners.into_iter().zip(at) {
+            check(p, uv, normal);
+        }
+    }
+}
+
+fn assert_near(uv: Vec2, u: f64, v: f64, at: DVec3) {
+    // The image repeats.
+    let off = (f64::from(uv.x) - u + 0.5).rem_euclid(1.0) - 0.5;
+    assert!(off.abs() < 1e-6 && (f64::from(uv.y) - v).abs() < 1e-6, "{uv} at {at}, not {u}, {v}");
+}
+
+#[test]
+fn a_quad_shows_the_image_once_along_its_edges() {
+    let loaded = textured("quad = { corner = [1, 2, 3], edges = [[4, 0, 0], [1, 2, 0]] }");
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    each_corner(&loaded.world.meshes[0], |p, uv, _| {
+        let v = (p.y - 2.0) / 2.0;
+        assert_near(uv, (p.x - 1.0 - v) / 4.0, v, p);
+        assert!((0.0..=1.0).contains(&uv.x));
+    });
+}
+
+#[test]
+fn a_box_shows_the_image_upright_on_each_side() {
+    let loaded = textured("box = { min = [-1, 0, 2], max = [1, 4, 5] }");
+    let (mut sides, middle) = ([0; 3], DVec3::new(0.0, 2.0, 3.5));
+    each_corner(&loaded.world.meshes[0], |p, uv, n| {
+        let share = (p - DVec3::new(-1.0, 0.0, 2.0)) / DVec3::new(2.0, 4.0, 3.0);
+        let axis = n.abs().max_position();
+        sides[axis] += 1;
+        // Right and up as a viewer before the face has them; on top and below up is -z and +z.
+        let up = if axis == 1 { DVec3::Z * -n.y } else { DVec3::Y };
+        let right = up.cross(n);
+        let along = |way: DVec3| 0.5 + (share - 0.5).dot(way);
+        assert_near(uv, along(right), along(up), p);
+        assert!((p - middle).dot(n) > 0.0);
+    });
+    assert_eq!(sides, [12; 3]);
+}
+
+#[test]
+fn a_sphere_shows_longitude_and_latitude() {
+    for (meridians, bands) in [(12, 6), (7, 5), (3, 2)] {
+        let ball = format!(
+            "uv_sphere = {{ centre = [1, 2, 3], radius = 2, meridians = {meridians}, bands = {bands} }}"
+        );
+        let loaded = textured(&ball);
+        each_corner(&loaded.world.meshes[0], |p, uv, _| {
+            let n = (p - DVec3::new(1.0, 2.0, 3.0)) / 2.0;
+            let v = 1.0 - n.y.clamp(-1.0, 1.0).acos() / std::f64::consts::PI;
+            // Every longitude is the pole's.
+            let at_pole = n.y.abs() > 1.0 - 1e-9;
+            let u = 0.75 - n.z.atan2(n.x) / std::f64::consts::TAU;
+            let u = if at_pole { uv.x.into() } else { u };
+            // Positions are rounded to six decimals.
+            let off = (f64::from(uv.x) - u + 0.5).rem_euclid(1.0) - 0.5;
+            assert!(off.abs() < 2e-6 && (f64::from(uv.y) - v).abs() < 2e-6, "{uv} at {n}");
+        });
+    }
+}
+
+#[test]
+fn a_terrain_shows_the_image_once_over_its_extent() {
+    let loaded = textured("terrain = { vertices = 9, size = 8 }");
+    each_corner(&loaded.world.meshes[0], |p, uv, _| {
+        assert_near(uv, (p.x + 4.0) / 8.0, (4.0 - p.z) / 8.0, p);
+        assert!((0.0..=1.0).contains(&uv.x));
+    });
+}
+
+#[test]
+fn shapes_without_a_texture_hold_no_coordinates() {
+    let loaded = good(
+        "[[mesh]]\nquad = { centre = [0, 0, 0], normal = 'y', size = [1, 1] }\n\
+         [[mesh]]\nbox = { min = [0, 0, 0], max = [1, 1, 1] }\n",
+    );
+    assert!(loaded.world.meshes.iter().all(|mesh| mesh.uvs.is_none()));
+}
+
+#[test]
+fn a_mesh_without_texture_coordinates_is_named_with_its_material() {
+    let loaded = textured("file = 't.obj'\nname = 'wing'");
+    let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+    assert!(warning.message.contains("`wing`") && warning.message.contains("`paper`"), "{warning}");
+    assert_eq!(warning.line, Some(4));
+}
