@@ -131,3 +131,42 @@ fn damaged_frames_are_told_in_a_line() {
     fs::write(job.path("o/f_04.png"), "no picture").expect("written");
     assert!(job.done(line).err.contains("o/f_04.png is damaged: its hash is not the manifest's"));
 }
+
+/// What was changed in the scene is told by its name, and no hash.
+#[test]
+fn what_has_changed_in_the_scene_is_named() {
+    let job = Job::new();
+    let scene = "camera = { still = { eye = [0, 2, 6], target = [0, 0, 0] }, frames = 4 }\n\
+        light = [{ point = { position = [3, 5, 2], intensity = 90 } }]\n\
+        material.red = { diffuse = [0.6, 0.1, 0.1] }\nmaterial.blue = { diffuse = [0.1, 0.1, 0.6] }\n\
+        mesh = [{ file = \"cube.obj\", material = \"red\" }]\n\
+        sphere = [{ centre = [2, 0, 0], radius = 0.5, material = \"blue\" }]\n";
+    let line = "render s.toml --size 32x18 --no-video --frames 1..2 -o o/f_##.png";
+    std::fs::write(job.path("s.toml"), scene).expect("written");
+    job.done(line);
+    for (from, to, says) in [
+        ("[0.6, 0.1, 0.1]", "[0.6, 0.1, 0.2]", "material `red` is not the same\n"),
+        ("intensity = 90", "intensity = 91", "light 1 is not the same\n"),
+        ("radius = 0.5", "radius = 0.6", "sphere 1 is not the same\n"),
+        (
+            "material = \"blue\" }",
+            "material = \"red\" }",
+            "which material goes where is not the same\n",
+        ),
+        ("{ file = \"cube.obj\"", "{ file = \"cube.obj\", transform = [{ scale = 2 }]", "mesh 1 `"),
+        ("camera =", "sky = { radiance = 0.5 }\ncamera =", "the sky is not the same\n"),
+        (
+            "material.blue",
+            "material.green = { diffuse = 0.5 }\nmaterial.blue",
+            "material `green` is new",
+        ),
+    ] {
+        let changed = scene.replacen(from, to, 1);
+        assert_ne!(changed, scene);
+        std::fs::write(job.path("s.toml"), changed).expect("written");
+        job.refused(line, "scene content has changed: ");
+        job.refused(line, says);
+    }
+    std::fs::write(job.path("s.toml"), scene).expect("written");
+    assert!(job.done(line).out.contains("2 kept"));
+}
