@@ -2,6 +2,7 @@
 
 mod choosing;
 mod round;
+mod videos;
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::choose::{Choice, ChoiceArgs, Judged};
@@ -15,8 +16,7 @@ use super::stats;
 use crate::cluster::{self, Outcome, World};
 use crate::error::{Error, Result};
 use crate::intersect;
-use crate::output::manifest::{AuditRow, beside};
-use crate::output::video::{self, Clip, Video};
+use crate::output::manifest::AuditRow;
 use crate::reuse::Evidence;
 use crate::scene::{Policy, Settings};
 use crate::stats::ReuseCounts;
@@ -238,7 +238,7 @@ fn say_stopped(job: &Frames, outcome: &Outcome, reason: &str) {
     ));
 }
 
-/// Says what there is now, and makes the video of the frames asked for, all of which are there.
+/// Says what there is now, and makes the videos of it: all frames asked for are there.
 fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Result<Exit> {
     let result = |line: String| if quiet { Ok(()) } else { say::result(line) };
     let frames = if job.total() == 1 { "frame" } else { "frames" };
@@ -265,8 +265,8 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
         result(line)?;
     }
     match job.request.fps {
-        Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
-        _ => {}
+        Some(fps) => videos::make(job, fps)?.into_iter().try_for_each(result)?,
+        None => {}
     }
     Ok(Exit::Done)
 }
@@ -343,34 +343,6 @@ fn judge_samples(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
     }
     tell(quiet, &[message], |m| say::warning(m));
     None
-}
-
-/// Makes the video of the frames asked for; gives the line to print. Only of the whole shot does
-/// it get the plain name, so that rendering a few frames again replaces no video of all.
-fn make_video(job: &Frames, fps: f64) -> Result<String> {
-    let Request { frames, shot, pattern, .. } = job.request;
-    let whole = frames.last - frames.first + 1 == shot.frames;
-    let ending = match whole {
-        true => ".mp4".to_string(),
-        false => format!("_{}-{}.mp4", frames.first, frames.last),
-    };
-    let clip = Clip {
-        pattern,
-        first: frames.first,
-        count: frames.last - frames.first + 1,
-        fps,
-        display: job.target.write.display,
-    };
-    let (out, stop) = (beside(pattern, &ending), &job.site.interrupt.stop);
-    Ok(match job.site.interrupt.watched(|| video::make(&clip, &out, stop))? {
-        Video::Made(path) => format!("video {}", path.display()),
-        Video::NoFfmpeg { command } => {
-            format!(
-                "no video, since ffmpeg is not installed; where it is, this makes one:\n{command}"
-            )
-        }
-        Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
-    })
 }
 
 #[cfg(test)]

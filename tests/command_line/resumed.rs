@@ -170,3 +170,32 @@ fn what_has_changed_in_the_scene_is_named() {
     std::fs::write(job.path("s.toml"), scene).expect("written");
     assert!(job.done(line).out.contains("2 kept"));
 }
+
+/// Whichever job brings the last frame makes the video of all.
+#[test]
+fn jobs_that_share_a_shot_leave_its_video() {
+    let job = Job::new();
+    let line =
+        |frames: &str| format!("render cube.obj --size 32x18 --frames {frames} -o o/f_##.png");
+    let whole = job.path("o/f.mp4");
+    let first = job.done(&line("1..20"));
+    if first.out.contains("ffmpeg is not installed") {
+        eprintln!("skipped: no ffmpeg here");
+        return;
+    }
+    assert!(job.path("o/f_1-20.mp4").exists() && !whole.exists());
+    job.done(&line("30..48"));
+    assert!(!whole.exists(), "frames are missing");
+    let last = job.done(&line("21..29"));
+    assert!(
+        whole.exists() && last.out.contains("f_21-29.mp4") && last.out.contains("video o/f.mp4"),
+        "{}",
+        last.out
+    );
+    let made = job.changed("o/f.mp4");
+    job.done(&line("5..6"));
+    assert_eq!(job.changed("o/f.mp4"), made, "no frame is new");
+    std::fs::remove_file(&whole).expect("removed");
+    job.done(&line("7"));
+    assert!(whole.exists(), "of a single frame too, where it is missing");
+}
