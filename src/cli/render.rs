@@ -13,8 +13,8 @@ use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
 use super::stats;
-use crate::cluster::{self, Outcome, World};
-use crate::error::{Error, Result};
+use crate::cluster::{self, Binding, Outcome, World};
+use crate::error::{Error, Result, counted};
 use crate::intersect;
 use crate::output::manifest::AuditRow;
 use crate::reuse::Evidence;
@@ -34,7 +34,8 @@ Frames that exist with the same settings are kept, so the same command goes on w
 `tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
 
 SIGINT, SIGTERM and SIGUSR1 stop the job; a second SIGINT or SIGTERM ends it at once.
-Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed.
+Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed,
+76 the same since mpirun (or srun) was killed.
 
 Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16 --size 640x360 --spp 4
@@ -98,12 +99,20 @@ pub fn run(args: &RenderArgs) -> Exit {
     // Rank 0 may make a video yet.
     world.part();
     interrupt.over();
+    if interrupt.is_orphan() {
+        let exit = if exit == Exit::Stopped { Exit::Orphaned } else { exit };
+        // Ending MPI would wait for a launcher that is not there.
+        signal_hook::low_level::exit(exit.code().into());
+    }
     exit
 }
 
 fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     interrupt.listen(world.is_root())?;
+    if let Some(launcher) = cluster::launcher_process() {
+        interrupt.end_with(launcher);
+    }
     interrupt.goes_on(NOTHING_DONE.into());
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.output.time_limit);
@@ -123,6 +132,7 @@ fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exi
         None => world.default_threads()?,
     };
     let pool = world.agree(machine::thread_pool(threads))?;
+    tell(quiet, world.binding(threads)?.as_slice(), |binding| say::note(in_words(binding)));
     let loaded = Instant::now();
     let build = || intersect::build(&request.scene, &request.settings, threads);
     let intersector = world.agree(pool.install(build))?;
@@ -219,6 +229,19 @@ fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> 
         }
     }
     Ok(())
+}
+
+/// What a launcher's binding costs, and what helps.
+fn in_words(binding: &Binding) -> String {
+    let Binding { ranks, cores, threads, of, idle } = *binding;
+    let each = if ranks == 1 { "its rank".into() } else { format!("each of its {ranks} ranks") };
+    let has = if ranks == 1 { "it has" } else { "a rank has" };
+    let idle = if idle == 1 { "1 core idles".into() } else { format!("{idle} cores idle") };
+    format!(
+        "the launcher binds {each} to {cores} of this machine's {of} cores: {has} {}, and {idle}\n  \
+         help: mpirun --bind-to none; with it --map-by ppr:1:node starts one rank a node",
+        counted(threads, "thread")
+    )
 }
 
 fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {

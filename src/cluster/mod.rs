@@ -27,7 +27,9 @@ mod worker;
 
 pub use failure::FAULT;
 pub use frames::{Duty, Outcome, prepare, render};
-pub use launcher::{alone, default_threads, is_follower};
+pub use launcher::{
+    Binding, LauncherProcess, alone, default_threads, is_follower, launcher_process,
+};
 pub use nodes::{check_rank_map, rank_order};
 pub use traffic::{Sent, Traffic};
 

@@ -11,6 +11,8 @@ mod launch;
 #[cfg(feature = "mpi")]
 #[path = "../common/mpirun.rs"]
 mod launcher;
+#[cfg(feature = "mpi")]
+mod orphaned;
 mod pages;
 mod ranks;
 #[cfg(feature = "mpi")]
