@@ -26,7 +26,7 @@ mod traffic;
 mod worker;
 
 pub use failure::FAULT;
-pub use frames::{Duty, Outcome, prepare, render};
+pub use frames::{Duty, Outcome, lock, prepare, render};
 pub use launcher::{
     Binding, LauncherProcess, alone, default_threads, is_follower, launcher_process,
 };
