@@ -287,9 +287,8 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
     if let Some(line) = audit.and_then(|audit| audit_line(&audit, settings.max_rmse)) {
         result(line)?;
     }
-    match job.request.fps {
-        Some(fps) => videos::make(job, fps)?.into_iter().try_for_each(result)?,
-        None => {}
+    if let Some(fps) = job.request.fps {
+        videos::make(job, fps)?.into_iter().try_for_each(result)?;
     }
     Ok(Exit::Done)
 }

@@ -50,7 +50,7 @@ struct Holder {
 enum Look {
     Kept(File),
     /// Somebody else has it: of what job, where that is known already.
-    Taken(Option<Holder>),
+    Taken(Option<Box<Holder>>),
     /// The file was replaced or removed meanwhile.
     Gone,
     NoLocks,
@@ -74,7 +74,7 @@ impl SequenceLock {
             }
             std::thread::sleep(NAP);
         }
-        Err(refusal(pattern, header, others.last()))
+        Err(refusal(pattern, header, others.last().map(|holder| &**holder)))
     }
 
     /// Whether the file system has locks at all.
@@ -135,7 +135,7 @@ fn look(path: &Path, header: &Header) -> Result<Look> {
     // While it is shared nobody writes. Without words whoever had it died before it had written them.
     Ok(match read(&mut file) {
         Some(holder) if is_same_job(&holder.header, header) => Look::Kept(file),
-        holder => Look::Taken(holder),
+        holder => Look::Taken(holder.map(Box::new)),
     })
 }
 

@@ -110,7 +110,7 @@ impl Source {
         let starts_so = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
         let ends_so = |text: &str| text.ends_with(|c: char| c.is_ascii_digit());
         let sign = &number[..number.len() - digits.len()];
-        let fits = !right.contains('.') && (left.is_empty() != !starts_so(right));
+        let fits = !right.contains('.') && left.is_empty() == starts_so(right);
         let is_bare = fits && (left.is_empty() || ends_so(left)) && sign.len() <= 1;
         let zero = |text: &str| if starts_so(text) { String::new() } else { "0".into() };
         is_bare.then(|| (number, format!("{sign}{}{left}.{}{right}", zero(left), zero(right))))

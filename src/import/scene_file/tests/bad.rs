@@ -98,7 +98,7 @@ const TYPES: &[Case] = &[
         "expected a whole number from 1 to 65536, found floating point `4.0`",
         "",
     ),
-    ("[settings]\ntime_limit = ¦'25'\n", "a time is written with its units, as in 90s", ""),
+    ("[settings]\ntime_limit = ¦'25x'\n", "a time limit is written with its units, as in 90s", ""),
     ("[settings]\ntime_limit = ¦25\n", "found integer `25`", ""),
     ("[settings]\ncheckpoint = ¦'never'\n", "as in 90s, 25m or 1h30m, or off", ""),
     ("[settings]\nfps = ¦2000-01-01\n", "found a table or a date", ""),
