@@ -2,6 +2,7 @@
 
 use super::errors::Errors;
 use super::foretell::ROUNDING;
+use super::knobs::Knob;
 use super::table::{Measured, Row};
 use crate::measure::psnr;
 
@@ -63,24 +64,31 @@ impl Goal {
     }
 }
 
-/// The fastest setting that reached `goal`, among those that may be recommended. Where the default does,
-/// only what is surely faster takes its place: not what chance made so. Where [`is_by_few_turns`], nothing
-/// can be sure, and the estimate decides.
+/// The setting to recommend for `goal` among those that reached it and may be recommended: the fastest.
+/// Where the default does, only what is surely faster takes its place, beyond the spread of the turns: not
+/// what chance made so, and nothing where too few turns tell.
 pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
     let default_reaches = goal.is_met(&measured.default_row().errors);
+    let is_surely_faster = |row: &Row| {
+        row.time_ratio.is_some_and(|r| r.differs_from(1.0) && r.interval.estimate < 1.0)
+    };
     let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
-    let reach = reach.filter(|row| match row.time_ratio {
-        Some(ratio) if default_reaches && ratio.is_sure() => {
-            ratio.differs_from(1.0) && ratio.interval.estimate < 1.0
-        }
-        _ => true,
-    });
+    let reach =
+        reach.filter(|row| !default_reaches || row.knob == Knob::Default || is_surely_faster(row));
     reach.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
 }
 
+/// A setting that may be faster than `found`, the one to recommend for `goal`, but was timed in too few
+/// turns to tell: by the estimates the fastest of them.
+pub fn untold<'m>(measured: &'m Measured, goal: Goal, found: &Row) -> Option<&'m Row> {
+    let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
+    let faster = reach.filter(|row| seconds(row) < seconds(found) && is_by_few_turns(row));
+    faster.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
+}
+
 /// Whether `row` was timed in too few turns for any difference from the default's time to be sure.
-pub fn is_by_few_turns(row: &Row) -> bool {
-    row.time_ratio.is_some_and(|ratio| !ratio.is_sure())
+fn is_by_few_turns(row: &Row) -> bool {
+    row.knob != Knob::Default && row.time_ratio.is_none_or(|ratio| !ratio.is_sure())
 }
 
 /// The setting nearest to the truth that took at most `most` seconds a frame, among those that may be
@@ -100,7 +108,6 @@ fn seconds(row: &Row) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::knobs::Knob;
     use super::super::table::tests::measured;
     use super::*;
 
@@ -125,25 +132,30 @@ mod tests {
     }
 
     #[test]
-    fn few_turns_go_by_the_estimate() {
+    fn few_turns_recommend_nothing_beside_the_default() {
         let mut measured = measured(&[
             (Knob::Default, "", 1.0, 2.0),
             (Knob::CutOff, "--cutoff 0.01", 0.9, 2.0),
             (Knob::Tolerance, "--tolerance 2", 0.5, 2.0),
+            (Knob::CameraSamples, "--spp 16", 4.0, 0.5),
         ]);
         // Of six turns one was fast by chance.
         let turns = [0.3, 1.1, 1.2, 1.1, 1.1, 1.2];
         measured.rows[2].time_ratio = crate::measure::median(&turns);
         let goal = Goal::Psnr(20.0);
-        let fastest = |m: &Measured| {
-            let row = fastest_reaching(m, goal).expect("all reach");
-            (row.options.clone(), is_by_few_turns(row))
+        let told = |m: &Measured, goal| {
+            let row = fastest_reaching(m, goal).expect("some reach");
+            (row.options.clone(), untold(m, goal, row).map(|row| row.options.clone()))
         };
-        assert_eq!(fastest(&measured), ("--cutoff 0.01".into(), false));
+        assert_eq!(told(&measured, goal), ("--cutoff 0.01".into(), None));
+        // All faster in each of three turns, which still may be chance.
         for row in &mut measured.rows[1..] {
-            row.time_ratio = crate::measure::median(&turns[..3]);
+            row.time_ratio = crate::measure::median(&[0.5, 0.6, 0.55]);
         }
-        assert_eq!(fastest(&measured), ("--tolerance 2".into(), true));
+        assert_eq!(told(&measured, goal), (String::new(), Some("--tolerance 2".into())));
+        // What alone reaches it is recommended however few turns there are.
+        let near = Goal::Flip(0.5 / 255.0 + 1e-9);
+        assert_eq!(told(&measured, near), ("--spp 16".into(), None));
     }
 
     #[test]

@@ -49,7 +49,7 @@ mod writing;
 
 pub use candidates::candidates;
 pub use check::{Check, Checked, Verdict};
-pub use choice::{Goal, best_within, fastest_reaching, is_by_few_turns};
+pub use choice::{Goal, best_within, fastest_reaching, untold};
 pub use effort::Effort;
 pub use errors::{Errors, displayed_rgb};
 pub use foretell::{Foretelling, Foretold, Range};

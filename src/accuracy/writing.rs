@@ -143,6 +143,7 @@ fn target(stage: &Stage, folder: &Path, keeps_light: bool) -> Result<Target> {
         tweenray: crate::output::VERSION.into(),
         scene: String::new(),
         scene_hash: String::new(),
+        scene_parts: Default::default(),
         shot_hash: String::new(),
         shot_frames: stage.shot.frames,
         files: manifest::file_name(&pattern),

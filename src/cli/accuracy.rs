@@ -74,9 +74,9 @@ pub struct AccuracyArgs {
     /// Measure everything anew, whatever the folder holds
     #[arg(long)]
     overwrite: bool,
-    /// Stop after this long and exit with code 75, with the page of what there is: 25m, 1h30m. In a
-    /// Slurm job at the latest 30 s before its end
-    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    /// Stop after this long and exit with code 75, with the page of what there is: 25m, 1h30m, or as
+    /// Slurm writes it: 30 (minutes), 00:30:00, 1-12. In a Slurm job at the latest 30 s before its end
+    #[arg(long, value_name = "TIME", value_parser = values::time_limit)]
     time_limit: Option<Duration>,
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true,

@@ -259,9 +259,9 @@ pub struct OutputArgs {
     /// from it too; repeatable
     #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]
     pub upload: Vec<(u32, PathBuf)>,
-    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s; counted from the program's start. In
-    /// a Slurm job at the latest 30 s before its end
-    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s, or as Slurm writes it: 30 (minutes),
+    /// 00:30:00, 1-12; counted from the program's start. In a Slurm job at the latest 30 s before its end
+    #[arg(long, value_name = "TIME", value_parser = values::time_limit)]
     pub time_limit: Option<Duration>,
     /// Put what frames to come need on disk every so often, so that a killed job need not trace it
     /// again: 30s, 5m, off [default: 30s]

@@ -16,6 +16,8 @@ pub enum Exit {
     Incomplete,
     /// Stopped cleanly; the same command goes on. (`EX_TEMPFAIL` of sysexits.h.)
     Stopped,
+    /// Stopped in the same way since its launcher was killed.
+    Orphaned,
 }
 
 impl Exit {
@@ -36,6 +38,7 @@ impl Exit {
             Self::Usage => 2,
             Self::Incomplete => 3,
             Self::Stopped => 75,
+            Self::Orphaned => 76,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod choosing;
 mod round;
+mod videos;
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::choose::{Choice, ChoiceArgs, Judged};
@@ -12,11 +13,10 @@ use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
 use super::stats;
-use crate::cluster::{self, Outcome, World};
-use crate::error::{Error, Result};
+use crate::cluster::{self, Binding, Outcome, World};
+use crate::error::{Error, Result, counted};
 use crate::intersect;
-use crate::output::manifest::{AuditRow, beside};
-use crate::output::video::{self, Clip, Video};
+use crate::output::manifest::AuditRow;
 use crate::scene::{Policy, Settings};
 use crate::stats::ReuseCounts;
 use choosing::Choosing;
@@ -33,7 +33,8 @@ Frames that exist with the same settings are kept, so the same command goes on w
 `tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
 
 SIGINT, SIGTERM and SIGUSR1 stop the job; a second SIGINT or SIGTERM ends it at once.
-Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed.
+Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed,
+76 the same since mpirun (or srun) was killed.
 
 Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16 --size 640x360 --spp 4
@@ -97,12 +98,20 @@ pub fn run(args: &RenderArgs) -> Exit {
     // Rank 0 may make a video yet.
     world.part();
     interrupt.over();
+    if interrupt.is_orphan() {
+        let exit = if exit == Exit::Stopped { Exit::Orphaned } else { exit };
+        // Ending MPI would wait for a launcher that is not there.
+        signal_hook::low_level::exit(exit.code().into());
+    }
     exit
 }
 
 fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     interrupt.listen(world.is_root())?;
+    if let Some(launcher) = cluster::launcher_process() {
+        interrupt.end_with(launcher);
+    }
     interrupt.goes_on(NOTHING_DONE.into());
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.output.time_limit);
@@ -122,6 +131,7 @@ fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exi
         None => world.default_threads()?,
     };
     let pool = world.agree(machine::thread_pool(threads))?;
+    tell(quiet, world.binding(threads)?.as_slice(), |binding| say::note(in_words(binding)));
     let loaded = Instant::now();
     let build = || intersect::build(&request.scene, &request.settings, threads);
     let intersector = world.agree(pool.install(build))?;
@@ -220,6 +230,19 @@ fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> 
     Ok(())
 }
 
+/// What a launcher's binding costs, and what helps.
+fn in_words(binding: &Binding) -> String {
+    let Binding { ranks, cores, threads, of, idle } = *binding;
+    let each = if ranks == 1 { "its rank".into() } else { format!("each of its {ranks} ranks") };
+    let has = if ranks == 1 { "it has" } else { "a rank has" };
+    let idle = if idle == 1 { "1 core idles".into() } else { format!("{idle} cores idle") };
+    format!(
+        "the launcher binds {each} to {cores} of this machine's {of} cores: {has} {}, and {idle}\n  \
+         help: mpirun --bind-to none; with it --map-by ppr:1:node starts one rank a node",
+        counted(threads, "thread")
+    )
+}
+
 fn tell<T>(quiet: bool, words: &[T], say: fn(&T)) {
     if !quiet {
         words.iter().for_each(say);
@@ -237,7 +260,7 @@ fn say_stopped(job: &Frames, outcome: &Outcome, reason: &str) {
     ));
 }
 
-/// Says what there is now, and makes the video of the frames asked for, all of which are there.
+/// Says what there is now, and makes the videos of it: all frames asked for are there.
 fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Result<Exit> {
     let result = |line: String| if quiet { Ok(()) } else { say::result(line) };
     let frames = if job.total() == 1 { "frame" } else { "frames" };
@@ -255,9 +278,8 @@ fn finish(job: &Frames, outcome: &Outcome, start: Instant, quiet: bool) -> Resul
     if let Some(line) = audit.and_then(|audit| audit_line(&audit)) {
         result(line)?;
     }
-    match job.request.fps {
-        Some(fps) if job.total() > 1 => result(make_video(job, fps)?)?,
-        _ => {}
+    if let Some(fps) = job.request.fps {
+        videos::make(job, fps)?.into_iter().try_for_each(result)?;
     }
     Ok(Exit::Done)
 }
@@ -322,34 +344,6 @@ fn judge_samples(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
     }
     tell(quiet, &[message], |m| say::warning(m));
     None
-}
-
-/// Makes the video of the frames asked for; gives the line to print. Only of the whole shot does
-/// it get the plain name, so that rendering a few frames again replaces no video of all.
-fn make_video(job: &Frames, fps: f64) -> Result<String> {
-    let Request { frames, shot, pattern, .. } = job.request;
-    let whole = frames.last - frames.first + 1 == shot.frames;
-    let ending = match whole {
-        true => ".mp4".to_string(),
-        false => format!("_{}-{}.mp4", frames.first, frames.last),
-    };
-    let clip = Clip {
-        pattern,
-        first: frames.first,
-        count: frames.last - frames.first + 1,
-        fps,
-        display: job.target.write.display,
-    };
-    let (out, stop) = (beside(pattern, &ending), &job.site.interrupt.stop);
-    Ok(match job.site.interrupt.watched(|| video::make(&clip, &out, stop))? {
-        Video::Made(path) => format!("video {}", path.display()),
-        Video::NoFfmpeg { command } => {
-            format!(
-                "no video, since ffmpeg is not installed; where it is, this makes one:\n{command}"
-            )
-        }
-        Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
-    })
 }
 
 #[cfg(test)]

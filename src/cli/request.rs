@@ -13,11 +13,10 @@ use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
 use crate::reuse::store::Terms;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
-use crate::sequence::{
-    Recipes, Target, check_upload, light_fingerprint, shot_fingerprint, world_fingerprint,
-};
+use crate::sequence::{Recipes, Target, WorldHash, check_upload, shot_fingerprint};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -66,6 +65,7 @@ pub struct Request {
     pub time_limit: Option<Duration>,
     scene_name: String,
     scene_hash: String,
+    scene_parts: BTreeMap<String, String>,
     light_hash: String,
     shot_hash: String,
 }
@@ -89,6 +89,7 @@ struct Read {
     exchange: Option<u32>,
     uploads: Vec<(u32, Image)>,
     scene_hash: String,
+    scene_parts: BTreeMap<String, String>,
     light_hash: String,
     shot_hash: String,
     /// (Only rank 0 tells of them, which reads by itself.)
@@ -104,8 +105,9 @@ impl Read {
         refuse_input(output.stats.as_deref().or(loaded.stats.as_deref()), &loaded.files)?;
         let Loaded { world, shot, settings, mut warnings, .. } = loaded;
         let uploads = uploads(&output.upload, &shot, &settings)?;
-        let scene_hash = world_fingerprint(&world);
-        let light_hash = light_fingerprint(&world, &scene_hash);
+        let hash = WorldHash::of(&world);
+        let (scene_hash, light_hash) = (hash.whole(), hash.light());
+        let scene_parts = hash.named();
         let shot_hash = shot_fingerprint(&scene_hash, &shot);
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
@@ -127,6 +129,7 @@ impl Read {
             exchange: loaded.exchange,
             uploads,
             scene_hash,
+            scene_parts,
             light_hash,
             shot_hash,
             warnings,
@@ -169,6 +172,7 @@ impl Request {
             warnings: read.warnings,
             scene_name: scene.scene.display().to_string(),
             scene_hash: read.scene_hash,
+            scene_parts: read.scene_parts,
             light_hash: read.light_hash,
             shot_hash: read.shot_hash,
             recipes,
@@ -233,6 +237,7 @@ impl Request {
             tweenray: crate::output::VERSION.into(),
             scene: self.scene_name.clone(),
             scene_hash: self.scene_hash.clone(),
+            scene_parts: self.scene_parts.clone(),
             shot_hash: self.shot_hash.clone(),
             shot_frames: self.shot.frames,
             files: manifest::file_name(&self.pattern),

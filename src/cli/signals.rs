@@ -1,9 +1,10 @@
-//! What ends a job early: Ctrl-C, SIGTERM, SIGUSR1 and time limits ask it to stop; a second Ctrl-C or
-//! SIGTERM ends it at once.
+//! What ends a job early: Ctrl-C, SIGTERM, SIGUSR1, time limits and the death of its launcher ask it to
+//! stop; a second Ctrl-C or SIGTERM ends it at once.
 
 use super::exit::Exit;
 use super::progress::duration;
 use super::say;
+use crate::cluster::LauncherProcess;
 use crate::error::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
@@ -18,6 +19,13 @@ const BEFORE_SLURM_ENDS: Duration = Duration::from_secs(30);
 /// How long a rank leaves it to rank 0 to end the job where nobody watches: a batch system signals to all of
 /// them, and one line is enough.
 const AFTER_RANK_0: Duration = Duration::from_secs(3);
+
+/// How often a rank looks whether its launcher lives.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// How long a rank without launcher has to stop: as a job does on SIGTERM, with something to spare. Then it
+/// ends, wherever it is, since without its launcher MPI may wait forever.
+const ORPHANS_GRACE: Duration = Duration::from_secs(15);
 
 /// How to go on, unless told otherwise.
 const GOES_ON: &str = "; the same command goes on from here";
@@ -41,6 +49,8 @@ pub struct Interrupt {
     /// Whether a person, or a system that waits no longer, has asked.
     asked: Arc<AtomicBool>,
     reason: Arc<OnceLock<String>>,
+    /// Whether the launcher of this rank has ended.
+    is_orphan: Arc<AtomicBool>,
 }
 
 impl Interrupt {
@@ -54,6 +64,7 @@ impl Interrupt {
             how: Arc::new(Mutex::new(GOES_ON.into())),
             asked: Arc::default(),
             reason: Arc::default(),
+            is_orphan: Arc::default(),
         }
     }
 
@@ -90,6 +101,27 @@ impl Interrupt {
         if let Some(left) = end.and_then(|end| until_slurm_ends(&end, now)) {
             self.stop_after(left, " shortly before the Slurm job ends".into());
         }
+    }
+
+    /// Stops when `launcher` ends, which started this rank: whoever killed it wants no more of the job, and
+    /// the ranks it left would keep the cores and the folder.
+    pub fn end_with(&self, launcher: LauncherProcess) {
+        let theirs = self.clone();
+        std::thread::spawn(move || {
+            while !launcher.is_gone() {
+                std::thread::sleep(LOOK);
+            }
+            theirs.is_orphan.store(true, Ordering::SeqCst);
+            let LauncherProcess { name, id, .. } = launcher;
+            theirs.stop(format!(" since {name} (process {id}), which started it, has ended"));
+            std::thread::sleep(ORPHANS_GRACE);
+            signal_hook::low_level::exit(Exit::Orphaned.code().into());
+        });
+    }
+
+    /// Whether the launcher of this rank has ended, so that MPI can no more be ended in good order.
+    pub fn is_orphan(&self) -> bool {
+        self.is_orphan.load(Ordering::SeqCst)
     }
 
     /// Why the job stops, to follow the word `stopped`.
@@ -160,6 +192,9 @@ impl Interrupt {
         let is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
         if !*is_over {
             self.say_stopped();
+            if self.is_orphan() {
+                signal_hook::low_level::exit(Exit::Orphaned.code().into());
+            }
             std::process::exit(Exit::Stopped.code().into());
         }
     }

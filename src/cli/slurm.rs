@@ -47,8 +47,9 @@ pub struct SlurmArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..=100_000))]
     nodes: u32,
-    /// Time limit of a run, as the queue allows: 30m, 4h, 2d
-    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    /// Time limit of a run, as the queue allows: 30m, 4h, 2d, or as Slurm writes it: 30 (minutes),
+    /// 00:30:00, 1-12
+    #[arg(long, value_name = "TIME", value_parser = values::time_limit)]
     time: Duration,
     /// Processes on each node; its cores are shared out among them
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,

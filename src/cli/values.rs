@@ -1,7 +1,7 @@
 //! Values of options as people type them: sizes, frame ranges, crops, choices, numbers in bounds.
 
 use crate::accuracy::Goal;
-use crate::scene::{FrameRange, Interval, Rect, parse_time};
+use crate::scene::{FrameRange, Interval, Rect, parse_time, parse_time_limit};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use std::ops::RangeInclusive;
@@ -120,6 +120,11 @@ pub fn goal(text: &str) -> Result<Goal, String> {
 /// `25m`, `1h30m`, `90s`, `2d`.
 pub fn time(text: &str) -> Result<Duration, String> {
     parse_time(text)
+}
+
+/// A time, or one of Slurm's forms: `30` (minutes), `00:30:00`, `1-00:00:00`.
+pub fn time_limit(text: &str) -> Result<Duration, String> {
+    parse_time_limit(text)
 }
 
 /// A time to keep to: more than none.

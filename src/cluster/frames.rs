@@ -6,6 +6,7 @@ use super::traffic::Traffic;
 use super::{World, worker};
 use crate::error::Result;
 use crate::output::manifest::{Manifest, manifest_path, part_path};
+use crate::output::{SequenceLock, atomic};
 use crate::scene::FrameRange;
 use crate::sequence::{self, FrameReport, Plan, Shared, Target};
 use rayon::ThreadPool;
@@ -37,6 +38,25 @@ pub struct Duty {
     pub waiting_seconds: f64,
     /// What it sent.
     pub sent: Traffic,
+}
+
+/// Takes the lock of the sequence at `target` on every rank: it is kept as long as any of them lives. All ranks
+/// call it.
+///
+/// # Errors
+/// Those of [`SequenceLock::take`]; its folder cannot be made.
+pub fn lock(world: &World, target: &Target) -> Result<SequenceLock> {
+    // A rank that still keeps the lock of an earlier round, of other settings, would be in the way.
+    world.agree(Ok(()))?;
+    let take = || SequenceLock::take(&target.pattern, &target.header);
+    let mut roots = None;
+    // Rank 0 decides which of two jobs was first; the others of its job then find a lock like theirs.
+    world.from_root(|| {
+        atomic::create_folder(target.pattern.folder())?;
+        roots = Some(take()?);
+        Ok(())
+    })?;
+    world.agree(roots.map_or_else(take, Ok))
 }
 
 /// What [`sequence::prepare`] decides, on every rank. The files that are there are read by all ranks, each

@@ -1,7 +1,13 @@
 //! Whether a launcher (mpirun, srun) started this process, and what its environment says.
 
+mod binding;
+mod process;
+
 use super::World;
 use crate::error::{Error, Result};
+pub use binding::Binding;
+pub use process::LauncherProcess;
+use process::allowed_cores;
 
 /// What is known of the launcher before MPI is asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,6 +66,11 @@ pub(super) fn several() -> Option<Launcher> {
     here().filter(|launcher| launcher.ranks != Some(1))
 }
 
+/// The process of the launcher that started this one, where both are known.
+pub fn launcher_process() -> Option<LauncherProcess> {
+    here().and_then(|_| LauncherProcess::find())
+}
+
 fn here() -> Option<Launcher> {
     detect(|name| std::env::var(name).ok())
 }
@@ -76,18 +87,11 @@ impl World {
     /// # Errors
     /// Those of talking to other ranks.
     pub fn default_threads(&self) -> Result<usize> {
-        let own = (self.nodes()?[self.rank() as usize], allowed_cores());
+        let own = (self.nodes()?[self.rank() as usize], allowed_cores(std::process::id()));
         let all = self.all(own.clone())?;
         let sharers = all.iter().filter(|other| **other == own).count();
         Ok((default_threads() / sharers.max(1)).max(1))
     }
-}
-
-/// The cores that this process may use, as the system lists them; empty where it does not tell.
-fn allowed_cores() -> String {
-    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = text.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
-    line.unwrap_or_default().trim().into()
 }
 
 impl Launcher {

@@ -26,8 +26,10 @@ mod traffic;
 mod worker;
 
 pub use failure::FAULT;
-pub use frames::{Duty, Outcome, prepare, render};
-pub use launcher::{alone, default_threads, is_follower};
+pub use frames::{Duty, Outcome, lock, prepare, render};
+pub use launcher::{
+    Binding, LauncherProcess, alone, default_threads, is_follower, launcher_process,
+};
 pub use nodes::{check_rank_map, rank_order};
 pub use traffic::{Sent, Traffic};
 

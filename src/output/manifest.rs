@@ -12,11 +12,13 @@
 //! Several jobs may write the same sequence at once. With equal settings they write equal bytes, and
 //! no row is lost however they meet ([`Journal`]); with others the second is refused when it starts.
 
+mod difference;
 mod journal;
 mod parts;
 #[cfg(test)]
 mod tests;
 
+pub use difference::Difference;
 pub use journal::Journal;
 pub use parts::part_path;
 
@@ -24,6 +26,7 @@ use super::{FramePattern, atomic};
 use crate::error::{Error, Result};
 use crate::scene::Settings;
 use crate::stats::{AuditSums, BadSamples, RayCounts, ReuseCounts};
+use difference::SCENE;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use serde::de::DeserializeOwned;
@@ -51,6 +54,10 @@ pub struct Header {
     pub scene: String,
     /// Hash of the resolved world, the shot left aside, hexadecimal.
     pub scene_hash: String,
+    /// Hashes of the world's parts by name: they say what differs where `scene_hash` does; never compared
+    /// otherwise.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub scene_parts: BTreeMap<String, String>,
     /// Hash of world and shot; no frame is refused by it, since every row has its own recipe.
     pub shot_hash: String,
     /// Frames of the whole shot; told, never compared.
@@ -145,17 +152,6 @@ pub struct AuditRow {
     pub sums: AuditSums,
 }
 
-/// A setting that keeps two headers apart.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Difference {
-    /// Its name as the command line spells it, or what else differs.
-    pub name: String,
-    /// Its value in the manifest.
-    pub before: String,
-    /// Its value now.
-    pub now: String,
-}
-
 /// A manifest as read: the header, and the last row of every frame.
 #[derive(Debug, Clone)]
 pub struct Manifest {
@@ -171,23 +167,6 @@ impl Header {
         // By way of text: `to_value` widens an f32 of 0.1 to 0.10000000149011612.
         let text = serde_json::to_string(settings).unwrap_or_default();
         serde_json::from_str(&text).unwrap_or(Value::Null)
-    }
-
-    /// The first entry in which a job with the header `now` would differ from this one.
-    pub fn first_difference(&self, now: &Self) -> Option<Difference> {
-        let (before, now) = (self.entries(), now.entries());
-        let names = now.iter().chain(&before).map(|(name, _)| name);
-        let value = |entries: &[(String, String)], name: &str| {
-            let found = entries.iter().find(|(n, _)| n == name);
-            found.map_or_else(|| "not set".to_string(), |(_, v)| v.clone())
-        };
-        names
-            .map(|name| Difference {
-                name: name.clone(),
-                before: value(&before, name),
-                now: value(&now, name),
-            })
-            .find(|d| d.before != d.now)
     }
 
     /// Stands for everything that is compared.
@@ -216,7 +195,7 @@ impl Header {
         }
         for (name, value) in [
             ("output file", &self.files),
-            ("scene content", &self.scene_hash),
+            (SCENE, &self.scene_hash),
             ("tweenray version", &self.tweenray),
             ("tracer (see --isa)", &self.tracer),
         ] {

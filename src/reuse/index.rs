@@ -56,12 +56,12 @@ impl Index {
         };
         let mut keyed: Vec<(Key, u32)> = members.iter().map(|i| (key(i), *i)).collect();
         keyed.sort_unstable();
-        let runs = keyed.chunk_by(|a, b| a.0 == b.0);
-        let cells = runs.clone().count();
+        let runs = || keyed.chunk_by(|a, b| a.0 == b.0);
+        let cells = runs().count();
         let mut table = vec![(0, 0, 0); (2 * cells).next_power_of_two()];
         let mut present = vec![0; table.len().div_ceil(8)];
         let mut first = first;
-        for run in runs {
+        for run in runs() {
             let mut at = run[0].0 as usize & (table.len() - 1);
             while table[at].2 != 0 {
                 at = (at + 1) & (table.len() - 1);

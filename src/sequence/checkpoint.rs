@@ -294,7 +294,7 @@ fn of_others(target: &Target, line: &FirstLine) -> Option<String> {
         return Some("is of another version of tweenray".into());
     };
     let d = head.header.first_difference(&target.header)?;
-    Some(format!("is of other settings: {} was {}, now it is {}", d.name, d.before, d.now))
+    Some(format!("is of other settings: {}", d.was_and_is()))
 }
 
 /// Why a file cannot be the reference of `frame` in the job at `target`.

@@ -3,63 +3,134 @@
 //! So a comment, a renamed file or a setting that moves between scene file and command line keeps
 //! the frames, while a vertex, a light or a key pose that changes does not.
 
-use crate::scene::{Corners, Shot, Texture, World, WorldMesh};
+use crate::scene::{Corners, Material, Shot, Texture, World, WorldMesh};
+use std::collections::BTreeMap;
 use std::fmt::Debug;
+
+/// How many parts of a kind are told apart by name; a manifest's first line stays readable.
+const MOST_NAMED: usize = 64;
 
 /// BLAKE3 of everything in `world` and `shot` that reaches a pixel, hexadecimal.
 pub fn fingerprint(world: &World, shot: &Shot) -> String {
-    shot_fingerprint(&world_fingerprint(world), shot)
+    shot_fingerprint(&WorldHash::of(world).whole(), shot)
 }
 
 /// [`fingerprint`] of a world with the hash `world`.
 pub fn shot_fingerprint(world: &str, shot: &Shot) -> String {
     let mut hash = Hash(blake3::Hasher::new());
     hash.text(&(world, shot));
-    hash.0.finalize().to_hex().to_string()
+    hash.hex()
 }
 
-/// BLAKE3 of everything in `world` that reaches a pixel, hexadecimal.
-pub fn world_fingerprint(world: &World) -> String {
-    fingerprint_of(world, true)
+/// A world's hash, part by part, so that what has changed can be named. A large world takes a while to
+/// hash: it is done once.
+pub struct WorldHash {
+    /// Every part, in order: what it is called, and the hash of what reaches a pixel.
+    parts: Vec<(String, blake3::Hash)>,
+    /// What is to be traced in every frame, where anything is.
+    traced: Option<blake3::Hash>,
 }
 
-/// The same, but for what is to be traced in every frame: that changes nothing of what was traced,
-/// so frames that name other things serve one another as references. `whole` is the hash with all: that of
-/// most worlds, and a large one takes a while to hash.
-pub fn light_fingerprint(world: &World, whole: &str) -> String {
-    let names_any = world.meshes.iter().any(|mesh| mesh.always_traced)
-        || world.spheres.iter().any(|sphere| sphere.always_traced)
-        || !world.traced_regions.is_empty();
-    if names_any { fingerprint_of(world, false) } else { whole.into() }
-}
-
-fn fingerprint_of(world: &World, with_traced: bool) -> String {
-    let mut hash = Hash(blake3::Hasher::new());
-    hash.text(&world.meshes.len());
-    world.meshes.iter().for_each(|mesh| hash.mesh(mesh, with_traced));
-    world.textures.iter().for_each(|texture| hash.texture(texture));
-    for sphere in &world.spheres {
-        let always_traced = sphere.always_traced && with_traced;
-        hash.text(&(sphere.centre, sphere.radius, sphere.material, always_traced));
+impl WorldHash {
+    /// Hashes everything in `world` that reaches a pixel.
+    pub fn of(world: &World) -> Self {
+        let mut parts = Vec::new();
+        for (n, mesh) in (1..).zip(&world.meshes) {
+            let shape = Hash::of(|hash| hash.shape(mesh));
+            parts.push((format!("mesh {n} `{}`", mesh.name), shape));
+        }
+        for (n, texture) in (1..).zip(&world.textures) {
+            parts.push((format!("texture {n}"), Hash::of(|hash| hash.texture(texture))));
+        }
+        for (n, sphere) in (1..).zip(&world.spheres) {
+            let hash = Hash::of(|hash| hash.text(&(sphere.centre, sphere.radius)));
+            parts.push((format!("sphere {n}"), hash));
+        }
+        for material in &world.materials {
+            // Names are for people.
+            let unnamed = Material { name: String::new(), ..material.clone() };
+            parts.push((format!("material `{}`", material.name), Hash::of(|h| h.text(&unnamed))));
+        }
+        for (n, light) in (1..).zip(&world.lights) {
+            parts.push((format!("light {n}"), Hash::of(|hash| hash.text(light))));
+        }
+        parts.push(("the sky".into(), Hash::of(|hash| hash.text(&world.sky))));
+        let wearers = world.meshes.iter().map(|mesh| mesh.material);
+        let wearers: Vec<u32> = wearers.chain(world.spheres.iter().map(|s| s.material)).collect();
+        parts.push(("which material goes where".into(), Hash::of(|hash| hash.array(&wearers))));
+        let flags = world.meshes.iter().map(|mesh| mesh.always_traced);
+        let flags: Vec<bool> = flags.chain(world.spheres.iter().map(|s| s.always_traced)).collect();
+        let names_any = flags.contains(&true) || !world.traced_regions.is_empty();
+        let traced = names_any.then(|| Hash::of(|hash| hash.text(&(flags, &world.traced_regions))));
+        Self { parts, traced }
     }
-    for material in &world.materials {
-        // Names are for people.
-        hash.text(&crate::scene::Material { name: String::new(), ..material.clone() });
+
+    /// The hash of everything, hexadecimal.
+    pub fn whole(&self) -> String {
+        self.joined(self.traced.as_ref())
     }
-    let regions = if with_traced { &world.traced_regions[..] } else { &[] };
-    hash.text(&(&world.lights, &world.sky, regions));
-    hash.0.finalize().to_hex().to_string()
+
+    /// The same, but for what is to be traced in every frame: that changes nothing of what was traced,
+    /// so frames that name other things serve one another as references.
+    pub fn light(&self) -> String {
+        self.joined(None)
+    }
+
+    /// The parts by name, each with a short hash; of very many of a kind the last ones are one.
+    pub fn named(&self) -> BTreeMap<String, String> {
+        let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut rest: BTreeMap<String, blake3::Hasher> = BTreeMap::new();
+        let mut named = BTreeMap::new();
+        let traced = self.traced.map(|hash| ("what is always traced".to_string(), hash));
+        for (name, hash) in self.parts.iter().chain(&traced) {
+            let kind = name.split(' ').next().unwrap_or_default();
+            let count = seen.entry(kind).or_default();
+            *count += 1;
+            if *count > MOST_NAMED {
+                let others = format!("one of the parts after {kind} {MOST_NAMED}");
+                rest.entry(others).or_default().update(hash.as_bytes());
+            } else {
+                named.insert(name.clone(), short(*hash));
+            }
+        }
+        named.extend(rest.into_iter().map(|(name, hash)| (name, short(hash.finalize()))));
+        named
+    }
+
+    fn joined(&self, traced: Option<&blake3::Hash>) -> String {
+        let mut hash = blake3::Hasher::new();
+        for (name, part) in &self.parts {
+            // The kind, so that a light is never taken for a sphere; names are for people.
+            hash.update(name.split(' ').next().unwrap_or_default().as_bytes());
+            hash.update(part.as_bytes());
+        }
+        traced.map(|traced| hash.update(traced.as_bytes()));
+        hash.finalize().to_hex().to_string()
+    }
+}
+
+fn short(hash: blake3::Hash) -> String {
+    hash.to_hex()[..16].to_string()
 }
 
 struct Hash(blake3::Hasher);
 
 impl Hash {
-    fn mesh(&mut self, mesh: &WorldMesh, with_traced: bool) {
+    fn of(fill: impl FnOnce(&mut Self)) -> blake3::Hash {
+        let mut hash = Self(blake3::Hasher::new());
+        fill(&mut hash);
+        hash.0.finalize()
+    }
+
+    fn hex(&self) -> String {
+        self.0.finalize().to_hex().to_string()
+    }
+
+    fn shape(&mut self, mesh: &WorldMesh) {
         self.array(&mesh.positions);
         self.array(&mesh.triangles);
         self.attribute(mesh.normals.as_ref());
         self.attribute(mesh.uvs.as_ref());
-        self.text(&(mesh.material, mesh.always_traced && with_traced));
     }
 
     fn attribute<T: bytemuck::NoUninit>(&mut self, attribute: Option<&Corners<T>>) {
@@ -145,15 +216,30 @@ mod tests {
 
     #[test]
     fn what_is_always_traced_is_nothing_to_the_light() {
-        let light_fingerprint = |world: &World| light_fingerprint(world, &world_fingerprint(world));
-        let base = light_fingerprint(&world());
-        assert_eq!(base, world_fingerprint(&world()));
-        assert_eq!(base, fingerprint_of(&world(), false));
+        let hash = |world: &World| WorldHash::of(world);
+        let base = hash(&world()).light();
+        assert_eq!(base, hash(&world()).whole());
         let mut named = world();
         named.meshes[0].always_traced = true;
         named.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }];
-        assert_eq!(base, light_fingerprint(&named));
+        assert_eq!(base, hash(&named).light());
+        assert_ne!(base, hash(&named).whole());
         named.lights.push(Light::Point { position: DVec3::Y, intensity: Rgb::ONE });
-        assert_ne!(base, light_fingerprint(&named));
+        assert_ne!(base, hash(&named).light());
+    }
+
+    #[test]
+    fn parts_have_names_however_many_there_are() {
+        let mut many = world();
+        let light = Light::Point { position: DVec3::Y, intensity: Rgb::ONE };
+        many.lights = vec![light; 500];
+        let named = WorldHash::of(&many).named();
+        assert!(named.contains_key("mesh 1 `a`") && named.contains_key("material `m`"));
+        assert!(named.contains_key("light 64") && !named.contains_key("light 65"));
+        let last =
+            |world: &World| WorldHash::of(world).named()["one of the parts after light 64"].clone();
+        let before = last(&many);
+        many.lights[499] = Light::Point { position: DVec3::X, intensity: Rgb::ONE };
+        assert_ne!(last(&many), before);
     }
 }

@@ -24,7 +24,7 @@ pub mod survey;
 mod tracer;
 
 pub use colour::{ColourMaker, check_upload};
-pub use fingerprint::{fingerprint, light_fingerprint, shot_fingerprint, world_fingerprint};
+pub use fingerprint::{WorldHash, fingerprint, shot_fingerprint};
 pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use recipe::{Recipe, Recipes, Tag};

@@ -234,5 +234,10 @@ fn a_job_ends_by_its_time_limit_and_before_its_allocation() {
     let end = ("SLURM_JOB_END_TIME", (now.as_secs() + 33).to_string());
     let reason = "stopped shortly before the Slurm job ends";
     stops_in_time("--time-limit 1h", &[end], reason);
-    Job::new().refused("render cube.obj --time-limit 25", "a time is written with its units");
+    let job = Job::new();
+    for (limit, says) in
+        [("25x", "hours:minutes:seconds"), ("0:75", "75 in 0:75"), ("0", "leave it out")]
+    {
+        job.refused(&format!("render cube.obj --time-limit {limit}"), says);
+    }
 }

@@ -11,6 +11,9 @@ mod launch;
 #[cfg(feature = "mpi")]
 #[path = "../common/mpirun.rs"]
 mod launcher;
+mod locked;
+#[cfg(feature = "mpi")]
+mod orphaned;
 mod pages;
 mod ranks;
 #[cfg(feature = "mpi")]

@@ -131,3 +131,71 @@ fn damaged_frames_are_told_in_a_line() {
     fs::write(job.path("o/f_04.png"), "no picture").expect("written");
     assert!(job.done(line).err.contains("o/f_04.png is damaged: its hash is not the manifest's"));
 }
+
+/// What was changed in the scene is told by its name, and no hash.
+#[test]
+fn what_has_changed_in_the_scene_is_named() {
+    let job = Job::new();
+    let scene = "camera = { still = { eye = [0, 2, 6], target = [0, 0, 0] }, frames = 4 }\n\
+        light = [{ point = { position = [3, 5, 2], intensity = 90 } }]\n\
+        material.red = { diffuse = [0.6, 0.1, 0.1] }\nmaterial.blue = { diffuse = [0.1, 0.1, 0.6] }\n\
+        mesh = [{ file = \"cube.obj\", material = \"red\" }]\n\
+        sphere = [{ centre = [2, 0, 0], radius = 0.5, material = \"blue\" }]\n";
+    let line = "render s.toml --size 32x18 --no-video --frames 1..2 -o o/f_##.png";
+    std::fs::write(job.path("s.toml"), scene).expect("written");
+    job.done(line);
+    for (from, to, says) in [
+        ("[0.6, 0.1, 0.1]", "[0.6, 0.1, 0.2]", "material `red` is not the same\n"),
+        ("intensity = 90", "intensity = 91", "light 1 is not the same\n"),
+        ("radius = 0.5", "radius = 0.6", "sphere 1 is not the same\n"),
+        (
+            "material = \"blue\" }",
+            "material = \"red\" }",
+            "which material goes where is not the same\n",
+        ),
+        ("{ file = \"cube.obj\"", "{ file = \"cube.obj\", transform = [{ scale = 2 }]", "mesh 1 `"),
+        ("camera =", "sky = { radiance = 0.5 }\ncamera =", "the sky is not the same\n"),
+        (
+            "material.blue",
+            "material.green = { diffuse = 0.5 }\nmaterial.blue",
+            "material `green` is new",
+        ),
+    ] {
+        let changed = scene.replacen(from, to, 1);
+        assert_ne!(changed, scene);
+        std::fs::write(job.path("s.toml"), changed).expect("written");
+        job.refused(line, "scene content has changed: ");
+        job.refused(line, says);
+    }
+    std::fs::write(job.path("s.toml"), scene).expect("written");
+    assert!(job.done(line).out.contains("2 kept"));
+}
+
+/// Whichever job brings the last frame makes the video of all.
+#[test]
+fn jobs_that_share_a_shot_leave_its_video() {
+    let job = Job::new();
+    let line =
+        |frames: &str| format!("render cube.obj --size 32x18 --frames {frames} -o o/f_##.png");
+    let whole = job.path("o/f.mp4");
+    let first = job.done(&line("1..20"));
+    if first.out.contains("ffmpeg is not installed") {
+        eprintln!("skipped: no ffmpeg here");
+        return;
+    }
+    assert!(job.path("o/f_1-20.mp4").exists() && !whole.exists());
+    job.done(&line("30..48"));
+    assert!(!whole.exists(), "frames are missing");
+    let last = job.done(&line("21..29"));
+    assert!(
+        whole.exists() && last.out.contains("f_21-29.mp4") && last.out.contains("video o/f.mp4"),
+        "{}",
+        last.out
+    );
+    let made = job.changed("o/f.mp4");
+    job.done(&line("5..6"));
+    assert_eq!(job.changed("o/f.mp4"), made, "no frame is new");
+    std::fs::remove_file(&whole).expect("removed");
+    job.done(&line("7"));
+    assert!(whole.exists(), "of a single frame too, where it is missing");
+}

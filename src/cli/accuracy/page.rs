@@ -6,8 +6,7 @@ mod tables;
 use super::given::{Given, given, with_given};
 use super::{AccuracyArgs, Outcome};
 use crate::accuracy::{
-    Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching,
-    is_by_few_turns,
+    Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching, untold,
 };
 use crate::cli::spelled;
 use crate::error::Result;
@@ -69,22 +68,27 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     )];
     let half = best_within(&outcome.measured, time * 1.02).filter(|row| row.knob != Knob::Default);
     let beyond_noise = |ratio: &Option<Median>| ratio.is_some_and(|r| r.differs_from(1.0));
-    if let Some(row) = half.filter(|row| beyond_noise(&row.error_ratio)) {
+    // That it takes no longer has to be told by as many turns as that it is nearer.
+    let is_timed = |row: &&Row| row.time_ratio.is_some_and(|ratio| ratio.is_sure());
+    if let Some(row) = half.filter(is_timed).filter(|row| beyond_noise(&row.error_ratio)) {
         lines.push(format!(
             "In the same time {} comes nearer: {}/255.",
             row.options,
             short(row.errors.rmse_steps)
         ));
     }
-    let same = fastest_reaching(&outcome.measured, Goal::Psnr(e.psnr));
-    let other = same.filter(|row| row.knob != Knob::Default);
-    let may_be_faster = |row: &&Row| beyond_noise(&row.time_ratio) || is_by_few_turns(row);
-    if let Some(row) = other.filter(may_be_faster) {
+    let goal = Goal::Psnr(e.psnr);
+    let Some(row) = fastest_reaching(&outcome.measured, goal) else { return lines };
+    if row.knob != Knob::Default {
+        let share = percent(median_of(row) / time);
+        lines.push(format!("{} is as near in {share} of the time.", row.options));
+    }
+    if let Some(row) = untold(&outcome.measured, goal, row) {
         lines.push(format!(
-            "{} is as near in {} of the time{}.",
+            "{} may be as near in less time, but {} turns are too few to tell that from noise: more --turns \
+             are needed, 6 or so.",
             row.options,
-            percent(median_of(row) / time),
-            if is_by_few_turns(row) { ", by so few turns" } else { "" }
+            row.seconds.turns.len()
         ));
     }
     lines

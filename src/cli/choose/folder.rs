@@ -46,9 +46,7 @@ impl Chooser<'_> {
         // Where others were given, the first difference may be of one that nobody gave.
         let is_given_alike = chosen.given == self.given();
         let d = base(chosen.base, before.clone()).first_difference(&now).filter(|_| is_given_alike);
-        let why = d.map_or("other options were given".into(), |d| {
-            format!("{} was {}, now it is {}", d.name, d.before, d.now)
-        });
+        let why = d.map_or("other options were given".into(), |d| d.was_and_is());
         format!("made for {} too, but {why}", chosen.wanted)
     }
 }

@@ -10,7 +10,7 @@ use crate::cluster::{self, Outcome, World};
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::intersect::Intersector;
-use crate::output::{Format, atomic};
+use crate::output::{Format, SequenceLock, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
@@ -56,12 +56,21 @@ pub(super) struct Round {
     /// What each rank took, and why it was asked to stop; known on rank 0.
     pub ranks: Vec<RankStats>,
     pub reasons: Vec<String>,
+    /// Keeps jobs of other settings out until all that is made of the frames is made.
+    _lock: SequenceLock,
 }
 
 impl Site<'_> {
     /// Renders the frames of `request` that are not there yet. All ranks call it.
     pub fn render(&self, request: &Request, target: &Target) -> Result<Round> {
         self.world.from_root(|| request.stats.as_ref().map_or(Ok(()), atomic::make_room))?;
+        let lock = cluster::lock(self.world, target)?;
+        if !lock.is_kept() {
+            let folder = target.pattern.folder().display();
+            let what =
+                "is on a file system without locks: nothing keeps a job of other settings out";
+            tell(self.quiet, &[format!("{folder} {what}")], |n| say::note(n));
+        }
         let plan = cluster::prepare(self.world, self.pool, target, request.frames)?;
         tell(self.quiet, &plan.notes, |n| say::note(n));
         let job = Frames { request, target, plan: &plan, site: self };
@@ -90,7 +99,7 @@ impl Site<'_> {
         if unfinished == 0 && self.world.is_root() {
             checkpoint::clear(target);
         }
-        Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons })
+        Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons, _lock: lock })
     }
 }
 

@@ -69,6 +69,11 @@ impl Source {
     pub fn toml_fault(&self, error: &toml::de::Error) -> Diagnostic {
         let span = error.span().unwrap_or(0..0);
         let message = error.message();
+        if let Some((number, whole)) = self.bare_point_at(&span) {
+            let text =
+                format!("TOML wants a digit on both sides of a number's point, not `{number}`");
+            return self.fault(&span, text).help(format!("write {whole}"));
+        }
         let unknown = message
             .strip_prefix("unknown field ")
             .map(|rest| ("key", rest))
@@ -86,6 +91,29 @@ impl Source {
             return self.fault(&span, text).help(KINDS);
         }
         self.fault(&span, in_plain_words(message))
+    }
+
+    /// A number like `.7` or `7.` at the start of `span` or around it, and how it is written in full.
+    fn bare_point_at(&self, span: &Span) -> Option<(&str, String)> {
+        let is_part = |c: char| c.is_ascii_digit() || "+-._eE".contains(c);
+        let (before, after) = self.text.split_at_checked(span.start)?;
+        let start = before.trim_end_matches(is_part).len();
+        let number =
+            &self.text[start..span.start + after.len() - after.trim_start_matches(is_part).len()];
+        // A dotted key, a word or a text is none.
+        let follows = before[..start].chars().next_back();
+        if follows.is_some_and(|c| !c.is_whitespace() && !"=[,{".contains(c)) {
+            return None;
+        }
+        let digits = number.trim_start_matches(['+', '-']);
+        let (left, right) = digits.split_once('.')?;
+        let starts_so = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
+        let ends_so = |text: &str| text.ends_with(|c: char| c.is_ascii_digit());
+        let sign = &number[..number.len() - digits.len()];
+        let fits = !right.contains('.') && left.is_empty() == starts_so(right);
+        let is_bare = fits && (left.is_empty() || ends_so(left)) && sign.len() <= 1;
+        let zero = |text: &str| if starts_so(text) { String::new() } else { "0".into() };
+        is_bare.then(|| (number, format!("{sign}{}{left}.{}{right}", zero(left), zero(right))))
     }
 
     /// An unknown name in quotes is a value, any other a key.

@@ -1,13 +1,13 @@
 //! Times in a scene file: text with units, the same as on the command line.
 
-use crate::scene::{Interval, parse_time};
+use crate::scene::{Interval, parse_time_limit};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 use std::borrow::Cow;
 use std::time::Duration;
 
-/// `"25m"`, `"1h30m"`.
+/// A time limit: `"25m"`, `"1h30m"`, or as Slurm has it: `"30"` (minutes), `"1-00:00:00"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Time(pub Duration);
 
@@ -18,7 +18,7 @@ pub(super) struct TimeOrOff(pub Interval);
 impl<'de> Deserialize<'de> for Time {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = String::deserialize(deserializer)?;
-        parse_time(&text).map(Self).map_err(D::Error::custom)
+        parse_time_limit(&text).map(Self).map_err(D::Error::custom)
     }
 }
 
@@ -39,7 +39,8 @@ impl JsonSchema for Time {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "string", "pattern": "^([0-9]+[smhd])+$" })
+        let pattern = "^(([0-9]+[smhd])+|[0-9]+(:[0-9]+){0,2}|[0-9]+-[0-9]+(:[0-9]+){0,2})$";
+        json_schema!({ "type": "string", "pattern": pattern })
     }
 }
 

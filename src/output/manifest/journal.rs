@@ -76,11 +76,9 @@ impl Journal {
         match there.first_difference(header) {
             None => Ok(()),
             Some(d) => Err(Error::Failed(format!(
-                "{} is of another job now: {} is {} there, not {}",
+                "{} is of another job now: {}",
                 self.path.display(),
-                d.name,
-                d.before,
-                d.now
+                d.there_and_here()
             ))),
         }
     }

@@ -53,7 +53,7 @@ fn rows_do_not_get_under_another_header() {
     own.append(&row(1)).expect("written");
     Manifest::create(&path, &header(7), &[]).expect("replaced");
     let error = own.append(&row(2)).expect_err("refused").to_string();
-    assert!(error.contains("seed is 7 there, not 0"), "{error}");
+    assert!(error.contains("seed is 7 there, 0 here"), "{error}");
     part.append(&row(3)).expect("written");
     Manifest::merge_parts(&path, &header(7)).expect("merged");
     assert!(frames(&path).is_empty());
@@ -67,8 +67,7 @@ fn of_two_formats_that_is_told_first_and_what_one_lacks_is_not_set() {
     let settings = serde_json::json!({ "seed": 0, "reuse": { "maps": false } });
     let exr = Header { files: "f_####.exr".into(), settings, ..header(0) };
     let told = |before: &Header, now: &Header| {
-        let d = before.first_difference(now).expect("they differ");
-        format!("{} was {}, now it is {}", d.name, d.before, d.now)
+        before.first_difference(now).expect("they differ").was_and_is()
     };
     assert_eq!(told(&png, &exr), "file format was png, now it is exr");
     let other = Header { files: "f_####.png".into(), ..exr };

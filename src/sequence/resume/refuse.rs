@@ -83,12 +83,10 @@ pub(super) fn refuse_others(
         return refuse_strangers(target, frames);
     }
     Err(Error::Usage(format!(
-        "{} holds {} of other settings: {} was {}, now it is {}\n  \
+        "{} holds {} of other settings: {}\n  \
          help: set it back, choose another output with -o, or replace the frames with --overwrite",
         target.pattern,
         counted(left, "frame"),
-        d.name,
-        d.before,
-        d.now
+        d.was_and_is()
     )))
 }

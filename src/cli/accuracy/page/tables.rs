@@ -1,7 +1,7 @@
 //! All figures.
 
 use super::{median_of, name_of, with_changes, with_ends};
-use crate::accuracy::{Goal, fastest_reaching, is_by_few_turns};
+use crate::accuracy::{Goal, fastest_reaching, untold};
 use crate::cli::accuracy::Outcome;
 use crate::measure::Median;
 use crate::page::Table;
@@ -34,8 +34,10 @@ pub fn goals(outcome: &Outcome) -> Table {
                     Goal::Flip(_) => short(e.flip),
                     Goal::MaxShare(_) => percent(e.share_over_2),
                 };
-                let few = if is_by_few_turns(row) { ", by so few turns" } else { "" };
-                let name = name_of(&row.options) + few;
+                let perhaps = untold(&outcome.measured, goal, row).map_or(String::new(), |row| {
+                    format!("; perhaps {}, which takes more --turns to tell", row.options)
+                });
+                let name = name_of(&row.options) + &perhaps;
                 [wanted, name, short(median_of(row)), reached]
             }
         };

@@ -44,6 +44,36 @@ const NAMES: &[Case] = &[
     ("[camera]\npan = ¦{ from = [0, 0, 1], to = [0, 0, 2] }\n", "the key `target` is missing", ""),
 ];
 
+/// TOML has no number that begins or ends with its point.
+const POINTS: &[&str] = &[
+    "[camera]\nfov = .7\n|write 0.7",
+    "[camera]\nfov = -.7\n|write -0.7",
+    "[camera]\nfov = 7.\n|write 7.0",
+    "[camera]\nfov = .5e1 # a remark\n|write 0.5e1",
+    "[material.a]\ndiffuse = [.7, 0.2, 0.3]\n|write 0.7",
+    "[material.a]\ndiffuse = [0.1,.2, 0.3]\n|write 0.2",
+    "[material.a]\ndiffuse = [0.1, 0.2, 3.]\n|write 3.0",
+    "[material.a]\nglass = { ior = .5 }\n|write 0.5",
+];
+
+#[test]
+fn a_number_without_a_digit_beside_its_point_is_told_how_to_be_written() {
+    for case in POINTS {
+        let (text, help) = case.split_once('|').expect("a case");
+        let source = Source { path: "s.toml".into(), text: text.into() };
+        let told = SceneFile::parse(&source).expect_err(text).to_string();
+        assert!(told.contains("a digit on both sides"), "{text}: {told}");
+        assert!(told.ends_with(help), "{text}: {told}");
+    }
+    for text in
+        ["a..b = 1\n", "[camera]\nfov = 1.2.3\n", "[camera]\nfov = '.7'\n", "[camera]\nfov = .\n"]
+    {
+        let source = Source { path: "s.toml".into(), text: text.into() };
+        let told = SceneFile::parse(&source).expect_err(text).to_string();
+        assert!(!told.contains("a digit on both sides"), "{text}: {told}");
+    }
+}
+
 const TYPES: &[Case] = &[
     ("camera = ¦3\n", "expected a table, found integer `3`", ""),
     (
@@ -68,7 +98,7 @@ const TYPES: &[Case] = &[
         "expected a whole number from 1 to 65536, found floating point `4.0`",
         "",
     ),
-    ("[settings]\ntime_limit = ¦'25'\n", "a time is written with its units, as in 90s", ""),
+    ("[settings]\ntime_limit = ¦'25x'\n", "a time limit is written with its units, as in 90s", ""),
     ("[settings]\ntime_limit = ¦25\n", "found integer `25`", ""),
     ("[settings]\ncheckpoint = ¦'never'\n", "as in 90s, 25m or 1h30m, or off", ""),
     ("[settings]\nfps = ¦2000-01-01\n", "found a table or a date", ""),

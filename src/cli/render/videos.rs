@@ -1,0 +1,69 @@
+//! The videos of a job whose frames are all there.
+//!
+//! A job of some frames makes the video of these. Where they complete the shot, whoever made the others, it
+//! makes that of the whole shot too: several jobs may have shared its frames, and any may be the last.
+
+use super::round::Frames;
+use crate::cli::request::Request;
+use crate::error::Result;
+use crate::output::manifest::{Manifest, beside, manifest_path};
+use crate::output::video::{self, Clip, Video};
+use crate::scene::FrameRange;
+use crate::sequence::survey::survey_of;
+
+/// What a video of the whole shot is called, after its frames: rendering a few frames again, which gives
+/// their numbers to the name, replaces no video of all.
+const WHOLE: &str = ".mp4";
+
+/// Makes the videos at `fps` frames a second; gives the lines to print.
+pub(super) fn make(job: &Frames, fps: f64) -> Result<Vec<String>> {
+    let Request { frames, shot, pattern, .. } = job.request;
+    let whole = FrameRange { first: 1, last: shot.frames };
+    let is_whole = frames.first == whole.first && frames.last == whole.last;
+    let mut lines = Vec::new();
+    if !is_whole && frames.first < frames.last {
+        let ending = format!("_{}-{}{WHOLE}", frames.first, frames.last);
+        lines.push(of(job, *frames, &ending, fps)?);
+    }
+    // The shot's video is made once: by the job that brought the last frame, or where there is none.
+    let is_due = is_whole || !job.plan.render.is_empty() || !beside(pattern, WHOLE).exists();
+    if shot.frames > 1 && is_due && (is_whole || is_complete(job)?) {
+        lines.push(of(job, whole, WHOLE, fps)?);
+    }
+    Ok(lines)
+}
+
+/// Whether every frame of the shot is there, as the manifest has it by now.
+fn is_complete(job: &Frames) -> Result<bool> {
+    let path = manifest_path(&job.target.pattern);
+    let Some(manifest) = Manifest::as_of_now(&path)? else { return Ok(false) };
+    // Before files are read: most jobs of a few frames are not the last.
+    let has = |frame| manifest.rows.get(&frame).is_some_and(|row| row.stray.is_none());
+    if !(1..=job.request.shot.frames).all(has) {
+        return Ok(false);
+    }
+    let all = |count| Ok(FrameRange { first: 1, last: count });
+    let is_this_shot = manifest.header.shot_hash == job.target.header.shot_hash;
+    Ok(is_this_shot && survey_of(&manifest, &path, all)?.complete)
+}
+
+fn of(job: &Frames, frames: FrameRange, ending: &str, fps: f64) -> Result<String> {
+    let pattern = &job.request.pattern;
+    let clip = Clip {
+        pattern,
+        first: frames.first,
+        count: frames.last - frames.first + 1,
+        fps,
+        display: job.target.write.display,
+    };
+    let (out, stop) = (beside(pattern, ending), &job.site.interrupt.stop);
+    Ok(match job.site.interrupt.watched(|| video::make(&clip, &out, stop))? {
+        Video::Made(path) => format!("video {}", path.display()),
+        Video::NoFfmpeg { command } => {
+            format!(
+                "no video, since ffmpeg is not installed; where it is, this makes one:\n{command}"
+            )
+        }
+        Video::Failed { stderr } => format!("no video, since ffmpeg failed:\n{stderr}"),
+    })
+}
