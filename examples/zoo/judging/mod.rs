@@ -1,0 +1,109 @@
+//! Renders a scene as a user would, inferred and traced, and judges both by a converged trace.
+//!
+//! Four kinds of render, all of the same camera samples, since these depend on the seed and the
+//! pixel alone, and light samples on the frame's number besides:
+//!
+//! * inferred: `--policy surface`, all frames;
+//! * traced: `--policy off`, all frames;
+//! * again, twice: traced as frames of other numbers, hence with other light samples. They tell
+//!   how far two traces are apart by chance;
+//! * truth, twice: the same with 8 times the shadow and sky samples each. Their mean is the truth, with
+//!   16 times the samples and independent of all that is judged by it, and their difference is its
+//!   own noise.
+//!
+//! All errors are in display steps of 1/255, not rounded.
+
+mod audit;
+mod contract;
+mod frame;
+mod job;
+mod measure;
+
+pub use contract::{FLOOR, Tile};
+pub use frame::{Picture, SIDE};
+pub use job::{Program, Spent};
+pub use measure::{FrameFigures, Pictures, Verdict};
+
+use crate::making::{Pose, Settings, Specimen};
+use job::Render;
+use std::path::Path;
+
+/// What goes wrong with a render.
+pub type Failure = Box<dyn std::error::Error>;
+
+/// Independent traces beside the traced job.
+const AGAIN: usize = 2;
+/// Renders whose mean is the truth.
+const TRUTHS: usize = 2;
+/// Light samples of each of them over those of a traced frame.
+const TRUER: usize = 8;
+
+/// How scenes are rendered.
+#[derive(Clone, Copy)]
+pub struct Plan {
+    /// Pixels.
+    pub size: [u32; 2],
+    /// Frames judged at most.
+    pub judged: usize,
+    /// Whether key frames may be left out of those that truth is rendered for.
+    pub between_only: bool,
+}
+
+/// Renders and judges one scene in `folder`, which it makes and empties of frames again.
+///
+/// # Errors
+/// Where a render fails or its files cannot be read.
+pub fn judge(
+    program: &Program,
+    specimen: &Specimen,
+    settings: Settings,
+    plan: &Plan,
+    folder: &Path,
+) -> Result<Verdict, Failure> {
+    let frames = specimen.poses.len();
+    specimen.write(folder, "move.toml", &specimen.poses, 1)?;
+    let judged = choose(frames, plan);
+    let run = |render: Render| program.render(folder, &render, settings, plan.size);
+    let inferred = run(Render::of_move("inferred", "surface"))?;
+    let traced = run(Render::of_move("traced", "off"))?;
+    let poses: Vec<Pose> = judged.iter().map(|frame| specimen.poses[frame - 1]).collect();
+    let other = |name: String, first: usize, factor: usize| -> Result<_, Failure> {
+        specimen.write(folder, &format!("{name}.toml"), &poses, first)?;
+        run(Render::of_others(&name, [first, poses.len()], factor))
+    };
+    // Numbers that no frame of the move has, nor the other renders.
+    let first = |k: usize| 1000 * (k + 1);
+    let again: Vec<_> =
+        (0..AGAIN).map(|k| other(format!("again{k}"), first(k), 1)).collect::<Result<_, _>>()?;
+    let truths: Vec<_> = (0..TRUTHS)
+        .map(|k| other(format!("truth{k}"), first(AGAIN + k), TRUER))
+        .collect::<Result<_, _>>()?;
+    let mut pictures = Vec::new();
+    for (i, frame) in judged.iter().enumerate() {
+        let of_others = |jobs: &[Spent], k0: usize| -> Result<Vec<Picture>, Failure> {
+            jobs.iter().enumerate().map(|(k, job)| job.frame(first(k0 + k) + i)).collect()
+        };
+        pictures.push(Pictures::new(
+            *frame,
+            [inferred.frame(*frame)?, traced.frame(*frame)?],
+            of_others(&again, 0)?,
+            &of_others(&truths, AGAIN)?,
+        ));
+    }
+    for job in again.iter().chain(&truths).chain([&inferred, &traced]) {
+        job.remove_frames()?;
+    }
+    Ok(Verdict::new(pictures, frames, inferred, traced))
+}
+
+/// Numbers of the frames that are judged: all of a short move; of a long one in-between frames in
+/// pairs of neighbours, since flicker is between neighbours, evenly spread.
+fn choose(frames: usize, plan: &Plan) -> Vec<usize> {
+    if frames <= plan.judged {
+        let all = 1..=frames;
+        return all.filter(|f| !plan.between_only || (*f != 1 && *f != frames)).collect();
+    }
+    let pairs = (plan.judged / 2).max(1);
+    let first = |k: usize| 2 + (frames - 3) * (2 * k + 1) / (2 * pairs);
+    (0..pairs).flat_map(|k| [first(k), first(k) + 1]).collect()
+}
