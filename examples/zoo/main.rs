@@ -15,7 +15,7 @@ use making::{FAMILIES, Specimen};
 use options::Options;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use telling::{Told, summary, table};
+use telling::{Sheet, Told, summary, table};
 
 fn main() -> ExitCode {
     let options = Options::parse();
@@ -38,6 +38,7 @@ fn run(options: &Options) -> Result<bool, Failure> {
     let program = Program::new(program()?);
     let folder = options.folder();
     let mut told = Vec::new();
+    let mut sheet = Sheet::default();
     println!("{}", telling::HEAD);
     for index in options.indices()? {
         let specimen = Specimen::new(options.seed, index, options.frames);
@@ -45,6 +46,7 @@ fn run(options: &Options) -> Result<bool, Failure> {
         let place = folder.join(format!("{index:04}"));
         let verdict = judge(&program, &specimen, settings, &options.plan(), &place)?;
         telling::save_panels(&place.join("panels.png"), &verdict)?;
+        sheet.add(&verdict);
         let one = Told::new(&specimen, settings, &verdict);
         println!("{}", one.line());
         told.push(one);
@@ -54,7 +56,9 @@ fn run(options: &Options) -> Result<bool, Failure> {
     println!("{}", summary.text);
     let path = folder.join("zoo.json");
     std::fs::write(&path, serde_json::to_vec_pretty(&telling::json(&told, &summary))?)?;
-    println!("figures: {}", path.display());
+    let sheet_path = folder.join("sheet.png");
+    sheet.save(&sheet_path)?;
+    println!("figures: {}, all scenes: {}", path.display(), sheet_path.display());
     telling::name_the_worst(&told, &folder);
     Ok(summary.all_met)
 }

@@ -23,7 +23,10 @@ use super::frame::Picture;
 /// RMSE that counts as none, display steps.
 pub const FLOOR: f64 = 0.25;
 /// Standard deviations that chance is allowed.
-const DEVIATIONS: f64 = 4.5;
+pub const DEVIATIONS: f64 = 4.5;
+
+/// Independent traces of a frame, the traced one among them.
+pub const TRACES: usize = 3;
 
 /// Errors of one tile, each a mean over its pixels of squared display steps.
 #[derive(Debug, Clone, Copy)]
@@ -35,27 +38,26 @@ pub struct Tile {
     pub traced: f64,
     /// What an independent trace hardly ever exceeds.
     pub bound: f64,
-    /// Whether any of the traces exceeds the bound that the others give.
-    pub chance: bool,
+    /// By how many of its deviations each trace exceeds what the others foretell.
+    pub chance: [f64; TRACES],
 }
 
 impl Tile {
     /// All tiles of a frame: of what is judged, and of independent traces of which the first is the
     /// traced frame; each pixel's squared error.
-    pub fn all(picture: &Picture, inferred: &[f64], traces: &[Vec<f64>]) -> Vec<Self> {
+    pub fn all(picture: &Picture, inferred: &[f64], traces: &[Vec<f64>; TRACES]) -> Vec<Self> {
         let of = |(place, pixels): ([usize; 2], Vec<usize>)| {
             let mean = |squares: &[f64]| mean(pixels.iter().map(|p| squares[*p]));
-            let all: Vec<&[f64]> = traces.iter().map(Vec::as_slice).collect();
-            let chance = (0..all.len()).any(|k| {
-                let others: Vec<&[f64]> =
-                    (0..all.len()).filter(|i| *i != k).map(|i| all[i]).collect();
-                mean(all[k]) > bound(&pixels, &others)
+            let all = traces.each_ref().map(Vec::as_slice);
+            let chance = std::array::from_fn(|k| {
+                let others: Vec<&[f64]> = (0..TRACES).filter(|i| *i != k).map(|i| all[i]).collect();
+                Foretold::new(&pixels, &others).deviations(mean(all[k]))
             });
             Self {
                 place,
                 inferred: mean(inferred),
                 traced: mean(all[0]),
-                bound: bound(&pixels, &all),
+                bound: Foretold::new(&pixels, &all).bound(),
                 chance,
             }
         };
@@ -78,18 +80,37 @@ impl Tile {
     }
 }
 
-/// What a further trace of these pixels hardly ever exceeds.
-fn bound(pixels: &[usize], traces: &[&[f64]]) -> f64 {
-    let k = traces.len() as f64;
-    let n = pixels.len() as f64;
-    let (mut sum, mut variance) = (0.0, 0.0);
-    for p in pixels {
-        let m = mean(traces.iter().map(|t| t[*p]));
-        sum += m;
-        variance += traces.iter().map(|t| (t[*p] - m).powi(2)).sum::<f64>() / (k - 1.0);
+/// What is to be expected of a further trace of some pixels.
+struct Foretold {
+    /// MSE, the floor at least.
+    mse: f64,
+    deviation: f64,
+}
+
+impl Foretold {
+    fn new(pixels: &[usize], traces: &[&[f64]]) -> Self {
+        let k = traces.len() as f64;
+        let n = pixels.len() as f64;
+        let (mut sum, mut variance) = (0.0, 0.0);
+        for p in pixels {
+            let m = mean(traces.iter().map(|t| t[*p]));
+            sum += m;
+            variance += traces.iter().map(|t| (t[*p] - m).powi(2)).sum::<f64>() / (k - 1.0);
+        }
+        let deviation = (variance * (1.0 + 1.0 / k)).sqrt() / n;
+        Self { mse: (sum / n).max(FLOOR * FLOOR), deviation }
     }
-    let deviation = (variance * (1.0 + 1.0 / k)).sqrt() / n;
-    (sum / n).max(FLOOR * FLOOR) + DEVIATIONS * deviation
+
+    /// What it hardly ever exceeds.
+    fn bound(&self) -> f64 {
+        self.mse + DEVIATIONS * self.deviation
+    }
+
+    /// By how many deviations this MSE lies above.
+    fn deviations(&self, mse: f64) -> f64 {
+        // No deviation at all: all of the tile is sky.
+        if mse <= self.mse { 0.0 } else { (mse - self.mse) / self.deviation.max(1e-12) }
+    }
 }
 
 /// The mean of numbers, of which there is one at least.

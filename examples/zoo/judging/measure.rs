@@ -1,9 +1,10 @@
 //! Figures of frames and scenes.
 
 use super::audit::AuditCheck;
-use super::contract::{FLOOR, Tile, mean};
+use super::contract::{DEVIATIONS, FLOOR, TRACES, Tile, mean};
 use super::frame::Picture;
 use super::job::Spent;
+use serde_json::Value;
 
 /// A pixel that is off by more than this in some channel is counted, display steps.
 const FAR_OFF: f32 = 16.0;
@@ -14,7 +15,7 @@ pub struct Pictures {
     pub inferred: Picture,
     pub traced: Picture,
     pub truth: Picture,
-    again: Vec<Picture>,
+    again: [Picture; TRACES - 1],
     /// MSE of the truth itself.
     truth_noise: f64,
 }
@@ -24,8 +25,8 @@ impl Pictures {
     pub fn new(
         frame: usize,
         [inferred, traced]: [Picture; 2],
-        again: Vec<Picture>,
-        truths: &[Picture],
+        again: [Picture; TRACES - 1],
+        truths: &[Picture; 2],
     ) -> Self {
         let truth_noise = mean(truths[0].squares(&truths[1]).into_iter()) / 4.0;
         Self { frame, inferred, traced, truth: Picture::mean(truths), again, truth_noise }
@@ -48,8 +49,8 @@ pub struct FrameFigures {
 impl FrameFigures {
     fn new(p: &Pictures) -> Self {
         let inferred = p.inferred.squares(&p.truth);
-        let traces: Vec<Vec<f64>> =
-            [&p.traced].into_iter().chain(&p.again).map(|t| t.squares(&p.truth)).collect();
+        let [a, b] = &p.again;
+        let traces = [&p.traced, a, b].map(|trace| trace.squares(&p.truth));
         let rms = |squares: &[f64]| mean(squares.iter().copied()).sqrt();
         let mean_trace = mean(traces.iter().map(|t| mean(t.iter().copied())));
         Self {
@@ -82,9 +83,14 @@ impl FrameFigures {
         self.tiles.iter().all(Tile::keeps)
     }
 
-    /// Whether a trace broke the bound for chance.
-    pub fn chance(&self) -> bool {
-        self.tiles.iter().any(|tile| tile.chance)
+    /// By how many deviations each of the traces exceeds what the others foretell, in its worst tile.
+    pub fn chance(&self) -> [f64; TRACES] {
+        std::array::from_fn(|k| self.tiles.iter().map(|t| t.chance[k]).fold(0.0, f64::max))
+    }
+
+    /// How many of the traces break the bound that the others give.
+    pub fn chance_breaks(&self) -> usize {
+        self.chance().iter().filter(|deviations| **deviations > DEVIATIONS).count()
     }
 
     /// The tile that exceeds the contract most, or comes nearest to it.
@@ -105,7 +111,7 @@ pub struct Verdict {
     /// RMSE of the change from frame to frame against the truth's, inferred and traced; none
     /// without neighbours.
     pub flicker: Option<[f64; 2]>,
-    /// Share of points inferred, seen directly and in mirrors or glass.
+    /// Share of the points of in-between frames inferred, seen directly and in mirrors or glass.
     pub inferred_share: [Option<f64>; 2],
     pub audit: Option<AuditCheck>,
     pub surface: Spent,
@@ -119,17 +125,9 @@ impl Verdict {
         let between = |p: &&Pictures| p.frame != 1 && p.frame != last;
         let frames: Vec<FrameFigures> =
             pictures.iter().filter(between).map(FrameFigures::new).collect();
-        let share = |all: &str, inferred: &str| {
-            let reuse = &surface.stats["reuse"];
-            let all = reuse[all].as_f64().filter(|n| *n > 0.0)?;
-            Some(reuse[inferred].as_f64()? / all)
-        };
         Self {
             flicker: flicker(&pictures),
-            inferred_share: [
-                share("direct", "direct_inferred"),
-                share("specular", "specular_inferred"),
-            ],
+            inferred_share: ["direct", "specular"].map(|kind| share(&surface.stats, kind, last)),
             audit: AuditCheck::new(&surface.stats, &frames, last),
             frames,
             surface,
@@ -158,6 +156,17 @@ impl Verdict {
         let is_seen = inferred.max(traced) > FLOOR;
         Some(if is_seen { inferred / traced.max(1e-6) } else { 1.0 })
     }
+}
+
+/// Share of the points of this kind inferred in the in-between frames of a move of `last`.
+fn share(stats: &Value, kind: &str, last: usize) -> Option<f64> {
+    let frames = stats["frames"].as_array()?;
+    let between = |f: &&Value| f["frame"] != 1 && f["frame"] != last;
+    let sum = |name: &str| -> f64 {
+        frames.iter().filter(between).filter_map(|f| f["reuse"][name].as_f64()).sum()
+    };
+    let all = sum(kind);
+    (all > 0.0).then(|| sum(&format!("{kind}_inferred")) / all)
 }
 
 /// Over all pairs of neighbours.

@@ -31,11 +31,7 @@ use std::path::Path;
 /// What goes wrong with a render.
 pub type Failure = Box<dyn std::error::Error>;
 
-/// Independent traces beside the traced job.
-const AGAIN: usize = 2;
-/// Renders whose mean is the truth.
-const TRUTHS: usize = 2;
-/// Light samples of each of them over those of a traced frame.
+/// Light samples of each half of the truth over those of a traced frame.
 const TRUER: usize = 8;
 
 /// How scenes are rendered.
@@ -67,30 +63,30 @@ pub fn judge(
     let inferred = run(Render::of_move("inferred", "surface"))?;
     let traced = run(Render::of_move("traced", "off"))?;
     let poses: Vec<Pose> = judged.iter().map(|frame| specimen.poses[frame - 1]).collect();
-    let other = |name: String, first: usize, factor: usize| -> Result<_, Failure> {
-        specimen.write(folder, &format!("{name}.toml"), &poses, first)?;
-        run(Render::of_others(&name, [first, poses.len()], factor))
-    };
-    // Numbers that no frame of the move has, nor the other renders.
+    // Numbers that no frame of the move has, nor another render.
     let first = |k: usize| 1000 * (k + 1);
-    let again: Vec<_> =
-        (0..AGAIN).map(|k| other(format!("again{k}"), first(k), 1)).collect::<Result<_, _>>()?;
-    let truths: Vec<_> = (0..TRUTHS)
-        .map(|k| other(format!("truth{k}"), first(AGAIN + k), TRUER))
-        .collect::<Result<_, _>>()?;
+    let other = |k: usize, name: &str, factor: usize| -> Result<Spent, Failure> {
+        specimen.write(folder, &format!("{name}.toml"), &poses, first(k))?;
+        run(Render::of_others(name, [first(k), poses.len()], factor))
+    };
+    let others = [
+        other(0, "again1", 1)?,
+        other(1, "again2", 1)?,
+        other(2, "truth1", TRUER)?,
+        other(3, "truth2", TRUER)?,
+    ];
     let mut pictures = Vec::new();
     for (i, frame) in judged.iter().enumerate() {
-        let of_others = |jobs: &[Spent], k0: usize| -> Result<Vec<Picture>, Failure> {
-            jobs.iter().enumerate().map(|(k, job)| job.frame(first(k0 + k) + i)).collect()
-        };
+        let of = |job: &Spent, k: usize| job.frame(first(k) + i);
+        let [a, b, c, d] = &others;
         pictures.push(Pictures::new(
             *frame,
             [inferred.frame(*frame)?, traced.frame(*frame)?],
-            of_others(&again, 0)?,
-            &of_others(&truths, AGAIN)?,
+            [of(a, 0)?, of(b, 1)?],
+            &[of(c, 2)?, of(d, 3)?],
         ));
     }
-    for job in again.iter().chain(&truths).chain([&inferred, &traced]) {
+    for job in others.iter().chain([&inferred, &traced]) {
         job.remove_frames()?;
     }
     Ok(Verdict::new(pictures, frames, inferred, traced))

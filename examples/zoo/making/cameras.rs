@@ -92,7 +92,11 @@ impl<'a> Path<'a> {
         let share = self.amount.abs();
         let slide = |eye: DVec3, by: DVec3| Pose { eye: eye + by, target: focus + 0.5 * by };
         match self.kind {
-            Move::Pan => slide(eye, right * (self.amount * room * (t - 0.5))),
+            Move::Pan => {
+                // Sideways, and up a little: down there may be ground.
+                let rise = DVec3::Y * (0.3 * share * room * t);
+                slide(eye, right * (self.amount * room * (t - 0.5)) + rise)
+            }
             Move::DollyIn => Pose { eye: eye + view * (0.6 * share * t), target: focus },
             Move::DollyOut => Pose { eye: eye + view * (0.6 * share * (1.0 - t)), target: focus },
             Move::NearStop => {

@@ -40,8 +40,8 @@ pub fn tree(dice: &mut Dice, b: &mut Builder, (at, name): (DVec3, &str), height:
     let mut leaves = Obj::default();
     let top = at + DVec3::Y * height;
     wood.prism([at, top], [0.04 * height, 0.01 * height], 6);
-    for _ in 0..dice.count(6, 14) {
-        let from = at.lerp(top, dice.within(0.3, 1.0));
+    for _ in 0..dice.count(8, 18) {
+        let from = at.lerp(top, dice.within(0.12, 1.0));
         let mut way = dice.direction();
         way.y = 0.5 * way.y.abs() + 0.1;
         let to = from + way * (0.45 * height * dice.within(0.5, 1.0));

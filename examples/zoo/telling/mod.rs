@@ -5,7 +5,7 @@ mod record;
 mod summary;
 mod table;
 
-pub use panels::{name_the_worst, save as save_panels};
+pub use panels::{Sheet, name_the_worst, save as save_panels};
 pub use record::{HEAD, Told};
 pub use summary::{json, summary};
 pub use table::table;

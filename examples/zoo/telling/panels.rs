@@ -46,7 +46,40 @@ fn image_of(p: &Pictures) -> RgbImage {
     image
 }
 
-/// Prints where the pictures of the ten worst scenes are, and removes the others'.
+/// Pictures of all scenes side by side, a small one each.
+#[derive(Default)]
+pub struct Sheet {
+    pictures: Vec<Picture>,
+}
+
+/// Pictures in a row of the sheet.
+const COLUMNS: usize = 5;
+
+impl Sheet {
+    /// Adds a scene's truth.
+    pub fn add(&mut self, verdict: &Verdict) {
+        self.pictures.extend(verdict.pictures.last().map(|p| p.truth.clone()));
+    }
+
+    /// Writes the sheet, in the order of the scenes.
+    pub fn save(&self, path: &Path) -> Result<(), Failure> {
+        let Some(first) = self.pictures.first() else { return Ok(()) };
+        let (w, h) = (first.width + GAP as usize, first.height + GAP as usize);
+        let rows = self.pictures.len().div_ceil(COLUMNS);
+        let mut image =
+            RgbImage::from_pixel((COLUMNS * w) as u32, (rows * h) as u32, Rgb([255; 3]));
+        for (k, picture) in self.pictures.iter().enumerate() {
+            for (i, pixel) in picture.steps.iter().enumerate() {
+                let (x, y) = (i % picture.width, i / picture.width);
+                let place = ((k % COLUMNS * w + x) as u32, (k / COLUMNS * h + y) as u32);
+                image.put_pixel(place.0, place.1, Rgb(pixel.map(|v| v.round() as u8)));
+            }
+        }
+        Ok(image.save(path)?)
+    }
+}
+
+/// Prints where the pictures of the ten worst scenes are.
 #[allow(clippy::print_stdout, reason = "a program for people")]
 pub fn name_the_worst(told: &[Told], folder: &Path) {
     let mut order: Vec<&Told> = told.iter().collect();

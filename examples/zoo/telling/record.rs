@@ -44,8 +44,10 @@ pub struct Frame {
     pub far_off: [f64; 2],
     pub keeps_strictly: bool,
     pub keeps: bool,
-    /// Whether an independent trace of it broke its bound.
-    pub chance: bool,
+    /// By how many deviations independent traces of it exceed what others foretell, in the worst tile.
+    pub chance: Vec<f64>,
+    /// How many of them break their bound.
+    pub chance_breaks: usize,
     pub is_visibly_worse: bool,
     /// Tiles that break the contract: strictly, with the allowance; and all.
     pub tiles_broken: [usize; 2],
@@ -86,7 +88,8 @@ impl Frame {
             far_off: f.far_off,
             keeps_strictly: f.keeps_strictly(),
             keeps: f.keeps(),
-            chance: f.chance(),
+            chance: f.chance().to_vec(),
+            chance_breaks: f.chance_breaks(),
             is_visibly_worse: f.is_visibly_worse(),
             tiles_broken: [broken(|t| t.keeps_strictly()), broken(|t| t.keeps())],
             tiles: f.tiles.len(),

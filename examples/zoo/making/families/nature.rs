@@ -59,14 +59,14 @@ pub fn foliage(dice: &mut Dice, b: &mut Builder) -> Stage {
     let level = dice.within(0.3, 1.5);
     lamps::sky(b, dice, level);
     let leaf = dice.scale(0.03, 0.12);
-    for i in 0..dice.count(1, 4) {
-        let place = dice.on_disc(DVec3::ZERO, 1.8);
-        let height = dice.within(0.8, 2.6);
+    for i in 0..dice.count(3, 8) {
+        let place = dice.on_disc(DVec3::ZERO, 1.6);
+        let height = dice.scale(0.4, 2.4);
         props::tree(dice, b, (place, &format!("tree{i}")), height, leaf);
     }
-    let eye = DVec3::new(dice.within(-1.5, 1.5), dice.within(0.6, 2.2), dice.within(3.5, 6.0));
-    let focus = DVec3::new(0.0, dice.within(0.3, 1.2), 0.0);
-    let far = Pose { eye: DVec3::new(0.3, 1.6, 2.2), target: DVec3::new(0.0, 0.2, -0.5) };
+    let eye = DVec3::new(dice.within(-1.5, 1.5), dice.within(0.8, 2.6), dice.within(3.0, 4.5));
+    let focus = DVec3::new(0.0, dice.within(0.2, 0.7), 0.0);
+    let far = Pose { eye: DVec3::new(0.3, 1.8, 2.2), target: DVec3::new(0.0, 0.2, -0.5) };
     Stage { eye, focus, room: 1.5, far: Some(far) }
 }
 
