@@ -39,6 +39,7 @@ fn run(options: &Options) -> Result<bool, Failure> {
     let folder = options.folder();
     let mut told = Vec::new();
     let mut sheet = Sheet::default();
+    let (json, sheet_path) = (folder.join("zoo.json"), folder.join("sheet.png"));
     println!("{}", telling::HEAD);
     for index in options.indices()? {
         let specimen = Specimen::new(options.seed, index, options.frames);
@@ -50,15 +51,14 @@ fn run(options: &Options) -> Result<bool, Failure> {
         let one = Told::new(&specimen, settings, &verdict);
         println!("{}", one.line());
         told.push(one);
+        // After each scene: a run that is stopped leaves what it found.
+        telling::save_json(&json, &told, &summary(&told, options.frames))?;
+        sheet.save(&sheet_path)?;
     }
     println!("\n{}", table(&told));
     let summary = summary(&told, options.frames);
     println!("{}", summary.text);
-    let path = folder.join("zoo.json");
-    std::fs::write(&path, serde_json::to_vec_pretty(&telling::json(&told, &summary))?)?;
-    let sheet_path = folder.join("sheet.png");
-    sheet.save(&sheet_path)?;
-    println!("figures: {}, all scenes: {}", path.display(), sheet_path.display());
+    println!("figures: {}, all scenes: {}", json.display(), sheet_path.display());
     telling::name_the_worst(&told, &folder);
     Ok(summary.all_met)
 }

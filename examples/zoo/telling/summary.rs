@@ -2,8 +2,10 @@
 
 use super::record::{Frame, Told};
 use super::table::median;
+use crate::judging::Failure;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::Path;
 
 /// What was wanted and what came out.
 #[derive(Serialize)]
@@ -78,7 +80,8 @@ impl Summary {
     }
 }
 
-/// All of it.
-pub fn json(told: &[Told], summary: &Summary) -> serde_json::Value {
-    serde_json::json!({ "scenes": told, "summary": summary })
+/// Writes all of it.
+pub fn save_json(path: &Path, told: &[Told], summary: &Summary) -> Result<(), Failure> {
+    let all = serde_json::json!({ "scenes": told, "summary": summary });
+    Ok(std::fs::write(path, serde_json::to_vec_pretty(&all)?)?)
 }
