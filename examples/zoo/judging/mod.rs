@@ -26,6 +26,7 @@ pub use measure::{FrameFigures, Pictures, Verdict};
 
 use crate::making::{Pose, Settings, Specimen};
 use job::Render;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What goes wrong with a render.
@@ -41,7 +42,8 @@ pub struct Plan {
     pub size: [u32; 2],
     /// Frames judged at most.
     pub judged: usize,
-    /// Whether key frames may be left out of those that truth is rendered for.
+    /// Whether key frames, which are traced in any case, are left out: flicker then is of in-between
+    /// frames alone.
     pub between_only: bool,
 }
 
@@ -101,5 +103,6 @@ fn choose(frames: usize, plan: &Plan) -> Vec<usize> {
     }
     let pairs = (plan.judged / 2).max(1);
     let first = |k: usize| 2 + (frames - 3) * (2 * k + 1) / (2 * pairs);
-    (0..pairs).flat_map(|k| [first(k), first(k) + 1]).collect()
+    let frames: BTreeSet<usize> = (0..pairs).flat_map(|k| [first(k), first(k) + 1]).collect();
+    frames.into_iter().collect()
 }
