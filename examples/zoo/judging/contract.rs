@@ -23,10 +23,10 @@ use super::frame::Picture;
 /// RMSE that counts as none, display steps.
 pub const FLOOR: f64 = 0.25;
 /// Standard deviations that chance is allowed.
-pub const DEVIATIONS: f64 = 4.5;
+pub const DEVIATIONS: f64 = 6.0;
 
 /// Independent traces of a frame, the traced one among them.
-pub const TRACES: usize = 3;
+pub const TRACES: usize = 4;
 
 /// Errors of one tile, each a mean over its pixels of squared display steps.
 #[derive(Debug, Clone, Copy)]

@@ -49,8 +49,8 @@ pub struct FrameFigures {
 impl FrameFigures {
     fn new(p: &Pictures) -> Self {
         let inferred = p.inferred.squares(&p.truth);
-        let [a, b] = &p.again;
-        let traces = [&p.traced, a, b].map(|trace| trace.squares(&p.truth));
+        let [a, b, c] = &p.again;
+        let traces = [&p.traced, a, b, c].map(|trace| trace.squares(&p.truth));
         let rms = |squares: &[f64]| mean(squares.iter().copied()).sqrt();
         let mean_trace = mean(traces.iter().map(|t| mean(t.iter().copied())));
         Self {

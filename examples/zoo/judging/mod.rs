@@ -5,8 +5,8 @@
 //!
 //! * inferred: `--policy surface`, all frames;
 //! * traced: `--policy off`, all frames;
-//! * again, twice: traced as frames of other numbers, hence with other light samples. They tell
-//!   how far two traces are apart by chance;
+//! * again, three times: traced as frames of other numbers, hence with other light samples. They tell
+//!   how far traces are apart by chance;
 //! * truth, twice: the same with 8 times the shadow and sky samples each. Their mean is the truth, with
 //!   16 times the samples and independent of all that is judged by it, and their difference is its
 //!   own noise.
@@ -74,18 +74,19 @@ pub fn judge(
     let others = [
         other(0, "again1", 1)?,
         other(1, "again2", 1)?,
-        other(2, "truth1", TRUER)?,
-        other(3, "truth2", TRUER)?,
+        other(2, "again3", 1)?,
+        other(3, "truth1", TRUER)?,
+        other(4, "truth2", TRUER)?,
     ];
     let mut pictures = Vec::new();
     for (i, frame) in judged.iter().enumerate() {
         let of = |job: &Spent, k: usize| job.frame(first(k) + i);
-        let [a, b, c, d] = &others;
+        let [a, b, c, d, e] = &others;
         pictures.push(Pictures::new(
             *frame,
             [inferred.frame(*frame)?, traced.frame(*frame)?],
-            [of(a, 0)?, of(b, 1)?],
-            &[of(c, 2)?, of(d, 3)?],
+            [of(a, 0)?, of(b, 1)?, of(c, 2)?],
+            &[of(d, 3)?, of(e, 4)?],
         ));
     }
     for job in others.iter().chain([&inferred, &traced]) {
