@@ -136,7 +136,7 @@ fn still_life(dice: &mut Dice, b: &mut Builder) -> Stage {
         let at = dice.on_disc(DVec3::ZERO, 1.2);
         props::any(dice, b, at);
     }
-    let eye = DVec3::new(dice.within(-1.5, 1.5), dice.within(0.8, 2.0), dice.within(3.0, 4.5));
+    let eye = DVec3::new(dice.within(-1.5, 1.5), dice.within(0.8, 2.0), dice.within(2.4, 3.8));
     let far = Pose { eye: DVec3::new(0.4, 1.6, 1.8), target: DVec3::new(0.0, 0.2, -0.8) };
     Stage { eye, focus: DVec3::new(0.0, 0.3, 0.0), room: 1.5, far: Some(far) }
 }

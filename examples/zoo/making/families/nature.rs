@@ -77,41 +77,24 @@ pub fn low_sun(dice: &mut Dice, b: &mut Builder) -> Stage {
 
 /// Hills, some with rocks on them.
 pub fn terrain(dice: &mut Dice, b: &mut Builder) -> Stage {
-    let stage = hills(dice, b, [20.0, 80.0]);
-    if dice.chance(0.7) {
-        b.paint("rock", dice.colour(0.4, 0.2));
-        let mut rocks = Obj::default();
-        for _ in 0..dice.count(5, 40) {
-            let mut at = dice.on_disc(stage.focus, 3.0);
-            at.y = dice.within(0.0, 0.8);
-            let radii = DVec3::new(1.0, dice.within(0.4, 0.9), 1.0) * dice.scale(0.05, 0.4);
-            rocks.ball(at, radii, dice.count(3, 7), props::any_turn(dice));
-        }
-        b.mesh(rocks, "rock", false);
-    }
-    stage
+    hills(dice, b, [20.0, 80.0])
 }
 
 /// Ground of one of two makes, under a sun at this elevation.
 fn hills(dice: &mut Dice, b: &mut Builder, elevation: [f64; 2]) -> Stage {
     b.paint("sand", dice.colour(0.5, 0.2));
     let steps = dice.count(40, 200);
-    if dice.chance(0.5) {
+    if dice.chance(0.4) {
         let keys = format!("terrain = {{ vertices = {steps}, size = 16.0 }}");
         b.shape(&keys, "sand");
     } else {
-        let waves: Vec<[f64; 4]> = (1..8)
-            .map(|i| {
-                let f = 0.5 * 1.6f64.powi(i);
-                [f * dice.within(-1.0, 1.0), f * dice.within(-1.0, 1.0), dice.angle(), 0.35 / f]
-            })
-            .collect();
-        let height = |x: f64, z: f64| {
-            waves.iter().map(|[a, b, c, h]| h * (a * x + b * z + c).sin()).sum::<f64>() + 0.4
-        };
+        let waves = Waves::new(dice);
         let mut ground = Obj::default();
-        ground.ground(8.0, steps, height);
+        ground.ground(8.0, steps, |x, z| waves.height(x, z));
         b.mesh(ground, "sand", dice.chance(0.5));
+        if dice.chance(0.7) {
+            waves.strew_rocks(dice, b);
+        }
     }
     let towards = lamps::above(dice, elevation);
     // A slope that faces a grazing sun must not burn out, level ground not vanish.
@@ -124,4 +107,37 @@ fn hills(dice: &mut Dice, b: &mut Builder, elevation: [f64; 2]) -> Stage {
     let eye = DVec3::new(dice.within(-1.0, 1.0), dice.within(1.8, 3.2), 6.0);
     let far = Pose { eye: DVec3::new(0.0, 2.0, 0.0), target: DVec3::new(0.0, 0.3, -5.0) };
     Stage { eye, focus: DVec3::new(0.0, 0.3, 0.0), room: 2.0, far: Some(far) }
+}
+
+/// Rolling ground: a sum of waves, the shorter the lower.
+struct Waves {
+    /// Along x and z, phase, height.
+    list: Vec<[f64; 4]>,
+}
+
+impl Waves {
+    fn new(dice: &mut Dice) -> Self {
+        let wave = |i| {
+            let f = 0.5 * 1.6f64.powi(i);
+            [f * dice.within(-1.0, 1.0), f * dice.within(-1.0, 1.0), dice.angle(), 0.35 / f]
+        };
+        Self { list: (1..8).map(wave).collect() }
+    }
+
+    fn height(&self, x: f64, z: f64) -> f64 {
+        0.4 + self.list.iter().map(|[a, b, c, h]| h * (a * x + b * z + c).sin()).sum::<f64>()
+    }
+
+    fn strew_rocks(&self, dice: &mut Dice, b: &mut Builder) {
+        b.paint("rock", dice.colour(0.4, 0.2));
+        let mut rocks = Obj::default();
+        for _ in 0..dice.count(10, 60) {
+            let mut at = dice.on_disc(DVec3::ZERO, 4.0);
+            let size = dice.scale(0.04, 0.35);
+            at.y = self.height(at.x, at.z) + 0.3 * size;
+            let radii = DVec3::new(1.0, dice.within(0.4, 0.9), 1.0) * size;
+            rocks.ball(at, radii, dice.count(3, 7), props::any_turn(dice));
+        }
+        b.mesh(rocks, "rock", false);
+    }
 }

@@ -26,7 +26,7 @@ pub fn grating(dice: &mut Dice, b: &mut Builder) -> Stage {
     let height = dice.within(1.6, 3.0);
     let pitch = dice.scale(0.03, 0.3);
     let half = dice.within(2.0, 4.0);
-    let bar = pitch * dice.within(0.15, 0.35);
+    let bar = pitch * dice.within(0.1, 0.25);
     let mut bars = Obj::default();
     let crossed = dice.chance(0.5);
     let count = (2.0 * half / pitch) as i32;
