@@ -2,6 +2,7 @@
 
 use crate::judging::{Failure, Plan, SIDE};
 use crate::making::{FAMILIES, Settings};
+use crate::telling::LONG;
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -49,7 +50,12 @@ impl Options {
     }
 
     pub fn plan(&self) -> Plan {
-        Plan { size: self.size, judged: self.judged.max(2), between_only: false }
+        Plan {
+            size: self.size,
+            judged: self.judged.max(2),
+            between_only: false,
+            timed: self.frames >= LONG,
+        }
     }
 
     /// Indices of the scenes. An index means the same scene whatever else is asked for.

@@ -22,18 +22,39 @@ pub struct Render {
     frames: Option<[usize; 2]>,
     /// On shadow and sky samples.
     factor: usize,
+    /// Of the frames' names.
+    ending: &'static str,
 }
 
 impl Render {
     /// All frames of the move.
     pub fn of_move(name: &str, policy: &'static str) -> Self {
-        Self { name: name.into(), scene: "move.toml".into(), policy, frames: None, factor: 1 }
+        Self {
+            name: name.into(),
+            scene: "move.toml".into(),
+            policy,
+            frames: None,
+            factor: 1,
+            ending: "exr",
+        }
+    }
+
+    /// The same to png files.
+    pub fn as_png(self) -> Self {
+        Self { ending: "png", ..self }
     }
 
     /// Traced frames of the scene file of this name: the first one's number, and how many.
     pub fn of_others(name: &str, [first, count]: [usize; 2], factor: usize) -> Self {
         let frames = Some([first, first + count - 1]);
-        Self { name: name.into(), scene: format!("{name}.toml"), policy: "off", frames, factor }
+        Self {
+            name: name.into(),
+            scene: format!("{name}.toml"),
+            policy: "off",
+            frames,
+            factor,
+            ending: "exr",
+        }
     }
 }
 
@@ -92,7 +113,7 @@ impl Program {
             .args(["--policy", render.policy, "--no-video", "--overwrite", "-q", "--stats"])
             .arg(&stats)
             .arg("-o")
-            .arg(frames.join("frame_####.exr"));
+            .arg(frames.join(format!("frame_####.{}", render.ending)));
         if let Some([first, last]) = render.frames {
             command.args(["--frames", &format!("{first}..{last}")]);
         }

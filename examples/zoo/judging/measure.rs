@@ -114,24 +114,23 @@ pub struct Verdict {
     /// Share of the points of in-between frames inferred, seen directly and in mirrors or glass.
     pub inferred_share: [Option<f64>; 2],
     pub audit: Option<AuditCheck>,
-    pub surface: Spent,
-    pub off: Spent,
+    /// The jobs that infer and that trace.
+    pub jobs: [Spent; 2],
     pub pictures: Vec<Pictures>,
 }
 
 impl Verdict {
     /// Judges the pictures of a move of `last` frames.
-    pub fn new(pictures: Vec<Pictures>, last: usize, surface: Spent, off: Spent) -> Self {
+    pub fn new(pictures: Vec<Pictures>, last: usize, jobs: [Spent; 2]) -> Self {
         let between = |p: &&Pictures| p.frame != 1 && p.frame != last;
         let frames: Vec<FrameFigures> =
             pictures.iter().filter(between).map(FrameFigures::new).collect();
         Self {
             flicker: flicker(&pictures),
-            inferred_share: ["direct", "specular"].map(|kind| share(&surface.stats, kind, last)),
-            audit: AuditCheck::new(&surface.stats, &frames, last),
+            inferred_share: ["direct", "specular"].map(|kind| share(&jobs[0].stats, kind, last)),
+            audit: AuditCheck::new(&jobs[0].stats, &frames, last),
             frames,
-            surface,
-            off,
+            jobs,
             pictures,
         }
     }
@@ -147,7 +146,9 @@ impl Verdict {
 
     /// How many times faster than tracing, by CPU seconds of whole jobs.
     pub fn speed(&self) -> f64 {
-        (self.off.cpu + 0.005) / (self.surface.cpu + 0.005)
+        // It is told in hundredths of a second.
+        let [surface, off] = self.jobs.each_ref().map(|job| job.cpu + 0.005);
+        off / surface
     }
 
     /// Flicker of inferred frames over that of traced ones; 1 where neither has any to be seen.

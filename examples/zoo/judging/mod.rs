@@ -45,6 +45,9 @@ pub struct Plan {
     /// Whether key frames, which are traced in any case, are left out: flicker then is of in-between
     /// frames alone.
     pub between_only: bool,
+    /// Whether the move is rendered twice more, to png files, to be timed: exr frames keep what later
+    /// jobs may infer from, and packing that takes longer than a small frame does.
+    pub timed: bool,
 }
 
 /// Renders and judges one scene in `folder`, which it makes and empties of frames again.
@@ -92,7 +95,16 @@ pub fn judge(
     for job in others.iter().chain([&inferred, &traced]) {
         job.remove_frames()?;
     }
-    Ok(Verdict::new(pictures, frames, inferred, traced))
+    let mut jobs = [inferred, traced];
+    if plan.timed {
+        let timed = |name: &str, policy| run(Render::of_move(name, policy).as_png());
+        let [surface, off] = [timed("timed-inferred", "surface")?, timed("timed-traced", "off")?];
+        for (job, timed) in jobs.iter_mut().zip([surface, off]) {
+            timed.remove_frames()?;
+            (job.wall, job.cpu) = (timed.wall, timed.cpu);
+        }
+    }
+    Ok(Verdict::new(pictures, frames, jobs))
 }
 
 /// Numbers of the frames that are judged: all of a short move; of a long one in-between frames in

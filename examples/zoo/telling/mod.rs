@@ -7,5 +7,5 @@ mod table;
 
 pub use panels::{Sheet, name_the_worst, save as save_panels};
 pub use record::{HEAD, Told};
-pub use summary::{save_json, summary};
+pub use summary::{LONG, save_json, summary};
 pub use table::table;

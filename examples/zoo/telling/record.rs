@@ -100,7 +100,7 @@ impl Frame {
 impl Told {
     /// The verdict's figures.
     pub fn new(specimen: &Specimen, settings: Settings, verdict: &Verdict) -> Self {
-        let jobs = [&verdict.surface, &verdict.off];
+        let jobs = &verdict.jobs;
         Self {
             index: specimen.index,
             family: FAMILIES[specimen.family].name,
@@ -112,9 +112,9 @@ impl Told {
             flicker: verdict.flicker,
             flicker_ratio: verdict.flicker_ratio(),
             inferred: verdict.inferred_share,
-            cpu_seconds: jobs.map(|job| job.cpu),
-            wall_seconds: jobs.map(|job| job.wall),
-            before_frames_seconds: jobs.map(|job| job.before_frames()),
+            cpu_seconds: jobs.each_ref().map(|job| job.cpu),
+            wall_seconds: jobs.each_ref().map(|job| job.wall),
+            before_frames_seconds: jobs.each_ref().map(|job| job.before_frames()),
             speed: verdict.speed(),
             audit: verdict.audit.as_ref().map(|audit| Audit {
                 rmse: audit.shown,

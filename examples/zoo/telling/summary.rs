@@ -15,7 +15,7 @@ pub struct Summary {
 }
 
 /// Moves shorter than this say little of speed: most of their frames are key frames.
-const LONG: usize = 24;
+pub const LONG: usize = 24;
 
 /// Holds the figures against the targets.
 pub fn summary(told: &[Told], frames_of_move: usize) -> Summary {
@@ -69,10 +69,13 @@ impl Summary {
 
     /// So many of so many are to be a share of them.
     fn want(&mut self, what: &str, [met, all]: [usize; 2], share: f64) {
+        if all == 0 {
+            return self.tell(&format!("-      {what}: none here"));
+        }
         let is_met = met as f64 >= share * all as f64;
         self.all_met &= is_met;
         let word = if is_met { "met   " } else { "MISSED" };
-        let percent = 100.0 * met as f64 / all.max(1) as f64;
+        let percent = 100.0 * met as f64 / all as f64;
         self.tell(&format!(
             "{word} {what}: {met} of {all}, {percent:.1} % (wanted {:.0} %)",
             100.0 * share
