@@ -40,7 +40,7 @@ impl Render {
     }
 
     /// The same to png files.
-    pub fn as_png(self) -> Self {
+    pub fn into_png(self) -> Self {
         Self { ending: "png", ..self }
     }
 

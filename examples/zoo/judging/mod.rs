@@ -97,7 +97,7 @@ pub fn judge(
     }
     let mut jobs = [inferred, traced];
     if plan.timed {
-        let timed = |name: &str, policy| run(Render::of_move(name, policy).as_png());
+        let timed = |name: &str, policy| run(Render::of_move(name, policy).into_png());
         let [surface, off] = [timed("timed-inferred", "surface")?, timed("timed-traced", "off")?];
         for (job, timed) in jobs.iter_mut().zip([surface, off]) {
             timed.remove_frames()?;
