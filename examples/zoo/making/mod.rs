@@ -1,0 +1,17 @@
+//! Random scenes: families of them, and camera moves that suit each.
+//!
+//! A scene is a function of the seed and its index alone. It comes as the text of a scene file
+//! without its camera, the meshes and textures beside it, and a pose for each frame.
+
+mod builder;
+mod cameras;
+mod dice;
+mod families;
+mod lamps;
+mod obj;
+mod props;
+mod specimen;
+
+pub use cameras::Pose;
+pub use families::FAMILIES;
+pub use specimen::{Settings, Specimen};

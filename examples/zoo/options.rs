@@ -1,0 +1,107 @@
+//! The command line.
+
+use crate::judging::{Failure, Plan, SIDE};
+use crate::making::{FAMILIES, Settings};
+use crate::telling::LONG;
+use clap::Parser;
+use std::path::PathBuf;
+
+/// Renders random scenes and judges what was inferred.
+#[derive(Parser)]
+#[command(name = "zoo")]
+pub struct Options {
+    /// Scenes are a function of this and their index
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How many scenes
+    #[arg(long, default_value_t = 38)]
+    count: usize,
+    /// Frames of each move; the first and the last are traced
+    #[arg(long, default_value_t = 4, value_parser = frames)]
+    pub frames: usize,
+    /// Most frames of a move that are judged
+    #[arg(long, default_value_t = 6)]
+    judged: usize,
+    /// Pixels of a frame; tiles of 32 x 32 are judged
+    #[arg(long, default_value = "160x96", value_parser = size)]
+    size: [u32; 2],
+    /// Camera samples and light samples of every scene, as 4,16, instead of random ones
+    #[arg(long, value_parser = settings)]
+    pub settings: Option<Settings>,
+    /// Only scenes of these families
+    #[arg(long, value_delimiter = ',')]
+    families: Vec<String>,
+    /// Only the scene of this index
+    #[arg(long)]
+    only: Option<u64>,
+    /// Names the families
+    #[arg(long)]
+    pub list: bool,
+    /// Exit code 1 where a target is missed
+    #[arg(long)]
+    pub check: bool,
+}
+
+impl Options {
+    /// Where scenes, pictures and figures go.
+    pub fn folder(&self) -> PathBuf {
+        let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+        PathBuf::from(target).join("zoo").join(self.seed.to_string())
+    }
+
+    pub fn plan(&self) -> Plan {
+        Plan {
+            size: self.size,
+            judged: self.judged.max(2),
+            between_only: false,
+            timed: self.frames >= LONG,
+        }
+    }
+
+    /// Indices of the scenes. An index means the same scene whatever else is asked for.
+    ///
+    /// # Errors
+    /// Where there is no such family.
+    pub fn indices(&self) -> Result<Vec<u64>, Failure> {
+        if let Some(only) = self.only {
+            return Ok(vec![only]);
+        }
+        let number = |name: &String| {
+            let found = FAMILIES.iter().position(|family| family.name == name);
+            found.ok_or_else(|| format!("there is no family {name}; --list names them"))
+        };
+        let wanted: Vec<usize> = self.families.iter().map(number).collect::<Result<_, _>>()?;
+        let is_wanted = |index: &u64| {
+            wanted.is_empty() || wanted.contains(&((index % FAMILIES.len() as u64) as usize))
+        };
+        Ok((0..).filter(is_wanted).take(self.count).collect())
+    }
+}
+
+fn frames(text: &str) -> Result<usize, String> {
+    // In-between frames there must be, and numbers above those of the move are the judges'.
+    match text.parse() {
+        Ok(frames) if (3..1000).contains(&frames) => Ok(frames),
+        _ => Err("wanted: 3 to 999".into()),
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once('x').ok_or("wanted: WxH, as 160x96")?;
+    let number = |text: &str| text.parse::<u32>().map_err(|e| format!("{text}: {e}"));
+    let size = [number(w)?, number(h)?];
+    if size.iter().any(|side| *side < SIDE as u32) {
+        return Err(format!("a frame holds at least one tile of {SIDE} x {SIDE}"));
+    }
+    Ok(size)
+}
+
+fn settings(text: &str) -> Result<Settings, String> {
+    let (spp, light) = text.split_once(',').ok_or("wanted: SPP,LIGHT, as 4,16")?;
+    let number = |text: &str| text.parse::<usize>().map_err(|e| format!("{text}: {e}"));
+    let settings = Settings { spp: number(spp)?, light: number(light)? };
+    if settings.spp == 0 || settings.light == 0 {
+        return Err("wanted: at least one sample of each".into());
+    }
+    Ok(settings)
+}
