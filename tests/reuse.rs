@@ -96,44 +96,6 @@ fn demo_is_no_worse_than_traced() {
     is_no_worse_than_traced("demo", 0.0, [0.96, 0.82]);
 }
 
-/// Where it is left to the scene, that is found out once a segment, from a quarter of its middle frame; of a
-/// scene whose frames are noisier than a display step nothing else changes.
-#[test]
-fn the_tolerance_is_what_the_segment_calls_for() {
-    let made = |scene: &str, tolerance: Option<f32>| {
-        let set = Set::load(scene, |_| ());
-        let settings = with_segment(set.settings((64, 48), 1, 16));
-        let reuse = ReuseSettings { tolerance, ..settings.reuse };
-        set.stage(2).frames(&Settings { reuse, ..settings }, &set.shot(FRAMES), &segment())
-    };
-    let own = made("reflective_spheres", None);
-    // Frames 1 and 9 are traced whole, 10 is the first of the next segment.
-    let found = own[1].tolerance.expect("found");
-    assert!(found > 0.0 && found < 0.5, "{found}");
-    for (frame, made) in (1..).zip(&own) {
-        let expected = match frame {
-            1 | 9 => None,
-            10 => Some(made.tolerance.filter(|t| *t < 0.5).expect("found")),
-            _ => Some(found),
-        };
-        assert!(made.tolerance == expected, "frame {frame}: {:?}", made.tolerance);
-    }
-    let (own, given) = (made("cornell", None), made("cornell", Some(1.0)));
-    for (frame, (own, given)) in (1..).zip(own.iter().zip(&given)) {
-        assert_eq!(own.tolerance, given.tolerance, "frame {frame}");
-        assert!(own.film.rgb == given.film.rgb && own.reuse == given.reuse, "frame {frame}");
-        // The look is the middle frame's, and its audit is none the larger for it.
-        assert_eq!(own.audit, given.audit, "frame {frame}");
-        let more = own.rays.camera - given.rays.camera;
-        let share = f64::from(u32::try_from(more).unwrap()) / (64.0 * 48.0);
-        let is_middle = frame == 5;
-        assert!(
-            if is_middle { (0.1..0.4).contains(&share) } else { more == 0 },
-            "{frame}: {share}"
-        );
-    }
-}
-
 #[test]
 fn inferred_frames_flicker_no_more_than_traced_ones() {
     let set = Set::load("cornell", |_| ());

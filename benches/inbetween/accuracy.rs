@@ -19,7 +19,7 @@ fn judged(choice: &Choice) -> Vec<u32> {
 
 /// `settings` with a policy, and without an audit: that changes no pixel.
 fn with(settings: &Settings, policy: Policy) -> Settings {
-    let reuse = ReuseSettings { policy, audit: 0.0, ..settings.reuse };
+    let reuse = ReuseSettings { policy, ..settings.reuse };
     Settings { reuse, ..settings.clone() }
 }
 

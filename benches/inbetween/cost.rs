@@ -99,7 +99,7 @@ fn row(choice: &Choice, set: &Set, bare: &Bare, settings: &Settings) -> Vec<Stri
     let stage = set.stage(choice.threads);
     let shot = set.shot(FRAMES);
     let mut plain = settings.clone();
-    (plain.reuse.policy, plain.reuse.audit) = (Policy::Surface, 0.0);
+    plain.reuse.policy = Policy::Surface;
     let mut audited = settings.clone();
     audited.reuse.policy = Policy::Surface;
     let frames: Vec<u32> = (1..=FRAMES).collect();

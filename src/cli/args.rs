@@ -235,7 +235,8 @@ pub struct OutputArgs {
     /// Replace frames that exist
     #[arg(long)]
     pub overwrite: bool,
-    /// Fail (exit code 1, frames written) where a sample is NaN, infinite or negative
+    /// Fail (exit code 1, frames written) where a sample is NaN, infinite or negative, or where inferred
+    /// frames are less true than traced ones
     #[arg(long)]
     pub strict: bool,
     /// Make no video of the sequence

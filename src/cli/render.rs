@@ -209,7 +209,11 @@ fn conclude(job: &Frames, round: &Round, was_checking: bool) -> Result<Exit> {
             say_stopped(job, outcome, &reason.unwrap_or_else(|| interrupt.reason()));
             Ok(Exit::Stopped)
         }
-        done => Ok(judge_samples(job, outcome, *quiet).unwrap_or(done?)),
+        done => {
+            let samples = judge_samples(job, outcome, *quiet);
+            let reuse = judge_reuse(job, outcome, *quiet);
+            Ok(samples.or(reuse).unwrap_or(done?))
+        }
     }
 }
 
@@ -298,6 +302,20 @@ fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
     Some(format!("{all} of the {what} were reused{mirrored}"))
 }
 
+/// Says so, with what to do, where the audit is sure that inferred frames are less true than traced ones, by
+/// more than `tolerance` display steps.
+fn worse_than_traced(audit: &AuditRow, tolerance: f32) -> Option<String> {
+    let ([rmse, low, _], [traced, _, high]) = (audit.rmse?, audit.rmse_traced?);
+    (low > high.max(tolerance.into())).then(|| {
+        format!(
+            "inferred frames are less true than traced ones (RMSE {}/255 against {}/255): trace them \
+             with --policy off, or raise --probes",
+            steps(rmse),
+            steps(traced)
+        )
+    })
+}
+
 /// How good the inferred frames are, in words.
 fn audit_line(audit: &AuditRow) -> Option<String> {
     let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
@@ -317,6 +335,18 @@ fn steps(x: f64) -> String {
         ..0.095 => format!("{x:.2}"),
         _ => format!("{x:.1}"),
     }
+}
+
+/// Says where inferred frames are less true than traced ones; an exit code where that is a failure.
+fn judge_reuse(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
+    let audit = stats::audit_of(job.plan, outcome)?;
+    let message = worse_than_traced(&audit, job.request.settings.reuse.tolerance)?;
+    if job.request.strict {
+        say::error(&Error::Failed(message));
+        return Some(Exit::Failed);
+    }
+    tell(quiet, &[message], |m| say::warning(m));
+    None
 }
 
 /// Says which samples are no radiance; an exit code where that is a failure.
@@ -352,17 +382,16 @@ mod tests {
     use crate::stats::AuditSums;
 
     #[test]
-    fn the_last_line_says_where_not_even_tracing_meets_the_bound() {
-        let audit = AuditRow {
-            rmse: Some([1.5, 1.2, 1.8]),
+    fn inferred_frames_are_called_worse_only_where_that_is_sure_and_seen() {
+        let audit = |rmse, traced| AuditRow {
+            rmse: Some(rmse),
             rmse_inferred_pixels: None,
-            rmse_traced: Some([2.7, 2.0, 3.0]),
+            rmse_traced: Some(traced),
             sums: AuditSums::default(),
         };
-        let says = |most| audit_line(&audit, most).expect("a line").contains("neither meets");
-        assert!(says(Some(1.0)));
-        assert!(!says(Some(2.0)), "what is inferred does");
-        assert!(!says(Some(0.0)), "whichever is better was asked for");
-        assert!(!says(None));
+        let is_worse = |rmse, traced| worse_than_traced(&audit(rmse, traced), 0.25).is_some();
+        assert!(is_worse([5.7, 5.0, 6.4], [2.7, 2.5, 2.9]));
+        assert!(!is_worse([2.9, 2.6, 3.2], [2.7, 2.5, 2.9]), "chance");
+        assert!(!is_worse([0.2, 0.15, 0.24], [0.05, 0.04, 0.06]), "nobody sees it");
     }
 }

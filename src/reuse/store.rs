@@ -441,10 +441,16 @@ mod tests {
         TracedPoints { points, ratios: (0..96).map(ratio).collect() }
     }
 
+    fn findings() -> Vec<Finding> {
+        let p = Vec3::new(0.1, -2.0, 3.5);
+        let one = Finding { p, footprint: 0.1, geom_id: 3, class: 7, error: -0.5, noise: 0.25 };
+        vec![one, Finding { class: 0, error: 9.0, ..one }]
+    }
+
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
-        let (terms, camera) = (terms(), camera());
-        let kept =
-            Kept { terms: &terms, frame: 7, camera: &camera, crop, traced, settings: "spp 1" };
+        let (terms, camera, findings) = (terms(), camera(), findings());
+        let (terms, camera, findings, settings) = (&terms, &camera, &findings[..], "spp 1");
+        let kept = Kept { terms, frame: 7, camera, crop, traced, findings, settings };
         kept.encode().expect("small enough")
     }
 
@@ -456,6 +462,7 @@ mod tests {
     fn a_reference_comes_back_as_it_was() {
         let back = read(&encoded(&traced(), None), &terms()).expect("whole");
         let own = Reference::new(Reference::SUPPLIED, &camera(), &traced(), 2);
+        let own = own.with_findings(findings());
         // By text, since NaN does not equal itself.
         assert_eq!(format!("{back:?}"), format!("{own:?}"));
     }

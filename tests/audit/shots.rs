@@ -20,7 +20,7 @@ pub struct Trial {
     pub edge: u32,
     pub frames: u32,
     pub spp: u32,
-    /// Share of a frame's cost that its audit takes.
+    /// Share of the pixels that are probed.
     pub share: f32,
     /// Shadow samples of each of the two converged renders.
     pub best: u32,
@@ -86,7 +86,7 @@ impl Stage<'_> {
             shadow_samples: samples,
             sky_samples: samples,
             seed: 1000 + u64::from(number),
-            reuse: ReuseSettings { audit: trial.share, ..ReuseSettings::default() },
+            reuse: ReuseSettings { probes: trial.share, ..ReuseSettings::default() },
             ..self.set.loaded.settings.clone()
         }
     }

@@ -47,36 +47,31 @@ fn the_words_of_reuse_are_checked() {
     job.refused("render cube.obj --segmnt 4", "'--segment'");
     job.refused("render cube.obj --segment 0", "1..=1000000");
     job.refused("render cube.obj --tolerance -1", "from 0 to 255");
-    job.refused("render cube.obj --audit 1.5", "from 0 to 1");
-    job.refused("render cube.obj --max-rmse nan", "from 0 to 255");
-    for policy in ["colour", "off"] {
-        let line = format!("render cube.obj --max-rmse 2 --policy {policy}");
-        job.refused(&line, "--max-rmse needs --policy surface");
-    }
+    job.refused("render cube.obj --probes 1.5", "from 0 to 1");
+    job.refused("render cube.obj --tolerance nan", "from 0 to 255");
     job.refused("inspect cube.obj --colour-epsilon -1", "from 0 to 1e30");
     job.refused("inspect cube.obj --distance-epsilon x", "not a number");
     let help = job.done("render --help").out;
-    assert!(help.contains("\nReuse:\n") && help.contains("--max-rmse <STEPS>"), "{help}");
+    assert!(help.contains("\nReuse:\n") && help.contains("--probes <SHARE>"), "{help}");
 }
 
 #[test]
 fn each_setting_of_reuse_keeps_frames_apart() {
     let job = Job::new();
-    scene(&job, PAN, "max_rmse = 3");
+    scene(&job, PAN, "probes = 0.02");
     job.done("render scene.toml --frames 1 -o o/f_#.png");
     for (option, says) in [
         ("--policy off", "policy was surface, now it is off"),
         ("--policy colour", "policy was surface, now it is colour"),
         ("--segment 5", "segment was 4, now it is 5"),
-        ("--tolerance 2", "tolerance was default, now it is 2"),
-        ("--audit 0.5", "audit was 0.03, now it is 0.5"),
-        ("--max-rmse 4", "max-rmse was 3, now it is 4"),
+        ("--tolerance 2", "tolerance was 0.25, now it is 2"),
+        ("--probes 0.5", "probes was 0.02, now it is 0.5"),
         ("--colour-epsilon 1", "colour-epsilon was 0.02, now it is 1"),
         ("--distance-epsilon 1", "distance-epsilon was 0.02, now it is 1"),
     ] {
         job.refused(&format!("render scene.toml --frames 1 -o o/f_#.png {option}"), says);
     }
-    scene(&job, PAN, "max_rmse = 3\ntraced = [{ min = [0, 0, 0], max = [1, 1, 1] }]");
+    scene(&job, PAN, "probes = 0.02\ntraced = [{ min = [0, 0, 0], max = [1, 1, 1] }]");
     job.refused("render scene.toml --frames 1 -o o/f_#.png", "scene content");
 }
 

@@ -1,13 +1,12 @@
-//! Each rule refuses what it is for, and it alone does: with the rule relaxed the answer is there.
+//! What other surfaces tell is refused, and what is uncertain is classed as that.
 
-use super::{Evidence, Lookup};
-use crate::inference::{Inference, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
+use super::Lookup;
+use crate::inference::{Estimate, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::reuse::Reference;
 use crate::scene::{Camera, Pose};
 
 const EDGE: u32 = 64;
-const RAYS: u32 = 100;
 
 fn camera() -> Camera {
     let (eye, up) = (DVec3::ZERO, DVec3::Y);
@@ -43,25 +42,27 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
     Reference::new(1, &camera(), &traced, 1)
 }
 
-/// What `evidence` lets `reference` tell about `point`, which would show 1 without shadows.
-fn told(reference: &Reference, point: SurfacePoint, evidence: Evidence) -> f32 {
-    let lookup = Lookup { frame: 2, references: &[reference], rays: &[RAYS], evidence };
+/// What `reference` suggests about `point`, which would show 1 without shadows.
+fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
+    let lookup = Lookup { frame: 2, references: &[reference], channels: 1 };
     let mut asked = Questions {
         points: vec![point],
+        pixels: vec![[0; 2]],
         unshadowed: vec![1.0],
         ratios: vec![f32::NAN],
+        estimates: Vec::new(),
         origins: vec![Origin::default()],
     };
-    lookup.infer(&mut asked);
-    asked.ratios[0]
+    lookup.estimate(&mut asked);
+    asked.estimates[0]
 }
 
-/// Refused by default, told once `relaxed`.
-fn refused(reference: &Reference, point: SurfacePoint, relaxed: impl Fn(&mut Evidence)) {
-    assert!(told(reference, point, Evidence::default()).is_nan(), "{point:?}");
-    let mut evidence = Evidence::default();
-    relaxed(&mut evidence);
-    assert!(!told(reference, point, evidence).is_nan(), "another rule refuses {point:?}");
+fn told(reference: &Reference, point: SurfacePoint) -> f32 {
+    estimated(reference, point).ratio
+}
+
+fn class(reference: &Reference, point: SurfacePoint) -> u8 {
+    estimated(reference, point).class
 }
 
 fn lifted(footprints: f64) -> SurfacePoint {
@@ -74,7 +75,7 @@ fn lifted(footprints: f64) -> SurfacePoint {
 fn what_lies_on_the_surface_is_told_exactly() {
     let reference = wall(|_| 0.25);
     for point in [on_wall(30.5, 20.5), on_wall(11.13, 47.9), on_wall(0.2, 0.1), lifted(0.5)] {
-        assert_eq!(told(&reference, point, Evidence::default()), 0.25);
+        assert_eq!(told(&reference, point), 0.25);
     }
 }
 
@@ -89,7 +90,7 @@ fn a_file_may_hold_normals_a_little_longer_than_1() {
         traced.ratios.extend([0.25; 3]);
     }
     let reference = Reference::new(1, &camera(), &traced, 1);
-    assert_eq!(told(&reference, on_wall(30.2, 31.7), Evidence::default()), 0.25);
+    assert_eq!(told(&reference, on_wall(30.2, 31.7)), 0.25);
 }
 
 #[test]
@@ -102,8 +103,7 @@ fn what_is_seen_in_mirrors_is_told_by_place_by_all_that_know() {
         traced.ratios.push(ratio(x, y));
     }
     let reference = Reference::new(1, &camera(), &traced, 1);
-    let asked =
-        |point| told(&reference, point, Evidence { tolerance: 255.0, ..Evidence::default() });
+    let asked = |point| told(&reference, point);
     let mirrored = SurfacePoint { direct: false, ..on_wall(30.1, 31.2) };
     let mean = asked(mirrored);
     assert!((0.4..0.6).contains(&mean), "{mean}");
@@ -116,7 +116,7 @@ fn what_is_seen_in_mirrors_is_told_by_place_by_all_that_know() {
 #[test]
 fn another_mesh_tells_nothing() {
     let point = SurfacePoint { geom_id: 1, ..on_wall(30.2, 31.7) };
-    assert!(told(&wall(|_| 1.0), point, Evidence::default()).is_nan());
+    assert!(told(&wall(|_| 1.0), point).is_nan());
 }
 
 #[test]
@@ -126,16 +126,16 @@ fn a_normal_turned_away_is_refused() {
         ..on_wall(30.2, 31.7)
     };
     let reference = wall(|_| 1.0);
-    assert_eq!(told(&reference, turned(20.0), Evidence::default()), 1.0);
-    refused(&reference, turned(45.0), |e| e.least_cos = 0.0);
+    assert_eq!(told(&reference, turned(20.0)), 1.0);
+    assert!(told(&reference, turned(45.0)).is_nan());
 }
 
 #[test]
 fn what_stands_off_the_surface_is_refused() {
     let reference = wall(|_| 1.0);
-    refused(&reference, lifted(1.4), |e| e.height = 1.5);
-    refused(&reference, lifted(1.4), |e| e.slope = 1.0);
-    refused(&reference, lifted(-1.8), |e| e.height = 2.0);
+    assert_eq!(told(&reference, lifted(0.5)), 1.0);
+    assert!(told(&reference, lifted(1.4)).is_nan());
+    assert!(told(&reference, lifted(-1.8)).is_nan());
 }
 
 #[test]
@@ -145,42 +145,67 @@ fn a_coarser_sampling_is_refused() {
         SurfacePoint { footprint: point.footprint / by, ..point }
     };
     let reference = wall(|_| 1.0);
-    assert_eq!(told(&reference, finer(2.0), Evidence::default()), 1.0);
-    refused(&reference, finer(3.0), |e| e.coarser = 10.0);
+    assert_eq!(told(&reference, finer(2.0)), 1.0);
+    assert!(told(&reference, finer(3.0)).is_nan());
 }
 
 #[test]
-fn samples_that_disagree_are_refused_at_the_edge_and_nowhere_else() {
-    let reference = wall(|x| if x < 32 { 1.0 } else { 0.0 });
-    assert_eq!(told(&reference, on_wall(30.5, 20.0), Evidence::default()), 1.0);
-    assert_eq!(told(&reference, on_wall(33.5, 20.0), Evidence::default()), 0.0);
-    refused(&reference, on_wall(32.0, 20.0), |e| e.tolerance = 255.0);
+fn what_lies_at_an_edge_is_of_another_class_and_so_is_what_lies_near_one() {
+    let edge = wall(|x| if x < 32 { 1.0 } else { 0.0 });
+    let at = |x: f64| class(&edge, on_wall(x, 20.0));
+    assert_eq!([at(10.5), at(50.5)], [at(20.5); 2], "far from it");
+    let near = [at(32.0), at(30.5), at(28.5), at(20.5)];
+    let mut different = near.to_vec();
+    different.dedup();
+    assert_eq!(different, near);
+    // As far on the other side.
+    assert_eq!(at(33.5), at(30.5));
+    assert_eq!(told(&edge, on_wall(30.5, 20.0)), 1.0);
+    assert_eq!(told(&edge, on_wall(33.5, 20.0)), 0.0);
 }
 
 #[test]
-fn a_steady_change_is_told_and_a_kink_is_not() {
+fn a_steady_change_bends_less_than_a_kink() {
     let point = on_wall(31.3, 20.2);
-    let steady = wall(|x| (0.5 + 0.2 * (x as f32 + 0.5 - 31.3)).clamp(0.0, 1.0));
-    let ratio = told(&steady, point, Evidence::default());
-    assert!((ratio - 0.5).abs() < 1e-4, "{ratio}");
-    let no_plane = Evidence { plane_leverage: 0.0, ..Evidence::default() };
-    assert!(told(&steady, point, no_plane).is_nan());
-    // The four samples about the point lie on a plane too, those beside them do not.
-    let step = wall(|x| if x < 32 { 0.5 } else { 0.9 });
-    refused(&step, on_wall(32.0, 20.0), |e| e.change_noise = 100.0);
+    let steady = wall(|x| (0.5 + 0.02 * (x as f32 - 31.0)).clamp(0.0, 1.0));
+    let kink = wall(|x| 0.5 + 0.04 * (x as f32 - 31.0).clamp(0.0, 9.0));
+    assert!((told(&steady, point) - 0.496).abs() < 0.01);
+    assert_ne!(class(&steady, point), class(&kink, point));
 }
 
 #[test]
-fn samples_to_one_side_tell_only_what_does_not_change_on_the_way() {
-    // Nothing is known from column 32 on.
-    let known = |ratio: fn(u32) -> f32| wall(move |x| if x < 32 { ratio(x) } else { f32::NAN });
-    let beside = on_wall(32.2, 20.5);
-    assert_eq!(told(&known(|_| 1.0), beside, Evidence::default()), 1.0);
-    assert_eq!(told(&known(|_| 0.5), beside, Evidence::default()), 0.5);
-    let steep = known(|x| 0.1 + 0.2 * (31 - x.min(31)).min(4) as f32);
-    refused(&steep, beside, |e| e.change_noise = 100.0);
-    // All that is asked sees the whole light, but a shadow is one sample further.
-    let rim = known(|x| if x < 31 { 0.0 } else { 1.0 });
-    refused(&rim, beside, |e| e.change = 1000.0);
-    assert_eq!(told(&rim, on_wall(31.5, 20.5), Evidence::default()), 1.0);
+fn samples_to_one_side_are_of_another_class() {
+    let half = wall(|x| if x < 32 { 1.0 } else { f32::NAN });
+    assert_eq!(told(&half, on_wall(32.2, 20.5)), 1.0);
+    assert_ne!(class(&half, on_wall(32.2, 20.5)), class(&half, on_wall(20.2, 20.5)));
+}
+
+/// A lamp that errs makes what all lamps together are told uncertain.
+#[test]
+fn lights_share_their_class() {
+    let mut traced = TracedPoints::default();
+    for (x, y) in (0..EDGE).flat_map(|y| (0..EDGE).map(move |x| (x, y))) {
+        let point = on_wall(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        traced.points.push(TracedPoint { x, y, point });
+        traced.ratios.extend([1.0, f32::from(u8::from(x < 32))]);
+    }
+    let reference = Reference::new(1, &camera(), &traced, 2);
+    let lookup = Lookup { frame: 2, references: &[&reference], channels: 2 };
+    let class_with = |second: f32, x: f64| {
+        let mut asked = Questions {
+            points: vec![on_wall(x, 20.5)],
+            pixels: vec![[0; 2]],
+            unshadowed: vec![1.0, second],
+            ratios: vec![f32::NAN; 2],
+            estimates: Vec::new(),
+            origins: vec![Origin::default()],
+        };
+        lookup.estimate(&mut asked);
+        assert_eq!(asked.estimates[0].class, asked.estimates[1].class);
+        asked.estimates[0].class
+    };
+    assert_eq!(class_with(1.0, 10.5), class_with(0.0, 10.5));
+    assert_ne!(class_with(1.0, 31.5), class_with(1.0, 10.5));
+    // The second lamp does not shine there.
+    assert_eq!(class_with(0.0, 31.5), class_with(0.0, 10.5));
 }

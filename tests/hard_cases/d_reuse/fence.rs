@@ -118,7 +118,7 @@ fn judge(
 }
 
 fn without_audit(settings: Settings) -> Settings {
-    let reuse = ReuseSettings { segment: 64, audit: 0.0, ..settings.reuse };
+    let reuse = ReuseSettings { segment: 64, ..settings.reuse };
     Settings { reuse, ..settings }
 }
 

@@ -57,7 +57,6 @@ fn is_same(a: &Made, b: &Made) -> bool {
         && a.film.sources == b.film.sources
         && a.reuse == b.reuse
         && a.audit == b.audit
-        && a.tolerance == b.tolerance
         && map(&a.film) == map(&b.film)
 }
 

@@ -31,7 +31,7 @@ pub fn no_accumulated_blur(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let set = sharpness::shadow_edge(FRAMES, 20.0);
     let stage = set.stage(common::threads());
-    let reuse = ReuseSettings { segment: FRAMES, audit: 0.0, ..ReuseSettings::default() };
+    let reuse = ReuseSettings { segment: FRAMES, ..ReuseSettings::default() };
     let settings = Settings { reuse, ..set.settings(size.of((96, 72), (320, 240)), 4, 16) };
     let all: Vec<u32> = (1..=FRAMES).collect();
     let made = stage.frames(&settings, &set.shot, &all);

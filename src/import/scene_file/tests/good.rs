@@ -62,7 +62,7 @@ fn every_setting_reaches_its_place() {
 #[test]
 fn everything_about_reuse_reaches_its_place() {
     let loaded = good(
-        "[reuse]\npolicy = 'colour'\nsegment = 9\ntolerance = 0.5\naudit = 0.25\nmax_rmse = 2\n\
+        "[reuse]\npolicy = 'colour'\nsegment = 9\ntolerance = 0.5\nprobes = 0.25\n\
          colour_epsilon = 0.125\ndistance_epsilon = 4\n\
          [[reuse.traced]]\nmin = [0, 0, 0]\nmax = [1, 2, 3]\n\
          [[mesh]]\nreuse = false\nbox = { min = [0, 0, 0], max = [9, 9, 9] }\n\
@@ -72,9 +72,8 @@ fn everything_about_reuse_reaches_its_place() {
     let reuse = ReuseSettings {
         policy: Policy::Colour,
         segment: 9,
-        tolerance: Some(0.5),
-        audit: 0.25,
-        max_rmse: Some(2.0),
+        tolerance: 0.5,
+        probes: 0.25,
         colour_epsilon: 0.125,
         distance_epsilon: 4.0,
     };
