@@ -10,7 +10,6 @@ use std::sync::atomic::AtomicBool;
 use tweenray::film::Provenance;
 use tweenray::math::Rgb;
 use tweenray::measure::Interval;
-use tweenray::output::Display;
 use tweenray::reuse::audit::rmse;
 use tweenray::scene::{Rect, ReuseSettings, Settings};
 use tweenray::sequence::{FrameMaker, Inferrer, Made, Pyramid};

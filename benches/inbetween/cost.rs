@@ -75,7 +75,7 @@ fn bands(camera: &Camera, count: u32) -> Vec<BareCamera> {
     (0..count).map(band).filter(|band| band.height > 0).collect()
 }
 
-/// Each in-between frame with and without its audit, beside the loop and the traced frame.
+/// Each in-between frame, beside the loop and the traced frame.
 pub fn report(choice: &Choice) {
     let size = choice.size.unwrap_or((640, 360));
     let set = Set::load("spheres_on_terrain", |_| ());
@@ -91,7 +91,7 @@ pub fn report(choice: &Choice) {
         let settings = set.settings(size, spp, samples);
         rows.push(row(choice, &set, &bare, &settings));
     }
-    let head = ["samples", "with audit", "without", "a key frame", "loop, ms", "in-between, ms"];
+    let head = ["samples", "an in-between frame", "a key frame", "loop, ms", "in-between, ms"];
     support::table(&head, &rows);
 }
 
@@ -100,32 +100,27 @@ fn row(choice: &Choice, set: &Set, bare: &Bare, settings: &Settings) -> Vec<Stri
     let shot = set.shot(FRAMES);
     let mut plain = settings.clone();
     plain.reuse.policy = Policy::Surface;
-    let mut audited = settings.clone();
-    audited.reuse.policy = Policy::Surface;
     let frames: Vec<u32> = (1..=FRAMES).collect();
-    let makers = [&audited, &plain].map(|settings| stage.maker(settings, &shot, &frames));
-    let (mut ratios, mut keys) = ([Vec::new(), Vec::new()], Vec::new());
+    let maker = stage.maker(&plain, &shot, &frames);
+    let (mut ratios, mut keys) = (Vec::new(), Vec::new());
     let (mut loops, mut betweens) = (Vec::new(), Vec::new());
-    for frame in makers[0].batches(&frames).concat() {
+    for frame in maker.batches(&frames).concat() {
         let camera = shot.camera(frame, settings.width, settings.height).expect("a camera");
         let turn = || bare.seconds(&stage.pool, &camera, settings.spp);
         let before = turn();
-        let [with, without] =
-            [&makers[0], &makers[1]].map(|maker| support::seconds(|| moves::make(&**maker, frame)));
+        let took = support::seconds(|| moves::make(&*maker, frame));
         let loop_seconds = support::quantile(&[before, turn(), turn()], 0.5);
         if frame == 1 || frame == FRAMES {
-            keys.push(without / loop_seconds);
+            keys.push(took / loop_seconds);
             continue;
         }
-        ratios[0].push(with / loop_seconds);
-        ratios[1].push(without / loop_seconds);
+        ratios.push(took / loop_seconds);
         loops.push(1e3 * loop_seconds);
-        betweens.push(1e3 * without);
+        betweens.push(1e3 * took);
     }
     vec![
         format!("{} camera, {} shadow", settings.spp, settings.shadow_samples),
-        quartiles(&ratios[0]),
-        quartiles(&ratios[1]),
+        quartiles(&ratios),
         format!("{:.1}", support::quantile(&keys, 0.5)),
         quartiles(&loops),
         quartiles(&betweens),

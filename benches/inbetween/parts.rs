@@ -8,7 +8,7 @@ use support::Candidate;
 use tweenray::effects::EffectPlan;
 use tweenray::inference::{Channels, Inference, Origin, Questions};
 use tweenray::output::{WriteOptions, write_image};
-use tweenray::reuse::{self, Evidence, Lookup, Reference};
+use tweenray::reuse::{self, Lookup, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
 use tweenray::sequence::Pyramid;
 use tweenray::shade::{FrameJob, Rendered, Renderer, Reuse};
@@ -32,13 +32,20 @@ impl Inference for AllKnown {
     }
 }
 
-/// Looks everything up and calls what it does not find known.
-struct NoMisses<'a>(Lookup<'a>);
+/// Looks everything up and takes it as it is; what it does not find is traced, or taken for known.
+struct Taken<'a> {
+    lookup: Lookup<'a>,
+    misses: bool,
+}
 
-impl Inference for NoMisses<'_> {
+impl Inference for Taken<'_> {
     fn infer(&self, questions: &mut Questions) {
-        self.0.infer(questions);
-        questions.ratios.iter_mut().filter(|ratio| ratio.is_nan()).for_each(|ratio| *ratio = 1.0);
+        self.lookup.estimate(questions);
+        let Questions { ratios, estimates, .. } = questions;
+        for (ratio, estimate) in ratios.iter_mut().zip(estimates) {
+            let is_missed = estimate.ratio.is_nan() && !self.misses;
+            *ratio = if is_missed { 1.0 } else { estimate.ratio };
+        }
     }
 }
 
@@ -48,7 +55,6 @@ struct Stand<'a> {
     settings: &'a Settings,
     camera: Camera,
     channels: Channels,
-    rays: Vec<u32>,
     references: Vec<Reference>,
 }
 
@@ -57,17 +63,16 @@ impl<'a> Stand<'a> {
     fn new(stage: &'a Stage<'a>, settings: &'a Settings, shot: &Shot) -> Self {
         let plan = EffectPlan::of(&stage.set.scene, settings);
         let channels = reuse::channels(&stage.set.scene, &plan, settings);
-        let rays = channels.iter().map(|c| reuse::rays_of(c, settings)).collect();
         let camera = |f: u32| shot.camera(f, settings.width, settings.height).expect("a camera");
         let mut stand =
-            Self { stage, settings, camera: camera(FRAME), channels, rays, references: Vec::new() };
+            Self { stage, settings, camera: camera(FRAME), channels, references: Vec::new() };
         let pyramid = Pyramid { segment: FRAMES - 1, frames: FRAMES };
         let mut known: BTreeMap<u32, Reference> = BTreeMap::new();
         let wanted = pyramid.ancestors(FRAME);
         for frame in pyramid.order(&wanted) {
             let own: Vec<&Reference> =
                 pyramid.ancestors(frame).iter().filter_map(|f| known.get(f)).collect();
-            let lookup = stand.lookup(frame, &own);
+            let lookup = Taken { lookup: stand.lookup(frame, &own), misses: true };
             let inference = (!own.is_empty()).then_some(&lookup as &dyn Inference);
             let eye = camera(frame);
             let job = stand.job(&eye, frame, inference);
@@ -79,7 +84,7 @@ impl<'a> Stand<'a> {
     }
 
     fn lookup<'l>(&'l self, frame: u32, references: &'l [&'l Reference]) -> Lookup<'l> {
-        Lookup { frame, references, rays: &self.rays, evidence: Evidence::default() }
+        Lookup { frame, references, channels: self.channels.len() }
     }
 
     fn job<'j>(
@@ -119,16 +124,6 @@ impl<'a> Stand<'a> {
         self.render(&renderer, &job);
     }
 
-    /// Traces the pixels at `places` twice, as the audit does.
-    fn scattered(&self, places: &[(u32, u32)]) {
-        let renderer = self.stage.renderer(self.settings);
-        let trace =
-            |stream| renderer.render_scattered(&self.camera, stream, places, &self.stage.stop);
-        [1 << 30, 1 << 31].iter().for_each(|bit| {
-            self.stage.pool.install(|| trace(FRAME | bit)).expect("not stopped");
-        });
-    }
-
     /// Renders the frame by `inference`.
     fn inferred(&self, inference: &dyn Inference) {
         let job = self.job(&self.camera, FRAME, Some(inference));
@@ -156,16 +151,13 @@ fn one(choice: &Choice, set: &Set, bare: &Bare, settings: &Settings) {
     let shot = set.shot(FRAMES);
     let stand = Stand::new(&stage, settings, &shot);
     let references: Vec<&Reference> = stand.references.iter().collect();
-    let lookup = stand.lookup(FRAME, &references);
-    let no_misses = NoMisses(stand.lookup(FRAME, &references));
+    let taken = |misses| Taken { lookup: stand.lookup(FRAME, &references), misses };
+    let (no_misses, lookup) = (taken(false), taken(true));
     let mut plain = settings.clone();
     plain.reuse.policy = Policy::Surface;
     plain.reuse.segment = FRAMES - 1;
     let maker = stage.maker(&plain, &shot, &[FRAME, FRAME + 1]);
     let film = moves::make(&*maker, FRAME).film;
-    let map = film.audit.as_ref().expect("an audit").iter().zip(0u32..);
-    let place = |i: u32| (i % settings.width, i / settings.width);
-    let drawn: Vec<(u32, u32)> = map.filter(|(x, _)| !x.is_nan()).map(|(_, i)| place(i)).collect();
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("frame.png");
     let options = WriteOptions::of(settings, None);
@@ -179,7 +171,6 @@ fn one(choice: &Choice, set: &Set, bare: &Bare, settings: &Settings) {
         ("+ exact shading, all known".into(), Box::new(|| stand.inferred(&AllKnown))),
         ("+ lookups, no misses".into(), Box::new(|| stand.inferred(&no_misses))),
         ("+ misses".into(), Box::new(|| stand.inferred(&lookup))),
-        ("audit's traces alone".into(), Box::new(|| stand.scattered(&drawn))),
         (
             "output alone (png)".into(),
             Box::new(|| _ = write_image(&path, &film, &options).expect("written")),
