@@ -2,6 +2,7 @@
 //!
 //! A small picture will not do in their place: the smaller, the more of it is edges.
 
+use super::draw::{DrawSeed, draw};
 use super::effort::Effort;
 use super::errors::displayed_rgb;
 use super::probe::one_sample;
@@ -10,7 +11,6 @@ use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
-use super::draw::{DrawSeed, draw};
 use crate::sampling::mix;
 use crate::scene::Settings;
 use crate::shade::Renderer;

@@ -66,6 +66,15 @@ pub fn family(class: u8) -> u8 {
     class % of_contrast + if is_unknown { of_contrast } else { 0 }
 }
 
+/// A squared error that a class may hide, squares of a display step: as large as its contrast.
+pub fn hidden_error(class: u8) -> f64 {
+    let [_, bends, wholes, directs] = BINS;
+    let contrast = class / (bends * wholes * directs);
+    let steps = [CALM, 1.0, CONTRAST[0], CONTRAST[1], CONTRAST[2], 2.0 * CONTRAST[2], CONTRAST[2]];
+    let steps = f64::from(steps[usize::from(contrast)]);
+    steps * steps
+}
+
 /// Number of the bin between `limits` that `x` lies in.
 fn bin(limits: &[f32], x: f32) -> u8 {
     limits.iter().filter(|limit| x > **limit).count() as u8

@@ -9,7 +9,7 @@
 //!
 //! Every figure is a sum over findings in a fixed order.
 
-use super::class::{CLASSES, family};
+use super::class::{CLASSES, family, hidden_error};
 use super::index::{cell_of, edge_of, key_of, level_of};
 use crate::inference::{Estimate, SurfacePoint};
 use crate::math::{Vec3, srgb_encode};
@@ -26,6 +26,9 @@ const PRIOR: f64 = 8.0;
 const FEW: f64 = 16.0;
 /// A class's error must be below its bound by so many standard errors.
 const SURE: f64 = 1.0;
+/// As large a share of the error that a class may hide ([`hidden_error`]) counts as found once among its
+/// probes: a few that find nothing say little where a shadow's edge is near.
+const HIDDEN: f64 = 0.25;
 /// Of a tile's error that nobody sees, the share that a class may use up: errors are rare and large, so a
 /// mean below it leaves tiles that are above.
 const UNSEEN_SHARE: f64 = 0.5;
@@ -175,7 +178,8 @@ impl Evidence {
             if classes[at].count < FEW {
                 classes[at] = classes[at].with(&families[usize::from(family(class))], PRIOR);
             }
-            margins[at] = SURE * classes[at].doubt();
+            let hidden = HIDDEN * hidden_error(class) / classes[at].count.max(1.0);
+            margins[at] = SURE * classes[at].doubt() + hidden;
             own.elsewhere.set(class, classes[at].may_be_used(margins[at], unseen));
         }
         for ((region, class), sums) in &regions {
@@ -225,5 +229,82 @@ impl Hasher for Mixed {
 
     fn write_u64(&mut self, word: u64) {
         self.0 ^= word;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a class of calm estimates, and of one beside a shadow's edge.
+    const CALM: u8 = 0;
+    const EDGE: u8 = 4 * 24;
+
+    fn point(x: f32) -> SurfacePoint {
+        let p = Vec3::new(x, 0.0, 0.0).as_dvec3();
+        let (n, footprint) = (Vec3::Y, 0.01);
+        SurfacePoint { p, n, geom_id: 0, footprint, cos: 1.0, direct: true, samples: 1 }
+    }
+
+    fn found(x: f32, class: u8, error: f32, noise: f32) -> Finding {
+        Finding { p: Vec3::new(x, 0.0, 0.0), footprint: 0.01, geom_id: 0, class, error, noise }
+    }
+
+    fn may_use(findings: &[Finding], x: f32, class: u8) -> bool {
+        Evidence::of(findings.iter(), 0.25).at(&point(x)).has(class)
+    }
+
+    #[test]
+    fn nothing_is_used_without_a_probe() {
+        assert!(!may_use(&[], 0.0, CALM));
+        assert!(!may_use(&[found(0.0, CALM, 0.0, 0.0)], 0.0, EDGE));
+    }
+
+    #[test]
+    fn what_is_no_worse_than_a_trace_is_used_and_what_is_worse_is_not() {
+        let probes = |error, noise| vec![found(0.0, EDGE, error, noise); 400];
+        assert!(may_use(&probes(1.0, 2.0), 0.0, EDGE));
+        assert!(!may_use(&probes(3.0, 2.0), 0.0, EDGE));
+        // Nobody sees it, if there are enough probes to say so.
+        let calm = |error| vec![found(0.0, CALM, error, 0.0); 400];
+        assert!(may_use(&calm(0.01), 0.0, CALM));
+        assert!(!may_use(&calm(0.1), 0.0, CALM));
+    }
+
+    #[test]
+    fn an_edge_needs_more_probes_than_what_is_calm() {
+        let clean = |class, count| vec![found(0.0, class, 0.0, 0.5); count];
+        assert!(may_use(&clean(CALM, 20), 0.0, CALM));
+        assert!(!may_use(&clean(EDGE, 20), 0.0, EDGE));
+        assert!(may_use(&clean(EDGE, 400), 0.0, EDGE));
+    }
+
+    #[test]
+    fn a_region_gainsays_what_was_found_elsewhere() {
+        let mut probes = vec![found(0.0, EDGE, 1.0, 2.0); 1000];
+        probes.extend([found(5.0, EDGE, 9.0, 2.0); 20]);
+        assert!(may_use(&probes, 0.0, EDGE) && may_use(&probes, 9.0, EDGE));
+        assert!(!may_use(&probes, 5.0, EDGE));
+        let finding = found(5.0, EDGE, 0.0, 0.0);
+        assert!(!Evidence::of(probes.iter(), 0.25).may_use(&finding));
+    }
+
+    #[test]
+    fn a_finding_compares_all_known_lights_together() {
+        let light = |ratio: f32, traced| Compared {
+            unshadowed: 0.5,
+            estimate: Estimate { ratio, class: EDGE },
+            traced,
+        };
+        // One light's error makes up for the other's.
+        let lights = [light(0.5, [0.25; 2]), light(0.5, [0.75; 2])];
+        let finding = finding_at(&point(0.0), 1.0, &lights).expect("known");
+        assert_eq!((finding.error, finding.noise, finding.class), (0.0, 0.0, EDGE));
+        let noisy = [light(0.5, [0.25, 0.75]), light(f32::NAN, [1.0, 0.0])];
+        let finding = finding_at(&point(0.0), 1.0, &noisy).expect("one is known");
+        assert!(finding.error < 0.0 && finding.noise > 0.0);
+        let half = finding_at(&point(0.0), 0.5, &noisy).expect("one is known");
+        assert!((half.noise / finding.noise - 0.25).abs() < 1e-6);
+        assert!(finding_at(&point(0.0), 1.0, &noisy[1..]).is_none());
     }
 }

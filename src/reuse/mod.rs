@@ -8,8 +8,8 @@
 //! All in scene space.
 
 pub mod audit;
-pub mod colour;
 mod class;
+pub mod colour;
 mod cost;
 pub mod evidence;
 mod index;

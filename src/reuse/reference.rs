@@ -99,12 +99,7 @@ impl Sample {
         let n = point.n.clamp(Vec3::NEG_ONE, Vec3::ONE);
         // To the nearest, without a call of `round`.
         let n = (n * Self::UNIT + Vec3::splat(32768.5)).to_array().map(|x| x as i32 - 32768);
-        Self {
-            p: point.p.as_vec3(),
-            n: n.map(|x| x as i16),
-            geom_id: point.geom_id,
-            first,
-        }
+        Self { p: point.p.as_vec3(), n: n.map(|x| x as i16), geom_id: point.geom_id, first }
     }
 
     /// Its normal, times [`Sample::UNIT`].
@@ -115,16 +110,11 @@ impl Sample {
 }
 
 impl Known {
-    const NOTHING: Self = Self {
-        ratio: f32::NAN,
-        bend: Level::UNKNOWN,
-        wide: Level::UNKNOWN,
-        far: Level::UNKNOWN,
-    };
+    const NOTHING: Self =
+        Self { ratio: f32::NAN, bend: Level::UNKNOWN, wide: Level::UNKNOWN, far: Level::UNKNOWN };
 
     fn of(ratio: f32, contrast: Contrast) -> Self {
-        let [bend, wide, far] =
-            [contrast.bend, contrast.wide, contrast.far].map(Level::of);
+        let [bend, wide, far] = [contrast.bend, contrast.wide, contrast.far].map(Level::of);
         Self { ratio, bend, wide, far }
     }
 }

@@ -80,12 +80,7 @@ impl Taps4 {
     };
 
     /// Those of `samples` that are `near` and have a weight; `None` where there is none.
-    fn new(
-        reference: u32,
-        mut samples: [u32; 4],
-        weight: f32x4,
-        near: &Near4,
-    ) -> Option<Self> {
+    fn new(reference: u32, mut samples: [u32; 4], weight: f32x4, near: &Near4) -> Option<Self> {
         let weight = weight & near.is_near & weight.cmp_gt(f32x4::ZERO);
         let some = weight.cmp_gt(f32x4::ZERO).move_mask();
         let any = *samples.get(some.trailing_zeros() as usize)?;
@@ -196,11 +191,7 @@ impl Place {
             & distance.cmp_le(f32x4::splat(reach))
             & dot(apart, n).abs().cmp_le(allowed);
         let alike = (cos - least) * f32x4::splat(1.0 / (1.0 - LEAST_COS));
-        Near4 {
-            is_near,
-            distance: distance & is_near,
-            alike: alike.fast_min(f32x4::ONE) & is_near,
-        }
+        Near4 { is_near, distance: distance & is_near, alike: alike.fast_min(f32x4::ONE) & is_near }
     }
 }
 

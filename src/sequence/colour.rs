@@ -136,13 +136,7 @@ impl<'a> ColourMaker<'a> {
             traced.film.gbuffer = None;
         }
         Ok(Some((
-            Made {
-                film: traced.film,
-                rays: traced.rays,
-                reuse,
-                audit: None,
-                reference: None,
-            },
+            Made { film: traced.film, rays: traced.rays, reuse, audit: None, reference: None },
             discoveries,
         )))
     }

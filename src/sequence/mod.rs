@@ -195,16 +195,7 @@ pub fn render_frame(
     journal.append(&row)?;
     let write_seconds = start.elapsed().as_secs_f64() - trace_seconds;
     let Row { bytes, bad, rays, reuse, .. } = row;
-    Ok(Some(FrameReport {
-        frame,
-        trace_seconds,
-        write_seconds,
-        bytes,
-        rays,
-        reuse,
-        audit,
-        bad,
-    }))
+    Ok(Some(FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad }))
 }
 
 /// What an audit found, with the figures that it amounts to.

@@ -27,13 +27,7 @@ impl FrameMaker for Plain {
         let mut film = Film::new(4, 2, false);
         film.rgb[0].x = frame as f32 / 255.0 * self.settings.exposure;
         let rays = RayCounts { camera: 8, ..RayCounts::default() };
-        Ok(Some(Made {
-            film,
-            rays,
-            reuse: ReuseCounts::default(),
-            audit: None,
-            reference: None,
-        }))
+        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
     }
 }
 

@@ -62,13 +62,7 @@ impl FrameMaker for Tracer<'_> {
         let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
         let note = || self.renderer.note_motion(&camera, previous.as_ref(), &mut film);
         self.pool.install(note);
-        Ok(Some(Made {
-            film,
-            rays,
-            reuse: ReuseCounts::default(),
-            audit: None,
-            reference: None,
-        }))
+        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
     }
 }
 

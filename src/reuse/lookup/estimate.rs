@@ -67,14 +67,8 @@ impl Lookup<'_> {
         let seen = means.iter().zip(shown).map(|(mean, s)| mean.map_or(0.0, |m| s * m.ratio));
         let steps = steps_per_radiance(seen.sum());
         // Lights err together: what is beside a shadow's edge is beside that of the next lamp too.
-        let mut features = Features {
-            spread: 0.0,
-            bend: 0.0,
-            wide: 0.0,
-            far: 0.0,
-            is_whole: true,
-            is_direct,
-        };
+        let mut features =
+            Features { spread: 0.0, bend: 0.0, wide: 0.0, far: 0.0, is_whole: true, is_direct };
         for (mean, shown) in means.iter().zip(shown).filter(|(_, shown)| **shown != 0.0) {
             let Some(mean) = mean else { continue };
             let by = steps * shown;

@@ -28,7 +28,7 @@ const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
 /// How many times the usual share of the pixels is probed where no, or one, other frame has probes.
 const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
 /// Where a frame is small, as many pixels are probed as if it had this many.
-const LEAST: f64 = 25_000.0;
+const LEAST: f64 = 50_000.0;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
 
@@ -101,8 +101,7 @@ impl Inferrer<'_> {
         let is_worth_looking =
             is_worth_looking(&evidence, &findings, &first.reuse, r.scene, &r.plan, r.settings);
         let traces = [first, second];
-        let probed =
-            Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
+        let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
         let probed = Arc::new(probed);
         self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
         Some(probed)
@@ -138,7 +137,8 @@ impl Inferrer<'_> {
         let Some((rays, inferred)) = audit else { return Ok(None) };
         let film = &mut rendered.film;
         let places = probed.mask.iter().enumerate().filter(|(_, is_probe)| **is_probe);
-        let places: Vec<usize> = places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
+        let places: Vec<usize> =
+            places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
         for &i in &places {
             film.rgb[i] = first.film.rgb[i];
             if let (Some(to), Some(from)) = (&mut film.sources, &first.film.sources) {
@@ -184,8 +184,7 @@ impl Inferrer<'_> {
     ) -> Result<Option<(RayCounts, Option<Film>)>> {
         self.with_lookup((frame, camera), references, |lookup| {
             let Some(lookup) = lookup else { return Some((RayCounts::default(), None)) };
-            let evidence =
-                |[x, y]: [u32; 2]| &probed.crossed[probed.draw.half(x, y)];
+            let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.half(x, y)];
             let judged = Judged { lookup: &lookup, evidence: &evidence };
             let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
             let inferred = self.render(job, Some(&judged), &Unheard)?;
@@ -213,4 +212,3 @@ impl Inferrer<'_> {
 fn is_inferred_source(source: &PixelSource) -> bool {
     !matches!(source.provenance, Provenance::Background | Provenance::Traced)
 }
-
