@@ -141,9 +141,9 @@ fn reuse() -> [Turned; 5] {
     [
         ("`--policy off`: every frame traced", |_| "--policy off".into()),
         ("`--policy colour`", |_| "--policy colour".into()),
-        ("`--tolerance 0.25`", |_| "--tolerance 0.25".into()),
-        ("`--tolerance 4`", |_| "--tolerance 4".into()),
-        ("`--audit 0`", |_| "--audit 0".into()),
+        ("`--tolerance 0.0625`", |_| "--tolerance 0.0625".into()),
+        ("`--tolerance 1`", |_| "--tolerance 1".into()),
+        ("`--probes 0.03`", |_| "--probes 0.03".into()),
     ]
 }
 

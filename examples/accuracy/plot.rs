@@ -38,7 +38,7 @@ impl Scale {
 fn kind(row: &Row) -> (&'static str, &'static str) {
     match row.knob.as_str() {
         "default" => ("#3b6fc9", "default"),
-        "policy" | "tolerance" | "segment" | "audit" => ("#d9801a", "reuse"),
+        "policy" | "tolerance" | "segment" | "probes" => ("#d9801a", "reuse"),
         "camera-samples" | "shadow-samples" | "sky-samples" => ("#2f9a78", "samples"),
         "bounces" | "cut-off" => ("#c2528a", "bounces, cut-off"),
         "combination" => ("#94853f", "samples and reuse"),

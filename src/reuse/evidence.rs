@@ -276,7 +276,7 @@ mod tests {
         let clean = |class, count| vec![found(0.0, class, 0.0, 0.5); count];
         assert!(may_use(&clean(CALM, 20), 0.0, CALM));
         assert!(!may_use(&clean(EDGE, 20), 0.0, EDGE));
-        assert!(may_use(&clean(EDGE, 400), 0.0, EDGE));
+        assert!(may_use(&clean(EDGE, 1000), 0.0, EDGE));
     }
 
     #[test]
