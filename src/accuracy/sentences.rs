@@ -178,7 +178,7 @@ mod tests {
         let mut m = measured(&[
             (Knob::Default, "", 1.0, 2.0),
             (Knob::Tolerance, "--tolerance 4", 0.8, 2.5),
-            (Knob::Compact, "--compact on", 1.0, 2.0),
+            (Knob::Probes, "--probes 0.03", 1.0, 2.0),
             (Knob::Retry, "--retry off", 1.0, 2.0),
         ]);
         for row in &mut m.rows[1..] {
@@ -192,7 +192,7 @@ mod tests {
         assert!(retry.contains("no more than noise in time (+0 % to +0 %)"), "{retry}");
         assert!(retry.contains("3 of 9,000 pixels differ by more than 2/255, the furthest by 90"));
         m.rows[2].change = Some(Change { pixels: 9000, ..Change::default() });
-        assert!(about_knob(&m, Knob::Compact).concat().contains("the same pixels"));
+        assert!(about_knob(&m, Knob::Probes).concat().contains("the same pixels"));
         assert!(about_knob(&m, Knob::Segment).is_empty());
     }
 }

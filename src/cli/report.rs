@@ -165,14 +165,13 @@ impl Job {
 
     /// What stands in place of an audit.
     fn why_no_audit(&self) -> &'static str {
-        let ReuseSettings { policy, probes, .. } = self.settings.reuse;
+        let ReuseSettings { policy, .. } = self.settings.reuse;
         match policy {
             Policy::Colour => {
                 "Policy colour has no audit: nothing is known of how far its frames are off."
             }
             _ if self.rows.is_empty() => "No frame was audited yet.",
             _ if !self.reuse().is_inferred() => "No frame was audited: none is inferred.",
-            _ if probes <= 0.0 => "No frame was audited: --probes 0.",
             _ => "No frame was audited.",
         }
     }

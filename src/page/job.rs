@@ -148,11 +148,11 @@ mod tests {
 
     #[test]
     fn a_page_without_a_frame_stands_and_text_is_escaped() {
-        let no_audit = "No frame was audited: --audit 0.".into();
+        let no_audit = "No frame was audited: --policy off.".into();
         let page = JobPage { title: "<b>&".into(), no_audit, ..JobPage::default() };
         let html = page.to_html().expect("set");
         assert!(html.contains("There is no frame to show yet") && !html.contains("<b>&"));
-        assert!(html.contains("No frame was audited: <code>--audit</code> 0."));
+        assert!(html.contains("No frame was audited: <code>--policy</code> off."));
     }
 
     #[test]

@@ -20,8 +20,10 @@ use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
 use crate::stats::{AuditSums, DrawnSum};
 
-/// A squared error that may have gone unseen in the pixels that were not drawn: one display step.
+/// A squared error that may have gone unseen in the pixels that were not drawn: one display step where pixels are
+/// traced, whose noise shows everywhere. Where they are inferred, errors are few and large: eight steps.
 const UNSEEN: f64 = 1.0;
+const UNSEEN_INFERRED: f64 = 64.0;
 /// Display steps.
 const STEPS: f64 = 255.0;
 
@@ -94,19 +96,23 @@ pub fn difference(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> f32 {
     ((0..3).map(|k| i[k] - m[k]).sum::<f64>() * STEPS / 3.0) as f32
 }
 
-/// The sums over the pixels `drawn` from a frame, as they are `shown` and in the two `traces` of the frame.
-/// How many pixels the frame has is left out, and so is who was inferred of those that were not drawn.
+/// The sums over the pixels `drawn` from a frame, as they are `shown` if they are inferred and in the two
+/// `traces` of the frame. Each stands for as many pixels as its weight: itself, which shows its first trace, and
+/// others, which show what it would. How many pixels the frame has is left out.
 pub fn sums(shown: &Shown, drawn: &[Drawn], traces: [&[Rgb]; 2]) -> AuditSums {
     let [a, b] = traces;
     let mut sums = AuditSums { drawn: drawn.len() as u64, ..AuditSums::default() };
     for Drawn { index, weight } in drawn {
         let i = *index as usize;
         let squares = Squares::of(&shown.display, shown.rgb[i], a[i], b[i]);
+        let others = weight - 1.0;
         if shown.is_inferred(i) {
-            sums.inferred_pixels += 1;
-            sums.inferred.add(squares.error, *weight, UNSEEN);
+            sums.inferred_pixels += others as u64;
+            sums.inferred.add(squares.error, others, UNSEEN_INFERRED);
         }
-        sums.shown.add(squares.error, *weight, UNSEEN);
+        let mean = (others * squares.error + squares.trace) / weight;
+        let unseen = if shown.is_inferred(i) { UNSEEN_INFERRED } else { UNSEEN };
+        sums.shown.add(mean, *weight, unseen);
         sums.traced.add(squares.trace, *weight, UNSEEN);
     }
     sums

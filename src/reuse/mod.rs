@@ -23,5 +23,5 @@ pub use cost::{
     LookupReason, channels, is_worth_looking, lookup_reasons, of_frame, of_traced_pixel, rays_of,
 };
 pub use lookup::{Judged, Lookup};
-pub use probe::{Probe, ProbeDraw};
+pub use probe::{PARTS, Probe, ProbeDraw};
 pub use reference::Reference;

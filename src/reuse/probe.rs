@@ -6,6 +6,9 @@ use crate::inference::{Estimate, Inference, Origin, Questions, SurfacePoint};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
 
+/// Parts of a frame's probes that are judged by one another.
+pub const PARTS: usize = 4;
+
 /// Which pixels of a frame are probes: one at a random place in each square cell of the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProbeDraw {
@@ -46,9 +49,9 @@ impl ProbeDraw {
         own == at
     }
 
-    /// Which half of the probes a probe belongs to: what one half finds is held against the other.
-    pub fn half(&self, x: u32, y: u32) -> usize {
-        (self.words(x, y) >> 63) as usize
+    /// Which part of the probes, of [`PARTS`], a probe belongs to: each is judged by what the others find.
+    pub fn part(&self, x: u32, y: u32) -> usize {
+        (self.words(x, y) >> 32) as usize / self.cell as usize % PARTS
     }
 
     /// For each pixel of an image, row by row, whether it is a probe.

@@ -42,7 +42,7 @@ impl AddAssign for DrawnSum {
 pub struct AuditSums {
     /// Pixels of the frames.
     pub pixels: u64,
-    /// Those of them that were inferred.
+    /// Those of them that were inferred: as many as the drawn ones stand for.
     pub inferred_pixels: u64,
     /// Pixels that were drawn and traced twice.
     pub drawn: u64,

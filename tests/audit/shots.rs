@@ -30,6 +30,7 @@ pub struct Trial {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Truth {
     pub inferred: f64,
+    pub inferred_pixels: u64,
     pub shown: f64,
     pub traced: f64,
 }
@@ -139,7 +140,7 @@ impl Stage<'_> {
             let traced = render(settings, frame);
             truth.add(settings, &made.film, &traced, &converged);
         }
-        truth.inferred /= sums.inferred_pixels as f64;
+        truth.inferred /= truth.inferred_pixels.max(1) as f64;
         truth.shown /= sums.pixels as f64;
         truth.traced /= sums.pixels as f64;
         Audited { sums, rmse: rmse(&sums).expect("pixels were drawn"), truth }
@@ -176,6 +177,7 @@ impl Truth {
             self.traced += error(traced.rgb[i]);
             if !matches!(source.provenance, Provenance::Background | Provenance::Traced) {
                 self.inferred += own;
+                self.inferred_pixels += 1;
             }
         }
     }

@@ -37,7 +37,7 @@ fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
         s["bounces"],
         s["reuse"]["policy"].as_str().expect("a name")
     );
-    assert!(s["reuse"]["tolerance"].is_null(), "{s}");
+    assert_eq!(s["reuse"]["tolerance"], 0.25, "{s}");
     job.done(&format!("{} {options}", LINE.replace("o/", "p/")));
     assert_eq!(job.read("p/f_02.png"), before);
 }

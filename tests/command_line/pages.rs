@@ -97,11 +97,8 @@ fn a_report_offers_the_maps_that_say_something() {
         names.map(|name| page.contains(&format!("data-map=\"{name}\"")))
     };
     for pattern in ["o/f_##.png", "o/f_##.exr"] {
-        let page = report("--audit 0.5", pattern);
+        let page = report("--probes 0.2", pattern);
         assert_eq!(maps(&page), [true; 4], "{pattern}");
-        let page = report("--audit 0", pattern);
-        assert_eq!(maps(&page), [true, true, true, false], "{pattern}");
-        assert!(page.contains("No frame was audited: <code>--audit</code> 0."));
         let page = report("--policy colour", pattern);
         assert_eq!(maps(&page), [true, true, true, false], "{pattern}");
         assert!(page.contains("Policy colour has no audit") && !page.contains("none is inferred"));

@@ -52,7 +52,7 @@ fn ranks_survive_forty_kills() {
     let line = |out: &str| {
         format!(
             "render {scene} --size 160x120 --spp 4 --shadow-samples 16 --frames 1..16 --no-video \
-             --segment 8 --audit 0.1 --checkpoint 0s --threads 1 -o {out}/f_##.png"
+             --segment 8 --probes 0.02 --checkpoint 0s --threads 1 -o {out}/f_##.png"
         )
     };
     let begun = Instant::now();

@@ -119,7 +119,7 @@ fn scenes_that_are_killed_and_regrouped_are_the_same() {
         let line = |threads: u32, out: &str| {
             format!(
                 "render {scene} --size 192x108 --spp 2 --shadow-samples 16 --frames 1..16 --no-video \
-                 --segment {segment} --audit 0.1 --checkpoint 0s --threads {threads} -o {out}/f_##.png"
+                 --segment {segment} --probes 0.02 --checkpoint 0s --threads {threads} -o {out}/f_##.png"
             )
         };
         let groups = [(2, 1), (4, 1), (1, 2), (3, 2), (8, 1), (2, 2), (16, 1)];
@@ -189,7 +189,7 @@ fn every_rank_leaves_its_references_when_it_is_stopped() {
     let line = |out: &str, more: &str| {
         format!(
             "render cube.obj --size 96x54 --spp 16 --segment 16 --frames 1..17 --no-video \
-             --threads 1 --audit 0 {more} -o {out}/f_##.png"
+             --threads 1 {more} -o {out}/f_##.png"
         )
     };
     job.done(&line("whole", ""));

@@ -65,7 +65,7 @@ fn the_bytes_are_the_same_on_1_to_16_ranks_with_references_sent_about() {
         // Frames 1 and 16 are made, and not written.
         let line = format!(
             "render {scene} --size 64x48 --spp 2 --shadow-samples 16 --frames 2..15 --segment 8 \
-             --audit 0.1 --no-video --quiet"
+             --probes 0.02 --no-video --quiet"
         );
         let ranks = [(1, 2), (2, 2), (3, 1), (4, 1), (8, 1), (16, 1)];
         let Some(stats) = same_bytes(&job, &line, "png", &ranks) else { return };
@@ -85,7 +85,7 @@ fn exr_files_crops_bounds_and_other_policies_are_the_same_too() {
     for (more, ending) in [
         ("--frames 3..12 --maps", "exr"),
         ("--frames 5..9 --crop 10,9,50,40", "exr"),
-        ("--frames 1..9 --max-rmse 0.2", "png"),
+        ("--frames 1..9 --tolerance 0.5", "png"),
         ("--frames 1..5 --policy off", "png"),
         ("--frames 1..24 --policy colour", "png"),
     ] {

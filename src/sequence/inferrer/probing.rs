@@ -2,23 +2,24 @@
 //!
 //! Each probe is estimated and traced twice. What that finds, and what the probes of the frames found that
 //! the frame is inferred from, is the [`Evidence`]. The probes show their first trace, and both are
-//! sources for other frames. They are the frame's audit, too: half of them are inferred by the evidence
-//! of the other half, with random numbers of their own, and held against their traces. An error that the
+//! sources for other frames. They are the frame's audit, too: each part of them is inferred by the
+//! evidence of the other parts, with random numbers of their own, and held against their traces. An error that the
 //! evidence was blind to is seen so; were a probe judged by itself, what stays inferred would be those
 //! that were lucky.
 
 use super::Inferrer;
 use crate::error::Result;
-use crate::film::{Film, PixelSource, Provenance};
+use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Shown};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{Judged, Lookup, Probe, ProbeDraw, Reference, is_worth_looking};
+use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
 use crate::scene::Camera;
 use crate::sequence::strips::Unheard;
 use crate::shade::{FrameJob, Rendered};
 use crate::stats::{AuditSums, RayCounts};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Added to a frame's number (at most a million) for the random numbers of the probes' two traces, and of
@@ -42,8 +43,8 @@ pub(super) struct Probed {
     pub findings: Vec<Finding>,
     /// What may be inferred in the frame.
     pub evidence: Evidence,
-    /// What may be inferred in each half of the probes, by the findings of the other half.
-    crossed: [Evidence; 2],
+    /// What may be inferred in each part of the probes, by the findings of the other parts.
+    crossed: Vec<Evidence>,
     /// Whether looking up saves more than it costs.
     pub is_worth_looking: bool,
 }
@@ -90,12 +91,12 @@ impl Inferrer<'_> {
         let found = own.findings(again, r.settings.spp);
         let before = || lookup.references.iter().flat_map(|r| r.findings());
         let tolerance = r.settings.reuse.tolerance;
-        let of_half = |half: usize| {
-            let is_in = move |pixel: &[u32; 2]| draw.half(pixel[0], pixel[1]) == half;
+        let of_others = |part: usize| {
+            let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
             let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
             Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), tolerance)
         };
-        let crossed = [of_half(0), of_half(1)];
+        let crossed = self.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         let is_worth_looking =
@@ -161,8 +162,6 @@ impl Inferrer<'_> {
         let traces = [&first.film.rgb[..], &second.film.rgb[..]];
         let mut sums = audit::sums(&shown, &drawn, traces);
         sums.pixels = (0..film.rgb.len()).filter(|i| self.is_shown(film, *i)).count() as u64;
-        let of_rest = film.sources.iter().flatten().filter(|s| is_inferred_source(s)).count();
-        sums.inferred_pixels = of_rest as u64 + sums.inferred_pixels;
         sums.rays = rays;
         sums.rays += second.rays;
         let mut map = vec![f32::NAN; film.rgb.len()];
@@ -184,7 +183,7 @@ impl Inferrer<'_> {
     ) -> Result<Option<(RayCounts, Option<Film>)>> {
         self.with_lookup((frame, camera), references, |lookup| {
             let Some(lookup) = lookup else { return Some((RayCounts::default(), None)) };
-            let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.half(x, y)];
+            let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.part(x, y)];
             let judged = Judged { lookup: &lookup, evidence: &evidence };
             let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
             let inferred = self.render(job, Some(&judged), &Unheard)?;
@@ -207,8 +206,4 @@ impl Inferrer<'_> {
         let crop = self.renderer.settings.crop;
         crop.is_none_or(|c| (c.x0..c.x1).contains(&x) && (c.y0..c.y1).contains(&y))
     }
-}
-
-fn is_inferred_source(source: &PixelSource) -> bool {
-    !matches!(source.provenance, Provenance::Background | Provenance::Traced)
 }

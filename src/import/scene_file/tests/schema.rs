@@ -66,8 +66,8 @@ fn ranges_and_defaults_are_in_the_schema() {
     assert_eq!(settings["cutoff"]["default"], 0.001);
     let reuse = &schema()["$defs"]["Reuse"]["properties"];
     assert_eq!(
-        (&reuse["segment"]["maximum"], &reuse["audit"]["default"]),
-        (&1_000_000.into(), &0.03.into())
+        (&reuse["segment"]["maximum"], &reuse["probes"]["default"]),
+        (&1_000_000.into(), &0.01.into())
     );
     assert_eq!(settings["size"]["default"], serde_json::json!([640, 360]));
     let fov = &schema()["$defs"]["Camera"]["properties"]["fov"];
