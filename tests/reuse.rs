@@ -81,7 +81,7 @@ fn is_no_worse_than_traced(scene: &str, [direct, specular]: [f64; 2]) {
 
 #[test]
 fn spheres_on_terrain_is_no_worse_than_traced() {
-    is_no_worse_than_traced("spheres_on_terrain", [0.3, 0.05]);
+    is_no_worse_than_traced("spheres_on_terrain", [0.15, 0.02]);
 }
 
 #[test]

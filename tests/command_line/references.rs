@@ -149,7 +149,7 @@ fn a_denser_and_longer_move_starts_warm() {
     scene(&job, "long.toml", &pan(21, 1.5));
     job.done("render short.toml -o base/f_#.exr");
     // In frames as small as these little can be vouched for: that is not what is tested here.
-    let long = "render long.toml --tolerance 255";
+    let long = "render long.toml --tolerance 255 --probes 0.0003";
     job.done(&format!("{long} -o cold/f_##.exr --stats cold.json"));
     let warm = format!("{long} --references base");
     job.done(&format!("{warm} -o warm/f_##.exr --stats warm.json --maps"));
