@@ -1,18 +1,8 @@
-//! The audit: how far inferred pixels are from the truth, told by tracing a few of them.
+//! How far inferred pixels are from the truth, by traces of a few of them.
 //!
-//! Some pixels are drawn ([`draw`]); whoever can trace traces each twice, independently, at the
-//! same settings. With the shown value I, traces A and B and the display's curve left aside,
-//! `(I - A)(I - B)` is an unbiased estimate of I's squared error, and `(A - B)²/2` of a trace's own.
-//! Camera samples do not depend on the frame, so the error is that against the picture with
-//! converged shadow samples. [`rmse`] makes figures with intervals of the sums.
-//!
-//! **Which pixels.** Nearly all of the error lies in penumbras, a few pixels of the picture. So a
-//! pixel's chance to be drawn is a share of its own, equal for all, and a larger one in
-//! proportion to its variance as its neighbours and itself foretell it
-//! ([`PixelSource::risk`]); each drawn pixel counts by one over its chance. That the equal share is
-//! there bounds what an error where nobody foretold it can do (a defensive mixture: Hesterberg,
-//! 1995). Chances are summed pixel by pixel, and each unit of the sum draws one pixel at a random
-//! place in it: so the draw is spread over the picture, and its size is known beforehand.
+//! Some pixels, the frame's probes, are traced twice, independently. With the shown value I and the
+//! traces A and B, (I - A)(I - B) is on average the squared error of what is shown, and (A - B)²/2 that of
+//! tracing, whatever the noise of A and B. Each drawn pixel counts by one over its chance.
 
 use crate::film::{PixelSource, Provenance};
 use crate::math::Rgb;

@@ -2,7 +2,7 @@
 //!
 //! A probe is a pixel that is estimated from other frames *and* traced twice, independently. With the
 //! estimate S and the traces A and B, (S - A)(S - B) is on average the squared error of the estimate, and
-//! (A - B)²/2 that of a trace. Estimates are sorted into classes ([`super::class`]); a class may be used
+//! (A - B)²/2 that of a trace. Estimates are sorted into classes (`class.rs`); a class may be used
 //! where probes of it, in the frame itself and in those that it is inferred from, found it no further from
 //! the truth than a trace, or off by less than can be seen. Errors come in regions, a shadow here, a
 //! thicket there: so what was found in a region of the surface outweighs what was found elsewhere.
@@ -26,7 +26,7 @@ const PRIOR: f64 = 8.0;
 const FEW: f64 = 16.0;
 /// A class's error must be below its bound by so many standard errors.
 const SURE: f64 = 1.0;
-/// As large a share of the error that a class may hide ([`hidden_error`]) counts as found once among its
+/// As large a share of the error that a class may hide (`hidden_error`) counts as found once among its
 /// probes: a few that find nothing say little where a shadow's edge is near.
 const HIDDEN: f64 = 0.25;
 /// Of a tile's error that nobody sees, the share that a class may use up: errors are rare and large, so a

@@ -5,7 +5,7 @@ use super::{LEAST_WEIGHT, Lookup};
 use crate::inference::Estimate;
 use crate::reuse::class::Features;
 use crate::reuse::taps::{ENOUGH_WEIGHT, Taps, sum};
-use wide::{CmpEq, CmpGt, CmpLt, f32x4};
+use wide::{CmpEq, CmpGt, f32x4};
 
 /// Weighted sums over the taps that know a light, and the largest contrasts, lane by lane.
 #[derive(Clone, Copy, Default)]
@@ -21,18 +21,21 @@ struct Sums {
 
 /// The largest of numbers none of which is negative; NaN once one is.
 #[derive(Clone, Copy, Default)]
-struct Largest(f32x4);
+struct Largest {
+    most: f32x4,
+    /// NaN once a number was.
+    sum: f32x4,
+}
 
 impl Largest {
     fn note(&mut self, other: f32x4) {
-        // Neither is less than a NaN.
-        self.0 = other.cmp_lt(self.0).blend(self.0, other + (self.0 - self.0));
+        self.most = other.cmp_gt(self.most).blend(other, self.most);
+        self.sum += other;
     }
 
     fn get(self) -> f32 {
-        let [a, b, c, d] = self.0.to_array();
-        let most = a.max(b).max(c.max(d));
-        if (a + b + c + d).is_nan() { f32::NAN } else { most }
+        let [a, b, c, d] = self.most.to_array();
+        if sum(self.sum).is_nan() { f32::NAN } else { a.max(b).max(c.max(d)) }
     }
 }
 
