@@ -30,17 +30,12 @@ pub struct PixelSource {
     /// Weighted mean distance to the samples that gave it, in footprints of a pixel. Under policy
     /// colour by how much the distances of the two entries differ, a share.
     pub distance: f32,
-    /// How far its radiance may be off: over its lights, the sum of √(r(1 - r)) times the radiance
-    /// that a light would give unshadowed, where r is the ratio of it that arrives. 0 in full light
-    /// and full shadow.
-    pub risk: f32,
 }
 
 impl PixelSource {
     /// Takes in another surface point of the pixel: one traced point makes the pixel traced.
     pub fn join(&mut self, other: &Self) {
         use Provenance::{Background, Both, Traced};
-        self.risk += other.risk;
         self.provenance = match (self.provenance, other.provenance) {
             (Background, p) | (p, Background) => p,
             (Traced, _) | (_, Traced) => Traced,
@@ -60,7 +55,7 @@ mod tests {
     use super::*;
 
     fn source(provenance: Provenance, frame: u32) -> PixelSource {
-        PixelSource { provenance, frame, distance: 0.5, risk: 0.25 }
+        PixelSource { provenance, frame, distance: 0.5 }
     }
 
     #[test]

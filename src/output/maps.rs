@@ -225,8 +225,7 @@ mod tests {
         let mut sources = vec![PixelSource::default(); 30];
         let kinds = [Provenance::Traced, Provenance::Earlier, Provenance::Later, Provenance::Both];
         for (i, provenance) in kinds.into_iter().enumerate() {
-            sources[i] =
-                PixelSource { provenance, frame: i as u32, distance: 0.5 * i as f32, risk: 0.0 };
+            sources[i] = PixelSource { provenance, frame: i as u32, distance: 0.5 * i as f32 };
         }
         film.sources = Some(sources);
         film

@@ -131,7 +131,7 @@ impl Inferred {
             return PixelSource::default();
         }
         let nearer = if frame - before <= after - frame { before } else { after };
-        PixelSource { provenance: Provenance::Both, frame: nearer, distance, risk: 0.0 }
+        PixelSource { provenance: Provenance::Both, frame: nearer, distance }
     }
 }
 

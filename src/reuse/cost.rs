@@ -103,20 +103,6 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
-/// What tracing one lit pixel costs in a frame that cast `rays`: its camera samples, as many
-/// specular rays as the frame has for each of its camera rays, and all shadow rays of each.
-pub fn of_traced_pixel(
-    rays: &RayCounts,
-    scene: &Scene,
-    plan: &EffectPlan,
-    settings: &Settings,
-) -> f64 {
-    let shadow: u64 = shadow_rays(scene, plan, settings);
-    let specular = (rays.mirror + rays.glass) as f64 / rays.camera.max(1) as f64;
-    let hit = SHADOW_RAY * shadow as f64;
-    f64::from(settings.spp) * (CAMERA_RAY + hit + specular * (SPECULAR_RAY + hit))
-}
-
 /// Shadow rays of one diffuse point, all lights together.
 fn shadow_rays(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> u64 {
     let one = |light: &Light| match light {

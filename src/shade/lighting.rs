@@ -369,8 +369,6 @@ impl Renderer<'_> {
             } else {
                 let light = point.weight * radiance * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
-                let unshadowed = point.weight * radiance * exact as f32;
-                pixels.note_risk(point.place.pixel, unshadowed, ratio);
             }
         }
         wanted
@@ -426,7 +424,6 @@ impl Renderer<'_> {
                 let ratio = (open / all) as f32;
                 let light = point.weight * span.unshadowed * ratio;
                 pixels.add(point.place.pixel, point.place.sample, light);
-                pixels.note_risk(point.place.pixel, point.weight * span.unshadowed, ratio);
             }
         }
     }

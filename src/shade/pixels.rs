@@ -36,8 +36,6 @@ pub(super) struct BlockPixels {
     records: Vec<Record>,
     with_records: bool,
     sources: Vec<PixelSource>,
-    /// Of each pixel's samples together, see [`PixelSource::risk`].
-    risks: Vec<f32>,
 }
 
 /// A pixel as it goes to the film.
@@ -96,7 +94,6 @@ impl BlockPixels {
             records: Vec::new(),
             with_records,
             sources: Vec::new(),
-            risks: Vec::new(),
         }
     }
 
@@ -134,8 +131,6 @@ impl BlockPixels {
         self.bad.clear();
         self.sources.clear();
         self.sources.resize(self.places.len(), PixelSource::default());
-        self.risks.clear();
-        self.risks.resize(self.places.len(), 0.0);
         self.records.clear();
         if self.with_records {
             let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
@@ -166,20 +161,9 @@ impl BlockPixels {
                 },
                 frame: o.frame,
                 distance: o.distance,
-                risk: 0.0,
             },
         };
         self.sources[pixel as usize].join(&source);
-    }
-
-    /// Notes that a light, which would send `unshadowed` to the camera, is known by a `ratio` of
-    /// samples: how far off that may be.
-    #[inline]
-    pub fn note_risk(&mut self, pixel: u32, unshadowed: Rgb, ratio: f32) {
-        let doubt = ratio * (1.0 - ratio);
-        if doubt > 0.0 {
-            self.risks[pixel as usize] += unshadowed.max_element() * doubt.sqrt();
-        }
     }
 
     /// Pixels in the block.
@@ -337,8 +321,7 @@ impl BlockPixels {
             let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
             let rgb = if flagged { MAGENTA } else { sum * share };
             let record = self.records.get(i).map(|r| r.pixel);
-            let source = PixelSource { risk: self.risks[i] * share, ..self.sources[i] };
-            FinishedPixel { x, y, rgb, record, source }
+            FinishedPixel { x, y, rgb, record, source: self.sources[i] }
         })
     }
 }

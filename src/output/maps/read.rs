@@ -38,7 +38,6 @@ fn film_of(channels: &Channels) -> Option<Film> {
         provenance: known(provenance[i]),
         frame: frame[i],
         distance: distance[i],
-        risk: 0.0,
     };
     film.sources = Some((0..r.len()).map(source).collect());
     film.audit = channels.f32("reuse.audit").map(<[f32]>::to_vec);
@@ -61,12 +60,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let mut film = Film::new(3, 2, false);
         film.rgb.fill(Rgb::splat(0.5));
-        let source = |i: u32| PixelSource {
-            provenance: known(i % 5),
-            frame: i,
-            distance: i as f32 / 4.0,
-            risk: 0.0,
-        };
+        let source =
+            |i: u32| PixelSource { provenance: known(i % 5), frame: i, distance: i as f32 / 4.0 };
         film.sources = Some((0..6).map(source).collect());
         film.audit = Some(vec![f32::NAN, 3.0, f32::NAN, -8.0, f32::NAN, f32::NAN]);
         let options = WriteOptions { maps: Some(2.0), ..WriteOptions::default() };
