@@ -87,6 +87,23 @@ impl Estimate {
     pub const UNKNOWN: Self = Self { ratio: f32::NAN, class: 0 };
 }
 
+/// Of the shadow rays that tracing would cast, one in so many checks an answer before it is used.
+pub const RAYS_PER_CHECK: u32 = 8;
+
+/// How many rays check an answer that saves `rays` shadow rays.
+pub fn check_rays(rays: u32) -> u32 {
+    (rays / RAYS_PER_CHECK).max(1)
+}
+
+/// What check rays found of one light at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Checked {
+    /// Ratio of shadowed to unshadowed irradiance.
+    pub ratio: f32,
+    /// How many rays found it; 0 where there was nothing to cast.
+    pub rays: u32,
+}
+
 /// Points in a batch with the answers about them.
 #[derive(Debug, Default)]
 pub struct Questions {
@@ -103,6 +120,10 @@ pub struct Questions {
     pub estimates: Vec<Estimate>,
     /// For each point where its ratios come from.
     pub origins: Vec<Origin>,
+    /// For each point and channel whether check rays shall be cast; empty where none is wanted.
+    pub checks: Vec<bool>,
+    /// For each point and channel what they found; empty where none was wanted.
+    pub checked: Vec<Checked>,
 }
 
 /// A point that was traced: a source for other frames.
@@ -150,8 +171,11 @@ impl TracedPoints {
 
 /// Answers what is known about the light at surface points.
 pub trait Inference: Sync {
-    /// Fills ratios and origins for all points.
+    /// Fills ratios and origins for all points, and says what is to be checked.
     fn infer(&self, questions: &mut Questions);
+
+    /// Hears what check rays found where there were any, and takes back answers that they contradict.
+    fn check(&self, _questions: &mut Questions) {}
 
     /// Hears what came out for the same points, once those that had to be were traced: a ratio is NaN
     /// only where no light was asked for. The estimates are as `infer` left them.

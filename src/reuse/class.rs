@@ -66,6 +66,11 @@ pub fn family(class: u8) -> u8 {
     class % of_contrast + if is_unknown { of_contrast } else { 0 }
 }
 
+/// Whether estimates of `class` are of points seen directly.
+pub fn is_direct(class: u8) -> bool {
+    class % BINS[3] == 0
+}
+
 /// A squared error that a class may hide, squares of a display step: as large as its contrast.
 pub fn hidden_error(class: u8) -> f64 {
     let [_, bends, wholes, directs] = BINS;

@@ -1,9 +1,9 @@
 //! What is worth a lookup: decided from a fixed table of costs, never from measured times, so that
 //! every machine decides alike.
 
-use super::evidence::{Evidence, Finding};
+use super::evidence::{Evidence, Finding, Verdict};
 use crate::effects::EffectPlan;
-use crate::inference::{Channel, Channels};
+use crate::inference::{Channel, Channels, RAYS_PER_CHECK};
 use crate::scene::{Light, Scene, Settings};
 use crate::stats::{RayCounts, ReuseCounts};
 
@@ -103,28 +103,22 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
-/// Shadow rays of one diffuse point, all lights together.
-fn shadow_rays(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> u64 {
-    let one = |light: &Light| match light {
-        Light::Quad(_) | Light::Sphere { .. } => u64::from(settings.shadow_samples),
-        _ => 1,
-    };
-    let sky = if plan.sky_light { u64::from(settings.sky_samples) } else { 0 };
-    scene.lights.iter().map(one).sum::<u64>() + sky
-}
-
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
-/// was found at probes. They have `points` surface points, all of which were traced.
+/// was found at probes. They have `points` surface points, all of which were traced with `rays`.
 pub fn is_worth_looking(
     evidence: &Evidence,
     findings: &[Finding],
     points: &ReuseCounts,
-    scene: &Scene,
-    plan: &EffectPlan,
-    settings: &Settings,
+    rays: &RayCounts,
 ) -> bool {
-    let usable = findings.iter().filter(|finding| evidence.may_use(finding)).count() as f64;
     let all = (points.direct + points.specular) as f64;
-    let rays = SHADOW_RAY * shadow_rays(scene, plan, settings) as f64 * f64::from(settings.spp);
-    usable * rays > LOOKUP * all
+    let of_point = SHADOW_RAY * (rays.shadow_area + rays.shadow_sky) as f64 / all.max(1.0);
+    let check = 1.0 / f64::from(RAYS_PER_CHECK);
+    let saved = |finding: &Finding| match evidence.verdict(finding) {
+        Verdict::Use => 1.0,
+        Verdict::Check if finding.agreed => 1.0 - check,
+        Verdict::Check => -check,
+        Verdict::Trace => 0.0,
+    };
+    of_point * findings.iter().map(saved).sum::<f64>() > LOOKUP * all
 }

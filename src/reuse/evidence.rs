@@ -9,7 +9,8 @@
 //!
 //! Every figure is a sum over findings in a fixed order.
 
-use super::class::{CLASSES, family, hidden_error};
+use super::check::CheckRays;
+use super::class::{CLASSES, family, hidden_error, is_direct};
 use super::index::{cell_of, edge_of, key_of, level_of};
 use crate::inference::{Estimate, SurfacePoint};
 use crate::math::{Vec3, srgb_encode};
@@ -48,6 +49,8 @@ pub struct Finding {
     pub error: f32,
     /// That of a trace.
     pub noise: f32,
+    /// Whether check rays agreed with the estimate.
+    pub agreed: bool,
 }
 
 /// What a light of a point showed: estimate and both traces.
@@ -63,7 +66,12 @@ pub struct Compared {
 
 /// What was found at `point`, which makes up `share` of its pixel, from what its lights showed; `None`
 /// where other frames know none of them.
-pub fn finding_at(point: &SurfacePoint, share: f32, lights: &[Compared]) -> Option<Finding> {
+pub fn finding_at(
+    point: &SurfacePoint,
+    share: f32,
+    lights: &[Compared],
+    agreed: bool,
+) -> Option<Finding> {
     let is_known = |l: &&Compared| {
         l.unshadowed != 0.0 && !l.estimate.ratio.is_nan() && !l.traced.iter().any(|r| r.is_nan())
     };
@@ -80,6 +88,7 @@ pub fn finding_at(point: &SurfacePoint, share: f32, lights: &[Compared]) -> Opti
         class,
         error: (share * (estimated - a) * (estimated - b)) as f32,
         noise: (share * 0.5 * (a - b) * (a - b)) as f32,
+        agreed,
     })
 }
 
@@ -105,12 +114,41 @@ impl ClassSet {
     }
 }
 
+/// What is done with an estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is used as it is.
+    Use,
+    /// It is used where check rays agree.
+    Check,
+    /// The point is traced.
+    Trace,
+}
+
+/// Which classes may be used as they are, and which where check rays agree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Usable {
+    outright: ClassSet,
+    checked: ClassSet,
+}
+
+impl Usable {
+    /// What is done with estimates of `class`.
+    pub fn verdict(&self, class: u8) -> Verdict {
+        match (self.outright.has(class), self.checked.has(class)) {
+            (true, _) => Verdict::Use,
+            (false, true) => Verdict::Check,
+            (false, false) => Verdict::Trace,
+        }
+    }
+}
+
 /// Which classes may be used where.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence {
     /// Where a region has no finding.
-    elsewhere: ClassSet,
-    regions: HashMap<u64, ClassSet, BuildHasherDefault<Mixed>>,
+    elsewhere: Usable,
+    regions: HashMap<u64, Usable, BuildHasherDefault<Mixed>>,
 }
 
 /// Sums over findings.
@@ -155,50 +193,83 @@ impl Sums {
     }
 }
 
+/// How much of the error that a class may hide is left behind check rays: what so many rays overlook is about
+/// as large a part of it.
+fn overlooked(class: u8, rays: CheckRays) -> f64 {
+    let rays = if is_direct(class) { rays.direct } else { rays.specular };
+    f64::from(rays).powi(-2)
+}
+
+/// The classes that may be used, by findings for which something holds, with `overlooked` of the hidden error
+/// of each.
+fn sort<'f>(
+    findings: impl Iterator<Item = &'f Finding>,
+    unseen: f64,
+    overlooked: impl Fn(u8) -> f64,
+) -> (ClassSet, HashMap<u64, ClassSet, BuildHasherDefault<Mixed>>) {
+    let mut families = [Sums::default(); CLASSES];
+    let mut classes = [Sums::default(); CLASSES];
+    let mut regions: HashMap<(u64, u8), Sums, BuildHasherDefault<Mixed>> = HashMap::default();
+    for finding in findings {
+        families[usize::from(family(finding.class))].add(finding);
+        classes[usize::from(finding.class)].add(finding);
+        for level in -1..=1 {
+            let region = region(finding.geom_id, finding.footprint, finding.p, level);
+            regions.entry((region, finding.class)).or_default().add(finding);
+        }
+    }
+    let mut elsewhere = ClassSet::default();
+    let mut margins = [0.0; CLASSES];
+    for class in 0..CLASSES as u8 {
+        let at = usize::from(class);
+        if classes[at].count < FEW {
+            classes[at] = classes[at].with(&families[usize::from(family(class))], PRIOR);
+        }
+        let hidden = HIDDEN * overlooked(class) * hidden_error(class) / classes[at].count.max(1.0);
+        margins[at] = SURE * classes[at].doubt() + hidden;
+        elsewhere.set(class, classes[at].may_be_used(margins[at], unseen));
+    }
+    let mut sets = HashMap::default();
+    for ((region, class), sums) in &regions {
+        let at = usize::from(*class);
+        let sums = sums.with(&classes[at], PRIOR);
+        let set: &mut ClassSet = sets.entry(*region).or_insert(elsewhere);
+        set.set(*class, sums.may_be_used(margins[at], unseen));
+    }
+    (elsewhere, sets)
+}
+
 impl Evidence {
-    /// What `findings` amount to. An error of `tolerance` display steps (root mean square over a tile)
-    /// is not seen.
-    pub fn of<'f>(findings: impl Iterator<Item = &'f Finding> + Clone, tolerance: f32) -> Self {
+    /// What `findings` amount to, where so many `rays` check an estimate. An error of `tolerance` display
+    /// steps (root mean square over a tile) is not seen.
+    pub fn of<'f>(
+        findings: impl Iterator<Item = &'f Finding> + Clone,
+        rays: CheckRays,
+        tolerance: f32,
+    ) -> Self {
         let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
-        let mut families = [Sums::default(); CLASSES];
-        let mut classes = [Sums::default(); CLASSES];
-        let mut regions: HashMap<(u64, u8), Sums, BuildHasherDefault<Mixed>> = HashMap::default();
-        for finding in findings {
-            families[usize::from(family(finding.class))].add(finding);
-            classes[usize::from(finding.class)].add(finding);
-            for level in -1..=1 {
-                let region = region(finding.geom_id, finding.footprint, finding.p, level);
-                regions.entry((region, finding.class)).or_default().add(finding);
-            }
+        let (outright, of_regions) = sort(findings.clone(), unseen, |_| 1.0);
+        let agreed = findings.filter(|finding| finding.agreed);
+        let (checked, checked_of_regions) = sort(agreed, unseen, |class| overlooked(class, rays));
+        let elsewhere = Usable { outright, checked };
+        let mut regions: HashMap<u64, Usable, _> = HashMap::default();
+        for (region, outright) in of_regions {
+            regions.insert(region, Usable { outright, ..elsewhere });
         }
-        let mut own = Self::default();
-        let mut margins = [0.0; CLASSES];
-        for class in 0..CLASSES as u8 {
-            let at = usize::from(class);
-            if classes[at].count < FEW {
-                classes[at] = classes[at].with(&families[usize::from(family(class))], PRIOR);
-            }
-            let hidden = HIDDEN * hidden_error(class) / classes[at].count.max(1.0);
-            margins[at] = SURE * classes[at].doubt() + hidden;
-            own.elsewhere.set(class, classes[at].may_be_used(margins[at], unseen));
+        for (region, checked) in checked_of_regions {
+            regions.entry(region).or_insert(elsewhere).checked = checked;
         }
-        for ((region, class), sums) in &regions {
-            let at = usize::from(*class);
-            let sums = sums.with(&classes[at], PRIOR);
-            let set = own.regions.entry(*region).or_insert(own.elsewhere);
-            set.set(*class, sums.may_be_used(margins[at], unseen));
-        }
-        own
+        Self { elsewhere, regions }
     }
 
-    /// Whether the estimates that `finding` is about may be used.
-    pub fn may_use(&self, finding: &Finding) -> bool {
+    /// What is done with the estimate that `finding` is about.
+    pub fn verdict(&self, finding: &Finding) -> Verdict {
         let region = region(finding.geom_id, finding.footprint, finding.p, 0);
-        self.regions.get(&region).unwrap_or(&self.elsewhere).has(finding.class)
+        self.regions.get(&region).unwrap_or(&self.elsewhere).verdict(finding.class)
     }
 
     /// The classes that may be used at a point.
-    pub fn at(&self, point: &SurfacePoint) -> ClassSet {
+    pub fn at(&self, point: &SurfacePoint) -> Usable {
         let region = region(point.geom_id, point.footprint, point.p.as_vec3(), 0);
         self.regions.get(&region).copied().unwrap_or(self.elsewhere)
     }
@@ -247,7 +318,8 @@ mod tests {
     }
 
     fn found(x: f32, class: u8, error: f32, noise: f32) -> Finding {
-        Finding { p: Vec3::new(x, 0.0, 0.0), footprint: 0.01, geom_id: 0, class, error, noise }
+        let (p, footprint, geom_id, agreed) = (Vec3::new(x, 0.0, 0.0), 0.01, 0, true);
+        Finding { p, footprint, geom_id, class, error, noise, agreed }
     }
 
     fn may_use(findings: &[Finding], x: f32, class: u8) -> bool {

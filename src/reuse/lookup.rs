@@ -7,7 +7,10 @@
 
 mod estimate;
 
-use super::evidence::Evidence;
+pub(super) use estimate::steps_per_radiance;
+
+use super::check::agrees;
+use super::evidence::{Evidence, Verdict};
 use super::reference::{NONE, Reference};
 use super::taps::{ALWAYS, Taps, Taps4, sum};
 use crate::inference::{Estimate, Inference, Origin, Questions};
@@ -34,12 +37,14 @@ pub struct Judged<'a> {
     pub lookup: &'a Lookup<'a>,
     /// The evidence that judges the estimates of a pixel (column, row).
     pub evidence: &'a (dyn Fn([u32; 2]) -> &'a Evidence + Sync),
+    /// An error of so many display steps is not seen.
+    pub tolerance: f32,
 }
 
 impl Inference for Judged<'_> {
     fn infer(&self, questions: &mut Questions) {
         self.lookup.estimate(questions);
-        let Questions { points, pixels, ratios, estimates, origins, .. } = questions;
+        let Questions { points, pixels, ratios, estimates, origins, checks, .. } = questions;
         let channels = self.lookup.channels;
         let answers = ratios.chunks_exact_mut(channels).zip(estimates.chunks_exact(channels));
         for (i, (ratios, estimates)) in answers.enumerate() {
@@ -47,10 +52,29 @@ impl Inference for Judged<'_> {
                 continue;
             }
             let usable = (self.evidence)(pixels[i]).at(&points[i]);
-            for (ratio, estimate) in ratios.iter_mut().zip(estimates) {
-                if usable.has(estimate.class) {
-                    *ratio = estimate.ratio;
-                }
+            let known = estimates.iter().position(|estimate| !estimate.ratio.is_nan());
+            let Some(first) = known else { continue };
+            // One class for all lights of a point.
+            let verdict = usable.verdict(estimates[first].class);
+            if verdict == Verdict::Trace {
+                continue;
+            }
+            ratios.iter_mut().zip(estimates).for_each(|(ratio, e)| *ratio = e.ratio);
+            if verdict == Verdict::Check {
+                checks.resize(points.len() * channels, false);
+                let own = &mut checks[i * channels..][..channels];
+                own.iter_mut().zip(estimates).for_each(|(check, e)| *check = !e.ratio.is_nan());
+            }
+        }
+    }
+
+    fn check(&self, questions: &mut Questions) {
+        let channels = self.lookup.channels;
+        for at in 0..questions.points.len() {
+            let own = at * channels..(at + 1) * channels;
+            let is_checked = questions.checks[own.clone()].contains(&true);
+            if is_checked && !agrees(questions, at, channels, self.tolerance) {
+                questions.ratios[own].fill(f32::NAN);
             }
         }
     }

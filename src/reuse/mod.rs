@@ -8,6 +8,7 @@
 //! All in scene space.
 
 pub mod audit;
+pub mod check;
 mod class;
 pub mod colour;
 mod cost;

@@ -1,6 +1,7 @@
 //! Probes: the pixels that are estimated and traced, and what is noted about them.
 
 use super::Lookup;
+use super::check::agrees;
 use super::evidence::{Compared, Finding, finding_at};
 use crate::inference::{Estimate, Inference, Origin, Questions, SurfacePoint};
 use crate::sampling::mix;
@@ -66,6 +67,8 @@ pub struct Probe<'a> {
     pub lookup: Option<&'a Lookup<'a>>,
     /// How many lights' ratios are kept.
     pub channels: usize,
+    /// An error of so many display steps is not seen.
+    pub tolerance: f32,
     notes: Mutex<Vec<Note>>,
 }
 
@@ -74,12 +77,14 @@ struct Note {
     pixel: [u32; 2],
     point: SurfacePoint,
     lights: Vec<Compared>,
+    /// Whether check rays agreed.
+    agreed: bool,
 }
 
 impl<'a> Probe<'a> {
     /// Nothing noted.
-    pub fn new(lookup: Option<&'a Lookup<'a>>, channels: usize) -> Self {
-        Self { lookup, channels, notes: Mutex::default() }
+    pub fn new(lookup: Option<&'a Lookup<'a>>, channels: usize, tolerance: f32) -> Self {
+        Self { lookup, channels, tolerance, notes: Mutex::default() }
     }
 
     /// The notes in the image's order; those of a pixel as they were made.
@@ -108,7 +113,7 @@ impl<'a> Probe<'a> {
             }
             let share = own.point.samples as f32 / spp as f32;
             if let Some((_, findings)) = all.last_mut() {
-                findings.extend(finding_at(&own.point, share, &own.lights));
+                findings.extend(finding_at(&own.point, share, &own.lights, own.agreed));
             }
         }
         all
@@ -122,6 +127,8 @@ impl Inference for Probe<'_> {
             lookup.estimate(questions);
             // Nothing of what is shown comes from there.
             questions.origins.fill(Origin::default());
+            let is_known = |estimate: &Estimate| !estimate.ratio.is_nan();
+            questions.checks.extend(questions.estimates.iter().map(is_known));
         }
     }
 
@@ -137,6 +144,7 @@ impl Inference for Probe<'_> {
             pixel: pixels[i],
             point: *point,
             lights: (i * channels..(i + 1) * channels).map(light).collect(),
+            agreed: !answered.checks.is_empty() && agrees(answered, i, channels, self.tolerance),
         };
         let notes = points.iter().enumerate().map(note);
         self.notes.lock().unwrap_or_else(PoisonError::into_inner).extend(notes);

@@ -29,11 +29,13 @@ use std::path::Path;
 /// The attribute of an exr file that holds it.
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// How the bytes begin: the last letter is the layout's version.
-const MAGIC: &[u8; 8] = b"twrayrf2";
+const MAGIC: &[u8; 8] = b"twrayrf3";
 /// Words of a point beside its ratios.
 const WORDS: usize = 12;
 /// Bytes of a finding.
 const FINDING: usize = 8 * 4;
+/// Flag beside a finding's class: check rays agreed.
+const AGREED: u32 = 1 << 8;
 /// Largest squared error of a finding: from black to white, display steps.
 const MOST_ERROR: f32 = 255.0 * 255.0;
 /// Bytes deflated together.
@@ -264,10 +266,10 @@ fn record_of(
 }
 
 fn finding_bytes(finding: &Finding) -> [u8; FINDING] {
-    let Finding { p, footprint, geom_id, class, error, noise } = *finding;
+    let Finding { p, footprint, geom_id, class, error, noise, agreed } = *finding;
     let floats = [p.x, p.y, p.z, footprint, error, noise].map(f32::to_bits);
     let mut bytes = [0; FINDING];
-    let words = floats.into_iter().chain([geom_id, u32::from(class)]);
+    let words = floats.into_iter().chain([geom_id, u32::from(class) | if agreed { AGREED } else { 0 }]);
     for (to, word) in bytes.chunks_exact_mut(4).zip(words) {
         to.copy_from_slice(&word.to_le_bytes());
     }
@@ -282,8 +284,9 @@ fn finding_of(mut bytes: &[u8]) -> Option<Finding> {
     }
     let [x, y, z, footprint, error, noise, geom_id, class] = words;
     let [x, y, z, footprint, error, noise] = [x, y, z, footprint, error, noise].map(f32::from_bits);
+    let (class, agreed) = (class & !AGREED, class & AGREED != 0);
     let class = u8::try_from(class).ok().filter(|class| usize::from(*class) < CLASSES)?;
-    let finding = Finding { p: Vec3::new(x, y, z), footprint, geom_id, class, error, noise };
+    let finding = Finding { p: Vec3::new(x, y, z), footprint, geom_id, class, error, noise, agreed };
     let is_sound = finding.p.is_finite()
         && footprint.is_finite()
         && footprint > 0.0
@@ -443,8 +446,8 @@ mod tests {
 
     fn findings() -> Vec<Finding> {
         let p = Vec3::new(0.1, -2.0, 3.5);
-        let one = Finding { p, footprint: 0.1, geom_id: 3, class: 7, error: -0.5, noise: 0.25 };
-        vec![one, Finding { class: 0, error: 9.0, ..one }]
+        let one = Finding { p, footprint: 0.1, geom_id: 3, class: 7, error: -0.5, noise: 0.25, agreed: true };
+        vec![one, Finding { class: 0, error: 9.0, agreed: false, ..one }]
     }
 
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {

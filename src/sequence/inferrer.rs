@@ -165,7 +165,9 @@ impl<'a> Inferrer<'a> {
         };
         self.with_lookup((frame, &camera), &references, |lookup| {
             let evidence = |_| &probed.evidence;
-            let judged = lookup.as_ref().map(|lookup| Judged { lookup, evidence: &evidence });
+            let tolerance = self.renderer.settings.reuse.tolerance;
+            let judged =
+                lookup.as_ref().map(|lookup| Judged { lookup, evidence: &evidence, tolerance });
             self.render(job, judged.as_ref().map(|judged| judged as &dyn Inference), progress)
         })
     }

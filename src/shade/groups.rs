@@ -7,7 +7,9 @@
 use super::lighting::LitPoint;
 use super::pixels::{BLOCK, BlockPixels};
 use super::{FrameInput, Reuse};
-use crate::inference::{Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
+use crate::inference::{
+    Checked, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints, check_rays,
+};
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
 
@@ -31,6 +33,8 @@ struct Gathered {
 pub(super) struct Groups {
     /// For each lit point its surface point.
     of_lit: Vec<u32>,
+    /// And how many of that point's samples came before it.
+    before: Vec<u32>,
     asked: Questions,
     /// Pixel of each surface point, in the block.
     pixels: Vec<u32>,
@@ -74,6 +78,8 @@ impl Groups {
             flags.clear();
             flags.resize(count, false);
         }
+        self.asked.checks.clear();
+        self.asked.checked.clear();
         if let Some(inference) = reuse.inference {
             inference.infer(&mut self.asked);
             let ratios = self.asked.ratios.chunks_exact_mut(channels);
@@ -83,8 +89,9 @@ impl Groups {
     }
 
     fn gather_points(&mut self, input: &FrameInput, lit: &[LitPoint]) {
-        let Self { of_lit, asked: Questions { points, .. }, pixels, next, .. } = self;
+        let Self { of_lit, before, asked: Questions { points, .. }, pixels, next, .. } = self;
         of_lit.clear();
+        before.clear();
         points.clear();
         pixels.clear();
         next.clear();
@@ -102,7 +109,9 @@ impl Groups {
                 pixels.push(point.place.pixel);
                 // Behind mirrors nothing joins.
                 next.push(if own.direct { std::mem::replace(head, at) } else { NONE });
+                before.push(0);
             } else {
+                before.push(points[at as usize].samples);
                 points[at as usize].join(&own);
             }
             of_lit.push(at);
@@ -163,6 +172,56 @@ impl Groups {
             let prim = point.si.prim;
             self.forbidden[*group as usize] |=
                 scene.is_always_traced(prim.geom_id, prim.prim_id, point.si.p);
+        }
+    }
+
+    /// Whether any answer is to be checked.
+    pub fn wants_checks(&self) -> bool {
+        !self.asked.checks.is_empty()
+    }
+
+    /// How many of the check rays in `channel` lit point `i` casts, where tracing would cast `rays` from
+    /// each lit point.
+    pub fn check_rays(&self, i: usize, channel: usize, channels: usize, rays: usize) -> usize {
+        let group = self.of_lit[i] as usize;
+        if !self.asked.checks[group * channels + channel] {
+            return 0;
+        }
+        let samples = self.asked.points[group].samples;
+        let all = check_rays(samples.saturating_mul(rays as u32));
+        let until = |samples_before: u32| {
+            u64::from(samples_before) * u64::from(all) / u64::from(samples)
+        };
+        (until(self.before[i] + 1) - until(self.before[i])) as usize
+    }
+
+    /// Adds what check rays from lit point `i` found: `open` of `all`.
+    pub fn note_checked(
+        &mut self,
+        i: usize,
+        (channel, channels): (usize, usize),
+        (open, all): (f64, f64),
+        rays: usize,
+    ) {
+        let at = self.of_lit[i] as usize * channels + channel;
+        self.gathered[at].open += open;
+        self.gathered[at].all += all;
+        if self.asked.checked.is_empty() {
+            self.asked.checked.resize(self.gathered.len(), Checked::default());
+        }
+        self.asked.checked[at].rays += rays as u32;
+    }
+
+    /// Tells the inference what the check rays found.
+    pub fn conclude_checks(&mut self, reuse: &Reuse) {
+        let Self { asked, gathered, .. } = self;
+        asked.checked.resize(gathered.len(), Checked::default());
+        for (checked, gathered) in asked.checked.iter_mut().zip(gathered.iter_mut()) {
+            checked.ratio = (gathered.open / gathered.all) as f32;
+            *gathered = Gathered::default();
+        }
+        if let Some(inference) = reuse.inference {
+            inference.check(asked);
         }
     }
 

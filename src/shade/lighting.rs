@@ -7,7 +7,7 @@
 use super::groups::Groups;
 use super::light::{self, AreaLight, LightSample, ShadowTarget};
 use super::pixels::BlockPixels;
-use super::{FrameInput, Renderer};
+use super::{FrameInput, Renderer, Reuse};
 use crate::inference::{Channel, Channels};
 use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance, orthonormal_basis};
@@ -187,6 +187,9 @@ impl Renderer<'_> {
             self.light_without_shadows(input, reuse.channels, lit, scratch);
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
+            if scratch.groups.wants_checks() {
+                self.check_answers(input, reuse, lit, pixels, scratch, counts);
+            }
         }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
@@ -254,26 +257,9 @@ impl Renderer<'_> {
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
-                let point = &lit[i as usize];
-                let p = point.si.p;
-                if let Some((seen, exact)) = source.area.seen_from(p, point.n) {
-                    let starts = s.starts(self, lit, i);
-                    self.fill(&point.place, source.index, n, pixels, &mut s.u);
-                    for k in 0..n {
-                        let sample = seen.sample(p, point.n, s.u[k].map(f64::from));
-                        s.push_sample(&starts, &sample);
-                    }
-                    if s.is_open() {
-                        // All below the horizon, but some of the light is above: a point of that
-                        // decides, or the horizon's own shadow would be counted twice.
-                        if let Some(sample) = seen.above(p, point.n) {
-                            s.push_sample(&starts, &sample);
-                        }
-                    }
-                    s.close(radiance * exact as f32);
-                } else {
-                    s.close(Rgb::ZERO);
-                }
+                let first = lit[i as usize].place.sample.wrapping_mul(n as u32);
+                let exact = self.rays_to_area(source, (lit, i), (first, n), pixels, s);
+                s.close(exact.map_or(Rgb::ZERO, |exact| radiance * exact as f32));
             }
             counts.shadow_area += s.rays.len() as u64;
             self.settle(lit, group, channel, pixels, s, counts);
@@ -323,25 +309,125 @@ impl Renderer<'_> {
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
-                let point = &lit[i as usize];
-                let facet = s.starts(self, lit, i).facet;
-                let dimension = self.scene.lights.len() as u32;
-                self.fill(&point.place, dimension, n, pixels, &mut s.u);
-                let (ng, basis) = (point.ng, orthonormal_basis(point.n));
-                for k in 0..n {
-                    let local = cosine_hemisphere(s.u[k].map(f64::from));
-                    let dir = to_world(local, basis, point.n);
-                    // Below the facet but above the smooth surface that it stands for: the
-                    // facet's own plane is no occluder.
-                    let dir = super::optics::keep_side(dir, ng, true);
-                    s.push(facet.along(dir), 1.0);
-                }
+                let first = lit[i as usize].place.sample.wrapping_mul(n as u32);
+                self.rays_to_sky((lit, i), (first, n), pixels, s);
                 s.close(irradiance);
             }
             counts.shadow_sky += s.rays.len() as u64;
             self.settle(lit, group, channel, pixels, s, counts);
         }
         s.wanted = wanted;
+    }
+
+    /// Pushes `n` shadow rays from lit point `i` to samples of an area light, from sample number `first`
+    /// on. Gives the unshadowed irradiance per unit of radiance; `None` where none arrives.
+    fn rays_to_area(
+        &self,
+        source: &AreaSource,
+        (lit, i): (&[LitPoint], u32),
+        (first, n): (u32, usize),
+        pixels: &BlockPixels,
+        s: &mut ShadowScratch,
+    ) -> Option<f64> {
+        let point = &lit[i as usize];
+        let p = point.si.p;
+        let (seen, exact) = source.area.seen_from(p, point.n)?;
+        let starts = s.starts(self, lit, i);
+        self.fill(&point.place, source.index, (first, n), pixels, &mut s.u);
+        for k in 0..n {
+            let sample = seen.sample(p, point.n, s.u[k].map(f64::from));
+            s.push_sample(&starts, &sample);
+        }
+        if s.is_open() {
+            // All below the horizon, but some of the light is above: a point of that decides, or the
+            // horizon's own shadow would be counted twice.
+            if let Some(sample) = seen.above(p, point.n) {
+                s.push_sample(&starts, &sample);
+            }
+        }
+        Some(exact)
+    }
+
+    /// Pushes `n` shadow rays from lit point `i` to the sky, from sample number `first` on.
+    fn rays_to_sky(
+        &self,
+        (lit, i): (&[LitPoint], u32),
+        (first, n): (u32, usize),
+        pixels: &BlockPixels,
+        s: &mut ShadowScratch,
+    ) {
+        let point = &lit[i as usize];
+        let facet = s.starts(self, lit, i).facet;
+        let dimension = self.scene.lights.len() as u32;
+        self.fill(&point.place, dimension, (first, n), pixels, &mut s.u);
+        let (ng, basis) = (point.ng, orthonormal_basis(point.n));
+        for k in 0..n {
+            let local = cosine_hemisphere(s.u[k].map(f64::from));
+            let dir = to_world(local, basis, point.n);
+            // Below the facet but above the smooth surface that it stands for: the facet's own plane is
+            // no occluder.
+            let dir = super::optics::keep_side(dir, ng, true);
+            s.push(facet.along(dir), 1.0);
+        }
+    }
+
+    /// Casts the check rays that the inference wants, and tells it what they found.
+    fn check_answers(
+        &self,
+        input: &FrameInput,
+        reuse: &Reuse,
+        lit: &[LitPoint],
+        pixels: &BlockPixels,
+        s: &mut ShadowScratch,
+        counts: &mut RayCounts,
+    ) {
+        let channels = reuse.channels.len();
+        for (at, channel) in reuse.channels.iter().enumerate() {
+            let (n, count) = match channel {
+                Channel::Area(_) => (self.settings.shadow_samples, &mut counts.shadow_area),
+                Channel::Sky => (self.settings.sky_samples, &mut counts.shadow_sky),
+            };
+            let mut wanted = std::mem::take(&mut s.wanted);
+            wanted.clear();
+            wanted.extend(0..lit.len() as u32);
+            s.clear();
+            for &i in &wanted {
+                let rays = s.groups.check_rays(i as usize, at, channels, n as usize);
+                if rays > 0 && s.exact[i as usize * channels + at] != 0.0 {
+                    // Samples that tracing does not use: had it any of these, what is traced because
+                    // of them would be darker or brighter than what is.
+                    let first = self.settings.spp.wrapping_mul(n);
+                    let first = first.wrapping_add(lit[i as usize].place.sample.wrapping_mul(n));
+                    match channel {
+                        Channel::Area(index) => {
+                            let light = &self.scene.lights[index as usize];
+                            let area = input.area_lights[index as usize].as_ref();
+                            if let Some(area) = area {
+                                let source = AreaSource { index, light, area };
+                                self.rays_to_area(&source, (lit, i), (first, rays), pixels, s);
+                            }
+                        }
+                        Channel::Sky => self.rays_to_sky((lit, i), (first, rays), pixels, s),
+                    }
+                }
+                s.close(Rgb::ZERO);
+            }
+            *count += s.rays.len() as u64;
+            s.occluded.clear();
+            s.occluded.resize(s.rays.len(), false);
+            self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
+            let mut start = 0;
+            for (&i, span) in wanted.iter().zip(&s.spans) {
+                let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
+                let rays = span.end - start;
+                start = span.end;
+                if rays > 0 {
+                    s.groups.note_checked(i as usize, (at, channels), (open, all), rays);
+                }
+            }
+            s.wanted = wanted;
+        }
+        s.groups.conclude_checks(reuse);
     }
 
     /// Adds the light of `channel`, of a light with this `radiance`, where its ratio is known. Returns
@@ -374,18 +460,17 @@ impl Renderer<'_> {
         wanted
     }
 
-    /// Stratified points of one light and one place.
+    /// Stratified points of one light and one place: `n` from sample number `first` on.
     fn fill(
         &self,
         place: &SamplePlace,
         light: u32,
-        n: usize,
+        (first, n): (u32, usize),
         pixels: &BlockPixels,
         u: &mut Vec<[f32; 2]>,
     ) {
         u.resize(n, [0.0; 2]);
         let dimension = self.dimension(place, light);
-        let first = place.sample.wrapping_mul(n as u32);
         pixels.sampler(place.pixel).fill2(first, dimension, &mut u[..n]);
     }
 
@@ -411,11 +496,7 @@ impl Renderer<'_> {
         let mut start = 0;
         for (&i, span) in group.iter().zip(&s.spans) {
             let point = &lit[i as usize];
-            let (mut open, mut all) = (0.0, 0.0);
-            for k in start..span.end {
-                all += s.weights[k];
-                open += if s.occluded[k] { 0.0 } else { s.weights[k] };
-            }
+            let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
             if let (Some((channel, channels)), true) = (channel, span.end > start) {
                 s.groups.add(i as usize, channel, channels, open, all);
             }
@@ -427,6 +508,16 @@ impl Renderer<'_> {
             }
         }
     }
+}
+
+/// Sums of the weights of those of `rays` that are not occluded, and of all.
+fn opened(weights: &[f64], occluded: &[bool], rays: std::ops::Range<usize>) -> (f64, f64) {
+    let (mut open, mut all) = (0.0, 0.0);
+    for k in rays {
+        all += weights[k];
+        open += if occluded[k] { 0.0 } else { weights[k] };
+    }
+    (open, all)
 }
 
 /// All points, in order.

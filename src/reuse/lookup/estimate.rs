@@ -130,7 +130,7 @@ impl Lookup<'_> {
 
 /// How many display steps of 1/255 a unit of radiance makes where `radiance` is shown: the slope of
 /// the sRGB curve, as a power of 1/2.4.
-fn steps_per_radiance(radiance: f32) -> f32 {
+pub(in crate::reuse) fn steps_per_radiance(radiance: f32) -> f32 {
     let shown = f64::from(radiance).clamp(0.003, 1.0);
     // Nearly x^(-7/12), by square roots, which are the same on every machine.
     let root = shown.sqrt();

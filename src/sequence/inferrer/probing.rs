@@ -14,6 +14,7 @@ use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Shown};
 use crate::reuse::evidence::{Evidence, Finding};
+use crate::reuse::check::CheckRays;
 use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
 use crate::scene::Camera;
 use crate::sequence::strips::Unheard;
@@ -80,7 +81,7 @@ impl Inferrer<'_> {
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
         let mask = draw.mask(camera.width, camera.height);
         let trace = |stream: u32, lookup| {
-            let probe = Probe::new(lookup, self.channels.len());
+            let probe = Probe::new(lookup, self.channels.len(), r.settings.reuse.tolerance);
             let with_gbuffer = self.with_gbuffer && stream == STREAMS[0];
             let job = self.job(camera, frame | stream, with_gbuffer, Some(&mask));
             let rendered = self.render(job, Some(&probe as &dyn Inference), &Unheard)?;
@@ -91,16 +92,17 @@ impl Inferrer<'_> {
         let found = own.findings(again, r.settings.spp);
         let before = || lookup.references.iter().flat_map(|r| r.findings());
         let tolerance = r.settings.reuse.tolerance;
+        let rays = CheckRays::of(&self.channels, r.settings);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
             let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
-            Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), tolerance)
+            Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), rays, tolerance)
         };
         let crossed = self.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
-        let evidence = Evidence::of(before().chain(&findings), tolerance);
+        let evidence = Evidence::of(before().chain(&findings), rays, tolerance);
         let is_worth_looking =
-            is_worth_looking(&evidence, &findings, &first.reuse, r.scene, &r.plan, r.settings);
+            is_worth_looking(&evidence, &findings, &first.reuse, &first.rays);
         let traces = [first, second];
         let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
         let probed = Arc::new(probed);
@@ -184,7 +186,8 @@ impl Inferrer<'_> {
         self.with_lookup((frame, camera), references, |lookup| {
             let Some(lookup) = lookup else { return Some((RayCounts::default(), None)) };
             let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.part(x, y)];
-            let judged = Judged { lookup: &lookup, evidence: &evidence };
+            let tolerance = self.renderer.settings.reuse.tolerance;
+            let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
             let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
             let inferred = self.render(job, Some(&judged), &Unheard)?;
             Some((inferred.rays, Some(inferred.film)))

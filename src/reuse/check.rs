@@ -1,0 +1,101 @@
+//! Check rays: a few shadow rays that an estimate must not contradict before it is used.
+//!
+//! What a class of estimates gets right on the whole may be wrong at a point beside a shadow's edge. A
+//! fraction of the rays that tracing would take tells such a point.
+
+use crate::inference::{Channels, Questions, check_rays};
+use crate::scene::Settings;
+
+use super::cost::rays_of;
+use super::lookup::steps_per_radiance;
+
+/// An estimate is contradicted when what check rays show is off by more than so many standard deviations
+/// of what as many rays would show if the estimate were right.
+const MOST_DEVIATIONS: f32 = 2.0;
+/// Camera samples of a pixel that are shaded, so checked, at once.
+const TOGETHER: u32 = 4;
+
+/// How many rays check each light of a point, at least: seen directly, and in mirrors and through glass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CheckRays {
+    /// Seen directly.
+    pub direct: u32,
+    /// Seen in mirrors and through glass, each camera sample on its own.
+    pub specular: u32,
+}
+
+impl CheckRays {
+    /// Those of a job that keeps the ratios of `channels`.
+    pub fn of(channels: &Channels, settings: &Settings) -> Self {
+        let fewest = channels.iter().map(|channel| rays_of(channel, settings)).min();
+        let rays = |samples: u32| check_rays(fewest.unwrap_or(1).saturating_mul(samples));
+        Self { direct: rays(settings.spp.min(TOGETHER)), specular: rays(1) }
+    }
+}
+
+/// Whether check rays bear out what other frames suggest about point `at`, all its lights together. An
+/// error of `tolerance` display steps is not seen.
+pub fn agrees(questions: &Questions, at: usize, channels: usize, tolerance: f32) -> bool {
+    let Questions { unshadowed, estimates, checked, .. } = questions;
+    let own = at * channels..(at + 1) * channels;
+    let Some(checked) = checked.get(own.clone()) else { return false };
+    let lights = unshadowed[own.clone()].iter().zip(&estimates[own]).zip(checked);
+    let lights = lights.filter(|((_, estimate), _)| !estimate.ratio.is_nan());
+    let (mut estimated, mut further, mut variance, mut rays) = (0.0, 0.0, 0.0, 0);
+    for ((unshadowed, estimate), checked) in lights {
+        estimated += unshadowed * estimate.ratio;
+        if checked.rays > 0 {
+            rays += checked.rays;
+            further += unshadowed * (checked.ratio - estimate.ratio);
+            let of_ray = unshadowed * unshadowed * estimate.ratio * (1.0 - estimate.ratio);
+            variance += of_ray / checked.rays as f32;
+        }
+    }
+    let steps = steps_per_radiance(estimated);
+    let limit = MOST_DEVIATIONS * MOST_DEVIATIONS * steps * steps * variance;
+    rays > 0 && steps * steps * further * further <= limit.max(tolerance * tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inference::{Checked, Estimate, SurfacePoint};
+    use crate::math::{DVec3, Vec3};
+
+    /// Whether a light of radiance 0.5 that is estimated as `ratio` agrees with `open` of `rays`.
+    fn does_agree(ratio: f32, open: u32, rays: u32) -> bool {
+        let (p, n, geom_id, footprint) = (DVec3::ZERO, Vec3::Y, 0, 1.0);
+        let point = SurfacePoint { p, n, geom_id, footprint, cos: 1.0, direct: true, samples: 1 };
+        let checked = Checked { ratio: open as f32 / rays.max(1) as f32, rays };
+        let questions = Questions {
+            points: vec![point],
+            unshadowed: vec![0.5],
+            estimates: vec![Estimate { ratio, class: 0 }],
+            checked: vec![checked],
+            ..Questions::default()
+        };
+        agrees(&questions, 0, 1, 0.25)
+    }
+
+    #[test]
+    fn what_is_fully_lit_or_shut_is_contradicted_by_one_ray() {
+        assert!(does_agree(1.0, 8, 8) && does_agree(0.0, 0, 8));
+        assert!(!does_agree(1.0, 7, 8) && !does_agree(0.0, 1, 8));
+    }
+
+    #[test]
+    fn half_shadow_is_contradicted_by_many() {
+        assert!(does_agree(0.5, 4, 8) && does_agree(0.5, 2, 8) && does_agree(0.5, 6, 8));
+        assert!(!does_agree(0.5, 0, 8) && !does_agree(0.5, 8, 8));
+    }
+
+    #[test]
+    fn what_nothing_was_cast_for_does_not_agree() {
+        assert!(!does_agree(1.0, 0, 0));
+    }
+
+    #[test]
+    fn a_difference_that_nobody_sees_does_not_count() {
+        assert!(does_agree(1.0, 4095, 4096));
+    }
+}
