@@ -78,21 +78,23 @@ pub struct Origin {
 pub struct Estimate {
     /// Ratio; NaN where no other frame knows it.
     pub ratio: f32,
-    /// Class of the estimate, by what its samples and those beside them look like.
-    pub class: u8,
+    /// Level of its risk, by what the samples around the point look like.
+    pub level: u8,
 }
 
 impl Estimate {
     /// Nothing is known.
-    pub const UNKNOWN: Self = Self { ratio: f32::NAN, class: 0 };
+    pub const UNKNOWN: Self = Self { ratio: f32::NAN, level: 0 };
 }
 
 /// Of the shadow rays that tracing would cast, one in so many checks an answer before it is used.
-pub const RAYS_PER_CHECK: u32 = 8;
+const RAYS_PER_CHECK: u32 = 16;
+/// But no fewer: one ray overlooks half of the shadows that cover half of a light.
+const FEWEST_CHECKS: u32 = 2;
 
 /// How many rays check an answer that saves `rays` shadow rays.
 pub fn check_rays(rays: u32) -> u32 {
-    (rays / RAYS_PER_CHECK).max(1)
+    (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays)
 }
 
 /// What check rays found of one light at a point.

@@ -1,38 +1,14 @@
 //! Check rays: a few shadow rays that an estimate must not contradict before it is used.
 //!
-//! What a class of estimates gets right on the whole may be wrong at a point beside a shadow's edge. A
+//! What is right of a level of risk on the whole may be far off at a point whose shadow no sample saw. A
 //! fraction of the rays that tracing would take tells such a point.
 
-use crate::inference::{Channels, Questions, check_rays};
-use crate::scene::Settings;
-
-use super::cost::rays_of;
 use super::lookup::steps_per_radiance;
+use crate::inference::Questions;
 
 /// An estimate is contradicted when what check rays show is off by more than so many standard deviations
 /// of what as many rays would show if the estimate were right.
 const MOST_DEVIATIONS: f32 = 2.0;
-/// Camera samples of a pixel that are shaded, so checked, at once.
-const TOGETHER: u32 = 4;
-
-/// How many rays check each light of a point, at least: seen directly, and in mirrors and through glass.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CheckRays {
-    /// Seen directly.
-    pub direct: u32,
-    /// Seen in mirrors and through glass, each camera sample on its own.
-    pub specular: u32,
-}
-
-impl CheckRays {
-    /// Those of a job that keeps the ratios of `channels`.
-    pub fn of(channels: &Channels, settings: &Settings) -> Self {
-        let fewest = channels.iter().map(|channel| rays_of(channel, settings)).min();
-        let rays = |samples: u32| check_rays(fewest.unwrap_or(1).saturating_mul(samples));
-        Self { direct: rays(settings.spp.min(TOGETHER)), specular: rays(1) }
-    }
-}
-
 /// Whether check rays bear out what other frames suggest about point `at`, all its lights together. An
 /// error of `tolerance` display steps is not seen.
 pub fn agrees(questions: &Questions, at: usize, channels: usize, tolerance: f32) -> bool {
@@ -70,7 +46,7 @@ mod tests {
         let questions = Questions {
             points: vec![point],
             unshadowed: vec![0.5],
-            estimates: vec![Estimate { ratio, class: 0 }],
+            estimates: vec![Estimate { ratio, level: 0 }],
             checked: vec![checked],
             ..Questions::default()
         };

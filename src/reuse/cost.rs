@@ -3,7 +3,7 @@
 
 use super::evidence::{Evidence, Finding, Verdict};
 use crate::effects::EffectPlan;
-use crate::inference::{Channel, Channels, RAYS_PER_CHECK};
+use crate::inference::{Channel, Channels, check_rays};
 use crate::scene::{Light, Scene, Settings};
 use crate::stats::{RayCounts, ReuseCounts};
 
@@ -112,13 +112,13 @@ pub fn is_worth_looking(
     rays: &RayCounts,
 ) -> bool {
     let all = (points.direct + points.specular) as f64;
-    let of_point = SHADOW_RAY * (rays.shadow_area + rays.shadow_sky) as f64 / all.max(1.0);
-    let check = 1.0 / f64::from(RAYS_PER_CHECK);
-    let saved = |finding: &Finding| match evidence.verdict(finding) {
-        Verdict::Use => 1.0,
-        Verdict::Check if finding.agreed => 1.0 - check,
+    let of_point = (rays.shadow_area + rays.shadow_sky) as f64 / all.max(1.0);
+    let check = f64::from(check_rays(of_point as u32));
+    let saved = |finding: &Finding| match evidence.verdict(finding.level) {
+        Verdict::Use => of_point,
+        Verdict::Check if finding.agreed => of_point - check,
         Verdict::Check => -check,
         Verdict::Trace => 0.0,
     };
-    of_point * findings.iter().map(saved).sum::<f64>() > LOOKUP * all
+    SHADOW_RAY * findings.iter().map(saved).sum::<f64>() > LOOKUP * all
 }

@@ -51,11 +51,10 @@ impl Inference for Judged<'_> {
             if origins[i] == Origin::default() {
                 continue;
             }
-            let usable = (self.evidence)(pixels[i]).at(&points[i]);
-            let known = estimates.iter().position(|estimate| !estimate.ratio.is_nan());
-            let Some(first) = known else { continue };
-            // One class for all lights of a point.
-            let verdict = usable.verdict(estimates[first].class);
+            // One level for all lights of a point.
+            let known = estimates.iter().find(|estimate| !estimate.ratio.is_nan());
+            let Some(known) = known else { continue };
+            let verdict = (self.evidence)(pixels[i]).verdict(known.level);
             if verdict == Verdict::Trace {
                 continue;
             }

@@ -8,8 +8,7 @@
 //! All in scene space.
 
 pub mod audit;
-pub mod check;
-mod class;
+mod check;
 pub mod colour;
 mod cost;
 pub mod evidence;
@@ -17,6 +16,7 @@ mod index;
 mod lookup;
 mod probe;
 mod reference;
+mod risk;
 pub mod store;
 mod taps;
 

@@ -2,7 +2,7 @@
 
 use super::Lookup;
 use super::check::agrees;
-use super::evidence::{Compared, Finding, finding_at};
+use super::evidence::{Compared, Finding, finding_of};
 use crate::inference::{Estimate, Inference, Origin, Questions, SurfacePoint};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
@@ -113,7 +113,7 @@ impl<'a> Probe<'a> {
             }
             let share = own.point.samples as f32 / spp as f32;
             if let Some((_, findings)) = all.last_mut() {
-                findings.extend(finding_at(&own.point, share, &own.lights, own.agreed));
+                findings.extend(finding_of(share, &own.lights, own.agreed));
             }
         }
         all

@@ -12,7 +12,7 @@
 //! what was really read, and every number must be one that tracing could have left.
 
 use super::Reference;
-use super::class::CLASSES;
+use super::risk::LEVELS;
 use super::evidence::Finding;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
@@ -33,8 +33,8 @@ const MAGIC: &[u8; 8] = b"twrayrf3";
 /// Words of a point beside its ratios.
 const WORDS: usize = 12;
 /// Bytes of a finding.
-const FINDING: usize = 8 * 4;
-/// Flag beside a finding's class: check rays agreed.
+const FINDING: usize = 3 * 4;
+/// Flag beside a finding's level: check rays agreed.
 const AGREED: u32 = 1 << 8;
 /// Largest squared error of a finding: from black to white, display steps.
 const MOST_ERROR: f32 = 255.0 * 255.0;
@@ -266,10 +266,10 @@ fn record_of(
 }
 
 fn finding_bytes(finding: &Finding) -> [u8; FINDING] {
-    let Finding { p, footprint, geom_id, class, error, noise, agreed } = *finding;
-    let floats = [p.x, p.y, p.z, footprint, error, noise].map(f32::to_bits);
+    let Finding { level, agreed, error, noise } = *finding;
+    let flag = if agreed { AGREED } else { 0 };
     let mut bytes = [0; FINDING];
-    let words = floats.into_iter().chain([geom_id, u32::from(class) | if agreed { AGREED } else { 0 }]);
+    let words = [error.to_bits(), noise.to_bits(), u32::from(level) | flag];
     for (to, word) in bytes.chunks_exact_mut(4).zip(words) {
         to.copy_from_slice(&word.to_le_bytes());
     }
@@ -282,18 +282,12 @@ fn finding_of(mut bytes: &[u8]) -> Option<Finding> {
     for word in &mut words {
         *word = take_u32(&mut bytes)? as u32;
     }
-    let [x, y, z, footprint, error, noise, geom_id, class] = words;
-    let [x, y, z, footprint, error, noise] = [x, y, z, footprint, error, noise].map(f32::from_bits);
-    let (class, agreed) = (class & !AGREED, class & AGREED != 0);
-    let class = u8::try_from(class).ok().filter(|class| usize::from(*class) < CLASSES)?;
-    let finding = Finding { p: Vec3::new(x, y, z), footprint, geom_id, class, error, noise, agreed };
-    let is_sound = finding.p.is_finite()
-        && footprint.is_finite()
-        && footprint > 0.0
-        && finding.p.abs().max_element() / footprint < MOST_CELLS
-        && error.abs() <= MOST_ERROR
-        && (0.0..=MOST_ERROR).contains(&noise);
-    is_sound.then_some(finding)
+    let [error, noise, flags] = words;
+    let [error, noise] = [error, noise].map(f32::from_bits);
+    let (level, agreed) = (flags & !AGREED, flags & AGREED != 0);
+    let level = u8::try_from(level).ok().filter(|level| usize::from(*level) < LEVELS)?;
+    let is_sound = error.abs() <= MOST_ERROR && (0.0..=MOST_ERROR).contains(&noise);
+    is_sound.then_some(Finding { level, agreed, error, noise })
 }
 
 fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Option<TracedPoints> {
@@ -446,8 +440,8 @@ mod tests {
 
     fn findings() -> Vec<Finding> {
         let p = Vec3::new(0.1, -2.0, 3.5);
-        let one = Finding { p, footprint: 0.1, geom_id: 3, class: 7, error: -0.5, noise: 0.25, agreed: true };
-        vec![one, Finding { class: 0, error: 9.0, agreed: false, ..one }]
+        let one = Finding { level: 7, agreed: true, error: -0.5, noise: 0.25 };
+        vec![one, Finding { level: 0, agreed: false, error: 9.0, noise: 0.0 }]
     }
 
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {

@@ -1,9 +1,9 @@
-//! What the samples about a point suggest of each light: weighted means, lane by lane, and the features
-//! that class them.
+//! What the samples about a point suggest of each light: weighted means, lane by lane, and how
+//! risky they are.
 
 use super::{LEAST_WEIGHT, Lookup};
 use crate::inference::Estimate;
-use crate::reuse::class::Features;
+use crate::reuse::risk::Features;
 use crate::reuse::taps::{ENOUGH_WEIGHT, Taps, sum};
 use wide::{CmpEq, CmpGt, f32x4};
 
@@ -13,7 +13,6 @@ struct Sums {
     weight: f32x4,
     share: f32x4,
     mean: f32x4,
-    squares: f32x4,
     bend: Largest,
     wide: Largest,
     far: Largest,
@@ -44,8 +43,6 @@ impl Largest {
 pub(super) struct Mean {
     /// Weighted mean of the ratios of the taps that know it.
     ratio: f32,
-    /// Their standard deviation.
-    spread: f32,
     /// The largest of the taps' own, see [`Contrast`](crate::reuse::reference::Contrast).
     bend: f32,
     wide: f32,
@@ -70,20 +67,20 @@ impl Lookup<'_> {
         let seen = means.iter().zip(shown).map(|(mean, s)| mean.map_or(0.0, |m| s * m.ratio));
         let steps = steps_per_radiance(seen.sum());
         // Lights err together: what is beside a shadow's edge is beside that of the next lamp too.
-        let mut features =
-            Features { spread: 0.0, bend: 0.0, wide: 0.0, far: 0.0, is_whole: true, is_direct };
+        let (bend, wide, far, unshadowed) = (0.0, 0.0, 0.0, 0.0);
+        let mut features = Features { bend, wide, far, unshadowed, is_whole: true, is_direct };
         for (mean, shown) in means.iter().zip(shown).filter(|(_, shown)| **shown != 0.0) {
             let Some(mean) = mean else { continue };
             let by = steps * shown;
-            features.spread += by * mean.spread;
             features.bend += by * mean.bend;
             features.wide += by * mean.wide;
             features.far += by * mean.far;
+            features.unshadowed += shown;
             features.is_whole &= f64::from(mean.weight) >= ENOUGH_WEIGHT;
         }
-        let class = features.class();
+        let level = features.level();
         for (estimate, mean) in estimates.iter_mut().zip(&*means) {
-            *estimate = mean.map_or(Estimate::UNKNOWN, |m| Estimate { ratio: m.ratio, class });
+            *estimate = mean.map_or(Estimate::UNKNOWN, |m| Estimate { ratio: m.ratio, level });
         }
     }
 
@@ -99,13 +96,12 @@ impl Lookup<'_> {
                 let lane = weight.cmp_gt(f32x4::ZERO).move_mask().trailing_zeros() as usize;
                 first = own.ratio.to_array().get(lane).copied().unwrap_or(first);
             }
-            // From the first, so that equal ones give just that, and no variance.
+            // From the first, so that equal ones give just that.
             let further = (own.ratio - f32x4::splat(first)) & known;
             let share = four.share & known;
             sums.weight += weight;
             sums.share += share;
             sums.mean += share * further;
-            sums.squares += share * further * further;
             sums.bend.note(own.bend);
             sums.wide.note(own.wide);
             sums.far.note(own.far);
@@ -119,7 +115,6 @@ impl Lookup<'_> {
         Some(Mean {
             // Rounding may leave it a little outside.
             ratio: (first + mean).clamp(0.0, 1.0),
-            spread: (sum(sums.squares) * share - mean * mean).max(0.0).sqrt(),
             bend: sums.bend.get(),
             wide: sums.wide.get(),
             far: sums.far.get(),

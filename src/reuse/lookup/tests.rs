@@ -1,4 +1,4 @@
-//! What other surfaces tell is refused, and what is uncertain is classed as that.
+//! What other surfaces tell is refused, and what is uncertain counts as that.
 
 use super::Lookup;
 use crate::inference::{Estimate, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
@@ -61,8 +61,8 @@ fn told(reference: &Reference, point: SurfacePoint) -> f32 {
     estimated(reference, point).ratio
 }
 
-fn class(reference: &Reference, point: SurfacePoint) -> u8 {
-    estimated(reference, point).class
+fn level(reference: &Reference, point: SurfacePoint) -> u8 {
+    estimated(reference, point).level
 }
 
 fn lifted(footprints: f64) -> SurfacePoint {
@@ -150,9 +150,9 @@ fn a_coarser_sampling_is_refused() {
 }
 
 #[test]
-fn what_lies_at_an_edge_is_of_another_class_and_so_is_what_lies_near_one() {
+fn what_lies_at_an_edge_is_of_another_risk_and_so_is_what_lies_near_one() {
     let edge = wall(|x| if x < 32 { 1.0 } else { 0.0 });
-    let at = |x: f64| class(&edge, on_wall(x, 20.0));
+    let at = |x: f64| level(&edge, on_wall(x, 20.0));
     assert_eq!([at(10.5), at(50.5)], [at(20.5); 2], "far from it");
     let near = [at(32.0), at(30.5), at(28.5), at(20.5)];
     let mut different = near.to_vec();
@@ -170,19 +170,19 @@ fn a_steady_change_bends_less_than_a_kink() {
     let steady = wall(|x| (0.5 + 0.02 * (x as f32 - 31.0)).clamp(0.0, 1.0));
     let kink = wall(|x| 0.5 + 0.04 * (x as f32 - 31.0).clamp(0.0, 9.0));
     assert!((told(&steady, point) - 0.496).abs() < 0.01);
-    assert_ne!(class(&steady, point), class(&kink, point));
+    assert_ne!(level(&steady, point), level(&kink, point));
 }
 
 #[test]
-fn samples_to_one_side_are_of_another_class() {
+fn samples_to_one_side_are_of_another_risk() {
     let half = wall(|x| if x < 32 { 1.0 } else { f32::NAN });
     assert_eq!(told(&half, on_wall(32.2, 20.5)), 1.0);
-    assert_ne!(class(&half, on_wall(32.2, 20.5)), class(&half, on_wall(20.2, 20.5)));
+    assert_ne!(level(&half, on_wall(32.2, 20.5)), level(&half, on_wall(20.2, 20.5)));
 }
 
 /// A lamp that errs makes what all lamps together are told uncertain.
 #[test]
-fn lights_share_their_class() {
+fn lights_share_their_level() {
     let mut traced = TracedPoints::default();
     for (x, y) in (0..EDGE).flat_map(|y| (0..EDGE).map(move |x| (x, y))) {
         let point = on_wall(f64::from(x) + 0.5, f64::from(y) + 0.5);
@@ -191,7 +191,7 @@ fn lights_share_their_class() {
     }
     let reference = Reference::new(1, &camera(), &traced, 2);
     let lookup = Lookup { frame: 2, references: &[&reference], channels: 2 };
-    let class_with = |second: f32, x: f64| {
+    let level_with = |second: f32, x: f64| {
         let mut asked = Questions {
             points: vec![on_wall(x, 20.5)],
             pixels: vec![[0; 2]],
@@ -201,11 +201,11 @@ fn lights_share_their_class() {
             origins: vec![Origin::default()],
         };
         lookup.estimate(&mut asked);
-        assert_eq!(asked.estimates[0].class, asked.estimates[1].class);
-        asked.estimates[0].class
+        assert_eq!(asked.estimates[0].level, asked.estimates[1].level);
+        asked.estimates[0].level
     };
-    assert_eq!(class_with(1.0, 10.5), class_with(0.0, 10.5));
-    assert_ne!(class_with(1.0, 31.5), class_with(1.0, 10.5));
+    assert_eq!(level_with(1.0, 10.5), level_with(0.0, 10.5));
+    assert_ne!(level_with(1.0, 31.5), level_with(1.0, 10.5));
     // The second lamp does not shine there.
-    assert_eq!(class_with(0.0, 31.5), class_with(0.0, 10.5));
+    assert_eq!(level_with(0.0, 31.5), level_with(0.0, 10.5));
 }

@@ -14,7 +14,6 @@ use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Shown};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::check::CheckRays;
 use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
 use crate::scene::Camera;
 use crate::sequence::strips::Unheard;
@@ -92,15 +91,14 @@ impl Inferrer<'_> {
         let found = own.findings(again, r.settings.spp);
         let before = || lookup.references.iter().flat_map(|r| r.findings());
         let tolerance = r.settings.reuse.tolerance;
-        let rays = CheckRays::of(&self.channels, r.settings);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
             let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
-            Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), rays, tolerance)
+            Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), tolerance)
         };
         let crossed = self.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
-        let evidence = Evidence::of(before().chain(&findings), rays, tolerance);
+        let evidence = Evidence::of(before().chain(&findings), tolerance);
         let is_worth_looking =
             is_worth_looking(&evidence, &findings, &first.reuse, &first.rays);
         let traces = [first, second];

@@ -1,0 +1,131 @@
+//! Risk of an estimate: how far it could be off, by what a lookup sees around the point.
+//!
+//! That is no claim how far it is off. It is a scale on which estimates are sorted; up to where on it they
+//! may be used is decided by what probes find ([`super::evidence`]).
+
+use crate::math::srgb_encode;
+
+/// Differences below this show as nothing, display steps.
+const CALM: f32 = 0.25;
+/// Steps of the scale, each half an octave of the risk.
+pub const STEPS: usize = 24;
+/// Half an octave of the risk in its third power.
+const HALF_OCTAVE_CUBED: f32 = 2.828_427;
+/// How many steps there are in all: those of points seen directly, then those of points seen in mirrors and
+/// through glass.
+pub const LEVELS: usize = 2 * STEPS;
+/// Levels whose estimates need no check: there is no contrast that anybody could see.
+const UNCHECKED: usize = 2;
+
+/// What a lookup sees of a point's light, all lights together, display steps. NaN where too few samples are
+/// known.
+#[derive(Debug, Clone, Copy)]
+pub struct Features {
+    /// By how much a tap's ratio is off the mean of those on opposite sides of it, at most: what bends
+    /// there is what a mean of taps misses.
+    pub bend: f32,
+    /// Largest difference between a tap's ratio and those of the 5 x 5 samples about it.
+    pub wide: f32,
+    /// The same of the 9 x 9 samples.
+    pub far: f32,
+    /// Radiance without shadows, exposure applied; stands in for what is not known.
+    pub unshadowed: f32,
+    /// Whether the taps surround the point.
+    pub is_whole: bool,
+    /// Whether a camera ray ends at the point, not one from a mirror or glass.
+    pub is_direct: bool,
+}
+
+impl Features {
+    /// The level on the scale, below [`LEVELS`].
+    pub fn level(&self) -> u8 {
+        let cubed = self.risk_cubed();
+        let mut step = 0;
+        let mut limit = CALM * CALM * CALM * HALF_OCTAVE_CUBED;
+        while step + 1 < STEPS && cubed >= limit {
+            limit *= HALF_OCTAVE_CUBED;
+            step += 1;
+        }
+        (if self.is_direct { step } else { STEPS + step }) as u8
+    }
+
+    /// Third power of the risk: the geometric mean of bend and both contrasts; twice that where the taps lie
+    /// on one side of the point.
+    fn risk_cubed(&self) -> f32 {
+        let Self { bend, wide, far, .. } = *self;
+        let is_known = !(bend + wide + far).is_nan();
+        // What is not known may be as large as the light: from full to none.
+        let most = if is_known { 0.0 } else { shown(self.unshadowed) };
+        let or = |x: f32, most: f32| if x.is_nan() { most } else { x }.max(CALM);
+        let apart = if self.is_whole { 1.0 } else { 8.0 };
+        apart * or(bend, 0.5 * most) * or(wide, most) * or(far, most)
+    }
+}
+
+/// Display steps that `radiance` is shown as.
+pub fn shown(radiance: f32) -> f32 {
+    (255.0 * srgb_encode(f64::from(radiance.clamp(0.0, 1.0)))) as f32
+}
+
+/// The risk of the estimates of `level`, display steps: in the middle of what falls there.
+pub fn risk_of(level: usize) -> f64 {
+    let step = (level % STEPS) as f64;
+    f64::from(CALM) * (0.5 * (step + 0.5)).exp2()
+}
+
+/// Whether estimates of `level` are checked by rays before they are used.
+pub fn is_checked(level: u8) -> bool {
+    usize::from(level) % STEPS >= UNCHECKED
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CALMEST: Features = Features {
+        bend: 0.0,
+        wide: 0.0,
+        far: 0.0,
+        unshadowed: 0.5,
+        is_whole: true,
+        is_direct: true,
+    };
+
+    #[test]
+    fn each_feature_raises_the_risk() {
+        assert_eq!(CALMEST.level(), 0);
+        assert!(!is_checked(0) && is_checked(2) && !is_checked(STEPS as u8));
+        let features = Features { bend: 1.0, wide: 2.0, far: 4.0, ..CALMEST };
+        // The geometric mean is 2: three octaves above the calm.
+        assert_eq!(features.level(), 6);
+        let riskier = [
+            Features { bend: 4.0, ..features },
+            Features { wide: 8.0, ..features },
+            Features { far: 16.0, ..features },
+            Features { bend: f32::NAN, ..features },
+            Features { wide: f32::NAN, ..features },
+            Features { far: f32::NAN, ..features },
+            Features { is_whole: false, ..features },
+        ];
+        assert!(riskier.iter().all(|r| r.level() > 6 && usize::from(r.level()) < STEPS));
+        let specular = Features { is_direct: false, ..features };
+        assert_eq!(usize::from(specular.level()), STEPS + 6);
+    }
+
+    #[test]
+    fn the_scale_has_two_ends() {
+        let most = Features { bend: 1e9, wide: 1e9, far: 1e9, is_direct: false, ..CALMEST };
+        assert_eq!(usize::from(most.level()), LEVELS - 1);
+        let infinite = Features { bend: f32::INFINITY, ..CALMEST };
+        assert_eq!(usize::from(infinite.level()), STEPS - 1);
+    }
+
+    #[test]
+    fn a_level_stands_for_the_risks_that_fall_there() {
+        for step in 0..STEPS {
+            let risk = risk_of(step) as f32;
+            let even = Features { bend: risk, wide: risk, far: risk, ..CALMEST };
+            assert_eq!(usize::from(even.level()), step);
+        }
+    }
+}
