@@ -5,7 +5,7 @@ use super::evidence::{Evidence, Finding, Verdict};
 use crate::effects::EffectPlan;
 use crate::inference::{Channel, Channels, check_rays};
 use crate::scene::{Light, Scene, Settings};
-use crate::stats::{RayCounts, ReuseCounts};
+use crate::stats::RayCounts;
 
 /// A camera ray with the look at its surface: the unit.
 const CAMERA_RAY: f64 = 1.0;
@@ -15,6 +15,10 @@ const SPECULAR_RAY: f64 = 2.0;
 const SHADOW_RAY: f64 = 1.2;
 /// Looking one surface point up.
 const LOOKUP: f64 = 1.5;
+/// The same where little is found, in all references, with what it costs to keep the point for others.
+const LOOKUP_IN_ALL: f64 = 10.0;
+/// Camera samples of a pixel that are looked up together, at most.
+const SHADED_TOGETHER: u32 = 4;
 
 /// Whether a lookup is cheaper than `rays` shadow rays.
 fn is_worth(rays: u32) -> bool {
@@ -103,22 +107,27 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
+/// Shadow rays to the kept `channels` of one surface point.
+pub fn rays_of_point(channels: &Channels, settings: &Settings) -> u64 {
+    let samples = u64::from(settings.spp.min(SHADED_TOGETHER));
+    channels.iter().map(|channel| samples * u64::from(rays_of(channel, settings))).sum()
+}
+
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
-/// was found at probes. They have `points` surface points, all of which were traced with `rays`.
-pub fn is_worth_looking(
+/// probes found. A point takes so many `rays` where it is traced.
+pub fn is_worth_looking<'f>(
     evidence: &Evidence,
-    findings: &[Finding],
-    points: &ReuseCounts,
-    rays: &RayCounts,
+    findings: impl Iterator<Item = &'f Finding>,
+    rays: u64,
 ) -> bool {
-    let all = (points.direct + points.specular) as f64;
-    let of_point = (rays.shadow_area + rays.shadow_sky) as f64 / all.max(1.0);
-    let check = f64::from(check_rays(of_point as u32));
+    let all = rays as f64;
+    let check = f64::from(check_rays(rays as u32));
     let saved = |finding: &Finding| match evidence.verdict(finding.level) {
-        Verdict::Use => of_point,
-        Verdict::Check if finding.agreed => of_point - check,
+        Verdict::Use => all,
+        Verdict::Check if finding.agreed => all - check,
         Verdict::Check => -check,
         Verdict::Trace => 0.0,
     };
-    SHADOW_RAY * findings.iter().map(saved).sum::<f64>() > LOOKUP * all
+    let gain = |finding: &Finding| SHADOW_RAY * saved(finding) - LOOKUP_IN_ALL;
+    findings.map(gain).sum::<f64>() > 0.0
 }

@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn levels_tell_of_those_beside_and_below_them() {
-        let clean = vec![found(EDGE, 0.0, 0.5); 4000];
+        let clean = vec![found(EDGE, 0.0, 0.5); 1000];
         let verdict = |level| verdict(&clean, level);
         assert_eq!(verdict(EDGE + 1), Verdict::Check);
         assert_eq!(verdict(EDGE + 2), Verdict::Trace);

@@ -439,7 +439,6 @@ mod tests {
     }
 
     fn findings() -> Vec<Finding> {
-        let p = Vec3::new(0.1, -2.0, 3.5);
         let one = Finding { level: 7, agreed: true, error: -0.5, noise: 0.25 };
         vec![one, Finding { level: 0, agreed: false, error: 9.0, noise: 0.0 }]
     }

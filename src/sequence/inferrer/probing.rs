@@ -14,7 +14,8 @@ use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Shown};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
+use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference};
+use crate::reuse::{is_worth_looking, rays_of_point};
 use crate::scene::Camera;
 use crate::sequence::strips::Unheard;
 use crate::shade::{FrameJob, Rendered};
@@ -29,7 +30,9 @@ const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
 /// How many times the usual share of the pixels is probed where no, or one, other frame has probes.
 const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
 /// Where a frame is small, as many pixels are probed as if it had this many.
-const LEAST: f64 = 50_000.0;
+const LEAST: f64 = 25_000.0;
+/// Share of the usual that is probed where the frames before say that looking up does not pay.
+const HOPELESS: f64 = 0.25;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
 
@@ -70,8 +73,13 @@ impl Inferrer<'_> {
             return Some(probed);
         }
         let r = &self.renderer;
+        let tolerance = r.settings.reuse.tolerance;
+        let rays = rays_of_point(&self.channels, r.settings);
+        let before = || lookup.references.iter().flat_map(|r| r.findings());
         let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
-        let first = FIRST[known.min(FIRST.len() - 1)];
+        let is_hopeless =
+            known > 0 && !is_worth_looking(&Evidence::of(before(), tolerance), before(), rays);
+        let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes);
         let share = (first * usual * (LEAST / pixels).max(1.0)).min(MOST);
@@ -89,8 +97,6 @@ impl Inferrer<'_> {
         let (first, own) = trace(STREAMS[0], Some(lookup))?;
         let (second, again) = trace(STREAMS[1], None)?;
         let found = own.findings(again, r.settings.spp);
-        let before = || lookup.references.iter().flat_map(|r| r.findings());
-        let tolerance = r.settings.reuse.tolerance;
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
             let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
@@ -100,7 +106,7 @@ impl Inferrer<'_> {
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         let is_worth_looking =
-            is_worth_looking(&evidence, &findings, &first.reuse, &first.rays);
+            is_worth_looking(&evidence, findings.iter(), rays);
         let traces = [first, second];
         let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
         let probed = Arc::new(probed);
