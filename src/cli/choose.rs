@@ -20,6 +20,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::time::{Duration, Instant};
 
+/// Share of the job that a probe for a target takes: what it saves is to be more.
+const PROBE_SHARE: f64 = 0.15;
+
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
 #[command(next_help_heading = "Choice")]
@@ -250,7 +253,10 @@ impl Chooser<'_> {
         let start = Instant::now();
         let budget = Budget::of(self);
         let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
-        let foretelling = probe.look(&|what| self.tell(format!("probe: {what}")))?;
+        let foretelling = match self.args.target {
+            Some(goal) => self.look(goal, timer)?,
+            None => probe.look(&|what| self.tell(format!("probe: {what}")))?,
+        };
         let allowed = self.args.target.map(|goal| foretelling.allowed(goal));
         let found = match (allowed, &budget) {
             (Some(allowed), _) => probe.fastest(&foretelling, allowed, timer)?,
@@ -283,6 +289,26 @@ impl Chooser<'_> {
             self.warn("no setting is foretold to fit this time; the fastest is taken".into());
         }
         Ok(choice)
+    }
+
+    /// Looks at the scene for about as long as `PROBE_SHARE` of the job that `goal` makes: briefly at first, and
+    /// again where that leaves time for much more.
+    fn look(&self, goal: Goal, timer: Timer) -> Result<Foretelling> {
+        let begun = Instant::now();
+        let told = |what: &str| self.tell(format!("probe: {what}"));
+        let brief = Probe { seconds: Some(0.0), ..self.probe() };
+        let first = brief.look(&told)?;
+        let Some(found) = brief.fastest(&first, first.allowed(goal), timer)? else {
+            return self.probe().look(&told);
+        };
+        let job = found.seconds * brief.frames_each(found.reuse);
+        let spent = begun.elapsed().as_secs_f64();
+        let left = PROBE_SHARE * job - spent;
+        if left < spent {
+            return Ok(first);
+        }
+        self.tell("there is time for a longer look".into());
+        Probe { seconds: Some(left), ..self.probe() }.look(&told)
     }
 
     /// What to say where no setting will do.

@@ -17,6 +17,8 @@ const SHADOW_RAY: f64 = 1.2;
 const LOOKUP: f64 = 1.5;
 /// The same where little is found, in all references, with what it costs to keep the point for others.
 const LOOKUP_IN_ALL: f64 = 10.0;
+/// The same with probes and check rays.
+const REUSE: f64 = 14.0;
 /// Camera samples of a pixel that are looked up together, at most.
 const SHADED_TOGETHER: u32 = 4;
 
@@ -35,14 +37,16 @@ pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
 
 /// The lights whose ratios are worth keeping.
 pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channels {
-    Channels::of(scene, |channel| {
+    let kept = Channels::of(scene, |channel| {
         let runs = match channel {
             Channel::Area(_) => plan.area_lights,
             Channel::Sky => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
         runs && is_worth(rays_of(channel, settings).saturating_mul(settings.spp))
-    })
+    });
+    let all = SHADOW_RAY * rays_of_point(&kept, settings) as f64;
+    if all > REUSE { kept } else { Channels::of(scene, |_| false) }
 }
 
 /// Whether a light's shadowing is looked up in other frames, and why.
@@ -70,7 +74,7 @@ pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> 
         let looked_up = kept.of_light(index as u32).is_some();
         let why = channel.map_or_else(
             || "one hard shadow ray is not worth a lookup".into(),
-            |channel| why(rays_of(channel, settings), settings.spp),
+            |channel| why(rays_of(channel, settings), looked_up, settings.spp),
         );
         reasons.push(LookupReason {
             light: format!("light {}, {kind}", index + 1),
@@ -79,22 +83,24 @@ pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> 
         });
     }
     if plan.sky_light {
-        let why = why(rays_of(Channel::Sky, settings), settings.spp);
-        reasons.push(LookupReason { light: "sky".into(), looked_up: kept.sky().is_some(), why });
+        let looked_up = kept.sky().is_some();
+        let why = why(rays_of(Channel::Sky, settings), looked_up, settings.spp);
+        reasons.push(LookupReason { light: "sky".into(), looked_up, why });
     }
     reasons
 }
 
-/// Why `rays` shadow rays of each of `spp` camera samples are looked up or not.
-fn why(rays: u32, spp: u32) -> String {
+/// Why `rays` shadow rays of each of `spp` camera samples are `looked_up` or not.
+fn why(rays: u32, looked_up: bool, spp: u32) -> String {
     let all = rays.saturating_mul(spp);
     if all == 0 {
         return "it has no samples".into();
     }
     let rays = if all == 1 { "one shadow ray".into() } else { format!("{all} shadow rays") };
-    match is_worth(all) {
-        true => format!("one lookup costs less than a pixel's {rays}"),
-        false => format!("a lookup costs more than a pixel's {rays}"),
+    match (looked_up, is_worth(all)) {
+        (true, _) => format!("one lookup costs less than a pixel's {rays}"),
+        (false, false) => format!("a lookup costs more than a pixel's {rays}"),
+        (false, true) => format!("a pixel's {rays}, and those to other lights, are too few for reuse"),
     }
 }
 

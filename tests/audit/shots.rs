@@ -77,9 +77,9 @@ impl Set {
 }
 
 impl Stage<'_> {
-    /// Settings of shot `number`: 4, 8 or 16 shadow samples, and a seed of its own.
+    /// Settings of shot `number`: 16, 24 or 32 shadow samples, and a seed of its own.
     pub fn settings(&self, trial: &Trial, number: u32) -> Settings {
-        let samples = [4, 8, 16][number as usize % 3];
+        let samples = [16, 24, 32][number as usize % 3];
         Settings {
             width: trial.edge,
             height: trial.edge,

@@ -147,9 +147,10 @@ fn a_denser_and_longer_move_starts_warm() {
     let job = Job::new();
     scene(&job, "short.toml", &pan(9, 1.0));
     scene(&job, "long.toml", &pan(21, 1.5));
-    job.done("render short.toml -o base/f_#.exr");
+    let samples = "--shadow-samples 64 --sky-samples 64";
+    job.done(&format!("render short.toml {samples} -o base/f_#.exr"));
     // In frames as small as these little can be vouched for: that is not what is tested here.
-    let long = "render long.toml --tolerance 255 --probes 0.0003";
+    let long = format!("render long.toml {samples} --tolerance 255 --probes 0.002");
     job.done(&format!("{long} -o cold/f_##.exr --stats cold.json"));
     let warm = format!("{long} --references base");
     job.done(&format!("{warm} -o warm/f_##.exr --stats warm.json --maps"));

@@ -99,7 +99,8 @@ pub fn audited_reuse(size: Size) -> Outcome {
             (inferred, traced) = (inferred + audited.truth.shown, traced + audited.truth.traced);
         }
         let ratio = (inferred / traced).sqrt();
-        outcome.check(ratio <= 1.0, || format!("{name}: inferred {ratio:.3} times as far off"));
+        // After the cut nearly all is traced, so equal but for chance.
+        outcome.check(ratio <= 1.005, || format!("{name}: inferred {ratio:.3} times as far off"));
         outcome.show(format!("{name}: error over that of tracing {ratio:.3}"));
     }
     let share = |held: u32| f64::from(held) / f64::from(shots);
