@@ -25,7 +25,7 @@ impl Effort {
     /// What a probe does that has time.
     pub const WHOLE: Self = Self { frames: 16, pixels: 800, picture: 100_000.0, small: 7_000.0 };
     /// Less than this says nothing.
-    pub const LEAST: Self = Self { frames: 3, pixels: 200, picture: 10_000.0, small: 1_200.0 };
+    pub const LEAST: Self = Self { frames: 8, pixels: 100, picture: 10_000.0, small: 1_200.0 };
 
     /// What a probe can do in about `seconds`, where tracing takes `each` seconds a camera sample.
     pub fn within(seconds: f64, each: f64) -> Self {
@@ -76,9 +76,9 @@ mod tests {
         let large = 640 * 360;
         assert_eq!(Effort::of_check(2.0, 2.0, 16, large), Some(Effort::WHOLE));
         let least = Effort::of_check(0.1, 2.0, 16, large).expect("time for the least");
-        assert_eq!((least.frames, least.pixels), (3, 200));
-        // Three frames of 300 pixels of sixteen of 1200.
-        let least = 3.0 * 300.0 / (16.0 * 1200.0);
+        assert_eq!((least.frames, least.pixels), (8, 100));
+        // Eight frames of 150 pixels of sixteen of 1200.
+        let least = 8.0 * 150.0 / (16.0 * 1200.0);
         assert_eq!(Effort::LEAST.looked_at(100, large), least);
         assert_eq!(Effort::of_check(1.9 * least, 2.0, 16, large), None);
         assert_eq!(Effort::WHOLE.looked_at(3, 256), 3.0 * 256.0 / (16.0 * 1200.0));

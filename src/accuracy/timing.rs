@@ -18,6 +18,8 @@ const LARGER: f64 = 3.0;
 const SLOWER: f64 = 2.5;
 /// Shares of what is left of a time that the trials of what may fit it take, one after the other.
 const SHARES: [f64; 3] = [0.12, 0.06, 0.04];
+/// Share of the job that each trial of what may be fastest takes.
+const TRIED: f64 = 0.04;
 /// Frames of fewer pixels than this are too unlike larger ones to tell what these take.
 const LEAST: f64 = 600.0;
 
@@ -47,10 +49,21 @@ impl Probe<'_> {
     ) -> Result<Option<Foretold>> {
         let mut found = likely(foretelling.fastest(&self.range(), allowed));
         for foretold in &mut found {
-            let timing = Timing { foretold: foretold.clone(), small: Effort::WHOLE.small };
-            foretold.seconds = timer(&timing)?;
+            let time = TRIED * foretold.seconds * self.frames_each(foretold.reuse);
+            let small = self.small_within(time, foretold);
+            if small >= LEAST {
+                let timing = Timing { foretold: foretold.clone(), small };
+                foretold.seconds = timer(&timing)?;
+            }
         }
         Ok(found.into_iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
+    }
+
+    /// Seconds that all frames are foretold to take this rank by the fastest setting whose squared error is
+    /// `allowed`, without trying any; `None` where there is none.
+    pub fn fastest_seconds(&self, foretelling: &Foretelling, allowed: f64) -> Option<f64> {
+        let found = likely(foretelling.fastest(&self.range(), allowed));
+        found.iter().map(|f| f.seconds * self.frames_each(f.reuse)).min_by(f64::total_cmp)
     }
 
     /// The best setting whose frames are rendered within `left` seconds, which are asked for anew each

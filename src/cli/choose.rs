@@ -21,7 +21,12 @@ use serde_json::Value;
 use std::time::{Duration, Instant};
 
 /// Share of the job that a probe for a target takes: what it saves is to be more.
-const PROBE_SHARE: f64 = 0.15;
+const PROBE_SHARE: f64 = 0.1;
+/// Shares of the allowed squared error that a choice aims at after a brief and after a longer look: what some
+/// frames showed is off in others, and a miss costs the job once more.
+const BRIEFLY: f64 = 0.7;
+/// See [`BRIEFLY`].
+const LONGER: f64 = 0.85;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
@@ -253,13 +258,18 @@ impl Chooser<'_> {
         let start = Instant::now();
         let budget = Budget::of(self);
         let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
-        let foretelling = match self.args.target {
-            Some(goal) => self.look(goal, timer)?,
-            None => probe.look(&|what| self.tell(format!("probe: {what}")))?,
+        let (foretelling, aim) = match self.args.target {
+            Some(goal) => self.look(goal).map(|(found, aim)| (found, Some(aim)))?,
+            None => (probe.look(&|what| self.tell(format!("probe: {what}")))?, None),
         };
         let allowed = self.args.target.map(|goal| foretelling.allowed(goal));
-        let found = match (allowed, &budget) {
-            (Some(allowed), _) => probe.fastest(&foretelling, allowed, timer)?,
+        let aimed = |aim| probe.fastest(&foretelling, aim, timer);
+        let found = match (aim, &budget) {
+            // What is just within reach leaves no room to aim at more.
+            (Some(aim), _) => match aimed(aim)? {
+                None => allowed.map_or(Ok(None), aimed)?,
+                found => found,
+            },
             (_, Some(budget)) => {
                 let left = |samples| budget.left(&foretelling, samples);
                 probe.best_within(&foretelling, &left, timer)?
@@ -292,23 +302,22 @@ impl Chooser<'_> {
     }
 
     /// Looks at the scene for about as long as `PROBE_SHARE` of the job that `goal` makes: briefly at first, and
-    /// again where that leaves time for much more.
-    fn look(&self, goal: Goal, timer: Timer) -> Result<Foretelling> {
+    /// again where that leaves time for much more. With the squared error to aim at.
+    fn look(&self, goal: Goal) -> Result<(Foretelling, f64)> {
         let begun = Instant::now();
         let told = |what: &str| self.tell(format!("probe: {what}"));
         let brief = Probe { seconds: Some(0.0), ..self.probe() };
         let first = brief.look(&told)?;
-        let Some(found) = brief.fastest(&first, first.allowed(goal), timer)? else {
-            return self.probe().look(&told);
-        };
-        let job = found.seconds * brief.frames_each(found.reuse);
-        let spent = begun.elapsed().as_secs_f64();
-        let left = PROBE_SHARE * job - spent;
-        if left < spent {
-            return Ok(first);
+        let (aim, spent) = (BRIEFLY * first.allowed(goal), begun.elapsed().as_secs_f64());
+        let job = brief.fastest_seconds(&first, aim);
+        let left = job.map(|job| PROBE_SHARE * job - spent);
+        if left.is_some_and(|left| left < spent) {
+            return Ok((first, aim));
         }
         self.tell("there is time for a longer look".into());
-        Probe { seconds: Some(left), ..self.probe() }.look(&told)
+        let foretelling = Probe { seconds: left, ..self.probe() }.look(&told)?;
+        let aim = LONGER * foretelling.allowed(goal);
+        Ok((foretelling, aim))
     }
 
     /// What to say where no setting will do.

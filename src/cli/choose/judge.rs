@@ -12,6 +12,9 @@ use crate::page::words::seconds;
 /// How often a target that was missed is tightened.
 const ROUNDS: u32 = 2;
 
+/// Share of the job that a look at what came out takes, where no time is to be kept.
+const CHECK_SHARE: f64 = 0.1;
+
 impl Chooser<'_> {
     /// Says what came out of `choice`, and makes a tighter one where the target was missed.
     ///
@@ -27,7 +30,7 @@ impl Chooser<'_> {
         let samples = choice.foretold.samples;
         let budget = Budget::of(self);
         let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
-            None => Effort::WHOLE,
+            None => self.effort_of_check(&choice),
             Some(Ok(effort)) => effort,
             Some(Err(least)) => {
                 self.tell_unchecked(&choice, least, rendered);
@@ -53,6 +56,16 @@ impl Chooser<'_> {
         self.tell(format!("came out: {figure}{psnr}{time}"));
         let came_out = Some(format!("{figure}{psnr}"));
         self.weigh(Choice { came_out, ..choice }, &check, audit, timer)
+    }
+
+    /// How much to look at where no time is to be kept: for a small share of the job.
+    fn effort_of_check(&self, choice: &Choice) -> Effort {
+        let whole = Check::seconds(&choice.foretelling, choice.foretold.samples);
+        let (frames, settings) = (self.request.frames, self.stage.base);
+        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let count = frames.last - frames.first + 1;
+        let effort = Effort::of_check(CHECK_SHARE * choice.seconds, whole, count, pixels);
+        effort.unwrap_or(Effort::LEAST)
     }
 
     /// `choice` with its verdict, or a tighter one where the target was missed and one may be had.
