@@ -100,7 +100,9 @@ fn why(rays: u32, looked_up: bool, spp: u32) -> String {
     match (looked_up, is_worth(all)) {
         (true, _) => format!("one lookup costs less than a pixel's {rays}"),
         (false, false) => format!("a lookup costs more than a pixel's {rays}"),
-        (false, true) => format!("a pixel's {rays}, and those to other lights, are too few for reuse"),
+        (false, true) => {
+            format!("a pixel's {rays}, and those to other lights, are too few for reuse")
+        }
     }
 }
 

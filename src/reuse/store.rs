@@ -12,8 +12,8 @@
 //! what was really read, and every number must be one that tracing could have left.
 
 use super::Reference;
-use super::risk::LEVELS;
 use super::evidence::Finding;
+use super::risk::LEVELS;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};

@@ -189,9 +189,8 @@ impl Groups {
         }
         let samples = self.asked.points[group].samples;
         let all = check_rays(samples.saturating_mul(rays as u32));
-        let until = |samples_before: u32| {
-            u64::from(samples_before) * u64::from(all) / u64::from(samples)
-        };
+        let until =
+            |samples_before: u32| u64::from(samples_before) * u64::from(all) / u64::from(samples);
         (until(self.before[i] + 1) - until(self.before[i])) as usize
     }
 

@@ -105,8 +105,7 @@ impl Inferrer<'_> {
         let crossed = self.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
-        let is_worth_looking =
-            is_worth_looking(&evidence, findings.iter(), rays);
+        let is_worth_looking = is_worth_looking(&evidence, findings.iter(), rays);
         let traces = [first, second];
         let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
         let probed = Arc::new(probed);
