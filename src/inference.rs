@@ -89,8 +89,8 @@ impl Estimate {
 
 /// Of the shadow rays that tracing would cast, one in so many checks an answer before it is used.
 const RAYS_PER_CHECK: u32 = 16;
-/// But no fewer: one ray overlooks half of the shadows that cover half of a light.
-const FEWEST_CHECKS: u32 = 2;
+/// But no fewer: two overlook a fourth of the shadows that cover half of a light.
+const FEWEST_CHECKS: u32 = 4;
 
 /// How many rays check an answer that saves `rays` shadow rays.
 pub fn check_rays(rays: u32) -> u32 {

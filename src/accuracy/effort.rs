@@ -32,6 +32,14 @@ impl Effort {
         Self::WHOLE.part(seconds / (PROBE_WORK * each.max(1e-12)))
     }
 
+    /// The same where there are only so many frames: with as many pixels in all, if that is no more of each
+    /// than a whole probe looks at.
+    pub fn of_frames(self, frames: u32) -> Self {
+        let all = self.frames * self.pixels;
+        let pixels = (all / frames.clamp(1, self.frames)).min(Self::WHOLE.pixels);
+        Self { pixels: pixels.max(self.pixels), ..self }
+    }
+
     /// The most that a check can look at in `seconds`, in a job of `frames` frames of `pixels` pixels,
     /// where a whole check of a long one of large frames takes `whole` seconds; `None` where even the
     /// least that says something takes longer.
@@ -75,7 +83,7 @@ mod tests {
     fn a_check_looks_at_what_there_is_and_at_no_more_than_there_is_time_for() {
         let large = 640 * 360;
         assert_eq!(Effort::of_check(2.0, 2.0, 16, large), Some(Effort::WHOLE));
-        let least = Effort::of_check(0.1, 2.0, 16, large).expect("time for the least");
+        let least = Effort::of_check(0.13, 2.0, 16, large).expect("time for the least");
         assert_eq!((least.frames, least.pixels), (8, 100));
         // Eight frames of 150 pixels of sixteen of 1200.
         let least = 8.0 * 150.0 / (16.0 * 1200.0);
@@ -83,9 +91,11 @@ mod tests {
         assert_eq!(Effort::of_check(1.9 * least, 2.0, 16, large), None);
         assert_eq!(Effort::WHOLE.looked_at(3, 256), 3.0 * 256.0 / (16.0 * 1200.0));
         assert_eq!(Effort::of_check(0.081, 2.0, 3, 256), Some(Effort::WHOLE));
-        assert_eq!(Effort::of_check(0.079, 2.0, 3, 256), None);
+        // Three frames of 150 pixels.
+        assert!(Effort::of_check(0.048, 2.0, 3, 256).is_some());
+        assert_eq!(Effort::of_check(0.046, 2.0, 3, 256), None);
         let mut last = f64::INFINITY;
-        for seconds in [3.0, 1.0, 0.5, 0.2, 0.1] {
+        for seconds in [3.0, 1.0, 0.5, 0.2, 0.13] {
             let effort = Effort::of_check(seconds, 2.0, 16, large).expect("time for some");
             let share = effort.looked_at(16, large);
             assert!(2.0 * share <= seconds && share <= last, "{effort:?}");
@@ -105,6 +115,10 @@ mod tests {
         assert_eq!(Effort::within(9.0, 1e-6), Effort::WHOLE);
         assert_eq!(Effort::within(0.0, 1e-6), Effort::LEAST);
         assert_eq!(Effort::within(1.0, 0.0), Effort::WHOLE);
+        assert_eq!(Effort::LEAST.of_frames(100), Effort::LEAST);
+        assert_eq!(Effort::LEAST.of_frames(2).pixels, 400);
+        assert_eq!(Effort::LEAST.of_frames(1).pixels, 800);
+        assert_eq!(Effort::WHOLE.of_frames(1), Effort::WHOLE);
         // A fourth of the time: half the frames, half their pixels.
         let part = Effort::within(2.25, 1e-6);
         assert_eq!((part.frames, part.pixels, part.small), (8, 400, 1750.0));

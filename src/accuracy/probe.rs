@@ -90,7 +90,8 @@ impl Probe<'_> {
         self.stage.trace(&settings, self.stage.intersector, middle)?;
         let samples = f64::from(settings.width) * f64::from(settings.height);
         let spent = begun.elapsed().as_secs_f64();
-        Ok(Effort::within(seconds - spent, spent / samples))
+        let FrameRange { first, last } = self.frames;
+        Ok(Effort::within(seconds - spent, spent / samples).of_frames(last - first + 1))
     }
 
     /// What may be chosen.
