@@ -1,7 +1,7 @@
 //! What is worth a lookup: decided from a fixed table of costs, never from measured times, so that
 //! every machine decides alike.
 
-use super::evidence::{Evidence, Finding, Verdict};
+use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
 use crate::inference::{Channel, Channels, check_rays};
 use crate::scene::{Light, Scene, Settings};
@@ -130,11 +130,10 @@ pub fn is_worth_looking<'f>(
 ) -> bool {
     let all = rays as f64;
     let check = f64::from(check_rays(rays as u32));
-    let saved = |finding: &Finding| match evidence.verdict(finding.level) {
-        Verdict::Use => all,
-        Verdict::Check if finding.agreed => all - check,
-        Verdict::Check => -check,
-        Verdict::Trace => 0.0,
+    let saved = |finding: &Finding| match (evidence.may_use(finding.level), finding.agreed) {
+        (true, true) => all - check,
+        (true, false) => -check,
+        (false, _) => 0.0,
     };
     let gain = |finding: &Finding| SHADOW_RAY * saved(finding) - LOOKUP_IN_ALL;
     findings.map(gain).sum::<f64>() > 0.0

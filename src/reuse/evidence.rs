@@ -8,7 +8,7 @@
 //!
 //! Every figure is a sum over findings in a fixed order.
 
-use super::risk::{LEVELS, STEPS, is_checked, risk_of, shown};
+use super::risk::{LEVELS, STEPS, risk_of, shown};
 use crate::inference::Estimate;
 
 /// Findings of so many levels on either side of a level count for it, scaled with the risk.
@@ -68,21 +68,9 @@ pub fn finding_of(share: f32, lights: &[Compared], agreed: bool) -> Option<Findi
     })
 }
 
-/// What is done with an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Verdict {
-    /// It is used as it is.
-    Use,
-    /// It is used where check rays agree.
-    Check,
-    /// The point is traced.
-    #[default]
-    Trace,
-}
-
-/// What is done with the estimates of each level.
+/// Which levels of risk are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Evidence([Verdict; LEVELS]);
+pub struct Evidence([bool; LEVELS]);
 
 /// Sums over findings.
 #[derive(Debug, Clone, Copy, Default)]
@@ -109,17 +97,14 @@ impl Evidence {
         let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
         let mut sums = [Sums::default(); LEVELS];
         // Where check rays do not agree, the point is traced whatever its level.
-        let is_used = |f: &&Finding| f.agreed || !is_checked(f.level);
-        for finding in findings.filter(is_used) {
+        for finding in findings.filter(|finding| finding.agreed) {
             let level = usize::from(finding.level);
             sums[level].count += 1.0;
             sums[level].error += f64::from(finding.error) / risk_of(level);
             sums[level].noise += f64::from(finding.noise);
         }
-        let mut verdicts = [Verdict::Trace; LEVELS];
-        for (kind, (sums, verdicts)) in
-            sums.chunks_exact(STEPS).zip(verdicts.chunks_exact_mut(STEPS)).enumerate()
-        {
+        let mut taken = [false; LEVELS];
+        for (sums, taken) in sums.chunks_exact(STEPS).zip(taken.chunks_exact_mut(STEPS)) {
             // What holds of a higher risk holds of a lower one.
             let mut most = f64::INFINITY;
             for step in (0..STEPS).rev() {
@@ -133,17 +118,14 @@ impl Evidence {
                 // Noise rises with the risk: never that of a higher one.
                 let below = total(&sums[first..=step]);
                 let noise = if below.count > 0.0 { below.noise / below.count } else { 0.0 };
-                if most <= (noise / GUARD).max(unseen) {
-                    let level = (kind * STEPS + step) as u8;
-                    verdicts[step] = if is_checked(level) { Verdict::Check } else { Verdict::Use };
-                }
+                taken[step] = most <= (noise / GUARD).max(unseen);
             }
         }
-        Self(verdicts)
+        Self(taken)
     }
 
-    /// What is done with estimates of `level`.
-    pub fn verdict(&self, level: u8) -> Verdict {
+    /// Whether estimates of `level` may be used where check rays agree.
+    pub fn may_use(&self, level: u8) -> bool {
         self.0.get(usize::from(level)).copied().unwrap_or_default()
     }
 }
@@ -160,49 +142,49 @@ mod tests {
         Finding { level, agreed: true, error, noise }
     }
 
-    fn verdict(findings: &[Finding], level: u8) -> Verdict {
-        Evidence::of(findings.iter(), 0.25).verdict(level)
+    fn may_use(findings: &[Finding], level: u8) -> bool {
+        Evidence::of(findings.iter(), 0.25).may_use(level)
     }
 
     #[test]
     fn nothing_is_used_without_a_probe() {
-        assert_eq!(verdict(&[], CALM), Verdict::Trace);
-        assert_eq!(verdict(&[found(CALM, 0.0, 0.0)], EDGE), Verdict::Trace);
-        assert_eq!(verdict(&[found(CALM, 0.0, 0.0); 9], u8::MAX), Verdict::Trace);
+        assert!(!may_use(&[], CALM));
+        assert!(!may_use(&[found(CALM, 0.0, 0.0)], EDGE));
+        assert!(!may_use(&[found(CALM, 0.0, 0.0); 9], u8::MAX));
     }
 
     #[test]
     fn what_is_no_worse_than_a_trace_is_used_and_what_is_worse_is_not() {
         let probes = |error, noise| vec![found(EDGE, error, noise); 2000];
-        assert_eq!(verdict(&probes(1.0, 2.0), EDGE), Verdict::Check);
-        assert_eq!(verdict(&probes(1.9, 2.0), EDGE), Verdict::Trace);
+        assert!(may_use(&probes(1.0, 2.0), EDGE));
+        assert!(!may_use(&probes(1.9, 2.0), EDGE));
         // Nobody sees it.
         let calm = |error| vec![found(CALM, error, 0.0); 400];
-        assert_eq!(verdict(&calm(0.01), CALM), Verdict::Use);
-        assert_eq!(verdict(&calm(0.1), CALM), Verdict::Trace);
+        assert!(may_use(&calm(0.01), CALM));
+        assert!(!may_use(&calm(0.1), CALM));
     }
 
     #[test]
     fn an_edge_needs_more_probes_than_what_is_calm() {
         let clean = |level, count| vec![found(level, 0.0, 0.5); count];
-        assert_eq!(verdict(&clean(CALM, 9), CALM), Verdict::Use);
-        assert_eq!(verdict(&clean(EDGE, 100), EDGE), Verdict::Trace);
-        assert_eq!(verdict(&clean(EDGE, 1000), EDGE), Verdict::Check);
+        assert!(may_use(&clean(CALM, 9), CALM));
+        assert!(!may_use(&clean(EDGE, 100), EDGE));
+        assert!(may_use(&clean(EDGE, 1000), EDGE));
     }
 
     #[test]
     fn levels_tell_of_those_beside_and_below_them() {
         let clean = vec![found(EDGE, 0.0, 0.5); 1000];
-        let verdict = |level| verdict(&clean, level);
-        assert_eq!(verdict(EDGE + 1), Verdict::Check);
-        assert_eq!(verdict(EDGE + 2), Verdict::Trace);
+        let may_use = |level| may_use(&clean, level);
+        assert!(may_use(EDGE + 1));
+        assert!(!may_use(EDGE + 2));
         // Nothing is known of tracing's noise there.
-        assert_eq!(verdict(EDGE - 2), Verdict::Trace);
+        assert!(!may_use(EDGE - 2));
         let seen = [&clean[..], &[found(EDGE - 2, 9.0, 0.5)]].concat();
-        let verdict = |level| super::Evidence::of(seen.iter(), 0.25).verdict(level);
-        assert_eq!(verdict(EDGE - 2), Verdict::Check);
+        let may_use = |level| Evidence::of(seen.iter(), 0.25).may_use(level);
+        assert!(may_use(EDGE - 2));
         // What is seen in mirrors is another matter.
-        assert_eq!(verdict(EDGE + STEPS as u8), Verdict::Trace);
+        assert!(!may_use(EDGE + STEPS as u8));
     }
 
     #[test]
@@ -210,9 +192,9 @@ mod tests {
         let wrong = Finding { agreed: false, ..found(EDGE, 900.0, 0.5) };
         let mut probes = vec![found(EDGE, 0.0, 0.5); 2000];
         probes.extend([wrong; 100]);
-        assert_eq!(verdict(&probes, EDGE), Verdict::Check);
+        assert!(may_use(&probes, EDGE));
         probes.iter_mut().for_each(|probe| probe.agreed = true);
-        assert_eq!(verdict(&probes, EDGE), Verdict::Trace);
+        assert!(!may_use(&probes, EDGE));
     }
 
     #[test]

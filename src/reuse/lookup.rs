@@ -10,7 +10,7 @@ mod estimate;
 pub(super) use estimate::steps_per_radiance;
 
 use super::check::agrees;
-use super::evidence::{Evidence, Verdict};
+use super::evidence::Evidence;
 use super::reference::{NONE, Reference};
 use super::taps::{ALWAYS, Taps, Taps4, sum};
 use crate::inference::{Estimate, Inference, Origin, Questions};
@@ -54,16 +54,13 @@ impl Inference for Judged<'_> {
             // One level for all lights of a point.
             let known = estimates.iter().find(|estimate| !estimate.ratio.is_nan());
             let Some(known) = known else { continue };
-            let verdict = (self.evidence)(pixels[i]).verdict(known.level);
-            if verdict == Verdict::Trace {
+            if !(self.evidence)(pixels[i]).may_use(known.level) {
                 continue;
             }
             ratios.iter_mut().zip(estimates).for_each(|(ratio, e)| *ratio = e.ratio);
-            if verdict == Verdict::Check {
-                checks.resize(points.len() * channels, false);
-                let own = &mut checks[i * channels..][..channels];
-                own.iter_mut().zip(estimates).for_each(|(check, e)| *check = !e.ratio.is_nan());
-            }
+            checks.resize(points.len() * channels, false);
+            let own = &mut checks[i * channels..][..channels];
+            own.iter_mut().zip(estimates).for_each(|(check, e)| *check = !e.ratio.is_nan());
         }
     }
 

@@ -14,8 +14,6 @@ const HALF_OCTAVE_CUBED: f32 = 2.828_427;
 /// How many steps there are in all: those of points seen directly, then those of points seen in mirrors and
 /// through glass.
 pub const LEVELS: usize = 2 * STEPS;
-/// Levels whose estimates need no check: there is no contrast that anybody could see.
-const UNCHECKED: usize = 2;
 
 /// What a lookup sees of a point's light, all lights together, display steps. NaN where too few samples are
 /// known.
@@ -73,11 +71,6 @@ pub fn risk_of(level: usize) -> f64 {
     f64::from(CALM) * (0.5 * (step + 0.5)).exp2()
 }
 
-/// Whether estimates of `level` are checked by rays before they are used.
-pub fn is_checked(level: u8) -> bool {
-    usize::from(level) % STEPS >= UNCHECKED
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,7 +87,6 @@ mod tests {
     #[test]
     fn each_feature_raises_the_risk() {
         assert_eq!(CALMEST.level(), 0);
-        assert!(!is_checked(0) && is_checked(2) && !is_checked(STEPS as u8));
         let features = Features { bend: 1.0, wide: 2.0, far: 4.0, ..CALMEST };
         // The geometric mean is 2: three octaves above the calm.
         assert_eq!(features.level(), 6);
