@@ -14,10 +14,10 @@ use tweenray::scene::{Rect, ReuseSettings, Settings};
 use tweenray::sequence::{FrameMaker, Inferrer, Made, Pyramid};
 use tweenray::stats::AuditSums;
 
-const SHOTS: u32 = 60;
+const SHOTS: u32 = 120;
 const SMALL: Trial = Trial { edge: 96, frames: 5, spp: 1, share: 0.02, best: 128 };
 
-/// Of 60 intervals at 95 % at least 56 hold the truth, 93 %.
+/// Of 120 intervals at 95 % at least 109 hold the truth: of true ones fewer do once in fifty times.
 #[test]
 fn intervals_hold_the_true_error() {
     let set = Set::load("cornell");
@@ -33,12 +33,10 @@ fn intervals_hold_the_true_error() {
         traced += holds(audited.rmse.traced, audited.truth.traced);
         width += (audited.rmse.shown.high - audited.rmse.shown.low) / audited.truth.shown.sqrt();
     }
-    let least = 56;
-    // Errors of inferred pixels alone are few and large: their intervals end too low now and then.
-    let least_inferred = 48;
+    let least = 109;
     println!("{shown} {inferred} {traced} of {SHOTS}");
     assert!(
-        shown >= least && inferred >= least_inferred && traced >= least,
+        shown >= least && inferred >= least && traced >= least,
         "{shown} {inferred} {traced}"
     );
     // An interval that held everything would say nothing.

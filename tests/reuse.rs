@@ -97,7 +97,7 @@ fn reflective_spheres_is_no_worse_than_traced() {
 
 #[test]
 fn demo_is_no_worse_than_traced() {
-    is_no_worse_than_traced("demo", [0.6, 0.2]);
+    is_no_worse_than_traced("demo", [0.6, 0.15]);
 }
 
 #[test]

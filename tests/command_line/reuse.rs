@@ -155,6 +155,8 @@ fn a_cut_to_another_view_reuses_nothing() {
         .collect();
     scene(&job, &format!("frames = 9\nkeys = [{}]", keys.join(", ")), "");
     let text = fs::read_to_string(job.path("scene.toml")).expect("there");
+    // Rays enough to save where there are this few pixels.
+    let text = text.replace("sky_samples = 4", "sky_samples = 64\nshadow_samples = 64");
     let floor = "[[mesh]]\nquad = { centre = [300, -1, 0], normal = 'y', size = [20, 20] }\n";
     fs::write(job.path("scene.toml"), text + floor).expect("written");
     job.done("render scene.toml --frames 2..3 -o o/f_#.png");

@@ -75,10 +75,10 @@ fn room() -> Vec<(&'static str, CameraPath)> {
 pub fn audited_reuse(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let trial = Trial {
-        edge: size.of(40, 64),
+        edge: size.of(80, 96),
         frames: size.of(5, 9),
         spp: 1,
-        share: size.of(0.1, 0.03),
+        share: size.of(0.05, 0.03),
         best: size.of(128, 256),
     };
     let set = Set::load("cornell");
