@@ -146,6 +146,13 @@ impl Foretelling {
         }
     }
 
+    /// `share` of the squared error that `goal` allows, to be on the safe side; all of it where nothing but
+    /// what was tried tells whether a setting reaches the goal.
+    pub fn aim(&self, goal: Goal, share: f64) -> f64 {
+        let is_foretold = goal.most().is_none() || self.line.is_some();
+        self.allowed(goal) * if is_foretold { share } else { 1.0 }
+    }
+
     /// Which part of the squared difference between frames of `samples` and of `reference` is the former's
     /// own error.
     pub fn own_part(&self, samples: Samples, reference: Samples) -> f64 {

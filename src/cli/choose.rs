@@ -308,7 +308,7 @@ impl Chooser<'_> {
         let told = |what: &str| self.tell(format!("probe: {what}"));
         let brief = Probe { seconds: Some(0.0), ..self.probe() };
         let first = brief.look(&told)?;
-        let (aim, spent) = (BRIEFLY * first.allowed(goal), begun.elapsed().as_secs_f64());
+        let (aim, spent) = (first.aim(goal, BRIEFLY), begun.elapsed().as_secs_f64());
         let job = brief.fastest_seconds(&first, aim);
         let left = job.map(|job| PROBE_SHARE * job - spent);
         if left.is_some_and(|left| left < spent) {
@@ -316,7 +316,7 @@ impl Chooser<'_> {
         }
         self.tell("there is time for a longer look".into());
         let foretelling = Probe { seconds: left, ..self.probe() }.look(&told)?;
-        let aim = LONGER * foretelling.allowed(goal);
+        let aim = foretelling.aim(goal, LONGER);
         Ok((foretelling, aim))
     }
 

@@ -161,8 +161,9 @@ fn figures_that_need_neighbours_are_targets_too() {
     let targets = [("ssim=0.9", "SSIM 0.9"), ("flip=10%", "FLIP 0.0"), ("max-share=30%", "share ")];
     for (target, figure) in targets {
         let said = job.done(&format!("{LINE} --target {target} --overwrite")).err;
-        // Before and afterwards in the same unit.
-        let line = |begin: &str| said.lines().rfind(|line| line.starts_with(begin)).expect("said");
+        // Before and afterwards in the same unit. Of a choice that is tightened later, by what nothing was
+        // tried of, the figure may not be foretold.
+        let line = |begin: &str| said.lines().find(|line| line.starts_with(begin)).expect("said");
         assert!(line("foretold: ").starts_with(&format!("foretold: {figure}")), "{said}");
         let came = line("came out: ");
         assert!(came.starts_with(&format!("came out: {figure}")), "{said}");

@@ -161,7 +161,13 @@ mod tests {
         assert!(samples.spp > 1 && (figure - 0.5).abs() < 1e-9);
         // There is something further to try.
         assert!(!none.fastest(&range(), none.to_try(Goal::Flip(0.02))).is_empty());
-        assert_eq!(first(&without(&[(4, 1, 0.5), (16, 1, 0.5), (64, 4, 0.002)])), Some((64, 4)));
+        let one = without(&[(4, 1, 0.5), (16, 1, 0.5), (64, 4, 0.002)]);
+        assert_eq!(first(&one), Some((64, 4)));
+        // To aim at less would lead to what nothing is known of.
+        let goal = Goal::Flip(0.02);
+        assert_eq!(one.aim(goal, 0.5), one.allowed(goal));
+        let with = tried(&[(4, 1, 0.5), (16, 1, 0.5), (64, 4, 0.002)]);
+        assert!((with.aim(goal, 0.5) - 0.5 * with.allowed(goal)).abs() < 1e-9);
     }
 
     /// As `cornell` at `max-share=5%`: the line told so little that 96 camera samples were tried, and then
