@@ -36,12 +36,18 @@ fn tweenray(folder: &Path, line: &str) {
     assert!(output.status.success(), "{line}\n{}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// Names the elements that end beyond the window.
+const STICKS_OUT: &str = "[...document.querySelectorAll('body *')]\
+    .filter(e => e.getBoundingClientRect().right > innerWidth)\
+    .map(e => e.tagName + '.' + e.className + ': ' + e.textContent.trim().slice(0, 60)).join('; ')";
+
 /// Opens the page wide and narrow, light and dark; nothing may stick out to the side.
 fn look(browser: &mut Browser, page: &Path, name: &str) {
     for (width, dark) in [(400, false), (1400, false), (1400, true)] {
         browser.open(page, (width, 900), dark);
         let sticks_out = browser.number("document.documentElement.scrollWidth - innerWidth");
-        assert!(sticks_out <= 0.0, "{name} is {sticks_out} pixels too wide at {width}");
+        let what = if sticks_out > 0.0 { browser.text(STICKS_OUT) } else { String::new() };
+        assert!(sticks_out <= 0.0, "{name} is {sticks_out} pixels too wide at {width}: {what}");
         let ground = browser.text("getComputedStyle(document.body).backgroundColor");
         assert_eq!(ground == "rgb(255, 255, 255)", !dark, "{name}: {ground}");
         if let Some(folder) = std::env::var_os("TWEENRAY_SCREENSHOTS").map(PathBuf::from) {
