@@ -49,8 +49,8 @@ pub struct Interrupt {
     /// Whether a person, or a system that waits no longer, has asked.
     asked: Arc<AtomicBool>,
     reason: Arc<OnceLock<String>>,
-    /// Whether the launcher of this rank has ended.
-    is_orphan: Arc<AtomicBool>,
+    /// What started this rank.
+    launcher: Arc<OnceLock<LauncherProcess>>,
 }
 
 impl Interrupt {
@@ -64,7 +64,7 @@ impl Interrupt {
             how: Arc::new(Mutex::new(GOES_ON.into())),
             asked: Arc::default(),
             reason: Arc::default(),
-            is_orphan: Arc::default(),
+            launcher: Arc::default(),
         }
     }
 
@@ -106,12 +106,12 @@ impl Interrupt {
     /// Stops when `launcher` ends, which started this rank: whoever killed it wants no more of the job, and
     /// the ranks it left would keep the cores and the folder.
     pub fn end_with(&self, launcher: LauncherProcess) {
+        let _ = self.launcher.set(launcher.clone());
         let theirs = self.clone();
         std::thread::spawn(move || {
             while !launcher.is_gone() {
                 std::thread::sleep(LOOK);
             }
-            theirs.is_orphan.store(true, Ordering::SeqCst);
             let LauncherProcess { name, id, .. } = launcher;
             theirs.stop(format!(" since {name} (process {id}), which started it, has ended"));
             std::thread::sleep(ORPHANS_GRACE);
@@ -119,9 +119,10 @@ impl Interrupt {
         });
     }
 
-    /// Whether the launcher of this rank has ended, so that MPI can no more be ended in good order.
+    /// Whether the launcher of this rank has ended, so that MPI can no more be ended in good order. Another
+    /// rank may have seen that first, and stopped this one.
     pub fn is_orphan(&self) -> bool {
-        self.is_orphan.load(Ordering::SeqCst)
+        self.launcher.get().is_some_and(LauncherProcess::is_gone)
     }
 
     /// Why the job stops, to follow the word `stopped`.
