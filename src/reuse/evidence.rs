@@ -189,6 +189,19 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_seen_in_a_tile_may_not_add_up_in_a_frame() {
+        let calm = |error| vec![found(CALM, error, 0.0); 1000];
+        assert!(may_use(&calm(0.02), CALM) && may_use(&calm(0.01), CALM));
+        // With edges that are traced, the frame's error shows.
+        let with_edges = |error| [calm(error), vec![found(EDGE, 9.0, 0.4); 50]].concat();
+        assert!(!may_use(&with_edges(0.02), CALM));
+        assert!(may_use(&with_edges(0.01), CALM));
+        // Unless they come out nearer to the truth than traced.
+        let better = [calm(0.02), vec![found(EDGE, 0.0, 0.4); 1000]].concat();
+        assert!(may_use(&better, CALM));
+    }
+
+    #[test]
     fn an_edge_needs_more_probes_than_what_is_calm() {
         let clean = |level, count| vec![found(level, 0.0, 0.5); count];
         assert!(may_use(&clean(CALM, 9), CALM));

@@ -67,8 +67,7 @@ impl AreaLight {
         }
     }
 
-    /// Unshadowed irradiance at `p` with unit normal `n` per unit radiance: what
-    /// [`seen_from`](Self::seen_from) gives, 0 where no light can arrive.
+    /// Unshadowed irradiance at `p` with unit normal `n` per unit radiance; 0 where no light can arrive.
     pub fn irradiance(&self, p: DVec3, n: DVec3) -> f64 {
         match self {
             Self::Quad { corners, normal, two_sided, .. } => {
@@ -81,18 +80,14 @@ impl AreaLight {
         }
     }
 
-    /// The light as seen from `p`, with its unshadowed irradiance per unit radiance for the unit
-    /// normal `n`; `None` where no light can arrive.
-    pub fn seen_from(&self, p: DVec3, n: DVec3) -> Option<(SeenLight<'_>, f64)> {
-        let irradiance = self.irradiance(p, n);
-        let seen = match self {
+    /// The light as seen from `p`; `None` from within.
+    pub fn seen_from(&self, p: DVec3) -> Option<SeenLight<'_>> {
+        Some(match self {
             Self::Quad { warp, normal, facet, .. } => SeenLight::Quad(warp, *normal, *facet),
             Self::Sphere { centre, radius } => {
                 SeenLight::Sphere(SphereCone::new(*centre, *radius, p)?, *centre)
             }
-        };
-        // What is NaN goes on, to be counted at its pixel.
-        (irradiance != 0.0).then_some((seen, irradiance))
+        })
     }
 }
 

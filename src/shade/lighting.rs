@@ -258,8 +258,14 @@ impl Renderer<'_> {
             s.clear();
             for &i in group {
                 let first = lit[i as usize].place.sample.wrapping_mul(n as u32);
-                let exact = self.rays_to_area(source, (lit, i), (first, n), pixels, s);
-                s.close(exact.map_or(Rgb::ZERO, |exact| radiance * exact as f32));
+                let exact = match channel {
+                    Some((channel, channels)) => s.exact[i as usize * channels + channel],
+                    None => source.area.irradiance(lit[i as usize].si.p, lit[i as usize].n),
+                };
+                // What is NaN goes on, to be counted at its pixel.
+                let arrives = exact != 0.0
+                    && self.rays_to_area(source, (lit, i), (first, n), pixels, s).is_some();
+                s.close(if arrives { radiance * exact as f32 } else { Rgb::ZERO });
             }
             counts.shadow_area += s.rays.len() as u64;
             self.settle(lit, group, channel, pixels, s, counts);
@@ -320,7 +326,7 @@ impl Renderer<'_> {
     }
 
     /// Pushes `n` shadow rays from lit point `i` to samples of an area light, from sample number `first`
-    /// on. Gives the unshadowed irradiance per unit of radiance; `None` where none arrives.
+    /// on; `None` from within the light.
     fn rays_to_area(
         &self,
         source: &AreaSource,
@@ -328,10 +334,10 @@ impl Renderer<'_> {
         (first, n): (u32, usize),
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
-    ) -> Option<f64> {
+    ) -> Option<()> {
         let point = &lit[i as usize];
         let p = point.si.p;
-        let (seen, exact) = source.area.seen_from(p, point.n)?;
+        let seen = source.area.seen_from(p)?;
         let starts = s.starts(self, lit, i);
         self.fill(&point.place, source.index, (first, n), pixels, &mut s.u);
         for k in 0..n {
@@ -345,7 +351,7 @@ impl Renderer<'_> {
                 s.push_sample(&starts, &sample);
             }
         }
-        Some(exact)
+        Some(())
     }
 
     /// Pushes `n` shadow rays from lit point `i` to the sky, from sample number `first` on.

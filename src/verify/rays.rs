@@ -91,7 +91,7 @@ impl Lit {
     /// light does not shine or the point lies below the horizon.
     fn ray_to(&self, light: &Light, rng: &mut Pcg64) -> Option<Ray> {
         if let Some(area) = AreaLight::new(light) {
-            let (seen, _) = area.seen_from(self.p, self.n)?;
+            let seen = area.seen_from(self.p).filter(|_| area.irradiance(self.p, self.n) != 0.0)?;
             let sample = seen.sample(self.p, self.n, [rng.random(), rng.random()]);
             return (sample.weight > 0.0).then(|| self.starts.smooth.to(&sample.target));
         }
