@@ -35,10 +35,7 @@ fn intervals_hold_the_true_error() {
     }
     let least = 109;
     println!("{shown} {inferred} {traced} of {SHOTS}");
-    assert!(
-        shown >= least && inferred >= least && traced >= least,
-        "{shown} {inferred} {traced}"
-    );
+    assert!(shown >= least && inferred >= least && traced >= least, "{shown} {inferred} {traced}");
     // An interval that held everything would say nothing.
     assert!(width / f64::from(SHOTS) < 3.0, "{width}");
 }

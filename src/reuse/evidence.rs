@@ -20,10 +20,8 @@ const HIDDEN: f64 = 0.25;
 /// little wrong in one tile and better than needed in another.
 const GUARD: f64 = 1.25;
 /// Of a tile's squared error that nobody sees, the share that a level may use up: errors are rare and large,
-/// so a mean below it leaves tiles that are above. The next is tried where a frame would be worse than traced.
-const UNSEEN_SHARES: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.0];
-/// As large a share of tracing's squared error may come on top of it in a whole frame, 0.13 dB.
-const MORE: f64 = 0.03;
+/// so a mean below it leaves tiles that are above.
+const UNSEEN_SHARE: f64 = 0.5;
 
 /// What a probe found at a surface point, all lights together that other frames know.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,29 +94,15 @@ impl Evidence {
     /// What `findings` amount to. An error of `tolerance` display steps (root mean square over a tile) is
     /// not seen.
     pub fn of<'f>(findings: impl Iterator<Item = &'f Finding>, tolerance: f32) -> Self {
+        let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
         let mut sums = [Sums::default(); LEVELS];
-        let mut all = Sums::default();
-        for finding in findings {
-            let noise = f64::from(finding.noise);
-            all.count += 1.0;
-            all.noise += noise;
-            // Where check rays do not agree, the point is traced whatever its level.
-            if finding.agreed {
-                let level = usize::from(finding.level);
-                sums[level].count += 1.0;
-                sums[level].error += f64::from(finding.error) / risk_of(level);
-                sums[level].noise += noise;
-            }
+        // Where check rays do not agree, the point is traced whatever its level.
+        for finding in findings.filter(|finding| finding.agreed) {
+            let level = usize::from(finding.level);
+            sums[level].count += 1.0;
+            sums[level].error += f64::from(finding.error) / risk_of(level);
+            sums[level].noise += f64::from(finding.noise);
         }
-        let unseen = f64::from(tolerance) * f64::from(tolerance);
-        let taken = |share: f64| Self::taken(&sums, share * unseen);
-        let is_right = |taken: &Self| taken.is_no_worse(&sums, all, UNSEEN_SHARES[0] * unseen);
-        let [most @ .., least] = UNSEEN_SHARES;
-        most.into_iter().map(taken).find(is_right).unwrap_or_else(|| taken(least))
-    }
-
-    /// The levels whose errors are below those of tracing, or below `unseen`.
-    fn taken(sums: &[Sums; LEVELS], unseen: f64) -> Self {
         let mut taken = [false; LEVELS];
         for (sums, taken) in sums.chunks_exact(STEPS).zip(taken.chunks_exact_mut(STEPS)) {
             // What holds of a higher risk holds of a lower one.
@@ -138,14 +122,6 @@ impl Evidence {
             }
         }
         Self(taken)
-    }
-
-    /// Whether a frame that uses these levels is on the whole as true as if `all` were traced, or its error
-    /// is below `unseen`: what is not seen in a tile adds up in a frame that tracing shows with less.
-    fn is_no_worse(&self, sums: &[Sums; LEVELS], all: Sums, unseen: f64) -> bool {
-        let used = sums.iter().enumerate().filter(|(level, _)| self.0[*level]);
-        let more: f64 = used.map(|(level, s)| s.error * risk_of(level) - s.noise).sum();
-        more <= (MORE * all.noise).max(unseen * all.count - all.noise)
     }
 
     /// Whether estimates of `level` may be used where check rays agree.
@@ -186,19 +162,6 @@ mod tests {
         let calm = |error| vec![found(CALM, error, 0.0); 400];
         assert!(may_use(&calm(0.01), CALM));
         assert!(!may_use(&calm(0.1), CALM));
-    }
-
-    #[test]
-    fn what_is_not_seen_in_a_tile_may_not_add_up_in_a_frame() {
-        let calm = |error| vec![found(CALM, error, 0.0); 1000];
-        assert!(may_use(&calm(0.02), CALM) && may_use(&calm(0.01), CALM));
-        // With edges that are traced, the frame's error shows.
-        let with_edges = |error| [calm(error), vec![found(EDGE, 9.0, 0.4); 50]].concat();
-        assert!(!may_use(&with_edges(0.02), CALM));
-        assert!(may_use(&with_edges(0.01), CALM));
-        // Unless they come out nearer to the truth than traced.
-        let better = [calm(0.02), vec![found(EDGE, 0.0, 0.4); 1000]].concat();
-        assert!(may_use(&better, CALM));
     }
 
     #[test]
