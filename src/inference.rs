@@ -9,6 +9,10 @@ use crate::scene::{Light, Scene};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+/// Camera samples of a pixel that are traced, shaded and looked up together: 256 rays of a whole block are enough
+/// for packets and few enough to stay in the L1 cache. As many where few pixels are rendered, so that a probe has
+/// the surface points that the frame would have, and sums in their order.
+pub const SAMPLES_TOGETHER: u32 = 4;
 /// Points of a pixel lie on one surface where their normals differ by less: cosine.
 const SAME_SURFACE: f32 = 0.9;
 /// And one lies so little off the tangent plane of the other, footprints.

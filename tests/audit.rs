@@ -71,6 +71,29 @@ fn a_crop_is_audited_by_its_own_pixels() {
     assert!((0.8..1.2).contains(&ratio), "{rmse:?}");
 }
 
+/// With more camera samples than are shaded together, and two lights whose sums could come in another order.
+#[test]
+fn probes_have_the_surface_points_of_the_frame() {
+    let mut set = Set::load("cornell");
+    set.scene.sky.radiance = Rgb::ONE;
+    set.scene.sky.lights = true;
+    let stage = set.stage(2);
+    let trial = Trial { edge: 60, share: 0.03, spp: 16, ..SMALL };
+    let settings = stage.settings(&trial, 2);
+    let (shot, made) = (stage.shot(&trial, 0), frames(&stage, &settings, &trial));
+    let order = Pyramid { segment: 64, frames: shot.frames }.order(&[1, 2, 3, 4, 5]);
+    let mut drawn = 0;
+    for (frame, made) in order.into_iter().zip(&made) {
+        let Some(map) = &made.film.audit else { continue };
+        let traced = stage.render(&settings, &shot.camera(frame, 60, 60).unwrap(), frame);
+        for i in (0..map.len()).filter(|i| !map[*i].is_nan()) {
+            assert!(made.film.rgb[i] == traced.rgb[i], "frame {frame}, pixel {i}");
+            drawn += 1;
+        }
+    }
+    assert!(drawn > 100, "{drawn}");
+}
+
 fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {
     let shot = stage.shot(trial, 0);
     let stop = AtomicBool::new(false);

@@ -309,7 +309,8 @@ impl Chooser<'_> {
         let brief = Probe { seconds: Some(0.0), ..self.probe() };
         let first = brief.look(&told)?;
         let (aim, spent) = (first.aim(goal, BRIEFLY), begun.elapsed().as_secs_f64());
-        let job = brief.fastest_seconds(&first, aim);
+        let within = |error| brief.fastest_seconds(&first, error);
+        let job = within(aim).or_else(|| within(first.allowed(goal)));
         let left = job.map(|job| PROBE_SHARE * job - spent);
         if left.is_some_and(|left| left < spent) {
             return Ok((first, aim));

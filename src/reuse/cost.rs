@@ -3,7 +3,7 @@
 
 use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
-use crate::inference::{Channel, Channels, check_rays};
+use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{Light, Scene, Settings};
 use crate::stats::RayCounts;
 
@@ -19,8 +19,6 @@ const LOOKUP: f64 = 1.5;
 const LOOKUP_IN_ALL: f64 = 10.0;
 /// The same with probes and check rays.
 const REUSE: f64 = 14.0;
-/// Camera samples of a pixel that are looked up together, at most.
-const SHADED_TOGETHER: u32 = 4;
 
 /// Whether a lookup is cheaper than `rays` shadow rays.
 fn is_worth(rays: u32) -> bool {
@@ -45,7 +43,7 @@ pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channe
         // The camera samples of a pixel share one lookup.
         runs && is_worth(rays_of(channel, settings).saturating_mul(settings.spp))
     });
-    let all = SHADOW_RAY * rays_of_point(&kept, settings) as f64;
+    let all = SHADOW_RAY * rays_of_point(&kept, settings)[0] as f64;
     if all > REUSE { kept } else { Channels::of(scene, |_| false) }
 }
 
@@ -115,21 +113,22 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
-/// Shadow rays to the kept `channels` of one surface point.
-pub fn rays_of_point(channels: &Channels, settings: &Settings) -> u64 {
-    let samples = u64::from(settings.spp.min(SHADED_TOGETHER));
-    channels.iter().map(|channel| samples * u64::from(rays_of(channel, settings))).sum()
+/// Shadow rays to the kept `channels` of one surface point: all, and those that check an answer.
+pub fn rays_of_point(channels: &Channels, settings: &Settings) -> [u64; 2] {
+    let samples = settings.spp.min(SAMPLES_TOGETHER);
+    let of = |channel| samples.saturating_mul(rays_of(channel, settings));
+    let sum = |rays: &dyn Fn(u32) -> u32| channels.iter().map(|c| u64::from(rays(of(c)))).sum();
+    [sum(&|rays| rays), sum(&check_rays)]
 }
 
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
-/// probes found. A point takes so many `rays` where it is traced.
+/// probes found. A point takes so many shadow rays where it is `traced`, and where it is `checked`.
 pub fn is_worth_looking<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
-    rays: u64,
+    [traced, checked]: [u64; 2],
 ) -> bool {
-    let all = rays as f64;
-    let check = f64::from(check_rays(rays as u32));
+    let [all, check] = [traced, checked].map(|rays| rays as f64);
     let saved = |finding: &Finding| match (evidence.may_use(finding.level), finding.agreed) {
         (true, true) => all - check,
         (true, false) => -check,

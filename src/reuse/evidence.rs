@@ -60,12 +60,10 @@ pub fn finding_of(share: f32, lights: &[Compared], agreed: bool) -> Option<Findi
     let estimated = shown(sum(&|l| l.estimate.ratio));
     let [a, b] = [0, 1].map(|k| shown(sum(&|l| l.traced[k])));
     let share = f64::from(share) * f64::from(share);
-    Some(Finding {
-        level,
-        agreed,
-        error: (share * (estimated - a) * (estimated - b)) as f32,
-        noise: (share * 0.5 * (a - b) * (a - b)) as f32,
-    })
+    let error = (share * (estimated - a) * (estimated - b)) as f32;
+    let noise = (share * 0.5 * (a - b) * (a - b)) as f32;
+    // Light beyond what f32 holds tells nothing.
+    (error.is_finite() && noise.is_finite()).then_some(Finding { level, agreed, error, noise })
 }
 
 /// Which levels of risk are taken.
@@ -112,7 +110,8 @@ impl Evidence {
                 let near = total(&sums[first..(step + BESIDE + 1).min(STEPS)]);
                 if near.count > 0.0 {
                     let risk = risk_of(step);
-                    let found = near.error * risk + HIDDEN * risk * risk;
+                    // By chance it may be negative, and would speak for all lower levels.
+                    let found = near.error.max(0.0) * risk + HIDDEN * risk * risk;
                     most = most.min(found / near.count);
                 }
                 // Noise rises with the risk: never that of a higher one.
@@ -162,6 +161,14 @@ mod tests {
         let calm = |error| vec![found(CALM, error, 0.0); 400];
         assert!(may_use(&calm(0.01), CALM));
         assert!(!may_use(&calm(0.1), CALM));
+    }
+
+    /// One estimate between its two traces has a negative error.
+    #[test]
+    fn what_is_found_by_chance_does_not_speak_for_what_is_known() {
+        let known = vec![found(4, 3.0, 1.0); 500];
+        assert!(!may_use(&known, 4));
+        assert!(!may_use(&[&known[..], &[found(8, -10.0, 9.0)]].concat(), 4));
     }
 
     #[test]

@@ -180,6 +180,9 @@ impl<'a> Inferrer<'a> {
         camera: &Camera,
         references: &[Arc<Reference>],
     ) -> Result<Option<Option<Arc<Probed>>>> {
+        if self.renderer.settings.reuse.probes == 0.0 {
+            return Ok(Some(None));
+        }
         self.with_lookup((frame, camera), references, |lookup| {
             lookup.map_or(Some(None), |lookup| self.probe(frame, camera, &lookup).map(Some))
         })

@@ -8,7 +8,7 @@ use super::lighting::LitPoint;
 use super::pixels::{BLOCK, BlockPixels};
 use super::{FrameInput, Reuse};
 use crate::inference::{
-    Checked, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints, check_rays,
+    Checked, Estimate, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints, check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -85,6 +85,16 @@ impl Groups {
             let ratios = self.asked.ratios.chunks_exact_mut(channels);
             let forbidden = ratios.zip(&self.forbidden).filter(|(_, forbidden)| **forbidden);
             forbidden.for_each(|(ratios, _)| ratios.fill(f32::NAN));
+            // Nor does what is suggested there tell of other surfaces.
+            for at in (0..self.forbidden.len()).filter(|at| self.forbidden[*at]) {
+                let own = at * channels..(at + 1) * channels;
+                self.asked
+                    .estimates
+                    .get_mut(own.clone())
+                    .unwrap_or_default()
+                    .fill(Estimate::UNKNOWN);
+                self.asked.checks.get_mut(own).unwrap_or_default().fill(false);
+            }
         }
     }
 

@@ -12,6 +12,7 @@ use super::pixels::BlockPixels;
 use super::surface::{albedo, emitted};
 use super::{FrameInput, Left, Renderer};
 use crate::film::GPixel;
+use crate::inference::SAMPLES_TOGETHER;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
 use crate::scene::Material;
@@ -19,9 +20,6 @@ use crate::stats::RayCounts;
 
 /// Boundaries of ranked glass that a ray passes without another medium behind them.
 const MOST_PASSED: usize = 1024;
-
-/// Camera rays traced together: enough for packets, few enough to stay in the L1 cache.
-const CHUNK: usize = 256;
 
 /// A ray's place in its camera sample's tree.
 #[derive(Debug, Clone, Copy)]
@@ -94,10 +92,9 @@ pub(super) fn block<
     left: &mut Left,
 ) -> RayCounts {
     let mut counts = RayCounts::default();
-    let samples_per_chunk = (CHUNK / pixels.len().max(1)).max(1) as u32;
     let mut first = 0;
     while first < renderer.settings.spp {
-        let last = (first + samples_per_chunk).min(renderer.settings.spp);
+        let last = first.saturating_add(SAMPLES_TOGETHER).min(renderer.settings.spp);
         pixels.start_samples(first..last);
         camera_rays(renderer, input, pixels, first..last, scratch);
         counts.camera += scratch.rays.len() as u64;

@@ -264,7 +264,7 @@ impl Renderer<'_> {
                 };
                 // What is NaN goes on, to be counted at its pixel.
                 let arrives = exact != 0.0
-                    && self.rays_to_area(source, (lit, i), (first, n), pixels, s).is_some();
+                    && self.rays_to_area(source, (lit, i), (first, n, true), pixels, s).is_some();
                 s.close(if arrives { radiance * exact as f32 } else { Rgb::ZERO });
             }
             counts.shadow_area += s.rays.len() as u64;
@@ -326,12 +326,13 @@ impl Renderer<'_> {
     }
 
     /// Pushes `n` shadow rays from lit point `i` to samples of an area light, from sample number `first`
-    /// on; `None` from within the light.
+    /// on; `None` from within the light. Where all of them lie below the horizon, `or_above` pushes one to a point of
+    /// the light that does not.
     fn rays_to_area(
         &self,
         source: &AreaSource,
         (lit, i): (&[LitPoint], u32),
-        (first, n): (u32, usize),
+        (first, n, or_above): (u32, usize, bool),
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
     ) -> Option<()> {
@@ -344,7 +345,7 @@ impl Renderer<'_> {
             let sample = seen.sample(p, point.n, s.u[k].map(f64::from));
             s.push_sample(&starts, &sample);
         }
-        if s.is_open() {
+        if or_above && s.is_open() {
             // All below the horizon, but some of the light is above: a point of that decides, or the
             // horizon's own shadow would be counted twice.
             if let Some(sample) = seen.above(p, point.n) {
@@ -410,7 +411,8 @@ impl Renderer<'_> {
                             let area = input.area_lights[index as usize].as_ref();
                             if let Some(area) = area {
                                 let source = AreaSource { index, light, area };
-                                self.rays_to_area(&source, (lit, i), (first, rays), pixels, s);
+                                let samples = (first, rays, false);
+                                self.rays_to_area(&source, (lit, i), samples, pixels, s);
                             }
                         }
                         Channel::Sky => self.rays_to_sky((lit, i), (first, rays), pixels, s),

@@ -160,7 +160,10 @@ impl Inferrer<'_> {
         for trace in &probed.traces {
             rendered.sources.append(trace.sources.clone());
         }
-        let Some(inferred) = inferred else { return Ok(Some(None)) };
+        let Some(inferred) = inferred else {
+            rendered.rays += second.rays;
+            return Ok(Some(None));
+        };
         let drawn = |i: usize| Drawn { index: i as u32, weight: probed.draw.weight() };
         let drawn: Vec<Drawn> = places.iter().map(|i| drawn(*i)).collect();
         let shown = self.shown(&inferred);
