@@ -43,7 +43,7 @@ pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channe
         // The camera samples of a pixel share one lookup.
         runs && is_worth(rays_of(channel, settings).saturating_mul(settings.spp))
     });
-    let all = SHADOW_RAY * rays_of_point(&kept, settings)[0] as f64;
+    let all = SHADOW_RAY * rays_of_point(&kept, settings) as f64;
     if all > REUSE { kept } else { Channels::of(scene, |_| false) }
 }
 
@@ -113,22 +113,21 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
-/// Shadow rays to the kept `channels` of one surface point: all, and those that check an answer.
-pub fn rays_of_point(channels: &Channels, settings: &Settings) -> [u64; 2] {
-    let samples = settings.spp.min(SAMPLES_TOGETHER);
-    let of = |channel| samples.saturating_mul(rays_of(channel, settings));
-    let sum = |rays: &dyn Fn(u32) -> u32| channels.iter().map(|c| u64::from(rays(of(c)))).sum();
-    [sum(&|rays| rays), sum(&check_rays)]
+/// Shadow rays to the kept `channels` of one surface point.
+pub fn rays_of_point(channels: &Channels, settings: &Settings) -> u64 {
+    let samples = u64::from(settings.spp.min(SAMPLES_TOGETHER));
+    channels.iter().map(|channel| samples * u64::from(rays_of(channel, settings))).sum()
 }
 
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
-/// probes found. A point takes so many shadow rays where it is `traced`, and where it is `checked`.
+/// probes found. A point takes so many `rays` where it is traced.
 pub fn is_worth_looking<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
-    [traced, checked]: [u64; 2],
+    rays: u64,
 ) -> bool {
-    let [all, check] = [traced, checked].map(|rays| rays as f64);
+    let all = rays as f64;
+    let check = f64::from(check_rays(u32::try_from(rays).unwrap_or(u32::MAX)));
     let saved = |finding: &Finding| match (evidence.may_use(finding.level), finding.agreed) {
         (true, true) => all - check,
         (true, false) => -check,
