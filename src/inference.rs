@@ -77,7 +77,7 @@ pub struct Origin {
     pub distance: f32,
 }
 
-/// What other frames suggest about one light at a point, and of what kind that suggestion is.
+/// What other frames suggest about one light at a point, and how risky that is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Ratio; NaN where no other frame knows it.

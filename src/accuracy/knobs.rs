@@ -47,11 +47,11 @@ pub enum Knob {
     Default,
     /// What frames take over.
     Policy,
-    /// How much samples may disagree.
+    /// What error is not seen.
     Tolerance,
     /// Frames from key frame to key frame.
     Segment,
-    /// How much of a frame is audited.
+    /// Share of the pixels that is probed.
     Probes,
     /// Camera samples.
     CameraSamples,

@@ -33,7 +33,7 @@ pub struct Shown<'a> {
 pub struct Drawn {
     /// Row by row.
     pub index: u32,
-    /// One over the probability with which it was drawn; twice that where it was drawn twice.
+    /// One over the probability with which it was drawn.
     pub weight: f64,
 }
 

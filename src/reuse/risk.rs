@@ -24,7 +24,7 @@ pub struct Features {
     pub bend: f32,
     /// Largest difference between a tap's ratio and those of the 5 x 5 samples about it.
     pub wide: f32,
-    /// The same of the 9 x 9 samples.
+    /// The largest of that of the 5 x 5 samples about it, each with its own 5 x 5.
     pub far: f32,
     /// Radiance without shadows, exposure applied; stands in for what is not known.
     pub unshadowed: f32,
