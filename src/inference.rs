@@ -252,6 +252,7 @@ impl Channels {
         self.sky
     }
 }
+
 #[cfg(test)]
 mod tests {
     use super::*;

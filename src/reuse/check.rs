@@ -9,6 +9,7 @@ use crate::inference::Questions;
 /// An estimate is contradicted when what check rays show is off by more than so many standard deviations
 /// of what as many rays would show if the estimate were right.
 const MOST_DEVIATIONS: f32 = 2.0;
+
 /// Whether check rays bear out what other frames suggest about point `at`, all its lights together. An
 /// error of `tolerance` display steps is not seen.
 pub fn agrees(questions: &Questions, at: usize, channels: usize, tolerance: f32) -> bool {

@@ -52,7 +52,7 @@ impl Features {
     fn risk_cubed(&self) -> f32 {
         let Self { bend, wide, far, .. } = *self;
         let is_known = !(bend + wide + far).is_nan();
-        // What is not known may be as large as the light: from full to none.
+        // What is not known may be as large as the light: from full to none. NaN is all that can be shown.
         let most = if is_known { 0.0 } else { shown(self.unshadowed).min(255.0) };
         let or = |x: f32, most: f32| if x.is_nan() { most } else { x }.max(CALM);
         let apart = if self.is_whole { 1.0 } else { 8.0 };

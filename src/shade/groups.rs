@@ -82,18 +82,13 @@ impl Groups {
         self.asked.checked.clear();
         if let Some(inference) = reuse.inference {
             inference.infer(&mut self.asked);
-            let ratios = self.asked.ratios.chunks_exact_mut(channels);
-            let forbidden = ratios.zip(&self.forbidden).filter(|(_, forbidden)| **forbidden);
-            forbidden.for_each(|(ratios, _)| ratios.fill(f32::NAN));
-            // Nor does what is suggested there tell of other surfaces.
-            for at in (0..self.forbidden.len()).filter(|at| self.forbidden[*at]) {
+            let Self { asked: Questions { ratios, estimates, checks, .. }, forbidden, .. } = self;
+            for (at, _) in forbidden.iter().enumerate().filter(|(_, forbidden)| **forbidden) {
                 let own = at * channels..(at + 1) * channels;
-                self.asked
-                    .estimates
-                    .get_mut(own.clone())
-                    .unwrap_or_default()
-                    .fill(Estimate::UNKNOWN);
-                self.asked.checks.get_mut(own).unwrap_or_default().fill(false);
+                ratios[own.clone()].fill(f32::NAN);
+                // Nor does what is suggested there tell of other surfaces.
+                estimates.get_mut(own.clone()).unwrap_or_default().fill(Estimate::UNKNOWN);
+                checks.get_mut(own).unwrap_or_default().fill(false);
             }
         }
     }

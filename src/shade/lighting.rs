@@ -5,7 +5,7 @@
 //! way there is no noise at all, and the ratio is what later frames can reuse.
 
 use super::groups::Groups;
-use super::light::{self, AreaLight, LightSample, ShadowTarget};
+use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer, Reuse};
 use crate::inference::{Channel, Channels};
@@ -262,10 +262,21 @@ impl Renderer<'_> {
                     Some((channel, channels)) => s.exact[i as usize * channels + channel],
                     None => source.area.irradiance(lit[i as usize].si.p, lit[i as usize].n),
                 };
+                let point = &lit[i as usize];
                 // What is NaN goes on, to be counted at its pixel.
-                let arrives = exact != 0.0
-                    && self.rays_to_area(source, (lit, i), (first, n, true), pixels, s).is_some();
-                s.close(if arrives { radiance * exact as f32 } else { Rgb::ZERO });
+                let seen = source.area.seen_from(point.si.p).filter(|_| exact != 0.0);
+                if let Some(seen) = &seen {
+                    self.rays_to_area((source.index, seen), (lit, i), (first, n), pixels, s);
+                    if s.is_open() {
+                        // All below the horizon, but some of the light is above: a point of that
+                        // decides, or the horizon's own shadow would be counted twice.
+                        if let Some(sample) = seen.above(point.si.p, point.n) {
+                            let starts = s.starts(self, lit, i);
+                            s.push_sample(&starts, &sample);
+                        }
+                    }
+                }
+                s.close(seen.map_or(Rgb::ZERO, |_| radiance * exact as f32));
             }
             counts.shadow_area += s.rays.len() as u64;
             self.settle(lit, group, channel, pixels, s, counts);
@@ -325,34 +336,23 @@ impl Renderer<'_> {
         s.wanted = wanted;
     }
 
-    /// Pushes `n` shadow rays from lit point `i` to samples of an area light, from sample number `first`
-    /// on; `None` from within the light. Where all of them lie below the horizon, `or_above` pushes one to a point of
-    /// the light that does not.
+    /// Pushes shadow rays from lit point `i` to `n` samples of an area light, from sample number `first` on, but
+    /// for those below the horizon.
     fn rays_to_area(
         &self,
-        source: &AreaSource,
+        (light, seen): (u32, &SeenLight),
         (lit, i): (&[LitPoint], u32),
-        (first, n, or_above): (u32, usize, bool),
+        (first, n): (u32, usize),
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
-    ) -> Option<()> {
+    ) {
         let point = &lit[i as usize];
-        let p = point.si.p;
-        let seen = source.area.seen_from(p)?;
         let starts = s.starts(self, lit, i);
-        self.fill(&point.place, source.index, (first, n), pixels, &mut s.u);
+        self.fill(&point.place, light, (first, n), pixels, &mut s.u);
         for k in 0..n {
-            let sample = seen.sample(p, point.n, s.u[k].map(f64::from));
+            let sample = seen.sample(point.si.p, point.n, s.u[k].map(f64::from));
             s.push_sample(&starts, &sample);
         }
-        if or_above && s.is_open() {
-            // All below the horizon, but some of the light is above: a point of that decides, or the
-            // horizon's own shadow would be counted twice.
-            if let Some(sample) = seen.above(p, point.n) {
-                s.push_sample(&starts, &sample);
-            }
-        }
-        Some(())
     }
 
     /// Pushes `n` shadow rays from lit point `i` to the sky, from sample number `first` on.
@@ -407,12 +407,16 @@ impl Renderer<'_> {
                     let first = first.wrapping_add(lit[i as usize].place.sample.wrapping_mul(n));
                     match channel {
                         Channel::Area(index) => {
-                            let light = &self.scene.lights[index as usize];
                             let area = input.area_lights[index as usize].as_ref();
-                            if let Some(area) = area {
-                                let source = AreaSource { index, light, area };
-                                let samples = (first, rays, false);
-                                self.rays_to_area(&source, (lit, i), samples, pixels, s);
+                            let p = lit[i as usize].si.p;
+                            if let Some(seen) = area.and_then(|area| area.seen_from(p)) {
+                                self.rays_to_area(
+                                    (index, &seen),
+                                    (lit, i),
+                                    (first, rays),
+                                    pixels,
+                                    s,
+                                );
                             }
                         }
                         Channel::Sky => self.rays_to_sky((lit, i), (first, rays), pixels, s),
