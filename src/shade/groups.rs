@@ -12,6 +12,7 @@ use crate::inference::{
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
+use std::ops::Range;
 
 /// Pixels of a block.
 const PIXELS: usize = (BLOCK * BLOCK) as usize;
@@ -38,6 +39,8 @@ pub(super) struct Groups {
     asked: Questions,
     /// Pixel of each surface point, in the block.
     pixels: Vec<u32>,
+    /// The first camera sample of each surface point.
+    first: Vec<u32>,
     /// Next surface point of the same pixel.
     next: Vec<u32>,
     gathered: Vec<Gathered>,
@@ -94,11 +97,13 @@ impl Groups {
     }
 
     fn gather_points(&mut self, input: &FrameInput, lit: &[LitPoint]) {
-        let Self { of_lit, before, asked: Questions { points, .. }, pixels, next, .. } = self;
+        let Self { of_lit, before, asked, pixels, first, next, .. } = self;
+        let points = &mut asked.points;
         of_lit.clear();
         before.clear();
         points.clear();
         pixels.clear();
+        first.clear();
         next.clear();
         let mut heads = [NONE; PIXELS];
         for point in lit {
@@ -112,6 +117,7 @@ impl Groups {
                 at = points.len() as u32;
                 points.push(own);
                 pixels.push(point.place.pixel);
+                first.push(point.place.sample);
                 // Behind mirrors nothing joins.
                 next.push(if own.direct { std::mem::replace(head, at) } else { NONE });
                 before.push(0);
@@ -185,18 +191,20 @@ impl Groups {
         !self.asked.checks.is_empty()
     }
 
-    /// How many of the check rays in `channel` lit point `i` casts, where tracing would cast `rays` from
-    /// each lit point.
-    pub fn check_rays(&self, i: usize, channel: usize, channels: usize, rays: usize) -> usize {
+    /// The sample numbers of the check rays in `channel` that lit point `i` casts, where tracing would cast
+    /// `rays` from each lit point. Those of a surface point follow one another, since such a run of samples is
+    /// spread over the light.
+    pub fn check_rays(&self, i: usize, channel: usize, channels: usize, rays: u32) -> Range<u32> {
         let group = self.of_lit[i] as usize;
         if !self.asked.checks[group * channels + channel] {
-            return 0;
+            return 0..0;
         }
         let samples = self.asked.points[group].samples;
-        let all = check_rays(samples.saturating_mul(rays as u32));
-        let until =
-            |samples_before: u32| u64::from(samples_before) * u64::from(all) / u64::from(samples);
-        (until(self.before[i] + 1) - until(self.before[i])) as usize
+        let all = check_rays(samples.saturating_mul(rays));
+        let until = |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as u32;
+        // A run of a net's points is spread evenly where it starts at a multiple of a power of two.
+        let first = self.first[group].wrapping_mul(rays.next_power_of_two());
+        first.wrapping_add(until(self.before[i]))..first.wrapping_add(until(self.before[i] + 1))
     }
 
     /// Adds what check rays from lit point `i` found: `open` of `all`.

@@ -399,12 +399,13 @@ impl Renderer<'_> {
             wanted.extend(0..lit.len() as u32);
             s.clear();
             for &i in &wanted {
-                let rays = s.groups.check_rays(i as usize, at, channels, n as usize);
+                let own = s.groups.check_rays(i as usize, at, channels, n);
+                let rays = own.len();
                 if rays > 0 && s.exact[i as usize * channels + at] != 0.0 {
                     // Samples that tracing does not use: had it any of these, what is traced because
                     // of them would be darker or brighter than what is.
-                    let first = self.settings.spp.wrapping_mul(n);
-                    let first = first.wrapping_add(lit[i as usize].place.sample.wrapping_mul(n));
+                    let traced = self.settings.spp.wrapping_mul(n.next_power_of_two());
+                    let first = own.start.wrapping_add(traced);
                     match channel {
                         Channel::Area(index) => {
                             let area = input.area_lights[index as usize].as_ref();
