@@ -81,7 +81,7 @@ fn is_no_worse_than_traced(scene: &str, [direct, specular]: [f64; 2]) {
 
 #[test]
 fn spheres_on_terrain_is_no_worse_than_traced() {
-    is_no_worse_than_traced("spheres_on_terrain", [0.17, 0.08]);
+    is_no_worse_than_traced("spheres_on_terrain", [0.15, 0.08]);
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn reflective_spheres_is_no_worse_than_traced() {
 
 #[test]
 fn demo_is_no_worse_than_traced() {
-    is_no_worse_than_traced("demo", [0.6, 0.15]);
+    is_no_worse_than_traced("demo", [0.6, 0.11]);
 }
 
 #[test]

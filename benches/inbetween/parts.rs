@@ -55,6 +55,8 @@ struct Stand<'a> {
     settings: &'a Settings,
     camera: Camera,
     channels: Channels,
+    /// Shadow rays of a camera sample in each channel.
+    rays: Vec<u32>,
     references: Vec<Reference>,
 }
 
@@ -64,8 +66,10 @@ impl<'a> Stand<'a> {
         let plan = EffectPlan::of(&stage.set.scene, settings);
         let channels = reuse::channels(&stage.set.scene, &plan, settings);
         let camera = |f: u32| shot.camera(f, settings.width, settings.height).expect("a camera");
+        let rays = channels.iter().map(|channel| reuse::rays_of(channel, settings)).collect();
+        let eye = camera(FRAME);
         let mut stand =
-            Self { stage, settings, camera: camera(FRAME), channels, references: Vec::new() };
+            Self { stage, settings, camera: eye, channels, rays, references: Vec::new() };
         let pyramid = Pyramid { segment: FRAMES - 1, frames: FRAMES };
         let mut known: BTreeMap<u32, Reference> = BTreeMap::new();
         let wanted = pyramid.ancestors(FRAME);
@@ -84,7 +88,7 @@ impl<'a> Stand<'a> {
     }
 
     fn lookup<'l>(&'l self, frame: u32, references: &'l [&'l Reference]) -> Lookup<'l> {
-        Lookup { frame, references, channels: self.channels.len() }
+        Lookup { frame, references, rays: &self.rays }
     }
 
     fn job<'j>(

@@ -16,7 +16,7 @@ const SHADOW_RAY: f64 = 1.2;
 /// Looking one surface point up.
 const LOOKUP: f64 = 1.5;
 /// The same where little is found, in all references, with what it costs to keep the point for others.
-const LOOKUP_IN_ALL: f64 = 10.0;
+const LOOKUP_IN_ALL: f64 = 7.0;
 /// The same with probes and check rays.
 const REUSE: f64 = 14.0;
 
@@ -43,8 +43,8 @@ pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channe
         // The camera samples of a pixel share one lookup.
         runs && is_worth(rays_of(channel, settings).saturating_mul(settings.spp))
     });
-    let all = SHADOW_RAY * rays_of_point(&kept, settings) as f64;
-    if all > REUSE { kept } else { Channels::of(scene, |_| false) }
+    let all: f64 = rays_of_point(&kept, settings).map(f64::from).sum();
+    if SHADOW_RAY * all > REUSE { kept } else { Channels::of(scene, |_| false) }
 }
 
 /// Whether a light's shadowing is looked up in other frames, and why.
@@ -113,26 +113,31 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
-/// Shadow rays to the kept `channels` of one surface point.
-pub fn rays_of_point(channels: &Channels, settings: &Settings) -> u64 {
-    let samples = u64::from(settings.spp.min(SAMPLES_TOGETHER));
-    channels.iter().map(|channel| samples * u64::from(rays_of(channel, settings))).sum()
+/// Shadow rays to each of the kept `channels` of one surface point.
+fn rays_of_point<'c>(
+    channels: &'c Channels,
+    settings: &'c Settings,
+) -> impl Iterator<Item = u32> + 'c {
+    let samples = settings.spp.min(SAMPLES_TOGETHER);
+    channels.iter().map(move |channel| samples.saturating_mul(rays_of(channel, settings)))
 }
 
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
-/// probes found. A point takes so many `rays` where it is traced.
+/// probes found: a share `probed` of the points, each of which is traced once more than it needs to be.
 pub fn is_worth_looking<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
-    rays: u64,
+    (channels, settings): (&Channels, &Settings),
+    probed: f64,
 ) -> bool {
-    let all = rays as f64;
-    let check = f64::from(check_rays(u32::try_from(rays).unwrap_or(u32::MAX)));
+    let all: f64 = rays_of_point(channels, settings).map(f64::from).sum();
+    let check: f64 =
+        rays_of_point(channels, settings).map(|rays| f64::from(check_rays(rays))).sum();
     let saved = |finding: &Finding| match (evidence.may_use(finding.level), finding.agreed) {
         (true, true) => all - check,
         (true, false) => -check,
         (false, _) => 0.0,
     };
-    let gain = |finding: &Finding| SHADOW_RAY * saved(finding) - LOOKUP_IN_ALL;
+    let gain = |finding: &Finding| SHADOW_RAY * (saved(finding) - probed * all) - LOOKUP_IN_ALL;
     findings.map(gain).sum::<f64>() > 0.0
 }

@@ -88,6 +88,27 @@ fn total(sums: &[Sums]) -> Sums {
     })
 }
 
+/// Adds to `taken` which steps of a scale are taken by what its `sums` show; a mean squared error of `unseen` is
+/// not seen.
+fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
+    // What holds of a higher risk holds of a lower one.
+    let mut most = f64::INFINITY;
+    for step in (0..STEPS).rev() {
+        let first = step.saturating_sub(BESIDE);
+        let near = total(&sums[first..(step + BESIDE + 1).min(STEPS)]);
+        if near.count > 0.0 {
+            let risk = risk_of(step);
+            // By chance it may be negative, and would speak for all lower levels.
+            let found = near.error.max(0.0) * risk + HIDDEN * risk * risk;
+            most = most.min(found / near.count);
+        }
+        // Noise rises with the risk: never that of a higher one.
+        let below = total(&sums[first..=step]);
+        let noise = if below.count > 0.0 { below.noise / below.count } else { 0.0 };
+        taken[step] |= most <= (noise / GUARD).max(unseen);
+    }
+}
+
 impl Evidence {
     /// What `findings` amount to. An error of `tolerance` display steps (root mean square over a tile) is
     /// not seen.
@@ -102,23 +123,15 @@ impl Evidence {
             sums[level].noise += f64::from(finding.noise);
         }
         let mut taken = [false; LEVELS];
-        for (sums, taken) in sums.chunks_exact(STEPS).zip(taken.chunks_exact_mut(STEPS)) {
-            // What holds of a higher risk holds of a lower one.
-            let mut most = f64::INFINITY;
-            for step in (0..STEPS).rev() {
-                let first = step.saturating_sub(BESIDE);
-                let near = total(&sums[first..(step + BESIDE + 1).min(STEPS)]);
-                if near.count > 0.0 {
-                    let risk = risk_of(step);
-                    // By chance it may be negative, and would speak for all lower levels.
-                    let found = near.error.max(0.0) * risk + HIDDEN * risk * risk;
-                    most = most.min(found / near.count);
-                }
-                // Noise rises with the risk: never that of a higher one.
-                let below = total(&sums[first..=step]);
-                let noise = if below.count > 0.0 { below.noise / below.count } else { 0.0 };
-                taken[step] = most <= (noise / GUARD).max(unseen);
-            }
+        for (sums, taken) in sums.chunks_exact(2 * STEPS).zip(taken.chunks_exact_mut(2 * STEPS)) {
+            let (noisy, detailed) = sums.split_at(STEPS);
+            let (noise, detail) = taken.split_at_mut(STEPS);
+            take(detailed, unseen, detail);
+            take(noisy, unseen, noise);
+            // Detail is no less wrong than noise of the same risk: what both show holds of noise.
+            let both: Vec<Sums> =
+                noisy.iter().zip(detailed).map(|(a, b)| total(&[*a, *b])).collect();
+            take(&both, unseen, noise);
         }
         Self(taken)
     }
@@ -190,8 +203,14 @@ mod tests {
         let seen = [&clean[..], &[found(EDGE - 2, 9.0, 0.5)]].concat();
         let may_use = |level| Evidence::of(seen.iter(), 0.25).may_use(level);
         assert!(may_use(EDGE - 2));
-        // What is seen in mirrors is another matter.
-        assert!(!may_use(EDGE + STEPS as u8));
+        // Detail, and what is seen in mirrors, are other matters.
+        let of_scale = |scale: usize| (scale * STEPS) as u8;
+        assert!((1..LEVELS / STEPS).all(|scale| !may_use(EDGE + of_scale(scale))));
+        // But what is no worse than a trace in detail is none the worse where it may be noise.
+        let detail = vec![found(EDGE + of_scale(1), 0.0, 0.5); 1000];
+        let evidence = Evidence::of(detail.iter(), 0.25);
+        let is_taken = |scale| evidence.may_use(EDGE + of_scale(scale));
+        assert_eq!([0, 1, 2, 3].map(is_taken), [true, true, false, false]);
     }
 
     #[test]

@@ -27,8 +27,8 @@ pub struct Lookup<'a> {
     pub frame: u32,
     /// The first two are asked always, the others where those do not tell enough.
     pub references: &'a [&'a Reference],
-    /// How many lights' ratios are kept.
-    pub channels: usize,
+    /// Shadow rays that tracing casts from a camera sample to each light whose ratios are kept.
+    pub rays: &'a [u32],
 }
 
 /// Uses what the evidence allows of a lookup's estimates.
@@ -45,7 +45,7 @@ impl Inference for Judged<'_> {
     fn infer(&self, questions: &mut Questions) {
         self.lookup.estimate(questions);
         let Questions { points, pixels, ratios, estimates, origins, checks, .. } = questions;
-        let channels = self.lookup.channels;
+        let channels = self.lookup.rays.len();
         let answers = ratios.chunks_exact_mut(channels).zip(estimates.chunks_exact(channels));
         for (i, (ratios, estimates)) in answers.enumerate() {
             if origins[i] == Origin::default() {
@@ -65,7 +65,7 @@ impl Inference for Judged<'_> {
     }
 
     fn check(&self, questions: &mut Questions) {
-        let channels = self.lookup.channels;
+        let channels = self.lookup.rays.len();
         for at in 0..questions.points.len() {
             let own = at * channels..(at + 1) * channels;
             let is_checked = questions.checks[own.clone()].contains(&true);
@@ -80,7 +80,7 @@ impl Lookup<'_> {
     /// Fills estimates and origins for all points.
     pub fn estimate(&self, questions: &mut Questions) {
         let Questions { points, unshadowed, estimates, origins, .. } = questions;
-        let channels = self.channels;
+        let channels = self.rays.len();
         estimates.clear();
         estimates.resize(points.len() * channels, Estimate::UNKNOWN);
         let each = points
@@ -99,7 +99,7 @@ impl Lookup<'_> {
                 self.gather(point, &found[i], &mut taps);
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];
-                    self.estimate_all(&taps, point.direct, shown(i), &mut means, own);
+                    self.estimate_all(&taps, point, shown(i), &mut means, own);
                     origins[i] = self.origin(&taps);
                 }
             }

@@ -11,9 +11,11 @@ const CALM: f32 = 0.25;
 pub const STEPS: usize = 24;
 /// Half an octave of the risk in its third power.
 const HALF_OCTAVE_CUBED: f32 = 2.828_427;
-/// How many steps there are in all: those of points seen directly, then those of points seen in mirrors and
-/// through glass.
-pub const LEVELS: usize = 2 * STEPS;
+/// How many steps there are in all. Points seen directly have two scales: one for what noise may have made, and one
+/// for detail, which noise cannot make. So have points seen in mirrors and through glass.
+pub const LEVELS: usize = 4 * STEPS;
+/// A risk of more standard deviations of tracing's noise than that is detail.
+const MOST_OF_NOISE: f32 = 6.0;
 
 /// What a lookup sees of a point's light, all lights together, display steps. NaN where too few samples are
 /// known.
@@ -26,6 +28,9 @@ pub struct Features {
     pub wide: f32,
     /// The largest of that of the 5 x 5 samples about it, each with its own 5 x 5.
     pub far: f32,
+    /// Standard deviation of a trace of the taps' ratios if its rays were independent: spread over a light as they
+    /// are, they show less.
+    pub noise: f32,
     /// Radiance without shadows, exposure applied; stands in for what is not known.
     pub unshadowed: f32,
     /// Whether the taps surround the point.
@@ -44,7 +49,10 @@ impl Features {
             limit *= HALF_OCTAVE_CUBED;
             step += 1;
         }
-        (if self.is_direct { step } else { STEPS + step }) as u8
+        let of_noise = (MOST_OF_NOISE * self.noise).max(CALM);
+        let is_detail = cubed > of_noise * of_noise * of_noise;
+        let scale = 2 * usize::from(!self.is_direct) + usize::from(is_detail);
+        (scale * STEPS + step) as u8
     }
 
     /// Third power of the risk: the geometric mean of bend and both contrasts; twice that where the taps lie
@@ -75,10 +83,12 @@ pub fn risk_of(level: usize) -> f64 {
 mod tests {
     use super::*;
 
+    /// As noisy as can be.
     const CALMEST: Features = Features {
         bend: 0.0,
         wide: 0.0,
         far: 0.0,
+        noise: f32::INFINITY,
         unshadowed: 0.5,
         is_whole: true,
         is_direct: true,
@@ -101,12 +111,24 @@ mod tests {
         ];
         assert!(riskier.iter().all(|r| r.level() > 6 && usize::from(r.level()) < STEPS));
         let specular = Features { is_direct: false, ..features };
-        assert_eq!(usize::from(specular.level()), STEPS + 6);
+        assert_eq!(usize::from(specular.level()), 2 * STEPS + 6);
+    }
+
+    #[test]
+    fn what_noise_cannot_make_has_a_scale_of_its_own() {
+        let even = |risk| Features { bend: risk, wide: risk, far: risk, noise: 1.0, ..CALMEST };
+        let scale = |features: Features| usize::from(features.level()) / STEPS;
+        assert_eq!([5.9, 6.1].map(|risk| scale(even(risk))), [0, 1]);
+        let specular = |risk| Features { is_direct: false, ..even(risk) };
+        assert_eq!([5.9, 6.1].map(|risk| scale(specular(risk))), [2, 3]);
+        // Where nothing differs there is nothing to tell apart.
+        assert_eq!(Features { noise: 0.0, ..even(0.0) }.level(), 0);
     }
 
     #[test]
     fn the_scale_has_two_ends() {
-        let most = Features { bend: 1e9, wide: 1e9, far: 1e9, is_direct: false, ..CALMEST };
+        let most = Features { bend: 1e9, wide: 1e9, far: 1e9, noise: 0.0, ..CALMEST };
+        let most = Features { is_direct: false, ..most };
         assert_eq!(usize::from(most.level()), LEVELS - 1);
         let infinite = Features { bend: f32::INFINITY, ..CALMEST };
         assert_eq!(usize::from(infinite.level()), STEPS - 1);

@@ -201,7 +201,9 @@ impl<'a> Inferrer<'a> {
         let nearest = |supply: &Supply| self.pool.install(|| supply.nearest(&own));
         let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
         let references = with_supplied(references, &supplied);
-        let lookup = Lookup { frame, references: &references, channels: self.channels.len() };
+        let settings = self.renderer.settings;
+        let rays: Vec<u32> = self.channels.iter().map(|c| reuse::rays_of(c, settings)).collect();
+        let lookup = Lookup { frame, references: &references, rays: &rays };
         Ok(act((!references.is_empty()).then_some(lookup)))
     }
 

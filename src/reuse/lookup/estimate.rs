@@ -2,7 +2,7 @@
 //! risky they are.
 
 use super::{LEAST_WEIGHT, Lookup};
-use crate::inference::Estimate;
+use crate::inference::{Estimate, SurfacePoint};
 use crate::reuse::risk::Features;
 use crate::reuse::taps::{ENOUGH_WEIGHT, Taps, sum};
 use wide::{CmpEq, CmpGt, f32x4};
@@ -13,6 +13,7 @@ struct Sums {
     weight: f32x4,
     share: f32x4,
     mean: f32x4,
+    spread: f32x4,
     bend: Largest,
     wide: Largest,
     far: Largest,
@@ -47,45 +48,53 @@ pub(super) struct Mean {
     bend: f32,
     wide: f32,
     far: f32,
+    /// Variance of a trace of as many camera samples, if its rays were independent.
+    variance: f32,
     /// Sum of the weights.
     weight: f32,
 }
 
 impl Lookup<'_> {
-    /// Estimates each light at a point where the pixel would show `shown` of them without shadows.
+    /// Estimates each light at `point`, where the pixel would show `shown` of them without shadows.
     /// `means` is room.
     pub(super) fn estimate_all(
         &self,
         taps: &Taps,
-        is_direct: bool,
+        point: &SurfacePoint,
         shown: &[f32],
         means: &mut Vec<Option<Mean>>,
         estimates: &mut [Estimate],
     ) {
         means.clear();
-        means.extend((0..shown.len()).map(|channel| self.mean(taps, channel)));
+        means.extend((0..shown.len()).map(|channel| self.mean(taps, channel, point.samples)));
         let seen = means.iter().zip(shown).map(|(mean, s)| mean.map_or(0.0, |m| s * m.ratio));
         let steps = steps_per_radiance(seen.sum());
         // Lights err together: what is beside a shadow's edge is beside that of the next lamp too.
-        let (bend, wide, far, unshadowed) = (0.0, 0.0, 0.0, 0.0);
-        let mut features = Features { bend, wide, far, unshadowed, is_whole: true, is_direct };
+        let (bend, wide, far, noise, unshadowed) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (is_whole, is_direct) = (true, point.direct);
+        let mut features = Features { bend, wide, far, noise, unshadowed, is_whole, is_direct };
+        let mut variance = 0.0;
         for (mean, shown) in means.iter().zip(shown).filter(|(_, shown)| **shown != 0.0) {
             let Some(mean) = mean else { continue };
             let by = steps * shown;
             features.bend += by * mean.bend;
             features.wide += by * mean.wide;
             features.far += by * mean.far;
+            variance += by * by * mean.variance;
             features.unshadowed += shown;
             features.is_whole &= f64::from(mean.weight) >= ENOUGH_WEIGHT;
         }
+        features.noise = variance.sqrt();
         let level = features.level();
         for (estimate, mean) in estimates.iter_mut().zip(&*means) {
             *estimate = mean.map_or(Estimate::UNKNOWN, |m| Estimate { ratio: m.ratio, level });
         }
     }
 
-    /// `None` where too few of the taps know the light.
-    fn mean(&self, taps: &Taps, channel: usize) -> Option<Mean> {
+    /// For a point of so many camera `samples`; `None` where too few of the taps know the light.
+    fn mean(&self, taps: &Taps, channel: usize, samples: u32) -> Option<Mean> {
+        let rays = samples as f32 * self.rays[channel] as f32;
+        let (one, per_ray) = (f32x4::splat(1.0), f32x4::splat(1.0 / (rays + 2.0)));
         let mut first = f32::NAN;
         let mut sums = Sums::default();
         for four in taps.fours() {
@@ -102,6 +111,9 @@ impl Lookup<'_> {
             sums.weight += weight;
             sums.share += share;
             sums.mean += share * further;
+            // Laplace's rule of succession: where all rays were open the next need not be.
+            let open = (own.ratio & known) * f32x4::splat(rays / (rays + 2.0)) + per_ray;
+            sums.spread += share * open * (one - open);
             sums.bend.note(own.bend);
             sums.wide.note(own.wide);
             sums.far.note(own.far);
@@ -118,6 +130,7 @@ impl Lookup<'_> {
             bend: sums.bend.get(),
             wide: sums.wide.get(),
             far: sums.far.get(),
+            variance: sum(sums.spread) * share / rays,
             weight,
         })
     }

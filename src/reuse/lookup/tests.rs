@@ -4,6 +4,7 @@ use super::Lookup;
 use crate::inference::{Estimate, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::reuse::Reference;
+use crate::reuse::risk::STEPS;
 use crate::scene::{Camera, Pose};
 
 const EDGE: u32 = 64;
@@ -44,7 +45,7 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
 
 /// What `reference` suggests about `point`, which would show 1 without shadows.
 fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
-    let lookup = Lookup { frame: 2, references: &[reference], channels: 1 };
+    let lookup = Lookup { frame: 2, references: &[reference], rays: &[16] };
     let mut asked = Questions {
         points: vec![point],
         pixels: vec![[0; 2]],
@@ -179,6 +180,21 @@ fn samples_to_one_side_are_riskier() {
     assert!(level(&half, on_wall(32.2, 20.5)) > level(&half, on_wall(20.2, 20.5)));
 }
 
+/// Ratios of 16 rays scatter by an eighth in half shadow.
+#[test]
+fn noise_and_detail_have_scales_of_their_own() {
+    let is_detail = |reference: &Reference, x: f64| {
+        usize::from(level(reference, on_wall(x, 20.5))) / STEPS == 1
+    };
+    let noisy = wall(|x| 0.5 + [0.0, 0.125, -0.0625, -0.125, 0.0625][x as usize % 5]);
+    assert!(!is_detail(&noisy, 20.2));
+    let bars = wall(|x| f32::from(u8::from(x % 5 < 2)));
+    assert!(is_detail(&bars, 20.2));
+    // A few rays of 16 that are shut now and then.
+    let specks = wall(|x| if x % 5 == 0 { 1.0 - 1.0 / 16.0 } else { 1.0 });
+    assert!(!is_detail(&specks, 20.2));
+}
+
 /// A lamp that errs makes what all lamps together are told uncertain.
 #[test]
 fn lights_share_their_level() {
@@ -189,7 +205,7 @@ fn lights_share_their_level() {
         traced.ratios.extend([1.0, f32::from(u8::from(x < 32))]);
     }
     let reference = Reference::new(1, &camera(), &traced, 2);
-    let lookup = Lookup { frame: 2, references: &[&reference], channels: 2 };
+    let lookup = Lookup { frame: 2, references: &[&reference], rays: &[16, 16] };
     let level_with = |second: f32, x: f64| {
         let mut asked = Questions {
             points: vec![on_wall(x, 20.5)],

@@ -14,8 +14,7 @@ use crate::inference::Inference;
 use crate::output::Display;
 use crate::reuse::audit::{self, Drawn, Shown};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference};
-use crate::reuse::{is_worth_looking, rays_of_point};
+use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
 use crate::scene::Camera;
 use crate::sequence::strips::Unheard;
 use crate::shade::{FrameJob, Rendered};
@@ -74,15 +73,15 @@ impl Inferrer<'_> {
         }
         let r = &self.renderer;
         let tolerance = r.settings.reuse.tolerance;
-        let rays = rays_of_point(&self.channels, r.settings);
+        let cast = (&self.channels, r.settings);
         let before = || lookup.references.iter().flat_map(|r| r.findings());
         let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
-        let is_hopeless =
-            known > 0 && !is_worth_looking(&Evidence::of(before(), tolerance), before(), rays);
-        let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let pixels = f64::from(camera.width) * f64::from(camera.height);
-        let usual = f64::from(r.settings.reuse.probes);
-        let share = (first * usual * (LEAST / pixels).max(1.0)).min(MOST);
+        let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
+        let is_worth = |known: &Evidence| is_worth_looking(known, before(), cast, usual);
+        let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
+        let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
+        let share = (first * usual).min(MOST);
         // Behind mirrors and glass a pixel's footprint is told by the pixels beside it.
         let block = if r.plan.mirror || r.plan.glass { 2 } else { 1 };
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
@@ -105,7 +104,8 @@ impl Inferrer<'_> {
         let crossed = self.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
-        let is_worth_looking = is_worth_looking(&evidence, findings.iter(), rays);
+        // The frame's own probes are traced, whatever is done with what they say.
+        let is_worth_looking = is_worth_looking(&evidence, findings.iter(), cast, 0.0);
         let traces = [first, second];
         let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
         let probed = Arc::new(probed);
