@@ -9,6 +9,7 @@ use crate::math::Rgb;
 use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
 use crate::stats::{AuditSums, DrawnSum};
+use std::collections::BTreeMap;
 
 /// A squared error that may have gone unseen in the pixels that were not drawn: one display step where pixels are
 /// traced, whose noise shows everywhere. Where they are inferred, errors are few and large: eight steps.
@@ -35,6 +36,8 @@ pub struct Drawn {
     pub index: u32,
     /// One over the probability with which it was drawn.
     pub weight: f64,
+    /// Pixels of one number were drawn together: neighbours, whose errors are alike.
+    pub group: u64,
 }
 
 impl Shown<'_> {
@@ -92,20 +95,54 @@ pub fn difference(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> f32 {
 pub fn sums(shown: &Shown, drawn: &[Drawn], traces: [&[Rgb]; 2]) -> AuditSums {
     let [a, b] = traces;
     let mut sums = AuditSums { drawn: drawn.len() as u64, ..AuditSums::default() };
-    for Drawn { index, weight } in drawn {
+    let mut groups: BTreeMap<u64, Group> = BTreeMap::new();
+    for Drawn { index, weight, group } in drawn {
+        let group = groups.entry(*group).or_default();
         let i = *index as usize;
         let squares = Squares::of(&shown.display, shown.rgb[i], a[i], b[i]);
         let others = weight - 1.0;
         if shown.is_inferred(i) {
             sums.inferred_pixels += others as u64;
-            sums.inferred.add(squares.error, others, UNSEEN_INFERRED);
+            group.inferred.get_or_insert_default().add(squares.error, others, UNSEEN_INFERRED);
         }
         let mean = (others * squares.error + squares.trace) / weight;
         let unseen = if shown.is_inferred(i) { UNSEEN_INFERRED } else { UNSEEN };
-        sums.shown.add(mean, *weight, unseen);
-        sums.traced.add(squares.trace, *weight, UNSEEN);
+        group.shown.add(mean, *weight, unseen);
+        group.traced.add(squares.trace, *weight, UNSEEN);
+    }
+    for Group { inferred, shown, traced } in groups.values() {
+        inferred.iter().for_each(|part| part.add_to(&mut sums.inferred));
+        shown.add_to(&mut sums.shown);
+        traced.add_to(&mut sums.traced);
     }
     sums
+}
+
+/// What a group of pixels adds to the sums.
+#[derive(Default)]
+struct Group {
+    /// `None` where none of them is inferred.
+    inferred: Option<Part>,
+    shown: Part,
+    traced: Part,
+}
+
+#[derive(Default)]
+struct Part {
+    sum: f64,
+    /// What could have gone unnoticed.
+    unseen: f64,
+}
+
+impl Part {
+    fn add(&mut self, figure: f64, weight: f64, unseen: f64) {
+        self.sum += figure * weight;
+        self.unseen = self.unseen.max(unseen * weight);
+    }
+
+    fn add_to(&self, sum: &mut DrawnSum) {
+        sum.add(self.sum, 1.0, self.unseen);
+    }
 }
 
 /// Root mean squares with their 95 % intervals, display steps of 255.
@@ -150,6 +187,24 @@ mod tests {
 
     fn mean(n: u32, of: impl Fn(u32) -> f64) -> f64 {
         (0..n).map(of).sum::<f64>() / f64::from(n)
+    }
+
+    /// Four pixels that err alike tell as much as one.
+    #[test]
+    fn pixels_that_were_drawn_together_are_one_figure() {
+        let rgb = vec![Rgb::splat(0.5); 4];
+        let source = PixelSource { provenance: Provenance::Traced, frame: 0, distance: 0.0 };
+        let sources = vec![source; 4];
+        let shown = Shown { rgb: &rgb, sources: &sources, display: LINEAR };
+        let (a, b) = (vec![Rgb::splat(0.4); 4], vec![Rgb::splat(0.6); 4]);
+        let of = |group: fn(u32) -> u64| {
+            let drawn: Vec<Drawn> =
+                (0..4).map(|k| Drawn { index: k, weight: 8.0, group: group(k) }).collect();
+            sums(&shown, &drawn, [&a, &b]).traced
+        };
+        let (apart, together) = (of(u64::from), of(|_| 0));
+        assert!((apart.sum - together.sum).abs() < 1e-9 * apart.sum);
+        assert!((4.0 * apart.squares - together.squares).abs() < 1e-9 * together.squares);
     }
 
     #[test]

@@ -35,10 +35,14 @@ impl ProbeDraw {
         f64::from(self.cell) * f64::from(self.cell)
     }
 
-    fn words(&self, x: u32, y: u32) -> u64 {
+    /// The number of the cell that a pixel lies in: its probes are drawn together.
+    pub fn group(&self, x: u32, y: u32) -> u64 {
         let edge = self.cell * self.block;
-        let cell = u64::from(y / edge) << 32 | u64::from(x / edge);
-        mix(self.seed ^ mix(u64::from(self.frame) ^ mix(cell)))
+        u64::from(y / edge) << 32 | u64::from(x / edge)
+    }
+
+    fn words(&self, x: u32, y: u32) -> u64 {
+        mix(self.seed ^ mix(u64::from(self.frame) ^ mix(self.group(x, y))))
     }
 
     /// Whether the pixel is a probe.

@@ -59,12 +59,6 @@ impl Pyramid {
         all
     }
 
-    /// The frame in the middle of the segment that `frame` lies in; `None` for a key frame.
-    pub fn middle_of(&self, frame: u32) -> Option<u32> {
-        let (low, high) = self.ends(frame);
-        (!self.is_key(frame)).then(|| middle(low, high))
-    }
-
     /// `frames` in the order that needs the fewest references at a time: segment by segment, each
     /// frame after its ancestors.
     pub fn order(&self, frames: &[u32]) -> Vec<u32> {

@@ -67,9 +67,7 @@ fn sources(schedule: &Schedule, cameras: &[Camera]) -> Vec<Tag> {
         let at = frame as usize - 1;
         let own = std::iter::once(number_and_camera(frame, &cameras[at]));
         let others = schedule.ancestors(frame).into_iter().map(|f| tags[f as usize - 1]);
-        // That says how much is allowed in its segment.
-        let middle = schedule.middle(frame).map(|f| number_and_camera(f, &cameras[f as usize - 1]));
-        tags[at] = Tag::of(own.chain(others).chain(middle));
+        tags[at] = Tag::of(own.chain(others));
     }
     tags
 }
@@ -159,24 +157,6 @@ mod tests {
         assert_eq!(same(&plain, &moved, |r| r.whole), [1, 17, 18, 19, 20]);
         assert_eq!(plain.get(0), None);
         assert_eq!(plain.get(21), None);
-    }
-
-    /// How much is allowed in frame 3 is found out in the middle, frame 5, even if that is a copy of an end.
-    #[test]
-    fn it_counts_which_frame_is_in_the_middle() {
-        let with_poses = |poses: [u32; 9]| {
-            let mut shot = shot(9);
-            let CameraPath::Keys(keys) = &mut shot.path else { panic!("keys") };
-            for (key, pose) in keys.iter_mut().zip(poses) {
-                key.pose.eye.x = f64::from(pose);
-            }
-            Recipes::new(&shot, &settings(Policy::Surface), true, false).expect("good cameras")
-        };
-        let (first, last) =
-            (with_poses([0, 0, 1, 0, 0, 0, 0, 0, 2]), with_poses([0, 0, 1, 0, 2, 0, 0, 0, 2]));
-        assert_eq!(first.get(3).map(|r| r.view), last.get(3).map(|r| r.view));
-        assert_ne!(first.get(3), last.get(3));
-        assert_eq!(first.get(9), last.get(9));
     }
 
     #[test]

@@ -75,11 +75,6 @@ impl Schedule {
         ancestors
     }
 
-    /// The original of the middle of the segment that `original` lies in; `None` for a key frame.
-    pub fn middle(&self, original: u32) -> Option<u32> {
-        self.pyramid.middle_of(original).map(|middle| self.original(middle))
-    }
-
     /// How many frames are traced whole: key frames that are their own originals.
     pub fn key_frames(&self) -> u32 {
         let copies = self.copies.keys().filter(|frame| self.pyramid.is_key(**frame)).count();

@@ -164,7 +164,11 @@ impl Inferrer<'_> {
             rendered.rays += second.rays;
             return Ok(Some(None));
         };
-        let drawn = |i: usize| Drawn { index: i as u32, weight: probed.draw.weight() };
+        let drawn = |i: usize| {
+            let (index, weight) = (i as u32, probed.draw.weight());
+            let group = probed.draw.group(index % film.width, index / film.width);
+            Drawn { index, weight, group }
+        };
         let drawn: Vec<Drawn> = places.iter().map(|i| drawn(*i)).collect();
         let shown = self.shown(&inferred);
         let traces = [&first.film.rgb[..], &second.film.rgb[..]];
