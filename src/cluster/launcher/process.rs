@@ -14,7 +14,7 @@ const OTHERS: [&str; 4] = ["prte", "hydra_pmi_proxy", "mpiexec.hydra", "slurmste
 /// The launcher's process on this machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LauncherProcess {
-    /// Its name, as the system shows it.
+    /// Its name, as its user knows it.
     pub name: String,
     /// Its number.
     pub id: u32,
@@ -38,7 +38,7 @@ impl LauncherProcess {
             id = stat(id)?.parent;
             let Stat { name, started, .. } = stat(id)?;
             if BINDING.contains(&&*name) || OTHERS.contains(&&*name) {
-                return Some(Self { name, id, started });
+                return Some(Self { name: usual_name(&name).into(), id, started });
             }
         }
     }
@@ -53,6 +53,15 @@ impl LauncherProcess {
     /// The cores that it could give to its ranks, where it binds these.
     pub(super) fn cores(&self) -> Option<BTreeSet<u32>> {
         BINDING.contains(&&*self.name).then(|| cores(&allowed_cores(self.id)))
+    }
+}
+
+/// What users call the launcher that the system shows as `name`: `mpirun` of Open MPI 5 turns itself into
+/// `prterun`, of older ones it may be shown as `orterun`.
+fn usual_name(name: &str) -> &str {
+    match name {
+        "prterun" | "orterun" => "mpirun",
+        name => name,
     }
 }
 
@@ -97,6 +106,14 @@ mod tests {
         assert!(cores("0-2,8").into_iter().eq([0, 1, 2, 8]));
         assert!(cores("7").into_iter().eq([7]));
         assert!(cores("").is_empty() && cores("x-3").is_empty());
+    }
+
+    #[test]
+    fn a_launcher_has_the_name_that_its_user_knows() {
+        assert_eq!(
+            ["prterun", "mpirun", "slurmstepd"].map(usual_name),
+            ["mpirun", "mpirun", "slurmstepd"]
+        );
     }
 
     #[test]
