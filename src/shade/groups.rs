@@ -29,6 +29,19 @@ struct Gathered {
     all: f64,
 }
 
+/// Check rays of a lit point to one light. Those of a surface point follow one another in the sequence of
+/// samples, since such a run is spread over the light.
+pub(super) struct CheckRays {
+    /// The surface point.
+    pub point: usize,
+    /// The first sample number of its run.
+    pub first: u32,
+    /// How many the run has.
+    pub all: usize,
+    /// Those of the run that are the lit point's.
+    pub own: Range<usize>,
+}
+
 /// The surface points of a chunk.
 #[derive(Default)]
 pub(super) struct Groups {
@@ -186,25 +199,37 @@ impl Groups {
         }
     }
 
+    /// How many surface points there are.
+    pub fn len(&self) -> usize {
+        self.asked.points.len()
+    }
+
     /// Whether any answer is to be checked.
     pub fn wants_checks(&self) -> bool {
         !self.asked.checks.is_empty()
     }
 
-    /// The sample numbers of the check rays in `channel` that lit point `i` casts, where tracing would cast
-    /// `rays` from each lit point. Those of a surface point follow one another, since such a run of samples is
-    /// spread over the light.
-    pub fn check_rays(&self, i: usize, channel: usize, channels: usize, rays: u32) -> Range<u32> {
-        let group = self.of_lit[i] as usize;
-        if !self.asked.checks[group * channels + channel] {
-            return 0..0;
+    /// The check rays in `channel` that lit point `i` casts, where tracing would cast `rays` from each lit
+    /// point; `None` where none is wanted.
+    pub fn check_rays(
+        &self,
+        i: usize,
+        channel: usize,
+        channels: usize,
+        rays: u32,
+    ) -> Option<CheckRays> {
+        let point = self.of_lit[i] as usize;
+        if !self.asked.checks[point * channels + channel] {
+            return None;
         }
-        let samples = self.asked.points[group].samples;
+        let samples = self.asked.points[point].samples;
         let all = check_rays(samples.saturating_mul(rays));
-        let until = |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as u32;
+        let until =
+            |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;
         // A run of a net's points is spread evenly where it starts at a multiple of a power of two.
-        let first = self.first[group].wrapping_mul(rays.next_power_of_two());
-        first.wrapping_add(until(self.before[i]))..first.wrapping_add(until(self.before[i] + 1))
+        let first = self.first[point].wrapping_mul(rays.next_power_of_two());
+        let own = until(self.before[i])..until(self.before[i] + 1);
+        Some(CheckRays { point, first, all: all as usize, own })
     }
 
     /// Adds what check rays from lit point `i` found: `open` of `all`.

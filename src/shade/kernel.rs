@@ -95,8 +95,8 @@ pub(super) fn block<
     let mut first = 0;
     while first < renderer.settings.spp {
         let last = first.saturating_add(SAMPLES_TOGETHER).min(renderer.settings.spp);
-        pixels.start_samples(first..last);
-        camera_rays(renderer, input, pixels, first..last, scratch);
+        pixels.start_samples(renderer.settings.spp, &input.filter, first..last);
+        camera_rays(input, pixels, first..last, scratch);
         counts.camera += scratch.rays.len() as u64;
         if NESTED {
             scratch.interiors.clear();
@@ -115,7 +115,6 @@ pub(super) fn block<
 }
 
 fn camera_rays(
-    renderer: &Renderer,
     input: &FrameInput,
     pixels: &mut BlockPixels,
     samples: std::ops::Range<u32>,
@@ -125,7 +124,7 @@ fn camera_rays(
     scratch.states.clear();
     for sample in samples {
         for pixel in 0..pixels.len() {
-            let (x, y) = pixels.sample_position(renderer, input, pixel, sample);
+            let (x, y) = pixels.sample_position(pixel, sample);
             scratch.rays.push(Ray::new(input.camera.eye, input.camera.direction(x, y)));
             let throughput = Rgb::ONE;
             scratch.states.push(PathState { throughput, pixel: pixel as u32, sample, branch: 1 });
@@ -367,7 +366,7 @@ fn record(
 ) {
     let scene = renderer.scene;
     for ((ray, hit), state) in rays.iter().zip(hits).zip(states) {
-        if !pixels.is_nearest(renderer, input, state.pixel as usize, state.sample) {
+        if !pixels.is_nearest(state.pixel as usize, state.sample) {
             continue;
         }
         let record = hit.map_or(GPixel::EMPTY, |hit| {

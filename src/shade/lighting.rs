@@ -4,7 +4,7 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse.
 
-use super::groups::Groups;
+use super::groups::{CheckRays, Groups};
 use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer, Reuse};
@@ -107,6 +107,7 @@ pub(super) struct ShadowScratch {
     occluded: Vec<bool>,
     spans: Vec<Span>,
     u: Vec<[f32; 2]>,
+    runs: Runs,
     /// Lit points that the present light must be traced for.
     wanted: Vec<u32>,
     /// Irradiance without shadows, per unit of radiance, for each lit point and kept channel.
@@ -117,6 +118,33 @@ pub(super) struct ShadowScratch {
     starts: Vec<Option<ShadowStarts>>,
     /// What is known already; unused where nothing is reused.
     pub groups: Groups,
+}
+
+/// Samples of one light for the check rays of each surface point.
+#[derive(Default)]
+struct Runs {
+    /// Where each surface point's run starts, once one of its lit points has asked for it.
+    starts: Vec<Option<usize>>,
+    u: Vec<[f32; 2]>,
+}
+
+impl Runs {
+    fn start(&mut self, points: usize) {
+        self.starts.clear();
+        self.starts.resize(points, None);
+        self.u.clear();
+    }
+
+    /// The samples of a lit point, of its surface point's run, which `fill` makes once.
+    fn own(&mut self, wanted: &CheckRays, fill: impl FnOnce(&mut [[f32; 2]])) -> &[[f32; 2]] {
+        let start = *self.starts[wanted.point].get_or_insert_with(|| {
+            let start = self.u.len();
+            self.u.resize(start + wanted.all, [0.0; 2]);
+            fill(&mut self.u[start..]);
+            start
+        });
+        &self.u[start..][wanted.own.clone()]
+    }
 }
 
 /// The shadow rays of one point, and the irradiance they decide on.
@@ -142,6 +170,13 @@ impl ShadowScratch {
         if sample.weight > 0.0 {
             self.push(starts.smooth.to(&sample.target), sample.weight);
         }
+    }
+
+    /// Room for `n` samples of a light, to be given back.
+    fn samples(&mut self, n: usize) -> Vec<[f32; 2]> {
+        let mut u = std::mem::take(&mut self.u);
+        u.resize(n, [0.0; 2]);
+        u
     }
 
     /// Whether the present point has no ray yet.
@@ -254,6 +289,7 @@ impl Renderer<'_> {
         let radiance = light::radiance(source.light);
         let channel = input.channel_of(source.index);
         let wanted = self.use_known(lit, channel, radiance, pixels, s);
+        let mut u = s.samples(n);
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
@@ -266,7 +302,8 @@ impl Renderer<'_> {
                 // What is NaN goes on, to be counted at its pixel.
                 let seen = source.area.seen_from(point.si.p).filter(|_| exact != 0.0);
                 if let Some(seen) = &seen {
-                    self.rays_to_area((source.index, seen), (lit, i), (first, n), pixels, s);
+                    self.fill(&point.place, source.index, first, pixels, &mut u);
+                    self.rays_to_area(seen, (lit, i), &u, s);
                     if s.is_open() {
                         // All below the horizon, but some of the light is above: a point of that
                         // decides, or the horizon's own shadow would be counted twice.
@@ -281,6 +318,7 @@ impl Renderer<'_> {
             counts.shadow_area += s.rays.len() as u64;
             self.settle(lit, group, channel, pixels, s, counts);
         }
+        s.u = u;
         s.wanted = wanted;
     }
 
@@ -323,53 +361,47 @@ impl Renderer<'_> {
         let irradiance = self.scene.sky.radiance * std::f32::consts::PI;
         let channel = input.sky_channel();
         let wanted = self.use_known(lit, channel, self.scene.sky.radiance, pixels, s);
+        let light = self.number_of(Channel::Sky);
+        let mut u = s.samples(n);
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
                 let first = lit[i as usize].place.sample.wrapping_mul(n as u32);
-                self.rays_to_sky((lit, i), (first, n), pixels, s);
+                self.fill(&lit[i as usize].place, light, first, pixels, &mut u);
+                self.rays_to_sky((lit, i), &u, s);
                 s.close(irradiance);
             }
             counts.shadow_sky += s.rays.len() as u64;
             self.settle(lit, group, channel, pixels, s, counts);
         }
+        s.u = u;
         s.wanted = wanted;
     }
 
-    /// Pushes shadow rays from lit point `i` to `n` samples of an area light, from sample number `first` on, but
-    /// for those below the horizon.
+    /// Pushes a shadow ray from lit point `i` to each of the samples `u` of an area light, but for those below
+    /// the horizon.
     fn rays_to_area(
         &self,
-        (light, seen): (u32, &SeenLight),
+        seen: &SeenLight,
         (lit, i): (&[LitPoint], u32),
-        (first, n): (u32, usize),
-        pixels: &BlockPixels,
+        u: &[[f32; 2]],
         s: &mut ShadowScratch,
     ) {
         let point = &lit[i as usize];
         let starts = s.starts(self, lit, i);
-        self.fill(&point.place, light, (first, n), pixels, &mut s.u);
-        for k in 0..n {
-            let sample = seen.sample(point.si.p, point.n, s.u[k].map(f64::from));
+        for u in u {
+            let sample = seen.sample(point.si.p, point.n, u.map(f64::from));
             s.push_sample(&starts, &sample);
         }
     }
 
-    /// Pushes `n` shadow rays from lit point `i` to the sky, from sample number `first` on.
-    fn rays_to_sky(
-        &self,
-        (lit, i): (&[LitPoint], u32),
-        (first, n): (u32, usize),
-        pixels: &BlockPixels,
-        s: &mut ShadowScratch,
-    ) {
+    /// Pushes a shadow ray from lit point `i` to each of the samples `u` of the sky.
+    fn rays_to_sky(&self, (lit, i): (&[LitPoint], u32), u: &[[f32; 2]], s: &mut ShadowScratch) {
         let point = &lit[i as usize];
         let facet = s.starts(self, lit, i).facet;
-        let dimension = self.scene.lights.len() as u32;
-        self.fill(&point.place, dimension, (first, n), pixels, &mut s.u);
         let (ng, basis) = (point.ng, orthonormal_basis(point.n));
-        for k in 0..n {
-            let local = cosine_hemisphere(s.u[k].map(f64::from));
+        for u in u {
+            let local = cosine_hemisphere(u.map(f64::from));
             let dir = to_world(local, basis, point.n);
             // Below the facet but above the smooth surface that it stands for: the facet's own plane is
             // no occluder.
@@ -389,57 +421,56 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         let channels = reuse.channels.len();
+        let all = all_of(lit, s);
         for (at, channel) in reuse.channels.iter().enumerate() {
             let (n, count) = match channel {
                 Channel::Area(_) => (self.settings.shadow_samples, &mut counts.shadow_area),
                 Channel::Sky => (self.settings.sky_samples, &mut counts.shadow_sky),
             };
-            let mut wanted = std::mem::take(&mut s.wanted);
-            wanted.clear();
-            wanted.extend(0..lit.len() as u32);
             s.clear();
-            for &i in &wanted {
-                let own = s.groups.check_rays(i as usize, at, channels, n);
-                let rays = own.len();
-                if rays > 0 && s.exact[i as usize * channels + at] != 0.0 {
-                    // Samples that tracing does not use: had it any of these, what is traced because
-                    // of them would be darker or brighter than what is.
-                    let traced = self.settings.spp.wrapping_mul(n.next_power_of_two());
-                    let first = own.start.wrapping_add(traced);
+            let mut runs = std::mem::take(&mut s.runs);
+            runs.start(s.groups.len());
+            for &i in &all {
+                let wanted = s.groups.check_rays(i as usize, at, channels, n);
+                let wanted = wanted.filter(|_| s.exact[i as usize * channels + at] != 0.0);
+                if let Some(wanted) = wanted {
+                    let own = runs.own(&wanted, |u| {
+                        // Samples that tracing does not use: had it any of these, what is traced
+                        // because of them would be darker or brighter than what is.
+                        let traced = self.settings.spp.wrapping_mul(n.next_power_of_two());
+                        let first = wanted.first.wrapping_add(traced);
+                        let place = &lit[i as usize].place;
+                        self.fill(place, self.number_of(channel), first, pixels, u);
+                    });
                     match channel {
                         Channel::Area(index) => {
                             let area = input.area_lights[index as usize].as_ref();
                             let p = lit[i as usize].si.p;
                             if let Some(seen) = area.and_then(|area| area.seen_from(p)) {
-                                self.rays_to_area(
-                                    (index, &seen),
-                                    (lit, i),
-                                    (first, rays),
-                                    pixels,
-                                    s,
-                                );
+                                self.rays_to_area(&seen, (lit, i), own, s);
                             }
                         }
-                        Channel::Sky => self.rays_to_sky((lit, i), (first, rays), pixels, s),
+                        Channel::Sky => self.rays_to_sky((lit, i), own, s),
                     }
                 }
                 s.close(Rgb::ZERO);
             }
+            s.runs = runs;
             *count += s.rays.len() as u64;
             s.occluded.clear();
             s.occluded.resize(s.rays.len(), false);
             self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
             let mut start = 0;
-            for (&i, span) in wanted.iter().zip(&s.spans) {
-                let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
+            for (&i, span) in all.iter().zip(&s.spans) {
+                let (open, weight) = opened(&s.weights, &s.occluded, start..span.end);
                 let rays = span.end - start;
                 start = span.end;
                 if rays > 0 {
-                    s.groups.note_checked(i as usize, (at, channels), (open, all), rays);
+                    s.groups.note_checked(i as usize, (at, channels), (open, weight), rays);
                 }
             }
-            s.wanted = wanted;
         }
+        s.wanted = all;
         s.groups.conclude_checks(reuse);
     }
 
@@ -473,18 +504,24 @@ impl Renderer<'_> {
         wanted
     }
 
-    /// Stratified points of one light and one place: `n` from sample number `first` on.
+    /// The number by which samples of a channel's light are drawn.
+    fn number_of(&self, channel: Channel) -> u32 {
+        match channel {
+            Channel::Area(index) => index,
+            Channel::Sky => self.scene.lights.len() as u32,
+        }
+    }
+
+    /// Stratified points of one light and one place, from sample number `first` on.
     fn fill(
         &self,
         place: &SamplePlace,
         light: u32,
-        (first, n): (u32, usize),
+        first: u32,
         pixels: &BlockPixels,
-        u: &mut Vec<[f32; 2]>,
+        u: &mut [[f32; 2]],
     ) {
-        u.resize(n, [0.0; 2]);
-        let dimension = self.dimension(place, light);
-        pixels.sampler(place.pixel).fill2(first, dimension, &mut u[..n]);
+        pixels.sampler(place.pixel).fill2(first, self.dimension(place, light), u);
     }
 
     fn dimension(&self, place: &SamplePlace, light: u32) -> u32 {

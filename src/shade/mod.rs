@@ -164,7 +164,8 @@ type BlockKernel =
 
 impl Renderer<'_> {
     /// Renders frame number `frame` (from 1) through `camera` (world space) on the current rayon
-    /// pool. `None` when `stop` was set before the frame was finished.
+    /// pool. `None` when `stop` was set before the frame was finished. To be called from outside the
+    /// pool's own loops: a thread that waits for the frame's tiles takes up other work of its pool.
     ///
     /// The bytes depend on scene, settings, camera and frame number only. With a crop the film
     /// has the full size and is black outside of it.

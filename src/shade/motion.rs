@@ -3,9 +3,10 @@
 //! Computed from the records of a finished film, not while it is traced: frames with the same camera
 //! share one tracing, but not the camera before them.
 
-use super::pixels::{film_sampler, offset_of};
+use super::pixels::{film_sampler, offsets_of};
 use super::{Renderer, pixel_filter};
 use crate::film::Film;
+use crate::inference::SAMPLES_TOGETHER;
 use crate::math::Vec2;
 use crate::scene::Camera;
 use rayon::prelude::*;
@@ -39,11 +40,14 @@ impl Renderer<'_> {
         let filter = pixel_filter(self.settings.filter);
         let sampler = film_sampler(self.settings.seed, x, y);
         let mut best = (f64::INFINITY, [0.0; 2]);
-        for sample in 0..self.settings.spp {
-            let [dx, dy] = offset_of(self.settings.spp, &filter, &sampler, sample);
-            let distance = dx * dx + dy * dy;
-            if distance < best.0 {
-                best = (distance, [dx, dy]);
+        let spp = self.settings.spp;
+        for first in (0..spp).step_by(SAMPLES_TOGETHER as usize) {
+            let chunk = first..first.saturating_add(SAMPLES_TOGETHER).min(spp);
+            for [dx, dy] in offsets_of(spp, &filter, &sampler, chunk) {
+                let distance = dx * dx + dy * dy;
+                if distance < best.0 {
+                    best = (distance, [dx, dy]);
+                }
             }
         }
         (f64::from(x) + 0.5 + best.1[0], f64::from(y) + 0.5 + best.1[1])

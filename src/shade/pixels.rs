@@ -1,8 +1,7 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
-use super::{FrameInput, Renderer};
 use crate::film::{GPixel, PixelSource, Provenance};
-use crate::inference::Origin;
+use crate::inference::{Origin, SAMPLES_TOGETHER};
 use crate::math::Rgb;
 use crate::sampling::{PixelFilter, PixelSampler};
 use crate::scene::Rect;
@@ -21,6 +20,8 @@ const FILM_DIMENSION: u32 = 0;
 pub(super) struct BlockPixels {
     places: Vec<(u32, u32)>,
     film_samplers: Vec<PixelSampler>,
+    /// Where the present chunk's samples lie from their pixels' middles, pixel by pixel, pixels.
+    offsets: Vec<[f64; 2]>,
     samplers: Vec<PixelSampler>,
     sums: Vec<Rgb>,
     /// The most that each channel of a sample's radiance may be.
@@ -58,17 +59,20 @@ pub(super) fn film_sampler(seed: u64, x: u32, y: u32) -> PixelSampler {
     PixelSampler::new(seed, 0, x, y)
 }
 
-/// Where a camera sample lies from its pixel's middle, pixels.
-pub(super) fn offset_of(
+/// Where camera samples, at most [`SAMPLES_TOGETHER`], lie from their pixel's middle, pixels: there, where
+/// the pixel has but one.
+pub(super) fn offsets_of(
     spp: u32,
     filter: &PixelFilter,
     sampler: &PixelSampler,
-    sample: u32,
-) -> [f64; 2] {
-    if spp == 1 {
-        return [0.0; 2];
+    samples: Range<u32>,
+) -> impl Iterator<Item = [f64; 2]> {
+    let mut u = [[0.5; 2]; SAMPLES_TOGETHER as usize];
+    let count = samples.len();
+    if spp > 1 {
+        sampler.fill2(samples.start, FILM_DIMENSION, &mut u[..count]);
     }
-    filter.offset2(sampler.get2(sample, FILM_DIMENSION))
+    u.into_iter().take(count).map(move |u| if spp > 1 { filter.offset2(u) } else { [0.0; 2] })
 }
 
 #[derive(Clone, Copy)]
@@ -84,6 +88,7 @@ impl BlockPixels {
         Self {
             places: Vec::new(),
             film_samplers: Vec::new(),
+            offsets: Vec::new(),
             samplers: Vec::new(),
             sums: Vec::new(),
             most,
@@ -190,8 +195,12 @@ impl BlockPixels {
         self.chunk.end - self.chunk.start
     }
 
-    /// Starts a chunk of camera samples.
-    pub fn start_samples(&mut self, chunk: Range<u32>) {
+    /// Starts a chunk of the `spp` camera samples.
+    pub fn start_samples(&mut self, spp: u32, filter: &PixelFilter, chunk: Range<u32>) {
+        self.offsets.clear();
+        for sampler in &self.film_samplers {
+            self.offsets.extend(offsets_of(spp, filter, sampler, chunk.clone()));
+        }
         self.chunk = chunk;
         if self.most.is_some() {
             let count = self.chunk_len() as usize * self.places.len();
@@ -262,27 +271,15 @@ impl BlockPixels {
         &self.samplers[pixel as usize]
     }
 
-    /// Image point of a camera sample: the pixel's middle where there is but one.
-    pub fn sample_position(
-        &self,
-        renderer: &Renderer,
-        input: &FrameInput,
-        pixel: usize,
-        sample: u32,
-    ) -> (f64, f64) {
+    /// Image point of one of the present chunk's camera samples.
+    pub fn sample_position(&self, pixel: usize, sample: u32) -> (f64, f64) {
         let (x, y) = self.places[pixel];
-        let [dx, dy] = self.offset(renderer, input, pixel, sample);
+        let [dx, dy] = self.offset(pixel, sample);
         (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
     }
 
-    fn offset(
-        &self,
-        renderer: &Renderer,
-        input: &FrameInput,
-        pixel: usize,
-        sample: u32,
-    ) -> [f64; 2] {
-        offset_of(renderer.settings.spp, &input.filter, &self.film_samplers[pixel], sample)
+    fn offset(&self, pixel: usize, sample: u32) -> [f64; 2] {
+        self.offsets[pixel * self.chunk_len() as usize + (sample - self.chunk.start) as usize]
     }
 
     /// Whether first-hit records are kept.
@@ -291,14 +288,8 @@ impl BlockPixels {
     }
 
     /// Whether this camera sample is the nearest so far to its pixel's middle; remembers it.
-    pub fn is_nearest(
-        &mut self,
-        renderer: &Renderer,
-        input: &FrameInput,
-        pixel: usize,
-        sample: u32,
-    ) -> bool {
-        let [dx, dy] = self.offset(renderer, input, pixel, sample);
+    pub fn is_nearest(&mut self, pixel: usize, sample: u32) -> bool {
+        let [dx, dy] = self.offset(pixel, sample);
         let distance = dx * dx + dy * dy;
         let nearer = distance < self.records[pixel].nearest;
         if nearer {
