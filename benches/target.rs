@@ -2,9 +2,10 @@
 //! a converged reference, how much longer it takes than the fastest setting of a sweep that reaches it
 //! in 95 % of them, and how near a budget of half the default's time is kept.
 //!
-//! `SCENE`, `TARGETS` (dB, or `budget`), `PIXELS`, `SPP` (of each reference), `LIGHTS` (shadow and sky
-//! samples of the sweep) and `THREADS` change what is run, `PROGRAM` which program. With `KEEP`, a folder,
-//! references and sweeps are made once and read again.
+//! `SCENE` (names under scenes/, or scene files, as those of `./x zoo`), `TARGETS` (dB, or `budget`),
+//! `PIXELS`, `SPP` (of each reference), `LIGHTS` (shadow and sky samples of the sweep) and `THREADS` change
+//! what is run, `PROGRAM` which program. With `KEEP`, a folder, references and sweeps are made once and read
+//! again.
 //!
 //! A reference of four times the samples still has some tenth of the squared error, enough for a frame
 //! at a target's edge to be counted as missed. So there are two with other seeds: the mean of the product
@@ -44,15 +45,18 @@ fn var<T: std::str::FromStr>(name: &str, default: T) -> T {
 
 impl Place {
     fn of(scene: &str, folder: &Path) -> Self {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene);
-        let scene_file = file.join("scene.toml");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let scene_file = match scene.ends_with(".toml") {
+            true => root.join(scene),
+            false => root.join("scenes").join(scene).join("scene.toml"),
+        };
         let loaded = import::load(&scene_file, &LoadOptions::default()).expect("a scene");
         let (width, height) = (loaded.settings.width, loaded.settings.height);
         let pixels: f64 = var("PIXELS", 12_000.0);
         let scale = (pixels / (f64::from(width) * f64::from(height))).sqrt();
         let edge = |length: u32| (f64::from(length) * scale).round();
         let mut place = Self {
-            folder: folder.join(scene),
+            folder: folder.join(scene.replace('/', "_")),
             scene: scene_file,
             size: "4x4".into(),
             frames: loaded.shot.frames,

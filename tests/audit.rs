@@ -49,7 +49,7 @@ fn a_crop_is_audited_by_its_own_pixels() {
     let crop = Rect { x0: 10, y0: 30, x1: 60, y1: 75 };
     let settings = Settings {
         shadow_samples: 1,
-        sky_samples: 16,
+        sky_samples: 64,
         crop: Some(crop),
         ..stage.settings(&trial, 2)
     };

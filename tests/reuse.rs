@@ -130,7 +130,7 @@ fn a_sample_is_clamped_alike_in_traced_and_inferred_frames() {
     let set = Set::load("cornell", |_| ());
     let stage = set.stage(2);
     let shot = set.shot(FRAMES);
-    let settings = with_segment(set.settings((64, 64), 1, 16));
+    let settings = with_segment(set.settings((64, 64), 1, 64));
     let plain = stage.frames(&settings, &shot, &segment());
     let clamped = Settings { clamp: Some(MOST * settings.exposure), ..settings };
     let mut inferred = 0;
@@ -172,7 +172,7 @@ fn a_cut_reuses_nothing_from_the_other_side() {
     set.shot.vfov_degrees = 30.0;
     let stage = set.stage(2);
     let shot = set.shot(6);
-    let settings = set.settings((64, 64), 1, 16);
+    let settings = set.settings((64, 64), 1, 64);
     let whole = stage.frames(&settings, &shot, &(1..=6).collect::<Vec<_>>());
     for (frame, made) in (1..).zip(&whole) {
         let others = made.film.sources.as_ref().unwrap().iter().map(|s| s.frame);

@@ -19,23 +19,36 @@ pub(super) fn albedo(scene: &Scene, material: &Material, si: &SurfaceInteraction
 
 /// Bilinear lookup, repeating; `(0, 0)` is the image's lower left corner.
 fn bilinear(texture: &Texture, uv: Vec2) -> Rgb {
-    let (w, h) = (texture.width as usize, texture.height as usize);
-    let x = repeat(uv.x) * w as f32 - 0.5;
-    let y = repeat(1.0 - uv.y) * h as f32 - 0.5;
-    let (fx, fy) = (x - x.floor(), y - y.floor());
-    let wrap = |i: f32, n: usize| (i as isize).rem_euclid(n as isize) as usize;
-    let (x0, x1) = (wrap(x.floor(), w), wrap(x.floor() + 1.0, w));
-    let (y0, y1) = (wrap(y.floor(), h), wrap(y.floor() + 1.0, h));
-    let at = |x: usize, y: usize| texture.texels[y * w + x];
+    let (x0, x1, fx) = texels(repeat(uv.x), texture.width);
+    let (y0, y1, fy) = texels(repeat(1.0 - uv.y), texture.height);
+    let at = |x: usize, y: usize| texture.texels[y * texture.width as usize + x];
     let upper = at(x0, y0).lerp(at(x1, y0), fx);
     let lower = at(x0, y1).lerp(at(x1, y1), fx);
     upper.lerp(lower, fy)
 }
 
+/// The two texels of `n` in a row between whose middles `u` of [0, 1] lies, and how far from the first.
+fn texels(u: f32, n: u32) -> (usize, usize, f32) {
+    let x = u * n as f32 - 0.5;
+    let whole = floor(x);
+    // The row repeats: before the first texel lies the last.
+    let last = n as usize - 1;
+    let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
+    let second = if first < last { first + 1 } else { 0 };
+    (first, second, x - whole)
+}
+
+/// The fraction of a coordinate; 0 beyond f32's whole numbers, and of what is not a number.
 fn repeat(x: f32) -> f32 {
-    let fraction = x - x.floor();
-    // A coordinate beyond f32's whole numbers, or not a number, has no fraction.
-    if fraction.is_finite() { fraction } else { 0.0 }
+    const WHOLE_FROM: f32 = 8_388_608.0;
+    if x.abs() < WHOLE_FROM { x - floor(x) } else { 0.0 }
+}
+
+/// The next whole number below `x`, which an `i32` holds. Not `f32::floor`, which is a call where the
+/// processor's instruction for it cannot be counted on.
+fn floor(x: f32) -> f32 {
+    let whole = x as i32 as f32;
+    if x < whole { whole - 1.0 } else { whole }
 }
 
 #[cfg(test)]

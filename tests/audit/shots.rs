@@ -77,9 +77,9 @@ impl Set {
 }
 
 impl Stage<'_> {
-    /// Settings of shot `number`: 16, 24 or 32 shadow samples, and a seed of its own.
+    /// Settings of shot `number`: 48, 64 or 80 shadow samples, and a seed of its own.
     pub fn settings(&self, trial: &Trial, number: u32) -> Settings {
-        let samples = [16, 24, 32][number as usize % 3];
+        let samples = [48, 64, 80][number as usize % 3];
         Settings {
             width: trial.edge,
             height: trial.edge,

@@ -38,7 +38,8 @@ fn a_report_names_the_command_and_follows_the_job() {
 #[test]
 fn a_report_shows_what_is_whole_and_names_the_rest() {
     let job = Job::new();
-    let line = "render cube.obj --size 24x16 --spp 1 --frames 1..4 --no-video --maps -q -o";
+    let line = "render cube.obj --size 24x16 --spp 1 --shadow-samples 64 --sky-samples 64 \
+                --frames 1..4 --no-video --maps -q -o";
     job.done(&format!("{line} o/f_##.png"));
     let pictures = |page: &str| page.matches("data:image/jpeg").count();
     job.done("report o -o whole.html");
@@ -85,7 +86,8 @@ fn frames_of_other_settings_are_named_and_not_shown() {
 #[test]
 fn a_report_offers_the_maps_that_say_something() {
     let job = Job::new();
-    let line = "render cube.obj --size 24x16 --spp 1 --frames 1..4 --no-video --maps -q -o";
+    let line = "render cube.obj --size 24x16 --spp 1 --shadow-samples 64 --sky-samples 64 \
+                --frames 1..4 --no-video --maps -q -o";
     let report = |options: &str, pattern: &str| {
         job.done(&format!("{line} {pattern} {options}"));
         job.done("report o -o p.html -q");

@@ -13,7 +13,7 @@ use tweenray::scene::{Camera, Pose};
 fn scene(job: &Job, name: &str, camera: &str) {
     let text = format!(
         "[camera]\n{camera}\n[settings]\nsize = [64, 36]\nspp = 1\nvideo = false\n\
-         sky_samples = 4\n[sky]\nradiance = 0.3\n[reuse]\nsegment = 8\n\
+         shadow_samples = 48\nsky_samples = 16\n[sky]\nradiance = 0.3\n[reuse]\nsegment = 8\n\
          [material.mirror]\nmirror = 0.9\n\
          [[light]]\nquad = {{ centre = [2, 5, 3], normal = '-y', size = [2, 2], radiance = 20 }}\n\
          [[mesh]]\nquad = {{ centre = [0, -1, 0], normal = 'y', size = [20, 20] }}\n\
@@ -215,7 +215,7 @@ fn references_that_cannot_serve_are_refused_by_name() {
     fs::create_dir(job.path("empty")).expect("made");
     job.refused(&format!("{line} empty"), "no exr frame is in there");
     job.refused(&format!("{line} base --policy off"), "--references needs --policy surface");
-    job.refused(&format!("{line} base --shadow-samples 64"), "16 shadow rays a pixel to light 1");
+    job.refused(&format!("{line} base --shadow-samples 64"), "48 shadow rays a pixel to light 1");
     job.refused(&format!("{line} base --sky-samples 0"), "keeps the shadowing of light 1, sky");
     job.refused(&format!("{line} o"), "o: ");
     job.refused("render scene.toml -o base/g_#.exr --references base", "own frames go");

@@ -119,7 +119,7 @@ fn quiet_says_nothing_and_otherwise_a_line_a_frame() {
     let job = Job::new();
     let ran = job.done(&small("--frames 1..2 --quiet -o q/f_##.png"));
     assert_eq!((ran.out.as_str(), ran.err.as_str()), ("", ""));
-    let ran = job.done(&small("--frames 1..2 -o p/f_##.png"));
+    let ran = job.done(&small("--frames 1..2 --shadow-samples 64 -o p/f_##.png"));
     let lines: Vec<&str> = ran.err.lines().collect();
     assert_eq!(lines.len(), 2, "{}", ran.err);
     assert!(lines[0].starts_with("frame 1 of 2  "), "{}", ran.err);

@@ -27,7 +27,9 @@ fn folder() -> Job {
 }
 
 fn line(scene: &str, out: &str) -> String {
-    format!("render {scene}.toml --size 48x27 --spp 2 --segment 8 --no-video -o {out}")
+    format!(
+        "render {scene}.toml --size 48x27 --spp 2 --sky-samples 64 --segment 8 --no-video -o {out}"
+    )
 }
 
 #[test]

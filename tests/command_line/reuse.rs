@@ -9,7 +9,7 @@ use std::fs;
 fn scene(job: &Job, camera: &str, more: &str) {
     let text = format!(
         "[camera]\n{camera}\n[settings]\nsize = [48, 27]\nspp = 1\nvideo = false\n\
-         sky_samples = 4\n[sky]\nradiance = 0.3\n\
+         shadow_samples = 48\nsky_samples = 16\n[sky]\nradiance = 0.3\n\
          [reuse]\nsegment = 4\n{more}\n[material.mirror]\nmirror = 0.9\n\
          [[light]]\nquad = {{ centre = [2, 5, 3], normal = '-y', size = [2, 2], radiance = 20 }}\n\
          [[mesh]]\nquad = {{ centre = [0, -1, 0], normal = 'y', size = [20, 20] }}\n\
@@ -156,7 +156,7 @@ fn a_cut_to_another_view_reuses_nothing() {
     scene(&job, &format!("frames = 9\nkeys = [{}]", keys.join(", ")), "");
     let text = fs::read_to_string(job.path("scene.toml")).expect("there");
     // Rays enough to save where there are this few pixels.
-    let text = text.replace("sky_samples = 4", "sky_samples = 64\nshadow_samples = 64");
+    let text = text.replace("sky_samples = 16", "sky_samples = 64");
     let floor = "[[mesh]]\nquad = { centre = [300, -1, 0], normal = 'y', size = [20, 20] }\n";
     fs::write(job.path("scene.toml"), text + floor).expect("written");
     job.done("render scene.toml --frames 2..3 -o o/f_#.png");
@@ -208,7 +208,7 @@ fn inspect_says_what_is_looked_up_and_what_it_takes() {
     let text = job.done("inspect scene.toml").out;
     for says in [
         "policy surface: 3 key frames, one every 4 frames",
-        "light 1, quad        looked up  one lookup costs less than a pixel's 16 shadow rays",
+        "light 1, quad        looked up  one lookup costs less than a pixel's 48 shadow rays",
         "light 2, point       traced     one hard shadow ray is not worth a lookup",
         "sky                  looked up",
         "references held at a time: ",

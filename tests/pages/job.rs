@@ -13,7 +13,8 @@ pan = { from = [-1, 1.5, 5], to = [1, 1.5, 5], target = [0, 0.5, 0] }
 [settings]
 size = [96, 54]
 spp = 2
-shadow_samples = 8
+shadow_samples = 32
+sky_samples = 32
 
 [sky]
 radiance = 0.2

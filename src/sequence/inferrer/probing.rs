@@ -73,7 +73,7 @@ impl Inferrer<'_> {
         }
         let r = &self.renderer;
         let tolerance = r.settings.reuse.tolerance;
-        let cast = (&self.channels, r.settings);
+        let cast = (r.scene, &self.channels, r.settings);
         let before = || lookup.references.iter().flat_map(|r| r.findings());
         let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);

@@ -131,20 +131,20 @@ const NARROW: f64 = 8.0;
 
 /// No pixel behind a picket shows what another frame had there.
 pub fn disocclusion(size: Size) -> Outcome {
-    let mut outcome = behind_pickets(size, WIDE, 16);
+    let mut outcome = behind_pickets(size, WIDE);
     if size == Size::Full {
-        // As many rays as make it worth a look: all but what is above the shadows is traced.
-        outcome.merge(behind_pickets(size, NARROW * pixel(192), 64));
+        outcome.merge(behind_pickets(size, NARROW * pixel(192)));
     }
     outcome
 }
 
-fn behind_pickets(size: Size, lamp: f64, samples: u32) -> Outcome {
+fn behind_pickets(size: Size, lamp: f64) -> Outcome {
     let mut outcome = Outcome::default();
     let (width, height) = size.of((64, 48), (256, 192));
     let set = fence(height, lamp);
     let stage = set.stage(common::threads());
-    let settings = in_one_segment(set.settings((width, height), 1, samples));
+    // As many rays as make it worth a look: by the narrow lamp all but what is above the shadows is traced.
+    let settings = in_one_segment(set.settings((width, height), 1, 64));
     // With loose epsilons, so that it does take over what it should not.
     let by_colour = ReuseSettings {
         policy: Policy::Colour,

@@ -78,7 +78,7 @@ fn order_of(scene: &str, size: Size) -> Outcome {
     let mut set = Set::load(scene, |_| ());
     set.shot = set.shot(FRAMES);
     let reuse = ReuseSettings { segment: 8, ..ReuseSettings::default() };
-    let settings = Settings { reuse, ..set.settings(size.of((40, 40), (240, 160)), 1, 16) };
+    let settings = Settings { reuse, ..set.settings(size.of((40, 40), (240, 160)), 1, 64) };
     let all: Vec<u32> = (1..=FRAMES).collect();
     let whole = set.stage(2).frames(&settings, &set.shot, &all);
     let inferred: u64 = whole.iter().map(|m| m.reuse.direct_inferred).sum();
