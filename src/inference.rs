@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// the surface points that the frame would have, and sums in their order.
 pub const SAMPLES_TOGETHER: u32 = 4;
 /// Points of a pixel lie on one surface where their normals differ by less: cosine.
-const SAME_SURFACE: f32 = 0.9;
+pub const SAME_SURFACE: f32 = 0.9;
 /// And one lies so little off the tangent plane of the other, footprints.
 const MOST_HEIGHT: f64 = 1.0;
 

@@ -4,6 +4,7 @@
 //! needs of a sample fills half a line of the cache; what a block of pixels sees directly lies
 //! together, and so does what lies in a cell of the index.
 
+mod contrast;
 mod gather;
 
 use super::evidence::Finding;

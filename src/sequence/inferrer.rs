@@ -130,7 +130,8 @@ impl<'a> Inferrer<'a> {
         let kept = self.kept(frame, &camera, &sources, findings);
         if is_due {
             let own = camera.to_scene(&self.renderer.scene.recentring);
-            let reference = Reference::new(frame, &own, &sources, self.channels.len());
+            let channels = self.channels.len();
+            let reference = self.pool.install(|| Reference::new(frame, &own, &sources, channels));
             let reference = reference.with_findings(findings.to_vec());
             self.with_state(|s| s.keep(&self.schedule, frame, reference));
             self.leave(frame, &camera, (&sources, findings), kept.as_ref());

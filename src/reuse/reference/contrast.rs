@@ -1,0 +1,234 @@
+//! How ratios change from pixel to pixel of a frame, by passes over its rows: each compares all pixels of a row
+//! with those at one place beside them, so that the compiler works on several at a time.
+
+use super::{Contrast, NONE};
+use crate::inference::{SAME_SURFACE, SurfacePoint};
+use rayon::prelude::*;
+
+/// How far away the pixels lie that one is compared with.
+const REACH: usize = 2;
+/// Pixels in the ring of the 3 x 3 around one.
+const NEAR: usize = 8;
+/// And in the 5 x 5.
+const ALL: usize = 24;
+/// Where they lie, row by row: those of the 3 x 3 first, opposite ones as far from either end.
+const AROUND: [[usize; 2]; ALL] = around();
+
+/// Columns and rows to the right of and below the one that is furthest left and up.
+const fn around() -> [[usize; 2]; ALL] {
+    let mut places = [[0; 2]; ALL];
+    let (mut near, mut wide) = (0, NEAR);
+    let mut at = 0;
+    while at <= ALL {
+        let (x, y) = (at % (2 * REACH + 1), at / (2 * REACH + 1));
+        let is_near = x.abs_diff(REACH) <= 1 && y.abs_diff(REACH) <= 1;
+        if x == REACH && y == REACH {
+        } else if is_near {
+            places[near] = [x, y];
+            near += 1;
+        } else {
+            places[wide] = [x, y];
+            wide += 1;
+        }
+        at += 1;
+    }
+    places
+}
+
+/// A figure of each pixel, with a margin on which nothing is known.
+struct Image<T> {
+    stride: usize,
+    values: Vec<T>,
+}
+
+impl<T: Copy + Sync> Image<T> {
+    /// What `of` makes of each pixel's number in `slots`, and `none` where there is none.
+    fn of(slots: &[u32], width: usize, none: T, of: impl Fn(usize) -> T) -> Self {
+        let stride = width + 2 * REACH;
+        let height = slots.len() / width;
+        let mut values = vec![none; stride * (height + 2 * REACH)];
+        for (y, row) in slots.chunks(width).enumerate() {
+            let out = &mut values[(y + REACH) * stride + REACH..][..width];
+            for (out, slot) in out.iter_mut().zip(row).filter(|(_, slot)| **slot != NONE) {
+                *out = of(*slot as usize);
+            }
+        }
+        Self { stride, values }
+    }
+
+    /// Row `y` of the pixels that lie at `place` of [`AROUND`] from those of the image.
+    fn row(&self, y: usize, [right, down]: [usize; 2]) -> &[T] {
+        let width = self.stride - 2 * REACH;
+        &self.values[(y + down) * self.stride + right..][..width]
+    }
+
+    fn own(&self, y: usize) -> &[T] {
+        self.row(y, [REACH; 2])
+    }
+}
+
+/// For each of `points` the contrasts in each of `channels`: [`Contrast::UNKNOWN`] but for each pixel's own,
+/// whose numbers are `slots`, in rows of `width`.
+pub(super) fn contrasts(
+    points: &[SurfacePoint],
+    ratios: &[f32],
+    slots: &[u32],
+    (width, channels): (usize, usize),
+) -> Vec<Contrast> {
+    let mut contrasts = vec![Contrast::UNKNOWN; ratios.len()];
+    if slots.is_empty() {
+        return contrasts;
+    }
+    let same = same_surface(points, slots, width);
+    let mut bend = vec![0.0; slots.len()];
+    let (mut wide, mut far) = (bend.clone(), bend.clone());
+    for channel in 0..channels {
+        let known = Image::of(slots, width, f32::NAN, |i| ratios[i * channels + channel]);
+        let rows = bend.par_chunks_mut(width).zip(wide.par_chunks_mut(width));
+        let rows = rows.zip(same.par_chunks(width)).enumerate();
+        rows.for_each(|(y, ((bend, wide), same))| near_row(&known, y, same, bend, wide));
+        let numbers: Vec<u32> = (0..slots.len() as u32).collect();
+        let known = Image::of(&numbers, width, f32::NAN, |i| wide[i]);
+        let rows = far.par_chunks_mut(width).zip(same.par_chunks(width)).enumerate();
+        rows.for_each(|(y, (far, same))| far_row(&known, y, same, far));
+        for (i, own) in slots.iter().enumerate().filter(|(_, own)| **own != NONE) {
+            let (bend, wide, far) = (bend[i], wide[i], far[i]);
+            contrasts[*own as usize * channels + channel] = Contrast { bend, wide, far };
+        }
+    }
+    contrasts
+}
+
+/// For each pixel which of those [`AROUND`] show the same surface, a bit each.
+fn same_surface(points: &[SurfacePoint], slots: &[u32], width: usize) -> Vec<u32> {
+    let mesh = Image::of(slots, width, NONE, |i| points[i].geom_id);
+    let normal = [0, 1, 2].map(|axis| Image::of(slots, width, 0.0, |i| points[i].n[axis]));
+    let mut same = vec![0; slots.len()];
+    same.par_chunks_mut(width).enumerate().for_each(|(y, same)| {
+        let [nx, ny, nz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.own(y));
+        let own = mesh.own(y);
+        for (k, place) in AROUND.into_iter().enumerate() {
+            let [ox, oy, oz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.row(y, place));
+            let other = mesh.row(y, place);
+            for (x, same) in same.iter_mut().enumerate() {
+                let cos = nx[x] * ox[x] + ny[x] * oy[x] + nz[x] * oz[x];
+                *same |= u32::from((own[x] == other[x]) & (cos > SAME_SURFACE)) << k;
+            }
+        }
+    });
+    same
+}
+
+/// Bend and contrast of the pixels of row `y` of the `known` ratios; NaN where too few are known.
+fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: &mut [f32]) {
+    let own = known.own(y);
+    bend.fill(f32::NEG_INFINITY);
+    for k in 0..NEAR / 2 {
+        let opposite = NEAR - 1 - k;
+        let (a, b) = (known.row(y, AROUND[k]), known.row(y, AROUND[opposite]));
+        let both = 1 << k | 1 << opposite;
+        for (x, bend) in bend.iter_mut().enumerate() {
+            let off = 0.5 * (a[x] + b[x] - 2.0 * own[x]).abs();
+            let is_more = (same[x] & both == both) & (off > *bend);
+            *bend = if is_more { off } else { *bend };
+        }
+    }
+    let mut count = vec![0; own.len()];
+    wide.fill(0.0);
+    for (k, place) in AROUND.into_iter().enumerate() {
+        let other = known.row(y, place);
+        for (x, (wide, count)) in wide.iter_mut().zip(&mut count).enumerate() {
+            let apart = (other[x] - own[x]).abs();
+            let is_known = (same[x] >> k & 1 == 1) & (apart >= 0.0);
+            *count += u32::from(is_known);
+            *wide = if is_known & (apart > *wide) { apart } else { *wide };
+        }
+    }
+    for ((bend, wide), count) in bend.iter_mut().zip(wide).zip(count) {
+        *bend = if *bend >= 0.0 { *bend } else { f32::NAN };
+        *wide = if 2 * count >= ALL as u32 { *wide } else { f32::NAN };
+    }
+}
+
+/// The largest contrast among the pixels of row `y` and those around each; what is not known is not larger.
+fn far_row(wide: &Image<f32>, y: usize, same: &[u32], far: &mut [f32]) {
+    far.copy_from_slice(wide.own(y));
+    for (k, place) in AROUND.into_iter().enumerate() {
+        let other = wide.row(y, place);
+        for (x, far) in far.iter_mut().enumerate() {
+            // True where `far` is NaN too.
+            let is_more = (same[x] >> k & 1 == 1) & (other[x] >= 0.0) & !(other[x] <= *far);
+            *far = if is_more { other[x] } else { *far };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Vec3};
+
+    /// Contrasts of 9 x 9 pixels of one plane, but for those that `is_other`.
+    fn of(
+        ratio: impl Fn(usize, usize) -> f32,
+        is_other: impl Fn(usize, usize) -> bool,
+    ) -> Vec<Contrast> {
+        let places = (0..81).map(|i| (i % 9, i / 9));
+        let point = |(x, y)| SurfacePoint {
+            p: DVec3::new(x as f64, y as f64, 0.0),
+            n: Vec3::Z,
+            geom_id: u32::from(is_other(x, y)),
+            footprint: 1.0,
+            cos: 1.0,
+            direct: true,
+            samples: 1,
+        };
+        let points: Vec<SurfacePoint> = places.clone().map(point).collect();
+        let ratios: Vec<f32> = places.map(|(x, y)| ratio(x, y)).collect();
+        let slots: Vec<u32> = (0..81).collect();
+        contrasts(&points, &ratios, &slots, (9, 1))
+    }
+
+    const MIDDLE: usize = 4 * 9 + 4;
+
+    #[test]
+    fn all_places_around_are_there_once_and_opposite_ones_face() {
+        for (k, [x, y]) in AROUND.into_iter().enumerate() {
+            assert!(x <= 4 && y <= 4 && [x, y] != [2, 2]);
+            assert_eq!(AROUND.iter().filter(|place| **place == [x, y]).count(), 1);
+            if k < NEAR {
+                assert_eq!(AROUND[NEAR - 1 - k], [4 - x, 4 - y]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_slope_has_a_contrast_and_no_bend() {
+        let own = of(|x, _| 0.125 * x as f32, |_, _| false)[MIDDLE];
+        assert_eq!(own, Contrast { bend: 0.0, wide: 0.25, far: 0.25 });
+    }
+
+    #[test]
+    fn a_single_pixel_bends_and_is_seen_from_four_pixels_away() {
+        let found = of(|x, y| if (x, y) == (4, 4) { 1.0 } else { 0.0 }, |_, _| false);
+        assert_eq!(found[MIDDLE], Contrast { bend: 1.0, wide: 1.0, far: 1.0 });
+        assert_eq!(found[MIDDLE + 1].bend, 0.5);
+        assert_eq!(found[MIDDLE + 2], Contrast { bend: 0.0, wide: 1.0, far: 1.0 });
+        assert_eq!((found[MIDDLE - 4].wide, found[MIDDLE - 4].far), (0.0, 1.0));
+    }
+
+    #[test]
+    fn another_surface_does_not_count() {
+        let found = of(|x, _| if x > 4 { 1.0 } else { 0.0 }, |x, _| x > 4);
+        assert_eq!(found[MIDDLE], Contrast { bend: 0.0, wide: 0.0, far: 0.0 });
+        // Fewer than half of the pixels around the corner are there.
+        assert!(found[0].wide.is_nan() && found[0].bend.is_nan());
+    }
+
+    #[test]
+    fn what_is_unknown_is_no_contrast() {
+        let found = of(|x, y| if (x, y) == (5, 4) { f32::NAN } else { 0.5 }, |_, _| false);
+        assert_eq!(found[MIDDLE], Contrast { bend: 0.0, wide: 0.0, far: 0.0 });
+        assert!(found[MIDDLE + 1].wide.is_nan() && found[MIDDLE + 1].bend.is_nan());
+    }
+}
