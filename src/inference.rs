@@ -112,7 +112,7 @@ pub struct Checked {
 
 /// Points in a batch with the answers about them.
 #[derive(Debug, Default)]
-pub struct Questions {
+pub struct LookupBatch {
     /// What is asked about.
     pub points: Vec<SurfacePoint>,
     /// For each point the pixel that shows it: column, row.
@@ -178,14 +178,14 @@ impl TracedPoints {
 /// Answers what is known about the light at surface points.
 pub trait Inference: Sync {
     /// Fills ratios and origins for all points, and says what is to be checked.
-    fn infer(&self, questions: &mut Questions);
+    fn infer(&self, batch: &mut LookupBatch);
 
     /// Hears what check rays found where there were any, and takes back answers that they contradict.
-    fn check(&self, _questions: &mut Questions) {}
+    fn check(&self, _questions: &mut LookupBatch) {}
 
     /// Hears what came out for the same points, once those that had to be were traced: a ratio is NaN
     /// only where no light was asked for. The estimates are as `infer` left them.
-    fn hear(&self, _answered: &Questions) {}
+    fn hear(&self, _answered: &LookupBatch) {}
 }
 
 /// Which light a channel of ratios belongs to.

@@ -11,7 +11,7 @@ use tweenray::math::Rgb;
 use tweenray::measure::Interval;
 use tweenray::reuse::audit::rmse;
 use tweenray::scene::{Rect, ReuseSettings, Settings};
-use tweenray::sequence::{FrameMaker, Inferrer, Made, Pyramid};
+use tweenray::sequence::{FrameMaker, Made, Pyramid, SurfaceReuse};
 use tweenray::stats::AuditSums;
 
 const SHOTS: u32 = 120;
@@ -109,8 +109,9 @@ fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {
     let stop = AtomicBool::new(false);
     let pyramid = Pyramid { segment: 64, frames: shot.frames };
     let all: Vec<u32> = pyramid.all().collect();
-    let maker = Inferrer::new(stage.renderer(settings), &shot, &stage.pool, &stop, &Quiet, pyramid)
-        .unwrap();
+    let maker =
+        SurfaceReuse::new(stage.renderer(settings), &shot, &stage.pool, &stop, &Quiet, pyramid)
+            .unwrap();
     maker.expect(&all);
     pyramid.order(&all).into_iter().map(|f| maker.make(f).unwrap().unwrap()).collect()
 }

@@ -13,11 +13,11 @@ use tweenray::output::manifest::{FORMAT, Header, manifest_path};
 use tweenray::output::{Format, FramePattern, WriteOptions};
 use tweenray::reuse;
 use tweenray::reuse::colour::Rule;
-use tweenray::reuse::store::Terms;
+use tweenray::reuse::store::Compatibility;
 use tweenray::scene::{FrameRange, Policy, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
 use tweenray::sequence::{
-    ColourMaker, FrameMaker, Inferrer, Pyramid, Recipes, Shared, Target, prepare, render_frames,
+    ColourMaker, FrameMaker, Pyramid, Recipes, Shared, SurfaceReuse, Target, prepare, render_frames,
 };
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
@@ -110,11 +110,11 @@ impl Bed {
         })
     }
 
-    fn process(&self, act: impl FnOnce(&mut Inferrer, &Target, &Terms)) -> Run {
+    fn process(&self, act: impl FnOnce(&mut SurfaceReuse, &Target, &Compatibility)) -> Run {
         self.with(|tools| {
             let pyramid = Pyramid { segment: 8, frames: 17 };
             let Tools { renderer, pool, stop, traced, checkpoints } = tools;
-            let maker = Inferrer::new(renderer, &self.shot, pool, stop, traced, pyramid);
+            let maker = SurfaceReuse::new(renderer, &self.shot, pool, stop, traced, pyramid);
             let mut maker = maker.expect("cameras");
             maker.with_gbuffer = self.ending == "exr";
             maker.terms = maker.with_gbuffer.then(|| checkpoints.terms.clone());
@@ -146,7 +146,7 @@ impl Bed {
         let mut notes = prepare(&target, ALL).expect("ready").notes;
         let plan = EffectPlan::of(&self.scene, settings);
         let channels = reuse::channels(&self.scene, &plan, settings);
-        let terms = Terms::of("h", &channels, settings);
+        let terms = Compatibility::of("h", &channels, settings);
         let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
         let every = Some(Duration::ZERO);
         let checkpoints = Checkpoints::new(&target, every, &terms, self.scene.recentring, whole);

@@ -6,7 +6,7 @@ use super::{Choice, support};
 use std::collections::BTreeMap;
 use support::Candidate;
 use tweenray::effects::EffectPlan;
-use tweenray::inference::{Channels, Inference, Origin, Questions};
+use tweenray::inference::{Channels, Inference, LookupBatch, Origin};
 use tweenray::output::{WriteOptions, write_image};
 use tweenray::reuse::{self, Lookup, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
@@ -22,13 +22,13 @@ const TURNS: usize = 11;
 struct AllKnown;
 
 impl Inference for AllKnown {
-    fn infer(&self, questions: &mut Questions) {
-        let (points, channels) = (questions.points.len(), questions.unshadowed.len());
-        questions.ratios.clear();
-        questions.ratios.resize(channels, 1.0);
-        questions.origins.clear();
+    fn infer(&self, batch: &mut LookupBatch) {
+        let (points, channels) = (batch.points.len(), batch.unshadowed.len());
+        batch.ratios.clear();
+        batch.ratios.resize(channels, 1.0);
+        batch.origins.clear();
         let found = Origin { frame: 1, earlier: true, ..Origin::default() };
-        questions.origins.resize(points, found);
+        batch.origins.resize(points, found);
     }
 }
 
@@ -39,9 +39,9 @@ struct Taken<'a> {
 }
 
 impl Inference for Taken<'_> {
-    fn infer(&self, questions: &mut Questions) {
-        self.lookup.estimate(questions);
-        let Questions { ratios, estimates, .. } = questions;
+    fn infer(&self, batch: &mut LookupBatch) {
+        self.lookup.estimate(batch);
+        let LookupBatch { ratios, estimates, .. } = batch;
         for (ratio, estimate) in ratios.iter_mut().zip(estimates) {
             let is_missed = estimate.ratio.is_nan() && !self.misses;
             *ratio = if is_missed { 1.0 } else { estimate.ratio };

@@ -11,7 +11,7 @@ use tweenray::reuse::colour::Rule;
 use tweenray::scene::{
     CameraPath, Easing, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
 };
-use tweenray::sequence::{ColourMaker, FrameMaker, Inferrer, Pyramid};
+use tweenray::sequence::{ColourMaker, FrameMaker, Pyramid, SurfaceReuse};
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
 
@@ -101,7 +101,7 @@ impl Filmed {
         let intersector = self.intersector();
         let (renderer, stop) = (self.renderer(&self.settings, &*intersector), no_stop());
         let pyramid = Pyramid { segment: self.settings.reuse.segment, frames: FRAMES };
-        let maker = Inferrer::new(renderer, &self.shot, &self.pool, &stop, &Silent, pyramid);
+        let maker = SurfaceReuse::new(renderer, &self.shot, &self.pool, &stop, &Silent, pyramid);
         maker.unwrap().make(frame).unwrap().unwrap().film
     }
 

@@ -2,9 +2,9 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
+use super::error_model::Samples;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Foretelling, Foretold};
-use super::law::Samples;
+use super::foretell::{Prediction, Predictor};
 use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
@@ -50,8 +50,8 @@ impl Check {
     /// Those of tracing and of `image`.
     pub fn of(
         probe: &Probe,
-        foretelling: &Foretelling,
-        foretold: &Foretold,
+        foretelling: &Predictor,
+        foretold: &Prediction,
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<Self> {
@@ -81,7 +81,7 @@ impl Check {
     }
 
     /// Wall seconds that a whole check of frames of `samples` is foretold to take.
-    pub fn seconds(foretelling: &Foretelling, samples: Samples) -> f64 {
+    pub fn seconds(foretelling: &Predictor, samples: Samples) -> f64 {
         let whole = Effort::WHOLE;
         let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
         pixels * foretelling.patch_seconds(samples_of_reference(samples))

@@ -4,7 +4,7 @@ mod line;
 mod tried;
 
 use super::choice::Goal;
-use super::law::{Law, Samples};
+use super::error_model::{ErrorModel, Samples};
 use super::worst::worst;
 use crate::measure::psnr;
 use crate::scene::limits::MAX_BOUNCES;
@@ -64,9 +64,9 @@ pub struct Pace {
 
 /// All that the probe found out. Squared errors are in squares of a display step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Foretelling {
+pub struct Predictor {
     /// Of samples that were not tried.
-    pub law: Law,
+    pub model: ErrorModel,
     /// Samples that were tried.
     pub measured: Vec<Measured>,
     /// What the probe's frames are off by for their bounces and cut-off.
@@ -91,7 +91,7 @@ pub struct Foretelling {
 
 /// A setting with what is foretold of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Foretold {
+pub struct Prediction {
     /// Samples.
     pub samples: Samples,
     /// Bounces.
@@ -104,7 +104,7 @@ pub struct Foretold {
     pub seconds: f64,
 }
 
-impl Foretold {
+impl Prediction {
     /// PSNR of the worst frame, dB.
     pub fn psnr(&self) -> f64 {
         psnr(self.squared_error / (255.0 * 255.0))
@@ -135,7 +135,7 @@ pub struct Range {
     pub sky: Vec<u32>,
 }
 
-impl Foretelling {
+impl Predictor {
     /// The squared error that `goal` allows.
     pub fn allowed(&self, goal: Goal) -> f64 {
         match (goal, self.line, goal.most()) {
@@ -156,22 +156,22 @@ impl Foretelling {
     /// Which part of the squared difference between frames of `samples` and of `reference` is the former's
     /// own error.
     pub fn own_part(&self, samples: Samples, reference: Samples) -> f64 {
-        let sum = |samples| self.law.errors(samples).sum::<f64>();
+        let sum = |samples| self.model.errors(samples).sum::<f64>();
         let (own, of_reference) = (sum(samples), sum(reference));
         if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
 
     /// What is foretold of `samples` in `mode`, of the worst frame.
-    pub fn of(&self, mode: &Mode, samples: Samples) -> Foretold {
+    pub fn of(&self, mode: &Mode, samples: Samples) -> Prediction {
         let (errors, doubts) = match self.tried(samples) {
             Some(measured) => (measured.errors.clone(), &measured.doubts),
-            None => (self.law.errors(samples).collect::<Vec<_>>(), &self.doubts),
+            None => (self.model.errors(samples).collect::<Vec<_>>(), &self.doubts),
         };
         let each = errors.iter().zip(&self.bias).map(|(error, bias)| self.excess * error + bias);
         let each: Vec<f64> = each.collect();
         let n = f64::from(samples.spp);
         let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
-        Foretold {
+        Prediction {
             samples,
             bounces: self.bounces,
             reuse: mode.reuse,
@@ -183,8 +183,8 @@ impl Foretelling {
     /// For each mode the fastest setting that is foretold to be off by at most `allowed`, or the nearest to
     /// the truth of those that are hardly slower. Where the goal's figure was found of a setting, that
     /// alone decides.
-    pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Foretold> {
-        let will_do = |f: &Foretold| {
+    pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Prediction> {
+        let will_do = |f: &Prediction| {
             self.reached(f.samples) || (f.squared_error <= allowed && !self.missed(f.samples))
         };
         let best = |mode| {
@@ -198,7 +198,11 @@ impl Foretelling {
 
     /// The setting nearest to the truth, of those that `fits` lets through; the fastest of all where it
     /// lets none.
-    pub fn best_within(&self, range: &Range, fits: &dyn Fn(&Foretold) -> bool) -> Option<Foretold> {
+    pub fn best_within(
+        &self,
+        range: &Range,
+        fits: &dyn Fn(&Prediction) -> bool,
+    ) -> Option<Prediction> {
         let all = || self.modes.iter().flat_map(|mode| self.all(mode, range));
         let within = all().filter(fits);
         let best = within.min_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
@@ -206,7 +210,7 @@ impl Foretelling {
     }
 
     /// Puts the times of a mode through what a setting of it `took`, seconds a frame.
-    pub fn correct(&mut self, foretold: &Foretold, took: f64) {
+    pub fn correct(&mut self, foretold: &Prediction, took: f64) {
         let factor = took / foretold.seconds.max(1e-12);
         let same = self.modes.iter_mut().filter(|mode| mode.reuse == foretold.reuse);
         same.flat_map(|mode| &mut mode.seconds).for_each(|seconds| *seconds *= factor);
@@ -225,7 +229,7 @@ impl Foretelling {
     }
 
     /// The setting with the least error foretold.
-    pub fn best(&self, range: &Range) -> Option<Foretold> {
+    pub fn best(&self, range: &Range) -> Option<Prediction> {
         self.best_within(range, &|_| true)
     }
 
@@ -242,7 +246,11 @@ impl Foretelling {
         pace.seconds * of(samples) / of(pace.samples).max(1e-12)
     }
 
-    fn all<'s>(&'s self, mode: &'s Mode, range: &'s Range) -> impl Iterator<Item = Foretold> + 's {
+    fn all<'s>(
+        &'s self,
+        mode: &'s Mode,
+        range: &'s Range,
+    ) -> impl Iterator<Item = Prediction> + 's {
         let lights = move |spp: u32| {
             let skies = move |shadow: u32| {
                 range.sky.iter().map(move |sky| Samples { spp, shadow, sky: *sky })
@@ -256,10 +264,10 @@ impl Foretelling {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::law::{Causes, Point};
+    use super::super::error_model::{Causes, Point};
     use super::*;
 
-    pub(super) fn foretelling() -> Foretelling {
+    pub(super) fn foretelling() -> Predictor {
         let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
         let error =
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
@@ -269,8 +277,8 @@ pub(super) mod tests {
         });
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
-        Foretelling {
-            law: Law::of(Causes { shadow: true, sky: false }, &points.each_ref()),
+        Predictor {
+            model: ErrorModel::of(Causes { shadow: true, sky: false }, &points.each_ref()),
             measured: Vec::new(),
             bias: vec![0.5],
             rounding: 1.0 / 12.0,
@@ -298,12 +306,12 @@ pub(super) mod tests {
         assert!((allowed - 8.0).abs() < 1e-9);
         let found = foretelling.fastest(&range(), allowed);
         // 40/8 + 20/8 + 0.58 is 8.1: one shadow sample is not enough with 8 camera samples.
-        let samples = |f: &Foretold| (f.samples.spp, f.samples.shadow);
+        let samples = |f: &Prediction| (f.samples.spp, f.samples.shadow);
         assert_eq!(found.iter().map(samples).collect::<Vec<_>>(), [(16, 1), (8, 4)]);
         assert!(found.iter().all(|f| f.squared_error <= allowed));
         // Shadow samples that hardly cost anything are taken.
         let cheap = Mode { seconds: [0.0, 2.0, 0.01, 0.0], ..foretelling.modes[1].clone() };
-        let cheap = Foretelling { modes: vec![cheap], ..foretelling.clone() };
+        let cheap = Predictor { modes: vec![cheap], ..foretelling.clone() };
         assert_eq!(
             cheap.fastest(&range(), allowed).iter().map(samples).collect::<Vec<_>>(),
             [(8, 16)]
@@ -317,9 +325,9 @@ pub(super) mod tests {
     fn bounces_are_more_where_rays_ended_for_too_few() {
         let some = foretelling().with_more_bounces();
         assert_eq!((some.bounces, some.clone().with_more_bounces().bounces), (8, 16));
-        let none = Foretelling { bias: vec![0.0], ..foretelling() };
+        let none = Predictor { bias: vec![0.0], ..foretelling() };
         assert_eq!(none.with_more_bounces().bounces, 4);
-        let most = Foretelling { bounces: MAX_BOUNCES - 1, ..foretelling() };
+        let most = Predictor { bounces: MAX_BOUNCES - 1, ..foretelling() };
         assert_eq!(most.with_more_bounces().bounces, MAX_BOUNCES);
     }
 

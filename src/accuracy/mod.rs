@@ -9,7 +9,7 @@
 //! and weighed by how many of it the move has.
 //!
 //! [`Probe`] takes a quick look instead, from which the error and the time of any setting are foretold
-//! ([`Foretelling`]), and the program chooses one; [`Check`] says afterwards what came out.
+//! ([`Predictor`]), and the program chooses one; [`Check`] says afterwards what came out.
 //!
 //! Only that choice is decided by measured times; the sweep only tells them.
 //!
@@ -23,6 +23,7 @@ mod check;
 mod choice;
 mod draw;
 mod effort;
+mod error_model;
 mod errors;
 mod figures;
 mod fit;
@@ -30,7 +31,6 @@ mod foretell;
 mod frames;
 mod front;
 mod knobs;
-mod law;
 mod ledger;
 mod modes;
 mod oracle;
@@ -51,11 +51,11 @@ pub use candidates::candidates;
 pub use check::{Check, Checked, Verdict};
 pub use choice::{Goal, best_within, fastest_reaching, untold};
 pub use effort::Effort;
+pub use error_model::Samples;
 pub use errors::{Errors, displayed_rgb};
-pub use foretell::{Foretelling, Foretold, Range};
+pub use foretell::{Prediction, Predictor, Range};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};
-pub use law::Samples;
 pub use ledger::{Entry, Ledger};
 pub use oracle::{OracleCrop, on_a_crop};
 pub use probe::{Given, Probe};

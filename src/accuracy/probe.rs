@@ -6,8 +6,8 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::foretell::{Foretelling, Range};
-use super::law::{Causes, Samples};
+use super::error_model::{Causes, Samples};
+use super::foretell::{Predictor, Range};
 use super::patches::Patches;
 use super::reference::truth_settings;
 use super::search::Search;
@@ -67,7 +67,7 @@ impl Probe<'_> {
     ///
     /// # Errors
     /// [`crate::error::Error::Stopped`]; those of rendering.
-    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Foretelling> {
+    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
         let effort = self.effort()?;
         heard("errors of a short sweep");
         let mut search = Search::begin(self, effort)?;

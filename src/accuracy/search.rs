@@ -1,10 +1,10 @@
-//! The probe's errors: a sweep, a law of it, and what the law leads to, tried.
+//! The probe's errors: a sweep, a model of it, and what the model leads to, tried.
 
 use super::choice::Goal;
 use super::effort::Effort;
+use super::error_model::{ErrorModel, Point, Samples};
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Figure, Foretelling, Line, Measured, Pace, ROUNDING};
-use super::law::{Law, Point, Samples};
+use super::foretell::{Figure, Line, Measured, Pace, Predictor, ROUNDING};
 use super::patches::{Patches, Seen, rounded};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
@@ -39,7 +39,7 @@ pub(super) struct Search<'a> {
     reference: Samples,
     found: Vec<Found>,
     /// What it comes to.
-    pub foretelling: Foretelling,
+    pub foretelling: Predictor,
 }
 
 impl<'a> Search<'a> {
@@ -52,8 +52,8 @@ impl<'a> Search<'a> {
             patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
         let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
         let causes = probe.causes();
-        let foretelling = Foretelling {
-            law: Law::of(causes, &[]),
+        let foretelling = Predictor {
+            model: ErrorModel::of(causes, &[]),
             measured: Vec::new(),
             bias: Vec::new(),
             rounding: if probe.rounds { ROUNDING } else { 0.0 },
@@ -137,13 +137,13 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Fits the law to all that was measured, and puts it through the last.
+    /// Fits the model to all that was measured, and puts it through the last.
     fn learn(&mut self) {
         let points: Vec<&Point> = self.found.iter().map(|found| &found.point).collect();
-        let law = Law::of(self.probe.causes(), &points);
+        let model = ErrorModel::of(self.probe.causes(), &points);
         let measured = |Found { point, doubts, figure }: &Found| {
-            // The law tells the reference's part of the difference.
-            let own = law.errors(point.samples).zip(law.errors(point.reference));
+            // The model tells the reference's part of the difference.
+            let own = model.errors(point.samples).zip(model.errors(point.reference));
             let parts = own.map(|(s, r)| s / (s + r).max(1e-12));
             let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
             Measured { samples: point.samples, errors, doubts: doubts.clone(), figure: *figure }
@@ -151,7 +151,7 @@ impl<'a> Search<'a> {
         self.foretelling.measured = self.found.iter().map(measured).collect();
         let last = self.found.last();
         self.foretelling.doubts = last.map_or(Vec::new(), |last| last.doubts.clone());
-        self.foretelling.law = last.map_or(law.clone(), |last| law.through(&last.point));
+        self.foretelling.model = last.map_or(model.clone(), |last| model.through(&last.point));
         self.foretelling.line = self.foretelling.most.and_then(|most| self.line(most));
     }
 

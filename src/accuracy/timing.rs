@@ -1,8 +1,8 @@
 //! How long what may be chosen takes: tried on small frames, and the choice by it.
 
-use super::foretell::{Foretelling, Foretold};
+use super::error_model::Samples;
+use super::foretell::{Prediction, Predictor};
 use super::frames::{Cut, timed_frames};
-use super::law::Samples;
 use super::modes::Spent;
 use super::probe::Probe;
 use super::{effort::Effort, trial};
@@ -27,7 +27,7 @@ const LEAST: f64 = 600.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// The setting.
-    pub foretold: Foretold,
+    pub foretold: Prediction,
     /// Pixels of the smaller frames.
     pub small: f64,
 }
@@ -43,10 +43,10 @@ impl Probe<'_> {
     /// As [`Self::look`].
     pub fn fastest(
         &self,
-        foretelling: &Foretelling,
+        foretelling: &Predictor,
         allowed: f64,
         timer: Timer,
-    ) -> Result<Option<Foretold>> {
+    ) -> Result<Option<Prediction>> {
         let mut found = likely(foretelling.fastest(&self.range(), allowed));
         for foretold in &mut found {
             let time = TRIED * foretold.seconds * self.frames_each(foretold.reuse);
@@ -61,7 +61,7 @@ impl Probe<'_> {
 
     /// Seconds that all frames are foretold to take this rank by the fastest setting whose squared error is
     /// `allowed`, without trying any; `None` where there is none.
-    pub fn fastest_seconds(&self, foretelling: &Foretelling, allowed: f64) -> Option<f64> {
+    pub fn fastest_seconds(&self, foretelling: &Predictor, allowed: f64) -> Option<f64> {
         let found = likely(foretelling.fastest(&self.range(), allowed));
         found.iter().map(|f| f.seconds * self.frames_each(f.reuse)).min_by(f64::total_cmp)
     }
@@ -73,10 +73,10 @@ impl Probe<'_> {
     /// As [`Self::look`].
     pub fn best_within(
         &self,
-        foretelling: &Foretelling,
+        foretelling: &Predictor,
         left: &dyn Fn(Samples) -> f64,
         timer: Timer,
-    ) -> Result<Option<Foretold>> {
+    ) -> Result<Option<Prediction>> {
         let mut foretelling = foretelling.clone();
         let frames: Vec<(ReuseSettings, f64)> = foretelling
             .modes
@@ -84,11 +84,11 @@ impl Probe<'_> {
             .map(|mode| (mode.reuse, self.frames_each(mode.reuse)))
             .collect();
         let frames = |reuse| frames.iter().find(|(r, _)| *r == reuse).map_or(0.0, |(_, n)| *n);
-        let best = |foretelling: &Foretelling| {
-            let fits = |f: &Foretold| f.seconds * frames(f.reuse) <= left(f.samples);
+        let best = |foretelling: &Predictor| {
+            let fits = |f: &Prediction| f.seconds * frames(f.reuse) <= left(f.samples);
             foretelling.best_within(&self.range(), &fits)
         };
-        let mut tried: Vec<Foretold> = Vec::new();
+        let mut tried: Vec<Prediction> = Vec::new();
         for share in SHARES {
             let Some(likely) = best(&foretelling) else { break };
             let time = share * left(likely.samples);
@@ -125,7 +125,7 @@ impl Probe<'_> {
     }
 
     /// Pixels of the smaller frames that can be tried in `seconds`.
-    fn small_within(&self, seconds: f64, foretold: &Foretold) -> f64 {
+    fn small_within(&self, seconds: f64, foretold: &Prediction) -> f64 {
         let base = self.stage.base;
         let pixels = f64::from(base.width) * f64::from(base.height);
         let frames = self.cut(foretold.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
@@ -156,14 +156,14 @@ impl Probe<'_> {
 }
 
 /// Those of `found` that may turn out to be the fastest.
-pub(super) fn likely(mut found: Vec<Foretold>) -> Vec<Foretold> {
+pub(super) fn likely(mut found: Vec<Prediction>) -> Vec<Prediction> {
     let least = found.iter().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
     found.retain(|f| f.seconds <= SLOWER * least);
     found
 }
 
 /// Whether what one took tells what the other does.
-fn is_near(a: &Foretold, b: &Foretold) -> bool {
+fn is_near(a: &Prediction, b: &Prediction) -> bool {
     let within = |a: u32, b: u32, factor: f64| {
         let ratio = f64::from(a) / f64::from(b);
         (1.0 / factor..=factor).contains(&ratio)

@@ -9,7 +9,7 @@ use crate::intersect::Intersector;
 use crate::reuse;
 use crate::reuse::colour::Rule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{ColourMaker, FrameMaker, Inferrer, Made, Pyramid, Tracer};
+use crate::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use std::time::Instant;
@@ -93,7 +93,7 @@ fn maker<'m>(
     Ok(match settings.reuse.policy {
         Policy::Surface => {
             let pyramid = Pyramid { segment: settings.reuse.segment, frames };
-            Box::new(Inferrer::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
+            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
         }
         Policy::Colour => {
             let rule = Rule {

@@ -8,10 +8,10 @@ use crate::film::Film;
 use crate::measure::{Interval, median};
 use crate::output::manifest::{self, Header};
 use crate::output::{FramePattern, WriteOptions, atomic, write_image};
-use crate::reuse::{self, store::Terms};
+use crate::reuse::{self, store::Compatibility};
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{FrameMaker, Inferrer, Pyramid, Recipes, Target, Tracer};
+use crate::sequence::{FrameMaker, Pyramid, Recipes, SurfaceReuse, Target, Tracer};
 use crate::shade::Renderer;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -114,14 +114,14 @@ fn traced(stage: &Stage) -> Result<Film> {
 fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
     let Stage { scene, shot, base, pool, stop, .. } = *stage;
     let channels = reuse::channels(scene, &EffectPlan::of(scene, base), base);
-    let terms = Terms::of("", &channels, base);
+    let terms = Compatibility::of("", &channels, base);
     let target = target(stage, folder, !channels.is_empty())?;
     let checkpoints =
         Checkpoints::new(&target, Some(Duration::ZERO), &terms, scene.recentring, true);
     let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
     let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
     for _ in 0..KEY_TIMES {
-        let mut maker = Inferrer::new(renderer(stage), shot, pool, stop, &Unheard, pyramid)?;
+        let mut maker = SurfaceReuse::new(renderer(stage), shot, pool, stop, &Unheard, pyramid)?;
         maker.checkpoints = Some(&checkpoints);
         let all: Vec<u32> = (1..=shot.frames).collect();
         maker.expect(&all);

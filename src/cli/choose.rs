@@ -7,7 +7,7 @@ mod judge;
 use super::args::SettingArgs;
 use super::request::Request;
 use super::{say, spelled, values};
-use crate::accuracy::{Foretelling, Foretold, Given, Goal, Probe, Stage, Timer, Verdict};
+use crate::accuracy::{Given, Goal, Prediction, Predictor, Probe, Stage, Timer, Verdict};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
@@ -52,9 +52,9 @@ pub struct Choice {
     /// The squared error that the target allows, display steps.
     allowed: Option<f64>,
     /// What is foretold of the choice.
-    pub foretold: Foretold,
+    pub foretold: Prediction,
     /// All that the probe found out.
-    foretelling: Foretelling,
+    foretelling: Predictor,
     /// Wall seconds that rendering and writing all frames is foretold to take.
     seconds: f64,
     /// How often it was tightened.
@@ -303,7 +303,7 @@ impl Chooser<'_> {
 
     /// Looks at the scene for about as long as `PROBE_SHARE` of the job that `goal` makes: briefly at first, and
     /// again where that leaves time for much more. With the squared error to aim at.
-    fn look(&self, goal: Goal) -> Result<(Foretelling, f64)> {
+    fn look(&self, goal: Goal) -> Result<(Predictor, f64)> {
         let begun = Instant::now();
         let told = |what: &str| self.tell(format!("probe: {what}"));
         let brief = Probe { seconds: Some(0.0), ..self.probe() };
@@ -322,7 +322,7 @@ impl Chooser<'_> {
     }
 
     /// What to say where no setting will do.
-    fn out_of_reach(&self, foretelling: &Foretelling) -> Error {
+    fn out_of_reach(&self, foretelling: &Predictor) -> Error {
         let best = foretelling.best(&self.probe().range()).map(|best| {
             let took = seconds(best.seconds * self.probe().frames_each(best.reuse));
             let psnr = decibels(best.psnr());
@@ -370,7 +370,7 @@ impl Chooser<'_> {
     }
 
     /// The options that stand for what was chosen, as far as they have a part in the scene.
-    fn options(&self, foretold: &Foretold) -> String {
+    fn options(&self, foretold: &Prediction) -> String {
         spelled::options(&foretold.settings(self.stage.base), &self.plan())
     }
 

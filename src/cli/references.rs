@@ -7,9 +7,9 @@ use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
 use crate::output::FramePattern;
 use crate::reuse;
-use crate::reuse::store::Terms;
+use crate::reuse::store::Compatibility;
 use crate::scene::{Policy, Scene, Settings};
-use crate::sequence::{Card, Supply};
+use crate::sequence::{ReferenceCache, ReferenceInfo};
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::ffi::OsStringExt;
@@ -18,15 +18,15 @@ use std::path::{Path, PathBuf};
 /// What the user supplies.
 pub struct References {
     /// Read when they serve; `None` for none.
-    pub supply: Option<Supply>,
+    pub cache: Option<ReferenceCache>,
     /// What tells this set from others; `none` for none.
     pub hash: String,
 }
 
 /// On which terms this job's frames and others serve one another, in a world with the hash `world`.
-pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Terms {
+pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Compatibility {
     let channels = reuse::channels(scene, &EffectPlan::of(scene, settings), settings);
-    Terms::of(world, &channels, settings)
+    Compatibility::of(world, &channels, settings)
 }
 
 impl References {
@@ -39,10 +39,10 @@ impl References {
         world: &World,
         folders: &[PathBuf],
         pattern: &FramePattern,
-        (scene, settings, terms): (&Scene, &Settings, &Terms),
+        (scene, settings, terms): (&Scene, &Settings, &Compatibility),
     ) -> Result<Self> {
         if folders.is_empty() {
-            return Ok(Self { supply: None, hash: "none".into() });
+            return Ok(Self { cache: None, hash: "none".into() });
         }
         refuse_policy(settings)?;
         // (Names as they are, which may be no text.)
@@ -52,22 +52,22 @@ impl References {
         let files = names.into_iter().map(|name| OsString::from_vec(name).into()).collect();
         let most = machine::memory().map_or(u64::MAX, |memory| memory / 2);
         let budget = most / u64::from(world.size_of_node());
-        let mut supply = Supply::new(files, terms.clone(), scene.recentring, budget);
+        let mut cache = ReferenceCache::new(files, terms.clone(), scene.recentring, budget);
         // Alone it needs them itself, as long as there is room.
         let is_kept = world.size() == 1;
-        let look = |file| supply.look(file, is_kept).map_err(as_input);
-        let own: Result<Vec<Card>> = own_part(count, world).map(look).collect();
-        let mut cards = world.all(world.agree(own)?)?.concat();
-        cards.sort_by_key(|card| card.hash);
-        cards.dedup_by_key(|card| card.hash);
-        let hash = name_of(&cards);
-        supply.serve(cards);
-        Ok(Self { supply: Some(supply), hash })
+        let look = |file| cache.look(file, is_kept).map_err(as_input);
+        let own: Result<Vec<ReferenceInfo>> = own_part(count, world).map(look).collect();
+        let mut infos = world.all(world.agree(own)?)?.concat();
+        infos.sort_by_key(|info| info.hash);
+        infos.dedup_by_key(|info| info.hash);
+        let hash = name_of(&infos);
+        cache.serve(infos);
+        Ok(Self { cache: Some(cache), hash })
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.supply.is_none()
+        self.cache.is_none()
     }
 }
 
@@ -97,10 +97,10 @@ fn bytes_of(path: PathBuf) -> Vec<u8> {
     path.into_os_string().into_vec()
 }
 
-fn name_of(cards: &[Card]) -> String {
+fn name_of(infos: &[ReferenceInfo]) -> String {
     let mut all = blake3::Hasher::new();
-    cards.iter().for_each(|card| _ = all.update(&card.hash));
-    format!("{}, {}", counted(cards.len(), "frame"), &all.finalize().to_hex()[..16])
+    infos.iter().for_each(|info| _ = all.update(&info.hash));
+    format!("{}, {}", counted(infos.len(), "frame"), &all.finalize().to_hex()[..16])
 }
 
 /// The exr files of all folders.

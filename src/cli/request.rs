@@ -11,7 +11,7 @@ use crate::film::Image;
 use crate::import::Loaded;
 use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, WriteOptions, read_image};
-use crate::reuse::store::Terms;
+use crate::reuse::store::Compatibility;
 use crate::scene::{FrameRange, IntersectorKind, Policy, Scene, Settings, Shot};
 use crate::sequence::{Recipes, Target, WorldHash, check_upload, shot_fingerprint};
 use serde::{Deserialize, Serialize};
@@ -52,7 +52,7 @@ pub struct Request {
     /// Whether frames get maps of reuse.
     pub maps: bool,
     /// On which terms frames serve as references.
-    pub terms: Terms,
+    pub terms: Compatibility,
     /// What each frame of the shot is made of.
     pub recipes: Recipes,
     /// Frames of an earlier job.
@@ -213,7 +213,7 @@ impl Request {
     /// What depends on the settings: on which terms frames serve as references, and their recipes.
     ///
     /// Errors: those of [`Recipes::new`].
-    pub fn terms_and_recipes(&self, settings: &Settings) -> Result<(Terms, Recipes)> {
+    pub fn terms_and_recipes(&self, settings: &Settings) -> Result<(Compatibility, Recipes)> {
         let Self { scene, shot, pattern, light_hash, .. } = self;
         let Derived { terms, recipes } =
             Derived::new((scene, shot), settings, pattern, light_hash)?;
@@ -261,7 +261,7 @@ impl Request {
 
 /// What follows from what was read; each rank sees to it for itself.
 struct Derived {
-    terms: Terms,
+    terms: Compatibility,
     recipes: Recipes,
 }
 

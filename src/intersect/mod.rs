@@ -5,12 +5,12 @@
 
 mod coarse;
 mod coincident;
+mod conservative;
 pub mod court;
 mod embree;
 mod facts;
 mod interaction;
 mod oracle;
-mod sieve;
 mod sphere;
 mod triangle;
 

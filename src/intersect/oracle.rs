@@ -3,8 +3,8 @@
 //! Of hits at the same `t` the lowest `(geom_id, prim_id)` wins; the conventions for edges, planes and
 //! degenerate triangles are the court's ([`super::court`]). No tree: about a nanosecond a pair.
 
+use super::conservative::{BLOCK, Block, ShearedRay, Triangles};
 use super::court::{Line, Meeting, Place};
-use super::sieve::{BLOCK, Block, Slit, Soup};
 use super::{Hit, Intersector, PrimRef, Ray, sphere};
 use crate::math::DVec3;
 use crate::scene::Scene;
@@ -17,7 +17,7 @@ const GROUP: usize = 64;
 /// Brute force over a scene.
 pub struct Oracle<'s> {
     scene: &'s Scene,
-    soup: Soup,
+    triangles: Triangles,
     /// First triangle of each mesh, and one past the last.
     starts: Vec<usize>,
     /// Largest coordinate of any triangle.
@@ -49,7 +49,7 @@ impl<'s> Oracle<'s> {
             .iter()
             .filter(|m| !m.bounds.is_empty())
             .fold(0f64, |reach, m| reach.max(m.bounds.largest_coordinate()));
-        Self { scene, soup: Soup::new(scene.triangle_count(), corners), starts, reach }
+        Self { scene, triangles: Triangles::new(scene.triangle_count(), corners), starts, reach }
     }
 
     /// `ray` (valid) as the court sees it in this scene.
@@ -93,12 +93,12 @@ impl<'s> Oracle<'s> {
             return Vec::new();
         }
         let line = self.line(ray);
-        let slits = [Slit::new(&line, margin)];
+        let sheared = [ShearedRay::new(&line, margin)];
         let (mut work, mut passed, mut near) = (Block::default(), Vec::new(), Vec::new());
-        for block in 0..self.soup.blocks() {
+        for block in 0..self.triangles.blocks() {
             passed.clear();
-            self.soup.sieve(block, &slits, &mut work, &mut passed);
-            let within = |t: &usize| line.distance(&self.soup.corners(*t)) <= margin;
+            self.triangles.filter(block, &sheared, &mut work, &mut passed);
+            let within = |t: &usize| line.distance(&self.triangles.corners(*t)) <= margin;
             let triangles = passed.iter().map(|(_, triangle)| *triangle as usize).filter(within);
             near.extend(triangles.map(|t| self.prim(t)));
         }
@@ -115,21 +115,22 @@ impl<'s> Oracle<'s> {
     fn each_hit(&self, rays: &[Ray], mut on_hit: impl FnMut(usize, CourtHit) -> bool) {
         let mut wants = vec![true; rays.len()];
         let lines: Vec<Line> = rays.iter().map(|ray| self.line(ray)).collect();
-        let slits: Vec<Slit> = lines.iter().map(|line| Slit::new(line, 0.0)).collect();
+        let sheared: Vec<ShearedRay> =
+            lines.iter().map(|line| ShearedRay::new(line, 0.0)).collect();
         self.sphere_hits(rays, &mut wants, &mut on_hit);
         let (mut work, mut passed) = (Block::default(), Vec::new());
-        for block in 0..self.soup.blocks() {
+        for block in 0..self.triangles.blocks() {
             if wants.iter().all(|wants| !wants) {
                 break;
             }
             passed.clear();
-            self.soup.sieve(block, &slits, &mut work, &mut passed);
+            self.triangles.filter(block, &sheared, &mut work, &mut passed);
             for (index, triangle) in &passed {
                 let (index, triangle) = (*index as usize, *triangle as usize);
                 if !wants[index] {
                     continue;
                 }
-                let Some(meeting) = lines[index].meet(&self.soup.corners(triangle)) else {
+                let Some(meeting) = lines[index].meet(&self.triangles.corners(triangle)) else {
                     continue;
                 };
                 if let Some(hit) = counts(&rays[index], &meeting, self.prim(triangle)) {
@@ -167,7 +168,7 @@ impl<'s> Oracle<'s> {
         out: &mut [T],
         answer: impl Fn(&[Ray], &mut [T]) + Sync,
     ) {
-        let work = rays.len() * self.soup.len();
+        let work = rays.len() * self.triangles.len();
         if rayon::current_thread_index().is_some() || work < GROUP * BLOCK {
             rays.chunks(GROUP).zip(out.chunks_mut(GROUP)).for_each(|(r, o)| answer(r, o));
         } else {
@@ -240,7 +241,7 @@ impl Intersector for Oracle<'_> {
     }
 
     fn memory(&self) -> u64 {
-        self.soup.memory()
+        self.triangles.memory()
     }
 }
 

@@ -116,13 +116,13 @@ pub struct Row {
     pub maps: Vec<MapRow>,
     /// Why the frame, which is left from an earlier job, is none of this sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stray: Option<Stray>,
+    pub stray: Option<Foreign>,
 }
 
 /// Why a frame is none of the sequence that its manifest is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Stray {
+pub enum Foreign {
     /// It is left from a sequence of other settings, of which only a part was replaced.
     OtherSettings,
     /// It is left from another move through the same scene, or from a shorter or longer one.

@@ -6,7 +6,7 @@
 //! * [`FramePattern`] turns `out/frame_####.png` and a frame number into a path.
 //! * [`atomic`] is how every file here comes into being: temporary name, sync, rename.
 //! * [`SequenceLock`] keeps jobs of other settings out of a sequence while one renders it.
-//! * [`Lying`] tells a file from what must not be read.
+//! * [`PathKind`] tells a file from what must not be read.
 //! * [`read_image`] reads png, ppm, jpeg, hdr and exr within a memory limit; [`exr`] reads and
 //!   writes any channels.
 //! * [`manifest`] lists the finished frames of a sequence.
@@ -24,9 +24,9 @@ mod display;
 pub mod exr;
 mod format;
 mod lock;
-mod lying;
 pub mod manifest;
 pub mod maps;
+mod path_kind;
 mod pattern;
 mod png;
 mod quantise;
@@ -37,6 +37,6 @@ pub use atomic::Written;
 pub use display::Display;
 pub use format::{Format, VERSION, WriteOptions, write_image};
 pub use lock::SequenceLock;
-pub use lying::{Lying, Regular};
+pub use path_kind::{PathKind, Regular};
 pub use pattern::FramePattern;
 pub use read::{DEFAULT_MEMORY_LIMIT, read_image, read_image_within};

@@ -4,7 +4,7 @@
 //! fraction of the rays that tracing would take tells such a point.
 
 use super::lookup::steps_per_radiance;
-use crate::inference::Questions;
+use crate::inference::LookupBatch;
 
 /// An estimate is contradicted when what check rays show is off by more than so many standard deviations
 /// of what as many rays would show if the estimate were right.
@@ -12,8 +12,8 @@ const MOST_DEVIATIONS: f32 = 2.0;
 
 /// Whether check rays bear out what other frames suggest about point `at`, all its lights together. An
 /// error of `tolerance` display steps is not seen.
-pub fn agrees(questions: &Questions, at: usize, channels: usize, tolerance: f32) -> bool {
-    let Questions { unshadowed, estimates, checked, .. } = questions;
+pub fn agrees(batch: &LookupBatch, at: usize, channels: usize, tolerance: f32) -> bool {
+    let LookupBatch { unshadowed, estimates, checked, .. } = batch;
     let own = at * channels..(at + 1) * channels;
     let Some(checked) = checked.get(own.clone()) else { return false };
     let lights = unshadowed[own.clone()].iter().zip(&estimates[own]).zip(checked);
@@ -44,14 +44,14 @@ mod tests {
         let (p, n, geom_id, footprint) = (DVec3::ZERO, Vec3::Y, 0, 1.0);
         let point = SurfacePoint { p, n, geom_id, footprint, cos: 1.0, direct: true, samples: 1 };
         let checked = Checked { ratio: open as f32 / rays.max(1) as f32, rays };
-        let questions = Questions {
+        let batch = LookupBatch {
             points: vec![point],
             unshadowed: vec![0.5],
             estimates: vec![Estimate { ratio, level: 0 }],
             checked: vec![checked],
-            ..Questions::default()
+            ..LookupBatch::default()
         };
-        agrees(&questions, 0, 1, 0.25)
+        agrees(&batch, 0, 1, 0.25)
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::check::agrees;
 use super::evidence::Evidence;
 use super::reference::{NONE, Reference};
 use super::taps::{ALWAYS, Taps, Taps4, sum};
-use crate::inference::{Estimate, Inference, Origin, Questions};
+use crate::inference::{Estimate, Inference, LookupBatch, Origin};
 
 /// Points that are looked up together: the memory that all of them need is asked for before any of it
 /// is waited for.
@@ -42,9 +42,9 @@ pub struct Judged<'a> {
 }
 
 impl Inference for Judged<'_> {
-    fn infer(&self, questions: &mut Questions) {
-        self.lookup.estimate(questions);
-        let Questions { points, pixels, ratios, estimates, origins, checks, .. } = questions;
+    fn infer(&self, batch: &mut LookupBatch) {
+        self.lookup.estimate(batch);
+        let LookupBatch { points, pixels, ratios, estimates, origins, checks, .. } = batch;
         let channels = self.lookup.rays.len();
         let answers = ratios.chunks_exact_mut(channels).zip(estimates.chunks_exact(channels));
         for (i, (ratios, estimates)) in answers.enumerate() {
@@ -64,13 +64,13 @@ impl Inference for Judged<'_> {
         }
     }
 
-    fn check(&self, questions: &mut Questions) {
+    fn check(&self, batch: &mut LookupBatch) {
         let channels = self.lookup.rays.len();
-        for at in 0..questions.points.len() {
+        for at in 0..batch.points.len() {
             let own = at * channels..(at + 1) * channels;
-            let is_checked = questions.checks[own.clone()].contains(&true);
-            if is_checked && !agrees(questions, at, channels, self.tolerance) {
-                questions.ratios[own].fill(f32::NAN);
+            let is_checked = batch.checks[own.clone()].contains(&true);
+            if is_checked && !agrees(batch, at, channels, self.tolerance) {
+                batch.ratios[own].fill(f32::NAN);
             }
         }
     }
@@ -78,8 +78,8 @@ impl Inference for Judged<'_> {
 
 impl Lookup<'_> {
     /// Fills estimates and origins for all points.
-    pub fn estimate(&self, questions: &mut Questions) {
-        let Questions { points, unshadowed, estimates, origins, .. } = questions;
+    pub fn estimate(&self, batch: &mut LookupBatch) {
+        let LookupBatch { points, unshadowed, estimates, origins, .. } = batch;
         let channels = self.rays.len();
         estimates.clear();
         estimates.resize(points.len() * channels, Estimate::UNKNOWN);

@@ -3,7 +3,7 @@
 use super::Lookup;
 use super::check::agrees;
 use super::evidence::{Compared, Finding, finding_of};
-use crate::inference::{Estimate, Inference, Origin, Questions, SurfacePoint};
+use crate::inference::{Estimate, Inference, LookupBatch, Origin, SurfacePoint};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
 
@@ -125,19 +125,19 @@ impl<'a> Probe<'a> {
 }
 
 impl Inference for Probe<'_> {
-    fn infer(&self, questions: &mut Questions) {
-        questions.estimates.clear();
+    fn infer(&self, batch: &mut LookupBatch) {
+        batch.estimates.clear();
         if let Some(lookup) = self.lookup {
-            lookup.estimate(questions);
+            lookup.estimate(batch);
             // Nothing of what is shown comes from there.
-            questions.origins.fill(Origin::default());
+            batch.origins.fill(Origin::default());
             let is_known = |estimate: &Estimate| !estimate.ratio.is_nan();
-            questions.checks.extend(questions.estimates.iter().map(is_known));
+            batch.checks.extend(batch.estimates.iter().map(is_known));
         }
     }
 
-    fn hear(&self, answered: &Questions) {
-        let Questions { points, pixels, unshadowed, ratios, estimates, .. } = answered;
+    fn hear(&self, answered: &LookupBatch) {
+        let LookupBatch { points, pixels, unshadowed, ratios, estimates, .. } = answered;
         let channels = self.channels;
         let light = |at: usize| Compared {
             unshadowed: unshadowed[at],

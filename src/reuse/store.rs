@@ -53,7 +53,7 @@ const MOST_CELLS: f32 = 1e12;
 
 /// What a reference and a job must have in common.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Terms {
+pub struct Compatibility {
     /// Hash of the world, the shot left aside.
     pub world: String,
     /// Whether the scene is traced about its own centre.
@@ -67,7 +67,7 @@ pub struct Terms {
 /// What the bytes say of themselves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Head {
-    terms: Terms,
+    terms: Compatibility,
     /// The frame's number in its own shot; told, never used.
     frame: u32,
     /// Settings as text; told, never used.
@@ -76,7 +76,7 @@ struct Head {
     findings: usize,
 }
 
-impl Terms {
+impl Compatibility {
     /// Those of a job of the world with the hash `world` that keeps `channels`.
     pub fn of(world: &str, channels: &Channels, settings: &Settings) -> Self {
         let name = |channel| match channel {
@@ -122,7 +122,7 @@ impl Terms {
 /// A frame's points with what they belong to.
 pub struct Kept<'a> {
     /// What other jobs must have in common.
-    pub terms: &'a Terms,
+    pub terms: &'a Compatibility,
     /// Number of the frame.
     pub frame: u32,
     /// World space.
@@ -220,7 +220,7 @@ impl Kept<'_> {
 pub fn decode(
     path: &Path,
     bytes: &[u8],
-    terms: &Terms,
+    terms: &Compatibility,
     recentring: &Recentring,
 ) -> Result<(Reference, [u8; 32])> {
     let refuse = |why: String| Error::input(path, format!("cannot serve as a reference: {why}"));
@@ -410,9 +410,9 @@ mod tests {
     use super::*;
     use crate::scene::Pose;
 
-    fn terms() -> Terms {
+    fn terms() -> Compatibility {
         let lights = vec!["light 1".to_string(), "sky".into()];
-        Terms { world: "w".into(), recentre: true, lights, rays: vec![16, 64] }
+        Compatibility { world: "w".into(), recentre: true, lights, rays: vec![16, 64] }
     }
 
     fn camera() -> Camera {
@@ -450,7 +450,7 @@ mod tests {
         kept.encode().expect("small enough")
     }
 
-    fn read(bytes: &[u8], terms: &Terms) -> Result<Reference> {
+    fn read(bytes: &[u8], terms: &Compatibility) -> Result<Reference> {
         decode(Path::new("f.exr"), bytes, terms, &Recentring::IDENTITY).map(|(r, _)| r)
     }
 
@@ -533,7 +533,7 @@ mod tests {
     #[test]
     fn other_terms_are_refused_by_name() {
         let bytes = encoded(&traced(), None);
-        let says = |change: fn(&mut Terms)| {
+        let says = |change: fn(&mut Compatibility)| {
             let mut other = terms();
             change(&mut other);
             read(&bytes, &other).expect_err("refused").to_string()

@@ -9,7 +9,6 @@
 //! (`docs/decisions`).
 
 mod camera;
-mod crushed;
 mod light;
 pub mod limits;
 mod material;
@@ -20,11 +19,11 @@ mod recentre;
 mod reuse;
 mod settings;
 mod time;
+mod too_small;
 mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
-pub use crushed::Collapsed;
 pub use light::{Light, QuadLight, Sky};
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
@@ -35,6 +34,7 @@ pub use settings::{
     BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
 pub use time::{Interval, parse_time, parse_time_limit};
+pub use too_small::Collapsed;
 pub(crate) use weld::weld;
 pub(crate) use winding::{borders, closed_volume};
 

@@ -2,7 +2,7 @@
 
 use super::{
     Collapsed, Corners, Light, Material, Mesh, QuadLight, Scene, Sphere, Surface, World, WorldMesh,
-    WorldSphere, crushed, winding,
+    WorldSphere, too_small, winding,
 };
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Rgb, Vec3};
@@ -124,7 +124,7 @@ impl World {
         }
         let recentring = if recentre { Recentring::of(&bounds) } else { Recentring::IDENTITY };
         if recentre {
-            crushed::refuse(&self, &recentring)?;
+            too_small::refuse(&self, &recentring)?;
         }
         let lights: Vec<Light> = std::mem::take(&mut self.lights)
             .into_iter()
@@ -142,7 +142,7 @@ impl World {
             let (mesh, lost) = to_scene_mesh(mesh, &self.materials, &recentring);
             let lost = Collapsed { mesh: mesh.name.clone(), lost, of: mesh.triangles.len() };
             if recentre {
-                crushed::refuse_collapsed(&lost)?;
+                too_small::refuse_collapsed(&lost)?;
             }
             if lost.lost > 0 {
                 collapsed.push(lost);
@@ -228,7 +228,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
         }
     }
     let rounded: Vec<Vec3> = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
-    let lost = crushed::count_collapsed(&positions, &rounded, &triangles);
+    let lost = too_small::count_collapsed(&positions, &rounded, &triangles);
     let surface = Surface { material, light: None, always_traced };
     (scene_mesh(name, rounded, triangles, normals, uvs, surface), lost)
 }

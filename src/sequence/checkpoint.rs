@@ -14,7 +14,7 @@ use crate::error::{Error, Result, counted};
 use crate::output::manifest::{self, Header, Manifest, Row, manifest_path};
 use crate::output::{Format, FramePattern, Regular, atomic, exr};
 use crate::reuse::Reference;
-use crate::reuse::store::{ATTRIBUTE, Terms, decode};
+use crate::reuse::store::{ATTRIBUTE, Compatibility, decode};
 use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -56,7 +56,7 @@ pub struct Checkpoints<'a> {
     /// How much time of tracing may be lost; `None` to write none and read those that are there.
     pub every: Option<Duration>,
     /// On which terms references serve.
-    pub terms: &'a Terms,
+    pub terms: &'a Compatibility,
     /// Where the scene was moved.
     pub recentring: Recentring,
     /// Whether the job's frame files hold all that was traced in their frames.
@@ -72,7 +72,7 @@ impl<'a> Checkpoints<'a> {
     pub fn new(
         target: &'a Target,
         every: Option<Duration>,
-        terms: &'a Terms,
+        terms: &'a Compatibility,
         recentring: Recentring,
         whole: bool,
     ) -> Self {

@@ -11,7 +11,6 @@
 pub mod checkpoint;
 mod colour;
 mod fingerprint;
-mod inferrer;
 mod pyramid;
 mod recipe;
 mod resume;
@@ -20,20 +19,21 @@ mod schedule;
 mod shared;
 mod strips;
 mod supplied;
+mod surface_reuse;
 pub mod survey;
 mod tracer;
 
 pub use colour::{ColourMaker, check_upload};
 pub use fingerprint::{WorldHash, fingerprint, shot_fingerprint};
-pub use inferrer::Inferrer;
 pub use pyramid::Pyramid;
 pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{
     Found, Plan, Target, is_worth_a_look, look, prepare, prepare_with, refuse_strangers,
 };
 pub use schedule::Schedule;
-pub use shared::{Laid, Left, Shared, Strip};
-pub use supplied::{Card, Supply};
+pub use shared::{JoinedStrips, Left, Shared, Strip};
+pub use supplied::{ReferenceCache, ReferenceInfo};
+pub use surface_reuse::SurfaceReuse;
 pub use tracer::Tracer;
 
 #[cfg(test)]

@@ -5,9 +5,11 @@ mod refuse;
 use super::checkpoint;
 use super::recipe::{Recipe, Recipes};
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{Header, Journal, Manifest, MapRow, Row, Stray, Turn, manifest_path};
+use crate::output::manifest::{
+    Foreign, Header, Journal, Manifest, MapRow, Row, Turn, manifest_path,
+};
 use crate::output::maps::Map;
-use crate::output::{Format, FramePattern, Lying, WriteOptions, atomic};
+use crate::output::{Format, FramePattern, PathKind, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
@@ -138,10 +140,10 @@ pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
 
 fn look_at(target: &Target, frame: u32) -> Result<Found> {
     let paths = target.paths(frame);
-    let hash = |path: &PathBuf| match Lying::at(path)? {
-        Lying::Nothing => Ok(None),
-        Lying::File(file) => file.hash(path).map(Some),
-        Lying::Other => {
+    let hash = |path: &PathBuf| match PathKind::at(path)? {
+        PathKind::Nothing => Ok(None),
+        PathKind::File(file) => file.hash(path).map(Some),
+        PathKind::Other => {
             let why = format!("{} is in the way: it is not a regular file", path.display());
             Err(Error::Usage(why))
         }
@@ -212,8 +214,8 @@ fn mark_strays(target: &Target, before: &Header, rows: &BTreeMap<u32, Row>) -> R
 
 fn marked(target: &Target, row: &Row) -> Row {
     let stray = match row.stray {
-        Some(Stray::OtherSettings) => row.stray,
-        _ => (!is_made_of(row, target.recipes.get(row.frame))).then_some(Stray::OtherMove),
+        Some(Foreign::OtherSettings) => row.stray,
+        _ => (!is_made_of(row, target.recipes.get(row.frame))).then_some(Foreign::OtherMove),
     };
     Row { stray, ..row.clone() }
 }
@@ -294,7 +296,7 @@ fn left_over(target: &Target, manifest: &Manifest, frames: FrameRange) -> Vec<Ro
             && target.pattern.path(row.frame) == folder.join(&row.file);
         !replaced && folder.join(&row.file).exists()
     };
-    let mark = |row: &Row| Row { stray: Some(Stray::OtherSettings), ..row.clone() };
+    let mark = |row: &Row| Row { stray: Some(Foreign::OtherSettings), ..row.clone() };
     manifest.rows.values().filter(stays).map(mark).collect()
 }
 

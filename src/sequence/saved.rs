@@ -1,11 +1,11 @@
 //! What frames left, on disk for a job that goes on after this one: when it is put there, and when removed.
 //!
-//! Of an [`Inferrer`] only references of key frames: they are dear, and serve long. The others would take
+//! Of a [`SurfaceReuse`] only references of key frames: they are dear, and serve long. The others would take
 //! more time to put on disk, one after every other frame, than the few of them that are lost take to be
 //! made again.
 
 use super::checkpoint::Checkpoints;
-use super::{Inferrer, SaveCost};
+use super::{SaveCost, SurfaceReuse};
 use crate::inference::TracedPoints;
 use crate::reuse::Reference;
 use crate::reuse::evidence::Finding;
@@ -129,7 +129,7 @@ impl Saved {
     }
 }
 
-impl Keeps for Inferrer<'_> {
+impl Keeps for SurfaceReuse<'_> {
     type Left = Arc<[u8]>;
 
     fn checkpoints(&self) -> Option<&Checkpoints<'_>> {
@@ -145,7 +145,7 @@ impl Keeps for Inferrer<'_> {
     }
 }
 
-impl Inferrer<'_> {
+impl SurfaceReuse<'_> {
     /// The reference of an original that an earlier run left. Not where the original itself is asked
     /// for: then it is made anyway.
     pub(super) fn left_on_disk(&self, frame: u32) -> Option<Arc<Reference>> {

@@ -88,22 +88,22 @@ impl Schedule {
 
     /// The most references that a job over `frames` holds at a time: key frames, and others.
     pub fn most_held(&self, frames: &[u32]) -> (usize, usize) {
-        let mut stock = Stock::default();
+        let mut pool = ReferencePool::default();
         let mut most = (0, 0);
         let ordered = self.pyramid.order(frames);
-        stock.expect(self, &ordered);
+        pool.expect(self, &ordered);
         for frame in ordered {
             let mut wanted = vec![self.original(frame)];
             while let Some(next) = wanted.pop() {
-                let missing = self.ancestors(next).into_iter().find(|f| !stock.holds(*f));
+                let missing = self.ancestors(next).into_iter().find(|f| !pool.holds(*f));
                 match missing {
                     Some(missing) => wanted.extend([next, missing]),
-                    None => stock.keep(self, next, || ()),
+                    None => pool.keep(self, next, || ()),
                 }
-                let keys = stock.held.keys().filter(|f| self.pyramid.is_key(**f)).count();
-                most = (most.0.max(keys), most.1.max(stock.held.len() - keys));
+                let keys = pool.held.keys().filter(|f| self.pyramid.is_key(**f)).count();
+                most = (most.0.max(keys), most.1.max(pool.held.len() - keys));
             }
-            stock.done(self, self.original(frame));
+            pool.done(self, self.original(frame));
         }
         most
     }
@@ -120,7 +120,7 @@ pub(super) fn bits(camera: &Camera) -> [u64; 12] {
 
 /// References, each held as long as a frame to come is inferred from it.
 #[derive(Debug)]
-pub(super) struct Stock<T> {
+pub(super) struct ReferencePool<T> {
     /// By original: how often it is still asked for.
     asked: BTreeMap<u32, u32>,
     /// By original: how many frames to come are inferred from it.
@@ -130,14 +130,14 @@ pub(super) struct Stock<T> {
     held: BTreeMap<u32, T>,
 }
 
-impl<T> Default for Stock<T> {
+impl<T> Default for ReferencePool<T> {
     fn default() -> Self {
         let (asked, uses, held) = Default::default();
         Self { asked, uses, due: BTreeSet::new(), held }
     }
 }
 
-impl<T> Stock<T> {
+impl<T> ReferencePool<T> {
     /// `frames` will be asked for.
     pub fn expect(&mut self, schedule: &Schedule, frames: &[u32]) {
         for frame in frames {
@@ -315,16 +315,16 @@ mod tests {
         assert!(keys <= 3 && (5..=6).contains(&others), "{keys} {others}");
         assert_eq!(schedule.most_held(&[2]), (2, 5));
         assert_eq!(schedule.most_held(&[1]), (0, 0));
-        let mut stock = Stock::default();
-        stock.expect(&schedule, &[3, 4]);
+        let mut pool = ReferencePool::default();
+        pool.expect(&schedule, &[3, 4]);
         for frame in [1, 65, 33, 17, 9, 5, 3] {
-            stock.keep(&schedule, frame, || ());
+            pool.keep(&schedule, frame, || ());
         }
-        stock.done(&schedule, 3);
-        assert!(stock.holds(3) && stock.holds(1));
-        stock.done(&schedule, 4);
-        assert_eq!(stock.held().count(), 0);
-        assert!(stock.uses.is_empty() && stock.due.is_empty() && stock.asked.is_empty());
+        pool.done(&schedule, 3);
+        assert!(pool.holds(3) && pool.holds(1));
+        pool.done(&schedule, 4);
+        assert_eq!(pool.held().count(), 0);
+        assert!(pool.uses.is_empty() && pool.due.is_empty() && pool.asked.is_empty());
     }
 
     #[test]
@@ -332,20 +332,20 @@ mod tests {
         let pan = returning(9);
         let schedule = schedule(4, &pan);
         let frame = (1..=9).find(|f| !schedule.ancestors(*f).is_empty()).expect("an in-between");
-        let mut stock = Stock::default();
+        let mut pool = ReferencePool::default();
         for other in schedule.ancestors(frame) {
-            stock.take(other, ());
+            pool.take(other, ());
         }
-        stock.hold(&schedule, frame);
-        assert!(stock.is_due(frame));
-        stock.keep(&schedule, frame, || ());
-        stock.expect(&schedule, &[frame]);
-        stock.done(&schedule, frame);
-        assert!(stock.holds(frame) && schedule.ancestors(frame).iter().all(|f| stock.holds(*f)));
+        pool.hold(&schedule, frame);
+        assert!(pool.is_due(frame));
+        pool.keep(&schedule, frame, || ());
+        pool.expect(&schedule, &[frame]);
+        pool.done(&schedule, frame);
+        assert!(pool.holds(frame) && schedule.ancestors(frame).iter().all(|f| pool.holds(*f)));
         for other in schedule.ancestors(frame).into_iter().chain([frame]) {
-            stock.let_go(&schedule, other);
+            pool.let_go(&schedule, other);
         }
-        assert_eq!(stock.held().count(), 0);
-        assert!(stock.uses.is_empty() && stock.due.is_empty());
+        assert_eq!(pool.held().count(), 0);
+        assert!(pool.uses.is_empty() && pool.due.is_empty());
     }
 }

@@ -104,9 +104,9 @@ pub struct Strip {
 
 /// Frames put together from strips, until they are asked for.
 #[derive(Default)]
-pub struct Laid(Mutex<BTreeMap<u32, Rendered>>);
+pub struct JoinedStrips(Mutex<BTreeMap<u32, Rendered>>);
 
-impl Laid {
+impl JoinedStrips {
     pub(super) fn put(&self, frame: u32, rendered: Rendered) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(frame, rendered);
     }

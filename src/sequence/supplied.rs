@@ -1,13 +1,13 @@
 //! References that somebody supplies: frames of an earlier job of the same scene.
 //!
 //! Each is read when a frame that is inferred from it is made, so a process reads those that serve its
-//! own frames. Which these are is known from [`Card`]s.
+//! own frames. Which these are is known from [`ReferenceInfo`]s.
 
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::output::exr;
 use crate::reuse::Reference;
-use crate::reuse::store::{ATTRIBUTE, Terms, decode};
+use crate::reuse::store::{ATTRIBUTE, Compatibility, decode};
 use crate::scene::{Camera, Recentring};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ const OTHERS: usize = 6;
 
 /// What is known of a supplied reference before it is read again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Card {
+pub struct ReferenceInfo {
     /// Where it lies in the list of all files.
     pub file: usize,
     /// Of its content.
@@ -36,7 +36,7 @@ pub struct Card {
     samples: usize,
 }
 
-impl Card {
+impl ReferenceInfo {
     /// Of what was read from the `file`-th file.
     pub fn of(file: usize, hash: [u8; 32], reference: &Reference) -> Self {
         let (eye, forward) = (reference.eye(), reference.forward());
@@ -48,9 +48,9 @@ impl Card {
 type Read = Box<dyn Fn(&Path) -> Result<(Reference, [u8; 32])> + Send + Sync>;
 
 /// All that is supplied.
-pub struct Supply {
+pub struct ReferenceCache {
     files: Vec<PathBuf>,
-    cards: Vec<Card>,
+    infos: Vec<ReferenceInfo>,
     read: Read,
     /// Most memory that references take as long as nobody needs them at this moment, bytes.
     budget: u64,
@@ -66,10 +66,15 @@ struct Held {
     most_memory: u64,
 }
 
-impl Supply {
+impl ReferenceCache {
     /// The references in `files` for a job on `terms` of a scene with `recentring`. Those that were used
     /// last are held, up to `budget` bytes.
-    pub fn new(files: Vec<PathBuf>, terms: Terms, recentring: Recentring, budget: u64) -> Self {
+    pub fn new(
+        files: Vec<PathBuf>,
+        terms: Compatibility,
+        recentring: Recentring,
+        budget: u64,
+    ) -> Self {
         let read = move |file: &Path| {
             let bytes = exr::read_attribute(file, ATTRIBUTE, LARGEST)?.ok_or_else(|| {
                 Error::input(
@@ -84,28 +89,28 @@ impl Supply {
     }
 
     fn reading(files: Vec<PathBuf>, read: Read, budget: u64) -> Self {
-        Self { files, cards: Vec::new(), read, budget, held: Mutex::default() }
+        Self { files, infos: Vec::new(), read, budget, held: Mutex::default() }
     }
 
     /// Looks into the `file`-th file; holds what it read if it `is_kept`.
     ///
     /// # Errors
     /// The file cannot be read, or cannot serve.
-    pub fn look(&self, file: usize, is_kept: bool) -> Result<Card> {
+    pub fn look(&self, file: usize, is_kept: bool) -> Result<ReferenceInfo> {
         let (reference, hash) = (self.read)(&self.files[file])?;
-        let card = Card::of(file, hash, &reference);
+        let info = ReferenceInfo::of(file, hash, &reference);
         if is_kept {
             let mut held = self.held();
             held.put(file, Arc::new(reference));
             held.shrink(self.budget);
         }
-        Ok(card)
+        Ok(info)
     }
 
     /// These serve, of all files, by what was seen in them. Their order counts; those that know nothing
     /// are left out.
-    pub fn serve(&mut self, cards: Vec<Card>) {
-        self.cards = cards.into_iter().filter(|card| card.samples > 0).collect();
+    pub fn serve(&mut self, infos: Vec<ReferenceInfo>) {
+        self.infos = infos.into_iter().filter(|info| info.samples > 0).collect();
     }
 
     /// The most memory that references took at a time so far, bytes.
@@ -120,20 +125,20 @@ impl Supply {
     pub fn nearest(&self, camera: &Camera) -> Result<Vec<Arc<Reference>>> {
         let mut held = self.held();
         let mut found = Vec::new();
-        for card in nearest(&self.cards, camera) {
-            found.push(match held.get(card.file) {
+        for info in nearest(&self.infos, camera) {
+            found.push(match held.get(info.file) {
                 Some(reference) => reference,
-                None => held.put(card.file, Arc::new(self.read_again(card)?)),
+                None => held.put(info.file, Arc::new(self.read_again(info)?)),
             });
         }
         held.shrink(self.budget);
         Ok(found)
     }
 
-    fn read_again(&self, card: &Card) -> Result<Reference> {
-        let file = &self.files[card.file];
+    fn read_again(&self, info: &ReferenceInfo) -> Result<Reference> {
+        let file = &self.files[info.file];
         match (self.read)(file)? {
-            (reference, hash) if hash == card.hash => Ok(reference),
+            (reference, hash) if hash == info.hash => Ok(reference),
             _ => Err(Error::input(file, "this reference has changed since the job began")),
         }
     }
@@ -191,15 +196,15 @@ pub(super) fn with_supplied<'r>(
 /// these alone. Frames in between know only what they discovered, so the nearest ones alone would
 /// know little: the two nearest of those with at least half as many samples as the one with most come
 /// first, then the nearest of the others.
-fn nearest<'c>(supplied: &'c [Card], camera: &Camera) -> Vec<&'c Card> {
+fn nearest<'c>(supplied: &'c [ReferenceInfo], camera: &Camera) -> Vec<&'c ReferenceInfo> {
     let most = supplied.iter().map(|c| c.samples).max().unwrap_or(0);
     let farthest = supplied.iter().map(|c| c.eye.distance(camera.eye)).fold(0.0, f64::max);
-    let apart = |c: &Card| {
+    let apart = |c: &ReferenceInfo| {
         let eyes = c.eye.distance(camera.eye) / farthest.max(f64::MIN_POSITIVE);
         let turn: DVec3 = c.forward - camera.forward;
         eyes + 0.5 * turn.length()
     };
-    let mut all: Vec<(f64, &Card)> = supplied.iter().map(|c| (apart(c), c)).collect();
+    let mut all: Vec<(f64, &ReferenceInfo)> = supplied.iter().map(|c| (apart(c), c)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (dense, others): (Vec<_>, Vec<_>) =
         all.into_iter().partition(|(_, c)| 2 * c.samples >= most);
@@ -238,8 +243,8 @@ mod tests {
         Reference::new(Reference::SUPPLIED, &camera(x), &traced, 1)
     }
 
-    fn cards(references: &[Reference]) -> Vec<Card> {
-        (0..).zip(references).map(|(i, r)| Card::of(i, [i as u8; 32], r)).collect()
+    fn infos(references: &[Reference]) -> Vec<ReferenceInfo> {
+        (0..).zip(references).map(|(i, r)| ReferenceInfo::of(i, [i as u8; 32], r)).collect()
     }
 
     #[test]
@@ -258,7 +263,7 @@ mod tests {
     fn two_that_know_much_come_before_the_nearest_of_the_others() {
         let mut all: Vec<Reference> = (0..20).map(|i| reference(f64::from(i), 5)).collect();
         all.extend([0.5, 9.0, 19.5].map(|x| reference(x, 1000)));
-        let all = cards(&all);
+        let all = infos(&all);
         let places =
             |x| -> Vec<f64> { nearest(&all, &camera(x)).iter().map(|c| c.eye.x).collect() };
         assert_eq!(places(18.9), [19.5, 9.0, 19.0, 18.0, 17.0, 16.0, 15.0, 14.0]);
@@ -267,7 +272,7 @@ mod tests {
     }
 
     /// Forty references along a line, named by where they stand, and what was read of them.
-    fn supply(budget: u64) -> (Supply, Arc<Mutex<Vec<usize>>>) {
+    fn cache(budget: u64) -> (ReferenceCache, Arc<Mutex<Vec<usize>>>) {
         let reads = Arc::new(Mutex::new(Vec::new()));
         let theirs = Arc::clone(&reads);
         let read = move |file: &Path| {
@@ -276,17 +281,17 @@ mod tests {
             Ok((reference(f64::from(place), 100), [place; 32]))
         };
         let files = (0..40).map(|place: u8| place.to_string().into()).collect();
-        let mut supply = Supply::reading(files, Box::new(read), budget);
-        supply.serve((0..40).map(|file| supply.look(file, file == 5).expect("there")).collect());
+        let mut cache = ReferenceCache::reading(files, Box::new(read), budget);
+        cache.serve((0..40).map(|file| cache.look(file, file == 5).expect("there")).collect());
         reads.lock().expect("no panic").clear();
-        (supply, reads)
+        (cache, reads)
     }
 
     #[test]
     fn only_those_that_serve_are_read_each_once_while_there_is_room() {
         let one = reference(0.0, 100).memory();
-        let ask = |supply: &Supply, x| supply.nearest(&camera(x)).expect("readable").len();
-        let (wide, reads) = supply(100 * one);
+        let ask = |cache: &ReferenceCache, x| cache.nearest(&camera(x)).expect("readable").len();
+        let (wide, reads) = cache(100 * one);
         for x in [4.0, 4.0, 5.0] {
             assert_eq!(ask(&wide, x), 8);
         }
@@ -297,7 +302,7 @@ mod tests {
         read.dedup();
         assert_eq!(read.len(), count, "read twice");
         // What there is no room for is read again, and the eight of a frame always serve.
-        let (narrow, reads) = supply(3 * one);
+        let (narrow, reads) = cache(3 * one);
         assert_eq!((ask(&narrow, 4.0), ask(&narrow, 4.0)), (8, 8));
         assert!(reads.lock().expect("no panic").len() > 8);
         assert_eq!(narrow.held().references.len(), 3);
@@ -305,9 +310,9 @@ mod tests {
 
     #[test]
     fn a_file_that_has_changed_is_refused_by_name() {
-        let (mut supply, _) = supply(0);
-        supply.cards[3].hash = [99; 32];
-        let error = supply.nearest(&camera(3.0)).expect_err("refused").to_string();
+        let (mut cache, _) = cache(0);
+        cache.infos[3].hash = [99; 32];
+        let error = cache.nearest(&camera(3.0)).expect_err("refused").to_string();
         assert!(error.starts_with("3: this reference has changed"), "{error}");
     }
 }

@@ -1,8 +1,8 @@
 //! How a sequence on disk stands, by its manifest alone: nothing is changed.
 
 use crate::error::{Error, Result};
-use crate::output::manifest::{Manifest, MapRow, Row, Stray, folder_of};
-use crate::output::{FramePattern, Lying};
+use crate::output::manifest::{Foreign, Manifest, MapRow, Row, folder_of};
+use crate::output::{FramePattern, PathKind};
 use crate::scene::FrameRange;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -74,8 +74,8 @@ pub fn survey_of(
         missing: all(Stands::Missing),
         damaged: any(&[Stands::Damaged, Stands::WithoutMap]),
         without_map: all(Stands::WithoutMap),
-        other_settings: all(Stands::Stray(Stray::OtherSettings)),
-        other_move: all(Stands::Stray(Stray::OtherMove)),
+        other_settings: all(Stands::Foreign(Foreign::OtherSettings)),
+        other_move: all(Stands::Foreign(Foreign::OtherMove)),
         beyond: beyond.filter(is_there).map(|row| row.frame).collect(),
     })
 }
@@ -86,7 +86,7 @@ enum Stands {
     Missing,
     Damaged,
     WithoutMap,
-    Stray(Stray),
+    Foreign(Foreign),
 }
 
 fn stands(
@@ -106,7 +106,7 @@ fn stands(
     let maps = row.maps.iter().map(|map| is_whole_map(folder, map));
     let with_maps = maps.collect::<Result<Vec<bool>>>()?;
     Ok(match row.stray {
-        Some(stray) => Stands::Stray(stray),
+        Some(stray) => Stands::Foreign(stray),
         None if !same_name || !is_whole => Stands::Damaged,
         None if with_maps.iter().all(|m| *m) => Stands::Done,
         None => Stands::WithoutMap,
@@ -123,10 +123,10 @@ pub fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
 
 /// Whether what lies there is a file of so many bytes with this hash; `None` where nothing does.
 fn is_whole(path: &Path, bytes: Option<u64>, hash: &str) -> Result<Option<bool>> {
-    let file = match Lying::at(path)? {
-        Lying::Nothing => return Ok(None),
-        Lying::Other => return Ok(Some(false)),
-        Lying::File(file) => file,
+    let file = match PathKind::at(path)? {
+        PathKind::Nothing => return Ok(None),
+        PathKind::Other => return Ok(Some(false)),
+        PathKind::File(file) => file,
     };
     let is_as_long = bytes.is_none_or(|bytes| bytes == file.bytes);
     Ok(Some(is_as_long && file.hash(path)? == hash))

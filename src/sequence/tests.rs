@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::math::DVec3;
-use crate::output::manifest::{FORMAT, Header, Manifest, Stray, manifest_path};
+use crate::output::manifest::{FORMAT, Foreign, Header, Manifest, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
 use crate::scene::{CameraPath, Easing, FrameRange, KeyPose, Pose, Settings};
 use std::cell::RefCell;
@@ -210,7 +210,7 @@ fn target_of(folder: &Folder, shot: &Shot, settings: &Settings) -> Target {
 fn strays(target: &Target) -> Vec<u32> {
     let manifest = Manifest::read(&manifest_path(&target.pattern)).expect("readable");
     let rows = manifest.expect("there").rows.into_values();
-    rows.filter(|row| row.stray == Some(Stray::OtherMove)).map(|row| row.frame).collect()
+    rows.filter(|row| row.stray == Some(Foreign::OtherMove)).map(|row| row.frame).collect()
 }
 
 #[test]

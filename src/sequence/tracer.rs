@@ -1,6 +1,6 @@
 //! The maker that traces every frame on its own.
 
-use super::shared::{Laid, Shared, Strip};
+use super::shared::{JoinedStrips, Shared, Strip};
 use super::strips::{self, Unheard};
 use super::{FrameMaker, Made, previous_camera};
 use crate::error::Result;
@@ -25,7 +25,7 @@ pub struct Tracer<'a> {
     /// Hears of finished tiles.
     pub progress: &'a dyn Progress,
     /// Frames that came as strips.
-    pub laid: Laid,
+    pub laid: JoinedStrips,
 }
 
 impl Tracer<'_> {

@@ -1,14 +1,14 @@
-//! The lit points of one chunk as reuse sees them: camera samples of a pixel that end on one surface
+//! The shading points of one chunk as reuse sees them: camera samples of a pixel that end on one surface
 //! are one surface point.
 //!
 //! Points behind mirrors and glass stay apart, since neighbouring samples may end far from one
 //! another there. What is traced is gathered per surface point and becomes a source.
 
-use super::lighting::LitPoint;
+use super::lighting::ShadingPoint;
 use super::pixels::{BLOCK, BlockPixels};
 use super::{FrameInput, Reuse};
 use crate::inference::{
-    Checked, Estimate, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints, check_rays,
+    Checked, Estimate, LookupBatch, Origin, SurfacePoint, TracedPoint, TracedPoints, check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -29,7 +29,7 @@ struct Gathered {
     all: f64,
 }
 
-/// Check rays of a lit point to one light. Those of a surface point follow one another in the sequence of
+/// Check rays of a shading point to one light. Those of a surface point follow one another in the sequence of
 /// samples, since such a run is spread over the light.
 pub(super) struct CheckRays {
     /// The surface point.
@@ -38,18 +38,18 @@ pub(super) struct CheckRays {
     pub first: u32,
     /// How many the run has.
     pub all: usize,
-    /// Those of the run that are the lit point's.
+    /// Those of the run that are the shading point's.
     pub own: Range<usize>,
 }
 
 /// The surface points of a chunk.
 #[derive(Default)]
 pub(super) struct Groups {
-    /// For each lit point its surface point.
+    /// For each shading point its surface point.
     of_lit: Vec<u32>,
     /// And how many of that point's samples came before it.
     before: Vec<u32>,
-    asked: Questions,
+    asked: LookupBatch,
     /// Pixel of each surface point, in the block.
     pixels: Vec<u32>,
     /// The first camera sample of each surface point.
@@ -72,7 +72,7 @@ impl Groups {
         &mut self,
         input: &FrameInput,
         (scene, reuse): (&Scene, &Reuse),
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         unshadowed: &[f32],
         pixels: &BlockPixels,
     ) {
@@ -98,7 +98,7 @@ impl Groups {
         self.asked.checked.clear();
         if let Some(inference) = reuse.inference {
             inference.infer(&mut self.asked);
-            let Self { asked: Questions { ratios, estimates, checks, .. }, forbidden, .. } = self;
+            let Self { asked: LookupBatch { ratios, estimates, checks, .. }, forbidden, .. } = self;
             for (at, _) in forbidden.iter().enumerate().filter(|(_, forbidden)| **forbidden) {
                 let own = at * channels..(at + 1) * channels;
                 ratios[own.clone()].fill(f32::NAN);
@@ -109,7 +109,7 @@ impl Groups {
         }
     }
 
-    fn gather_points(&mut self, input: &FrameInput, lit: &[LitPoint]) {
+    fn gather_points(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {
         let Self { of_lit, before, asked, pixels, first, next, .. } = self;
         let points = &mut asked.points;
         of_lit.clear();
@@ -144,7 +144,7 @@ impl Groups {
 
     /// Means over each surface point's samples.
     fn gather_unshadowed(&mut self, channels: usize, unshadowed: &[f32]) {
-        let Self { of_lit, asked: Questions { points, unshadowed: out, .. }, .. } = self;
+        let Self { of_lit, asked: LookupBatch { points, unshadowed: out, .. }, .. } = self;
         out.clear();
         out.resize(points.len() * channels, 0.0);
         for (at, own) in of_lit.iter().zip(unshadowed.chunks_exact(channels.max(1))) {
@@ -157,8 +157,8 @@ impl Groups {
 
     /// Behind mirrors and glass a pixel's size on the surface is told by its neighbours: how far
     /// away the same branch of their same sample ends.
-    fn measure_footprints(&mut self, lit: &[LitPoint], pixels: &BlockPixels) {
-        let Self { of_lit, asked: Questions { points, .. }, order, .. } = self;
+    fn measure_footprints(&mut self, lit: &[ShadingPoint], pixels: &BlockPixels) {
+        let Self { of_lit, asked: LookupBatch { points, .. }, order, .. } = self;
         order.clear();
         let specular = lit.iter().zip(of_lit.iter()).filter(|(l, _)| l.place.branch > 1);
         order.extend(
@@ -186,7 +186,7 @@ impl Groups {
     }
 
     /// Notes the surface points that must be traced whatever is known.
-    fn forbid(&mut self, input: &FrameInput, scene: &Scene, lit: &[LitPoint]) {
+    fn forbid(&mut self, input: &FrameInput, scene: &Scene, lit: &[ShadingPoint]) {
         self.forbidden.clear();
         if !input.has_always_traced {
             return;
@@ -209,8 +209,8 @@ impl Groups {
         !self.asked.checks.is_empty()
     }
 
-    /// The check rays in `channel` that lit point `i` casts, where tracing would cast `rays` from each lit
-    /// point; `None` where none is wanted.
+    /// The check rays in `channel` that shading point `i` casts, where tracing would cast `rays` from each
+    /// of them; `None` where none is wanted.
     pub fn check_rays(
         &self,
         i: usize,
@@ -232,7 +232,7 @@ impl Groups {
         Some(CheckRays { point, first, all: all as usize, own })
     }
 
-    /// Adds what check rays from lit point `i` found: `open` of `all`.
+    /// Adds what check rays from shading point `i` found: `open` of `all`.
     pub fn note_checked(
         &mut self,
         i: usize,
@@ -262,17 +262,17 @@ impl Groups {
         }
     }
 
-    /// The ratio that is known for lit point `i` in `channel`, else NaN.
+    /// The ratio that is known for shading point `i` in `channel`, else NaN.
     pub fn known(&self, i: usize, channel: usize, channels: usize) -> f32 {
         self.asked.ratios[self.of_lit[i] as usize * channels + channel]
     }
 
-    /// Notes that the light of a channel shines on lit point `i`, shadows aside.
+    /// Notes that the light of a channel shines on shading point `i`, shadows aside.
     pub fn note_lit(&mut self, i: usize) {
         self.lit[self.of_lit[i] as usize] = true;
     }
 
-    /// Adds what was traced for lit point `i`.
+    /// Adds what was traced for shading point `i`.
     pub fn add(&mut self, i: usize, channel: usize, channels: usize, open: f64, all: f64) {
         let group = self.of_lit[i] as usize;
         self.traced[group] = true;
@@ -332,7 +332,7 @@ fn neighbours(cell: usize) -> impl Iterator<Item = usize> {
     [left, right, above, below].into_iter().flatten()
 }
 
-impl LitPoint {
+impl ShadingPoint {
     /// The point as reuse sees it.
     fn surface_point(&self, input: &FrameInput) -> SurfacePoint {
         let direct = self.place.branch == 1;

@@ -5,8 +5,8 @@
 //! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
-use super::interior::{self, Interior};
-use super::lighting::{LitPoint, ShadowScratch};
+use super::lighting::{ShadingPoint, ShadowScratch};
+use super::medium_stack::{self, MediumStack};
 use super::optics;
 use super::pixels::BlockPixels;
 use super::surface::{albedo, emitted};
@@ -40,14 +40,14 @@ pub(super) struct Scratch {
     rays: Vec<Ray>,
     states: Vec<PathState>,
     /// Bodies of ranked glass around each ray's start; empty in kernels without.
-    interiors: Vec<Interior>,
+    interiors: Vec<MediumStack>,
     hits: Vec<Option<Hit>>,
     next_rays: Vec<Ray>,
     next_states: Vec<PathState>,
-    next_interiors: Vec<Interior>,
+    next_interiors: Vec<MediumStack>,
     /// Branch of each next ray, and which it is.
     order: Vec<(u32, u32)>,
-    lit: Vec<LitPoint>,
+    lit: Vec<ShadingPoint>,
     shadow: ShadowScratch,
 }
 
@@ -161,7 +161,7 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
             match hit {
                 None => vertex.escape(ray, state),
                 Some(hit) => {
-                    let no = Interior::default();
+                    let no = MediumStack::default();
                     vertex.meet::<MIRROR, GLASS, NESTED>(ray, hit, state, &no, may_bounce);
                 }
             }
@@ -177,10 +177,10 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
 struct Vertex<'v, 'r> {
     renderer: &'v Renderer<'r>,
     pixels: &'v mut BlockPixels,
-    lit: &'v mut Vec<LitPoint>,
+    lit: &'v mut Vec<ShadingPoint>,
     next_rays: &'v mut Vec<Ray>,
     next_states: &'v mut Vec<PathState>,
-    next_interiors: &'v mut Vec<Interior>,
+    next_interiors: &'v mut Vec<MediumStack>,
     counts: &'v mut RayCounts,
 }
 
@@ -202,7 +202,7 @@ impl Vertex<'_, '_> {
         mut ray: Ray,
         mut hit: Option<Hit>,
         state: &PathState,
-        mut inside: Interior,
+        mut inside: MediumStack,
         may_bounce: bool,
     ) {
         let renderer = self.renderer;
@@ -210,18 +210,18 @@ impl Vertex<'_, '_> {
             let Some(met) = &hit else { return self.escape(&ray, state) };
             let si = SurfaceInteraction::new(renderer.scene, &ray, met);
             let material = &renderer.scene.materials[si.surface.material as usize];
-            if !material.glass.as_ref().is_some_and(interior::is_ranked) {
+            if !material.glass.as_ref().is_some_and(medium_stack::is_ranked) {
                 return self.meet::<MIRROR, true, true>(&ray, met, state, &inside, may_bounce);
             }
-            let crossing = interior::cross(renderer, &ray, &si, &inside, self.counts);
+            let crossing = medium_stack::cross(renderer, &ray, &si, &inside, self.counts);
             if let Some(boundary) = &crossing.boundary {
                 if may_bounce {
-                    let ways = Ways {
+                    let ways = ScatteredRays {
                         reflected: (&si, &inside),
                         refracted: (&crossing.last, &crossing.after),
                     };
                     let wo = -ray.dir.normalize();
-                    let bend = Bend { eta: boundary.eta, tint: boundary.tint };
+                    let bend = Interface { eta: boundary.eta, tint: boundary.tint };
                     self.split::<true>(&boundary.surface, wo, &bend, &ways, state);
                 }
                 return;
@@ -240,7 +240,7 @@ impl Vertex<'_, '_> {
         ray: &Ray,
         hit: &Hit,
         state: &PathState,
-        inside: &Interior,
+        inside: &MediumStack,
         may_bounce: bool,
     ) {
         let scene = self.renderer.scene;
@@ -254,7 +254,7 @@ impl Vertex<'_, '_> {
         if material.diffuse != Rgb::ZERO {
             let albedo = albedo(scene, material, &si);
             let reflectance = state.throughput * albedo;
-            self.lit.push(LitPoint::new((&si, ray, hit), wo, reflectance, state.place()));
+            self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
         }
         if MIRROR && may_bounce && material.mirror != Rgb::ZERO {
             self.mirror::<NESTED>(&si, wo, material, inside, state);
@@ -262,8 +262,8 @@ impl Vertex<'_, '_> {
         if GLASS && may_bounce {
             if let Some(glass) = &material.glass {
                 let eta = if si.is_outside(wo) { glass.ior } else { 1.0 / glass.ior };
-                let ways = Ways { reflected: (&si, inside), refracted: (&si, inside) };
-                self.split::<NESTED>(&si, wo, &Bend { eta, tint: glass.tint }, &ways, state);
+                let ways = ScatteredRays { reflected: (&si, inside), refracted: (&si, inside) };
+                self.split::<NESTED>(&si, wo, &Interface { eta, tint: glass.tint }, &ways, state);
             }
         }
     }
@@ -273,7 +273,7 @@ impl Vertex<'_, '_> {
         si: &SurfaceInteraction,
         wo: DVec3,
         material: &Material,
-        inside: &Interior,
+        inside: &MediumStack,
         state: &PathState,
     ) {
         let dir = optics::keep_side(optics::reflect(wo, si.ns), si.ng, si.is_outside(wo));
@@ -288,8 +288,8 @@ impl Vertex<'_, '_> {
         &mut self,
         si: &SurfaceInteraction,
         wo: DVec3,
-        bend: &Bend,
-        ways: &Ways,
+        bend: &Interface,
+        ways: &ScatteredRays,
         state: &PathState,
     ) {
         let outside = si.is_outside(wo);
@@ -309,7 +309,7 @@ impl Vertex<'_, '_> {
     /// Queues a ray unless its weight is below the cut-off; says whether it did.
     fn push<const NESTED: bool>(
         &mut self,
-        (si, inside): (&SurfaceInteraction, &Interior),
+        (si, inside): (&SurfaceInteraction, &MediumStack),
         dir: DVec3,
         from: &PathState,
         throughput: Rgb,
@@ -336,7 +336,7 @@ impl Vertex<'_, '_> {
 }
 
 /// What a boundary does to light.
-struct Bend {
+struct Interface {
     /// Index of refraction behind over that before.
     eta: f64,
     /// Share of light that it lets through.
@@ -344,9 +344,9 @@ struct Bend {
 }
 
 /// Where the two rays of a boundary start, and the ranked glass around them.
-struct Ways<'w> {
-    reflected: (&'w SurfaceInteraction, &'w Interior),
-    refracted: (&'w SurfaceInteraction, &'w Interior),
+struct ScatteredRays<'w> {
+    reflected: (&'w SurfaceInteraction, &'w MediumStack),
+    refracted: (&'w SurfaceInteraction, &'w MediumStack),
 }
 
 impl PathState {

@@ -29,7 +29,7 @@ pub(super) struct SamplePlace {
 
 /// A diffuse point that waits for light.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LitPoint {
+pub(super) struct ShadingPoint {
     pub si: SurfaceInteraction,
     /// What hit it.
     pub ray: Ray,
@@ -43,7 +43,7 @@ pub(super) struct LitPoint {
     pub place: SamplePlace,
 }
 
-impl LitPoint {
+impl ShadingPoint {
     /// The point `si` where `ray` hit, seen from `wo`, whose reflected light reaches the camera
     /// times `reflectance`.
     pub fn new(
@@ -57,7 +57,7 @@ impl LitPoint {
     }
 }
 
-/// Where shadow rays leave a lit point.
+/// Where shadow rays leave a shading point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShadowStarts {
     /// Those to the sky: the facet.
@@ -108,13 +108,13 @@ pub(super) struct ShadowScratch {
     spans: Vec<Span>,
     u: Vec<[f32; 2]>,
     runs: Runs,
-    /// Lit points that the present light must be traced for.
+    /// Shading points that the present light must be traced for.
     wanted: Vec<u32>,
-    /// Irradiance without shadows, per unit of radiance, for each lit point and kept channel.
+    /// Irradiance without shadows, per unit of radiance, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
     shown: Vec<f32>,
-    /// Where the rays of each lit point start, once one has cast any.
+    /// Where the rays of each shading point start, once one has cast any.
     starts: Vec<Option<ShadowStarts>>,
     /// What is known already; unused where nothing is reused.
     pub groups: Groups,
@@ -123,7 +123,7 @@ pub(super) struct ShadowScratch {
 /// Samples of one light for the check rays of each surface point.
 #[derive(Default)]
 struct Runs {
-    /// Where each surface point's run starts, once one of its lit points has asked for it.
+    /// Where each surface point's run starts, once one of its shading points has asked for it.
     starts: Vec<Option<usize>>,
     u: Vec<[f32; 2]>,
 }
@@ -135,7 +135,7 @@ impl Runs {
         self.u.clear();
     }
 
-    /// The samples of a lit point, of its surface point's run, which `fill` makes once.
+    /// The samples of a shading point, of its surface point's run, which `fill` makes once.
     fn own(&mut self, wanted: &CheckRays, fill: impl FnOnce(&mut [[f32; 2]])) -> &[[f32; 2]] {
         let start = *self.starts[wanted.point].get_or_insert_with(|| {
             let start = self.u.len();
@@ -189,7 +189,7 @@ impl ShadowScratch {
         self.spans.push(Span { end: self.rays.len(), unshadowed });
     }
 
-    fn starts(&mut self, renderer: &Renderer, lit: &[LitPoint], i: u32) -> ShadowStarts {
+    fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
         let point = &lit[i as usize];
         *self.starts[i as usize].get_or_insert_with(|| {
             let seen = (&point.si, &point.ray, &point.hit);
@@ -211,7 +211,7 @@ impl Renderer<'_> {
     pub(super) fn light_points<const AREA: bool, const SKY: bool>(
         &self,
         input: &FrameInput,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         scratch: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -254,7 +254,7 @@ impl Renderer<'_> {
         &self,
         input: &FrameInput,
         channels: &Channels,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         s: &mut ShadowScratch,
     ) {
         s.exact.clear();
@@ -280,7 +280,7 @@ impl Renderer<'_> {
         &self,
         input: &FrameInput,
         source: &AreaSource,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -325,7 +325,7 @@ impl Renderer<'_> {
     fn delta_light(
         &self,
         light: &Light,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -351,7 +351,7 @@ impl Renderer<'_> {
     fn sky_light(
         &self,
         input: &FrameInput,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -378,12 +378,12 @@ impl Renderer<'_> {
         s.wanted = wanted;
     }
 
-    /// Pushes a shadow ray from lit point `i` to each of the samples `u` of an area light, but for those below
+    /// Pushes a shadow ray from shading point `i` to each of the samples `u` of an area light, but for those below
     /// the horizon.
     fn rays_to_area(
         &self,
         seen: &SeenLight,
-        (lit, i): (&[LitPoint], u32),
+        (lit, i): (&[ShadingPoint], u32),
         u: &[[f32; 2]],
         s: &mut ShadowScratch,
     ) {
@@ -395,8 +395,8 @@ impl Renderer<'_> {
         }
     }
 
-    /// Pushes a shadow ray from lit point `i` to each of the samples `u` of the sky.
-    fn rays_to_sky(&self, (lit, i): (&[LitPoint], u32), u: &[[f32; 2]], s: &mut ShadowScratch) {
+    /// Pushes a shadow ray from shading point `i` to each of the samples `u` of the sky.
+    fn rays_to_sky(&self, (lit, i): (&[ShadingPoint], u32), u: &[[f32; 2]], s: &mut ShadowScratch) {
         let point = &lit[i as usize];
         let facet = s.starts(self, lit, i).facet;
         let (ng, basis) = (point.ng, orthonormal_basis(point.n));
@@ -415,7 +415,7 @@ impl Renderer<'_> {
         &self,
         input: &FrameInput,
         reuse: &Reuse,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -478,7 +478,7 @@ impl Renderer<'_> {
     /// the points where it must be traced: all of them without a channel.
     fn use_known(
         &self,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         channel: Option<(usize, usize)>,
         radiance: Rgb,
         pixels: &mut BlockPixels,
@@ -533,7 +533,7 @@ impl Renderer<'_> {
     /// in a channel that is kept, also to its surface point.
     fn settle(
         &self,
-        lit: &[LitPoint],
+        lit: &[ShadingPoint],
         group: &[u32],
         channel: Option<(usize, usize)>,
         pixels: &mut BlockPixels,
@@ -571,7 +571,7 @@ fn opened(weights: &[f64], occluded: &[bool], rays: std::ops::Range<usize>) -> (
 }
 
 /// All points, in order.
-fn all_of(lit: &[LitPoint], s: &mut ShadowScratch) -> Vec<u32> {
+fn all_of(lit: &[ShadingPoint], s: &mut ShadowScratch) -> Vec<u32> {
     let mut wanted = std::mem::take(&mut s.wanted);
     wanted.clear();
     wanted.extend(0..lit.len() as u32);

@@ -7,11 +7,11 @@
 //! Not done: light through glass (its shadow is opaque), glossy lobes, diffuse interreflection.
 
 mod groups;
-mod interior;
 mod irradiance;
 mod kernel;
 pub(crate) mod light;
 mod lighting;
+mod medium_stack;
 mod motion;
 pub mod optics;
 mod pixels;
@@ -26,10 +26,10 @@ use crate::math::Rgb;
 use crate::sampling::PixelFilter;
 use crate::scene::{Camera, Filter, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
-use interior::Interior;
 use kernel::Scratch;
 use light::AreaLight;
 pub(crate) use lighting::ShadowStarts;
+use medium_stack::MediumStack;
 use pixels::{BLOCK, BlockPixels, FinishedPixel};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -109,7 +109,7 @@ struct FrameInput<'a> {
     /// For each light of the scene, its area form.
     area_lights: Vec<Option<AreaLight>>,
     /// Bodies of ranked glass that the camera is in.
-    around_eye: Interior,
+    around_eye: MediumStack,
     reuse: Option<Reuse<'a>>,
     /// Whether any light must be traced in every frame.
     has_always_traced: bool,
@@ -220,8 +220,8 @@ impl Renderer<'_> {
     fn input<'a>(&self, camera: &Camera, stream: u32, reuse: Option<Reuse<'a>>) -> FrameInput<'a> {
         let own = camera.to_scene(&self.scene.recentring);
         let around_eye = match self.plan.nested_glass {
-            true => Interior::at(self, own.eye, own.forward),
-            false => Interior::default(),
+            true => MediumStack::at(self, own.eye, own.forward),
+            false => MediumStack::default(),
         };
         FrameInput {
             camera: own,

@@ -10,7 +10,7 @@ use tweenray::math::Rgb;
 use tweenray::output::Display;
 use tweenray::reuse::audit::{Rmse, rmse};
 use tweenray::scene::{Camera, CameraPath, ReuseSettings, Scene, Settings, Shot};
-use tweenray::sequence::{FrameMaker, Inferrer, Pyramid};
+use tweenray::sequence::{FrameMaker, Pyramid, SurfaceReuse};
 use tweenray::shade::{FrameJob, Progress, Renderer};
 use tweenray::stats::{AuditSums, RayCounts};
 
@@ -126,7 +126,7 @@ impl Stage<'_> {
         let pyramid = Pyramid { segment: 64, frames: shot.frames };
         let frames: Vec<u32> = pyramid.all().collect();
         let maker =
-            Inferrer::new(self.renderer(settings), shot, &self.pool, &stop, &Quiet, pyramid);
+            SurfaceReuse::new(self.renderer(settings), shot, &self.pool, &stop, &Quiet, pyramid);
         let maker = maker.expect("cameras");
         maker.expect(&frames);
         let (mut sums, mut truth) = (AuditSums::default(), Truth::default());

@@ -12,7 +12,7 @@ use tweenray::measure::psnr;
 use tweenray::output::Display;
 use tweenray::reuse::colour::Rule;
 use tweenray::scene::{Light, Policy, Scene, Settings, Shot, World};
-use tweenray::sequence::{ColourMaker, FrameMaker, Inferrer, Made, Pyramid, Tracer};
+use tweenray::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use tweenray::shade::{FrameJob, Progress, Renderer};
 use tweenray::stats::RayCounts;
 
@@ -103,7 +103,7 @@ impl Stage<'_> {
         let maker: Box<dyn FrameMaker + 'a> = match reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: reuse.segment, frames: shot.frames };
-                let maker = Inferrer::new(renderer, shot, pool, stop, progress, pyramid);
+                let maker = SurfaceReuse::new(renderer, shot, pool, stop, progress, pyramid);
                 Box::new(maker.expect("cameras"))
             }
             Policy::Colour => {

@@ -1,8 +1,8 @@
 //! What the figures of settings that were tried tell of these, and of others.
 
 use super::super::choice::Goal;
-use super::super::law::Samples;
-use super::{Foretelling, Foretold, Measured};
+use super::super::error_model::Samples;
+use super::{Measured, Prediction, Predictor};
 
 /// Where nothing that was tried reaches the goal, the squared error is to come down by so much at a time.
 const STEP: f64 = 4.0;
@@ -20,7 +20,7 @@ impl Goal {
     }
 }
 
-impl Foretelling {
+impl Predictor {
     /// The goal's figure of `samples` if they were tried: as it was found, and the larger for all that is
     /// added to the squared error.
     pub fn figure(&self, samples: Samples) -> Option<f64> {
@@ -28,7 +28,7 @@ impl Foretelling {
     }
 
     /// The goal's figure that is foretold: as it was found if the samples were tried, else by the line.
-    pub fn foretold_figure(&self, foretold: &Foretold) -> Option<f64> {
+    pub fn foretold_figure(&self, foretold: &Prediction) -> Option<f64> {
         let by_line = || self.line.map(|line| line.figure(foretold.squared_error));
         self.figure(foretold.samples).or_else(by_line)
     }
@@ -115,15 +115,15 @@ impl Foretelling {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{foretelling, range};
-    use super::super::{Figure, Foretelling, Line};
+    use super::super::{Figure, Line, Predictor};
     use super::*;
 
-    fn tried(all: &[(u32, u32, f64)]) -> Foretelling {
+    fn tried(all: &[(u32, u32, f64)]) -> Predictor {
         let mut foretelling = foretelling();
         (foretelling.most, foretelling.rounding, foretelling.bias) = (Some(0.02), 0.0, vec![0.0]);
         let measured = |&(spp, shadow, figure): &(u32, u32, f64)| {
             let samples = Samples { spp, shadow, sky: 1 };
-            let errors: Vec<f64> = foretelling.law.errors(samples).collect();
+            let errors: Vec<f64> = foretelling.model.errors(samples).collect();
             let figure = Some(Figure { figure, squared_error: errors[0] });
             Measured { samples, errors, doubts: vec![0.0], figure }
         };
@@ -131,7 +131,7 @@ mod tests {
         foretelling
     }
 
-    fn first(foretelling: &Foretelling) -> Option<(u32, u32)> {
+    fn first(foretelling: &Predictor) -> Option<(u32, u32)> {
         let allowed = foretelling.allowed(Goal::Flip(0.02));
         let found = foretelling.fastest(&range(), allowed);
         found.first().map(|f| (f.samples.spp, f.samples.shadow))
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn without_a_line_what_was_seen_decides() {
-        let without = |all: &[(u32, u32, f64)]| Foretelling { line: None, ..tried(all) };
+        let without = |all: &[(u32, u32, f64)]| Predictor { line: None, ..tried(all) };
         let none = without(&[(4, 1, 0.5), (16, 1, 0.5)]);
         assert_eq!((none.allowed(Goal::Flip(0.02)), first(&none)), (0.0, None));
         let (samples, figure) = none.nearest().expect("one");
@@ -176,8 +176,8 @@ mod tests {
     fn what_is_tried_is_not_far_beyond_what_missed_nor_is_the_first_that_reaches_taken() {
         let goal = Goal::Flip(0.02);
         let flat = Line { at_one: 0.022f64.ln(), rise: 0.11 };
-        let missed = |all: &[(u32, u32, f64)]| Foretelling { line: Some(flat), ..tried(all) };
-        let error = |f: &Foretelling, spp| f.of(&f.modes[0], Samples { spp, shadow: 1, sky: 1 });
+        let missed = |all: &[(u32, u32, f64)]| Predictor { line: Some(flat), ..tried(all) };
+        let error = |f: &Predictor, spp| f.of(&f.modes[0], Samples { spp, shadow: 1, sky: 1 });
         let none = missed(&[(4, 1, 0.03), (16, 1, 0.025)]);
         let least = error(&none, 16).squared_error / STEP;
         assert!(none.allowed(goal) < least && near(none.to_try(goal), least), "{none:?}");
@@ -208,7 +208,7 @@ mod tests {
         assert!((of(16) - 0.019).abs() < 1e-9);
         // By the line, which is 0.02 at 4: 60/32 at 32 camera samples.
         assert!((of(32) - 0.02 * (60f64 / 32.0 / 4.0).sqrt()).abs() < 1e-3, "{}", of(32));
-        let none = Foretelling { line: None, ..foretelling.clone() };
+        let none = Predictor { line: None, ..foretelling.clone() };
         let foretold = none.of(&none.modes[0], Samples { spp: 32, shadow: 1, sky: 1 });
         assert_eq!(none.foretold_figure(&foretold), None);
     }

@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::{Choice, Chooser, Judged, decibels};
-use crate::accuracy::{Check, Effort, Foretold, Timer, Verdict, displayed_rgb};
+use crate::accuracy::{Check, Effort, Prediction, Timer, Verdict, displayed_rgb};
 use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
@@ -137,7 +137,7 @@ impl Chooser<'_> {
             foretelling = foretelling.with_more_bounces();
         }
         let found = self.probe().fastest(&foretelling, allowed, timer)?;
-        let set = |foretold: &Foretold| (foretold.samples, foretold.bounces);
+        let set = |foretold: &Prediction| (foretold.samples, foretold.bounces);
         let Some(foretold) = found.filter(|found| set(found) != set(&choice.foretold)) else {
             self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
             return Ok(None);

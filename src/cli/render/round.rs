@@ -14,7 +14,7 @@ use crate::output::{Format, SequenceLock, atomic};
 use crate::reuse::colour::Rule;
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{ColourMaker, Inferrer, Plan, Pyramid, SaveCost, Shared, Target, Tracer};
+use crate::sequence::{ColourMaker, Plan, Pyramid, SaveCost, Shared, SurfaceReuse, Target, Tracer};
 use crate::shade::Renderer;
 use rayon::ThreadPool;
 use std::time::Instant;
@@ -126,9 +126,9 @@ impl Frames<'_> {
         let maker: Box<dyn Shared> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
-                let mut maker = Inferrer::new(renderer, shot, pool, stop, &watch, pyramid)?;
+                let mut maker = SurfaceReuse::new(renderer, shot, pool, stop, &watch, pyramid)?;
                 maker.with_gbuffer = with_gbuffer;
-                maker.supplied = self.request.references.supply.as_ref();
+                maker.supplied = self.request.references.cache.as_ref();
                 maker.checkpoints = Some(&checkpoints);
                 maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());

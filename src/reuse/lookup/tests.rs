@@ -1,7 +1,7 @@
 //! What other surfaces tell is refused, and what is uncertain counts as that.
 
 use super::Lookup;
-use crate::inference::{Estimate, Origin, Questions, SurfacePoint, TracedPoint, TracedPoints};
+use crate::inference::{Estimate, LookupBatch, Origin, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::reuse::Reference;
 use crate::reuse::risk::STEPS;
@@ -46,14 +46,14 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
 /// What `reference` suggests about `point`, which would show 1 without shadows.
 fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
     let lookup = Lookup { frame: 2, references: &[reference], rays: &[16] };
-    let mut asked = Questions {
+    let mut asked = LookupBatch {
         points: vec![point],
         pixels: vec![[0; 2]],
         unshadowed: vec![1.0],
         ratios: vec![f32::NAN],
         estimates: Vec::new(),
         origins: vec![Origin::default()],
-        ..Questions::default()
+        ..LookupBatch::default()
     };
     lookup.estimate(&mut asked);
     asked.estimates[0]
@@ -207,14 +207,14 @@ fn lights_share_their_level() {
     let reference = Reference::new(1, &camera(), &traced, 2);
     let lookup = Lookup { frame: 2, references: &[&reference], rays: &[16, 16] };
     let level_with = |second: f32, x: f64| {
-        let mut asked = Questions {
+        let mut asked = LookupBatch {
             points: vec![on_wall(x, 20.5)],
             pixels: vec![[0; 2]],
             unshadowed: vec![1.0, second],
             ratios: vec![f32::NAN; 2],
             estimates: Vec::new(),
             origins: vec![Origin::default()],
-            ..Questions::default()
+            ..LookupBatch::default()
         };
         lookup.estimate(&mut asked);
         assert_eq!(asked.estimates[0].level, asked.estimates[1].level);

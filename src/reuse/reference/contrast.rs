@@ -123,9 +123,9 @@ fn same_surface(points: &[SurfacePoint], slots: &[u32], width: usize) -> Vec<u32
 fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: &mut [f32]) {
     let own = known.own(y);
     bend.fill(f32::NEG_INFINITY);
-    for k in 0..NEAR / 2 {
+    for (k, place) in AROUND.into_iter().enumerate().take(NEAR / 2) {
         let opposite = NEAR - 1 - k;
-        let (a, b) = (known.row(y, AROUND[k]), known.row(y, AROUND[opposite]));
+        let (a, b) = (known.row(y, place), known.row(y, AROUND[opposite]));
         let both = 1 << k | 1 << opposite;
         for (x, bend) in bend.iter_mut().enumerate() {
             let off = 0.5 * (a[x] + b[x] - 2.0 * own[x]).abs();
@@ -156,8 +156,8 @@ fn far_row(wide: &Image<f32>, y: usize, same: &[u32], far: &mut [f32]) {
     for (k, place) in AROUND.into_iter().enumerate() {
         let other = wide.row(y, place);
         for (x, far) in far.iter_mut().enumerate() {
-            // True where `far` is NaN too.
-            let is_more = (same[x] >> k & 1 == 1) & (other[x] >= 0.0) & !(other[x] <= *far);
+            let is_more =
+                (same[x] >> k & 1 == 1) & (other[x] >= 0.0) & ((other[x] > *far) | far.is_nan());
             *far = if is_more { other[x] } else { *far };
         }
     }

@@ -2,7 +2,7 @@
 
 use super::Target;
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{Manifest, Row, Stray};
+use crate::output::manifest::{Foreign, Manifest, Row};
 use crate::scene::FrameRange;
 use crate::sequence::Recipe;
 use std::collections::{BTreeMap, HashMap};
@@ -26,7 +26,7 @@ pub(super) fn by_file(rows: &BTreeMap<u32, Row>) -> HashMap<&str, &Row> {
     let mut found = HashMap::new();
     for row in rows.values() {
         let there = found.entry(&*row.file).or_insert(row);
-        if row.stray == Some(Stray::OtherSettings) {
+        if row.stray == Some(Foreign::OtherSettings) {
             *there = row;
         }
     }
@@ -42,7 +42,7 @@ pub(super) fn refuse_taken(
 ) -> Result<()> {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let holds = match files.get(name) {
-        Some(row) if row.stray == Some(Stray::OtherSettings) => {
+        Some(row) if row.stray == Some(Foreign::OtherSettings) => {
             "a frame of other settings".to_string()
         }
         Some(row) if !rows.contains_key(&frame) => format!("frame {}", row.frame),

@@ -137,7 +137,7 @@ mod tests {
         };
         assert!(with(1e-5, 1.0).is_ok());
         assert!(with(0.0, 1.0).is_ok(), "a point is no loss");
-        let error = with(1e-7, 1.0).expect_err("crushed").to_string();
+        let error = with(1e-7, 1.0).expect_err("too_small").to_string();
         assert!(error.contains("`tiny` is 2.0e-7 units wide"), "{error}");
         // Near the middle numbers are finer.
         assert!(with(1e-7, 0.0).is_ok());
@@ -182,7 +182,7 @@ mod tests {
     fn lost_triangles_are_counted_and_a_mesh_of_them_refused() {
         let near = grid_and_far(10, 3.0).into_scene(true).expect("renders");
         assert_eq!(near.collapsed, []);
-        let error = grid_and_far(10, 1e9).into_scene(true).expect_err("crushed").to_string();
+        let error = grid_and_far(10, 1e9).into_scene(true).expect_err("too_small").to_string();
         assert!(error.contains("200 of the 201 triangles of `grid`"), "{error}");
         // Not refused where the rule is off: small coordinates lose nothing as they are.
         let plain = grid_and_far(10, 1e9).into_scene(false).expect("renders");

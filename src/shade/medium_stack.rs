@@ -46,12 +46,12 @@ impl Body {
 
 /// The bodies that a point lies in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Interior {
+pub(super) struct MediumStack {
     bodies: [Body; MOST_BODIES],
     len: u8,
 }
 
-impl Interior {
+impl MediumStack {
     fn bodies(&self) -> &[Body] {
         &self.bodies[..usize::from(self.len)]
     }
@@ -128,7 +128,7 @@ pub(super) struct Crossing {
     /// The last of them: what goes through starts here.
     pub last: SurfaceInteraction,
     /// The bodies behind it.
-    pub after: Interior,
+    pub after: MediumStack,
     /// The boundary between two media, or `None` where the medium stays what it was.
     pub boundary: Option<Boundary>,
 }
@@ -212,7 +212,7 @@ pub(super) fn cross(
     renderer: &Renderer,
     ray: &Ray,
     first: &SurfaceInteraction,
-    before: &Interior,
+    before: &MediumStack,
     counts: &mut RayCounts,
 ) -> Crossing {
     let scene = renderer.scene;
@@ -258,7 +258,7 @@ mod tests {
     fn the_highest_priority_is_there_in_any_order() {
         let (glass, tea, ice) = (body(0, 2), body(1, 1), body(2, 3));
         for order in [[glass, tea, ice], [ice, tea, glass], [tea, ice, glass]] {
-            let mut inside = Interior::default();
+            let mut inside = MediumStack::default();
             order.iter().for_each(|b| inside.enter(*b));
             assert_eq!(inside.medium(), Some(ice));
             inside.leave(ice);
@@ -272,7 +272,7 @@ mod tests {
 
     #[test]
     fn edges_and_strangers_do_not_count_twice() {
-        let mut inside = Interior::default();
+        let mut inside = MediumStack::default();
         inside.enter(body(0, 1));
         inside.enter(body(0, 1));
         inside.leave(body(5, 1));
@@ -285,7 +285,7 @@ mod tests {
         let ascending: Vec<Body> = (0..20).map(|i| body(i, i as u8)).collect();
         let descending: Vec<Body> = ascending.iter().rev().copied().collect();
         for order in [ascending, descending] {
-            let mut inside = Interior::default();
+            let mut inside = MediumStack::default();
             order.iter().for_each(|b| inside.enter(*b));
             assert_eq!(usize::from(inside.len), MOST_BODIES);
             for i in (20 - MOST_BODIES as u32..20).rev() {

@@ -1,8 +1,8 @@
-//! The oracle's sieve: which triangles a line may meet, many at a time and never one too few.
+//! The oracle's conservative filter: which triangles a line may meet, many at a time and never one too few.
 //!
 //! Triangles are sheared so that the line runs along z (Woop et al., 2013) and their three edge
 //! functions compared with a bound on all rounding errors; what passes goes to the exact court, so
-//! nothing here decides a hit. Products and sums are not fused: every CPU sieves alike.
+//! nothing here decides a hit. Products and sums are not fused: every CPU filters alike.
 
 use super::court::Line;
 use crate::math::DVec3;
@@ -16,7 +16,7 @@ const UNROLL: usize = 2;
 /// Triangles as nine rows of numbers: `rows[3·corner + axis][triangle]`.
 ///
 /// 36 bytes a triangle; the last block is filled up with triangles of one point.
-pub struct Soup {
+pub struct Triangles {
     rows: [Vec<f32>; 9],
     count: usize,
 }
@@ -27,9 +27,9 @@ pub struct Block {
     rows: Box<[[f64; BLOCK]; 9]>,
 }
 
-/// A line as the sieve sees it.
+/// A line as the filter sees it.
 #[derive(Debug, Clone, Copy)]
-pub struct Slit {
+pub struct ShearedRay {
     /// Axis along which the line moves most, last; the other two before it.
     axes: [usize; 3],
     /// Change of the first two coordinates with the last.
@@ -40,7 +40,7 @@ pub struct Slit {
     bound: f64,
 }
 
-impl Slit {
+impl ShearedRay {
     /// For triangles that `line` meets or passes within `margin` (scene space).
     pub fn new(line: &Line, margin: f64) -> Self {
         let dir = line.end - line.start;
@@ -59,7 +59,7 @@ impl Slit {
     }
 }
 
-impl Soup {
+impl Triangles {
     /// From the corners of `count` triangles, f32 as Embree holds them.
     pub fn new(count: usize, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Self {
         let padded = count.next_multiple_of(BLOCK);
@@ -97,10 +97,10 @@ impl Soup {
     }
 
     /// Pairs (line, triangle) of one block that may meet, appended to `passed`; `work` is scratch.
-    pub fn sieve(
+    pub fn filter(
         &self,
         block: usize,
-        slits: &[Slit],
+        rays: &[ShearedRay],
         work: &mut Block,
         passed: &mut Vec<(u32, u32)>,
     ) {
@@ -111,7 +111,7 @@ impl Soup {
                 *wide = f64::from(*narrow);
             }
         }
-        Arch::new().dispatch(Sieve { block: work, slits, first: first as u32, passed });
+        Arch::new().dispatch(ConservativeFilter { block: work, rays, first: first as u32, passed });
         // What fills up the last block is no triangle.
         if first + BLOCK > self.count {
             let count = self.count as u32;
@@ -133,20 +133,20 @@ impl Default for Block {
     }
 }
 
-struct Sieve<'a> {
+struct ConservativeFilter<'a> {
     block: &'a Block,
-    slits: &'a [Slit],
+    rays: &'a [ShearedRay],
     first: u32,
     passed: &'a mut Vec<(u32, u32)>,
 }
 
-impl WithSimd for Sieve<'_> {
+impl WithSimd for ConservativeFilter<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        for (index, slit) in self.slits.iter().enumerate() {
-            let lanes = Lanes::new(simd, self.block, slit);
+        for (index, ray) in self.rays.iter().enumerate() {
+            let lanes = Lanes::new(simd, self.block, ray);
             let vectors = BLOCK / S::F64_LANES;
             let mut at = 0;
             while at < vectors {
@@ -154,13 +154,13 @@ impl WithSimd for Sieve<'_> {
                 for more in 1..UNROLL {
                     best = simd.max_f64s(best, lanes.least_side(simd, at + more));
                 }
-                if simd.reduce_max_f64s(best) >= -slit.bound {
+                if simd.reduce_max_f64s(best) >= -ray.bound {
                     for vector in at..at + UNROLL {
                         let sides = [lanes.least_side(simd, vector)];
                         for (lane, side) in
                             bytemuck::cast_slice::<_, f64>(&sides).iter().enumerate()
                         {
-                            if *side >= -slit.bound {
+                            if *side >= -ray.bound {
                                 let triangle = vector * S::F64_LANES + lane;
                                 self.passed.push((index as u32, self.first + triangle as u32));
                             }
@@ -183,8 +183,8 @@ struct Lanes<'a, S: Simd> {
 
 impl<'a, S: Simd> Lanes<'a, S> {
     #[inline(always)]
-    fn new(simd: S, block: &'a Block, slit: &Slit) -> Self {
-        let [x, y, z] = slit.axes;
+    fn new(simd: S, block: &'a Block, ray: &ShearedRay) -> Self {
+        let [x, y, z] = ray.axes;
         let rows = &block.rows;
         Self {
             corners: [
@@ -200,8 +200,8 @@ impl<'a, S: Simd> Lanes<'a, S> {
                     vectors::<S>(&rows[6 + z]),
                 ],
             ],
-            shear: [simd.splat_f64s(slit.shear[0]), simd.splat_f64s(slit.shear[1])],
-            foot: [simd.splat_f64s(slit.foot[0]), simd.splat_f64s(slit.foot[1])],
+            shear: [simd.splat_f64s(ray.shear[0]), simd.splat_f64s(ray.shear[1])],
+            foot: [simd.splat_f64s(ray.foot[0]), simd.splat_f64s(ray.foot[1])],
         }
     }
 

@@ -48,13 +48,13 @@ pub struct Causes {
     pub sky: bool,
 }
 
-/// The law of a move's traced frames.
+/// The model of a move's traced frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Law {
+pub struct ErrorModel {
     causes: Causes,
     powers: Powers,
     frames: Vec<Amplitudes>,
-    /// Root mean square of what the law misses the measurements by, as a share of them.
+    /// Root mean square of what the model misses the measurements by, as a share of them.
     pub misfit: f64,
 }
 
@@ -91,8 +91,8 @@ impl Powers {
     }
 }
 
-impl Law {
-    /// The law that comes nearest to `points`, as shares of them. `references` are the samples of what
+impl ErrorModel {
+    /// The model that comes nearest to `points`, as shares of them. `references` are the samples of what
     /// each was held against, whose own error is part of the difference.
     pub fn of(causes: Causes, points: &[&Point]) -> Self {
         let frames = points.first().map_or(0, |point| point.errors.len());
@@ -108,9 +108,9 @@ impl Law {
             for light in grid(1.0, if lit { 1.6 } else { 1.0 }) {
                 for samples in grid(0.8, if lit { 1.8 } else { 0.8 }) {
                     let powers = Powers { camera, light, samples };
-                    let law = Self::with(causes, powers, points);
-                    if law.misfit < best.misfit {
-                        best = law;
+                    let model = Self::with(causes, powers, points);
+                    if model.misfit < best.misfit {
+                        best = model;
                     }
                 }
             }
@@ -145,23 +145,23 @@ impl Law {
         self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
     }
 
-    /// The law under which `point` comes to what it did, frame by frame.
+    /// The model under which `point` comes to what it did, frame by frame.
     pub fn through(&self, point: &Point) -> Self {
         let own: Vec<f64> = self.errors(point.reference).collect();
-        let mut law = self.clone();
+        let mut model = self.clone();
         let told = self.errors(point.samples).zip(own).zip(&point.errors);
-        for (frame, ((foretold, own), measured)) in law.frames.iter_mut().zip(told) {
+        for (frame, ((foretold, own), measured)) in model.frames.iter_mut().zip(told) {
             let factor = measured / f64::max(foretold + own, 1e-12);
             frame.iter_mut().for_each(|amplitude| *amplitude *= factor);
         }
-        law
+        model
     }
 
-    /// The law of frames whose errors are all `factor` times as large.
+    /// The model of frames whose errors are all `factor` times as large.
     pub fn times(&self, factor: f64) -> Self {
-        let mut law = self.clone();
-        law.frames.iter_mut().flatten().for_each(|amplitude| *amplitude *= factor);
-        law
+        let mut model = self.clone();
+        model.frames.iter_mut().flatten().for_each(|amplitude| *amplitude *= factor);
+        model
     }
 }
 
@@ -195,17 +195,17 @@ mod tests {
         let design =
             [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
         let points: Vec<Point> = design.into_iter().enumerate().map(point).collect();
-        let law = Law::of(LIT, &points.iter().collect::<Vec<_>>());
-        assert!(law.misfit < 0.05, "{law:?}");
+        let model = ErrorModel::of(LIT, &points.iter().collect::<Vec<_>>());
+        assert!(model.misfit < 0.05, "{model:?}");
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
             let s = Samples { spp, shadow, sky };
-            for (error, scale) in law.errors(s).zip([1.0, 2.0]) {
+            for (error, scale) in model.errors(s).zip([1.0, 2.0]) {
                 let ratio = error / truth(s, scale);
                 assert!((0.75..1.33).contains(&ratio), "{s:?}: {ratio}");
             }
         }
-        let twice: Vec<f64> = law.times(2.0).errors(REFERENCE).collect();
-        let once: Vec<f64> = law.errors(REFERENCE).collect();
+        let twice: Vec<f64> = model.times(2.0).errors(REFERENCE).collect();
+        let once: Vec<f64> = model.errors(REFERENCE).collect();
         assert!((twice[0] / once[0] - 2.0).abs() < 1e-12);
     }
 
@@ -231,10 +231,10 @@ mod tests {
             Point { samples: s, reference: REFERENCE, errors }
         };
         let points = [point(1), point(4), point(16)];
-        let law = Law::of(Causes { shadow: false, sky: false }, &points.each_ref());
+        let model = ErrorModel::of(Causes { shadow: false, sky: false }, &points.each_ref());
         let error =
-            |shadow| law.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
-        assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{law:?}");
+            |shadow| model.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
+        assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{model:?}");
         assert_eq!(error(1), error(64));
     }
 
@@ -247,9 +247,9 @@ mod tests {
             Point { samples: s, reference: REFERENCE, errors }
         });
         let point = Point { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
-        let law = Law::of(LIT, &points.each_ref()).through(&point);
-        let [own, _] = [0, 1].map(|i| law.errors(REFERENCE).nth(i).expect("a frame"));
-        let now: Vec<f64> = law.errors(s).collect();
+        let model = ErrorModel::of(LIT, &points.each_ref()).through(&point);
+        let [own, _] = [0, 1].map(|i| model.errors(REFERENCE).nth(i).expect("a frame"));
+        let now: Vec<f64> = model.errors(s).collect();
         assert!((now[0] + own - 3.0).abs() < 1e-9 && now[1] > 6.0, "{now:?}");
     }
 }

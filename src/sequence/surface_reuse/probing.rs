@@ -7,7 +7,7 @@
 //! evidence was blind to is seen so; were a probe judged by itself, what stays inferred would be those
 //! that were lucky.
 
-use super::Inferrer;
+use super::SurfaceReuse;
 use crate::error::Result;
 use crate::film::Film;
 use crate::inference::Inference;
@@ -59,7 +59,7 @@ impl Probed {
     }
 }
 
-impl Inferrer<'_> {
+impl SurfaceReuse<'_> {
     /// Renders the probes of `frame`, seen by `camera`, where `lookup` can estimate. `None` when the job
     /// shall stop.
     pub(super) fn probe(

@@ -1,7 +1,7 @@
 //! What the inferring maker gives to other ranks and takes from them: references, encoded as in exr
 //! files, and strips of frames.
 
-use super::Inferrer;
+use super::SurfaceReuse;
 use crate::error::Result;
 use crate::reuse::store;
 use crate::sequence::shared::{Left, Shared, Strip};
@@ -9,7 +9,7 @@ use crate::sequence::strips::{self, Unheard};
 use std::path::Path;
 use std::sync::Arc;
 
-impl Shared for Inferrer<'_> {
+impl Shared for SurfaceReuse<'_> {
     fn original(&self, frame: u32) -> u32 {
         self.schedule.original(frame)
     }

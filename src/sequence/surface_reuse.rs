@@ -6,15 +6,15 @@ mod probing;
 use super::checkpoint::Checkpoints;
 use super::pyramid::Pyramid;
 use super::saved::{Keeps, Saved};
-use super::schedule::{Schedule, Stock};
-use super::shared::Laid;
-use super::supplied::{Supply, with_supplied};
+use super::schedule::{ReferencePool, Schedule};
+use super::shared::JoinedStrips;
+use super::supplied::{ReferenceCache, with_supplied};
 use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::evidence::Finding;
-use crate::reuse::store::{Kept, Terms};
+use crate::reuse::store::{Compatibility, Kept};
 use crate::reuse::{self, Judged, Lookup, Reference};
 use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
@@ -24,7 +24,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Infers in-between frames.
-pub struct Inferrer<'a> {
+pub struct SurfaceReuse<'a> {
     /// What traces and shades.
     pub renderer: Renderer<'a>,
     /// Where the camera is when.
@@ -40,15 +40,15 @@ pub struct Inferrer<'a> {
     /// Which frames depend on which.
     pub pyramid: Pyramid,
     /// Frames of other shots that all frames, key frames too, are inferred from.
-    pub supplied: Option<&'a Supply>,
+    pub supplied: Option<&'a ReferenceCache>,
     /// On which terms frames serve later jobs as references; `None` where none is kept.
-    pub terms: Option<Terms>,
+    pub terms: Option<Compatibility>,
     /// Where references are kept for a job that goes on after this one; `None` for nowhere.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
     /// On which terms frames serve other ranks as references; `None` where there are none.
-    pub exchange: Option<Terms>,
+    pub exchange: Option<Compatibility>,
     /// Frames that came as strips.
-    laid: Laid,
+    laid: JoinedStrips,
     pub(super) schedule: Schedule,
     pub(super) channels: Channels,
     state: Mutex<State>,
@@ -56,7 +56,7 @@ pub struct Inferrer<'a> {
 
 #[derive(Default)]
 pub(super) struct State {
-    pub(super) references: Stock<Arc<Reference>>,
+    pub(super) references: ReferencePool<Arc<Reference>>,
     /// Originals that were made as references before they were asked for.
     early: BTreeMap<u32, Made>,
     /// The last original that is asked for again, as its copies are.
@@ -69,7 +69,7 @@ pub(super) struct State {
     pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
 }
 
-impl<'a> Inferrer<'a> {
+impl<'a> SurfaceReuse<'a> {
     /// A maker of frames of `shot`.
     ///
     /// Errors: those of the shot's cameras.
@@ -95,7 +95,7 @@ impl<'a> Inferrer<'a> {
             terms: None,
             checkpoints: None,
             exchange: None,
-            laid: Laid::default(),
+            laid: JoinedStrips::default(),
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -199,7 +199,7 @@ impl<'a> Inferrer<'a> {
     ) -> Result<T> {
         let own = camera.to_scene(&self.renderer.scene.recentring);
         let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
-        let nearest = |supply: &Supply| self.pool.install(|| supply.nearest(&own));
+        let nearest = |cache: &ReferenceCache| self.pool.install(|| cache.nearest(&own));
         let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
         let references = with_supplied(references, &supplied);
         let settings = self.renderer.settings;
@@ -233,7 +233,7 @@ impl<'a> Inferrer<'a> {
 
     pub(super) fn encode(
         &self,
-        terms: &Terms,
+        terms: &Compatibility,
         frame: u32,
         camera: &Camera,
         crop: Option<Rect>,
@@ -328,7 +328,7 @@ impl State {
     }
 }
 
-impl FrameMaker for Inferrer<'_> {
+impl FrameMaker for SurfaceReuse<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
         let original = self.schedule.original(frame);
         let made = self.with_state(|s| {
@@ -375,7 +375,7 @@ impl FrameMaker for Inferrer<'_> {
     }
 
     fn reference_memory(&self) -> u64 {
-        let supplied = self.supplied.map_or(0, Supply::most_memory);
+        let supplied = self.supplied.map_or(0, ReferenceCache::most_memory);
         supplied + self.with_state(|s| s.most_memory)
     }
 }

@@ -6,7 +6,7 @@ use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
 /// What lies at a path.
-pub enum Lying {
+pub enum PathKind {
     /// Nothing.
     Nothing,
     /// A regular file, opened.
@@ -23,7 +23,7 @@ pub struct Regular {
     pub bytes: u64,
 }
 
-impl Lying {
+impl PathKind {
     /// What lies at `path`.
     ///
     /// # Errors
@@ -53,10 +53,10 @@ impl Regular {
     /// # Errors
     /// [`Error::Io`] where there is none, [`Error::Input`] where something else lies there.
     pub fn at(path: &Path) -> Result<Self> {
-        match Lying::at(path)? {
-            Lying::File(file) => Ok(file),
-            Lying::Nothing => Err(Error::io("read", path, ErrorKind::NotFound.into())),
-            Lying::Other => Err(Error::input(path, "not a regular file")),
+        match PathKind::at(path)? {
+            PathKind::File(file) => Ok(file),
+            PathKind::Nothing => Err(Error::io("read", path, ErrorKind::NotFound.into())),
+            PathKind::Other => Err(Error::input(path, "not a regular file")),
         }
     }
 
@@ -79,9 +79,9 @@ mod tests {
     fn a_file_is_told_from_nothing_and_from_what_is_no_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("frame.png");
-        assert!(matches!(Lying::at(&path), Ok(Lying::Nothing)));
-        assert!(matches!(Lying::at(folder.path()), Ok(Lying::Other)));
-        assert!(matches!(Lying::at(Path::new("/dev/zero")), Ok(Lying::Other)));
+        assert!(matches!(PathKind::at(&path), Ok(PathKind::Nothing)));
+        assert!(matches!(PathKind::at(folder.path()), Ok(PathKind::Other)));
+        assert!(matches!(PathKind::at(Path::new("/dev/zero")), Ok(PathKind::Other)));
         std::fs::write(&path, "twelve bytes").expect("written");
         let file = Regular::at(&path).expect("a file");
         assert_eq!(file.bytes, 12);
