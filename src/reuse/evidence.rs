@@ -47,6 +47,28 @@ pub struct Compared {
     pub traced: [f32; 2],
 }
 
+impl Compared {
+    /// Takes in what more camera samples showed, their `share` of all. Risk is that of the riskiest.
+    pub fn join(&mut self, other: &Self, share: f32) {
+        let (own_light, light) = (self.unshadowed * (1.0 - share), other.unshadowed * share);
+        self.unshadowed = own_light + light;
+        if light == 0.0 {
+            return;
+        }
+        let by = light / self.unshadowed;
+        let mean =
+            |own: f32, other: f32| if own_light == 0.0 { other } else { own + (other - own) * by };
+        self.estimate.ratio = mean(self.estimate.ratio, other.estimate.ratio);
+        let risk = |level: u8| (usize::from(level) % STEPS, level);
+        if risk(other.estimate.level) > risk(self.estimate.level) {
+            self.estimate.level = other.estimate.level;
+        }
+        for (own, other) in self.traced.iter_mut().zip(other.traced) {
+            *own = mean(*own, other);
+        }
+    }
+}
+
 /// What was found at a point that makes up `share` of its pixel, from what its lights showed; `None` where
 /// other frames know none of them.
 pub fn finding_of(share: f32, lights: &[Compared], agreed: bool) -> Option<Finding> {
@@ -156,6 +178,31 @@ mod tests {
 
     fn may_use(findings: &[Finding], level: u8) -> bool {
         Evidence::of(findings.iter(), 0.25).may_use(level)
+    }
+
+    #[test]
+    fn camera_samples_that_were_estimated_apart_are_one_finding() {
+        let light = |ratio, traced: [f32; 2], level| {
+            let estimate = Estimate { ratio, level };
+            Compared { unshadowed: 0.5, estimate, traced }
+        };
+        // The estimates are off by the same, the traces by chance.
+        let mut one = light(0.5, [0.75, 0.85], 3);
+        one.join(&light(0.5, [0.85, 0.75], 5), 0.5);
+        assert_eq!((one.unshadowed, one.estimate), (0.5, Estimate { ratio: 0.5, level: 5 }));
+        assert!(one.traced.iter().all(|traced| (traced - 0.8).abs() < 1e-6));
+        let found = finding_of(1.0, &[one], true).expect("a finding");
+        assert!(found.noise < 1e-6 && found.error > 100.0, "{found:?}");
+        // More risk counts, on whichever scale.
+        one.join(&light(0.5, [0.8; 2], STEPS as u8 + 4), 0.5);
+        assert_eq!(one.estimate.level, 5);
+        one.join(&light(0.5, [0.8; 2], STEPS as u8 + 5), 0.5);
+        assert_eq!(one.estimate.level, STEPS as u8 + 5);
+        // What no light reached tells nothing.
+        let dark = Compared { unshadowed: 0.0, ..light(f32::NAN, [f32::NAN; 2], 0) };
+        let before = one.estimate;
+        one.join(&dark, 0.5);
+        assert_eq!((one.unshadowed, one.estimate), (0.25, before));
     }
 
     #[test]

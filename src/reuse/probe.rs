@@ -101,7 +101,7 @@ impl<'a> Probe<'a> {
     /// What `self`, which estimated, and `other`, which traced the same probes once more with other random
     /// numbers, found: pixel by pixel, for frames of `spp` camera samples.
     pub fn findings(self, other: Self, spp: u32) -> Vec<([u32; 2], Vec<Finding>)> {
-        let mut all: Vec<([u32; 2], Vec<Finding>)> = Vec::new();
+        let mut all: Vec<([u32; 2], Vec<Note>)> = Vec::new();
         for (mut own, again) in self.sorted().into_iter().zip(other.sorted()) {
             let is_same = own.pixel == again.pixel && own.point.p == again.point.p;
             if !is_same {
@@ -115,12 +115,37 @@ impl<'a> Probe<'a> {
             if all.last().is_none_or(|(pixel, _)| *pixel != own.pixel) {
                 all.push((own.pixel, Vec::new()));
             }
-            let share = own.point.samples as f32 / spp as f32;
-            if let Some((_, findings)) = all.last_mut() {
-                findings.extend(finding_of(share, &own.lights, own.agreed));
+            let Some((_, notes)) = all.last_mut() else { continue };
+            match notes.iter_mut().find(|note| note.is_one_with(&own)) {
+                Some(note) => note.join(&own),
+                None => notes.push(own),
             }
         }
-        all
+        let finding = |note: &Note| {
+            let share = note.point.samples as f32 / spp as f32;
+            finding_of(share, &note.lights, note.agreed)
+        };
+        let of_pixel = |(pixel, notes): ([u32; 2], Vec<Note>)| {
+            (pixel, notes.iter().filter_map(finding).collect())
+        };
+        all.into_iter().map(of_pixel).collect()
+    }
+}
+
+impl Note {
+    /// Whether `other` is of another part of the same pixel's camera samples and of the same surface. Their
+    /// estimates are off by the same, while the noise of tracing is independent.
+    fn is_one_with(&self, other: &Self) -> bool {
+        self.agreed == other.agreed
+            && self.point.direct == other.point.direct
+            && self.point.is_one_surface(&other.point)
+    }
+
+    fn join(&mut self, other: &Self) {
+        let share = self.point.join(&other.point);
+        for (own, other) in self.lights.iter_mut().zip(&other.lights) {
+            own.join(other, share);
+        }
     }
 }
 

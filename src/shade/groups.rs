@@ -29,6 +29,45 @@ struct Gathered {
     all: f64,
 }
 
+/// What check rays found in a block's pixels so far, surface by surface: those of one chunk of camera samples
+/// tell little.
+#[derive(Default)]
+struct Earlier {
+    /// The first surface of each pixel, and the next one of the same pixel.
+    heads: Vec<u32>,
+    next: Vec<u32>,
+    /// One of each surface's points.
+    points: Vec<SurfacePoint>,
+    /// For each surface and channel what its rays found, and how many there were.
+    found: Vec<(Gathered, u32)>,
+}
+
+impl Earlier {
+    fn clear(&mut self) {
+        self.heads.clear();
+        self.heads.resize(PIXELS, NONE);
+        self.next.clear();
+        self.points.clear();
+        self.found.clear();
+    }
+
+    /// What is known of the surface that `pixel` shows at `point`, in each channel.
+    fn of(&mut self, pixel: u32, point: &SurfacePoint, channels: usize) -> &mut [(Gathered, u32)] {
+        let head = &mut self.heads[pixel as usize];
+        let mut at = *head;
+        while at != NONE && !self.points[at as usize].is_one_surface(point) {
+            at = self.next[at as usize];
+        }
+        if at == NONE {
+            at = self.points.len() as u32;
+            self.next.push(std::mem::replace(head, at));
+            self.points.push(*point);
+            self.found.resize(self.points.len() * channels, Default::default());
+        }
+        &mut self.found[at as usize * channels..][..channels]
+    }
+}
+
 /// Check rays of a shading point to one light. Those of a surface point follow one another in the sequence of
 /// samples, since such a run is spread over the light.
 pub(super) struct CheckRays {
@@ -57,6 +96,7 @@ pub(super) struct Groups {
     /// Next surface point of the same pixel.
     next: Vec<u32>,
     gathered: Vec<Gathered>,
+    earlier: Earlier,
     /// Whether a ray to a kept light was cast from the surface point.
     traced: Vec<bool>,
     /// Whether any kept light could shine on it.
@@ -67,6 +107,11 @@ pub(super) struct Groups {
 }
 
 impl Groups {
+    /// Starts another block of pixels.
+    pub fn start_block(&mut self) {
+        self.earlier.clear();
+    }
+
     /// Groups `lit` and asks what is known about each surface point.
     pub fn ask(
         &mut self,
@@ -249,13 +294,26 @@ impl Groups {
         self.asked.checked[at].rays += rays as u32;
     }
 
-    /// Tells the inference what the check rays found.
+    /// Tells the inference what the check rays found, with those of the same pixels' earlier samples.
     pub fn conclude_checks(&mut self, reuse: &Reuse) {
-        let Self { asked, gathered, .. } = self;
+        let channels = reuse.channels.len();
+        let Self { asked, gathered, earlier, pixels, .. } = self;
         asked.checked.resize(gathered.len(), Checked::default());
-        for (checked, gathered) in asked.checked.iter_mut().zip(gathered.iter_mut()) {
-            checked.ratio = (gathered.open / gathered.all) as f32;
-            *gathered = Gathered::default();
+        let found = asked.checked.chunks_mut(channels).zip(gathered.chunks_mut(channels));
+        for ((point, pixel), (checked, gathered)) in asked.points.iter().zip(pixels).zip(found) {
+            if point.direct && checked.iter().any(|checked| checked.rays > 0) {
+                let all = earlier.of(*pixel, point, channels).iter_mut();
+                for (all, (checked, gathered)) in all.zip(checked.iter_mut().zip(&mut *gathered)) {
+                    all.0.open += gathered.open;
+                    all.0.all += gathered.all;
+                    all.1 += checked.rays;
+                    (*gathered, checked.rays) = *all;
+                }
+            }
+            for (checked, gathered) in checked.iter_mut().zip(gathered) {
+                checked.ratio = (gathered.open / gathered.all) as f32;
+                *gathered = Gathered::default();
+            }
         }
         if let Some(inference) = reuse.inference {
             inference.check(asked);
@@ -351,5 +409,39 @@ impl ShadingPoint {
             direct,
             samples: 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Vec3};
+
+    #[test]
+    fn check_rays_of_a_surface_add_up_from_chunk_to_chunk() {
+        let point = |z: f64| SurfacePoint {
+            p: DVec3::new(0.0, 0.0, z),
+            n: Vec3::Z,
+            geom_id: 0,
+            footprint: 0.1,
+            cos: 1.0,
+            direct: true,
+            samples: 1,
+        };
+        let mut earlier = Earlier::default();
+        earlier.clear();
+        let mut add = |pixel, z, rays| {
+            let found = earlier.of(pixel, &point(z), 2);
+            found[1].1 += rays;
+            [found[0].1, found[1].1]
+        };
+        assert_eq!(add(5, 0.0, 4), [0, 4]);
+        assert_eq!(add(5, 0.01, 4), [0, 8]);
+        // Another surface of the pixel, and another pixel.
+        assert_eq!(add(5, 1.0, 4), [0, 4]);
+        assert_eq!(add(6, 0.0, 4), [0, 4]);
+        assert_eq!(add(5, 0.0, 1), [0, 9]);
+        earlier.clear();
+        assert_eq!(earlier.of(5, &point(0.0), 2)[1].1, 0);
     }
 }

@@ -92,6 +92,7 @@ pub(super) fn block<
     left: &mut Left,
 ) -> RayCounts {
     let mut counts = RayCounts::default();
+    scratch.shadow.groups.start_block();
     let mut first = 0;
     while first < renderer.settings.spp {
         let last = first.saturating_add(SAMPLES_TOGETHER).min(renderer.settings.spp);
