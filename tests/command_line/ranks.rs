@@ -91,7 +91,8 @@ mod with_mpi {
     #[test]
     fn inferred_frames_are_the_same_on_any_number_of_ranks() {
         let job = Job::new();
-        let line = "render cube.obj --size 48x27 --spp 1 --frames 2..19 --segment 4 --no-video";
+        let line = "render cube.obj --size 48x27 --spp 1 --shadow-samples 64 --sky-samples 64 \
+                    --frames 2..19 --segment 4 --no-video";
         job.done(&format!("{line} -o solo/f_##.png"));
         for ranks in [2, 3] {
             let line = format!("{line} -o r{ranks}/f_##.png --stats s.json");

@@ -64,7 +64,7 @@ fn the_bytes_are_the_same_on_1_to_16_ranks_with_references_sent_about() {
         let scene = small(&job, name);
         // Frames 1 and 16 are made, and not written.
         let line = format!(
-            "render {scene} --size 64x48 --spp 2 --shadow-samples 16 --frames 2..15 --segment 8 \
+            "render {scene} --size 64x48 --spp 2 --shadow-samples 64 --frames 2..15 --segment 8 \
              --probes 0.02 --no-video --quiet"
         );
         let ranks = [(1, 2), (2, 2), (3, 1), (4, 1), (8, 1), (16, 1)];
@@ -110,7 +110,7 @@ fn what_an_exchange_carries_changes_no_byte() {
     for (policy, kind) in [("surface", "references"), ("colour", "discoveries")] {
         let line = |scene: &str, more: &str| {
             format!(
-                "render {scene} --size 64x48 --spp 1 --shadow-samples 16 --frames 1..9 --segment 4 \
+                "render {scene} --size 64x48 --spp 1 --shadow-samples 64 --frames 1..9 --segment 4 \
                  --policy {policy} --no-video --quiet {more}"
             )
         };
