@@ -29,13 +29,44 @@ struct Gathered {
     all: f64,
 }
 
+/// Which of a list of surface points belong to a pixel of the block.
+#[derive(Default)]
+struct Chains {
+    /// The last point of each pixel.
+    heads: Vec<u32>,
+    /// For each point the one before it of the same pixel.
+    next: Vec<u32>,
+}
+
+impl Chains {
+    fn clear(&mut self) {
+        self.heads.clear();
+        self.heads.resize(PIXELS, NONE);
+        self.next.clear();
+    }
+
+    /// The number of the one among `points`, whose chains these are, that shows the surface of `point` in `pixel`.
+    fn find(&self, pixel: u32, points: &[SurfacePoint], point: &SurfacePoint) -> Option<usize> {
+        let mut at = self.heads[pixel as usize];
+        while at != NONE && !points[at as usize].is_one_surface(point) {
+            at = self.next[at as usize];
+        }
+        (at != NONE).then_some(at as usize)
+    }
+
+    /// Notes the list's next point, which belongs to `pixel`, if any point is to find it.
+    fn push(&mut self, pixel: Option<u32>) {
+        let at = self.next.len() as u32;
+        let before = pixel.map(|pixel| std::mem::replace(&mut self.heads[pixel as usize], at));
+        self.next.push(before.unwrap_or(NONE));
+    }
+}
+
 /// What check rays found in a block's pixels so far, surface by surface: those of one chunk of camera samples
 /// tell little.
 #[derive(Default)]
 struct Earlier {
-    /// The first surface of each pixel, and the next one of the same pixel.
-    heads: Vec<u32>,
-    next: Vec<u32>,
+    chains: Chains,
     /// One of each surface's points.
     points: Vec<SurfacePoint>,
     /// For each surface and channel what its rays found, and how many there were.
@@ -44,27 +75,21 @@ struct Earlier {
 
 impl Earlier {
     fn clear(&mut self) {
-        self.heads.clear();
-        self.heads.resize(PIXELS, NONE);
-        self.next.clear();
+        self.chains.clear();
         self.points.clear();
         self.found.clear();
     }
 
     /// What is known of the surface that `pixel` shows at `point`, in each channel.
     fn of(&mut self, pixel: u32, point: &SurfacePoint, channels: usize) -> &mut [(Gathered, u32)] {
-        let head = &mut self.heads[pixel as usize];
-        let mut at = *head;
-        while at != NONE && !self.points[at as usize].is_one_surface(point) {
-            at = self.next[at as usize];
-        }
-        if at == NONE {
-            at = self.points.len() as u32;
-            self.next.push(std::mem::replace(head, at));
+        let known = self.chains.find(pixel, &self.points, point);
+        let at = known.unwrap_or_else(|| {
+            self.chains.push(Some(pixel));
             self.points.push(*point);
             self.found.resize(self.points.len() * channels, Default::default());
-        }
-        &mut self.found[at as usize * channels..][..channels]
+            self.points.len() - 1
+        });
+        &mut self.found[at * channels..][..channels]
     }
 }
 
@@ -93,8 +118,7 @@ pub(super) struct Groups {
     pixels: Vec<u32>,
     /// The first camera sample of each surface point.
     first: Vec<u32>,
-    /// Next surface point of the same pixel.
-    next: Vec<u32>,
+    chains: Chains,
     gathered: Vec<Gathered>,
     earlier: Earlier,
     /// Whether a ray to a kept light was cast from the surface point.
@@ -155,35 +179,31 @@ impl Groups {
     }
 
     fn gather_points(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {
-        let Self { of_lit, before, asked, pixels, first, next, .. } = self;
+        let Self { of_lit, before, asked, pixels, first, chains, .. } = self;
         let points = &mut asked.points;
         of_lit.clear();
         before.clear();
         points.clear();
         pixels.clear();
         first.clear();
-        next.clear();
-        let mut heads = [NONE; PIXELS];
+        chains.clear();
         for point in lit {
             let own = point.surface_point(input);
-            let head = &mut heads[point.place.pixel as usize];
-            let mut at = if own.direct { *head } else { NONE };
-            while at != NONE && !points[at as usize].is_one_surface(&own) {
-                at = next[at as usize];
-            }
-            if at == NONE {
-                at = points.len() as u32;
-                points.push(own);
-                pixels.push(point.place.pixel);
-                first.push(point.place.sample);
-                // Behind mirrors nothing joins.
-                next.push(if own.direct { std::mem::replace(head, at) } else { NONE });
-                before.push(0);
+            let pixel = point.place.pixel;
+            // Behind mirrors nothing joins.
+            let known = own.direct.then(|| chains.find(pixel, points, &own)).flatten();
+            if let Some(at) = known {
+                before.push(points[at].samples);
+                points[at].join(&own);
+                of_lit.push(at as u32);
             } else {
-                before.push(points[at as usize].samples);
-                points[at as usize].join(&own);
+                of_lit.push(points.len() as u32);
+                points.push(own);
+                pixels.push(pixel);
+                first.push(point.place.sample);
+                chains.push(own.direct.then_some(pixel));
+                before.push(0);
             }
-            of_lit.push(at);
         }
     }
 

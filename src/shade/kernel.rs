@@ -217,13 +217,13 @@ impl Vertex<'_, '_> {
             let crossing = medium_stack::cross(renderer, &ray, &si, &inside, self.counts);
             if let Some(boundary) = &crossing.boundary {
                 if may_bounce {
-                    let ways = ScatteredRays {
+                    let scattered = ScatteredRays {
                         reflected: (&si, &inside),
                         refracted: (&crossing.last, &crossing.after),
                     };
                     let wo = -ray.dir.normalize();
-                    let bend = Interface { eta: boundary.eta, tint: boundary.tint };
-                    self.split::<true>(&boundary.surface, wo, &bend, &ways, state);
+                    let interface = Interface { eta: boundary.eta, tint: boundary.tint };
+                    self.split::<true>(&boundary.surface, wo, &interface, &scattered, state);
                 }
                 return;
             }
@@ -263,8 +263,15 @@ impl Vertex<'_, '_> {
         if GLASS && may_bounce {
             if let Some(glass) = &material.glass {
                 let eta = if si.is_outside(wo) { glass.ior } else { 1.0 / glass.ior };
-                let ways = ScatteredRays { reflected: (&si, inside), refracted: (&si, inside) };
-                self.split::<NESTED>(&si, wo, &Interface { eta, tint: glass.tint }, &ways, state);
+                let scattered =
+                    ScatteredRays { reflected: (&si, inside), refracted: (&si, inside) };
+                self.split::<NESTED>(
+                    &si,
+                    wo,
+                    &Interface { eta, tint: glass.tint },
+                    &scattered,
+                    state,
+                );
             }
         }
     }
@@ -289,20 +296,20 @@ impl Vertex<'_, '_> {
         &mut self,
         si: &SurfaceInteraction,
         wo: DVec3,
-        bend: &Interface,
-        ways: &ScatteredRays,
+        interface: &Interface,
+        scattered: &ScatteredRays,
         state: &PathState,
     ) {
         let outside = si.is_outside(wo);
-        let split = optics::split(wo, si.ns, bend.eta);
+        let split = optics::split(wo, si.ns, interface.eta);
         let reflected = optics::keep_side(optics::reflect(wo, si.ns), si.ng, outside);
         let weight = state.throughput * split.reflectance as f32;
-        let sent = self.push::<NESTED>(ways.reflected, reflected, state, weight, 2);
+        let sent = self.push::<NESTED>(scattered.reflected, reflected, state, weight, 2);
         self.counts.glass += u64::from(sent);
         if let Some(refracted) = split.refracted {
             let refracted = optics::keep_side(refracted, si.ng, !outside);
-            let weight = state.throughput * (1.0 - split.reflectance) as f32 * bend.tint;
-            let sent = self.push::<NESTED>(ways.refracted, refracted, state, weight, 3);
+            let weight = state.throughput * (1.0 - split.reflectance) as f32 * interface.tint;
+            let sent = self.push::<NESTED>(scattered.refracted, refracted, state, weight, 3);
             self.counts.glass += u64::from(sent);
         }
     }

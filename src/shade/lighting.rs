@@ -421,7 +421,6 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         let channels = reuse.channels.len();
-        let all = all_of(lit, s);
         for (at, channel) in reuse.channels.iter().enumerate() {
             let (n, count) = match channel {
                 Channel::Area(_) => (self.settings.shadow_samples, &mut counts.shadow_area),
@@ -430,7 +429,7 @@ impl Renderer<'_> {
             s.clear();
             let mut runs = std::mem::take(&mut s.runs);
             runs.start(s.groups.len());
-            for &i in &all {
+            for i in 0..lit.len() as u32 {
                 let wanted = s.groups.check_rays(i as usize, at, channels, n);
                 let wanted = wanted.filter(|_| s.exact[i as usize * channels + at] != 0.0);
                 if let Some(wanted) = wanted {
@@ -461,16 +460,15 @@ impl Renderer<'_> {
             s.occluded.resize(s.rays.len(), false);
             self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
             let mut start = 0;
-            for (&i, span) in all.iter().zip(&s.spans) {
+            for (i, span) in s.spans.iter().enumerate() {
                 let (open, weight) = opened(&s.weights, &s.occluded, start..span.end);
                 let rays = span.end - start;
                 start = span.end;
                 if rays > 0 {
-                    s.groups.note_checked(i as usize, (at, channels), (open, weight), rays);
+                    s.groups.note_checked(i, (at, channels), (open, weight), rays);
                 }
             }
         }
-        s.wanted = all;
         s.groups.conclude_checks(reuse);
     }
 

@@ -42,16 +42,13 @@ struct Image<T> {
 }
 
 impl<T: Copy + Sync> Image<T> {
-    /// What `of` makes of each pixel's number in `slots`, and `none` where there is none.
-    fn of(slots: &[u32], width: usize, none: T, of: impl Fn(usize) -> T) -> Self {
+    /// What `of` makes of the number of each of so many `pixels`; `none` where that is nothing.
+    fn of(pixels: usize, width: usize, none: T, of: impl Fn(usize) -> Option<T>) -> Self {
         let stride = width + 2 * REACH;
-        let height = slots.len() / width;
-        let mut values = vec![none; stride * (height + 2 * REACH)];
-        for (y, row) in slots.chunks(width).enumerate() {
-            let out = &mut values[(y + REACH) * stride + REACH..][..width];
-            for (out, slot) in out.iter_mut().zip(row).filter(|(_, slot)| **slot != NONE) {
-                *out = of(*slot as usize);
-            }
+        let mut values = vec![none; stride * (pixels / width + 2 * REACH)];
+        for y in 0..pixels / width {
+            let row = &mut values[(y + REACH) * stride + REACH..][..width];
+            row.iter_mut().zip(y * width..).for_each(|(out, i)| *out = of(i).unwrap_or(none));
         }
         Self { stride, values }
     }
@@ -79,31 +76,38 @@ pub(super) fn contrasts(
     if slots.is_empty() {
         return contrasts;
     }
-    let same = same_surface(points, slots, width);
+    let own = |i: usize| (slots[i] != NONE).then_some(slots[i] as usize);
+    let same = same_surface(points, slots.len(), width, own);
     let mut bend = vec![0.0; slots.len()];
     let (mut wide, mut far) = (bend.clone(), bend.clone());
     for channel in 0..channels {
-        let known = Image::of(slots, width, f32::NAN, |i| ratios[i * channels + channel]);
+        let ratio = |i| own(i).map(|own| ratios[own * channels + channel]);
+        let known = Image::of(slots.len(), width, f32::NAN, ratio);
         let rows = bend.par_chunks_mut(width).zip(wide.par_chunks_mut(width));
         let rows = rows.zip(same.par_chunks(width)).enumerate();
         rows.for_each(|(y, ((bend, wide), same))| near_row(&known, y, same, bend, wide));
-        let numbers: Vec<u32> = (0..slots.len() as u32).collect();
-        let known = Image::of(&numbers, width, f32::NAN, |i| wide[i]);
+        let known = Image::of(slots.len(), width, f32::NAN, |i| Some(wide[i]));
         let rows = far.par_chunks_mut(width).zip(same.par_chunks(width)).enumerate();
         rows.for_each(|(y, (far, same))| far_row(&known, y, same, far));
-        for (i, own) in slots.iter().enumerate().filter(|(_, own)| **own != NONE) {
+        for (i, own) in (0..slots.len()).filter_map(|i| Some((i, own(i)?))) {
             let (bend, wide, far) = (bend[i], wide[i], far[i]);
-            contrasts[*own as usize * channels + channel] = Contrast { bend, wide, far };
+            contrasts[own * channels + channel] = Contrast { bend, wide, far };
         }
     }
     contrasts
 }
 
-/// For each pixel which of those [`AROUND`] show the same surface, a bit each.
-fn same_surface(points: &[SurfacePoint], slots: &[u32], width: usize) -> Vec<u32> {
-    let mesh = Image::of(slots, width, NONE, |i| points[i].geom_id);
-    let normal = [0, 1, 2].map(|axis| Image::of(slots, width, 0.0, |i| points[i].n[axis]));
-    let mut same = vec![0; slots.len()];
+/// For each pixel which of those [`AROUND`] show the same surface, a bit each; `own` is the number of its point.
+fn same_surface(
+    points: &[SurfacePoint],
+    pixels: usize,
+    width: usize,
+    own: impl Fn(usize) -> Option<usize>,
+) -> Vec<u32> {
+    let mesh = Image::of(pixels, width, NONE, |i| own(i).map(|own| points[own].geom_id));
+    let normal = [0, 1, 2]
+        .map(|axis| Image::of(pixels, width, 0.0, |i| own(i).map(|own| points[own].n[axis])));
+    let mut same = vec![0; pixels];
     same.par_chunks_mut(width).enumerate().for_each(|(y, same)| {
         let [nx, ny, nz] = [&normal[0], &normal[1], &normal[2]].map(|n| n.own(y));
         let own = mesh.own(y);
