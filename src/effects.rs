@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Light, Scene, Settings};
+use crate::scene::{Scene, Settings};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,11 +67,7 @@ impl EffectPlan {
 
     fn with_reasons(scene: &Scene, settings: &Settings) -> (Self, Vec<EffectReason>) {
         let used = UsedMaterials::of(scene);
-        let area = scene
-            .lights
-            .iter()
-            .filter(|l| matches!(l, Light::Quad(_) | Light::Sphere { .. }))
-            .count();
+        let area = scene.lights.iter().filter(|light| light.is_area()).count();
         let delta = scene.lights.len() - area;
         let bounces = settings.bounces;
         let bounced = counted(bounces as usize, "bounce");

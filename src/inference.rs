@@ -5,7 +5,7 @@
 //! comes from; `reuse` answers and never traces. All in scene space.
 
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Light, Scene};
+use crate::scene::Scene;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -214,8 +214,7 @@ impl Channels {
         let mut channels = Self { of_light: vec![None; scene.lights.len()], ..Self::default() };
         for (index, light) in scene.lights.iter().enumerate() {
             let channel = Channel::Area(index as u32);
-            let is_area = matches!(light, Light::Quad(_) | Light::Sphere { .. });
-            if is_area && is_kept(channel) {
+            if light.is_area() && is_kept(channel) {
                 channels.of_light[index] = Some(channels.list.len());
                 channels.list.push(channel);
             }

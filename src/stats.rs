@@ -4,67 +4,138 @@ mod audit;
 
 pub use audit::{AuditSums, DrawnSum};
 
-use serde::{Deserialize, Serialize};
-use std::ops::AddAssign;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
+use std::ops::{AddAssign, Index, IndexMut};
 
-/// Rays cast, by kind. `retry` and `invalid` count inside the other kinds' rays, not beside them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RayCounts {
+/// What a ray is cast for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RayKind {
     /// Camera rays.
-    pub camera: u64,
+    Camera,
     /// Rays reflected by mirrors.
-    pub mirror: u64,
+    Mirror,
     /// Rays reflected or refracted by glass.
-    pub glass: u64,
+    Glass,
     /// Shadow rays to area lights.
-    pub shadow_area: u64,
-    /// Shadow rays to point and directional lights.
-    pub shadow_delta: u64,
+    ShadowArea,
+    /// Shadow rays to delta lights.
+    ShadowDelta,
     /// Shadow rays to the sky.
-    pub shadow_sky: u64,
-    /// Second tries after a miss inside the bounds.
-    pub retry: u64,
-    /// Rays refused before tracing (NaN, infinite, zero direction).
-    pub invalid: u64,
+    ShadowSky,
+    /// Second tries after a miss inside the bounds; their first tries count as what they are.
+    Retry,
+    /// Rays refused before tracing (NaN, infinite, zero direction); they also count as what they are.
+    Invalid,
 }
 
+impl RayKind {
+    /// All kinds, in the order in which they are stored and shown.
+    pub const ALL: [Self; 8] = [
+        Self::Camera,
+        Self::Mirror,
+        Self::Glass,
+        Self::ShadowArea,
+        Self::ShadowDelta,
+        Self::ShadowSky,
+        Self::Retry,
+        Self::Invalid,
+    ];
+
+    /// The kinds that were traced.
+    pub fn traced() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|kind| *kind != Self::Invalid)
+    }
+
+    /// The kind in a table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Camera => "camera",
+            Self::Mirror => "mirror",
+            Self::Glass => "glass",
+            Self::ShadowArea => "shadow of area lights",
+            Self::ShadowDelta => "shadow of other lights",
+            Self::ShadowSky => "shadow of the sky",
+            Self::Retry => "second tries",
+            Self::Invalid => "invalid",
+        }
+    }
+
+    /// The kind in JSON and CSV files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Camera => "camera",
+            Self::Mirror => "mirror",
+            Self::Glass => "glass",
+            Self::ShadowArea => "shadow_area",
+            Self::ShadowDelta => "shadow_delta",
+            Self::ShadowSky => "shadow_sky",
+            Self::Retry => "retry",
+            Self::Invalid => "invalid",
+        }
+    }
+}
+
+/// Rays cast, by kind: `counts[RayKind::Camera]`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RayCounts([u64; RayKind::ALL.len()]);
+
 impl RayCounts {
-    /// Each kind by name, with its rays.
-    pub fn by_kind(&self) -> [(&'static str, u64); 8] {
-        [
-            ("camera", self.camera),
-            ("mirror", self.mirror),
-            ("glass", self.glass),
-            ("shadow of area lights", self.shadow_area),
-            ("shadow of other lights", self.shadow_delta),
-            ("shadow of the sky", self.shadow_sky),
-            ("second tries", self.retry),
-            ("invalid", self.invalid),
-        ]
+    /// `rays` of one kind, none of the others.
+    pub fn of(kind: RayKind, rays: u64) -> Self {
+        let mut counts = Self::default();
+        counts[kind] = rays;
+        counts
     }
 
     /// All rays that were traced, second tries included.
     pub fn total(&self) -> u64 {
-        self.camera
-            + self.mirror
-            + self.glass
-            + self.shadow_area
-            + self.shadow_delta
-            + self.shadow_sky
-            + self.retry
+        RayKind::traced().map(|kind| self[kind]).sum()
+    }
+
+    /// Shadow rays of all kinds.
+    pub fn shadow(&self) -> u64 {
+        self[RayKind::ShadowArea] + self[RayKind::ShadowDelta] + self[RayKind::ShadowSky]
+    }
+}
+
+impl Index<RayKind> for RayCounts {
+    type Output = u64;
+
+    fn index(&self, kind: RayKind) -> &u64 {
+        &self.0[kind as usize]
+    }
+}
+
+impl IndexMut<RayKind> for RayCounts {
+    fn index_mut(&mut self, kind: RayKind) -> &mut u64 {
+        &mut self.0[kind as usize]
     }
 }
 
 impl AddAssign for RayCounts {
     fn add_assign(&mut self, o: Self) {
-        self.camera += o.camera;
-        self.mirror += o.mirror;
-        self.glass += o.glass;
-        self.shadow_area += o.shadow_area;
-        self.shadow_delta += o.shadow_delta;
-        self.shadow_sky += o.shadow_sky;
-        self.retry += o.retry;
-        self.invalid += o.invalid;
+        self.0.iter_mut().zip(o.0).for_each(|(count, more)| *count += more);
+    }
+}
+
+// Named in files that people read, eight numbers in order in those that only tweenray reads.
+impl Serialize for RayCounts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match serializer.is_human_readable() {
+            true => serializer.collect_map(RayKind::ALL.map(|kind| (kind.key(), self[kind]))),
+            false => self.0.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for RayCounts {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if !deserializer.is_human_readable() {
+            return Deserialize::deserialize(deserializer).map(Self);
+        }
+        let named = BTreeMap::<String, u64>::deserialize(deserializer)?;
+        Ok(Self(RayKind::ALL.map(|kind| named.get(kind.key()).copied().unwrap_or(0))))
     }
 }
 

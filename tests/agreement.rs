@@ -13,6 +13,7 @@ use tweenray::intersect::{self, Intersector};
 use tweenray::math::Rgb;
 use tweenray::scene::IntersectorKind;
 use tweenray::shade::Renderer;
+use tweenray::stats::RayKind;
 
 /// Linear radiance that Embree and the oracle may differ by.
 const TOLERANCE: f32 = 1e-5;
@@ -29,7 +30,7 @@ fn both_agree(scene: &str, frame: u32) {
         .map(|(x, y, c)| format!("({x}, {y}): {c} and {}", oracle.rgb[oracle.index(x, y)]))
         .collect();
     assert!(apart.is_empty(), "{scene}, frame {frame}: {apart:#?}");
-    assert_eq!(embree_rays.camera, oracle_rays.camera);
+    assert_eq!(embree_rays[RayKind::Camera], oracle_rays[RayKind::Camera]);
 }
 
 #[test]

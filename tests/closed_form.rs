@@ -6,7 +6,8 @@ mod common;
 
 use common::{job, pose, quad, render, sphere_world};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{IntersectorKind, Light, Material, QuadLight, Sky, World};
+use tweenray::scene::{IntersectorKind, Light, Material, PointLight, QuadLight, Sky, World};
+use tweenray::stats::RayKind;
 
 const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
 
@@ -24,7 +25,7 @@ fn lambert_floor_under_a_point_light() {
     let light = DVec3::new(0.3, 1.5, -0.2);
     for kind in BOTH {
         let mut world = floor(0.6);
-        world.lights.push(Light::Point { position: light, intensity: Rgb::splat(7.0) });
+        world.lights.push(Light::Point(PointLight { position: light, intensity: Rgb::splat(7.0) }));
         let camera = pose((0.1, 2.0, 0.7), (0.0, 0.0, 0.0));
         let mut job = job(world, camera, 24, 18);
         job.settings.intersector = kind;
@@ -36,7 +37,7 @@ fn lambert_floor_under_a_point_light() {
             let expected = 0.6 / std::f64::consts::PI * 7.0 * cos / to_light.length_squared();
             assert!((f64::from(rgb.x) - expected).abs() < 2e-6 * expected, "{kind:?} {x},{y}");
         }
-        assert_eq!(counts.shadow_delta, 24 * 18);
+        assert_eq!(counts[RayKind::ShadowDelta], 24 * 18);
     }
 }
 
@@ -97,7 +98,7 @@ fn a_mirror_shows_a_known_emitter() {
         for (x, y, rgb) in common::pixels(&film) {
             assert!(rgb.abs_diff_eq(Rgb::new(1.8, 2.0, 2.0), 1e-6), "{kind:?} {x},{y}: {rgb}");
         }
-        assert_eq!((counts.mirror, counts.shadow_area), (16 * 12, 0));
+        assert_eq!((counts[RayKind::Mirror], counts[RayKind::ShadowArea]), (16 * 12, 0));
     }
 }
 
@@ -118,7 +119,7 @@ fn a_white_sphere_in_a_furnace_is_one() {
             for (x, y, rgb) in common::pixels(&film) {
                 assert!(rgb.abs_diff_eq(Rgb::ONE, 0.002), "{kind:?} {x},{y}: {rgb}");
             }
-            assert!(counts.shadow_sky > 0);
+            assert!(counts[RayKind::ShadowSky] > 0);
         }
     }
 }
@@ -206,7 +207,7 @@ fn from_inside_a_box_no_sky_is_seen() {
         world.meshes.push(common::cube(DVec3::ZERO, 1.0, 0));
         world.sky = Sky { radiance: Rgb::splat(1000.0), ..Sky::default() };
         let position = DVec3::new(0.0, 0.5, 0.0);
-        world.lights.push(Light::Point { position, intensity: Rgb::ONE });
+        world.lights.push(Light::Point(PointLight { position, intensity: Rgb::ONE }));
         for target in [(1.0, 1.0, 1.0), (-1.0, 0.0, 0.2), (0.0, -1.0, 0.0), (1.0, 0.0, 1.0)] {
             let mut job = job(world.clone(), pose((0.1, 0.0, -0.1), target), 32, 24);
             job.settings.intersector = kind;

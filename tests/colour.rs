@@ -13,11 +13,12 @@ use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb, srgb_encode};
 use tweenray::reuse::colour::Rule;
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, QuadLight, Rect, Scene, Settings, Shot, Sky, ToneCurve,
-    World, WorldSphere,
+    CameraPath, DirectionalLight, Easing, Light, Material, QuadLight, Rect, Scene, Settings, Shot,
+    Sky, ToneCurve, World, WorldSphere,
 };
 use tweenray::sequence::{ColourMaker, FrameMaker, Made, Tracer, check_upload};
 use tweenray::shade::Renderer;
+use tweenray::stats::RayKind;
 
 /// A floor and a ball before the sky. Lit by the sun, which makes no noise, or by a lamp.
 fn world(with_lamp: bool) -> World {
@@ -36,7 +37,9 @@ fn world(with_lamp: bool) -> World {
         world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: false }));
     } else {
         let to_light = DVec3::new(0.3, 1.0, 0.5).normalize();
-        world.lights.push(Light::Directional { to_light, irradiance: Rgb::splat(2.0) });
+        world
+            .lights
+            .push(Light::Directional(DirectionalLight { to_light, irradiance: Rgb::splat(2.0) }));
     }
     world.sky = Sky { radiance: Rgb::new(0.1, 0.15, 0.3), lights: false, ambient: Rgb::ZERO };
     world
@@ -134,7 +137,7 @@ fn first_and_last_frame_are_traced_as_without_the_policy() {
     assert!(inferred > 500, "{inferred} pixels inferred");
     assert_eq!(between.reuse.direct_inferred, inferred as u64);
     assert_eq!(between.reuse.direct, 61 * 43);
-    assert_eq!(between.rays.camera, 2 * (61 * 43 - inferred as u64));
+    assert_eq!(between.rays[RayKind::Camera], 2 * (61 * 43 - inferred as u64));
 }
 
 #[test]
@@ -173,7 +176,7 @@ fn a_still_camera_in_light_without_noise_traces_two_frames() {
     let made = still.all(STRICT, &[]);
     for between in &made[1..FRAMES as usize - 1] {
         assert_eq!(count(&between.film, Provenance::Both), 61 * 43);
-        assert_eq!(between.rays.camera, 0);
+        assert_eq!(between.rays[RayKind::Camera], 0);
         assert_eq!(between.film.rgb, made[0].film.rgb);
     }
 }
@@ -194,7 +197,7 @@ fn a_larger_epsilon_infers_more() {
 fn threads_order_and_range_change_no_byte() {
     let mut pan = Move::pan(true, 0.5);
     let whole = pan.all(USUAL, &[]);
-    assert!(whole[1].reuse.direct_inferred > 0 && whole[1].rays.camera > 0);
+    assert!(whole[1].reuse.direct_inferred > 0 && whole[1].rays[RayKind::Camera] > 0);
     for threads in [1, 3] {
         pan.threads = threads;
         let again = pan.all(USUAL, &[]);
@@ -252,11 +255,11 @@ fn what_passes_between_two_samples_is_missed_and_an_uploaded_picture_shows_it() 
     let uploads = [(5, picture(&traced[4]))];
     let with_upload = pan.all(loose, &uploads);
     assert_eq!(redness(&with_upload[4].film), redness(&traced[4]));
-    assert_eq!(with_upload[4].rays.camera, 0);
+    assert_eq!(with_upload[4].rays[RayKind::Camera], 0);
     let apart = with_upload[4].film.rgb.iter().zip(&traced[4].rgb).map(|(a, b)| (*a - *b).abs());
     assert!(apart.fold(0.0, |most, d| d.max_element().max(most)) < 0.01);
     // Where the ball is in the picture the frames beside it disagree, and are traced.
-    let cast = |made: &[Made]| made.iter().map(|m| m.rays.camera).sum::<u64>();
+    let cast = |made: &[Made]| made.iter().map(|m| m.rays[RayKind::Camera]).sum::<u64>();
     assert!(cast(&with_upload) > cast(&pan.all(loose, &[])));
 }
 

@@ -12,10 +12,11 @@ use tweenray::film::Film;
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    BuildQuality, Filter, Glass, Light, Material, QuadLight, Rect, Sky, World, WorldMesh,
-    WorldSphere,
+    BuildQuality, DirectionalLight, Filter, Glass, Light, Material, QuadLight, Rect, Sky,
+    SphereLight, World, WorldMesh, WorldSphere,
 };
 use tweenray::shade::Renderer;
+use tweenray::stats::RayKind;
 
 /// A bumpy floor of 3,200 triangles with spheres on it; `extras` adds lights and materials.
 fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
@@ -46,12 +47,16 @@ fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
         let radiance = Rgb::splat(8.0);
         world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: false }));
         let centre = DVec3::new(-3.0, 3.0, 2.0);
-        world.lights.push(Light::Sphere { centre, radius: 0.4, radiance: Rgb::splat(9.0) });
+        world.lights.push(Light::Sphere(SphereLight {
+            centre,
+            radius: 0.4,
+            radiance: Rgb::splat(9.0),
+        }));
     }
-    world.lights.push(Light::Directional {
+    world.lights.push(Light::Directional(DirectionalLight {
         to_light: DVec3::new(0.3, 1.0, 0.5).normalize(),
         irradiance: Rgb::splat(0.4),
-    });
+    }));
     world.sky = Sky { radiance: Rgb::new(0.1, 0.15, 0.3), lights: sky, ambient: Rgb::ZERO };
     world
 }
@@ -170,8 +175,12 @@ fn each_specialised_kernel_equals_the_one_with_everything_on() {
         let (full, full_counts) = render_scene(&scene, &job, everything);
         assert!(film == full, "kernel {bits:04b} differs");
         assert_eq!(counts, full_counts, "kernel {bits:04b} casts other rays");
-        let absent = [(on(0), counts.mirror), (on(1), counts.glass), (on(2), counts.shadow_area)];
-        for (present, rays) in absent.into_iter().chain([(on(3), counts.shadow_sky)]) {
+        let absent = [
+            (on(0), counts[RayKind::Mirror]),
+            (on(1), counts[RayKind::Glass]),
+            (on(2), counts[RayKind::ShadowArea]),
+        ];
+        for (present, rays) in absent.into_iter().chain([(on(3), counts[RayKind::ShadowSky])]) {
             assert_eq!(present, rays > 0, "kernel {bits:04b}: {counts:?}");
         }
     }
@@ -216,11 +225,11 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
         for light in &mut w.lights {
             match light {
                 Light::Quad(q) => q.corners.iter_mut().for_each(|c| *c *= s),
-                Light::Sphere { centre, radius, .. } => {
+                Light::Sphere(SphereLight { centre, radius, .. }) => {
                     *centre *= s;
                     *radius *= s;
                 }
-                Light::Point { .. } | Light::Directional { .. } => {}
+                Light::Point(_) | Light::Directional(_) => {}
             }
         }
         job.camera.eye *= s;

@@ -8,8 +8,8 @@ use common::{job, pose, render};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector};
 use tweenray::math::{Bounds3, DVec3, Rgb};
 use tweenray::ray::Ray;
-use tweenray::scene::{HitRules, Light, Material, Recheck, Scene, World, WorldMesh};
-use tweenray::stats::RayCounts;
+use tweenray::scene::{HitRules, Light, Material, PointLight, Recheck, Scene, World, WorldMesh};
+use tweenray::stats::{RayCounts, RayKind};
 
 fn tessellated_sphere() -> Scene {
     let world = common::sphere_world(Material::diffuse("white", Rgb::ONE), true);
@@ -143,7 +143,11 @@ fn a_true_hit_is_not_given_up_for_a_neighbour_seen_edge_on() {
         }
     }
     assert_eq!(wrong, 0, "of {rays} rays at the middles of triangles");
-    assert!(counts.retry as usize > rays / 2, "the case is not hard: {} tries", counts.retry);
+    assert!(
+        counts[RayKind::Retry] as usize > rays / 2,
+        "the case is not hard: {} tries",
+        counts[RayKind::Retry]
+    );
 }
 
 #[test]
@@ -171,7 +175,7 @@ fn a_translated_scene_looks_the_same() {
         let mut world = common::sphere_world(Material::diffuse("white", Rgb::splat(0.8)), true);
         world.meshes[0].positions.iter_mut().for_each(|p| *p += offset);
         let position = offset + DVec3::new(2.0, 3.0, 2.0);
-        world.lights.push(Light::Point { position, intensity: Rgb::splat(12.0) });
+        world.lights.push(Light::Point(PointLight { position, intensity: Rgb::splat(12.0) }));
         let mut job = job(world, pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), 64, 64);
         job.camera.eye += offset;
         render(&job).0.rgb
@@ -206,7 +210,7 @@ fn senseless_rays_hit_nothing_and_are_counted() {
     for (i, (hit, occluded)) in hits.iter().zip(&occluded).enumerate() {
         assert_eq!((hit.is_some(), *occluded), (i % 3 != 1, i % 3 != 1), "ray {i}");
     }
-    assert_eq!(counts.invalid, 2 * bad.len() as u64);
+    assert_eq!(counts[RayKind::Invalid], 2 * bad.len() as u64);
 }
 
 /// A light outside of a closed room lights nothing inside, not even along the corners.
@@ -216,11 +220,14 @@ fn a_closed_room_is_dark() {
     world.materials.push(Material::diffuse("wall", Rgb::splat(0.8)));
     world.meshes.push(common::cube(DVec3::ZERO, 1.0, 0));
     let position = DVec3::new(1.7, 2.9, 2.3);
-    world.lights.push(Light::Point { position, intensity: Rgb::splat(1e6) });
+    world.lights.push(Light::Point(PointLight { position, intensity: Rgb::splat(1e6) }));
     // Towards the walls that face the light from inside.
     for target in [(-1.0, -1.0, -1.0), (-1.0, -0.999, 0.0), (-1.0, -1.0, 0.3)] {
         let (film, counts) = render(&job(world.clone(), pose((0.0, 0.0, 0.0), target), 160, 120));
-        assert!(counts.shadow_delta > 160 * 120 / 2, "few points face the light: {counts:?}");
+        assert!(
+            counts[RayKind::ShadowDelta] > 160 * 120 / 2,
+            "few points face the light: {counts:?}"
+        );
         for (x, y, rgb) in common::pixels(&film) {
             assert_eq!(rgb, Rgb::ZERO, "{x},{y} towards {target:?}");
         }
@@ -251,10 +258,10 @@ fn of_coincident_faces_the_lowest_number_is_seen() {
         for copy in 0..copies {
             world.meshes.push(common::cube(DVec3::ZERO, 1.0, copy % 2));
         }
-        world.lights.push(Light::Point {
+        world.lights.push(Light::Point(PointLight {
             position: DVec3::new(3.0, 5.0, 4.0),
             intensity: Rgb::splat(80.0),
-        });
+        }));
         world
     };
     let picture = |copies: u32, threads: usize| {

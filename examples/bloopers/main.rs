@@ -15,7 +15,8 @@ use picture::Picture;
 use std::path::Path;
 use tweenray::math::{DMat3, DVec3, Rgb};
 use tweenray::scene::{
-    Camera, Glass, HitRules, Light, Material, Pose, Settings, Sky, World, WorldMesh, WorldSphere,
+    Camera, DirectionalLight, Glass, HitRules, Light, Material, Pose, Settings, Sky, World,
+    WorldMesh, WorldSphere,
 };
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/pictures");
@@ -53,10 +54,10 @@ fn still_life(mesh: &WorldMesh, scale: f64) -> Still {
     let far = 20.0 * scale;
     let floor = [(-far, far), (far, far), (far, -far), (-far, -far)];
     world.meshes.push(quad(floor.map(|(x, z)| DVec3::new(x, 0.0, z)), 1));
-    world.lights.push(Light::Directional {
+    world.lights.push(Light::Directional(DirectionalLight {
         to_light: DVec3::new(-0.5, 0.8, 0.6).normalize(),
         irradiance: Rgb::splat(2.2),
-    });
+    }));
     world.sky = Sky { radiance: Rgb::splat(0.25), lights: false, ambient: Rgb::splat(0.25) };
     let (eye, target) = (DVec3::new(0.5, 1.1, 2.9), DVec3::new(0.0, 0.62, 0.0));
     Still::new(world, eye * scale, target * scale)

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use tweenray::effects::EffectPlan;
 use tweenray::intersect::{self, Hit, Intersector, Ray, SurfaceInteraction};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Light, Scene};
+use tweenray::scene::{DirectionalLight, Light, Scene};
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
 
@@ -110,7 +110,7 @@ pub fn shade(still: &Still, mistake: NormalMistake) -> Picture {
             NormalMistake::OneSided => si.ns,
             NormalMistake::TrustTheFile => file_normal(scene, &hit).unwrap_or(si.ns),
         };
-        let Light::Directional { to_light, irradiance } = scene.lights[0] else {
+        let Light::Directional(DirectionalLight { to_light, irradiance }) = scene.lights[0] else {
             panic!("the still life has one sun")
         };
         let to_shadow = Ray { exclude: hit.prim, ..Ray::new(si.p + si.ng * 1e-5, to_light) };

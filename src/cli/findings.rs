@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::intersect::{Hit, Intersector, Ray};
 use crate::math::{Bounds3, DVec3};
-use crate::scene::{Camera, Light, Scene, Settings, Shot};
+use crate::scene::{Camera, Scene, Settings, Shot};
 use crate::stats::RayCounts;
 
 /// Frames that are looked at, spread over the shot, both ends among them.
@@ -85,11 +85,10 @@ fn no_light(scene: &Scene, settings: &Settings) -> Option<String> {
     let sky = &scene.sky;
     let sky_bright = sky.radiance.max_element() > 0.0;
     let sky_lights = sky_bright && sky.lights && settings.sky_samples > 0;
-    let is_delta = |l: &Light| matches!(l, Light::Point { .. } | Light::Directional { .. });
     let has_area_lights = !scene.lights.is_empty();
     if sky_lights
         || sky.ambient.max_element() > 0.0
-        || scene.lights.iter().any(is_delta)
+        || scene.lights.iter().any(|light| !light.is_area())
         || (has_area_lights && settings.shadow_samples > 0)
     {
         return None;

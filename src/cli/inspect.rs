@@ -16,6 +16,7 @@ use crate::scene::{Light, Mesh, Scene, Settings, Shot};
 use crate::shade::Renderer;
 use clap::Args;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Say what a scene holds and what rendering it would do, without rendering
 #[derive(Debug, Args)]
@@ -60,10 +61,9 @@ struct Inspection {
 
 #[derive(Serialize, Default)]
 struct Lights {
-    point: usize,
-    directional: usize,
-    quad: usize,
-    sphere: usize,
+    /// How many there are of each kind.
+    #[serde(flatten)]
+    by_kind: BTreeMap<&'static str, usize>,
     sky: bool,
     ambient: bool,
 }
@@ -155,16 +155,10 @@ impl Lights {
         let mut lights = Self {
             sky: scene.sky.lights && scene.sky.radiance.max_element() > 0.0,
             ambient: scene.sky.ambient.max_element() > 0.0,
-            ..Self::default()
+            by_kind: Light::KINDS.map(|kind| (kind, 0)).into(),
         };
-        for light in &scene.lights {
-            match light {
-                Light::Point { .. } => lights.point += 1,
-                Light::Directional { .. } => lights.directional += 1,
-                Light::Quad(_) => lights.quad += 1,
-                Light::Sphere { .. } => lights.sphere += 1,
-            }
-        }
+        let kinds = scene.lights.iter().map(Light::name);
+        kinds.for_each(|kind| *lights.by_kind.entry(kind).or_default() += 1);
         lights
     }
 }
@@ -259,14 +253,9 @@ impl Inspection {
 
 impl Lights {
     fn to_text(&self) -> String {
-        let counts = [
-            (self.point, "point"),
-            (self.directional, "directional"),
-            (self.quad, "quad"),
-            (self.sphere, "sphere"),
-        ];
-        let mut parts: Vec<String> =
-            counts.iter().filter(|(n, _)| *n > 0).map(|(n, kind)| format!("{n} {kind}")).collect();
+        let present = Light::KINDS.iter().map(|kind| (kind, self.by_kind[kind]));
+        let present = present.filter(|(_, count)| *count > 0);
+        let mut parts: Vec<String> = present.map(|(kind, n)| format!("{n} {kind}")).collect();
         parts.extend(self.sky.then(|| "sky".into()));
         parts.extend(self.ambient.then(|| "ambient".into()));
         if parts.is_empty() { "none".into() } else { parts.join(", ") }

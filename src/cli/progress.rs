@@ -137,10 +137,11 @@ pub fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::RayKind;
 
     #[test]
     fn a_line_says_frame_seconds_rays_and_time_left() {
-        let rays = RayCounts { camera: 4_920_000, ..RayCounts::default() };
+        let rays = RayCounts::of(RayKind::Camera, 4_920_000);
         let report = FrameReport {
             frame: 9,
             trace_seconds: 0.4,

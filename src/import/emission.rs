@@ -6,7 +6,7 @@
 //! is seen, and casts no light.
 
 use crate::math::DVec3;
-use crate::scene::{Light, Material, QuadLight, World, WorldMesh};
+use crate::scene::{Light, Material, QuadLight, SphereLight, World, WorldMesh};
 
 /// More quads than this would each cost shadow rays at every point.
 const MAX_QUADS: usize = 64;
@@ -69,7 +69,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
         if emits(material) {
             notes.extend(reflects(material).then_some(Note::ReflectsNothing(sphere.name)));
             let (centre, radius, radiance) = (sphere.centre, sphere.radius, material.emission);
-            world.lights.push(Light::Sphere { centre, radius, radiance });
+            world.lights.push(Light::Sphere(SphereLight { centre, radius, radiance }));
         } else {
             world.spheres.push(sphere);
         }

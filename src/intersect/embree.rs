@@ -28,7 +28,7 @@ use crate::embree::{
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
 use crate::scene::{BuildQuality, HitRules, Scene, Settings};
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 
 /// Half an ulp at 1 in f32.
 const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
@@ -201,7 +201,7 @@ impl<'s> EmbreeIntersector<'s> {
         let hit = self.recheck(ray, &candidate);
         if self.retries() && self.is_doubtful(ray, &candidate.hit) {
             for turn in TURNS {
-                counts.retry += 1;
+                counts[RayKind::Retry] += 1;
                 let again = self.query(ray, turn, &[]);
                 let again = again.filter(|again| again.hit.prim != candidate.hit.prim);
                 let again = again.and_then(|again| self.locate(ray, &again));
@@ -259,7 +259,7 @@ impl<'s> EmbreeIntersector<'s> {
             return None;
         }
         TURNS.into_iter().find_map(|turn| {
-            counts.retry += 1;
+            counts[RayKind::Retry] += 1;
             self.pursue(ray, turn, &mut passed)
         })
     }
@@ -273,7 +273,7 @@ fn rounding_margin(bounds: &Bounds3) -> DVec3 {
 impl Intersector for EmbreeIntersector<'_> {
     fn intersect(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit> {
         if !ray.is_valid() {
-            counts.invalid += 1;
+            counts[RayKind::Invalid] += 1;
             return None;
         }
         self.first_hit(ray, counts)

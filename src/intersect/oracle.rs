@@ -8,7 +8,7 @@ use super::court::{Line, Meeting, Place};
 use super::{Hit, Intersector, PrimRef, Ray, sphere};
 use crate::math::DVec3;
 use crate::scene::Scene;
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 use rayon::prelude::*;
 
 /// Rays that share one pass over the triangles.
@@ -191,7 +191,7 @@ fn counts(ray: &Ray, meeting: &Meeting, prim: PrimRef) -> Option<CourtHit> {
 fn valid(rays: &[Ray], counts: &mut RayCounts) -> (Vec<Ray>, Vec<usize>) {
     let valid = rays.iter().enumerate().filter(|(_, ray)| ray.is_valid());
     let (places, valid): (Vec<usize>, Vec<Ray>) = valid.map(|(i, ray)| (i, *ray)).unzip();
-    counts.invalid += (rays.len() - valid.len()) as u64;
+    counts[RayKind::Invalid] += (rays.len() - valid.len()) as u64;
     (valid, places)
 }
 

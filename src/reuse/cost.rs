@@ -4,8 +4,8 @@
 use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
 use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
-use crate::scene::{Light, Scene, Settings};
-use crate::stats::RayCounts;
+use crate::scene::{Scene, Settings};
+use crate::stats::{RayCounts, RayKind};
 
 /// A camera ray with the look at its surface: the unit.
 const CAMERA_RAY: f64 = 1.0;
@@ -73,19 +73,14 @@ pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> 
     let kept = channels(scene, plan, settings);
     let mut reasons = Vec::new();
     for (index, light) in scene.lights.iter().enumerate() {
-        let (kind, channel) = match light {
-            Light::Point { .. } => ("point", None),
-            Light::Directional { .. } => ("directional", None),
-            Light::Quad(_) => ("quad", Some(Channel::Area(index as u32))),
-            Light::Sphere { .. } => ("sphere", Some(Channel::Area(index as u32))),
-        };
+        let channel = light.is_area().then_some(Channel::Area(index as u32));
         let looked_up = kept.of_light(index as u32).is_some();
         let why = channel.map_or_else(
             || "one hard shadow ray is not worth a lookup".into(),
             |channel| why(scene, rays_of(channel, settings), looked_up, settings.spp),
         );
         reasons.push(LookupReason {
-            light: format!("light {}, {kind}", index + 1),
+            light: format!("light {}, {}", index + 1, light.name()),
             looked_up,
             why,
         });
@@ -116,10 +111,9 @@ fn why(scene: &Scene, rays: u32, looked_up: bool, spp: u32) -> String {
 
 /// What a frame costs that cast `rays` and looked `lookups` surface points up.
 pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
-    let shadow = rays.shadow_area + rays.shadow_delta + rays.shadow_sky;
-    CAMERA_RAY * rays.camera as f64
-        + SPECULAR_RAY * (rays.mirror + rays.glass) as f64
-        + SHADOW_RAY * shadow as f64
+    CAMERA_RAY * rays[RayKind::Camera] as f64
+        + SPECULAR_RAY * (rays[RayKind::Mirror] + rays[RayKind::Glass]) as f64
+        + SHADOW_RAY * rays.shadow() as f64
         + LOOKUP * lookups as f64
 }
 

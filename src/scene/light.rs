@@ -1,79 +1,140 @@
 //! Lights: plain data, in world space inside a `World` and in scene space inside a `Scene`.
+//!
+//! One file for each kind says all that a scene needs to know of it ([`LightData`]); nothing else in
+//! this room asks for the kind. How a light shines stands in the room `lights`.
 
-use crate::math::{DVec3, Rgb};
+mod directional;
+mod point;
+mod quad;
+mod sky;
+mod sphere;
+
+pub use directional::DirectionalLight;
+pub use point::PointLight;
+pub use quad::QuadLight;
+pub use sky::Sky;
+pub use sphere::SphereLight;
+
+use super::too_small::Size;
+use super::{Recentring, place};
+use crate::error::Result;
+use crate::math::{Bounds3, DAffine3, DVec3, Rgb, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// A light. Radiometric units: radiance W/(m²·sr), intensity W/sr, irradiance W/m².
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Light {
-    /// A point that emits alike in all directions (a delta light).
-    Point {
-        /// Where it is.
-        position: DVec3,
-        /// Radiant intensity; irradiance at distance d is `intensity / d²` in world units.
-        intensity: Rgb,
-    },
-    /// Parallel light from infinitely far (a delta light).
-    Directional {
-        /// Unit vector from the surface towards the light.
-        to_light: DVec3,
-        /// Irradiance on a surface that faces it.
-        irradiance: Rgb,
-    },
+    /// A point that emits alike in all directions.
+    Point(PointLight),
+    /// Parallel light from infinitely far.
+    Directional(DirectionalLight),
     /// A flat convex quad.
     Quad(QuadLight),
     /// A sphere that emits outwards.
-    Sphere {
-        /// Centre.
-        centre: DVec3,
-        /// Radius, positive.
-        radius: f64,
-        /// Emitted radiance.
-        radiance: Rgb,
-    },
+    Sphere(SphereLight),
 }
 
-/// A flat convex quad that emits from the side its corners run counter-clockwise on.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct QuadLight {
-    /// Corners in order.
-    pub corners: [DVec3; 4],
+/// What a scene needs to know of a kind of light.
+trait LightData {
+    /// The kind, as scene files and messages call it.
+    fn name(&self) -> &'static str;
+
+    /// Whether the light has an extent, so that its shadows are soft and take samples. A delta light has none.
+    fn is_area(&self) -> bool;
+
+    /// Whether every coordinate is a finite number.
+    fn is_finite(&self) -> bool;
+
+    /// The box around what emits, in the light's own space; empty where rays cannot meet it.
+    fn bounds(&self) -> Bounds3;
+
+    /// What of its size rounding to f32 must leave, world space; `None` where there is nothing to lose.
+    fn size(&self) -> Option<Size>;
+
+    /// Moves the light by `transform`, which `mirrors` or does not.
+    ///
+    /// Errors: a transform that would deform the light.
+    fn transform(&mut self, transform: &DAffine3, mirrors: bool) -> Result<()>;
+
+    /// Moves the light from world to scene space.
+    fn recentre(&mut self, recentring: &Recentring);
+
+    /// The surface that rays see, scene space; `None` for a light that is not seen.
+    fn surface(&self) -> Option<EmittingSurface>;
+}
+
+/// The visible surface of a light.
+pub(super) struct EmittingSurface {
+    /// Where it is.
+    pub shape: EmittingShape,
     /// Emitted radiance.
     pub radiance: Rgb,
     /// Whether the back emits too.
     pub two_sided: bool,
 }
 
-impl QuadLight {
-    /// Cross product of the diagonals: twice the area long, along the emitting side's normal.
-    pub fn area_vector(&self) -> DVec3 {
-        (self.corners[2] - self.corners[0]).cross(self.corners[3] - self.corners[1])
-    }
-
-    /// Unit normal of the emitting side.
-    pub fn normal(&self) -> DVec3 {
-        self.area_vector().normalize()
-    }
-
-    /// Area.
-    pub fn area(&self) -> f64 {
-        0.5 * self.area_vector().length()
-    }
+/// The shape of a light's surface, scene space.
+pub(super) enum EmittingShape {
+    /// Triangles between corners, counter-clockwise on the emitting side.
+    Triangles(Vec<Vec3>, Vec<[u32; 3]>),
+    /// An exact sphere: its centre and radius.
+    Sphere(DVec3, f64),
 }
 
-/// What a ray that hits nothing sees, and how it lights surfaces.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Sky {
-    /// Constant background radiance.
-    pub radiance: Rgb,
-    /// Whether that radiance lights diffuse surfaces through occluded sky rays.
-    pub lights: bool,
-    /// Plain ambient term: each diffuse hit gets `albedo · ambient`, without any ray.
-    pub ambient: Rgb,
-}
+impl Light {
+    /// Names of all kinds.
+    pub const KINDS: [&str; 4] = ["point", "directional", "quad", "sphere"];
 
-impl Default for Sky {
-    fn default() -> Self {
-        Self { radiance: Rgb::ZERO, lights: true, ambient: Rgb::ZERO }
+    /// The kind, as scene files and messages call it.
+    pub fn name(&self) -> &'static str {
+        self.data().name()
+    }
+
+    /// Whether the light has an extent, so that its shadows are soft and take samples.
+    pub fn is_area(&self) -> bool {
+        self.data().is_area()
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.data().is_finite()
+    }
+
+    pub(super) fn bounds(&self) -> Bounds3 {
+        self.data().bounds()
+    }
+
+    pub(super) fn size(&self) -> Option<Size> {
+        self.data().size()
+    }
+
+    pub(super) fn transform(&mut self, transform: &DAffine3, mirrors: bool) -> Result<()> {
+        self.data_mut().transform(transform, mirrors)
+    }
+
+    pub(super) fn into_scene(mut self, recentring: &Recentring) -> Self {
+        self.data_mut().recentre(recentring);
+        self
+    }
+
+    pub(super) fn surface(&self) -> Option<EmittingSurface> {
+        self.data().surface()
+    }
+
+    fn data(&self) -> &dyn LightData {
+        match self {
+            Self::Point(light) => light,
+            Self::Directional(light) => light,
+            Self::Quad(light) => light,
+            Self::Sphere(light) => light,
+        }
+    }
+
+    fn data_mut(&mut self) -> &mut dyn LightData {
+        match self {
+            Self::Point(light) => light,
+            Self::Directional(light) => light,
+            Self::Quad(light) => light,
+            Self::Sphere(light) => light,
+        }
     }
 }

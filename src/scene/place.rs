@@ -1,6 +1,6 @@
 //! Putting worlds together: affine transforms, and one world after another.
 
-use super::{Corners, Light, QuadLight, World, WorldMesh};
+use super::{Corners, World, WorldMesh};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -46,7 +46,7 @@ impl World {
         for sphere in &mut self.spheres {
             move_sphere(&sphere.name, &mut sphere.centre, &mut sphere.radius, transform)?;
         }
-        self.lights.iter_mut().try_for_each(|light| move_light(light, transform, mirrors))
+        self.lights.iter_mut().try_for_each(|light| light.transform(transform, mirrors))
     }
 
     /// Adds all that `other` holds, with its indices shifted. The sky stays this world's.
@@ -91,7 +91,7 @@ fn reverse_corners<T>(corners: &mut Corners<T>) {
     corners.corners.iter_mut().for_each(|c| reverse(c));
 }
 
-fn move_sphere(
+pub(super) fn move_sphere(
     name: &str,
     centre: &mut DVec3,
     radius: &mut f64,
@@ -113,30 +113,11 @@ fn move_sphere(
     Ok(())
 }
 
-fn move_light(light: &mut Light, transform: &DAffine3, mirrors: bool) -> Result<()> {
-    match light {
-        Light::Point { position, .. } => *position = transform.transform_point3(*position),
-        Light::Directional { to_light, .. } => {
-            *to_light = transform.transform_vector3(*to_light).normalize_or_zero();
-        }
-        Light::Quad(QuadLight { corners, .. }) => {
-            *corners = corners.map(|c| transform.transform_point3(c));
-            if mirrors {
-                corners.swap(1, 3);
-            }
-        }
-        Light::Sphere { centre, radius, .. } => {
-            move_sphere("a sphere light", centre, radius, transform)?;
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::{DQuat, Rgb};
-    use crate::scene::{Material, WorldSphere};
+    use crate::scene::{Light, Material, QuadLight, WorldSphere};
 
     fn triangle() -> WorldMesh {
         WorldMesh {

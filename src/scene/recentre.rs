@@ -1,8 +1,10 @@
 //! From world space (f64, the user's units) to scene space (f32, about unit size).
 
 use super::{
-    Collapsed, Corners, Light, Material, Mesh, QuadLight, Scene, Sphere, Surface, World, WorldMesh,
-    WorldSphere, too_small, winding,
+    Collapsed, Corners, Light, Material, Mesh, Scene, Sphere, Surface, World, WorldMesh,
+    WorldSphere,
+    light::{EmittingShape, EmittingSurface},
+    too_small, winding,
 };
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Rgb, Vec3};
@@ -50,6 +52,12 @@ impl Recentring {
         p / self.scale() + self.centre
     }
 
+    /// Radiant intensity in scene units, so that the irradiance intensity/d² stays what it was in world units.
+    pub fn intensity_to_scene(&self, intensity: Rgb) -> Rgb {
+        let scale = self.scale();
+        (intensity.as_dvec3() * scale * scale).as_vec3()
+    }
+
     /// A scene length in world units.
     pub fn length_to_world(&self, length: f64) -> f64 {
         length / self.scale()
@@ -68,14 +76,7 @@ impl World {
             bounds.include(s.centre + DVec3::splat(s.radius));
         }
         for light in &self.lights {
-            match light {
-                Light::Quad(q) => q.corners.iter().for_each(|c| bounds.include(*c)),
-                Light::Sphere { centre, radius, .. } => {
-                    bounds.include(*centre - DVec3::splat(*radius));
-                    bounds.include(*centre + DVec3::splat(*radius));
-                }
-                Light::Point { .. } | Light::Directional { .. } => {}
-            }
+            bounds = bounds.union(light.bounds());
         }
         bounds
     }
@@ -83,16 +84,10 @@ impl World {
     /// Refuses lights and spheres whose place is no number: no bounds would hold them. (Meshes
     /// are finite by invariant.)
     fn check_finite(&self) -> Result<()> {
-        let finite = |light: &Light| match light {
-            Light::Point { position, .. } => position.is_finite(),
-            Light::Directional { to_light, .. } => to_light.is_finite(),
-            Light::Quad(q) => q.corners.iter().all(|c| c.is_finite()),
-            Light::Sphere { centre, radius, .. } => centre.is_finite() && radius.is_finite(),
-        };
         let what = |what: &str| {
             Err(Error::Usage(format!("the place or size of {what} is not a finite number")))
         };
-        if let Some(index) = self.lights.iter().position(|l| !finite(l)) {
+        if let Some(index) = self.lights.iter().position(|l| !l.is_finite()) {
             return what(&format!("light {}", index + 1));
         }
         match self.spheres.iter().find(|s| !(s.centre.is_finite() && s.radius.is_finite())) {
@@ -128,7 +123,7 @@ impl World {
         }
         let lights: Vec<Light> = std::mem::take(&mut self.lights)
             .into_iter()
-            .map(|l| to_scene_light(l, &recentring))
+            .map(|light| light.into_scene(&recentring))
             .collect();
         let to_scene_box = |b: &Bounds3| Bounds3 {
             min: recentring.point_to_scene(b.min),
@@ -177,26 +172,6 @@ impl World {
             bounds: scene_bounds,
             collapsed,
         })
-    }
-}
-
-fn to_scene_light(light: Light, r: &Recentring) -> Light {
-    let scale = r.scale();
-    match light {
-        // Irradiance intensity/d² stays what it was in world units.
-        Light::Point { position, intensity } => Light::Point {
-            position: r.point_to_scene(position),
-            intensity: (intensity.as_dvec3() * scale * scale).as_vec3(),
-        },
-        Light::Directional { .. } => light,
-        Light::Quad(q) => {
-            // The emitting mesh holds f32 corners; the light uses the very same points.
-            let corners = q.corners.map(|c| r.point_to_scene(c).as_vec3().as_dvec3());
-            Light::Quad(QuadLight { corners, ..q })
-        }
-        Light::Sphere { centre, radius, radiance } => {
-            Light::Sphere { centre: r.point_to_scene(centre), radius: radius * scale, radiance }
-        }
     }
 }
 
@@ -284,31 +259,23 @@ fn add_emitting_surface(
     meshes: &mut Vec<Mesh>,
     spheres: &mut Vec<Sphere>,
 ) {
-    let mut emitter = |radiance: Rgb, emits_back: bool| {
-        let name = format!("light {}", index + 1);
-        materials.push(Material { emission: radiance, emits_back, ..Material::black(name) });
-        let material = materials.len() as u32 - 1;
-        Surface { material, light: Some(index), always_traced: false }
-    };
+    let Some(emitting) = light.surface() else { return };
     let name = format!("light {}", index + 1);
-    match light {
-        Light::Quad(q) => {
-            let surface = emitter(q.radiance, q.two_sided);
-            let positions = q.corners.iter().map(|c| c.as_vec3()).collect();
-            meshes.push(scene_mesh(
-                name,
-                positions,
-                vec![[0, 1, 2], [0, 2, 3]],
-                None,
-                None,
-                surface,
-            ));
+    let EmittingSurface { shape, radiance, two_sided } = emitting;
+    materials.push(Material {
+        emission: radiance,
+        emits_back: two_sided,
+        ..Material::black(name.clone())
+    });
+    let material = materials.len() as u32 - 1;
+    let surface = Surface { material, light: Some(index), always_traced: false };
+    match shape {
+        EmittingShape::Triangles(corners, triangles) => {
+            meshes.push(scene_mesh(name, corners, triangles, None, None, surface));
         }
-        Light::Sphere { centre, radius, radiance } => {
-            let surface = emitter(*radiance, false);
-            spheres.push(Sphere { name, centre: *centre, radius: *radius, surface });
+        EmittingShape::Sphere(centre, radius) => {
+            spheres.push(Sphere { name, centre, radius, surface });
         }
-        Light::Point { .. } | Light::Directional { .. } => {}
     }
 }
 

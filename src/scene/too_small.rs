@@ -1,6 +1,6 @@
 //! What rounding to f32 would make nothing of: refused by name, or counted.
 
-use super::{Light, Recentring, World};
+use super::{Recentring, World};
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ pub(super) fn refuse(world: &World, r: &Recentring) -> Result<()> {
     for mesh in &world.meshes {
         let mut bounds = Bounds3::EMPTY;
         mesh.positions.iter().for_each(|p| bounds.include(*p));
-        refuse_crushed_box(&mesh.name, &bounds, r)?;
+        refuse_flattened(&mesh.name, &bounds, r)?;
     }
     // Spheres stay f64, so their place does not matter.
     for s in &world.spheres {
@@ -31,17 +31,21 @@ pub(super) fn refuse(world: &World, r: &Recentring) -> Result<()> {
     }
     for (index, light) in world.lights.iter().enumerate() {
         let name = format!("light {}", index + 1);
-        match light {
-            Light::Quad(q) => {
-                let mut bounds = Bounds3::EMPTY;
-                q.corners.iter().for_each(|c| bounds.include(*c));
-                refuse_crushed_box(&name, &bounds, r)?;
-            }
-            Light::Sphere { radius, .. } => refuse_narrower(&name, 2.0 * radius, r, NARROWEST)?,
-            Light::Point { .. } | Light::Directional { .. } => {}
+        match light.size() {
+            Some(Size::Triangles(bounds)) => refuse_flattened(&name, &bounds, r)?,
+            Some(Size::Exact(width)) => refuse_narrower(&name, width, r, NARROWEST)?,
+            None => {}
         }
     }
     Ok(())
+}
+
+/// How large something is that rounding to f32 could make nothing of, world space.
+pub(super) enum Size {
+    /// Triangles within this box, whose corners are rounded.
+    Triangles(Bounds3),
+    /// The width of a shape that stays f64.
+    Exact(f64),
 }
 
 /// Widths of scene space: what is narrower has triangles whose determinants underflow in f32.
@@ -52,7 +56,7 @@ const FEWEST_STEPS: f64 = 8.0;
 
 /// Errors for triangles within `bounds` (world) whose corners would fall together in f32. What is
 /// a point in f64 already is nothing that could be lost.
-fn refuse_crushed_box(name: &str, bounds: &Bounds3, r: &Recentring) -> Result<()> {
+fn refuse_flattened(name: &str, bounds: &Bounds3, r: &Recentring) -> Result<()> {
     let largest = r.point_to_scene(bounds.min).abs().max(r.point_to_scene(bounds.max).abs());
     let step = f64::from(f32::EPSILON) * largest.max_element();
     let width = bounds.extent().max_element();

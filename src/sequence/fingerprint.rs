@@ -165,6 +165,7 @@ impl Hash {
 mod tests {
     use super::*;
     use crate::math::{Bounds3, DVec3, Rgb, Vec3};
+    use crate::scene::PointLight;
     use crate::scene::{CameraPath, Easing, Light, Material, Pose};
 
     fn world() -> World {
@@ -224,14 +225,14 @@ mod tests {
         named.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }];
         assert_eq!(base, hash(&named).light());
         assert_ne!(base, hash(&named).whole());
-        named.lights.push(Light::Point { position: DVec3::Y, intensity: Rgb::ONE });
+        named.lights.push(Light::Point(PointLight { position: DVec3::Y, intensity: Rgb::ONE }));
         assert_ne!(base, hash(&named).light());
     }
 
     #[test]
     fn parts_have_names_however_many_there_are() {
         let mut many = world();
-        let light = Light::Point { position: DVec3::Y, intensity: Rgb::ONE };
+        let light = Light::Point(PointLight { position: DVec3::Y, intensity: Rgb::ONE });
         many.lights = vec![light; 500];
         let named = WorldHash::of(&many).named();
         assert!(named.contains_key("mesh 1 `a`") && named.contains_key("material `m`"));
@@ -239,7 +240,7 @@ mod tests {
         let last =
             |world: &World| WorldHash::of(world).named()["one of the parts after light 64"].clone();
         let before = last(&many);
-        many.lights[499] = Light::Point { position: DVec3::X, intensity: Rgb::ONE };
+        many.lights[499] = Light::Point(PointLight { position: DVec3::X, intensity: Rgb::ONE });
         assert_ne!(last(&many), before);
     }
 }

@@ -125,6 +125,7 @@ pub fn unpack<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> Result<T> {
 mod tests {
     use super::*;
     use crate::film::Provenance;
+    use crate::stats::RayKind;
 
     #[test]
     fn strips_are_whole_blocks_and_cover_every_row_once() {
@@ -153,7 +154,7 @@ mod tests {
         }
         film.gbuffer.iter_mut().for_each(|g| g.depth[7] = 3.5);
         film.sources = Some(pixel_sources);
-        let rays = RayCounts { camera: 3, ..RayCounts::default() };
+        let rays = RayCounts::of(RayKind::Camera, 3);
         let rendered = |film: &Film| Rendered {
             film: film.clone(),
             rays,
@@ -164,7 +165,7 @@ mod tests {
         let bytes = |number| encode(rendered(&film), strip(number)).expect("packed").into();
         let strips: Vec<Arc<[u8]>> = (0..3).map(bytes).collect();
         let joined = join(&strips, width, height).expect("joined");
-        assert_eq!((&joined.film, joined.rays.camera), (&film, 9));
+        assert_eq!((&joined.film, joined.rays[RayKind::Camera]), (&film, 9));
         assert!(join(&strips[..2], width, height).is_err());
         assert!(join(&[vec![1, 2, 3].into()], width, height).is_err());
     }

@@ -5,6 +5,7 @@ use crate::math::DVec3;
 use crate::output::manifest::{FORMAT, Foreign, Header, Manifest, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
 use crate::scene::{CameraPath, Easing, FrameRange, KeyPose, Pose, Settings};
+use crate::stats::RayKind;
 use std::cell::RefCell;
 use std::fs;
 use std::path::PathBuf;
@@ -26,7 +27,7 @@ impl FrameMaker for Plain {
         self.made.borrow_mut().push(frame);
         let mut film = Film::new(4, 2, false);
         film.rgb[0].x = frame as f32 / 255.0 * self.settings.exposure;
-        let rays = RayCounts { camera: 8, ..RayCounts::default() };
+        let rays = RayCounts::of(RayKind::Camera, 8);
         Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
     }
 }

@@ -4,7 +4,7 @@
 //! Points behind mirrors and glass stay apart, since neighbouring samples may end far from one
 //! another there. What is traced is gathered per surface point and becomes a source.
 
-use super::lighting::ShadingPoint;
+use super::direct::ShadingPoint;
 use super::pixels::{BLOCK, BlockPixels};
 use super::{FrameInput, Reuse};
 use crate::inference::{

@@ -5,7 +5,7 @@
 //! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
-use super::lighting::{ShadingPoint, ShadowScratch};
+use super::direct::{ShadingPoint, ShadowScratch};
 use super::medium_stack::{self, MediumStack};
 use super::optics;
 use super::pixels::BlockPixels;
@@ -16,7 +16,7 @@ use crate::inference::SAMPLES_TOGETHER;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
 use crate::scene::Material;
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 
 /// Boundaries of ranked glass that a ray passes without another medium behind them.
 const MOST_PASSED: usize = 1024;
@@ -78,13 +78,7 @@ fn gather<T: Copy>(order: &[(u32, u32)], from: &[T], to: &mut Vec<T>) {
 /// Renders one block into `pixels`, which holds its radiance sums and records.
 ///
 /// `NESTED` is glass with priorities, on top of `GLASS`.
-pub(super) fn block<
-    const MIRROR: bool,
-    const GLASS: bool,
-    const NESTED: bool,
-    const AREA: bool,
-    const SKY: bool,
->(
+pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     renderer: &Renderer,
     input: &FrameInput,
     pixels: &mut BlockPixels,
@@ -98,14 +92,14 @@ pub(super) fn block<
         let last = first.saturating_add(SAMPLES_TOGETHER).min(renderer.settings.spp);
         pixels.start_samples(renderer.settings.spp, &input.filter, first..last);
         camera_rays(input, pixels, first..last, scratch);
-        counts.camera += scratch.rays.len() as u64;
+        counts[RayKind::Camera] += scratch.rays.len() as u64;
         if NESTED {
             scratch.interiors.clear();
             scratch.interiors.resize(scratch.rays.len(), input.around_eye);
         }
         trace_paths::<MIRROR, GLASS, NESTED>(renderer, input, pixels, scratch, &mut counts);
         let Scratch { lit, shadow, .. } = scratch;
-        renderer.light_points::<AREA, SKY>(input, lit, pixels, shadow, &mut counts);
+        renderer.light_points(input, lit, pixels, shadow, &mut counts);
         if let Some(reuse) = &input.reuse {
             shadow.groups.finish(reuse, pixels, &mut left.sources, &mut left.reuse);
         }
@@ -229,7 +223,7 @@ impl Vertex<'_, '_> {
             }
             inside = crossing.after;
             ray = crossing.last.spawn(ray.dir, renderer.settings.rules.spawn_offset);
-            self.counts.glass += 1;
+            self.counts[RayKind::Glass] += 1;
             hit = renderer.intersector.intersect(&ray, self.counts);
         }
         // Given up, and not silently.
@@ -287,7 +281,7 @@ impl Vertex<'_, '_> {
         let dir = optics::keep_side(optics::reflect(wo, si.ns), si.ng, si.is_outside(wo));
         let weight = state.throughput * material.mirror;
         if self.push::<NESTED>((si, inside), dir, state, weight, 2) {
-            self.counts.mirror += 1;
+            self.counts[RayKind::Mirror] += 1;
         }
     }
 
@@ -305,12 +299,12 @@ impl Vertex<'_, '_> {
         let reflected = optics::keep_side(optics::reflect(wo, si.ns), si.ng, outside);
         let weight = state.throughput * split.reflectance as f32;
         let sent = self.push::<NESTED>(scattered.reflected, reflected, state, weight, 2);
-        self.counts.glass += u64::from(sent);
+        self.counts[RayKind::Glass] += u64::from(sent);
         if let Some(refracted) = split.refracted {
             let refracted = optics::keep_side(refracted, si.ng, !outside);
             let weight = state.throughput * (1.0 - split.reflectance) as f32 * interface.tint;
             let sent = self.push::<NESTED>(scattered.refracted, refracted, state, weight, 3);
-            self.counts.glass += u64::from(sent);
+            self.counts[RayKind::Glass] += u64::from(sent);
         }
     }
 
@@ -358,8 +352,8 @@ struct ScatteredRays<'w> {
 }
 
 impl PathState {
-    fn place(&self) -> super::lighting::SamplePlace {
-        super::lighting::SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
+    fn place(&self) -> super::direct::SamplePlace {
+        super::direct::SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
     }
 }
 

@@ -1,176 +1,150 @@
-//! Samples on area lights, and what delta lights send: before any shadow ray.
+//! How lights shine on a surface point, before any shadow ray.
+//!
+//! Takes a light and a point with its normal; gives the irradiance that would arrive if nothing were in
+//! the way, and samples of the light that say where shadow rays go. One file for each kind; nothing else
+//! in `shade` asks for the kind.
+
+mod directional;
+mod point;
+mod quad;
+mod sky;
+mod sphere;
 
 use super::irradiance;
-use crate::intersect::{Facet, Target};
+use crate::intersect::Target;
 use crate::math::{DVec3, Rgb};
-use crate::sampling::{QuadWarp, SphereCone};
-use crate::scene::Light;
+use crate::scene::{Light, Sky};
+use directional::Directional;
+use point::Point;
+use quad::{Quad, QuadView};
+use sky::{SkyDome, SkyView};
+use sphere::{Sphere, SphereView};
 
-/// A point on an area light as seen from a surface point.
+/// A light that is sampled, with all that its samples need: made once a frame.
+pub struct LightSampler {
+    /// What the light emits: radiance of an area light and of the sky, intensity of a point light, irradiance of
+    /// a directional one.
+    pub emission: Rgb,
+    shape: Shape,
+}
+
+/// What differs by the kind of light.
+#[allow(clippy::large_enum_variant)] // A handful of lights: nothing to gain from a box.
+enum Shape {
+    Point(Point),
+    Directional(Directional),
+    Quad(Quad),
+    Sphere(Sphere),
+    Sky(SkyDome),
+}
+
+/// A light as seen from one surface point.
+pub struct LightView<'a>(View<'a>);
+
+enum View<'a> {
+    Point(&'a Point),
+    Directional(&'a Directional),
+    Quad(QuadView<'a>),
+    Sphere(SphereView),
+    Sky(SkyView),
+}
+
+/// A point of a light, or a direction to it, as seen from a surface point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSample {
-    /// The point, scene space.
-    pub target: Target,
+    /// Where the shadow ray goes.
+    pub target: ShadowTarget,
     /// Unshadowed irradiance that the sample stands for, up to a factor that all samples of one
     /// surface point share; 0 where the light does not shine.
     pub weight: f64,
 }
 
-/// An area light with what sampling it needs, computed once a frame.
-#[allow(clippy::large_enum_variant)] // A handful of lights: nothing to gain from a box.
-pub enum AreaLight {
-    /// A flat quad.
-    Quad {
-        /// Uniform points on it.
-        warp: QuadWarp,
-        /// Corners.
-        corners: [DVec3; 4],
-        /// Unit normal of the emitting side.
-        normal: DVec3,
-        /// Whether the back emits too.
-        two_sided: bool,
-        /// What f32 may make of its two triangles.
-        facet: Facet,
-    },
-    /// A sphere.
-    Sphere {
-        /// Centre.
-        centre: DVec3,
-        /// Radius.
-        radius: f64,
-    },
+/// Where a shadow ray goes, scene space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ShadowTarget {
+    /// To a point of a light.
+    Point(Target),
+    /// Along this direction without end, from the smooth surface that the facet stands for.
+    Direction(DVec3),
+    /// Along this direction without end, from the facet.
+    Sky(DVec3),
 }
 
-/// An area light as seen from one surface point.
-pub enum SeenLight<'a> {
-    /// A quad: its points, unit normal and facets.
-    Quad(&'a QuadWarp, DVec3, Facet),
-    /// A sphere: its cone of directions, and centre.
-    Sphere(SphereCone, DVec3),
-}
-
-impl AreaLight {
-    /// Prepares `light`; `None` for delta lights.
-    pub fn new(light: &Light) -> Option<Self> {
-        match light {
-            Light::Quad(q) => Some(Self::Quad {
-                warp: QuadWarp::new(q.corners),
-                corners: q.corners,
-                normal: q.normal(),
-                two_sided: q.two_sided,
-                facet: Facet::of_quad(&q.corners),
-            }),
-            Light::Sphere { centre, radius, .. } => {
-                Some(Self::Sphere { centre: *centre, radius: *radius })
+impl LightSampler {
+    /// Prepares `light`, scene space.
+    pub fn new(light: &Light) -> Self {
+        let (emission, shape) = match light {
+            Light::Point(light) => (light.intensity, Shape::Point(Point::new(light))),
+            Light::Directional(light) => {
+                (light.irradiance, Shape::Directional(Directional::new(light)))
             }
-            Light::Point { .. } | Light::Directional { .. } => None,
+            Light::Quad(light) => (light.radiance, Shape::Quad(Quad::new(light))),
+            Light::Sphere(light) => (light.radiance, Shape::Sphere(Sphere::new(light))),
+        };
+        Self { emission, shape }
+    }
+
+    /// Prepares the constant sky.
+    pub fn of_sky(sky: &Sky) -> Self {
+        Self { emission: sky.radiance, shape: Shape::Sky(SkyDome) }
+    }
+
+    /// Unshadowed irradiance at `p` with unit normal `n`, per unit of emission; 0 where no light can arrive.
+    /// NaN goes on, to be counted at its pixel.
+    pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {
+        match &self.shape {
+            Shape::Point(light) => light.unshadowed(p, n),
+            Shape::Directional(light) => light.unshadowed(n),
+            Shape::Quad(light) => light.unshadowed(p, n),
+            Shape::Sphere(light) => light.unshadowed(p, n),
+            Shape::Sky(sky) => sky.unshadowed(),
         }
     }
 
-    /// Unshadowed irradiance at `p` with unit normal `n` per unit radiance; 0 where no light can arrive.
-    pub fn irradiance(&self, p: DVec3, n: DVec3) -> f64 {
-        match self {
-            Self::Quad { corners, normal, two_sided, .. } => {
-                if !two_sided && normal.dot(p - corners[0]) <= 0.0 {
-                    return 0.0;
-                }
-                irradiance::polygon(p, n, corners)
-            }
-            Self::Sphere { centre, radius } => irradiance::sphere(p, n, *centre, *radius),
-        }
-    }
-
-    /// The light as seen from `p`; `None` from within.
-    pub fn seen_from(&self, p: DVec3) -> Option<SeenLight<'_>> {
-        Some(match self {
-            Self::Quad { warp, normal, facet, .. } => SeenLight::Quad(warp, *normal, *facet),
-            Self::Sphere { centre, radius } => {
-                SeenLight::Sphere(SphereCone::new(*centre, *radius, p)?, *centre)
-            }
-        })
+    /// The light as seen from `p` with unit normal `n`; `None` from within.
+    pub fn seen_from(&self, p: DVec3, n: DVec3) -> Option<LightView<'_>> {
+        Some(LightView(match &self.shape {
+            Shape::Point(light) => View::Point(light),
+            Shape::Directional(light) => View::Directional(light),
+            Shape::Quad(light) => View::Quad(light.seen()),
+            Shape::Sphere(light) => View::Sphere(light.seen_from(p)?),
+            Shape::Sky(_) => View::Sky(SkyView::above(n)),
+        }))
     }
 }
 
-impl SeenLight<'_> {
+impl LightView<'_> {
+    /// The light's point or direction for `u` in the unit square, as seen from `p` with unit normal `n`.
+    pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
+        match &self.0 {
+            View::Point(light) => light.sample_li(p),
+            View::Directional(light) => light.sample_li(),
+            View::Quad(light) => light.sample_li(p, n, u),
+            View::Sphere(light) => light.sample_li(p, n, u),
+            View::Sky(sky) => sky.sample_li(n, u),
+        }
+    }
+
     /// A point of the light above the horizon of `n`, in the middle of what is: for slivers that
     /// no sample meets. `None` where nothing is.
     pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
-        match self {
-            Self::Quad(warp, normal, facet) => {
-                let point = irradiance::middle_above(p, n, &warp.corners())?;
-                let target = Target { point, normal: *normal, facet: *facet };
-                Some(LightSample { target, weight: 1.0 })
-            }
-            Self::Sphere(cone, centre) => {
-                let (dir, distance) = cone.above(n)?;
-                let point = p + dir * distance;
-                let normal = (point - *centre).normalize();
-                let target = Target { point, normal, facet: Facet::EXACT };
-                Some(LightSample { target, weight: 1.0 })
-            }
-        }
-    }
-
-    /// The light's point for `u` in the unit square: uniform over area (quad) or over solid angle
-    /// (sphere; Shirley, Wang and Zimmerman, 1996).
-    pub fn sample(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
-        match self {
-            Self::Quad(warp, normal, facet) => {
-                let point = warp.point(u);
-                let to_light = point - p;
-                let d2 = to_light.length_squared();
-                let cos_light = to_light.dot(*normal).abs();
-                let weight = (to_light.dot(n) * cos_light / (d2 * d2)).max(0.0);
-                LightSample { target: Target { point, normal: *normal, facet: *facet }, weight }
-            }
-            Self::Sphere(cone, centre) => {
-                let (dir, distance) = cone.direction(u);
-                let point = p + dir * distance;
-                let normal = (point - *centre).normalize();
-                let target = Target { point, normal, facet: Facet::EXACT };
-                LightSample { target, weight: dir.dot(n).max(0.0) }
-            }
+        match &self.0 {
+            View::Quad(light) => light.above(p, n),
+            View::Sphere(light) => light.above(p, n),
+            // Each sample of these lies above.
+            View::Point(_) | View::Directional(_) | View::Sky(_) => None,
         }
     }
 }
 
-/// Radiance of an area light; zero for delta lights.
-pub fn radiance(light: &Light) -> Rgb {
-    match light {
-        Light::Quad(q) => q.radiance,
-        Light::Sphere { radiance, .. } => *radiance,
-        Light::Point { .. } | Light::Directional { .. } => Rgb::ZERO,
-    }
-}
-
-/// What a delta light sends to `p` with unit normal `n`: irradiance, unshadowed, and where the
-/// shadow ray goes. `None` where it does not shine or for area lights.
-pub fn delta(light: &Light, p: DVec3, n: DVec3) -> Option<(Rgb, ShadowTarget)> {
-    match light {
-        Light::Point { position, intensity } => {
-            let to_light = *position - p;
-            let d2 = to_light.length_squared();
-            let cos = to_light.dot(n) / d2.sqrt();
-            lit(cos).then(|| (*intensity * (cos / d2) as f32, ShadowTarget::Point(*position)))
-        }
-        Light::Directional { to_light, irradiance } => {
-            let cos = to_light.dot(n);
-            lit(cos).then(|| (*irradiance * cos as f32, ShadowTarget::Direction(*to_light)))
-        }
-        Light::Quad(_) | Light::Sphere { .. } => None,
+impl LightSample {
+    /// The one sample of a delta light.
+    fn of_delta(target: ShadowTarget) -> Self {
+        Self { target, weight: 1.0 }
     }
 }
 
 /// Whether light arrives from above; NaN goes on, to be counted at its pixel.
-fn lit(cos: f64) -> bool {
+fn is_lit(cos: f64) -> bool {
     cos > 0.0 || cos.is_nan()
-}
-
-/// Where a shadow ray to a delta light goes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ShadowTarget {
-    /// To a point.
-    Point(DVec3),
-    /// Without end.
-    Direction(DVec3),
 }

@@ -13,7 +13,7 @@ use super::Renderer;
 use crate::intersect::{Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Glass, MaterialId, Scene};
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 
 /// Bodies that one point can be in; of more, the lowest priority is forgotten.
 const MOST_BODIES: usize = 8;
@@ -180,7 +180,7 @@ impl Touching {
             }
             let exclude = found[count - 1].prim;
             let probe = Ray { org, tnear, tfar, exclude, ..*ray };
-            counts.glass += 1;
+            counts[RayKind::Glass] += 1;
             let Some(hit) = renderer.intersector.intersect(&probe, counts) else { break };
             let si = SurfaceInteraction::new(scene, &probe, &hit);
             if si.prim == ray.exclude || found[..count].iter().any(|c| c.prim == si.prim) {

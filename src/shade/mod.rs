@@ -6,11 +6,12 @@
 //!
 //! Not done: light through glass (its shadow is opaque), glossy lobes, diffuse interreflection.
 
+mod dimensions;
+mod direct;
 mod groups;
 mod irradiance;
 mod kernel;
 pub(crate) mod light;
-mod lighting;
 mod medium_stack;
 mod motion;
 pub mod optics;
@@ -26,9 +27,9 @@ use crate::math::Rgb;
 use crate::sampling::PixelFilter;
 use crate::scene::{Camera, Filter, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
+use direct::LightSource;
+pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
-use light::AreaLight;
-pub(crate) use lighting::ShadowStarts;
 use medium_stack::MediumStack;
 use pixels::{BLOCK, BlockPixels, FinishedPixel};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -106,27 +107,13 @@ struct FrameInput<'a> {
     pixel_size: f64,
     stream: u32,
     filter: PixelFilter,
-    /// For each light of the scene, its area form.
-    area_lights: Vec<Option<AreaLight>>,
+    /// The lights that shine, the sky last.
+    lights: Vec<LightSource>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: MediumStack,
     reuse: Option<Reuse<'a>>,
     /// Whether any light must be traced in every frame.
     has_always_traced: bool,
-}
-
-impl FrameInput<'_> {
-    /// The channel of a light with the number of channels, if its ratio is kept.
-    fn channel_of(&self, light: u32) -> Option<(usize, usize)> {
-        let channels = self.reuse?.channels;
-        channels.of_light(light).map(|c| (c, channels.len()))
-    }
-
-    /// That of the sky.
-    fn sky_channel(&self) -> Option<(usize, usize)> {
-        let channels = self.reuse?.channels;
-        channels.sky().map(|c| (c, channels.len()))
-    }
 }
 
 /// What blocks leave behind beside their pixels.
@@ -228,7 +215,7 @@ impl Renderer<'_> {
             pixel_size: own.pixel_size(),
             stream,
             filter: pixel_filter(self.settings.filter),
-            area_lights: self.scene.lights.iter().map(AreaLight::new).collect(),
+            lights: self.light_sources(reuse),
             around_eye,
             reuse,
             has_always_traced: self.scene.has_always_traced(),
@@ -265,31 +252,17 @@ impl Renderer<'_> {
         Some(out)
     }
 
-    /// The kernel that the plan calls for: one of twenty-four.
+    /// The kernel that the plan calls for: one of six. Lights need none of their own, since it loops over
+    /// those that shine.
     fn kernel(&self) -> BlockKernel {
-        let EffectPlan { mirror, glass, nested_glass, area_lights, sky_light, .. } = self.plan;
-        macro_rules! choose {
-            ($([$m:literal $g:literal $n:literal $a:literal $s:literal])*) => {
-                match (mirror, glass, glass && nested_glass, area_lights, sky_light) {
-                    $(($m, $g, $n, $a, $s) => kernel::block::<$m, $g, $n, $a, $s>,)*
-                    // Nested glass is glass.
-                    (_, false, true, _, _) => unreachable!(),
-                }
-            };
-        }
-        choose! {
-            [false false false false false] [false false false false true]
-            [false false false true false] [false false false true true]
-            [false true false false false] [false true false false true]
-            [false true false true false] [false true false true true]
-            [false true true false false] [false true true false true]
-            [false true true true false] [false true true true true]
-            [true false false false false] [true false false false true]
-            [true false false true false] [true false false true true]
-            [true true false false false] [true true false false true]
-            [true true false true false] [true true false true true]
-            [true true true false false] [true true true false true]
-            [true true true true false] [true true true true true]
+        let EffectPlan { mirror, glass, nested_glass, .. } = self.plan;
+        match (mirror, glass, nested_glass) {
+            (false, false, _) => kernel::block::<false, false, false>,
+            (false, true, false) => kernel::block::<false, true, false>,
+            (false, true, true) => kernel::block::<false, true, true>,
+            (true, false, _) => kernel::block::<true, false, false>,
+            (true, true, false) => kernel::block::<true, true, false>,
+            (true, true, true) => kernel::block::<true, true, true>,
         }
     }
 }

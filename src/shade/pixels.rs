@@ -1,5 +1,6 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
+use super::dimensions;
 use crate::film::{GPixel, PixelSource, Provenance};
 use crate::inference::{Origin, SAMPLES_TOGETHER};
 use crate::math::Rgb;
@@ -12,9 +13,6 @@ use std::ops::Range;
 pub(super) const BLOCK: u32 = 8;
 /// What no light looks like.
 const MAGENTA: Rgb = Rgb::new(1.0, 0.0, 1.0);
-/// Dimension of the camera samples' pixel positions.
-const FILM_DIMENSION: u32 = 0;
-
 /// One block's pixels, in 4 x 4 sub-blocks so that the rays of a packet, which follow this order, are
 /// neighbours.
 pub(super) struct BlockPixels {
@@ -70,7 +68,7 @@ pub(super) fn offsets_of(
     let mut u = [[0.5; 2]; SAMPLES_TOGETHER as usize];
     let count = samples.len();
     if spp > 1 {
-        sampler.fill2(samples.start, FILM_DIMENSION, &mut u[..count]);
+        sampler.fill2(samples.start, dimensions::FILM, &mut u[..count]);
     }
     u.into_iter().take(count).map(move |u| if spp > 1 { filter.offset2(u) } else { [0.0; 2] })
 }

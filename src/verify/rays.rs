@@ -6,7 +6,7 @@ use crate::math::DVec3;
 use crate::sampling::mix;
 use crate::scene::Light;
 use crate::shade::ShadowStarts;
-use crate::shade::light::{self, AreaLight};
+use crate::shade::light::{LightSampler, ShadowTarget};
 use crate::stats::RayCounts;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -90,12 +90,12 @@ impl Lit {
     /// A ray to a random point of the light that the renderer's sampling gives; `None` where the
     /// light does not shine or the point lies below the horizon.
     fn ray_to(&self, light: &Light, rng: &mut Pcg64) -> Option<Ray> {
-        if let Some(area) = AreaLight::new(light) {
-            let seen = area.seen_from(self.p).filter(|_| area.irradiance(self.p, self.n) != 0.0)?;
-            let sample = seen.sample(self.p, self.n, [rng.random(), rng.random()]);
-            return (sample.weight > 0.0).then(|| self.starts.smooth.to(&sample.target));
-        }
-        Some(self.starts.ray_to_delta(self.p, light::delta(light, self.p, self.n)?.1))
+        let sampler = LightSampler::new(light);
+        let seen = sampler.seen_from(self.p, self.n);
+        let seen = seen.filter(|_| sampler.unshadowed(self.p, self.n) != 0.0)?;
+        let u = if light.is_area() { [rng.random(), rng.random()] } else { [0.5; 2] };
+        let sample = seen.sample_li(self.p, self.n, u);
+        (sample.weight > 0.0).then(|| self.starts.ray_to(&sample.target))
     }
 }
 
@@ -206,7 +206,8 @@ impl Check<'_> {
             }
         }
         let dir = direction(rng);
-        Some(lit.starts.facet.along(if dir.dot(lit.ng) < 0.0 { -dir } else { dir }))
+        let above = if dir.dot(lit.ng) < 0.0 { -dir } else { dir };
+        Some(lit.starts.ray_to(&ShadowTarget::Sky(above)))
     }
 
     /// Where the renderer's shadow rays start.

@@ -8,6 +8,7 @@ use crate::measure::Median;
 use crate::output::atomic;
 use crate::output::manifest::Header;
 use crate::page::accuracy::KnobText;
+use crate::stats::RayKind;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -81,15 +82,17 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
     atomic::write(folder.join("accuracy.csv"), |w| w.write_all(csv.as_bytes())).map(drop)
 }
 
-/// What the page's tables have, a column each. Rays by kind are those of a turn, as in the JSON.
-const HEAD: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,cpu_seconds_low,\
+/// What the page's tables have, a column each, up to the rays of a turn by kind.
+const BEFORE_RAYS: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,cpu_seconds_low,\
     cpu_seconds_high,time_ratio,time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
-    error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame,\
-    rays_camera,rays_mirror,rays_glass,rays_shadow_area,rays_shadow_delta,rays_shadow_sky,rays_retry,\
-    rays_invalid,build_seconds,memory_bytes,on_front,on_cpu_front\n";
+    error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame";
+/// The columns after those.
+const AFTER_RAYS: &str = "build_seconds,memory_bytes,on_front,on_cpu_front";
 
 fn csv(rows: &[Row]) -> String {
-    HEAD.to_string() + &rows.iter().map(line).collect::<String>()
+    let rays = RayKind::ALL.map(|kind| format!("rays_{}", kind.key())).join(",");
+    let head = format!("{BEFORE_RAYS},{rays},{AFTER_RAYS}\n");
+    head + &rows.iter().map(line).collect::<String>()
 }
 
 fn line(row: &Row) -> String {
@@ -110,7 +113,7 @@ fn line(row: &Row) -> String {
     cells.extend(ratio(&row.error_ratio));
     cells.push(row.change.map_or(String::new(), |c| c.over_2.to_string()));
     cells.push(number(row.rays_per_frame));
-    cells.extend(row.rays.by_kind().map(|(_, n)| n.to_string()));
+    cells.extend(RayKind::ALL.map(|kind| row.rays[kind].to_string()));
     cells.push(number(row.build_seconds.median.interval.estimate));
     cells.push(row.memory_bytes.to_string());
     cells.push(row.on_front.to_string());

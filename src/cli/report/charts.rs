@@ -3,7 +3,7 @@
 use super::Job;
 use crate::output::manifest::Row;
 use crate::page::{Chart, Series, Span, Timeline};
-use crate::stats::RayCounts;
+use crate::stats::RayKind;
 
 /// All charts that there is something to say in.
 pub fn all(job: &Job) -> Vec<Chart> {
@@ -54,22 +54,11 @@ fn reuse(job: &Job) -> Option<Chart> {
     })
 }
 
-/// A kind of rays: its name, and how many there are.
-type Kind = (&'static str, fn(&RayCounts) -> u64);
-
 fn rays(job: &Job) -> Chart {
-    let kinds: [Kind; 7] = [
-        ("camera", |r| r.camera),
-        ("mirror", |r| r.mirror),
-        ("glass", |r| r.glass),
-        ("shadow, area lights", |r| r.shadow_area),
-        ("shadow, other lights", |r| r.shadow_delta),
-        ("sky", |r| r.shadow_sky),
-        ("second tries", |r| r.retry),
-    ];
     let millions = |count: u64| (count > 0).then_some(count as f64 * 1e-6);
-    let bars = kinds.map(|(name, of)| series(job, name, |row| millions(of(&row.rays))));
-    let cast = bars.into_iter().filter(|s| s.values.iter().any(Option::is_some));
+    let bars =
+        RayKind::traced().map(|kind| series(job, kind.name(), |row| millions(row.rays[kind])));
+    let cast = bars.filter(|s| s.values.iter().any(Option::is_some));
     Chart {
         caption: "Rays per frame".into(),
         unit: " M".into(),

@@ -8,7 +8,7 @@ use crate::page::Table;
 use crate::page::words::{bytes, count, date, percent, seconds, short, steps};
 use crate::reuse::of_frame;
 use crate::sequence::audit_row;
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -23,15 +23,6 @@ pub fn effects(job: &Job) -> Table {
     let reuse = job.reuse();
     let lookups = reuse.direct + reuse.specular;
     let none = RayCounts::default();
-    let parts = [
-        ("Camera rays", RayCounts { camera: rays.camera, ..none }),
-        ("Mirrors", RayCounts { mirror: rays.mirror, ..none }),
-        ("Glass", RayCounts { glass: rays.glass, ..none }),
-        ("Soft shadows of area lights", RayCounts { shadow_area: rays.shadow_area, ..none }),
-        ("Hard shadows", RayCounts { shadow_delta: rays.shadow_delta, ..none }),
-        ("Light of the sky", RayCounts { shadow_sky: rays.shadow_sky, ..none }),
-        ("Second tries", RayCounts { retry: rays.retry, ..none }),
-    ];
     let audit = job.audited().map_or(none, |sums| sums.rays);
     let all_cost = of_frame(&rays, lookups) + of_frame(&audit, 0);
     let all_rays = rays.total() + audit.total();
@@ -40,11 +31,11 @@ pub fn effects(job: &Job) -> Table {
     };
     let share = |n: u64| n as f64 / all_rays.max(1) as f64;
     let mut table = Table::new("Rays by effect", &["", "rays", "share of rays", "share of cost"]);
-    for (name, part) in parts.iter().filter(|(_, part)| part.total() > 0) {
-        let n = part.total();
-        let mut cells = row(name, count(n), share(n), of_frame(part, 0));
+    for kind in RayKind::traced().filter(|kind| rays[*kind] > 0) {
+        let n = rays[kind];
+        let mut cells = row(kind.name(), count(n), share(n), of_frame(&RayCounts::of(kind, n), 0));
         // The table of costs has no entry for them.
-        if part.retry > 0 {
+        if kind == RayKind::Retry {
             cells[3] = "not weighed".into();
         }
         table.rows.push(cells);

@@ -10,7 +10,6 @@ pub use write_ply::{PlyReport, write_ply};
 
 use super::model::read_model;
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::Light;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
@@ -52,7 +51,7 @@ pub fn convert(input: &Path, output: &Path) -> Result<ConvertReport> {
         let message = format!("a PLY file holds no {}: left out", lost.join(", "));
         warnings.push(Diagnostic::new(input, message));
     }
-    if world.lights.iter().any(|light| matches!(light, Light::Quad(_) | Light::Sphere { .. })) {
+    if world.lights.iter().any(|light| light.is_area()) {
         warnings.push(Diagnostic::new(input, "the surfaces of area lights were left out too"));
     }
     if !world.spheres.is_empty() {

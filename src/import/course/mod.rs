@@ -18,7 +18,7 @@ use super::texture::{self, TextureCache};
 use super::{lamps, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DVec3, Rgb, Vec2};
-use crate::scene::{Corners, Light, Material, MaterialId, WorldMesh, WorldSphere};
+use crate::scene::{Corners, Light, Material, MaterialId, SphereLight, WorldMesh, WorldSphere};
 use statements::{CourseMaterial, Face, File};
 use std::path::Path;
 
@@ -74,7 +74,7 @@ fn add_spheres(file: &File, materials: &[CourseMaterial], model: &mut Model) {
         let radiance = sphere.material.map_or(Rgb::ZERO, |m| materials[m as usize].emitted);
         let (centre, radius) = (sphere.centre, sphere.radius);
         if radiance != Rgb::ZERO {
-            model.world.lights.push(Light::Sphere { centre, radius, radiance });
+            model.world.lights.push(Light::Sphere(SphereLight { centre, radius, radiance }));
         } else {
             let material = sphere.material.unwrap_or_else(|| default_material(model));
             let name = format!("sphere {}", number + 1);

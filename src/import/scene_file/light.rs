@@ -107,23 +107,24 @@ impl At<Light> {
     /// As scene data.
     pub fn build(&self, source: &Source) -> Result<scene::Light> {
         Ok(match &self.value {
-            Light::Point(p) => {
-                scene::Light::Point { position: p.position.vec(), intensity: p.intensity.rgb() }
-            }
-            Light::Directional(d) => scene::Light::Directional {
+            Light::Point(p) => scene::Light::Point(scene::PointLight {
+                position: p.position.vec(),
+                intensity: p.intensity.rgb(),
+            }),
+            Light::Directional(d) => scene::Light::Directional(scene::DirectionalLight {
                 to_light: d.to_light.unit(),
                 irradiance: d.irradiance.rgb(),
-            },
+            }),
             Light::Quad(q) => scene::Light::Quad(QuadLight {
                 corners: quad::corners(&q.shape(), source, &self.span)?,
                 radiance: q.radiance.rgb(),
                 two_sided: q.two_sided,
             }),
-            Light::Sphere(s) => scene::Light::Sphere {
+            Light::Sphere(s) => scene::Light::Sphere(scene::SphereLight {
                 centre: s.centre.vec(),
                 radius: s.radius.0,
                 radiance: s.radiance.rgb(),
-            },
+            }),
         })
     }
 }

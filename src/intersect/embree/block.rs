@@ -6,7 +6,7 @@ use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn};
 use crate::embree::{Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
 use crate::ray::{Hit, PrimRef, Ray};
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 
 /// Rays of a block that are asked about together, whether they come near a triangle.
 const PART: usize = 16;
@@ -41,7 +41,7 @@ impl EmbreeIntersector<'_> {
     ) {
         hits.fill(None);
         let mut valid = valid_lanes(rays);
-        counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
+        counts[RayKind::Invalid] += rays.len() as u64 - u64::from(valid.count_ones());
         // A camera more than a scene's size away: what Embree sees is moved up to the scene.
         let (mut moved, mut shifts, mut cast);
         (cast, shifts) = (rays, [0.0; BLOCK]);
@@ -150,7 +150,7 @@ impl EmbreeIntersector<'_> {
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
     ) -> Lanes {
-        counts.retry += u64::from(doubtful.count_ones());
+        counts[RayKind::Retry] += u64::from(doubtful.count_ones());
         let mut hit = 0;
         let mut left = doubtful;
         // Few are, mostly: arrays for all of a block would be dear to make.
@@ -196,7 +196,7 @@ impl EmbreeIntersector<'_> {
         let mut packet = Packet::<W>::new();
         for (rays, occluded) in rays.chunks(W).zip(occluded.chunks_mut(W)) {
             let valid = valid_lanes(rays);
-            counts.invalid += rays.len() as u64 - u64::from(valid.count_ones());
+            counts[RayKind::Invalid] += rays.len() as u64 - u64::from(valid.count_ones());
             let mask = fill(&mut packet, rays, valid);
             let exclude = rays.iter().any(|ray| ray.exclude != PrimRef::NONE);
             let flags = QueryFlags { coherent: false, exclude, passed: &[] };

@@ -1,6 +1,7 @@
 use super::*;
 use crate::math::DVec3;
 use crate::scene::{Material, World, WorldMesh, WorldSphere};
+use crate::stats::RayKind;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use std::f64::consts::{PI, TAU};
@@ -177,7 +178,7 @@ fn batches_single_rays_and_pools_agree() {
         let mut hits = vec![None; rays.len()];
         let mut counts = RayCounts::default();
         oracle.intersect_batch(rays, &mut hits, &mut counts);
-        assert_eq!(counts.invalid, 1);
+        assert_eq!(counts[RayKind::Invalid], 1);
         let mut occluded = vec![false; rays.len()];
         oracle.occluded_batch(rays, &mut occluded, &mut RayCounts::default());
         assert!(hits.iter().zip(&occluded).all(|(hit, occluded)| hit.is_some() == *occluded));

@@ -7,7 +7,7 @@ use rand::Rng;
 use tweenray::effects::EffectPlan;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{HitRules, Light, Material, Scene, World};
+use tweenray::scene::{HitRules, Light, Material, PointLight, Scene, SphereLight, World};
 use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
 
@@ -25,9 +25,9 @@ fn stack(first: u32, copies: usize) -> World {
         world.meshes.push(sheet);
     }
     let (position, intensity) = (DVec3::new(2.0, 3.0, 4.0), Rgb::splat(40.0));
-    world.lights.push(Light::Point { position, intensity });
+    world.lights.push(Light::Point(PointLight { position, intensity }));
     let (centre, radiance) = (DVec3::new(-3.0, 3.0, 2.0), Rgb::splat(4.0));
-    world.lights.push(Light::Sphere { centre, radius: 0.4, radiance });
+    world.lights.push(Light::Sphere(SphereLight { centre, radius: 0.4, radiance }));
     world
 }
 

@@ -10,7 +10,9 @@ use tweenray::error::Result;
 use tweenray::import::{Model, load_model};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, Ray, SurfaceInteraction};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{HitRules, Light, Material, NormalPolicy, Scene, World, WorldMesh};
+use tweenray::scene::{
+    HitRules, Light, Material, NormalPolicy, PointLight, Scene, World, WorldMesh,
+};
 use tweenray::stats::RayCounts;
 
 /// What loading must say.
@@ -141,7 +143,9 @@ fn traced(name: &str, mut world: World, rays: u64) -> Outcome {
     let centre = if world.meshes.is_empty() { DVec3::ZERO } else { bounds.centre() };
     let reach = bounds.extent().max_element().max(1e-3);
     let position = centre + DVec3::new(1.0, 2.0, 3.0) * reach;
-    world.lights.push(Light::Point { position, intensity: Rgb::splat((reach * reach) as f32) });
+    world
+        .lights
+        .push(Light::Point(PointLight { position, intensity: Rgb::splat((reach * reach) as f32) }));
     world.sky.radiance = Rgb::splat(0.2);
     let eye = centre + DVec3::new(0.7, 1.1, 2.0) * reach;
     let pose = tweenray::scene::Pose { eye, target: centre, up: DVec3::Y, roll_degrees: 0.0 };

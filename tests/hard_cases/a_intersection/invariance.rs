@@ -7,8 +7,8 @@ use tweenray::film::Film;
 use tweenray::math::{DAffine3, DVec3, Rgb, Vec3};
 use tweenray::output::Display;
 use tweenray::scene::{
-    Camera, Glass, HitRules, Light, Material, Pose, QuadLight, Recheck, Sky, World, WorldMesh,
-    WorldSphere,
+    Camera, Glass, HitRules, Light, Material, PointLight, Pose, QuadLight, Recheck, Sky,
+    SphereLight, World, WorldMesh, WorldSphere,
 };
 
 /// Our rules, but the world's own coordinates rounded to f32, and Embree's word for the hit.
@@ -48,9 +48,15 @@ fn studio(spp: u32) -> Job {
     let lamp = [p(-0.7, 3.0, -0.7), p(0.7, 3.0, -0.7), p(0.7, 3.0, 0.7), p(-0.7, 3.0, 0.7)];
     let radiance = Rgb::splat(4.0);
     world.lights.push(Light::Quad(QuadLight { corners: lamp, radiance, two_sided: false }));
-    world.lights.push(Light::Point { position: p(2.5, 2.0, 2.5), intensity: Rgb::splat(5.0) });
+    world
+        .lights
+        .push(Light::Point(PointLight { position: p(2.5, 2.0, 2.5), intensity: Rgb::splat(5.0) }));
     let centre = p(-2.4, 1.8, 1.5);
-    world.lights.push(Light::Sphere { centre, radius: 0.3, radiance: Rgb::new(2.0, 3.0, 6.0) });
+    world.lights.push(Light::Sphere(SphereLight {
+        centre,
+        radius: 0.3,
+        radiance: Rgb::new(2.0, 3.0, 6.0),
+    }));
     world.sky = Sky { radiance: Rgb::splat(0.1), lights: true, ambient: Rgb::ZERO };
     let mut job = common::job(world, common::pose((0.6, 1.9, 4.3), (0.0, 0.5, 0.0)), EDGE, EDGE);
     job.settings.spp = spp;
@@ -81,7 +87,7 @@ fn moved(job: &Job, transform: &DAffine3, scale: f64) -> Job {
     let mut world = job.world.clone();
     world.apply_transform(transform).unwrap();
     for light in &mut world.lights {
-        if let Light::Point { intensity, .. } = light {
+        if let Light::Point(PointLight { intensity, .. }) = light {
             *intensity = (intensity.as_dvec3() * scale * scale).as_vec3();
         }
     }

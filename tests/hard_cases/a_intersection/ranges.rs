@@ -9,7 +9,8 @@ use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::output::Display;
 use tweenray::scene::{
-    HitRules, Light, Material, QuadLight, Scene, Sky, ToneCurve, World, WorldMesh, WorldSphere,
+    DirectionalLight, HitRules, Light, Material, QuadLight, Scene, Sky, ToneCurve, World,
+    WorldMesh, WorldSphere,
 };
 
 /// Radii that f32 tracers are asked to take, and far beyond.
@@ -46,7 +47,7 @@ fn holes(scene: &Scene, rules: HitRules, radius: f64, rays: u64) -> u64 {
 fn picture(radius: f64) -> Vec<u8> {
     let mut world = shapes::world_of(ball(DVec3::ZERO, radius));
     let to_light = DVec3::new(1.0, 2.0, 3.0).normalize();
-    world.lights.push(Light::Directional { to_light, irradiance: Rgb::ONE });
+    world.lights.push(Light::Directional(DirectionalLight { to_light, irradiance: Rgb::ONE }));
     world.sky = Sky { radiance: Rgb::splat(0.3), lights: false, ambient: Rgb::splat(0.1) };
     let eye = (0.5 * radius, 1.0 * radius, 3.0 * radius);
     let job = common::job(world, common::pose(eye, (0.0, 0.0, 0.0)), 32, 32);

@@ -9,8 +9,8 @@ use std::time::Instant;
 use tweenray::embree::floating_point_mode;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, Ray};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{HitRules, Light, Scene};
-use tweenray::stats::RayCounts;
+use tweenray::scene::{HitRules, Light, PointLight, Scene, SphereLight};
+use tweenray::stats::{RayCounts, RayKind};
 
 /// What must come of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,7 +110,7 @@ fn answers(
 ) -> [(&'static str, Option<Hit>, bool, bool); 2] {
     let mut counts = RayCounts::default();
     let alone = (intersector.intersect(ray, &mut counts), intersector.occluded(ray, &mut counts));
-    let refused = counts.invalid == 2;
+    let refused = counts[RayKind::Invalid] == 2;
     let mut counts = RayCounts::default();
     let mut rays = [Ray::new(DVec3::new(0.0, 0.0, 3.0), DVec3::NEG_Z); 11];
     rays[6] = *ray;
@@ -119,7 +119,7 @@ fn answers(
     intersector.occluded_batch(&rays, &mut occluded, &mut counts);
     let others_hit = (0..11).filter(|i| *i != 6).all(|i| hits[i].is_some() && occluded[i]);
     let batch = if others_hit { "in a batch" } else { "in a batch that lost its other rays" };
-    let refused_too = counts.invalid == 2 && others_hit;
+    let refused_too = counts[RayKind::Invalid] == 2 && others_hit;
     [("alone", alone.0, alone.1, refused), (batch, hits[6], occluded[6], refused_too)]
 }
 
@@ -246,9 +246,9 @@ fn ftz_payload() -> Vec<u8> {
     let mut world = shapes::world_of(shapes::sphere(DVec3::ZERO, 1.0, 60, 40));
     // Weak light, but above f32's denormals: those are gone by definition.
     let intensity = Rgb::new(12.0, 1e-30, 1.0);
-    world.lights.push(Light::Point { position: DVec3::new(2.0, 3.0, 2.0), intensity });
+    world.lights.push(Light::Point(PointLight { position: DVec3::new(2.0, 3.0, 2.0), intensity }));
     let (centre, radiance) = (DVec3::new(-3.0, 2.0, 1.0), Rgb::splat(3.0));
-    world.lights.push(Light::Sphere { centre, radius: 0.5, radiance });
+    world.lights.push(Light::Sphere(SphereLight { centre, radius: 0.5, radiance }));
     world.sky.radiance = Rgb::splat(0.1);
     let pose = common::pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0));
     let (film, _) = common::render(&common::job(world, pose, 64, 64));

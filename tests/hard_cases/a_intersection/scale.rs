@@ -6,7 +6,7 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, Ray, SurfaceInteraction};
 use tweenray::math::{DVec3, Rgb, orthonormal_basis, srgb_encode};
-use tweenray::scene::{HitRules, Light, Material, Scene, World, WorldSphere};
+use tweenray::scene::{HitRules, Light, Material, PointLight, Scene, World, WorldSphere};
 use tweenray::stats::RayCounts;
 
 /// A small cube on wide ground, and OSPRay's spheres near and far.
@@ -223,7 +223,7 @@ pub fn unrelated_mesh(size: Size) -> Outcome {
             world.meshes.push(shapes::sphere(DVec3::new(0.2, 0.1, 1.0) * far, 0.5, 20, 10));
         }
         let (position, intensity) = (DVec3::new(2.0, 3.0, 2.0), Rgb::splat(12.0));
-        world.lights.push(Light::Point { position, intensity });
+        world.lights.push(Light::Point(PointLight { position, intensity }));
         let pose = common::pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0));
         let mut job = common::job(world, pose, edge, edge);
         job.settings.rules.recentre = recentre;

@@ -10,7 +10,9 @@ use tweenray::intersect::{
     Target, lift_to_smooth,
 };
 use tweenray::math::{DQuat, DVec3, Rgb};
-use tweenray::scene::{Corners, HitRules, Light, Material, Scene, World, WorldMesh};
+use tweenray::scene::{
+    Corners, DirectionalLight, HitRules, Light, Material, Scene, SphereLight, World, WorldMesh,
+};
 use tweenray::stats::RayCounts;
 
 /// Hits that are made up have no ray.
@@ -169,15 +171,17 @@ fn lit(
 pub fn contact(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let edge = size.of(64, 256);
-    let directional = |up: f64| Light::Directional {
-        to_light: DVec3::new(-1.0, up, 0.2).normalize(),
-        irradiance: Rgb::splat(3.0),
+    let directional = |up: f64| {
+        Light::Directional(DirectionalLight {
+            to_light: DVec3::new(-1.0, up, 0.2).normalize(),
+            irradiance: Rgb::splat(3.0),
+        })
     };
-    let sphere = Light::Sphere {
+    let sphere = Light::Sphere(SphereLight {
         centre: DVec3::new(-6.0, 5.0, 1.0),
         radius: 0.3,
         radiance: Rgb::splat(50.0),
-    };
+    });
     let lights = [("low sun", directional(0.2)), ("high sun", directional(1.5)), ("lamp", sphere)];
     for (name, light) in lights {
         let (mut widest, mut pixels, mut lit_elsewhere) = (0, 0u64, 0u64);

@@ -6,7 +6,7 @@ use crate::suite::{Outcome, Size};
 use std::f32::consts::PI;
 use std::time::Instant;
 use tweenray::math::{DVec3, Rgb, luminance};
-use tweenray::scene::Light;
+use tweenray::scene::{DirectionalLight, Light, SphereLight};
 
 /// A ball of `rows` by `rows` facets with the normals of a sphere.
 fn ball(rows: u32, light: Light, edge: u32, smooth_terminator: bool) -> Job {
@@ -90,8 +90,10 @@ fn look(job: &Job) -> Seen {
 /// sure: not where a lamp is half below the horizon.
 fn unshadowed(light: &Light, p: DVec3, n: DVec3) -> (f32, bool) {
     let (to_light, irradiance, sin) = match light {
-        Light::Directional { to_light, irradiance } => (*to_light, irradiance.x, 0.0),
-        Light::Sphere { centre, radius, radiance } => {
+        Light::Directional(DirectionalLight { to_light, irradiance }) => {
+            (*to_light, irradiance.x, 0.0)
+        }
+        Light::Sphere(SphereLight { centre, radius, radiance }) => {
             let sin = radius / (*centre - p).length();
             ((*centre - p).normalize(), radiance.x * PI * (sin * sin) as f32, sin)
         }
@@ -111,13 +113,13 @@ fn direction(angle: f64) -> DVec3 {
 }
 
 fn sun(to_light: DVec3) -> Light {
-    Light::Directional { to_light, irradiance: Rgb::splat(SUN) }
+    Light::Directional(DirectionalLight { to_light, irradiance: Rgb::splat(SUN) })
 }
 
 /// A lamp of radius 0.4 at distance 6, as bright as the sun there.
 fn lamp(to_light: DVec3) -> Light {
     let radiance = Rgb::splat(SUN * 36.0 / (0.16 * PI));
-    Light::Sphere { centre: to_light * 6.0, radius: 0.4, radiance }
+    Light::Sphere(SphereLight { centre: to_light * 6.0, radius: 0.4, radiance })
 }
 
 pub fn terminator(size: Size) -> Outcome {

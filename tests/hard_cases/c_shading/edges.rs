@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Camera, Material, Pose, World, WorldMesh};
+use tweenray::stats::RayKind;
 
 /// Width of the rim, pixels.
 const RIM: f64 = 3.0;
@@ -59,7 +60,13 @@ fn picture(edge: u32, spp: u32, seed: u64) -> Picture {
     job.settings.seed = seed;
     let (film, counts) = common::render(&job);
     let half = f64::from(edge) * 0.5;
-    Picture { film, inner, outer, middle: [half + off[0], half + off[1]], rays: counts.camera }
+    Picture {
+        film,
+        inner,
+        outer,
+        middle: [half + off[0], half + off[1]],
+        rays: counts[RayKind::Camera],
+    }
 }
 
 impl Picture {

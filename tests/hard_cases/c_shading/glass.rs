@@ -8,7 +8,7 @@ use tweenray::intersect::{EmbreeIntersector, Intersector, Ray, SurfaceInteractio
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Glass, HitRules, Material, Scene, Sky, World, WorldSphere};
 use tweenray::shade::optics;
-use tweenray::stats::RayCounts;
+use tweenray::stats::{RayCounts, RayKind};
 
 /// The unit direction at `angle` from z.
 fn at(angle: f64) -> DVec3 {
@@ -233,6 +233,10 @@ pub fn light_guide(size: Size) -> Outcome {
         outcome.check(error <= 1e-4, || format!("pixel {x},{y}: {rgb}"));
     }
     outcome.at_most("largest error of radiance 1", worst, 1e-4);
-    outcome.at_least("glass rays a camera ray", counts.glass as f64 / counts.camera as f64, 100.0);
+    outcome.at_least(
+        "glass rays a camera ray",
+        counts[RayKind::Glass] as f64 / counts[RayKind::Camera] as f64,
+        100.0,
+    );
     outcome
 }

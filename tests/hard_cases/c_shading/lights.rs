@@ -4,7 +4,7 @@ use crate::common;
 use crate::suite::{Outcome, Size};
 use std::f64::consts::{PI, TAU};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Camera, Light, Material, Pose, QuadLight, World};
+use tweenray::scene::{Camera, Light, Material, Pose, QuadLight, SphereLight, World};
 
 /// A light, what may hide it, a floor point, and the exact irradiance there per unit radiance.
 struct Extreme {
@@ -24,7 +24,7 @@ fn extreme(name: impl Into<String>, light: Light, exact: f64) -> Extreme {
 }
 
 fn ball(centre: DVec3, radius: f64) -> Light {
-    Light::Sphere { centre, radius, radiance: Rgb::ONE }
+    Light::Sphere(SphereLight { centre, radius, radiance: Rgb::ONE })
 }
 
 fn quad(corners: [DVec3; 4]) -> Light {

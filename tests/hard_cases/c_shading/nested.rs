@@ -5,6 +5,7 @@ use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DAffine3, DQuat, DVec3, Rgb};
 use tweenray::scene::{Camera, Glass, Material, Pose, World, WorldMesh};
+use tweenray::stats::RayKind;
 
 const GLASS: f64 = 1.5;
 const TEA: f64 = 1.33;
@@ -198,7 +199,7 @@ fn film_within(
     job.settings.cutoff = 0.004;
     let (film, counts) = common::render(&job);
     assert!(film.bad.is_none());
-    assert_eq!(counts.invalid, 0);
+    assert_eq!(counts[RayKind::Invalid], 0);
     film
 }
 

@@ -9,7 +9,8 @@ use tweenray::error::Error;
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    Corners, Glass, Light, Material, QuadLight, Sky, Texture, World, WorldSphere,
+    Corners, DirectionalLight, Glass, Light, Material, PointLight, QuadLight, Sky, SphereLight,
+    Texture, World, WorldSphere,
 };
 
 /// Everything that has a parameter, side by side.
@@ -51,9 +52,16 @@ fn world() -> World {
     let lamp = [p(-1.0, 3.0, -1.0), p(1.0, 3.0, -1.0), p(1.0, 3.0, 1.0), p(-1.0, 3.0, 1.0)];
     world.lights = vec![
         Light::Quad(QuadLight { corners: lamp, radiance: Rgb::splat(2.0), two_sided: false }),
-        Light::Sphere { centre: p(3.0, 1.5, -1.5), radius: 0.3, radiance: Rgb::splat(3.0) },
-        Light::Point { position: p(-3.0, 2.0, 1.0), intensity: Rgb::splat(2.0) },
-        Light::Directional { to_light: p(1.0, 2.0, 1.0).normalize(), irradiance: Rgb::splat(0.3) },
+        Light::Sphere(SphereLight {
+            centre: p(3.0, 1.5, -1.5),
+            radius: 0.3,
+            radiance: Rgb::splat(3.0),
+        }),
+        Light::Point(PointLight { position: p(-3.0, 2.0, 1.0), intensity: Rgb::splat(2.0) }),
+        Light::Directional(DirectionalLight {
+            to_light: p(1.0, 2.0, 1.0).normalize(),
+            irradiance: Rgb::splat(0.3),
+        }),
     ];
     let radiance = Rgb::new(0.2, 0.3, 0.5);
     world.sky = Sky { radiance, lights: true, ambient: Rgb::splat(0.05) };
@@ -85,17 +93,17 @@ const LIGHT: [Site; 20] = [
     ("quad light", |w, v| quad(w).radiance = Rgb::splat(v)),
     ("quad light, blue", |w, v| quad(w).radiance.z = v),
     ("sphere light", |w, v| {
-        if let Light::Sphere { radiance, .. } = &mut w.lights[1] {
+        if let Light::Sphere(SphereLight { radiance, .. }) = &mut w.lights[1] {
             *radiance = Rgb::splat(v);
         }
     }),
     ("point light", |w, v| {
-        if let Light::Point { intensity, .. } = &mut w.lights[2] {
+        if let Light::Point(PointLight { intensity, .. }) = &mut w.lights[2] {
             intensity.x = v;
         }
     }),
     ("directional light", |w, v| {
-        if let Light::Directional { irradiance, .. } = &mut w.lights[3] {
+        if let Light::Directional(DirectionalLight { irradiance, .. }) = &mut w.lights[3] {
             *irradiance = Rgb::splat(v);
         }
     }),
@@ -108,22 +116,22 @@ const LIGHT: [Site; 20] = [
 const PLACE: [Site; 6] = [
     ("quad light corner", |w, v| quad(w).corners[1].y = v.into()),
     ("sphere light centre", |w, v| {
-        if let Light::Sphere { centre, .. } = &mut w.lights[1] {
+        if let Light::Sphere(SphereLight { centre, .. }) = &mut w.lights[1] {
             centre.z = v.into();
         }
     }),
     ("sphere light radius", |w, v| {
-        if let Light::Sphere { radius, .. } = &mut w.lights[1] {
+        if let Light::Sphere(SphereLight { radius, .. }) = &mut w.lights[1] {
             *radius = v.into();
         }
     }),
     ("point light position", |w, v| {
-        if let Light::Point { position, .. } = &mut w.lights[2] {
+        if let Light::Point(PointLight { position, .. }) = &mut w.lights[2] {
             position.x = v.into();
         }
     }),
     ("directional light direction", |w, v| {
-        if let Light::Directional { to_light, .. } = &mut w.lights[3] {
+        if let Light::Directional(DirectionalLight { to_light, .. }) = &mut w.lights[3] {
             to_light.y = v.into();
         }
     }),

@@ -5,7 +5,10 @@ use crate::shapes;
 use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DAffine3, DMat3, DVec3, Rgb};
-use tweenray::scene::{Camera, Glass, Light, Material, Pose, QuadLight, Sky, World, WorldMesh};
+use tweenray::scene::{
+    Camera, DirectionalLight, Glass, Light, Material, PointLight, Pose, QuadLight, Sky,
+    SphereLight, World, WorldMesh,
+};
 
 const EYE: DVec3 = DVec3::new(1.0, 1.2, 4.0);
 
@@ -33,9 +36,12 @@ fn world() -> World {
     let radiance = Rgb::splat(6.0);
     world.lights = vec![
         Light::Quad(QuadLight { corners: lamp, radiance, two_sided: false }),
-        Light::Sphere { centre: p(-2.0, 2.0, 2.0), radius: 0.3, radiance },
-        Light::Point { position: p(2.0, 1.0, 1.0), intensity: Rgb::splat(2.0) },
-        Light::Directional { to_light: p(1.0, 2.0, 1.0).normalize(), irradiance: Rgb::splat(0.3) },
+        Light::Sphere(SphereLight { centre: p(-2.0, 2.0, 2.0), radius: 0.3, radiance }),
+        Light::Point(PointLight { position: p(2.0, 1.0, 1.0), intensity: Rgb::splat(2.0) }),
+        Light::Directional(DirectionalLight {
+            to_light: p(1.0, 2.0, 1.0).normalize(),
+            irradiance: Rgb::splat(0.3),
+        }),
     ];
     world.sky = Sky { radiance: Rgb::new(0.2, 0.3, 0.4), lights: false, ambient: Rgb::splat(0.05) };
     world

@@ -4,7 +4,7 @@ use crate::moves::{self, Set};
 use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Light, ReuseSettings, Settings, World};
+use tweenray::scene::{Light, PointLight, ReuseSettings, Settings, World};
 use tweenray::sequence::{FrameMaker, Made, fingerprint};
 
 /// A scene that is edited has another fingerprint, so that no frame of the old one is kept or
@@ -23,7 +23,7 @@ pub fn scene_change(_: Size) -> Outcome {
         ("light moved", |w| moves::lower(w, 2.48)),
         ("a further light", |w| {
             let (position, intensity) = (DVec3::ONE, Rgb::splat(1e-6));
-            w.lights.push(Light::Point { position, intensity });
+            w.lights.push(Light::Point(PointLight { position, intensity }));
         }),
         ("sky", |w| w.sky.radiance.x += 1e-6),
         ("material", |w| w.materials[1].diffuse.y += 1e-6),

@@ -11,7 +11,8 @@ use crate::suite::{Outcome, Size};
 use std::process::Command;
 use tweenray::effects::EffectPlan;
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Glass, Light, Material, Sky, World};
+use tweenray::scene::{DirectionalLight, Glass, Light, Material, Sky, World};
+use tweenray::stats::RayKind;
 
 /// Says which render the process is to do; unset, it runs the case.
 const RENDER: &str = "TWEENRAY_CASE_62";
@@ -22,10 +23,10 @@ fn plain() -> World {
     let p = DVec3::new;
     let floor = [p(-4.0, 0.0, 4.0), p(4.0, 0.0, 4.0), p(4.0, 0.0, -4.0), p(-4.0, 0.0, -4.0)];
     world.meshes.push(common::quad(floor, 0));
-    world.lights.push(Light::Directional {
+    world.lights.push(Light::Directional(DirectionalLight {
         to_light: p(1.0, 2.0, 1.0).normalize(),
         irradiance: Rgb::splat(2.0),
-    });
+    }));
     world.sky = Sky { radiance: Rgb::splat(0.4), lights: false, ambient: Rgb::splat(0.1) };
     world
 }
@@ -109,8 +110,11 @@ pub fn effects_cost_nothing(size: Size) -> Outcome {
         !(plan.mirror || plan.glass || plan.nested_glass || plan.area_lights || plan.sky_light);
     outcome.check(off, || format!("{plan:?}"));
     let (film, counts) = common::render_scene(&scene, &job, plan);
-    let none = counts.mirror + counts.glass + counts.shadow_area + counts.shadow_sky;
-    outcome.check(none == 0 && counts.shadow_delta > 0, || format!("{counts:?}"));
+    let none = counts[RayKind::Mirror]
+        + counts[RayKind::Glass]
+        + counts[RayKind::ShadowArea]
+        + counts[RayKind::ShadowSky];
+    outcome.check(none == 0 && counts[RayKind::ShadowDelta] > 0, || format!("{counts:?}"));
     let everything = EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING };
     let (all, all_counts) = common::render_scene(&scene, &job, everything);
     outcome.check(film == all, || "other bytes with everything on".into());

@@ -6,7 +6,7 @@ use crate::cli::accuracy::Outcome;
 use crate::measure::Median;
 use crate::page::Table;
 use crate::page::words::{bytes, count, percent, seconds, short};
-use crate::stats::RayCounts;
+use crate::stats::{RayCounts, RayKind};
 
 /// The fastest setting for errors that one may want.
 pub fn goals(outcome: &Outcome) -> Table {
@@ -130,9 +130,8 @@ fn against(ratio: Option<&Median>) -> [String; 2] {
 
 /// Every setting's rays.
 pub fn rays(outcome: &Outcome) -> Table {
-    let of = |rays: &RayCounts| rays.by_kind().map(|(_, n)| count(n));
-    let kinds = RayCounts::default().by_kind().map(|(kind, _)| kind);
-    let head: Vec<&str> = std::iter::once("").chain(kinds).collect();
+    let of = |rays: &RayCounts| RayKind::ALL.map(|kind| count(rays[kind]));
+    let head: Vec<&str> = std::iter::once("").chain(RayKind::ALL.map(RayKind::name)).collect();
     let caption =
         "Rays of a turn by kind: of the frames looked at and those that they are inferred from";
     let mut table = Table::new(caption, &head);

@@ -4,8 +4,8 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    BuildQuality, CameraPath, Interval, Light as SceneLight, Policy, ReuseSettings,
-    Settings as SceneSettings,
+    BuildQuality, CameraPath, DirectionalLight, Interval, Light as SceneLight, PointLight, Policy,
+    ReuseSettings, Settings as SceneSettings, SphereLight,
 };
 use std::time::Duration;
 
@@ -104,16 +104,19 @@ fn lights_come_in_four_kinds_and_quads_in_two_forms() {
     let [point, sun, lamp, window, bulb] = &loaded.world.lights[..] else { panic!("5 lights") };
     assert_eq!(
         *point,
-        SceneLight::Point { position: DVec3::new(1., 2., 3.), intensity: Rgb::splat(5.) }
+        SceneLight::Point(PointLight {
+            position: DVec3::new(1., 2., 3.),
+            intensity: Rgb::splat(5.)
+        })
     );
     let irradiance = Rgb::new(1.0, 2.0, 3.0);
-    assert_eq!(*sun, SceneLight::Directional { to_light: DVec3::Y, irradiance });
+    assert_eq!(*sun, SceneLight::Directional(DirectionalLight { to_light: DVec3::Y, irradiance }));
     let SceneLight::Quad(lamp) = lamp else { panic!("a quad") };
     assert_eq!((lamp.normal(), lamp.area(), lamp.two_sided), (DVec3::NEG_Y, 8.0, false));
     assert!(lamp.corners.contains(&DVec3::new(-1.0, 10.0, 1.0)));
     let SceneLight::Quad(window) = window else { panic!("a quad") };
     assert_eq!((window.normal(), window.area(), window.two_sided), (DVec3::Z, 1.0, true));
-    assert!(matches!(bulb, SceneLight::Sphere { radius: 0.5, .. }));
+    assert!(matches!(bulb, SceneLight::Sphere(SphereLight { radius: 0.5, .. })));
 }
 
 #[test]
@@ -221,7 +224,7 @@ fn what_emits_becomes_a_light_or_a_warning() {
     let lights = &loaded.world.lights;
     assert_eq!(lights.len(), 1 + 6 + 1);
     assert!(matches!(&lights[0], SceneLight::Quad(q) if q.normal() == DVec3::NEG_Y));
-    assert!(matches!(&lights[7], SceneLight::Sphere { .. }));
+    assert!(matches!(&lights[7], SceneLight::Sphere(_)));
     assert_eq!((loaded.world.meshes.len(), loaded.world.spheres.len()), (1, 0));
     let [warning] = &loaded.warnings[..] else { panic!("one warning") };
     assert_eq!(warning.line, Some(13));

@@ -1,19 +1,17 @@
 //! Direct light at diffuse points: shadow rays in batches, light by light.
 //!
-//! For an area light the estimate is `ratio · exact`: the samples' ratio of shadowed to
+//! For a light with an extent the estimate is `ratio · unshadowed`: the samples' ratio of shadowed to
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
-//! way there is no noise at all, and the ratio is what later frames can reuse.
+//! way there is no noise at all, and the ratio is what later frames can reuse. A delta light has one sample.
 
 use super::groups::{CheckRays, Groups};
-use super::light::{self, AreaLight, LightSample, SeenLight, ShadowTarget};
+use super::light::{LightSample, LightSampler, LightView, ShadowTarget};
 use super::pixels::BlockPixels;
-use super::{FrameInput, Renderer, Reuse};
-use crate::inference::{Channel, Channels};
-use crate::intersect::{Facet, Hit, Ray, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
-use crate::math::{DVec3, Rgb, luminance, orthonormal_basis};
-use crate::sampling::{cosine_hemisphere, to_world};
-use crate::scene::{Light, Scene, Settings};
-use crate::stats::RayCounts;
+use super::{FrameInput, Renderer, Reuse, dimensions, optics};
+use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
+use crate::math::{DVec3, Rgb, luminance};
+use crate::scene::{Scene, Settings};
+use crate::stats::{RayCounts, RayKind};
 use std::f32::consts::FRAC_1_PI;
 
 /// Shadow rays traced together.
@@ -60,14 +58,16 @@ impl ShadingPoint {
 /// Where shadow rays leave a shading point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShadowStarts {
-    /// Those to the sky: the facet.
-    pub facet: SpawnPoint,
-    /// Those to lights: the smooth surface that the facet stands for.
-    pub smooth: SpawnPoint,
+    /// Where rays to the sky start: the facet.
+    facet: SpawnPoint,
+    /// Where rays to lights start: the smooth surface that the facet stands for.
+    smooth: SpawnPoint,
+    /// Unit geometric normal on the side that the rays leave.
+    ng: DVec3,
 }
 
 impl ShadowStarts {
-    /// Those of the point `si` where `ray` hit, on the side of the unit geometric normal `ng`.
+    /// The starts at the point `si` where `ray` hit, on the side of the unit geometric normal `ng`.
     pub fn of(
         scene: &Scene,
         settings: &Settings,
@@ -82,20 +82,40 @@ impl ShadowStarts {
         } else {
             facet
         };
-        Self { facet, smooth }
+        Self { facet, smooth, ng }
     }
 
-    /// The ray from the point `p` to a delta light.
-    pub fn ray_to_delta(&self, p: DVec3, target: ShadowTarget) -> Ray {
+    /// The shadow ray to `target`.
+    pub fn ray_to(&self, target: &ShadowTarget) -> Ray {
         match target {
-            // No surface to stop short of: the normal along the ray costs a few ulp.
-            ShadowTarget::Point(q) => self.smooth.to(&Target {
-                point: q,
-                normal: (p - q).normalize(),
-                facet: Facet::EXACT,
-            }),
-            ShadowTarget::Direction(d) => self.smooth.along(d),
+            ShadowTarget::Point(target) => self.smooth.to(target),
+            ShadowTarget::Direction(direction) => self.smooth.along(*direction),
+            // Below the facet but above the smooth surface that it stands for: the facet's own plane is
+            // no occluder.
+            ShadowTarget::Sky(direction) => {
+                self.facet.along(optics::keep_side(*direction, self.ng, true))
+            }
         }
+    }
+}
+
+/// A light that shines in this frame.
+pub(super) struct LightSource {
+    pub sampler: LightSampler,
+    /// Its number among the scene's lights, the sky last.
+    pub number: u32,
+    /// Shadow rays of one camera sample.
+    pub samples: u32,
+    /// What its shadow rays count as.
+    pub rays: RayKind,
+    /// The channel of its ratio with the number of channels, if the ratio is kept.
+    pub channel: Option<(usize, usize)>,
+}
+
+impl LightSource {
+    /// Whether its samples are drawn at random: a delta light has one.
+    fn is_sampled(&self) -> bool {
+        self.rays != RayKind::ShadowDelta
     }
 }
 
@@ -160,15 +180,11 @@ impl ShadowScratch {
         self.spans.clear();
     }
 
-    fn push(&mut self, ray: Ray, weight: f64) {
-        self.rays.push(ray);
-        self.weights.push(weight);
-    }
-
     /// A shadow ray to the sample, where it lies above the horizon.
     fn push_sample(&mut self, starts: &ShadowStarts, sample: &LightSample) {
         if sample.weight > 0.0 {
-            self.push(starts.smooth.to(&sample.target), sample.weight);
+            self.rays.push(starts.ray_to(&sample.target));
+            self.weights.push(sample.weight);
         }
     }
 
@@ -198,17 +214,39 @@ impl ShadowScratch {
     }
 }
 
-/// An area light with its place in the scene.
-struct AreaSource<'a> {
-    index: u32,
-    light: &'a Light,
-    area: &'a AreaLight,
-}
-
 impl Renderer<'_> {
+    /// The lights that shine under the plan, in the scene's order, then the sky.
+    pub(super) fn light_sources(&self, reuse: Option<Reuse>) -> Vec<LightSource> {
+        let channels = reuse.map(|reuse| reuse.channels);
+        let of = |channel: Option<usize>| Some((channel?, channels?.len()));
+        let plan = &self.plan;
+        let mut sources = Vec::new();
+        for (number, light) in (0..).zip(&self.scene.lights) {
+            let (runs, rays, samples) = match light.is_area() {
+                true => (plan.area_lights, RayKind::ShadowArea, self.settings.shadow_samples),
+                false => (plan.delta_lights, RayKind::ShadowDelta, 1),
+            };
+            if runs {
+                let sampler = LightSampler::new(light);
+                let channel = of(channels.and_then(|channels| channels.of_light(number)));
+                sources.push(LightSource { sampler, number, samples, rays, channel });
+            }
+        }
+        if plan.sky_light {
+            sources.push(LightSource {
+                sampler: LightSampler::of_sky(&self.scene.sky),
+                number: self.scene.lights.len() as u32,
+                samples: self.settings.sky_samples,
+                rays: RayKind::ShadowSky,
+                channel: of(channels.and_then(|channels| channels.sky())),
+            });
+        }
+        sources
+    }
+
     /// Adds the direct light of all `lit` points to their pixels. What is known about a point is
     /// used; the rest is traced.
-    pub(super) fn light_points<const AREA: bool, const SKY: bool>(
+    pub(super) fn light_points(
         &self,
         input: &FrameInput,
         lit: &[ShadingPoint],
@@ -219,7 +257,7 @@ impl Renderer<'_> {
         scratch.starts.clear();
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
-            self.light_without_shadows(input, reuse.channels, lit, scratch);
+            self.light_without_shadows(input, reuse.channels.len(), lit, scratch);
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
             if scratch.groups.wants_checks() {
@@ -230,22 +268,8 @@ impl Renderer<'_> {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
             lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
         }
-        for (index, light) in self.scene.lights.iter().enumerate() {
-            match light {
-                Light::Quad(_) | Light::Sphere { .. } if AREA => {
-                    let area = input.area_lights[index].as_ref();
-                    let Some(area) = area else { continue };
-                    let source = AreaSource { index: index as u32, light, area };
-                    self.area_light(input, &source, lit, pixels, scratch, counts);
-                }
-                Light::Point { .. } | Light::Directional { .. } if self.plan.delta_lights => {
-                    self.delta_light(light, lit, pixels, scratch, counts);
-                }
-                _ => {}
-            }
-        }
-        if SKY {
-            self.sky_light(input, lit, pixels, scratch, counts);
+        for source in &input.lights {
+            self.light_from(source, lit, pixels, scratch, counts);
         }
     }
 
@@ -253,57 +277,54 @@ impl Renderer<'_> {
     fn light_without_shadows(
         &self,
         input: &FrameInput,
-        channels: &Channels,
+        channels: usize,
         lit: &[ShadingPoint],
         s: &mut ShadowScratch,
     ) {
         s.exact.clear();
+        s.exact.resize(lit.len() * channels, 0.0);
         s.shown.clear();
-        for point in lit {
-            for channel in channels.iter() {
-                let (exact, radiance) = match channel {
-                    Channel::Area(index) => {
-                        let area = input.area_lights[index as usize].as_ref();
-                        let exact = area.map_or(0.0, |a| a.irradiance(point.si.p, point.n));
-                        (exact, light::radiance(&self.scene.lights[index as usize]))
-                    }
-                    Channel::Sky => (std::f64::consts::PI, self.scene.sky.radiance),
-                };
-                s.exact.push(exact);
-                let shown = luminance(point.weight * radiance) * exact as f32;
-                s.shown.push(shown * self.settings.exposure);
+        s.shown.resize(lit.len() * channels, 0.0);
+        for source in &input.lights {
+            let Some((channel, _)) = source.channel else { continue };
+            for (i, point) in lit.iter().enumerate() {
+                let exact = source.sampler.unshadowed(point.si.p, point.n);
+                let shown = luminance(point.weight * source.sampler.emission) * exact as f32;
+                s.exact[i * channels + channel] = exact;
+                s.shown[i * channels + channel] = shown * self.settings.exposure;
             }
         }
     }
 
-    fn area_light(
+    /// Adds the light of one source, known or traced.
+    fn light_from(
         &self,
-        input: &FrameInput,
-        source: &AreaSource,
+        source: &LightSource,
         lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        let n = self.settings.shadow_samples as usize;
-        let radiance = light::radiance(source.light);
-        let channel = input.channel_of(source.index);
-        let wanted = self.use_known(lit, channel, radiance, pixels, s);
+        let n = source.samples as usize;
+        let wanted = self.use_known(source, lit, pixels, s);
         let mut u = s.samples(n);
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
             for &i in group {
-                let first = lit[i as usize].place.sample.wrapping_mul(n as u32);
-                let exact = match channel {
-                    Some((channel, channels)) => s.exact[i as usize * channels + channel],
-                    None => source.area.irradiance(lit[i as usize].si.p, lit[i as usize].n),
-                };
                 let point = &lit[i as usize];
+                let exact = match source.channel {
+                    Some((channel, channels)) => s.exact[i as usize * channels + channel],
+                    None => source.sampler.unshadowed(point.si.p, point.n),
+                };
                 // What is NaN goes on, to be counted at its pixel.
-                let seen = source.area.seen_from(point.si.p).filter(|_| exact != 0.0);
+                let seen = source.sampler.seen_from(point.si.p, point.n);
+                let seen = seen.filter(|_| exact != 0.0);
                 if let Some(seen) = &seen {
-                    self.fill(&point.place, source.index, first, pixels, &mut u);
-                    self.rays_to_area(seen, (lit, i), &u, s);
+                    if source.is_sampled() {
+                        let first = point.place.sample.wrapping_mul(source.samples);
+                        self.fill(&point.place, source, first, pixels, &mut u);
+                    }
+                    self.rays_to(seen, (lit, i), &u, s);
                     if s.is_open() {
                         // All below the horizon, but some of the light is above: a point of that
                         // decides, or the horizon's own shadow would be counted twice.
@@ -313,76 +334,20 @@ impl Renderer<'_> {
                         }
                     }
                 }
-                s.close(seen.map_or(Rgb::ZERO, |_| radiance * exact as f32));
+                s.close(seen.map_or(Rgb::ZERO, |_| source.sampler.emission * exact as f32));
             }
-            counts.shadow_area += s.rays.len() as u64;
-            self.settle(lit, group, channel, pixels, s, counts);
+            counts[source.rays] += s.rays.len() as u64;
+            self.settle(lit, group, source.channel, pixels, s, counts);
         }
         s.u = u;
         s.wanted = wanted;
     }
 
-    fn delta_light(
-        &self,
-        light: &Light,
-        lit: &[ShadingPoint],
-        pixels: &mut BlockPixels,
-        s: &mut ShadowScratch,
-        counts: &mut RayCounts,
-    ) {
-        let wanted = all_of(lit, s);
-        for group in wanted.chunks(BATCH) {
-            s.clear();
-            for &i in group {
-                let point = &lit[i as usize];
-                let sent = light::delta(light, point.si.p, point.n);
-                if let Some((_, target)) = sent {
-                    let ray = s.starts(self, lit, i).ray_to_delta(point.si.p, target);
-                    s.push(ray, 1.0);
-                }
-                s.close(sent.map_or(Rgb::ZERO, |(irradiance, _)| irradiance));
-            }
-            counts.shadow_delta += s.rays.len() as u64;
-            self.settle(lit, group, None, pixels, s, counts);
-        }
-        s.wanted = wanted;
-    }
-
-    fn sky_light(
-        &self,
-        input: &FrameInput,
-        lit: &[ShadingPoint],
-        pixels: &mut BlockPixels,
-        s: &mut ShadowScratch,
-        counts: &mut RayCounts,
-    ) {
-        let n = self.settings.sky_samples as usize;
-        // A constant sky of radiance L sends the irradiance πL to an open surface.
-        let irradiance = self.scene.sky.radiance * std::f32::consts::PI;
-        let channel = input.sky_channel();
-        let wanted = self.use_known(lit, channel, self.scene.sky.radiance, pixels, s);
-        let light = self.number_of(Channel::Sky);
-        let mut u = s.samples(n);
-        for group in wanted.chunks((BATCH / n).max(1)) {
-            s.clear();
-            for &i in group {
-                let first = lit[i as usize].place.sample.wrapping_mul(n as u32);
-                self.fill(&lit[i as usize].place, light, first, pixels, &mut u);
-                self.rays_to_sky((lit, i), &u, s);
-                s.close(irradiance);
-            }
-            counts.shadow_sky += s.rays.len() as u64;
-            self.settle(lit, group, channel, pixels, s, counts);
-        }
-        s.u = u;
-        s.wanted = wanted;
-    }
-
-    /// Pushes a shadow ray from shading point `i` to each of the samples `u` of an area light, but for those below
+    /// Pushes a shadow ray from shading point `i` to each of the samples `u` of a light, but for those below
     /// the horizon.
-    fn rays_to_area(
+    fn rays_to(
         &self,
-        seen: &SeenLight,
+        seen: &LightView,
         (lit, i): (&[ShadingPoint], u32),
         u: &[[f32; 2]],
         s: &mut ShadowScratch,
@@ -390,23 +355,8 @@ impl Renderer<'_> {
         let point = &lit[i as usize];
         let starts = s.starts(self, lit, i);
         for u in u {
-            let sample = seen.sample(point.si.p, point.n, u.map(f64::from));
+            let sample = seen.sample_li(point.si.p, point.n, u.map(f64::from));
             s.push_sample(&starts, &sample);
-        }
-    }
-
-    /// Pushes a shadow ray from shading point `i` to each of the samples `u` of the sky.
-    fn rays_to_sky(&self, (lit, i): (&[ShadingPoint], u32), u: &[[f32; 2]], s: &mut ShadowScratch) {
-        let point = &lit[i as usize];
-        let facet = s.starts(self, lit, i).facet;
-        let (ng, basis) = (point.ng, orthonormal_basis(point.n));
-        for u in u {
-            let local = cosine_hemisphere(u.map(f64::from));
-            let dir = to_world(local, basis, point.n);
-            // Below the facet but above the smooth surface that it stands for: the facet's own plane is
-            // no occluder.
-            let dir = super::optics::keep_side(dir, ng, true);
-            s.push(facet.along(dir), 1.0);
         }
     }
 
@@ -420,42 +370,31 @@ impl Renderer<'_> {
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        let channels = reuse.channels.len();
-        for (at, channel) in reuse.channels.iter().enumerate() {
-            let (n, count) = match channel {
-                Channel::Area(_) => (self.settings.shadow_samples, &mut counts.shadow_area),
-                Channel::Sky => (self.settings.sky_samples, &mut counts.shadow_sky),
-            };
+        for source in &input.lights {
+            let Some((at, channels)) = source.channel else { continue };
             s.clear();
             let mut runs = std::mem::take(&mut s.runs);
             runs.start(s.groups.len());
-            for i in 0..lit.len() as u32 {
-                let wanted = s.groups.check_rays(i as usize, at, channels, n);
+            for (i, point) in (0..).zip(lit) {
+                let wanted = s.groups.check_rays(i as usize, at, channels, source.samples);
                 let wanted = wanted.filter(|_| s.exact[i as usize * channels + at] != 0.0);
                 if let Some(wanted) = wanted {
                     let own = runs.own(&wanted, |u| {
                         // Samples that tracing does not use: had it any of these, what is traced
                         // because of them would be darker or brighter than what is.
-                        let traced = self.settings.spp.wrapping_mul(n.next_power_of_two());
+                        let samples = source.samples.next_power_of_two();
+                        let traced = self.settings.spp.wrapping_mul(samples);
                         let first = wanted.first.wrapping_add(traced);
-                        let place = &lit[i as usize].place;
-                        self.fill(place, self.number_of(channel), first, pixels, u);
+                        self.fill(&point.place, source, first, pixels, u);
                     });
-                    match channel {
-                        Channel::Area(index) => {
-                            let area = input.area_lights[index as usize].as_ref();
-                            let p = lit[i as usize].si.p;
-                            if let Some(seen) = area.and_then(|area| area.seen_from(p)) {
-                                self.rays_to_area(&seen, (lit, i), own, s);
-                            }
-                        }
-                        Channel::Sky => self.rays_to_sky((lit, i), own, s),
+                    if let Some(seen) = source.sampler.seen_from(point.si.p, point.n) {
+                        self.rays_to(&seen, (lit, i), own, s);
                     }
                 }
                 s.close(Rgb::ZERO);
             }
             s.runs = runs;
-            *count += s.rays.len() as u64;
+            counts[source.rays] += s.rays.len() as u64;
             s.occluded.clear();
             s.occluded.resize(s.rays.len(), false);
             self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
@@ -472,19 +411,21 @@ impl Renderer<'_> {
         s.groups.conclude_checks(reuse);
     }
 
-    /// Adds the light of `channel`, of a light with this `radiance`, where its ratio is known. Returns
-    /// the points where it must be traced: all of them without a channel.
+    /// Adds the light of `source` where its ratio is known. Returns the points where it must be traced: all of
+    /// them where no ratio is kept.
     fn use_known(
         &self,
+        source: &LightSource,
         lit: &[ShadingPoint],
-        channel: Option<(usize, usize)>,
-        radiance: Rgb,
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
     ) -> Vec<u32> {
-        let Some((channel, channels)) = channel else { return all_of(lit, s) };
         let mut wanted = std::mem::take(&mut s.wanted);
         wanted.clear();
+        let Some((channel, channels)) = source.channel else {
+            wanted.extend(0..lit.len() as u32);
+            return wanted;
+        };
         for (i, point) in lit.iter().enumerate() {
             let exact = s.exact[i * channels + channel];
             if exact == 0.0 {
@@ -495,36 +436,24 @@ impl Renderer<'_> {
             if ratio.is_nan() {
                 wanted.push(i as u32);
             } else {
-                let light = point.weight * radiance * (exact as f32 * ratio);
+                let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
             }
         }
         wanted
     }
 
-    /// The number by which samples of a channel's light are drawn.
-    fn number_of(&self, channel: Channel) -> u32 {
-        match channel {
-            Channel::Area(index) => index,
-            Channel::Sky => self.scene.lights.len() as u32,
-        }
-    }
-
     /// Stratified points of one light and one place, from sample number `first` on.
     fn fill(
         &self,
         place: &SamplePlace,
-        light: u32,
+        source: &LightSource,
         first: u32,
         pixels: &BlockPixels,
         u: &mut [[f32; 2]],
     ) {
-        pixels.sampler(place.pixel).fill2(first, self.dimension(place, light), u);
-    }
-
-    fn dimension(&self, place: &SamplePlace, light: u32) -> u32 {
-        let lights = self.scene.lights.len() as u32 + 1;
-        place.branch.wrapping_mul(lights).wrapping_add(light)
+        let dimension = dimensions::of_light(place.branch, source.number, self.scene.lights.len());
+        pixels.sampler(place.pixel).fill2(first, dimension, u);
     }
 
     /// Traces the batch of points `group` and adds `weight · unshadowed · ratio` to each one's pixel;
@@ -566,12 +495,4 @@ fn opened(weights: &[f64], occluded: &[bool], rays: std::ops::Range<usize>) -> (
         open += if occluded[k] { 0.0 } else { weights[k] };
     }
     (open, all)
-}
-
-/// All points, in order.
-fn all_of(lit: &[ShadingPoint], s: &mut ShadowScratch) -> Vec<u32> {
-    let mut wanted = std::mem::take(&mut s.wanted);
-    wanted.clear();
-    wanted.extend(0..lit.len() as u32);
-    wanted
 }

@@ -1,0 +1,81 @@
+//! A quad light.
+
+use super::{EmittingShape, EmittingSurface, LightData, Size};
+use crate::error::Result;
+use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
+use crate::scene::Recentring;
+use serde::{Deserialize, Serialize};
+
+/// A flat convex quad that emits from the side its corners run counter-clockwise on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct QuadLight {
+    /// Corners in order.
+    pub corners: [DVec3; 4],
+    /// Emitted radiance.
+    pub radiance: Rgb,
+    /// Whether the back emits too.
+    pub two_sided: bool,
+}
+
+impl QuadLight {
+    /// Cross product of the diagonals: twice the area long, along the emitting side's normal.
+    pub fn area_vector(&self) -> DVec3 {
+        (self.corners[2] - self.corners[0]).cross(self.corners[3] - self.corners[1])
+    }
+
+    /// Unit normal of the emitting side.
+    pub fn normal(&self) -> DVec3 {
+        self.area_vector().normalize()
+    }
+
+    /// Area.
+    pub fn area(&self) -> f64 {
+        0.5 * self.area_vector().length()
+    }
+}
+
+impl LightData for QuadLight {
+    fn name(&self) -> &'static str {
+        "quad"
+    }
+
+    fn is_area(&self) -> bool {
+        true
+    }
+
+    fn is_finite(&self) -> bool {
+        self.corners.iter().all(|c| c.is_finite())
+    }
+
+    fn bounds(&self) -> Bounds3 {
+        let mut bounds = Bounds3::EMPTY;
+        self.corners.iter().for_each(|c| bounds.include(*c));
+        bounds
+    }
+
+    fn size(&self) -> Option<Size> {
+        Some(Size::Triangles(self.bounds()))
+    }
+
+    fn transform(&mut self, transform: &DAffine3, mirrors: bool) -> Result<()> {
+        self.corners = self.corners.map(|c| transform.transform_point3(c));
+        if mirrors {
+            self.corners.swap(1, 3);
+        }
+        Ok(())
+    }
+
+    fn recentre(&mut self, recentring: &Recentring) {
+        // The emitting mesh holds f32 corners; the light uses the very same points.
+        self.corners = self.corners.map(|c| recentring.point_to_scene(c).as_vec3().as_dvec3());
+    }
+
+    fn surface(&self) -> Option<EmittingSurface> {
+        let corners = self.corners.iter().map(|c| c.as_vec3()).collect();
+        Some(EmittingSurface {
+            shape: EmittingShape::Triangles(corners, vec![[0, 1, 2], [0, 2, 3]]),
+            radiance: self.radiance,
+            two_sided: self.two_sided,
+        })
+    }
+}

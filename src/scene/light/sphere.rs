@@ -1,0 +1,61 @@
+//! A sphere light.
+
+use super::{EmittingShape, EmittingSurface, LightData, Size, place};
+use crate::error::Result;
+use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
+use crate::scene::Recentring;
+use serde::{Deserialize, Serialize};
+
+/// A sphere that emits outwards.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SphereLight {
+    /// Centre.
+    pub centre: DVec3,
+    /// Radius, positive.
+    pub radius: f64,
+    /// Emitted radiance.
+    pub radiance: Rgb,
+}
+
+impl LightData for SphereLight {
+    fn name(&self) -> &'static str {
+        "sphere"
+    }
+
+    fn is_area(&self) -> bool {
+        true
+    }
+
+    fn is_finite(&self) -> bool {
+        self.centre.is_finite() && self.radius.is_finite()
+    }
+
+    fn bounds(&self) -> Bounds3 {
+        let mut bounds = Bounds3::EMPTY;
+        bounds.include(self.centre - DVec3::splat(self.radius));
+        bounds.include(self.centre + DVec3::splat(self.radius));
+        bounds
+    }
+
+    fn size(&self) -> Option<Size> {
+        Some(Size::Exact(2.0 * self.radius))
+    }
+
+    fn transform(&mut self, transform: &DAffine3, _mirrors: bool) -> Result<()> {
+        let Self { centre, radius, radiance: _ } = self;
+        place::move_sphere("a sphere light", centre, radius, transform)
+    }
+
+    fn recentre(&mut self, recentring: &Recentring) {
+        self.centre = recentring.point_to_scene(self.centre);
+        self.radius *= recentring.scale();
+    }
+
+    fn surface(&self) -> Option<EmittingSurface> {
+        Some(EmittingSurface {
+            shape: EmittingShape::Sphere(self.centre, self.radius),
+            radiance: self.radiance,
+            two_sided: false,
+        })
+    }
+}

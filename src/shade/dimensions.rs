@@ -1,0 +1,14 @@
+//! The one table of random dimensions.
+//!
+//! A pair of random numbers is a function of seed, frame, pixel, sample and dimension
+//! ([`PixelSampler`](crate::sampling::PixelSampler)). Two uses of one pixel's sampler never share a dimension.
+
+/// The place of a camera sample in its pixel: the only use of the film's own sampler, which does not depend
+/// on the frame.
+pub(super) const FILM: u32 = 0;
+
+/// A light as seen from the end of a branch of a path: `light` is its number among the scene's `lights`, the
+/// sky last.
+pub(super) fn of_light(branch: u32, light: u32, lights: usize) -> u32 {
+    branch.wrapping_mul(lights as u32 + 1).wrapping_add(light)
+}

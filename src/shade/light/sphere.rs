@@ -1,0 +1,53 @@
+//! A sphere light.
+
+use super::{LightSample, ShadowTarget, irradiance};
+use crate::intersect::{Facet, Target};
+use crate::math::DVec3;
+use crate::sampling::SphereCone;
+use crate::scene::SphereLight;
+
+/// A sphere that emits outwards.
+pub(super) struct Sphere {
+    centre: DVec3,
+    radius: f64,
+}
+
+impl Sphere {
+    pub fn new(light: &SphereLight) -> Self {
+        Self { centre: light.centre, radius: light.radius }
+    }
+
+    pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {
+        irradiance::sphere(p, n, self.centre, self.radius)
+    }
+
+    /// `None` from within.
+    pub fn seen_from(&self, p: DVec3) -> Option<SphereView> {
+        let cone = SphereCone::new(self.centre, self.radius, p)?;
+        Some(SphereView { cone, centre: self.centre })
+    }
+}
+
+/// A sphere as seen from one point.
+pub(super) struct SphereView {
+    cone: SphereCone,
+    centre: DVec3,
+}
+
+impl SphereView {
+    /// Uniform over the solid angle (Shirley, Wang and Zimmerman, 1996).
+    pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
+        let (dir, distance) = self.cone.direction(u);
+        LightSample { target: self.target(p + dir * distance), weight: dir.dot(n).max(0.0) }
+    }
+
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+        let (dir, distance) = self.cone.above(n)?;
+        Some(LightSample { target: self.target(p + dir * distance), weight: 1.0 })
+    }
+
+    fn target(&self, point: DVec3) -> ShadowTarget {
+        let normal = (point - self.centre).normalize();
+        ShadowTarget::Point(Target { point, normal, facet: Facet::EXACT })
+    }
+}
