@@ -46,6 +46,7 @@ impl QuadWarp {
     }
 
     /// The point for `u` in (0, 1)²; density 1/area.
+    #[inline]
     pub fn point(&self, u: [f64; 2]) -> DVec3 {
         let [u, v] = match self.stretch {
             None => u,

@@ -86,6 +86,7 @@ impl ShadowStarts {
     }
 
     /// The shadow ray to `target`.
+    #[inline(always)]
     pub fn ray_to(&self, target: &ShadowTarget) -> Ray {
         match target {
             ShadowTarget::Point(target) => self.smooth.to(target),
@@ -181,6 +182,7 @@ impl ShadowScratch {
     }
 
     /// A shadow ray to the sample, where it lies above the horizon.
+    #[inline(always)] // So that the kind of target is known.
     fn push_sample(&mut self, starts: &ShadowStarts, sample: &LightSample) {
         if sample.weight > 0.0 {
             self.rays.push(starts.ray_to(&sample.target));
@@ -354,10 +356,7 @@ impl Renderer<'_> {
     ) {
         let point = &lit[i as usize];
         let starts = s.starts(self, lit, i);
-        for u in u {
-            let sample = seen.sample_li(point.si.p, point.n, u.map(f64::from));
-            s.push_sample(&starts, &sample);
-        }
+        seen.sample_li(point.si.p, point.n, u, |sample| s.push_sample(&starts, &sample));
     }
 
     /// Casts the check rays that the inference wants, and tells it what they found.

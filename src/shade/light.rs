@@ -114,14 +114,17 @@ impl LightSampler {
 }
 
 impl LightView<'_> {
-    /// The light's point or direction for `u` in the unit square, as seen from `p` with unit normal `n`.
-    pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
+    /// Gives `each` the light's point or direction for each of `u` in the unit square, as seen from `p` with unit
+    /// normal `n`. All at once, so that nothing asks for the kind sample by sample.
+    #[inline]
+    pub fn sample_li(&self, p: DVec3, n: DVec3, u: &[[f32; 2]], mut each: impl FnMut(LightSample)) {
+        let u = u.iter().map(|u| u.map(f64::from));
         match &self.0 {
-            View::Point(light) => light.sample_li(p),
-            View::Directional(light) => light.sample_li(),
-            View::Quad(light) => light.sample_li(p, n, u),
-            View::Sphere(light) => light.sample_li(p, n, u),
-            View::Sky(sky) => sky.sample_li(n, u),
+            View::Point(light) => u.for_each(|_| each(light.sample_li(p))),
+            View::Directional(light) => u.for_each(|_| each(light.sample_li())),
+            View::Quad(light) => u.for_each(|u| each(light.sample_li(p, n, u))),
+            View::Sphere(light) => u.for_each(|u| each(light.sample_li(p, n, u))),
+            View::Sky(sky) => u.for_each(|u| each(sky.sample_li(n, u))),
         }
     }
 

@@ -94,8 +94,11 @@ impl Lit {
         let seen = sampler.seen_from(self.p, self.n);
         let seen = seen.filter(|_| sampler.unshadowed(self.p, self.n) != 0.0)?;
         let u = if light.is_area() { [rng.random(), rng.random()] } else { [0.5; 2] };
-        let sample = seen.sample_li(self.p, self.n, u);
-        (sample.weight > 0.0).then(|| self.starts.ray_to(&sample.target))
+        let mut ray = None;
+        seen.sample_li(self.p, self.n, &[u], |sample| {
+            ray = (sample.weight > 0.0).then(|| self.starts.ray_to(&sample.target));
+        });
+        ray
     }
 }
 

@@ -20,6 +20,7 @@ impl Directional {
         if is_lit(cos) { cos } else { 0.0 }
     }
 
+    #[inline]
     pub fn sample_li(&self) -> LightSample {
         LightSample::of_delta(ShadowTarget::Direction(self.to_light))
     }
