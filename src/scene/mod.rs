@@ -52,7 +52,7 @@ pub struct World {
     pub materials: Vec<Material>,
     /// Decoded images, named by [`TextureId`].
     pub textures: Vec<Texture>,
-    /// Lights without a surface in `meshes` or `spheres`: point, directional, quad, sphere.
+    /// Lights. None has a surface in `meshes` or `spheres` yet.
     /// Area lights get their emitting surface from [`World::into_scene`].
     pub lights: Vec<Light>,
     /// What a ray that hits nothing sees.

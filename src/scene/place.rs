@@ -97,20 +97,28 @@ pub(super) fn move_sphere(
     radius: &mut f64,
     transform: &DAffine3,
 ) -> Result<()> {
+    let instead = ", or a sphere made of triangles";
+    *radius *= uniform_scale(&format!("`{name}` is an exact sphere"), instead, transform)?;
+    *centre = transform.transform_point3(*centre);
+    Ok(())
+}
+
+/// By how much `transform` scales, in all directions alike.
+///
+/// Errors: a scale that differs by direction; `what` cannot follow it, and `instead` says what could.
+pub(super) fn uniform_scale(what: &str, instead: &str, transform: &DAffine3) -> Result<f64> {
     let m = transform.matrix3;
     let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
     let scale = x.length();
     let near = |value: f64, target: f64| (value - target).abs() <= SAME_SCALE * scale;
     let skew = [x.dot(y), y.dot(z), z.dot(x)].map(|d| d / scale);
-    if !(near(y.length(), scale) && near(z.length(), scale) && skew.iter().all(|d| near(*d, 0.0))) {
-        return Err(Error::Usage(format!(
-            "`{name}` is an exact sphere, which a scale that differs by direction would deform; \
-             use the same scale in x, y and z, or a sphere made of triangles"
-        )));
+    if near(y.length(), scale) && near(z.length(), scale) && skew.iter().all(|d| near(*d, 0.0)) {
+        return Ok(scale);
     }
-    *centre = transform.transform_point3(*centre);
-    *radius *= scale;
-    Ok(())
+    Err(Error::Usage(format!(
+        "{what}, which a scale that differs by direction would deform; use the same scale in x, y \
+         and z{instead}"
+    )))
 }
 
 #[cfg(test)]

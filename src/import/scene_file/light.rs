@@ -10,7 +10,7 @@ use crate::scene::{self, QuadLight};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A light: exactly one of `point`, `directional`, `quad` and `sphere`.
+/// A light: exactly one key, its kind.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case", expecting = "a table")]
 pub(super) enum Light {

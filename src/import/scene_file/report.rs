@@ -2,14 +2,20 @@
 
 use super::at::Span;
 use crate::error::{Diagnostic, Error, Result};
+use crate::scene::Light;
 use std::path::{Path, PathBuf};
 
 /// Larger scene files are refused: geometry belongs into mesh files.
 const MAX_BYTES: u64 = 16 << 20;
 
 /// The kinds of what comes in kinds.
-const KINDS: &str = "a light has one of `point`, `directional`, `quad` and `sphere`; a step of \
-                     `transform` one of `translate`, `rotate`, `scale` and `matrix`";
+fn kinds() -> String {
+    let lights = Light::KINDS.map(|kind| format!("`{kind}`")).join(", ");
+    format!(
+        "a light has one of {lights}; a step of `transform` one of `translate`, `rotate`, `scale` and \
+         `matrix`"
+    )
+}
 
 /// A scene file's text and name.
 pub(super) struct Source {
@@ -88,7 +94,7 @@ impl Source {
         }
         if message.starts_with("wanted exactly 1 element") {
             let text = "exactly one key that says the kind must stand here";
-            return self.fault(&span, text).help(KINDS);
+            return self.fault(&span, text).help(kinds());
         }
         self.fault(&span, in_plain_words(message))
     }
