@@ -229,6 +229,10 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
                     *centre *= s;
                     *radius *= s;
                 }
+                Light::Disk(disk) => {
+                    disk.centre *= s;
+                    disk.radius *= s;
+                }
                 Light::Point(_) | Light::Directional(_) => {}
             }
         }

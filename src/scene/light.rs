@@ -4,12 +4,14 @@
 //! this room asks for the kind. How a light shines stands in the room `lights`.
 
 mod directional;
+mod disk;
 mod point;
 mod quad;
 mod sky;
 mod sphere;
 
 pub use directional::DirectionalLight;
+pub use disk::DiskLight;
 pub use point::PointLight;
 pub use quad::QuadLight;
 pub use sky::Sky;
@@ -32,6 +34,8 @@ pub enum Light {
     Quad(QuadLight),
     /// A sphere that emits outwards.
     Sphere(SphereLight),
+    /// A flat disk.
+    Disk(DiskLight),
 }
 
 /// What a scene needs to know of a kind of light.
@@ -83,7 +87,7 @@ pub(super) enum EmittingShape {
 
 impl Light {
     /// Names of all kinds.
-    pub const KINDS: [&str; 4] = ["point", "directional", "quad", "sphere"];
+    pub const KINDS: [&str; 5] = ["point", "directional", "quad", "sphere", "disk"];
 
     /// The kind, as scene files and messages call it.
     pub fn name(&self) -> &'static str {
@@ -126,6 +130,7 @@ impl Light {
             Self::Directional(light) => light,
             Self::Quad(light) => light,
             Self::Sphere(light) => light,
+            Self::Disk(light) => light,
         }
     }
 
@@ -135,6 +140,7 @@ impl Light {
             Self::Directional(light) => light,
             Self::Quad(light) => light,
             Self::Sphere(light) => light,
+            Self::Disk(light) => light,
         }
     }
 }

@@ -5,6 +5,7 @@
 //! in `shade` asks for the kind.
 
 mod directional;
+mod disk;
 mod point;
 mod quad;
 mod sky;
@@ -15,6 +16,7 @@ use crate::intersect::Target;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Light, Sky};
 use directional::Directional;
+use disk::Disk;
 use point::Point;
 use quad::{Quad, QuadView};
 use sky::{SkyDome, SkyView};
@@ -35,6 +37,7 @@ enum Shape {
     Directional(Directional),
     Quad(Quad),
     Sphere(Sphere),
+    Disk(Disk),
     Sky(SkyDome),
 }
 
@@ -46,6 +49,7 @@ enum View<'a> {
     Directional(&'a Directional),
     Quad(QuadView<'a>),
     Sphere(SphereView),
+    Disk(&'a Disk),
     Sky(SkyView),
 }
 
@@ -80,6 +84,7 @@ impl LightSampler {
             }
             Light::Quad(light) => (light.radiance, Shape::Quad(Quad::new(light))),
             Light::Sphere(light) => (light.radiance, Shape::Sphere(Sphere::new(light))),
+            Light::Disk(light) => (light.radiance, Shape::Disk(Disk::new(light))),
         };
         Self { emission, shape }
     }
@@ -97,6 +102,7 @@ impl LightSampler {
             Shape::Directional(light) => light.unshadowed(n),
             Shape::Quad(light) => light.unshadowed(p, n),
             Shape::Sphere(light) => light.unshadowed(p, n),
+            Shape::Disk(light) => light.unshadowed(p, n),
             Shape::Sky(sky) => sky.unshadowed(),
         }
     }
@@ -108,6 +114,7 @@ impl LightSampler {
             Shape::Directional(light) => View::Directional(light),
             Shape::Quad(light) => View::Quad(light.seen()),
             Shape::Sphere(light) => View::Sphere(light.seen_from(p)?),
+            Shape::Disk(light) => View::Disk(light),
             Shape::Sky(_) => View::Sky(SkyView::above(n)),
         }))
     }
@@ -124,6 +131,7 @@ impl LightView<'_> {
             View::Directional(light) => u.for_each(|_| each(light.sample_li())),
             View::Quad(light) => u.for_each(|u| each(light.sample_li(p, n, u))),
             View::Sphere(light) => u.for_each(|u| each(light.sample_li(p, n, u))),
+            View::Disk(light) => u.for_each(|u| each(light.sample_li(p, n, u))),
             View::Sky(sky) => u.for_each(|u| each(sky.sample_li(n, u))),
         }
     }
@@ -134,6 +142,7 @@ impl LightView<'_> {
         match &self.0 {
             View::Quad(light) => light.above(p, n),
             View::Sphere(light) => light.above(p, n),
+            View::Disk(light) => light.above(p, n),
             // Each sample of these lies above.
             View::Point(_) | View::Directional(_) | View::Sky(_) => None,
         }

@@ -22,6 +22,8 @@ pub(super) enum Light {
     Quad(QuadLightTable),
     /// A glowing sphere; its shadows are soft.
     Sphere(SphereLight),
+    /// A flat round lamp; its shadows are soft.
+    Disk(DiskLight),
 }
 
 /// A point that emits alike in all directions.
@@ -82,6 +84,23 @@ pub(super) struct SphereLight {
     radiance: Amount,
 }
 
+/// A flat round lamp.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct DiskLight {
+    /// Centre, world units.
+    centre: Point,
+    /// Direction in which it shines.
+    normal: Direction,
+    /// Radius, world units.
+    radius: Positive,
+    /// Emitted radiance, W/(m² sr).
+    radiance: Amount,
+    /// Whether the back shines too.
+    #[serde(default)]
+    two_sided: bool,
+}
+
 /// What a ray that hits nothing sees: a constant sky.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -124,6 +143,13 @@ impl At<Light> {
                 centre: s.centre.vec(),
                 radius: s.radius.0,
                 radiance: s.radiance.rgb(),
+            }),
+            Light::Disk(d) => scene::Light::Disk(scene::DiskLight {
+                centre: d.centre.vec(),
+                normal: d.normal.unit(),
+                radius: d.radius.0,
+                radiance: d.radiance.rgb(),
+                two_sided: d.two_sided,
             }),
         })
     }
