@@ -77,7 +77,34 @@ impl<'a> Cargo<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::board::What;
     use super::*;
+
+    #[test]
+    fn bytes_on_the_wire_keep_their_names() {
+        let json = |note: &Note| serde_json::to_string(note).expect("JSON");
+        let strip = What::Strip { number: 1, of: 2, leader: 3 };
+        let order = Order { task: 4, original: 5, is_source: true, what: strip };
+        let done = Note::Done { order, reports: Vec::new(), seconds: 0.5 };
+        let expected = concat!(
+            r#"{"Done":{"order":{"task":4,"original":5,"is_source":true,"#,
+            r#""what":{"Strip":{"number":1,"of":2,"leader":3}}},"reports":[],"seconds":0.5}}"#
+        );
+        assert_eq!(json(&done), expected);
+        let whole = What::Whole { strips: 0, frames: vec![6] };
+        let order = Order { task: 4, original: 6, is_source: false, what: whole };
+        let errand = Errand { order, needs: vec![1], drops: vec![2] };
+        let expected = concat!(
+            r#"{"Do":{"order":{"task":4,"original":6,"is_source":false,"#,
+            r#""what":{"Whole":{"strips":0,"frames":[6]}}},"needs":[1],"drops":[2]}}"#
+        );
+        assert_eq!(json(&Note::Do(errand)), expected);
+        assert_eq!(json(&Note::Send { original: 1, to: 2 }), r#"{"Send":{"original":1,"to":2}}"#);
+        let kind = Kind::Strip;
+        let cargo = Cargo { kind, original: 1, number: 3, piece: 4, of: 5, bytes: &[6] };
+        let words: Vec<u8> = [2, 1, 3, 4, 5].map(u32::to_le_bytes).concat();
+        assert_eq!(cargo.encode(), [words, vec![6]].concat());
+    }
 
     #[test]
     fn cargo_arrives_as_it_was_sent() {
