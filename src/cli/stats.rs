@@ -1,7 +1,7 @@
 //! The file of `--stats`: what a job took, as JSON.
 
 use super::machine::{Machine, peak_memory};
-use crate::cluster::{Duty, Outcome};
+use crate::cluster::{Outcome, RankWork};
 use crate::error::{Error, Result};
 use crate::output::atomic;
 use crate::output::manifest::{AuditRow, Header};
@@ -31,7 +31,7 @@ pub struct RankStats {
     pub checkpoint_bytes: u64,
     /// What it did from the first frame to the last.
     #[serde(flatten)]
-    pub duty: Duty,
+    pub duty: RankWork,
     /// Most memory held at once, where the system tells.
     pub peak_memory_bytes: Option<u64>,
 }
