@@ -42,6 +42,7 @@ pub enum PayloadKind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Payload<'a> {
     pub kind: PayloadKind,
+    /// The original that the bytes belong to.
     pub original: u32,
     /// Number of the strip; 0 for other kinds.
     pub strip: u32,

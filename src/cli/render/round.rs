@@ -88,7 +88,7 @@ impl Site<'_> {
             reference_bytes,
             checkpoint_seconds: saved.seconds,
             checkpoint_bytes: saved.bytes,
-            duty: outcome.own,
+            work: outcome.own,
             peak_memory_bytes: None,
         };
         let ranks = self.comm.gather(&rank.with_peak())?;

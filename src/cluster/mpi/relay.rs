@@ -14,7 +14,8 @@ use std::time::{Duration, Instant};
 pub const FAILED: i32 = 4;
 /// Tag of rank 0's empty acknowledgement, sent before rank 0 prints the error.
 pub const ACKNOWLEDGED: i32 = 5;
-/// How long a failed rank waits for the acknowledgement; rank 0 polls no messages while it reads files.
+/// How long a failed rank waits for the acknowledgement; rank 0 may not poll, because
+/// it reads files or traces on its main thread.
 const ACKNOWLEDGE_TIMEOUT: Duration = Duration::from_millis(1500);
 /// How long a failed rank then waits for rank 0 to abort the job.
 const ABORT_TIMEOUT: Duration = Duration::from_millis(1500);
