@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use tweenray::cluster::{self, World};
+use tweenray::cluster::{self, Communicator};
 use tweenray::error::{Error, Result};
 use tweenray::film::Film;
 use tweenray::output::manifest::{FORMAT, Header};
@@ -68,20 +68,20 @@ fn target(folder: &Path) -> Target {
 
 /// One rank of a job that will not end well.
 fn be_a_rank(place: &str, folder: &Path) {
-    let world = World::join(say).expect("a job");
+    let comm = Communicator::init(say).expect("a job");
     if let Some(busy) = place.strip_prefix("agreeing while rank ") {
-        return fail_while_another_is_busy(&world, busy.parse().expect("a rank"));
+        return fail_while_another_is_busy(&comm, busy.parse().expect("a rank"));
     }
     let target = target(folder);
     let frames = FrameRange { first: 1, last: FRAMES };
-    let plan = world.from_root(|| sequence::prepare(&target, frames)).expect("a plan");
-    let order: Vec<u32> = (0..world.size()).collect();
+    let plan = comm.from_root(|| sequence::prepare(&target, frames)).expect("a plan");
+    let order: Vec<u32> = (0..comm.size()).collect();
     let maker = Lemon { place: place.into() };
     let stop = AtomicBool::new(false);
     let done = |_: &_| assert!(place != "main", "the main thread met a lemon");
-    match cluster::render(&world, &order, &target, &plan, &maker, &stop, &done) {
+    match cluster::render(&comm, &order, &target, &plan, &maker, &stop, &done) {
         Ok(outcome) => assert_eq!(outcome.unfinished, 0),
-        Err(error) => world.fail(&error),
+        Err(error) => comm.abort(&error),
     }
 }
 
@@ -91,17 +91,17 @@ fn say(error: &Error) -> u8 {
 }
 
 /// Rank 1 fails, and not all others come to hear of it.
-fn fail_while_another_is_busy(world: &World, busy: u32) {
-    let outcome = match world.rank() {
+fn fail_while_another_is_busy(comm: &Communicator, busy: u32) {
+    let outcome = match comm.rank() {
         1 => Err(Error::Failed("it met a lemon".into())),
         rank => {
             std::thread::sleep(Duration::from_secs(if rank == busy { 60 } else { 0 }));
             Ok(())
         }
     };
-    if let Err(error) = world.agree(outcome) {
-        assert!(world.is_stranded());
-        world.fail(&error);
+    if let Err(error) = comm.agree(outcome) {
+        assert!(comm.has_unreported_failure());
+        comm.abort(&error);
     }
 }
 

@@ -1,16 +1,16 @@
 //! What frames and messages take, as measured.
 
 use crate::real::{Line, Ran, Stage};
-use tweenray::cluster::simulation::{Model, Table};
+use tweenray::cluster::simulation::{Model, SchedulerCost};
 use tweenray::sequence::Pyramid;
 
 /// What is given, not measured: a cluster whose nodes have 64 ranks and 100 Gbit/s each.
 pub const LATENCY: f64 = 10e-6;
 pub const BANDWIDTH: f64 = 12.5e9 / 64.0;
-/// How long a clerk sleeps between looks, `src/cluster/clerk.rs`.
-const NAP: f64 = 1e-3;
-/// To write or read a note of some hundred bytes and hand it to MPI.
-const NOTE_SECONDS: f64 = 10e-6;
+/// Seconds between polls of a communication thread, as in `src/cluster/comm_thread.rs`.
+const POLL_INTERVAL: f64 = 1e-3;
+/// Seconds to write or read a control message of some hundred bytes and hand it to MPI.
+const MESSAGE_SECONDS: f64 = 10e-6;
 
 /// What was measured of a job.
 #[derive(Clone)]
@@ -27,9 +27,9 @@ pub struct Costs {
     pub between_share: f64,
     pub discovery_bytes: u64,
     pub strips_bytes: u64,
-    pub note_bytes: u64,
+    pub message_bytes: u64,
     /// Share of its core that a rank spends on looking for messages.
-    pub clerk_share: f64,
+    pub comm_share: f64,
 }
 
 impl Costs {
@@ -62,8 +62,8 @@ impl Costs {
             between_share: ran.traced_share(),
             discovery_bytes: 0,
             strips_bytes: 0,
-            note_bytes: 400,
-            clerk_share: 0.0,
+            message_bytes: 400,
+            comm_share: 0.0,
         }
     }
 
@@ -116,13 +116,13 @@ impl Costs {
             reference_bytes: self.reference_bytes,
             between_share: self.between_share,
             strips_bytes: self.strips_bytes,
-            note_bytes: self.note_bytes,
+            message_bytes: self.message_bytes,
             latency: LATENCY,
             bandwidth: BANDWIDTH,
-            nap: NAP,
-            note_seconds: NOTE_SECONDS,
-            clerk_share: self.clerk_share,
-            table: Table::Measured,
+            poll_interval: POLL_INTERVAL,
+            message_seconds: MESSAGE_SECONDS,
+            comm_share: self.comm_share,
+            scheduler: SchedulerCost::Measured,
             cores: None,
         }
     }

@@ -43,7 +43,7 @@ pub struct Fit {
 pub fn fit(stage: &Stage) -> Fit {
     let mut rows = Vec::new();
     let mut costs = None;
-    let mut note_bytes = 0;
+    let mut message_bytes = 0;
     for ranks in RANKS {
         let line = Line { ranks, threads: 1, frames: SHOT.frames, words: WORDS.into() };
         let runs: Vec<(Ran, f64)> = (0..REPEATS)
@@ -66,12 +66,12 @@ pub fn fit(stage: &Stage) -> Fit {
         if ranks == 1 {
             costs = Some(Costs::of(&runs[0].0, SHOT, row.cpu[1]));
         } else if ranks <= 4 {
-            note_bytes = runs[0].0.size("notes");
+            message_bytes = runs[0].0.size("notes");
         }
         rows.push(row);
     }
     let mut costs = costs.unwrap();
-    costs.note_bytes = note_bytes;
+    costs.message_bytes = message_bytes;
     costs.weigh(stage, "--size 400x300 --spp 1 --shadow-samples 16");
     let rank_seconds = fit_rank_seconds(&costs, &rows);
     let shares = rows[1..4].iter().map(|row| row.cpu[1] / row.wall[1]);
@@ -97,14 +97,14 @@ fn say(costs: &Costs, cores: f64, rank_seconds: f64, ranks: u32) -> Said {
     let seconds = costs.as_measured();
     let share = if ranks == 1 { None } else { Some(cores) };
     let model = Model { cores: share, ..costs.model(&seconds) };
-    let job = Job { pyramid: SHOT, most_strips: strips(300), tells_all: false };
-    let played = job.play(ranks, &model);
+    let job = Job { pyramid: SHOT, most_strips: strips(300), sends_to_all: false };
+    let run = job.simulate(ranks, &model);
     let own = if ranks == 1 { 0.0 } else { rank_seconds * f64::from(ranks) };
     Said {
-        cpu: played.busy_seconds + own,
-        wall: played.seconds + own / share.unwrap_or(1.0),
-        references: played.sent.references.messages as f64,
-        notes: played.sent.notes.messages as f64,
+        cpu: run.busy_seconds + own,
+        wall: run.seconds + own / share.unwrap_or(1.0),
+        references: run.sent.references.messages as f64,
+        notes: run.sent.notes.messages as f64,
     }
 }
 

@@ -1,5 +1,5 @@
 //! `./x scaling`: what a job would take on 1 to 4,096 ranks. Frames, messages and a few real ranks are
-//! measured here, the program's own table of frames is played with what they take, and
+//! measured here, a job is simulated with these costs and the program's own scheduler, and
 //! `docs/scaling.md` and its picture are written from that. Several minutes.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program for people")]
@@ -22,23 +22,23 @@ fn main() {
     println!("real ranks, oversubscribed");
     let fit = fit::fit(&stage);
     println!("frames of the large job");
-    let costs = predict::measure(&stage, fit.costs.note_bytes);
+    let costs = predict::measure(&stage, fit.costs.message_bytes);
     let ours = curve(&costs, "tweenray", &[1, 4, 16, 64, 256, 1024, 2048, MOST], NONE);
     let others: Vec<(&str, predict::Curve)> = [
         ("a hundred times the latency", Change { latency: 100.0, ..NONE }),
         ("a tenth of the bandwidth", Change { bandwidth: 0.1, ..NONE }),
-        ("twice the time for each note", Change { note: 2.0, ..NONE }),
+        ("twice the time for each control message", Change { message: 2.0, ..NONE }),
         ("stretches of the path 30 % heavier and lighter", Change { swing: 0.3, ..NONE }),
         ("segments of 128, the default: half a one for each rank", Change { segment: 128, ..NONE }),
-        ("a table that takes no time", Change { is_table_free: true, ..NONE }),
+        ("a scheduler that takes no time", Change { is_scheduler_free: true, ..NONE }),
     ]
     .into_iter()
     .map(|(name, change)| (name, curve(&costs, name, &[MOST], change)))
     .collect();
-    let small_costs = costs::Costs { clerk_share: costs.clerk_share, ..fit.costs.clone() };
+    let small_costs = costs::Costs { comm_share: costs.comm_share, ..fit.costs.clone() };
     let small = curve(&small_costs, "frames of 400x300", &[64, 256, 1024, MOST], NONE);
     let paper = paper::tables(&stage, &small_costs);
-    let to_all = Change { tells_all: true, ..NONE };
+    let to_all = Change { sends_to_all: true, ..NONE };
     let all =
         curve(&costs, "every discovery to every rank", &[1, 4, 16, 64, 256, 1024, MOST], to_all);
     let machine = machine(&before);

@@ -6,6 +6,7 @@ use crate::plot;
 use crate::predict::{Curve, FRAMES, WORDS};
 use std::fmt::Write;
 use std::fs;
+use tweenray::cluster::simulation::SimulatedRun;
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs");
 const TEXT: &str = include_str!("page.md");
@@ -56,7 +57,7 @@ impl Page<'_> {
             ("discoveries", megabytes(costs.discovery_bytes)),
             ("share", format!("{:.1} %", 100.0 * self.costs.between_share)),
             ("pack", format!("{:.0} ms", 1e3 * costs.pack_seconds)),
-            ("clerk", format!("{:.1} %", 100.0 * costs.clerk_share)),
+            ("comm", format!("{:.1} %", 100.0 * costs.comm_share)),
             ("latency", format!("{:.0} µs", 1e6 * LATENCY)),
             ("bandwidth", format!("{:.0} MB/s", 1e-6 * BANDWIDTH)),
             ("table", self.table()),
@@ -73,22 +74,22 @@ impl Page<'_> {
 
     fn table(&self) -> String {
         let mut out = String::from(
-            "| ranks | time | efficiency | rank 0's clerk busy | its longest look | references sent, a \
-             rank | notes a frame | every discovery to every rank |\n\
+            "| ranks | time | efficiency | rank 0's communication thread busy | longest scheduler pass | references sent, a \
+             rank | control messages a frame | every discovery to every rank |\n\
              |--:|--:|--:|--:|--:|--:|--:|--:|\n",
         );
-        for (ranks, efficiency, played) in &self.ours.points {
+        for (ranks, efficiency, run) in &self.ours.points {
             let all = self.all.points.iter().find(|(n, ..)| n == ranks);
             let all = all.map_or(String::new(), |(_, efficiency, _)| format!("{efficiency:.3}"));
             let each = f64::from(*ranks);
             _ = writeln!(
                 out,
                 "| {ranks} | {} | {efficiency:.3} | {:.1} % | {:.0} ms | {:.1} | {:.2} | {all} |",
-                time(played.seconds),
-                100.0 * played.clerk_seconds / played.seconds,
-                1e3 * played.longest_look,
-                played.sent.references.messages as f64 / each,
-                played.sent.notes.messages as f64 / f64::from(FRAMES),
+                time(run.seconds),
+                100.0 * run.comm_seconds / run.seconds,
+                1e3 * run.longest_pass,
+                run.sent.references.messages as f64 / each,
+                run.sent.notes.messages as f64 / f64::from(FRAMES),
             );
         }
         out
@@ -96,29 +97,31 @@ impl Page<'_> {
 
     fn changes(&self) -> String {
         let mut out = String::from(
-            "| 4,096 ranks, with | efficiency | rank 0's clerk busy |\n|---|--:|--:|\n",
+            "| 4,096 ranks, with | efficiency | rank 0's communication thread busy |\n|---|--:|--:|\n",
         );
         for (name, curve) in self.others {
-            let (_, efficiency, played) = &curve.points[0];
-            let busy = 100.0 * played.clerk_seconds / played.seconds;
+            let (_, efficiency, run) = &curve.points[0];
+            let busy = 100.0 * run.comm_seconds / run.seconds;
             _ = writeln!(out, "| {name} | {efficiency:.3} | {busy:.1} % |");
         }
         out
     }
 
     fn small(&self) -> String {
-        let point =
-            |(ranks, efficiency, played): &(u32, f64, tweenray::cluster::simulation::Played)| {
-                let busy = 100.0 * played.clerk_seconds / played.seconds;
-                format!("| {ranks} | {efficiency:.3} | {busy:.1} % |\n")
-            };
+        let point = |(ranks, efficiency, run): &(u32, f64, SimulatedRun)| {
+            let busy = 100.0 * run.comm_seconds / run.seconds;
+            format!("| {ranks} | {efficiency:.3} | {busy:.1} % |\n")
+        };
         let rows: String = self.small.points.iter().map(point).collect();
-        format!("| ranks | efficiency | rank 0's clerk busy |\n|--:|--:|--:|\n{rows}")
+        format!(
+            "| ranks | efficiency | rank 0's communication thread busy |\n|--:|--:|--:|\n{rows}"
+        )
     }
 
     fn fit_table(&self) -> String {
         let mut out = String::from(
-            "| ranks | seconds of a core | model | wall seconds | model | references | model | notes | \
+            "| ranks | seconds of a core | model | wall seconds | model | references | model | \
+             control messages | \
              model |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         );
         for (row, said) in self.fit.rows.iter().zip(&self.fit.said) {
@@ -145,7 +148,7 @@ impl Page<'_> {
         let off = |said: f64, is: f64| format!("{:+.1} %", 100.0 * (said / is - 1.0));
         let walls = fitted.iter().map(|(row, said)| off(said.wall, row.wall[1]));
         let text = format!(
-            "seconds of a core {}, wall time {}, references {}, notes {}. Wall times of 1 to 4, which were \
+            "seconds of a core {}, wall time {}, references {}, control messages {}. Wall times of 1 to 4, which were \
              fitted: {}",
             off(said.cpu, row.cpu[1]),
             off(said.wall, row.wall[1]),

@@ -35,7 +35,7 @@ const THIRTY_TWO: [(u32, f64); 4] = [(32, 30.9), (64, 41.6), (128, 69.2), (256, 
 const WORDS: &str = "--size 400x300 --spp 1 --shadow-samples 1 --segment 64";
 const SEGMENT: u32 = 64;
 
-/// Ours, as measured and as played.
+/// Ours, as measured and as simulated.
 struct Ours {
     costs: Costs,
     /// By number of frames: wall seconds with start, seconds of a core without.
@@ -44,12 +44,12 @@ struct Ours {
 
 impl Ours {
     /// The pan in so many frames on so many ranks with a core each.
-    fn played(&self, ranks: u32, frames: u32) -> f64 {
+    fn simulated(&self, ranks: u32, frames: u32) -> f64 {
         let shot = Pyramid { segment: SEGMENT, frames };
         let seconds = self.costs.seconds(shot, 0.0);
         let model = self.costs.model(&seconds);
-        Job { pyramid: shot, most_strips: strips(300), tells_all: false }
-            .play(ranks, &model)
+        Job { pyramid: shot, most_strips: strips(300), sends_to_all: false }
+            .simulate(ranks, &model)
             .seconds
     }
 }
@@ -93,14 +93,14 @@ fn measure(stage: &Stage, small: &Costs) -> Ours {
 fn strong(out: &mut String, stage: &Stage, ours: &Ours) {
     out.push_str(
         "### Table 1: more ranks for the same frames\n\n\
-         | ranks | paper: 32 frames | 64 | 128 | ours, played: 32 | 64 | 128 | \
+         | ranks | paper: 32 frames | 64 | 128 | ours, simulated: 32 | 64 | 128 | \
          ours, run: 128, seconds of a core |\n|--:|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     for (ranks, paper) in STRONG {
         let line = Line { ranks, threads: 1, frames: 128, words: WORDS.into() };
         let ran = stage.run(&line);
         let cpu = ran.cpu - stage.start_of(&line);
-        let [a, b, c] = [32, 64, 128].map(|frames| ours.played(ranks, frames));
+        let [a, b, c] = [32, 64, 128].map(|frames| ours.simulated(ranks, frames));
         let [p, q, r] = paper;
         _ = writeln!(
             out,
@@ -112,11 +112,11 @@ fn strong(out: &mut String, stage: &Stage, ours: &Ours) {
 fn weak(out: &mut String, ours: &Ours) {
     out.push_str(
         "\n### Table 2: as many frames as ranks, over several nodes\n\n\
-         | ranks and frames | paper | ours, played |\n|--:|--:|--:|\n",
+         | ranks and frames | paper | ours, simulated |\n|--:|--:|--:|\n",
     );
     for (ranks, paper) in WEAK {
         let paper = paper.map_or("timed out".into(), |seconds| format!("{seconds} s"));
-        _ = writeln!(out, "| {ranks} | {paper} | {:.2} s |", ours.played(ranks, ranks));
+        _ = writeln!(out, "| {ranks} | {paper} | {:.2} s |", ours.simulated(ranks, ranks));
     }
 }
 
@@ -131,8 +131,10 @@ fn alone(out: &mut String, ours: &Ours) {
 }
 
 fn thirty_two(out: &mut String, ours: &Ours) {
-    out.push_str("\n### Table 4: 32 ranks\n\n| frames | paper | ours, played |\n|--:|--:|--:|\n");
+    out.push_str(
+        "\n### Table 4: 32 ranks\n\n| frames | paper | ours, simulated |\n|--:|--:|--:|\n",
+    );
     for (frames, paper) in THIRTY_TWO {
-        _ = writeln!(out, "| {frames} | {paper} s | {:.2} s |", ours.played(32, frames));
+        _ = writeln!(out, "| {frames} | {paper} s | {:.2} s |", ours.simulated(32, frames));
     }
 }

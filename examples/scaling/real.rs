@@ -101,7 +101,7 @@ impl Stage {
     }
 
     /// Share of a core that a rank's main thread takes while another renders, all in all.
-    pub fn clerk_share(&self, line: &Line) -> f64 {
+    pub fn comm_share(&self, line: &Line) -> f64 {
         _ = std::fs::remove_dir_all(self.folder.path().join("out"));
         let mut launched = self.command(line).spawn().unwrap();
         std::thread::sleep(Duration::from_secs(2));

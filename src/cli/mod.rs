@@ -80,13 +80,13 @@ const VERSION: &str = concat!(
 /// Runs the program with the process's arguments; the process ends with what this returns.
 pub fn run() -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
-        say::aside(format_args!("error: {}: {panic}", cluster::FAULT));
+        say::aside(format_args!("error: {}: {panic}", cluster::PANIC_MESSAGE));
     }));
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(wrong) => {
             // Help and version are "errors" to clap. All processes of a job have the same words.
-            let printed = match cluster::is_follower() {
+            let printed = match cluster::is_nonzero_rank() {
                 true => Ok(()),
                 false => say::told(wrong.print()),
             };
@@ -102,7 +102,7 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(command: &Command) -> Exit {
-    let is_alone = command.alone().map_or(Ok(()), cluster::alone);
+    let is_alone = command.alone().map_or(Ok(()), cluster::require_single);
     if let Err(error) = is_alone {
         return refused(&error);
     }
@@ -135,7 +135,7 @@ impl Command {
 
 /// Says what is wrong with all processes that a launcher started, once.
 fn refused(error: &Error) -> Exit {
-    if !cluster::is_follower() {
+    if !cluster::is_nonzero_rank() {
         say::error(error);
     }
     Exit::of(error)

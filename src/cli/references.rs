@@ -2,7 +2,7 @@
 
 use super::exit::as_input;
 use super::machine;
-use crate::cluster::World;
+use crate::cluster::Communicator;
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
 use crate::output::FramePattern;
@@ -36,7 +36,7 @@ impl References {
     ///
     /// Errors: a folder without such files or with the job's own; a file that cannot serve, by name.
     pub fn survey(
-        world: &World,
+        comm: &Communicator,
         folders: &[PathBuf],
         pattern: &FramePattern,
         (scene, settings, terms): (&Scene, &Settings, &Compatibility),
@@ -47,17 +47,17 @@ impl References {
         refuse_policy(settings)?;
         // (Names as they are, which may be no text.)
         let names = || Ok(list(folders, pattern)?.into_iter().map(bytes_of).collect());
-        let names: Vec<Vec<u8>> = world.from_root(names)?;
+        let names: Vec<Vec<u8>> = comm.from_root(names)?;
         let count = names.len();
         let files = names.into_iter().map(|name| OsString::from_vec(name).into()).collect();
         let most = machine::memory().map_or(u64::MAX, |memory| memory / 2);
-        let budget = most / u64::from(world.size_of_node());
+        let budget = most / u64::from(comm.node_size());
         let mut cache = ReferenceCache::new(files, terms.clone(), scene.recentring, budget);
         // Alone it needs them itself, as long as there is room.
-        let is_kept = world.size() == 1;
+        let is_kept = comm.size() == 1;
         let look = |file| cache.look(file, is_kept).map_err(as_input);
-        let own: Result<Vec<ReferenceInfo>> = own_part(count, world).map(look).collect();
-        let mut infos = world.all(world.agree(own)?)?.concat();
+        let own: Result<Vec<ReferenceInfo>> = own_part(count, comm).map(look).collect();
+        let mut infos = comm.all_gather(comm.agree(own)?)?.concat();
         infos.sort_by_key(|info| info.hash);
         infos.dedup_by_key(|info| info.hash);
         let hash = name_of(&infos);
@@ -88,9 +88,9 @@ fn refuse_policy(settings: &Settings) -> Result<()> {
 }
 
 /// Which of `count` files this rank looks into.
-fn own_part(count: usize, world: &World) -> std::ops::Range<usize> {
-    let edge = |rank: u32| count * rank as usize / world.size() as usize;
-    edge(world.rank())..edge(world.rank() + 1)
+fn own_part(count: usize, comm: &Communicator) -> std::ops::Range<usize> {
+    let edge = |rank: u32| count * rank as usize / comm.size() as usize;
+    edge(comm.rank())..edge(comm.rank() + 1)
 }
 
 fn bytes_of(path: PathBuf) -> Vec<u8> {

@@ -13,7 +13,7 @@ use super::request::Request;
 use super::say;
 use super::signals::Interrupt;
 use super::stats;
-use crate::cluster::{self, Binding, Outcome, World};
+use crate::cluster::{self, Binding, Communicator, Outcome};
 use crate::error::{Error, Result, counted};
 use crate::intersect;
 use crate::output::manifest::AuditRow;
@@ -78,25 +78,25 @@ pub fn run(args: &RenderArgs) -> Exit {
         say::error(error);
         Exit::of(error).code()
     };
-    let world = match World::join(tell_failure) {
-        Ok(world) => world,
+    let comm = match Communicator::init(tell_failure) {
+        Ok(comm) => comm,
         Err(error) => return super::refused(&error),
     };
-    let ended = render(&world, &interrupt, args);
+    let ended = render(&comm, &interrupt, args);
     // Others still hear what stops rank 0's video.
-    if world.is_root() || !matches!(ended, Ok(Exit::Done)) {
+    if comm.is_root() || !matches!(ended, Ok(Exit::Done)) {
         interrupt.over();
     }
     let exit = ended.unwrap_or_else(|error| {
-        if world.is_stranded() {
-            world.fail(&error);
-        } else if world.is_root() {
+        if comm.has_unreported_failure() {
+            comm.abort(&error);
+        } else if comm.is_root() {
             say::error(&error);
         }
         Exit::of(&error)
     });
     // Rank 0 may make a video yet.
-    world.part();
+    comm.final_barrier();
     interrupt.over();
     if interrupt.is_orphan() {
         let exit = if exit == Exit::Stopped { Exit::Orphaned } else { exit };
@@ -106,9 +106,9 @@ pub fn run(args: &RenderArgs) -> Exit {
     exit
 }
 
-fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exit> {
+fn render(comm: &Communicator, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
-    interrupt.listen(world.is_root())?;
+    interrupt.listen(comm.is_root())?;
     if let Some(launcher) = cluster::launcher_process() {
         interrupt.end_with(launcher);
     }
@@ -116,36 +116,36 @@ fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exi
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.output.time_limit);
     // Only one rank talks.
-    let quiet = args.output.quiet || !world.is_root();
-    let mut request = Request::load(world, args)?;
+    let quiet = args.output.quiet || !comm.is_root();
+    let mut request = Request::load(comm, args)?;
     if args.output.time_limit.is_none() {
         interrupt.limit(start, request.time_limit);
     }
-    world.set_exchange(request.exchange);
-    world.agree(args.choice.check(&request))?;
+    comm.set_exchange(request.exchange);
+    comm.agree(args.choice.check(&request))?;
     tell(quiet, &request.warnings, |w| say::warning(w));
-    share_isa(world, &mut request.settings, quiet)?;
-    let order = cluster::rank_order(world, args.output.rank_map.as_deref())?;
+    share_isa(comm, &mut request.settings, quiet)?;
+    let order = cluster::rank_order(comm, args.output.rank_map.as_deref())?;
     let threads = match request.threads {
         Some(threads) => threads,
-        None => world.default_threads()?,
+        None => comm.default_threads()?,
     };
-    let pool = world.agree(machine::thread_pool(threads))?;
-    tell(quiet, world.binding(threads)?.as_slice(), |binding| say::note(in_words(binding)));
+    let pool = comm.agree(machine::thread_pool(threads))?;
+    tell(quiet, comm.binding(threads)?.as_slice(), |binding| say::note(in_words(binding)));
     let loaded = Instant::now();
     let build = || intersect::build(&request.scene, &request.settings, threads);
-    let intersector = world.agree(pool.install(build))?;
+    let intersector = comm.agree(pool.install(build))?;
     let built = Instant::now();
     let tracer = request.tracer(&intersector.describe())?;
-    let tracer = world.same_everywhere("traces with", tracer)?;
+    let tracer = comm.same_everywhere("traces with", tracer)?;
     let clock = Clock { start, loaded, built };
     let (intersector, pool, order) = (&*intersector, &pool, &order[..]);
-    let site = Site { world, intersector, pool, order, interrupt, clock, quiet };
+    let site = Site { comm, intersector, pool, order, interrupt, clock, quiet };
     let base = request.settings.clone();
     let choosing = Choosing { args, base: &base, site: &site };
     let mut choice = match choosing.first(&request, &tracer) {
         Err(Error::Stopped) => {
-            if world.is_root() {
+            if comm.is_root() {
                 interrupt.say_stopped();
             }
             return Ok(Exit::Stopped);
@@ -192,9 +192,9 @@ fn render(world: &World, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exi
 /// while these were held against what was wanted.
 fn conclude(job: &Frames, round: &Round, was_checking: bool) -> Result<Exit> {
     let Round { plan, outcome, unfinished, ranks, .. } = round;
-    let Site { world, interrupt, clock: Clock { start, .. }, quiet, .. } = job.site;
+    let Site { comm, interrupt, clock: Clock { start, .. }, quiet, .. } = job.site;
     let is_stopped = was_checking || *unfinished > 0;
-    if !world.is_root() {
+    if !comm.is_root() {
         return Ok(if is_stopped { Exit::Stopped } else { Exit::Done });
     }
     if let Some(path) = &job.request.stats {
@@ -219,11 +219,11 @@ fn conclude(job: &Frames, round: &Round, was_checking: bool) -> Result<Exit> {
 
 /// Holds every rank to the best instruction set that all their machines have, unless one was
 /// asked for: frames differ in their last bits by it.
-fn share_isa(world: &World, settings: &mut Settings, quiet: bool) -> Result<()> {
-    let best: Vec<String> = world.all(machine::best_isa()?.to_string())?;
+fn share_isa(comm: &Communicator, settings: &mut Settings, quiet: bool) -> Result<()> {
+    let best: Vec<String> = comm.all_gather(machine::best_isa()?.to_string())?;
     let Some(isa) = machine::shared_isa(&best) else { return Ok(()) };
     // Where Embree would choose the same on every machine it may.
-    let needed = world.all(isa != machine::detected_isa())?.contains(&true);
+    let needed = comm.all_gather(isa != machine::detected_isa())?.contains(&true);
     if settings.isa.is_none() && needed {
         settings.isa = Some(isa.into());
         if best.iter().any(|other| other != isa) {

@@ -5,7 +5,7 @@ use super::exit::as_input;
 use super::references::{self, References};
 use super::render::RenderArgs;
 use super::{job, machine, values};
-use crate::cluster::{self, World};
+use crate::cluster::{self, Communicator};
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::import::Loaded;
@@ -139,16 +139,16 @@ impl Read {
 
 impl Request {
     /// Reads the scene and puts the options over it. All ranks call it.
-    pub fn load(world: &World, args: &RenderArgs) -> Result<Self> {
+    pub fn load(comm: &Communicator, args: &RenderArgs) -> Result<Self> {
         let RenderArgs { scene, settings, output, .. } = args;
         // Before the work of reading a scene.
-        world.agree(machine::best_isa())?;
-        let read = world.from_node(|| Read::by(scene, settings, output));
-        let read = world.agree(read)?;
-        let derived = world.agree(Derived::of(&read, output))?;
+        comm.agree(machine::best_isa())?;
+        let read = comm.from_node(|| Read::by(scene, settings, output));
+        let read = comm.agree(read)?;
+        let derived = comm.agree(Derived::of(&read, output))?;
         let Derived { terms, recipes } = derived;
         let on = (&read.scene, &read.settings, &terms);
-        let references = References::survey(world, &output.references, &read.pattern, on)?;
+        let references = References::survey(comm, &output.references, &read.pattern, on)?;
         let checkpoint = output.checkpoint.map(|interval| interval.0).or(read.checkpoint);
         Ok(Self {
             scene: read.scene,

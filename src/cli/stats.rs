@@ -1,7 +1,7 @@
 //! The file of `--stats`: what a job took, as JSON.
 
 use super::machine::{Machine, peak_memory};
-use crate::cluster::{Duty, Outcome};
+use crate::cluster::{Outcome, RankWork};
 use crate::error::{Error, Result};
 use crate::output::atomic;
 use crate::output::manifest::{AuditRow, Header};
@@ -29,9 +29,9 @@ pub struct RankStats {
     pub checkpoint_seconds: f64,
     /// Bytes of references put there.
     pub checkpoint_bytes: u64,
-    /// What it did from the first frame to the last.
+    /// The work of the process from the first frame to the last.
     #[serde(flatten)]
-    pub duty: Duty,
+    pub work: RankWork,
     /// Most memory held at once, where the system tells.
     pub peak_memory_bytes: Option<u64>,
 }
@@ -117,8 +117,8 @@ pub fn write(
     let mut bad_samples = bad_of(plan, outcome);
     bad_samples.first = None;
     let slowest = |of: fn(&RankStats) -> f64| ranks.iter().map(of).fold(0.0, f64::max);
-    let busy: f64 = ranks.iter().map(|r| r.duty.busy_seconds).sum();
-    let most = slowest(|r| r.duty.busy_seconds);
+    let busy: f64 = ranks.iter().map(|r| r.work.busy_seconds).sum();
+    let most = slowest(|r| r.work.busy_seconds);
     let stats = Stats {
         tweenray: &header.tweenray,
         scene: &header.scene,
@@ -132,7 +132,7 @@ pub fn write(
         build_seconds: slowest(|r| r.build_seconds),
         render_seconds: slowest(|r| r.render_seconds),
         busy_seconds: busy,
-        waiting_seconds: ranks.iter().map(|r| r.duty.waiting_seconds).sum(),
+        waiting_seconds: ranks.iter().map(|r| r.work.waiting_seconds).sum(),
         balance: if most > 0.0 { busy / ranks.len() as f64 / most } else { 1.0 },
         peak_memory_bytes: ranks.iter().filter_map(|r| r.peak_memory_bytes).max(),
         reference_bytes: ranks.iter().map(|r| r.reference_bytes).max().unwrap_or(0),

@@ -1,57 +1,59 @@
-//! A rank that fails while the others are busy: the job ends, and rank 0 says why, if it hears in time.
+//! A rank that fails while other ranks are busy ends the job, and rank 0 prints the error if it is
+//! reached in time.
 
-use super::{Ranks, World};
+use super::{Backend, Communicator};
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
-/// What a panic is called.
-pub const FAULT: &str = "this is a fault in tweenray, please report it";
+/// The words before a panic's own message.
+pub const PANIC_MESSAGE: &str = "this is a fault in tweenray, please report it";
 
-impl World {
-    /// Ends all ranks for this rank's `error`, which rank 0 says; alone it does nothing. What was finished
-    /// stays: it is on disk.
-    pub fn fail(&self, error: &Error) {
-        match &self.ranks {
-            Ranks::Solo => _ = error,
+impl Communicator {
+    /// Ends all ranks because of this rank's `error`, which rank 0 prints. A single process does
+    /// nothing. Finished frames stay on disk.
+    pub fn abort(&self, error: &Error) {
+        match &self.backend {
+            Backend::Single => _ = error,
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => {
-                let is_told = session.confess(Verdict::of(error).encode());
-                session.abort(if is_told { 1 } else { (self.tell)(error) });
+            Backend::Mpi(session) => {
+                let is_reported = session.report_failure(RemoteError::of(error).encode());
+                session.abort(if is_reported { 1 } else { (self.on_failure)(error) });
             }
         }
     }
 
-    /// On rank 0: says why another rank failed, if one did, and ends all. Elsewhere it helps a thread that
-    /// panicked to be heard.
-    pub(super) fn heed_failures(&self) {
-        match &self.ranks {
-            Ranks::Solo => {}
+    /// On rank 0: if another rank failed, prints its error and ends all ranks. On other ranks: sends the
+    /// report of a thread that panicked.
+    pub(super) fn poll_failures(&self) {
+        match &self.backend {
+            Backend::Single => {}
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => {
-                if let Some((rank, words)) = session.failure() {
-                    session.abort((self.tell)(&Verdict::decode(&words).into_error(rank as usize)));
+            Backend::Mpi(session) => {
+                if let Some((rank, report)) = session.receive_failure() {
+                    let error = RemoteError::decode(&report).into_error(rank as usize);
+                    session.abort((self.on_failure)(&error));
                 }
             }
         }
     }
 }
 
-/// A panic's words, for rank 0.
+/// The failure report of a panic.
 #[cfg(feature = "mpi")]
-pub(super) fn of_panic(panic: &dyn std::fmt::Display) -> Vec<u8> {
-    Verdict::Failed(format!("{FAULT}: {panic}")).encode()
+pub(super) fn encode_panic(panic: &dyn std::fmt::Display) -> Vec<u8> {
+    RemoteError::Failed(format!("{PANIC_MESSAGE}: {panic}")).encode()
 }
 
-/// An error as other ranks hear of it.
+/// An error in the form in which ranks send it.
 #[derive(Serialize, Deserialize)]
-pub(super) enum Verdict {
+pub(super) enum RemoteError {
     Input(String),
     Usage(String),
     Stopped,
     Failed(String),
 }
 
-impl Verdict {
+impl RemoteError {
     pub(super) fn of(error: &Error) -> Self {
         match error {
             Error::Input(fault) => Self::Input(fault.to_string()),
@@ -63,7 +65,7 @@ impl Verdict {
 
     pub(super) fn into_error(self, rank: usize) -> Error {
         match self {
-            // Kept apart from `Failed` for the exit code; the text already holds the place.
+            // `Usage` gives the exit code of wrong input; the text already names the file and line.
             Self::Input(text) | Self::Usage(text) => Error::Usage(text),
             Self::Stopped => Error::Stopped,
             Self::Failed(text) => Error::Failed(format!("rank {rank}: {text}")),
@@ -76,8 +78,8 @@ impl Verdict {
     }
 
     #[cfg(feature = "mpi")]
-    fn decode(words: &[u8]) -> Self {
-        let unclear = |_| Self::Failed("failed, in words that cannot be understood".into());
-        postcard::from_bytes(words).unwrap_or_else(unclear)
+    fn decode(report: &[u8]) -> Self {
+        let unclear = |_| Self::Failed("failed, and its report cannot be decoded".into());
+        postcard::from_bytes(report).unwrap_or_else(unclear)
     }
 }

@@ -1,34 +1,34 @@
-//! Whether a launcher (mpirun, srun) started this process, and what its environment says.
+//! The launcher (mpirun, srun) that started this process, found by its environment variables.
 
 mod binding;
 mod process;
 
-use super::World;
+use super::Communicator;
 use crate::error::{Error, Result};
 pub use binding::Binding;
 pub use process::LauncherProcess;
 use process::allowed_cores;
 
-/// What is known of the launcher before MPI is asked.
+/// The launcher's environment variables, read before MPI is initialised.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launcher {
-    /// Its usual name.
+    /// Name for messages.
     pub name: String,
-    /// How many processes it started, where it says so.
+    /// Number of processes that the launcher started, if set.
     pub ranks: Option<u32>,
-    /// Which of them this one is, where it says so.
+    /// Number of this process, from 0, if set.
     pub rank: Option<u32>,
 }
 
-/// Looks for a launcher's variables. `SLURM_NTASKS` alone is none: it is also set in a batch
-/// script, which runs once; `SLURM_STEP_NUM_TASKS` is set in the tasks of srun.
+/// Finds a launcher by its variables. `SLURM_NTASKS` is not one of them, because it is also set in a batch
+/// script, which runs once; `SLURM_STEP_NUM_TASKS` is set only in the tasks of srun.
 fn detect(env: impl Fn(&str) -> Option<String>) -> Option<Launcher> {
     let number = |name: &str| env(name).and_then(|text| text.trim().parse::<u32>().ok());
     let srun = env("SLURM_MPI_TYPE").map_or("srun".into(), |kind| format!("srun --mpi={kind}"));
-    // srun sets PMI_SIZE too where it plays MPICH's launcher. Where mpirun starts its helpers by srun,
-    // Slurm counts these, and not the ranks.
-    let plays_mpich = number("PMI_SIZE") == number("SLURM_STEP_NUM_TASKS");
-    let mpich = if plays_mpich { &srun } else { "mpiexec of MPICH or Intel MPI" };
+    // srun sets PMI_SIZE too when it acts as MPICH's launcher. If mpirun starts its helpers by srun,
+    // Slurm counts the helpers and not the ranks.
+    let is_srun = number("PMI_SIZE") == number("SLURM_STEP_NUM_TASKS");
+    let mpich = if is_srun { &srun } else { "mpiexec of MPICH or Intel MPI" };
     for (name, size, rank) in [
         ("mpirun of Open MPI", "OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
         (mpich, "PMI_SIZE", "PMI_RANK"),
@@ -44,63 +44,63 @@ fn detect(env: impl Fn(&str) -> Option<String>) -> Option<Launcher> {
     })
 }
 
-/// Whether a launcher started this process as another than the first. What all of them find wrong before
-/// they know of each other, the first one tells.
-pub fn is_follower() -> bool {
-    here().is_some_and(|launcher| launcher.is_follower())
+/// Whether a launcher started this process with a number other than 0. Such a process stays silent about
+/// errors that all processes meet before MPI connects them.
+pub fn is_nonzero_rank() -> bool {
+    current().is_some_and(|launcher| launcher.is_nonzero_rank())
 }
 
-/// Whether this process is the only one, as `command` has to be, which does all of its work by itself.
+/// Refuses to run `command`, which does not share its work, in several processes.
 ///
 /// # Errors
-/// A launcher started several.
-pub fn alone(command: &str) -> Result<()> {
-    match several() {
-        Some(launcher) => Err(launcher.crowd(command)),
+/// A launcher started several processes.
+pub fn require_single(command: &str) -> Result<()> {
+    match multi_process_launcher() {
+        Some(launcher) => Err(launcher.not_shared(command)),
         None => Ok(()),
     }
 }
 
-/// The launcher, where it started several processes as far as is known.
-pub(super) fn several() -> Option<Launcher> {
-    here().filter(|launcher| launcher.ranks != Some(1))
+/// The launcher, unless it is known to have started only one process.
+pub(super) fn multi_process_launcher() -> Option<Launcher> {
+    current().filter(|launcher| launcher.ranks != Some(1))
 }
 
-/// The process of the launcher that started this one, where both are known.
+/// The process of the launcher that started this one, if the launcher is known and still visible.
 pub fn launcher_process() -> Option<LauncherProcess> {
-    here().and_then(|_| LauncherProcess::find())
+    current().and_then(|_| LauncherProcess::find())
 }
 
-fn here() -> Option<Launcher> {
+fn current() -> Option<Launcher> {
     detect(|name| std::env::var(name).ok())
 }
 
-/// How many threads a process uses unless told, with nobody to share with: the cores that it may use.
+/// Default number of threads of a single process: the number of cores that it may use.
 pub fn default_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-impl World {
-    /// How many threads this rank uses unless told: the cores that the launcher gave it, shared with
-    /// those ranks of its node that got the very same ones. All ranks call it.
+impl Communicator {
+    /// Default number of threads of this rank: the number of cores that the rank may use, divided by the
+    /// number of ranks on its node with exactly the same cores. All ranks call it.
     ///
     /// # Errors
-    /// Those of talking to other ranks.
+    /// A message between ranks cannot be encoded or decoded.
     pub fn default_threads(&self) -> Result<usize> {
-        let own = (self.nodes()?[self.rank() as usize], allowed_cores(std::process::id()));
-        let all = self.all(own.clone())?;
+        let own = (self.node_ids()?[self.rank() as usize], allowed_cores(std::process::id()));
+        let all = self.all_gather(own.clone())?;
         let sharers = all.iter().filter(|other| **other == own).count();
         Ok((default_threads() / sharers.max(1)).max(1))
     }
 }
 
 impl Launcher {
-    fn is_follower(&self) -> bool {
+    fn is_nonzero_rank(&self) -> bool {
         self.ranks != Some(1) && self.rank.is_some_and(|rank| rank > 0)
     }
 
-    /// The error of a command that several processes would each run as a whole.
-    fn crowd(&self, command: &str) -> Error {
+    /// The error of a command that each of several processes would run as a whole.
+    fn not_shared(&self, command: &str) -> Error {
         Error::Usage(format!(
             "{} started {}, and each would do all that `tweenray {command}` does and write the same \
              files\n  help: start it without a launcher; only `tweenray render` shares its work",
@@ -121,9 +121,9 @@ impl Launcher {
         ))
     }
 
-    /// The error of a process that MPI takes to be alone though the launcher started several.
+    /// The error of a process that MPI does not connect to the others that the launcher started.
     #[cfg_attr(not(feature = "mpi"), allow(dead_code))]
-    pub fn stranger(&self) -> Error {
+    pub fn not_connected(&self) -> Error {
         Error::Usage(format!(
             "{} started {}, but MPI knows of one only, and each would render every frame\n  \
              help: use the mpirun of the MPI that tweenray was built with, or `srun --mpi=pmix`",
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_launcher_is_known_by_its_variables_and_a_batch_script_is_none() {
+    fn a_launcher_is_found_by_its_variables_and_a_batch_script_is_not_one() {
         assert_eq!(detect(env(&[])), None);
         assert_eq!(detect(env(&[("SLURM_NTASKS", "4"), ("SLURM_PROCID", "0")])), None);
         let ranks = |pairs| detect(env(pairs)).and_then(|l| l.ranks);
@@ -161,24 +161,25 @@ mod tests {
     }
 
     #[test]
-    fn all_but_the_first_process_leave_it_to_that_to_speak() {
-        let follows = |pairs: &[(&str, &str)]| detect(env(pairs)).is_some_and(|l| l.is_follower());
-        assert!(!follows(&[]));
-        assert!(!follows(&[("SLURM_NTASKS", "4"), ("SLURM_PROCID", "3")]));
+    fn a_nonzero_rank_is_one_of_several_processes_and_has_a_number_above_0() {
+        let is_nonzero =
+            |pairs: &[(&str, &str)]| detect(env(pairs)).is_some_and(|l| l.is_nonzero_rank());
+        assert!(!is_nonzero(&[]));
+        assert!(!is_nonzero(&[("SLURM_NTASKS", "4"), ("SLURM_PROCID", "3")]));
         for (size, rank) in [
             ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
             ("PMI_SIZE", "PMI_RANK"),
             ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
         ] {
-            assert!(!follows(&[(size, "4"), (rank, "0")]), "{size}");
-            assert!(follows(&[(size, "4"), (rank, "3")]), "{size}");
-            assert!(!follows(&[(size, "1"), (rank, "3")]), "{size}");
-            assert!(!follows(&[(size, "4")]), "{size}");
+            assert!(!is_nonzero(&[(size, "4"), (rank, "0")]), "{size}");
+            assert!(is_nonzero(&[(size, "4"), (rank, "3")]), "{size}");
+            assert!(!is_nonzero(&[(size, "1"), (rank, "3")]), "{size}");
+            assert!(!is_nonzero(&[(size, "4")]), "{size}");
         }
-        assert!(follows(&[("PMIX_RANK", "1")]) && !follows(&[("PMIX_RANK", "0")]));
-        // A step of one process that mpirun starts its helpers in is not what counts.
+        assert!(is_nonzero(&[("PMIX_RANK", "1")]) && !is_nonzero(&[("PMIX_RANK", "0")]));
+        // mpirun starts its helper in a Slurm step of one process; mpirun's own variables take precedence.
         let helper = [("SLURM_STEP_NUM_TASKS", "1"), ("SLURM_PROCID", "0")];
         let ranks = [("OMPI_COMM_WORLD_SIZE", "2"), ("OMPI_COMM_WORLD_RANK", "1")];
-        assert!(follows(&[helper, ranks].concat()));
+        assert!(is_nonzero(&[helper, ranks].concat()));
     }
 }

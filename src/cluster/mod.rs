@@ -1,34 +1,34 @@
-//! Who renders which frames: one process alone, or the ranks of an MPI job, by the same code.
+//! Which process renders which frames: one process alone, or the ranks of an MPI job, by the same code.
 //!
-//! [`World`] is the process's place among the ranks; [`render`] makes the frames of a sequence. MPI is
+//! [`Communicator`] stands for all ranks of the job; [`render`] makes the frames of a sequence. MPI is
 //! initialised only when a launcher started the process and the feature `mpi` is compiled in. The
-//! bytes of a frame do not depend on who renders it.
+//! bytes of a frame do not depend on the rank that renders it.
 //!
-//! On every rank one thread, the `worker`, renders, and the main thread, the `clerk`, talks to
-//! other ranks meanwhile. Rank 0's clerk keeps the `board`, which says who makes what and who sends
-//! which reference to whom; references travel from the rank that has them to the one that needs them
-//! (`docs/decisions/019-ranks.md`).
+//! Each rank has a `render_thread`, and its main thread is the `comm_thread`, which exchanges messages
+//! with other ranks. Rank 0 also runs the `scheduler`, which assigns frames to ranks and has references
+//! sent to the ranks that need them (`docs/decisions/019-ranks.md`). Not done: recovery from a rank that
+//! fails. The job ends, and a restart resumes it.
 
-mod board;
-mod clerk;
+mod chunks;
 mod collective;
+mod comm_thread;
 mod failure;
 mod frames;
 mod launcher;
+mod message;
 #[cfg(feature = "mpi")]
 mod mpi;
 mod nodes;
-mod note;
-mod parcel;
-mod post;
+mod point_to_point;
+mod render_thread;
+mod scheduler;
 pub mod simulation;
 mod traffic;
-mod worker;
 
-pub use failure::FAULT;
-pub use frames::{Duty, Outcome, lock, prepare, render};
+pub use failure::PANIC_MESSAGE;
+pub use frames::{Outcome, RankWork, lock, prepare, render};
 pub use launcher::{
-    Binding, LauncherProcess, alone, default_threads, is_follower, launcher_process,
+    Binding, LauncherProcess, default_threads, is_nonzero_rank, launcher_process, require_single,
 };
 pub use nodes::{check_rank_map, rank_order};
 pub use traffic::{Sent, Traffic};
@@ -38,175 +38,179 @@ use launcher::Launcher;
 use std::cell::Cell;
 use std::time::Duration;
 
-/// How many discoveries a message carries at most, unless told; docs/decisions/019-ranks.md has the
+/// Default of `--exchange`: most discoveries in one message. `docs/decisions/019-ranks.md` has the
 /// measurement.
 pub const EXCHANGE: u64 = 100_000;
 
-/// This process's place in the job.
-pub struct World {
-    ranks: Ranks,
-    /// What this rank sent, so far.
+/// All ranks of the job, as one of them sees them.
+pub struct Communicator {
+    backend: Backend,
+    /// Messages and bytes that this rank sent so far.
     sent: Cell<Traffic>,
-    /// How many discoveries a message carries at most.
+    /// Most discoveries in one message.
     exchange: Cell<u64>,
-    /// Whether this rank failed and could not tell the others.
-    is_stranded: Cell<bool>,
-    /// Says why the job ends, and gives its exit code.
+    /// Whether this rank failed and could not report the error.
+    has_unreported_failure: Cell<bool>,
+    /// Prints the error that ends the job, and returns the exit code.
     #[cfg_attr(not(feature = "mpi"), allow(dead_code))]
-    tell: Box<dyn Fn(&Error) -> u8>,
+    on_failure: Box<dyn Fn(&Error) -> u8>,
 }
 
-enum Ranks {
-    Solo,
+enum Backend {
+    Single,
     #[cfg(feature = "mpi")]
     Mpi(mpi::Session),
 }
 
-impl World {
-    /// A world of one process.
-    pub fn solo() -> Self {
-        Self::of(Ranks::Solo, Box::new(|_| 1))
+impl Communicator {
+    /// A communicator of one process, without MPI.
+    pub fn single() -> Self {
+        Self::new(Backend::Single, Box::new(|_| 1))
     }
 
-    fn of(ranks: Ranks, tell: Box<dyn Fn(&Error) -> u8>) -> Self {
+    fn new(backend: Backend, on_failure: Box<dyn Fn(&Error) -> u8>) -> Self {
         Self {
-            ranks,
+            backend,
             sent: Cell::default(),
             exchange: Cell::new(EXCHANGE),
-            is_stranded: Cell::default(),
-            tell,
+            has_unreported_failure: Cell::default(),
+            on_failure,
         }
     }
 
-    /// From here on a message carries so many discoveries at most. It decides when bytes arrive, never
-    /// which.
+    /// Sets the most discoveries in one message. The number affects when bytes arrive, never which.
     pub fn set_exchange(&self, discoveries: u64) {
         self.exchange.set(discoveries);
     }
 
-    /// Joins the ranks that a launcher started with this one; alone without a launcher. Where a rank
-    /// fails while others are busy, `tell` says why and gives the exit code: on rank 0 if that
-    /// hears of it in time, else on the rank that failed, and all end.
+    /// Initialises MPI if a launcher started several processes; otherwise the communicator has one
+    /// process. `on_failure` prints the error that ends the job and returns the exit code. Rank 0 calls
+    /// it if the failed rank can reach rank 0 in time, else the failed rank does.
     ///
-    /// Errors: several processes were started, but they cannot know of each other, so each would
-    /// render everything.
-    pub fn join(tell: impl Fn(&Error) -> u8 + 'static) -> Result<Self> {
-        match launcher::several() {
-            Some(launcher) => Self::join_by(&launcher, Box::new(tell)),
-            None => Ok(Self::solo()),
+    /// # Errors
+    /// A launcher started several processes, but MPI does not connect them: each would render
+    /// every frame.
+    pub fn init(on_failure: impl Fn(&Error) -> u8 + 'static) -> Result<Self> {
+        match launcher::multi_process_launcher() {
+            Some(launcher) => Self::init_mpi(&launcher, Box::new(on_failure)),
+            None => Ok(Self::single()),
         }
     }
 
     #[cfg(feature = "mpi")]
-    fn join_by(launcher: &Launcher, tell: Box<dyn Fn(&Error) -> u8>) -> Result<Self> {
-        let session = mpi::Session::start(failure::of_panic)?;
+    fn init_mpi(launcher: &Launcher, on_failure: Box<dyn Fn(&Error) -> u8>) -> Result<Self> {
+        let session = mpi::Session::start(failure::encode_panic)?;
         if session.size() == 1 && launcher.ranks.is_some_and(|n| n > 1) {
-            return Err(launcher.stranger());
+            return Err(launcher.not_connected());
         }
-        Ok(Self::of(Ranks::Mpi(session), tell))
+        Ok(Self::new(Backend::Mpi(session), on_failure))
     }
 
     #[cfg(not(feature = "mpi"))]
-    fn join_by(launcher: &Launcher, _: Box<dyn Fn(&Error) -> u8>) -> Result<Self> {
+    fn init_mpi(launcher: &Launcher, _: Box<dyn Fn(&Error) -> u8>) -> Result<Self> {
         Err(launcher.without_mpi())
     }
 
-    /// This process's number, from 0.
+    /// Number of this process, from 0.
     pub fn rank(&self) -> u32 {
-        match &self.ranks {
-            Ranks::Solo => 0,
+        match &self.backend {
+            Backend::Single => 0,
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.rank(),
+            Backend::Mpi(session) => session.rank(),
         }
     }
 
-    /// How many processes share the job.
+    /// Number of processes in the job.
     pub fn size(&self) -> u32 {
-        match &self.ranks {
-            Ranks::Solo => 1,
+        match &self.backend {
+            Backend::Single => 1,
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.size(),
+            Backend::Mpi(session) => session.size(),
         }
     }
 
-    /// How many of the processes share this one's memory, itself included.
-    pub fn size_of_node(&self) -> u32 {
-        self.place_in_node().1
+    /// Number of ranks that share this rank's memory, itself included.
+    pub fn node_size(&self) -> u32 {
+        self.node_rank_and_size().1
     }
 
-    /// Whether this rank talks to people and keeps the manifest.
+    /// Whether this is rank 0, which prints and keeps the manifest.
     pub fn is_root(&self) -> bool {
         self.rank() == 0
     }
 
+    /// Rank 0's `bytes`, on every rank.
     fn broadcast(&self, bytes: Vec<u8>) -> Vec<u8> {
-        match &self.ranks {
-            Ranks::Solo => bytes,
+        match &self.backend {
+            Backend::Single => bytes,
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.broadcast(bytes),
+            Backend::Mpi(session) => session.broadcast(bytes),
         }
     }
 
+    /// The `bytes` of the node's first rank, on every rank of the node.
     fn broadcast_in_node(&self, bytes: Vec<u8>) -> Vec<u8> {
-        match &self.ranks {
-            Ranks::Solo => bytes,
+        match &self.backend {
+            Backend::Single => bytes,
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.broadcast_in_node(bytes),
+            Backend::Mpi(session) => session.broadcast_in_node(bytes),
         }
     }
 
-    /// This rank's place among those of its node, from 0, and how many these are.
-    fn place_in_node(&self) -> (u32, u32) {
-        match &self.ranks {
-            Ranks::Solo => (0, 1),
+    /// This rank's number within its node, from 0, and the number of ranks on the node.
+    fn node_rank_and_size(&self) -> (u32, u32) {
+        match &self.backend {
+            Backend::Single => (0, 1),
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.place_in_node(),
+            Backend::Mpi(session) => session.node_rank_and_size(),
         }
     }
 
-    /// Waits, asleep, for all ranks to get here; false where some do not within `patience`.
-    fn assemble(&self, patience: Option<Duration>) -> bool {
-        match &self.ranks {
-            Ranks::Solo => {
-                _ = patience;
+    /// A barrier that sleeps between polls; false if a rank does not reach it within `timeout`.
+    fn timed_barrier(&self, timeout: Option<Duration>) -> bool {
+        match &self.backend {
+            Backend::Single => {
+                _ = timeout;
                 true
             }
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.assemble(patience, &|| self.heed_failures()),
+            Backend::Mpi(session) => session.timed_barrier(timeout, &|| self.poll_failures()),
         }
     }
 
-    /// Waits, asleep, for all ranks to get to the end; MPI itself would have those that wait look without
-    /// a pause. All ranks call it, last.
-    pub fn part(&self) {
-        self.assemble(None);
+    /// The barrier before `MPI_Finalize`. All ranks call it, last. It sleeps between polls, where
+    /// MPI's own wait would spin on a core.
+    pub fn final_barrier(&self) {
+        self.timed_barrier(None);
     }
 
+    /// The `bytes` of all ranks, in rank order, on rank 0; empty on the others.
     fn gather_bytes(&self, bytes: Vec<u8>) -> Vec<Vec<u8>> {
-        match &self.ranks {
-            Ranks::Solo => vec![bytes],
+        match &self.backend {
+            Backend::Single => vec![bytes],
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.gather(&bytes),
+            Backend::Mpi(session) => session.gather(&bytes),
         }
     }
 
-    /// For each rank the number of its node: the lowest of the ranks that share memory with it. All
+    /// For each rank the id of its node: the lowest of the ranks that share memory with it. All
     /// ranks call it.
-    fn nodes(&self) -> Result<Vec<u32>> {
-        let own = match &self.ranks {
-            Ranks::Solo => 0,
+    fn node_ids(&self) -> Result<Vec<u32>> {
+        let own = match &self.backend {
+            Backend::Single => 0,
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.node(),
+            Backend::Mpi(session) => session.node_id(),
         };
-        self.all(own)
+        self.all_gather(own)
     }
 
-    /// Waits until every rank got here, asleep between looks; `meanwhile` runs at every look.
-    fn settle(&self, meanwhile: &mut dyn FnMut() -> Result<()>) -> Result<()> {
-        match &self.ranks {
-            Ranks::Solo => {}
+    /// Completes this rank's sends, then waits in a barrier; runs `meanwhile` at every poll, and once at
+    /// the end. All ranks call it.
+    fn flush_and_barrier(&self, meanwhile: &mut dyn FnMut() -> Result<()>) -> Result<()> {
+        match &self.backend {
+            Backend::Single => {}
             #[cfg(feature = "mpi")]
-            Ranks::Mpi(session) => session.settle(meanwhile)?,
+            Backend::Mpi(session) => session.flush_and_barrier(meanwhile)?,
         }
         meanwhile()
     }

@@ -1,8 +1,8 @@
-//! Ranks over MPI: the only place of this room that is unsafe, and the only one that knows rsmpi.
+//! Ranks over MPI: the only unsafe code of `cluster`, and the only user of rsmpi.
 //!
-//! MPI is initialised as `Funneled`: every call comes from the main thread, except `MPI_Abort`
-//! from the hook of a thread that panics, since a panic must not leave the other ranks waiting
-//! (a rank that unwinds hangs the job in `MPI_Finalize`).
+//! MPI is initialised as `Funneled`: every call comes from the main thread. The exception is
+//! `MPI_Abort` from the panic hook of any thread, because a rank that unwinds would hang the job in
+//! `MPI_Finalize`.
 #![allow(unsafe_code)]
 
 mod relay;
@@ -13,7 +13,7 @@ use ::mpi::environment::Universe;
 use ::mpi::ffi;
 use ::mpi::point_to_point::MatchedReceiveVec;
 use ::mpi::topology::SimpleCommunicator;
-use ::mpi::traits::{AsRaw, Communicator, CommunicatorCollectives, Destination, Root, Source};
+use ::mpi::traits::{AsRaw, Communicator as _, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::RefCell;
 use std::ffi::{c_char, c_void};
 use std::fmt::Display;
@@ -21,44 +21,44 @@ use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long a waiting rank sleeps between looks; Open MPI would spin on a core instead.
-const NAP: Duration = Duration::from_millis(2);
-/// Tag of notes.
-const NOTE: i32 = 1;
-/// Tag of what `gather` sends.
+/// Time between polls of a waiting rank; Open MPI's own wait would spin on a core.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
+/// Tag of control messages.
+const MESSAGE: i32 = 1;
+/// Tag of the messages of `gather`.
 const GATHERED: i32 = 2;
-/// Tag of cargo.
-const CARGO: i32 = 3;
-/// Largest broadcast or gather in one call; MPI counts in `int`.
-const PIECE: usize = 1 << 30;
+/// Tag of payloads.
+const PAYLOAD: i32 = 3;
+/// Most bytes of one broadcast or gather call, because MPI counts in `int`.
+const MAX_BYTES: usize = 1 << 30;
 
-/// MPI, initialised; finalised when dropped, on the main thread.
+/// Initialised MPI. Dropping it on the main thread finalises MPI.
 pub struct Session {
-    outbox: RefCell<Vec<Posted>>,
+    pending_sends: RefCell<Vec<PendingSend>>,
     world: SimpleCommunicator,
-    /// The ranks that share memory with this one, in the order of their numbers.
+    /// The ranks that share memory with this rank, in rank order.
     node: SimpleCommunicator,
     // Dropped last: it finalises MPI.
     _universe: Universe,
 }
 
-/// A message on its way, with the memory that MPI still reads.
-struct Posted {
+/// A send that is not complete, with the memory that MPI still reads.
+struct PendingSend {
     request: ffi::MPI_Request,
     _bytes: Arc<[u8]>,
 }
 
 impl Session {
-    /// Initialises MPI and makes every later panic of this process end the job. Rank 0 says of others'
-    /// what `words` makes of it.
-    pub fn start(words: fn(&dyn Display) -> Vec<u8>) -> Result<Self> {
+    /// Initialises MPI. From then on a panic on any thread ends the job; on ranks other than 0, rank 0 gets
+    /// the report that `encode_panic` makes.
+    pub fn start(encode_panic: fn(&dyn Display) -> Vec<u8>) -> Result<Self> {
         let (universe, _) = ::mpi::initialize_with_threading(Threading::Funneled)
             .ok_or_else(|| Error::Failed("MPI was already initialised".into()))?;
         relay::start();
         let is_root = universe.world().rank() == 0;
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            if is_root || !relay::confess(words(panic)) {
+            if is_root || !relay::report_failure(encode_panic(panic)) {
                 before(panic);
             }
             // SAFETY: MPI is initialised; `MPI_Abort` on the world communicator does not return,
@@ -68,7 +68,7 @@ impl Session {
         wait_for_all_to_start();
         let world = universe.world();
         let node = world.split_shared(world.rank());
-        Ok(Self { outbox: RefCell::default(), world, node, _universe: universe })
+        Ok(Self { pending_sends: RefCell::default(), world, node, _universe: universe })
     }
 
     pub fn rank(&self) -> u32 {
@@ -81,55 +81,55 @@ impl Session {
 
     /// Rank 0's `bytes`, on every rank.
     pub fn broadcast(&self, bytes: Vec<u8>) -> Vec<u8> {
-        from_first(&self.world, bytes)
+        broadcast_from_first(&self.world, bytes)
     }
 
-    /// The `bytes` of this node's first rank, on every rank of it. All ranks of the node call it.
+    /// The `bytes` of the node's first rank, on every rank of the node. All ranks of the node call it.
     pub fn broadcast_in_node(&self, bytes: Vec<u8>) -> Vec<u8> {
-        from_first(&self.node, bytes)
+        broadcast_from_first(&self.node, bytes)
     }
 
-    /// This rank's place among the ranks of its node, from 0, and how many these are.
-    pub fn place_in_node(&self) -> (u32, u32) {
+    /// This rank's number within its node, from 0, and the number of ranks on the node.
+    pub fn node_rank_and_size(&self) -> (u32, u32) {
         (self.node.rank() as u32, self.node.size() as u32)
     }
 
-    /// Every rank's `bytes` on rank 0, nothing elsewhere.
+    /// The `bytes` of all ranks, in rank order, on rank 0; empty on the others.
     pub fn gather(&self, bytes: &[u8]) -> Vec<Vec<u8>> {
         if self.rank() != 0 {
             let root = self.world.process_at_rank(0);
             root.send_with_tag(&(bytes.len() as u64), GATHERED);
-            bytes.chunks(PIECE).for_each(|piece| root.send_with_tag(piece, GATHERED));
+            bytes.chunks(MAX_BYTES).for_each(|chunk| root.send_with_tag(chunk, GATHERED));
             return Vec::new();
         }
         let mut all = vec![bytes.to_vec()];
         for rank in 1..self.world.size() {
             let from = self.world.process_at_rank(rank);
             let (length, _) = from.receive_with_tag::<u64>(GATHERED);
-            let mut theirs = vec![0; length as usize];
-            for piece in theirs.chunks_mut(PIECE) {
-                from.receive_into_with_tag(piece, GATHERED);
+            let mut received = vec![0; length as usize];
+            for chunk in received.chunks_mut(MAX_BYTES) {
+                from.receive_into_with_tag(chunk, GATHERED);
             }
-            all.push(theirs);
+            all.push(received);
         }
         all
     }
 
-    /// The lowest of the ranks that share memory with this one, itself included. All ranks call it.
-    pub fn node(&self) -> u32 {
+    /// The id of this rank's node: the lowest rank on the node. All ranks call it.
+    pub fn node_id(&self) -> u32 {
         let mut first = self.world.rank();
         self.node.process_at_rank(0).broadcast_into(&mut first);
         first as u32
     }
 
-    /// Starts sending and returns at once.
-    pub fn post(&self, to: u32, is_cargo: bool, bytes: Arc<[u8]>) -> Result<()> {
+    /// Starts a non-blocking send.
+    pub fn send(&self, to: u32, is_payload: bool, bytes: Arc<[u8]>) -> Result<()> {
         let length = i32::try_from(bytes.len())
             .map_err(|_| Error::Failed(format!("{} bytes are too much to send", bytes.len())))?;
-        let tag = if is_cargo { CARGO } else { NOTE };
+        let tag = if is_payload { PAYLOAD } else { MESSAGE };
         let mut request = MaybeUninit::uninit();
         // SAFETY: `MPI_Isend` reads `bytes` until the request completes; the shared memory is kept
-        // beside the request, is not moved or written, and is let go only in `clear_outbox`, after
+        // beside the request, is not moved or written, and is freed only in `complete_sends`, after
         // `MPI_Test` said that the request is complete.
         let request = unsafe {
             ffi::MPI_Isend(
@@ -143,31 +143,32 @@ impl Session {
             );
             request.assume_init()
         };
-        self.outbox.borrow_mut().push(Posted { request, _bytes: bytes });
+        self.pending_sends.borrow_mut().push(PendingSend { request, _bytes: bytes });
         Ok(())
     }
 
-    /// What has arrived, with its senders.
-    pub fn arrived(&self, is_cargo: bool) -> Vec<(u32, Vec<u8>)> {
-        self.clear_outbox();
+    /// All messages that have arrived, with their senders.
+    pub fn receive(&self, is_payload: bool) -> Vec<(u32, Vec<u8>)> {
+        self.complete_sends();
         let any = self.world.any_process();
-        let tag = if is_cargo { CARGO } else { NOTE };
+        let tag = if is_payload { PAYLOAD } else { MESSAGE };
         std::iter::from_fn(|| any.immediate_matched_probe_with_tag(tag))
-            .map(|arrived| arrived.matched_receive_vec())
+            .map(|message| message.matched_receive_vec())
             .map(|(bytes, status)| (status.source_rank() as u32, bytes))
             .collect()
     }
 
-    /// Whether something is still on its way.
-    pub fn is_sending(&self) -> bool {
-        !self.clear_outbox()
+    /// Whether a send is not complete.
+    pub fn has_pending_sends(&self) -> bool {
+        !self.complete_sends()
     }
 
-    /// Waits, asleep, until every rank called this and every note of this rank is on its way.
-    pub fn settle(&self, meanwhile: &mut dyn FnMut() -> Result<()>) -> Result<()> {
-        while !self.clear_outbox() {
+    /// Completes this rank's sends, then waits in a barrier; runs `meanwhile` at every poll. All ranks
+    /// call it.
+    pub fn flush_and_barrier(&self, meanwhile: &mut dyn FnMut() -> Result<()>) -> Result<()> {
+        while !self.complete_sends() {
             meanwhile()?;
-            std::thread::sleep(NAP);
+            std::thread::sleep(POLL_INTERVAL);
         }
         let mut barrier = self.world.immediate_barrier();
         while let Err(pending) = barrier.test() {
@@ -176,46 +177,45 @@ impl Session {
                 barrier.wait();
                 return Err(error);
             }
-            std::thread::sleep(NAP);
+            std::thread::sleep(POLL_INTERVAL);
         }
         Ok(())
     }
 
-    /// Waits, asleep, until every rank called this; false where somebody is not there after
-    /// `patience`, and then nothing is left to do with the others but to end them. `meanwhile` runs at
-    /// every look.
-    pub fn assemble(&self, patience: Option<Duration>, meanwhile: &dyn Fn()) -> bool {
+    /// A barrier; false if a rank does not reach it within `timeout`, after which only
+    /// [`abort`](Self::abort) may follow. Runs `meanwhile` at every poll.
+    pub fn timed_barrier(&self, timeout: Option<Duration>, meanwhile: &dyn Fn()) -> bool {
         let start = Instant::now();
         let mut barrier = self.world.immediate_barrier();
         while let Err(pending) = barrier.test() {
             meanwhile();
-            if patience.is_some_and(|patience| start.elapsed() > patience) {
-                // (Its request is MPI's until the end, which is near.)
+            if timeout.is_some_and(|timeout| start.elapsed() > timeout) {
+                // (MPI owns the request until the job is aborted.)
                 std::mem::forget(pending);
                 return false;
             }
             barrier = pending;
-            std::thread::sleep(NAP);
+            std::thread::sleep(POLL_INTERVAL);
         }
         true
     }
 
-    /// On rank 0: a rank that failed, with its words, which are to be said now. On others: takes along
-    /// what a thread of this rank has to say.
-    pub fn failure(&self) -> Option<(u32, Vec<u8>)> {
+    /// On rank 0: receives and acknowledges a failure report, and returns it with the failed rank. On
+    /// other ranks: sends the report of another thread.
+    pub fn receive_failure(&self) -> Option<(u32, Vec<u8>)> {
         if self.rank() != 0 {
-            relay::pass_on();
+            relay::send_report();
             return None;
         }
-        let arrived = self.world.any_process().immediate_matched_probe_with_tag(relay::FAILED)?;
-        let (words, status) = arrived.matched_receive_vec();
-        relay::answer(status.source_rank());
-        Some((status.source_rank() as u32, words))
+        let message = self.world.any_process().immediate_matched_probe_with_tag(relay::FAILED)?;
+        let (report, status) = message.matched_receive_vec();
+        relay::acknowledge(status.source_rank());
+        Some((status.source_rank() as u32, report))
     }
 
-    /// Has rank 0 say `words`; false where it does not hear.
-    pub fn confess(&self, words: Vec<u8>) -> bool {
-        self.rank() != 0 && relay::confess(words)
+    /// Reports a failure to rank 0, which prints it; false if rank 0 does not acknowledge in time.
+    pub fn report_failure(&self, report: Vec<u8>) -> bool {
+        self.rank() != 0 && relay::report_failure(report)
     }
 
     /// Ends all ranks.
@@ -223,23 +223,23 @@ impl Session {
         self.world.abort(i32::from(code));
     }
 
-    /// Frees the notes that were sent; true when none is left.
-    fn clear_outbox(&self) -> bool {
-        let mut outbox = self.outbox.borrow_mut();
-        outbox.retain_mut(|posted| {
+    /// Frees the memory of completed sends; true when no send is pending.
+    fn complete_sends(&self) -> bool {
+        let mut pending = self.pending_sends.borrow_mut();
+        pending.retain_mut(|send| {
             let mut done = 0;
             // SAFETY: the request comes from `MPI_Isend` and is active: completed ones are
             // removed here, before anything could test them again.
-            unsafe { ffi::MPI_Test(&mut posted.request, &mut done, ffi::RSMPI_STATUS_IGNORE) };
+            unsafe { ffi::MPI_Test(&mut send.request, &mut done, ffi::RSMPI_STATUS_IGNORE) };
             done == 0
         });
-        outbox.is_empty()
+        pending.is_empty()
     }
 }
 
-/// Waits until every rank has left `MPI_Init`, by the launcher's own barrier where it has one. In Open
-/// MPI 5 a rank that is still in there crashes where a message of a quicker one reaches it
-/// (open-mpi/ompi#12495; met with 5.0.7 over TCP on busy cores).
+/// Waits until every rank has left `MPI_Init`, in a PMIx barrier where the launcher has PMIx. In Open MPI 5
+/// a rank inside `MPI_Init` crashes when a message of a faster rank arrives (open-mpi/ompi#12495; seen
+/// with 5.0.7 over TCP on busy cores).
 #[cfg(target_os = "linux")]
 fn wait_for_all_to_start() {
     type Fence =
@@ -247,30 +247,30 @@ fn wait_for_all_to_start() {
     unsafe extern "C" {
         fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
     }
-    // SAFETY: the name is a C string; on Linux the null library is `RTLD_DEFAULT`, all that the
-    // program was linked with and what that needs. Open MPI 5 needs PMIx, others may not.
+    // SAFETY: the name is a C string; on Linux the null handle is `RTLD_DEFAULT`, all libraries that
+    // the program loaded. Open MPI 5 loads PMIx; other MPIs may not.
     let found = unsafe { dlsym(std::ptr::null_mut(), c"PMIx_Fence".as_ptr()) };
     if found.is_null() {
         return;
     }
     // SAFETY: `pmix_status_t PMIx_Fence(const pmix_proc_t[], size_t, const pmix_info_t[], size_t)` by
-    // the PMIx Standard since 2.0, in which no processes are all of the job. MPI has initialised PMIx.
+    // the PMIx Standard since 2.0; an empty process list means the whole job. MPI has initialised PMIx.
     let fence = unsafe { std::mem::transmute::<*mut c_void, Fence>(found) };
-    // SAFETY: as above; every rank calls it once, here. Where it fails there is nothing to wait for.
+    // SAFETY: as above; every rank calls it once, here. An error means no barrier, and is ignored.
     unsafe { fence(std::ptr::null(), 0, std::ptr::null(), 0) };
 }
 
 #[cfg(not(target_os = "linux"))]
 fn wait_for_all_to_start() {}
 
-/// The `bytes` of the first of some ranks, on all of them.
-fn from_first(ranks: &SimpleCommunicator, mut bytes: Vec<u8>) -> Vec<u8> {
+/// The `bytes` of the communicator's first rank, on all its ranks.
+fn broadcast_from_first(ranks: &SimpleCommunicator, mut bytes: Vec<u8>) -> Vec<u8> {
     let first = ranks.process_at_rank(0);
     let mut length = bytes.len() as u64;
     first.broadcast_into(&mut length);
     bytes.resize(length as usize, 0);
-    for piece in bytes.chunks_mut(PIECE) {
-        first.broadcast_into(piece);
+    for chunk in bytes.chunks_mut(MAX_BYTES) {
+        first.broadcast_into(chunk);
     }
     bytes
 }

@@ -1,32 +1,32 @@
-//! Which ranks share a node, so that neighbouring stretches of the path lie on one.
+//! Which ranks share a node, so that neighbouring segments of the camera path are rendered on one node.
 
-use super::World;
+use super::Communicator;
 use crate::error::{Error, Result};
 use std::fs;
 use std::path::Path;
 
-/// The ranks in the order in which they get stretches of the path: node by node. Nodes are told apart
-/// by the memory that their ranks share, or by the file at `map`: a line a rank with its number and
-/// its node's name, in any order; what follows a `#` does not count. All ranks call it.
+/// The ranks in the order in which they get segments of the camera path: node by node. Ranks that share
+/// memory share a node, unless the file at `map` says otherwise. The file has one line for each rank, in
+/// any order: the rank's number and the name of its node. A `#` starts a comment. All ranks call it.
 ///
 /// # Errors
-/// `map` cannot be read, or does not name every rank once.
-pub fn rank_order(world: &World, map: Option<&Path>) -> Result<Vec<u32>> {
+/// `map` cannot be read, or does not name every rank exactly once.
+pub fn rank_order(comm: &Communicator, map: Option<&Path>) -> Result<Vec<u32>> {
     let nodes = match map {
-        // The same command line works on one machine.
-        _ if world.size() == 1 => vec![0],
-        Some(path) => world.from_root(|| read(path, world.size()))?,
-        None => world.nodes()?,
+        // A map for several ranks is no error for one rank, so the same command line works.
+        _ if comm.size() == 1 => vec![0],
+        Some(path) => comm.from_root(|| read(path, comm.size()))?,
+        None => comm.node_ids()?,
     };
-    let mut order: Vec<u32> = (0..world.size()).collect();
+    let mut order: Vec<u32> = (0..comm.size()).collect();
     order.sort_by_key(|rank| (nodes[*rank as usize], *rank));
     Ok(order)
 }
 
-/// Whether the file at `map` would do for a job of `ranks`.
+/// Checks that the file at `map` is valid for a job of `ranks` ranks.
 ///
 /// # Errors
-/// Those of [`rank_order`].
+/// As for [`rank_order`].
 pub fn check_rank_map(map: &Path, ranks: u32) -> Result<()> {
     match ranks {
         1 => Ok(()),
@@ -34,7 +34,7 @@ pub fn check_rank_map(map: &Path, ranks: u32) -> Result<()> {
     }
 }
 
-/// For each rank its node, numbered as they come in the file.
+/// For each rank the id of its node: ids count the names in the file, in order of first use.
 fn read(path: &Path, size: u32) -> Result<Vec<u32>> {
     let text = fs::read_to_string(path)
         .map_err(|e| Error::input(path, format!("cannot read the map of ranks: {e}")))?;
@@ -44,7 +44,7 @@ fn read(path: &Path, size: u32) -> Result<Vec<u32>> {
 fn parse(text: &str, size: u32) -> std::result::Result<Vec<u32>, String> {
     let mut names: Vec<&str> = Vec::new();
     let mut nodes = vec![None; size as usize];
-    // Some editors put one there.
+    // Some editors write a byte order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.split('#').next().unwrap_or_default();

@@ -1,101 +1,100 @@
-//! A job on any number of ranks, played through without one of them: the table that deals out frames is
-//! the program's own, and time is counted, not spent (a discrete-event simulation).
+//! Discrete-event simulation of a job on any number of ranks, with the scheduler of real jobs.
 //!
-//! What is modelled is what stands about the table: ranks that take so long for an order, notes and
-//! references that take so long to arrive, clerks that sleep between looks, and rank 0's clerk, which
-//! handles one note after the other. Not modelled: failures, files that wait for a shared disk, and
-//! messages that cross in the network.
+//! The model has seconds for each task, latency and bandwidth for each message, communication threads that
+//! sleep between polls, and rank 0's communication thread, which handles one control message at a time.
+//! Not modelled: failures, waiting for a shared disk, and contention in the network.
 
-mod play;
+mod network;
+mod simulator;
 #[cfg(test)]
 mod tests;
-mod wire;
 
 use super::traffic::Traffic;
 use crate::error::Result;
 use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
 
-/// A job: its frames, and which of them are made of which.
+/// A job: frames, the dependencies between them, and how references are sent.
 #[derive(Debug, Clone, Copy)]
 pub struct Job {
-    /// The shot and its segments; all of its frames are made.
+    /// The shot and its segments. All frames are rendered.
     pub pyramid: Pyramid,
-    /// Into how many strips a frame can be cut at most.
+    /// Most strips that a frame can be cut into.
     pub most_strips: u32,
-    /// Whether what a frame leaves goes to all ranks, needed or not, as the source paper has it.
-    pub tells_all: bool,
+    /// Whether each frame's discoveries go to all ranks, needed or not, as in the source paper.
+    pub sends_to_all: bool,
 }
 
-/// What things take.
+/// The costs of tasks and messages.
 pub struct Model<'a> {
-    /// Seconds of a core to make an original and write it, by its number.
+    /// Core seconds to render and write an original, by its frame number.
     pub seconds: &'a dyn Fn(u32) -> f64,
-    /// Those of them that go into writing, which is not shared among strips.
+    /// Core seconds of these for writing, which strips do not share.
     pub write_seconds: f64,
-    /// Seconds of a core to make a key frame's reference ready to travel.
+    /// Core seconds to encode a key frame's reference.
     pub pack_seconds: f64,
-    /// Seconds of a core to take one in that came.
+    /// Core seconds to decode a key frame's reference.
     pub unpack_seconds: f64,
-    /// Bytes of one on its way.
+    /// Bytes of a key frame's encoded reference.
     pub reference_bytes: u64,
-    /// Share of these that other frames' references take: they hold what had to be traced there.
+    /// Size of another frame's reference, as a share of a key frame's. It holds only the pixels that were
+    /// traced.
     pub between_share: f64,
-    /// Bytes of all strips of a frame together.
+    /// Bytes of all strips of a frame, summed.
     pub strips_bytes: u64,
-    /// Bytes of a note.
-    pub note_bytes: u64,
-    /// Seconds that a message takes whatever its length.
+    /// Bytes of a control message.
+    pub message_bytes: u64,
+    /// Seconds from sending to arrival of an empty message.
     pub latency: f64,
-    /// Bytes a second that a rank can send, and as many that it can receive.
+    /// Bytes per second that a rank can send, and at the same time receive.
     pub bandwidth: f64,
-    /// Seconds that a clerk sleeps between looks.
-    pub nap: f64,
-    /// Seconds of rank 0's clerk to write or read a note.
-    pub note_seconds: f64,
-    /// Share of its core that each of several ranks spends on looking for messages.
-    pub clerk_share: f64,
-    /// What the table itself takes.
-    pub table: Table,
-    /// Cores that all ranks share evenly; each has one of its own without.
+    /// Seconds between two polls of a communication thread.
+    pub poll_interval: f64,
+    /// Seconds of rank 0's communication thread to write or read a control message.
+    pub message_seconds: f64,
+    /// Share of a rank's core that its communication thread takes, if there are several ranks.
+    pub comm_share: f64,
+    /// Seconds that the scheduler takes.
+    pub scheduler: SchedulerCost,
+    /// Cores that all ranks share evenly; `None`: each rank has a core of its own.
     pub cores: Option<f64>,
 }
 
-/// How long rank 0 thinks about what to give out.
+/// Seconds that the scheduler on rank 0 takes for its decisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Table {
-    /// So many seconds a note that comes in.
+pub enum SchedulerCost {
+    /// Seconds for each received control message.
     Seconds(f64),
-    /// As long as the program's own table takes here and now: two runs differ a little.
+    /// The measured processor time of the scheduler in this simulation, which varies between runs.
     Measured,
 }
 
-/// What a job came to.
+/// The result of a simulated job.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Played {
-    /// Seconds from the first order to the last frame.
+pub struct SimulatedRun {
+    /// Seconds from the first assignment to the last frame.
     pub seconds: f64,
-    /// Seconds of a core that all ranks worked, what was done for others included.
+    /// Core seconds of all tasks on all ranks.
     pub busy_seconds: f64,
-    /// Seconds that rank 0's clerk had notes in hand.
-    pub clerk_seconds: f64,
-    /// Those of them that the table took.
-    pub table_seconds: f64,
-    /// The longest that the table took at one look.
-    pub longest_look: f64,
-    /// What all ranks sent.
+    /// Seconds that rank 0's communication thread handled control messages.
+    pub comm_seconds: f64,
+    /// Seconds of these that the scheduler took.
+    pub scheduler_seconds: f64,
+    /// Most seconds that the scheduler took at one time.
+    pub longest_pass: f64,
+    /// Messages that all ranks sent.
     pub sent: Traffic,
-    /// Frames that were made.
+    /// Number of frames rendered.
     pub frames: u64,
 }
 
 impl Job {
-    /// The job on so many ranks.
-    pub fn play(&self, ranks: u32, model: &Model) -> Played {
-        play::Play::new(self, ranks, model).run()
+    /// Simulates the job on `ranks` ranks.
+    pub fn simulate(&self, ranks: u32, model: &Model) -> SimulatedRun {
+        simulator::Simulator::new(self, ranks, model).run()
     }
 
-    /// Seconds of a core for all frames when one rank makes them.
-    pub fn alone(&self, model: &Model) -> f64 {
+    /// Core seconds of all frames on one rank, which sends no messages.
+    pub fn single_rank_seconds(&self, model: &Model) -> f64 {
         self.pyramid.all().map(model.seconds).sum()
     }
 }
@@ -116,7 +115,7 @@ impl Shared for Job {
     }
 
     fn tells_all(&self) -> bool {
-        self.tells_all
+        self.sends_to_all
     }
 
     fn most_strips(&self) -> u32 {

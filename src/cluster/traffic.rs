@@ -1,53 +1,54 @@
-//! What a rank sent to others, by kind.
+//! Messages and bytes that a rank sent to other ranks, by kind.
 
-use super::note::Kind;
+use super::message::PayloadKind;
 use serde::{Deserialize, Serialize};
 
-/// Messages of one kind.
+/// Number and size of the messages of one kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sent {
-    /// How many.
+    /// Number of messages.
     pub messages: u64,
-    /// Their bytes, without what MPI adds.
+    /// Bytes of the messages, without MPI's own headers.
     pub bytes: u64,
 }
 
-/// Messages sent: the scene before the first frame, the others while rendering.
+/// Messages sent, by kind: the scene before the first frame, the other kinds while rendering. The names
+/// are those of `sent` in `--stats`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Traffic {
-    /// The scene as it was read, to the other ranks of the node.
+    /// The scene, from the rank that read it to the other ranks of the node.
     pub scene: Sent,
-    /// Orders, reports and the like.
+    /// Control messages: assignments and reports.
     pub notes: Sent,
-    /// References of policy `surface`, to ranks that need them.
+    /// References of policy `surface`, to the ranks whose frames take them.
     pub references: Sent,
     /// Discoveries of policy `colour`, to all ranks.
     pub discoveries: Sent,
-    /// Strips of frames that several ranks made together.
+    /// Strips of frames that several ranks rendered together.
     pub strips: Sent,
 }
 
 impl Traffic {
-    /// The scene to one more rank.
+    /// Counts a scene of `bytes` sent to one rank.
     pub fn scene(&mut self, bytes: usize) {
         self.scene.count(bytes);
     }
 
-    /// One more note.
-    pub fn note(&mut self, bytes: usize) {
+    /// Counts a control message.
+    pub fn message(&mut self, bytes: usize) {
         self.notes.count(bytes);
     }
 
-    /// One more cargo.
-    pub fn cargo(&mut self, kind: Kind, bytes: usize) {
+    /// Counts a payload.
+    pub fn payload(&mut self, kind: PayloadKind, bytes: usize) {
         match kind {
-            Kind::Reference => self.references.count(bytes),
-            Kind::Discoveries => self.discoveries.count(bytes),
-            Kind::Strip => self.strips.count(bytes),
+            PayloadKind::Reference => self.references.count(bytes),
+            PayloadKind::Discoveries => self.discoveries.count(bytes),
+            PayloadKind::Strip => self.strips.count(bytes),
         }
     }
 
-    /// What was sent since it stood at `before`, and the scene.
+    /// Traffic since `before`. The scene, sent earlier, is kept whole.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             scene: self.scene,

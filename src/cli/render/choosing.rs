@@ -79,8 +79,8 @@ impl Choosing<'_> {
         request: &Request,
         question: impl Fn(&Chooser, Timer) -> Result<T>,
     ) -> Result<T> {
-        let Site { world, interrupt, .. } = self.site;
-        match world.is_root() {
+        let Site { comm, interrupt, .. } = self.site;
+        match comm.is_root() {
             true => interrupt.watched(|| self.lead(request, question)),
             // Who waits for the answer cannot tell rank 0, which looks at nothing but its trials: where it
             // alone is asked to stop, it ends the job, of which nothing is in hand.
@@ -93,11 +93,11 @@ impl Choosing<'_> {
         request: &Request,
         question: impl Fn(&Chooser, Timer) -> Result<T>,
     ) -> Result<T> {
-        let world = self.site.world;
+        let comm = self.site.comm;
         // Of a trial that failed all ranks have heard.
         let is_over = Cell::new(false);
         let timer = |timing: &Timing| {
-            let told = world.from_root(|| Ok(Word::<T>::Time(timing.clone())));
+            let told = comm.from_root(|| Ok(Word::<T>::Time(timing.clone())));
             let seconds = told.and_then(|_| self.time(request, timing));
             is_over.set(seconds.is_err());
             seconds
@@ -106,7 +106,7 @@ impl Choosing<'_> {
         if is_over.get() {
             return answer;
         }
-        match world.from_root(|| answer.map(Word::Answer))? {
+        match comm.from_root(|| answer.map(Word::Answer))? {
             Word::Answer(answer) => Ok(answer),
             Word::Time(_) => Err(Error::Failed("rank 0 gave no answer".into())),
         }
@@ -115,7 +115,7 @@ impl Choosing<'_> {
     fn follow<T: Serialize + DeserializeOwned>(&self, request: &Request) -> Result<T> {
         let nothing = || Err(Error::Failed("only rank 0 answers".into()));
         loop {
-            match self.site.world.from_root(nothing)? {
+            match self.site.comm.from_root(nothing)? {
                 Word::Answer(answer) => return Ok(answer),
                 Word::Time(timing) => _ = self.time(request, &timing)?,
             }
@@ -124,9 +124,9 @@ impl Choosing<'_> {
 
     /// Seconds a frame of a rank, when all try at once; the mean of how many they make in a second.
     fn time(&self, request: &Request, timing: &Timing) -> Result<f64> {
-        let world = self.site.world;
+        let comm = self.site.comm;
         let own = self.ask(request, |chooser| chooser.probe().timed(timing));
-        let all = world.all(world.agree(own)?)?;
+        let all = comm.all_gather(comm.agree(own)?)?;
         let made: f64 = all.iter().map(|seconds| 1.0 / seconds.max(1e-12)).sum();
         Ok(all.len() as f64 / made)
     }
@@ -148,7 +148,7 @@ impl Choosing<'_> {
             stage: &stage,
             request,
             started: self.site.clock.start,
-            ranks: self.site.world.size(),
+            ranks: self.site.comm.size(),
             quiet: self.site.quiet,
         })
     }

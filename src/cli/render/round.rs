@@ -6,7 +6,7 @@ use crate::cli::request::Request;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use crate::cli::stats::RankStats;
-use crate::cluster::{self, Outcome, World};
+use crate::cluster::{self, Communicator, Outcome};
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::intersect::Intersector;
@@ -21,7 +21,7 @@ use std::time::Instant;
 
 /// Where frames are rendered.
 pub(super) struct Site<'a> {
-    pub world: &'a World,
+    pub comm: &'a Communicator,
     pub intersector: &'a dyn Intersector,
     pub pool: &'a ThreadPool,
     /// The ranks, node by node.
@@ -63,15 +63,15 @@ pub(super) struct Round {
 impl Site<'_> {
     /// Renders the frames of `request` that are not there yet. All ranks call it.
     pub fn render(&self, request: &Request, target: &Target) -> Result<Round> {
-        self.world.from_root(|| request.stats.as_ref().map_or(Ok(()), atomic::make_room))?;
-        let lock = cluster::lock(self.world, target)?;
+        self.comm.from_root(|| request.stats.as_ref().map_or(Ok(()), atomic::make_room))?;
+        let lock = cluster::lock(self.comm, target)?;
         if !lock.is_kept() {
             let folder = target.pattern.folder().display();
             let what =
                 "is on a file system without locks: nothing keeps a job of other settings out";
             tell(self.quiet, &[format!("{folder} {what}")], |n| say::note(n));
         }
-        let plan = cluster::prepare(self.world, self.pool, target, request.frames)?;
+        let plan = cluster::prepare(self.comm, self.pool, target, request.frames)?;
         tell(self.quiet, &plan.notes, |n| say::note(n));
         let job = Frames { request, target, plan: &plan, site: self };
         self.interrupt.goes_on(job.goes_on());
@@ -88,15 +88,15 @@ impl Site<'_> {
             reference_bytes,
             checkpoint_seconds: saved.seconds,
             checkpoint_bytes: saved.bytes,
-            duty: outcome.own,
+            work: outcome.own,
             peak_memory_bytes: None,
         };
-        let ranks = self.world.gather(&rank.with_peak())?;
+        let ranks = self.comm.gather(&rank.with_peak())?;
         // Whichever rank was asked to stop knows why.
-        let reasons = self.world.gather(&self.interrupt.reason())?;
+        let reasons = self.comm.gather(&self.interrupt.reason())?;
         // A rank that was asked to stop when all its frames were finished has stopped no more than the video.
-        let unfinished = self.world.from_root(|| Ok(outcome.unfinished))?;
-        if unfinished == 0 && self.world.is_root() {
+        let unfinished = self.comm.from_root(|| Ok(outcome.unfinished))?;
+        if unfinished == 0 && self.comm.is_root() {
             checkpoint::clear(target);
         }
         Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons, _lock: lock })
@@ -116,7 +116,7 @@ impl Frames<'_> {
     /// put them on disk.
     pub fn render(&self) -> Result<(Outcome, u64, SaveCost)> {
         let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
-        let Site { world, intersector, pool, order, interrupt, quiet, .. } = *self.site;
+        let Site { comm, intersector, pool, order, interrupt, quiet, .. } = *self.site;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
         let effects = EffectPlan::of(scene, settings);
         let renderer = Renderer { scene, settings, plan: effects, intersector };
@@ -130,7 +130,7 @@ impl Frames<'_> {
                 maker.with_gbuffer = with_gbuffer;
                 maker.supplied = self.request.references.cache.as_ref();
                 maker.checkpoints = Some(&checkpoints);
-                maker.exchange = (world.size() > 1).then(|| self.request.terms.clone());
+                maker.exchange = (comm.size() > 1).then(|| self.request.terms.clone());
                 maker.terms = with_gbuffer.then(|| self.request.terms.clone());
                 Box::new(maker)
             }
@@ -151,14 +151,14 @@ impl Frames<'_> {
             }
         };
         let done = |report: &_| watch.frame_done(report);
-        let work = || cluster::render(world, order, target, plan, &*maker, stop, &done);
+        let work = || cluster::render(comm, order, target, plan, &*maker, stop, &done);
         let outcome = interrupt.watched(work);
         watch.finish();
         let notes = outcome.as_ref().map_or_else(|_| maker.notes(), |o| o.notes.clone());
         tell(quiet, &notes, |n| say::note(n));
-        if let (Err(error), true) = (&outcome, world.size() > 1) {
+        if let (Err(error), true) = (&outcome, comm.size() > 1) {
             // The other ranks are in the middle of their frames and would wait for this one.
-            world.fail(error);
+            comm.abort(error);
         }
         Ok((outcome?, maker.reference_memory(), maker.save_cost()))
     }

@@ -1,58 +1,60 @@
-//! Cores that the launcher's binding leaves idle.
+//! Cores that no rank may use because the launcher bound each rank to few cores.
 
 use super::process::{LauncherProcess, allowed_cores, cores};
-use super::{World, here};
+use super::{Communicator, current};
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// What one rank knows.
+/// The cores of one rank.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Place {
+struct RankCores {
+    /// Id of the rank's node.
     node: u32,
     threads: usize,
+    /// Cores that the rank may use.
     own: BTreeSet<u32>,
-    /// What the launcher on its machine could give, where it binds.
+    /// Cores that the launcher on the node could give, if it is one that binds.
     launcher: Option<BTreeSet<u32>>,
 }
 
-/// How the launcher bound the ranks of a node, where it left cores to nobody.
+/// A node with cores that no rank may use.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Binding {
-    /// Ranks of the node.
+    /// Number of ranks on the node.
     pub ranks: usize,
-    /// Least cores that one of them has.
+    /// Number of cores of the rank with the fewest.
     pub cores: usize,
-    /// Threads of that one.
+    /// Number of threads of that rank.
     pub threads: usize,
-    /// Cores of the node that the launcher had.
+    /// Number of cores that the launcher had.
     pub of: usize,
-    /// Those of them that no rank may use.
+    /// Number of the launcher's cores that no rank may use.
     pub idle: usize,
 }
 
-impl World {
-    /// How the launcher bound the ranks, where that leaves cores idle; of several such nodes the first.
-    /// `threads` are this rank's. All ranks call it.
+impl Communicator {
+    /// The first node with cores that no rank may use. `threads` is this rank's number of threads. All
+    /// ranks call it.
     ///
     /// # Errors
-    /// Those of talking to other ranks.
+    /// A message between ranks cannot be encoded or decoded.
     pub fn binding(&self, threads: usize) -> Result<Option<Binding>> {
-        let launcher = here().and_then(|_| LauncherProcess::find()?.cores());
+        let launcher = current().and_then(|_| LauncherProcess::find()?.cores());
         let own = cores(&allowed_cores(std::process::id()));
-        let node = self.nodes()?[self.rank() as usize];
-        Ok(wasted(&self.all(Place { node, threads, own, launcher })?))
+        let node = self.node_ids()?[self.rank() as usize];
+        Ok(first_with_idle_cores(&self.all_gather(RankCores { node, threads, own, launcher })?))
     }
 }
 
-fn wasted(places: &[Place]) -> Option<Binding> {
-    let nodes: BTreeSet<u32> = places.iter().map(|place| place.node).collect();
+fn first_with_idle_cores(all: &[RankCores]) -> Option<Binding> {
+    let nodes: BTreeSet<u32> = all.iter().map(|rank| rank.node).collect();
     nodes.into_iter().find_map(|node| {
-        let ranks: Vec<&Place> = places.iter().filter(|place| place.node == node).collect();
-        let had = ranks.iter().find_map(|place| place.launcher.as_ref())?;
-        let used: BTreeSet<u32> = ranks.iter().flat_map(|place| &place.own).copied().collect();
+        let ranks: Vec<&RankCores> = all.iter().filter(|rank| rank.node == node).collect();
+        let had = ranks.iter().find_map(|rank| rank.launcher.as_ref())?;
+        let used: BTreeSet<u32> = ranks.iter().flat_map(|rank| &rank.own).copied().collect();
         let idle = had.difference(&used).count();
-        let least = ranks.iter().min_by_key(|place| place.own.len())?;
+        let least = ranks.iter().min_by_key(|rank| rank.own.len())?;
         let (cores, threads) = (least.own.len(), least.threads);
         let binding = Binding { ranks: ranks.len(), cores, threads, of: had.len(), idle };
         (idle > 0 && cores > 0).then_some(binding)
@@ -64,21 +66,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_cores_that_nobody_may_use_are_told() {
-        let place = |node, own: &str, launcher: Option<&str>| Place {
+    fn only_cores_that_no_rank_may_use_count_as_idle() {
+        let rank = |node, own: &str, launcher: Option<&str>| RankCores {
             node,
             threads: 1,
             own: cores(own),
             launcher: launcher.map(cores),
         };
         let all = Some("0-3");
-        let bound = wasted(&[place(0, "0", all), place(0, "1", all)]);
+        let bound = first_with_idle_cores(&[rank(0, "0", all), rank(0, "1", all)]);
         assert_eq!(bound, Some(Binding { ranks: 2, cores: 1, threads: 1, of: 4, idle: 2 }));
-        assert_eq!(wasted(&[place(0, "0-1", all), place(0, "2-3", all)]), None, "all are used");
-        assert_eq!(wasted(&[place(0, "0-3", all)]), None, "not bound");
-        assert_eq!(wasted(&[place(0, "0", None)]), None, "not the launcher's doing");
-        assert_eq!(wasted(&[place(0, "0", Some("0"))]), None, "the launcher had no more");
-        let second = wasted(&[place(0, "0-3", all), place(1, "2", all)]);
+        assert_eq!(
+            first_with_idle_cores(&[rank(0, "0-1", all), rank(0, "2-3", all)]),
+            None,
+            "all are used"
+        );
+        assert_eq!(first_with_idle_cores(&[rank(0, "0-3", all)]), None, "not bound");
+        assert_eq!(
+            first_with_idle_cores(&[rank(0, "0", None)]),
+            None,
+            "the launcher does not bind"
+        );
+        assert_eq!(
+            first_with_idle_cores(&[rank(0, "0", Some("0"))]),
+            None,
+            "the launcher had no more"
+        );
+        let second = first_with_idle_cores(&[rank(0, "0-3", all), rank(1, "2", all)]);
         assert_eq!(second.map(|b| (b.ranks, b.idle)), Some((1, 3)), "another node");
     }
 }

@@ -1,28 +1,27 @@
-//! The process that started this one as a rank: whether it lives, and which cores it had to give.
+//! The launcher's process on this machine: whether it lives, and its cores.
 //!
-//! By `/proc`; where there is none, nothing is known.
+//! All is read from `/proc`. On a system without `/proc` no launcher is found.
 
 use std::collections::BTreeSet;
 use std::fs;
 
-/// Launchers that bind ranks to cores unless told otherwise, and their helpers on other nodes, as the
-/// system names them.
+/// Process names of launchers that bind ranks to cores by default, and of their helpers on other nodes.
 const BINDING: [&str; 6] = ["mpirun", "mpiexec", "orterun", "orted", "prterun", "prted"];
-/// Other launchers.
+/// Process names of other launchers.
 const OTHERS: [&str; 4] = ["prte", "hydra_pmi_proxy", "mpiexec.hydra", "slurmstepd"];
 
 /// The launcher's process on this machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LauncherProcess {
-    /// Its name, as its user knows it.
+    /// Name of the command that the user started.
     pub name: String,
-    /// Its number.
+    /// Process id.
     pub id: u32,
-    /// When it started, in ticks since the machine did: a number is given again.
+    /// Start time in clock ticks since boot; tells the process from a later one with the same id.
     started: u64,
 }
 
-/// What the system says of a process.
+/// Fields of `/proc/PID/stat`.
 struct Stat {
     name: String,
     state: String,
@@ -31,7 +30,7 @@ struct Stat {
 }
 
 impl LauncherProcess {
-    /// The nearest of this process's ancestors that is a launcher; `None` where none is known.
+    /// This process's nearest ancestor that is a launcher.
     pub(super) fn find() -> Option<Self> {
         let mut id = std::process::id();
         loop {
@@ -43,21 +42,21 @@ impl LauncherProcess {
         }
     }
 
-    /// Whether it has ended.
+    /// Whether the process has ended.
     pub fn is_gone(&self) -> bool {
-        // What was killed stays listed until somebody asks for its exit code.
+        // A killed process stays listed as a zombie until its parent reads the exit code.
         !stat(self.id)
             .is_some_and(|s| s.started == self.started && s.state != "Z" && s.state != "X")
     }
 
-    /// The cores that it could give to its ranks, where it binds these.
+    /// The cores that the launcher may use, if it binds ranks to cores.
     pub(super) fn cores(&self) -> Option<BTreeSet<u32>> {
         BINDING.contains(&&*self.name).then(|| cores(&allowed_cores(self.id)))
     }
 }
 
-/// What users call the launcher that the system shows as `name`: `mpirun` of Open MPI 5 turns itself into
-/// `prterun`, of older ones it may be shown as `orterun`.
+/// The command behind the process name `name`: `mpirun` of Open MPI 5 runs as `prterun`, that of older
+/// versions may run as `orterun`.
 fn usual_name(name: &str) -> &str {
     match name {
         "prterun" | "orterun" => "mpirun",
@@ -69,26 +68,26 @@ fn stat(id: u32) -> Option<Stat> {
     parse_stat(&fs::read_to_string(format!("/proc/{id}/stat")).ok()?)
 }
 
-/// `123 (name) S 1 ...`; the name may hold anything, brackets and blanks too.
+/// Parses `123 (name) S 1 ...`. The name may contain brackets and blanks.
 fn parse_stat(text: &str) -> Option<Stat> {
     let (head, tail) = text.rsplit_once(')')?;
     let (_, name) = head.split_once('(')?;
     let mut fields = tail.split_whitespace();
     let state = fields.next()?.to_string();
     let parent = fields.next()?.parse().ok()?;
-    // The 22nd field of all, of which four are read.
+    // Field 22 of the line; four were read.
     let started = fields.nth(17)?.parse().ok()?;
     Some(Stat { name: name.into(), state, parent, started })
 }
 
-/// The cores that a process may use, as the system lists them; empty where it does not tell.
+/// The cores that a process may use, in the form `0-3,8`; empty if unknown.
 pub(super) fn allowed_cores(id: u32) -> String {
     let text = fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
     line.unwrap_or_default().trim().into()
 }
 
-/// `0-3,8` as numbers.
+/// The numbers of a list such as `0-3,8`.
 pub(super) fn cores(list: &str) -> BTreeSet<u32> {
     let range = |text: &str| {
         let (first, last) = text.split_once('-').unwrap_or((text, text));
@@ -102,14 +101,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_of_cores_is_read() {
+    fn a_list_of_cores_is_parsed() {
         assert!(cores("0-2,8").into_iter().eq([0, 1, 2, 8]));
         assert!(cores("7").into_iter().eq([7]));
         assert!(cores("").is_empty() && cores("x-3").is_empty());
     }
 
     #[test]
-    fn a_launcher_has_the_name_that_its_user_knows() {
+    fn a_launcher_is_named_by_the_command_that_started_it() {
         assert_eq!(
             ["prterun", "mpirun", "slurmstepd"].map(usual_name),
             ["mpirun", "mpirun", "slurmstepd"]
@@ -117,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_is_known_by_number_and_start() {
+    fn a_process_is_identified_by_its_id_and_start_time() {
         let text = "12 (a) b) S 7 12 1 0 -1 4 100 0 0 0 1 2 0 0 20 0 1 0 4711 99 5";
         let found = parse_stat(text).expect("a process");
         assert_eq!((&*found.name, &*found.state), ("a) b", "S"));

@@ -1,8 +1,8 @@
-//! How a rank that fails has rank 0 say so, since rank 0's words are those that people read: in a large
-//! job the others' may go to files of their own, or between its lines.
+//! Failure reports to rank 0, which prints the error. In a large job the output of other ranks may go to
+//! separate files, or be mixed with rank 0's lines.
 //!
-//! MPI is the main thread's. So a thread that panics leaves its words here, and the main thread, which
-//! looks for messages every millisecond while frames are made, takes them along.
+//! Only the main thread may call MPI. So a thread that panics stores its report here, and the main
+//! thread, which polls every millisecond while frames are rendered, sends it.
 
 use ::mpi::ffi;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,72 +10,75 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
-/// Tag of what a rank that failed has to say.
+/// Tag of a failure report.
 pub const FAILED: i32 = 4;
-/// Tag of rank 0's answer, which is empty: it says it now.
-pub const HEARD: i32 = 5;
-/// How long a rank that failed waits for that; rank 0 may be reading, or tracing on its own.
-const PATIENCE: Duration = Duration::from_millis(1500);
-/// How long it waits then to be ended by rank 0.
-const GRACE: Duration = Duration::from_millis(1500);
-const NAP: Duration = Duration::from_millis(2);
+/// Tag of rank 0's empty acknowledgement, sent before rank 0 prints the error.
+pub const ACKNOWLEDGED: i32 = 5;
+/// How long a failed rank waits for the acknowledgement; rank 0 may not poll, because
+/// it reads files or traces on its main thread.
+const ACKNOWLEDGE_TIMEOUT: Duration = Duration::from_millis(1500);
+/// How long a failed rank then waits for rank 0 to abort the job.
+const ABORT_TIMEOUT: Duration = Duration::from_millis(1500);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 static MAIN: OnceLock<ThreadId> = OnceLock::new();
-static WORDS: Mutex<Option<Vec<u8>>> = Mutex::new(None);
+static REPORT: Mutex<Option<Vec<u8>>> = Mutex::new(None);
 static HAS_FAILED: AtomicBool = AtomicBool::new(false);
 static IS_SENT: AtomicBool = AtomicBool::new(false);
-static IS_HEARD: AtomicBool = AtomicBool::new(false);
+static IS_ACKNOWLEDGED: AtomicBool = AtomicBool::new(false);
 
-/// Makes the calling thread the one that talks to MPI.
+/// Records the calling thread as the one that may call MPI.
 pub fn start() {
     _ = MAIN.set(std::thread::current().id());
 }
 
-/// Has rank 0 say `words`, and waits to be ended; false where rank 0 does not hear, so that this rank
-/// has to say them. Of several threads only the first to fail is told: for the others it is true.
-pub fn confess(words: Vec<u8>) -> bool {
+/// Reports a failure to rank 0 and waits for the job to be aborted; false if rank 0 does not
+/// acknowledge in time, so that this rank must print the error. If several threads fail, only the first is
+/// reported; the others get true.
+pub fn report_failure(report: Vec<u8>) -> bool {
     let is_first = !HAS_FAILED.swap(true, Ordering::SeqCst);
     if is_first {
-        *WORDS.lock().unwrap_or_else(PoisonError::into_inner) = Some(words);
+        *REPORT.lock().unwrap_or_else(PoisonError::into_inner) = Some(report);
     }
     let is_main = MAIN.get() == Some(&std::thread::current().id());
-    let patience = if is_first { PATIENCE } else { PATIENCE + GRACE };
+    let timeout = if is_first { ACKNOWLEDGE_TIMEOUT } else { ACKNOWLEDGE_TIMEOUT + ABORT_TIMEOUT };
     let start = Instant::now();
-    while start.elapsed() < patience {
-        // Whoever failed first: nobody else may talk to MPI.
+    while start.elapsed() < timeout {
+        // The main thread sends the report of whichever thread failed first.
         if is_main {
-            pass_on();
+            send_report();
         }
-        if IS_HEARD.load(Ordering::SeqCst) {
-            std::thread::sleep(GRACE);
+        if IS_ACKNOWLEDGED.load(Ordering::SeqCst) {
+            std::thread::sleep(ABORT_TIMEOUT);
             return true;
         }
-        std::thread::sleep(NAP);
+        std::thread::sleep(POLL_INTERVAL);
     }
     !is_first
 }
 
-/// On the main thread: sends what another left to say, and looks for rank 0's answer.
-pub fn pass_on() {
+/// On the main thread: sends a stored report, and looks for rank 0's acknowledgement.
+pub fn send_report() {
     if !HAS_FAILED.load(Ordering::SeqCst) {
         return;
     }
-    let words = WORDS.lock().unwrap_or_else(PoisonError::into_inner).take();
-    if let Some(words) = words {
-        send(0, FAILED, words);
+    let report = REPORT.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if let Some(report) = report {
+        send(0, FAILED, report);
         IS_SENT.store(true, Ordering::SeqCst);
     }
-    if IS_SENT.load(Ordering::SeqCst) && has_come(0, HEARD) {
-        IS_HEARD.store(true, Ordering::SeqCst);
+    if IS_SENT.load(Ordering::SeqCst) && has_arrived(0, ACKNOWLEDGED) {
+        IS_ACKNOWLEDGED.store(true, Ordering::SeqCst);
     }
 }
 
-/// Rank 0's answer to rank `to`.
-pub fn answer(to: i32) {
-    send(to, HEARD, Vec::new());
+/// On rank 0: acknowledges the report of rank `to`.
+pub fn acknowledge(to: i32) {
+    send(to, ACKNOWLEDGED, Vec::new());
 }
 
-/// Sends without waiting. The process ends soon, so nobody looks at the request, and MPI keeps the bytes.
+/// Starts a non-blocking send. The bytes are leaked and the request is never tested, because the process
+/// ends soon.
 fn send(to: i32, tag: i32, bytes: Vec<u8>) {
     let Ok(length) = i32::try_from(bytes.len()) else { return };
     let bytes: &'static [u8] = Vec::leak(bytes);
@@ -94,9 +97,9 @@ fn send(to: i32, tag: i32, bytes: Vec<u8>) {
     };
 }
 
-fn has_come(from: i32, tag: i32) -> bool {
+fn has_arrived(from: i32, tag: i32) -> bool {
     let mut flag = 0;
-    // SAFETY: as above; the status is not asked for.
+    // SAFETY: as in `send`; the status is ignored.
     unsafe {
         ffi::MPI_Iprobe(from, tag, ffi::RSMPI_COMM_WORLD, &mut flag, ffi::RSMPI_STATUS_IGNORE)
     };
