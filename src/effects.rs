@@ -110,7 +110,7 @@ impl EffectPlan {
             delta_lights: decide(
                 "hard shadows",
                 diffuse && delta > 0,
-                if diffuse { counted(delta, "point or directional light") } else { no_diffuse() },
+                if diffuse { counted(delta, "delta light") } else { no_diffuse() },
             ),
             sky_light: decide(
                 "sky light",
