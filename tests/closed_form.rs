@@ -6,7 +6,10 @@ mod common;
 
 use common::{job, pose, quad, render, sphere_world};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{IntersectorKind, Light, Material, PointLight, QuadLight, Sky, World};
+use tweenray::scene::{
+    Camera, DiskLight, IntersectorKind, Light, Material, PointLight, QuadLight, Sky, SpotLight,
+    World,
+};
 use tweenray::stats::RayKind;
 
 const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
@@ -61,6 +64,86 @@ fn lambert_floor_under_a_rectangle_light() {
             let error = (f64::from(rgb.x) - expected).abs();
             assert!(error < 1e-5 * expected, "{kind:?} {x},{y}: {} for {expected}", rgb.x);
         }
+    }
+}
+
+/// Under a disk: on its axis the irradiance is πL sin²θ, θ being the angle to its rim.
+#[test]
+fn lambert_floor_under_a_disk_light() {
+    for kind in BOTH {
+        let mut world = floor(0.5);
+        let (height, radius) = (1.5, 0.8);
+        world.lights.push(Light::Disk(DiskLight {
+            centre: DVec3::Y * height,
+            normal: DVec3::NEG_Y,
+            radius,
+            radiance: Rgb::splat(3.0),
+            two_sided: false,
+        }));
+        // Straight down past the rim at the floor's middle; the disk hides nothing of what is looked at.
+        let mut job = job(world, pose((0.9, 0.4, 0.0), (0.0, 0.0, 0.0)), 9, 9);
+        job.settings.intersector = kind;
+        job.settings.shadow_samples = 4;
+        let (film, _) = render(&job);
+        let middle = f64::from(film.rgb[40].x);
+        assert!(common::on_plane_y(&job, 4, 4, 0.0).length() < 1e-9, "the axis' foot");
+        let expected = 0.5 * 3.0 * radius * radius / (radius * radius + height * height);
+        assert!((middle - expected).abs() < 1e-6 * expected, "{kind:?}: {middle} for {expected}");
+        // What is far away sees a small source: intensity times both cosines over the distance squared.
+        let far = pose((8.0, 0.4, 0.0), (8.6, 0.0, 0.0));
+        job.camera = Camera::new(&far, 40.0, 9, 9).unwrap();
+        let (film, _) = render(&job);
+        let p = common::on_plane_y(&job, 4, 4, 0.0);
+        let d2 = (p - DVec3::Y * height).length_squared();
+        let cos2 = height * height / d2;
+        let about = 0.5 * 3.0 * radius * radius * cos2 / d2;
+        let got = f64::from(film.rgb[40].x);
+        assert!((got - about).abs() < 0.02 * about, "{kind:?}: {got} for about {about}");
+    }
+}
+
+/// Under a spot: full within the inner angle, none beyond the outer one, cubic in the cosine between, with hard
+/// shadows and, from afar, with soft ones.
+#[test]
+fn lambert_floor_under_a_spot_light() {
+    let at = DVec3::new(0.0, 4.0, 0.0);
+    let [inner, outer] = [10.0f64, 25.0].map(|angle| angle.to_radians().cos());
+    for (kind, radius, tolerance) in
+        [(BOTH[0], 0.0, 2e-6), (BOTH[1], 0.0, 2e-6), (BOTH[0], 0.02, 1e-4), (BOTH[1], 0.02, 1e-4)]
+    {
+        let mut world = floor(0.6);
+        world.lights.push(Light::Spot(SpotLight {
+            position: at,
+            direction: DVec3::NEG_Y,
+            intensity: Rgb::splat(7.0),
+            cos_inner: inner,
+            cos_outer: outer,
+            radius,
+        }));
+        let mut job = job(world, pose((0.1, 3.0, 1.2), (0.0, 0.0, 0.0)), 24, 18);
+        job.settings.intersector = kind;
+        job.settings.shadow_samples = 4;
+        let (film, counts) = render(&job);
+        let (mut full, mut none) = (0, 0);
+        for (x, y, rgb) in common::pixels(&film) {
+            let p = common::on_plane_y(&job, x, y, 0.0);
+            let to_light = at - p;
+            let cos = to_light.normalize().y;
+            let t = ((cos - outer) / (inner - outer)).clamp(0.0, 1.0);
+            let falloff = t * t * (3.0 - 2.0 * t);
+            (full, none) = (full + i32::from(t == 1.0), none + i32::from(t == 0.0));
+            let expected =
+                falloff * 0.6 / std::f64::consts::PI * 7.0 * cos / to_light.length_squared();
+            let error = (f64::from(rgb.x) - expected).abs();
+            assert!(
+                error <= tolerance * expected,
+                "{kind:?} {radius} {x},{y}: {} {expected}",
+                rgb.x
+            );
+        }
+        assert!(full > 10 && none > 10, "{full} {none}");
+        let shadow = if radius > 0.0 { RayKind::ShadowArea } else { RayKind::ShadowDelta };
+        assert!(counts[shadow] > 0 && counts.shadow() == counts[shadow]);
     }
 }
 

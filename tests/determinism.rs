@@ -233,7 +233,7 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
                     disk.centre *= s;
                     disk.radius *= s;
                 }
-                Light::Point(_) | Light::Directional(_) => {}
+                Light::Spot(_) | Light::Point(_) | Light::Directional(_) => {}
             }
         }
         job.camera.eye *= s;

@@ -9,6 +9,7 @@ mod point;
 mod quad;
 mod sky;
 mod sphere;
+mod spot;
 
 pub use directional::DirectionalLight;
 pub use disk::DiskLight;
@@ -16,6 +17,7 @@ pub use point::PointLight;
 pub use quad::QuadLight;
 pub use sky::Sky;
 pub use sphere::SphereLight;
+pub use spot::SpotLight;
 
 use super::too_small::Size;
 use super::{Recentring, place};
@@ -36,6 +38,8 @@ pub enum Light {
     Sphere(SphereLight),
     /// A flat disk.
     Disk(DiskLight),
+    /// A cone of light.
+    Spot(SpotLight),
 }
 
 /// What a scene needs to know of a kind of light.
@@ -87,7 +91,7 @@ pub(super) enum EmittingShape {
 
 impl Light {
     /// Names of all kinds.
-    pub const KINDS: [&str; 5] = ["point", "directional", "quad", "sphere", "disk"];
+    pub const KINDS: [&str; 6] = ["point", "directional", "quad", "sphere", "disk", "spot"];
 
     /// The kind, as scene files and messages call it.
     pub fn name(&self) -> &'static str {
@@ -131,6 +135,7 @@ impl Light {
             Self::Quad(light) => light,
             Self::Sphere(light) => light,
             Self::Disk(light) => light,
+            Self::Spot(light) => light,
         }
     }
 
@@ -141,6 +146,7 @@ impl Light {
             Self::Quad(light) => light,
             Self::Sphere(light) => light,
             Self::Disk(light) => light,
+            Self::Spot(light) => light,
         }
     }
 }

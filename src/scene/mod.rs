@@ -24,7 +24,9 @@ mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
-pub use light::{DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight};
+pub use light::{
+    DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
+};
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};

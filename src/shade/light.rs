@@ -10,6 +10,7 @@ mod point;
 mod quad;
 mod sky;
 mod sphere;
+mod spot;
 
 use super::irradiance;
 use crate::intersect::Target;
@@ -21,11 +22,12 @@ use point::Point;
 use quad::{Quad, QuadView};
 use sky::{SkyDome, SkyView};
 use sphere::{Sphere, SphereView};
+use spot::Spot;
 
 /// A light that is sampled, with all that its samples need: made once a frame.
 pub struct LightSampler {
-    /// What the light emits: radiance of an area light and of the sky, intensity of a point light, irradiance of
-    /// a directional one.
+    /// What the light emits: radiance of an area light and of the sky, intensity of a point or spot light,
+    /// irradiance of a directional one.
     pub emission: Rgb,
     shape: Shape,
 }
@@ -38,6 +40,7 @@ enum Shape {
     Quad(Quad),
     Sphere(Sphere),
     Disk(Disk),
+    Spot(Spot),
     Sky(SkyDome),
 }
 
@@ -85,6 +88,7 @@ impl LightSampler {
             Light::Quad(light) => (light.radiance, Shape::Quad(Quad::new(light))),
             Light::Sphere(light) => (light.radiance, Shape::Sphere(Sphere::new(light))),
             Light::Disk(light) => (light.radiance, Shape::Disk(Disk::new(light))),
+            Light::Spot(light) => (light.intensity, Shape::Spot(Spot::new(light))),
         };
         Self { emission, shape }
     }
@@ -103,6 +107,7 @@ impl LightSampler {
             Shape::Quad(light) => light.unshadowed(p, n),
             Shape::Sphere(light) => light.unshadowed(p, n),
             Shape::Disk(light) => light.unshadowed(p, n),
+            Shape::Spot(light) => light.unshadowed(p, n),
             Shape::Sky(sky) => sky.unshadowed(),
         }
     }
@@ -115,6 +120,7 @@ impl LightSampler {
             Shape::Quad(light) => View::Quad(light.seen()),
             Shape::Sphere(light) => View::Sphere(light.seen_from(p)?),
             Shape::Disk(light) => View::Disk(light),
+            Shape::Spot(light) => light.seen_from(p)?,
             Shape::Sky(_) => View::Sky(SkyView::above(n)),
         }))
     }

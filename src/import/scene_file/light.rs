@@ -1,7 +1,7 @@
 //! `[[light]]` and `[sky]`.
 
-use super::at::At;
-use super::number::Positive;
+use super::at::{At, Span};
+use super::number::{Crease, Positive};
 use super::quad::{self, QuadShape};
 use super::report::Source;
 use super::vector::{Direction, Light as Amount, List, Point, Size2};
@@ -24,6 +24,8 @@ pub(super) enum Light {
     Sphere(SphereLight),
     /// A flat round lamp; its shadows are soft.
     Disk(DiskLight),
+    /// A cone of light with a smooth edge; its shadows are hard, or soft where it has a radius.
+    Spot(SpotLight),
 }
 
 /// A point that emits alike in all directions.
@@ -101,6 +103,65 @@ pub(super) struct DiskLight {
     two_sided: bool,
 }
 
+/// A cone of light with a smooth edge: either `direction` or `target`.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(extend("oneOf" = [{"required": ["direction"]}, {"required": ["target"]}]))]
+pub(super) struct SpotLight {
+    /// Where it is, world units.
+    position: Point,
+    /// Direction in which it shines.
+    direction: Option<Direction>,
+    /// A point that it shines at, world units.
+    target: Option<Point>,
+    /// Radiant intensity along the axis, W/sr: at distance d it gives the irradiance intensity / d².
+    intensity: Amount,
+    /// Angle from the axis beyond which there is no light, degrees.
+    #[serde(default = "outer_angle")]
+    outer_angle: Crease,
+    /// Angle from the axis up to which the light is full, degrees.
+    #[serde(default = "inner_angle")]
+    inner_angle: Crease,
+    /// Radius of the sphere that shines, world units; without, shadows are hard.
+    radius: Option<Positive>,
+}
+
+fn outer_angle() -> Crease {
+    Crease(45.0)
+}
+
+fn inner_angle() -> Crease {
+    Crease(0.0)
+}
+
+impl SpotLight {
+    /// Errors: an inner angle beyond the outer one; both or neither of `direction` and `target`; a target at the
+    /// light's own place; at `span`.
+    fn build(&self, source: &Source, span: &Span) -> Result<scene::SpotLight> {
+        let position = self.position.vec();
+        let direction = match (&self.direction, &self.target) {
+            (Some(direction), None) => direction.unit(),
+            (None, Some(target)) => {
+                let along = target.vec() - position;
+                let unit = (along / along.abs().max_element()).try_normalize();
+                unit.ok_or_else(|| source.fault(span, "the spot's target is its own position"))?
+            }
+            _ => {
+                let message = "a spot is aimed by either `direction` or `target`";
+                return Err(source.fault(span, message).into());
+            }
+        };
+        let [inner, outer] = [self.inner_angle.0, self.outer_angle.0];
+        if inner > outer {
+            let message = "the spot's `inner_angle` is beyond its `outer_angle`";
+            return Err(source.fault(span, message).into());
+        }
+        let [cos_inner, cos_outer] = [inner, outer].map(|angle| libm::cos(angle.to_radians()));
+        let (intensity, radius) = (self.intensity.rgb(), self.radius.map_or(0.0, |r| r.0));
+        Ok(scene::SpotLight { position, direction, intensity, cos_inner, cos_outer, radius })
+    }
+}
+
 /// What a ray that hits nothing sees: a constant sky.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -151,6 +212,7 @@ impl At<Light> {
                 radiance: d.radiance.rgb(),
                 two_sided: d.two_sided,
             }),
+            Light::Spot(s) => scene::Light::Spot(s.build(source, &self.span)?),
         })
     }
 }

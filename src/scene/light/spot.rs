@@ -1,0 +1,68 @@
+//! A spot light.
+
+use super::{EmittingSurface, LightData, Size, place};
+use crate::error::Result;
+use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
+use crate::scene::Recentring;
+use serde::{Deserialize, Serialize};
+
+/// A cone of light with a smooth edge. With a radius it is a small sphere that shines into the cone and casts
+/// soft shadows; without, it is a delta light. It is not seen itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpotLight {
+    /// Where it is.
+    pub position: DVec3,
+    /// Unit vector along the cone's axis, away from the light.
+    pub direction: DVec3,
+    /// Radiant intensity along the axis.
+    pub intensity: Rgb,
+    /// Cosine of the angle from the axis up to which the intensity is full.
+    pub cos_inner: f64,
+    /// Cosine of the angle from the axis beyond which there is none; at most `cos_inner`.
+    pub cos_outer: f64,
+    /// Radius of the sphere that shines; 0 for hard shadows.
+    pub radius: f64,
+}
+
+impl LightData for SpotLight {
+    fn name(&self) -> &'static str {
+        "spot"
+    }
+
+    fn is_area(&self) -> bool {
+        self.radius > 0.0
+    }
+
+    fn is_finite(&self) -> bool {
+        let Self { position, direction, intensity: _, cos_inner, cos_outer, radius } = self;
+        position.is_finite()
+            && direction.is_finite()
+            && [cos_inner, cos_outer, radius].iter().all(|x| x.is_finite())
+    }
+
+    fn bounds(&self) -> Bounds3 {
+        Bounds3::EMPTY
+    }
+
+    fn size(&self) -> Option<Size> {
+        None
+    }
+
+    fn transform(&mut self, transform: &DAffine3, _mirrors: bool) -> Result<()> {
+        let scale = place::uniform_scale("`a spot light` shines into a round cone", "", transform)?;
+        self.radius *= scale;
+        self.position = transform.transform_point3(self.position);
+        self.direction = transform.transform_vector3(self.direction).normalize_or_zero();
+        Ok(())
+    }
+
+    fn recentre(&mut self, recentring: &Recentring) {
+        self.position = recentring.point_to_scene(self.position);
+        self.intensity = recentring.intensity_to_scene(self.intensity);
+        self.radius *= recentring.scale();
+    }
+
+    fn surface(&self) -> Option<EmittingSurface> {
+        None
+    }
+}

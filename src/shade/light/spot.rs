@@ -1,0 +1,72 @@
+//! A spot light.
+
+use super::View;
+use super::point::Point;
+use super::sphere::Sphere;
+use crate::math::DVec3;
+use crate::scene::{PointLight, SphereLight, SpotLight};
+use std::f64::consts::PI;
+
+/// A cone of light: a point or a sphere, times a falloff by the angle between the cone's axis and the direction from
+/// the light's middle.
+pub(super) struct Spot {
+    body: Body,
+    position: DVec3,
+    direction: DVec3,
+    cos_inner: f64,
+    cos_outer: f64,
+}
+
+/// What shines.
+enum Body {
+    Point(Point),
+    /// A sphere, and its radiance per unit of intensity.
+    Sphere(Sphere, f64),
+}
+
+impl Spot {
+    pub fn new(light: &SpotLight) -> Self {
+        let SpotLight { position, direction, intensity, cos_inner, cos_outer, radius } = *light;
+        let body = if radius > 0.0 {
+            let sphere = SphereLight { centre: position, radius, radiance: intensity };
+            Body::Sphere(Sphere::new(&sphere), 1.0 / (PI * radius * radius))
+        } else {
+            Body::Point(Point::new(&PointLight { position, intensity }))
+        };
+        Self { body, position, direction, cos_inner, cos_outer }
+    }
+
+    pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {
+        let falloff = self.falloff(p);
+        if falloff == 0.0 {
+            return 0.0;
+        }
+        falloff
+            * match &self.body {
+                Body::Point(point) => point.unshadowed(p, n),
+                Body::Sphere(sphere, radiance) => radiance * sphere.unshadowed(p, n),
+            }
+    }
+
+    /// The body as seen from `p`; `None` from within.
+    pub fn seen_from(&self, p: DVec3) -> Option<View<'_>> {
+        Some(match &self.body {
+            Body::Point(point) => View::Point(point),
+            Body::Sphere(sphere, _) => View::Sphere(sphere.seen_from(p)?),
+        })
+    }
+
+    /// The share of the axis' intensity that is sent towards `p`: smooth from 1 to 0 between the two angles, cubic in
+    /// the cosine (Pharr, Jakob and Humphreys, 2023, section 12.2.1).
+    fn falloff(&self, p: DVec3) -> f64 {
+        let cos = (p - self.position).normalize_or_zero().dot(self.direction);
+        if cos >= self.cos_inner {
+            return 1.0;
+        }
+        if cos <= self.cos_outer {
+            return 0.0;
+        }
+        let x = (cos - self.cos_outer) / (self.cos_inner - self.cos_outer);
+        x * x * (3.0 - 2.0 * x)
+    }
+}
