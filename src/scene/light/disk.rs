@@ -7,8 +7,8 @@ use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Triangles of the surface that rays see: its rim is off the circle by 1/3,000 of the radius.
-const TRIANGLES: u32 = 128;
+/// Corners of the surface that rays see, an even number: its rim is off the circle by 1/3,000 of the radius.
+const CORNERS: u32 = 128;
 
 /// A flat disk that emits from the side that its normal points to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,19 +26,17 @@ pub struct DiskLight {
 }
 
 impl DiskLight {
-    /// The centre, then the corners of the regular polygon that has the disk's area, counter-clockwise on the
-    /// emitting side.
-    fn fan(&self) -> impl Iterator<Item = DVec3> {
+    /// The corners of the regular polygon that has the disk's area, counter-clockwise on the emitting side.
+    fn corners(&self) -> impl Iterator<Item = DVec3> {
         let (s, t) = orthonormal_basis(self.normal);
-        let step = TAU / f64::from(TRIANGLES);
+        let step = TAU / f64::from(CORNERS);
         let radius = self.radius * (step / libm::sin(step)).sqrt();
         let corner = move |i: u32| {
             let angle = step * f64::from(i);
             s * libm::cos(angle) + t * libm::sin(angle)
         };
         let centre = self.centre;
-        let rim = (0..TRIANGLES).map(move |i| centre + corner(i) * radius);
-        std::iter::once(centre).chain(rim)
+        (0..CORNERS).map(move |i| centre + corner(i) * radius)
     }
 }
 
@@ -57,7 +55,7 @@ impl LightData for DiskLight {
 
     fn bounds(&self) -> Bounds3 {
         let mut bounds = Bounds3::EMPTY;
-        self.fan().for_each(|p| bounds.include(p));
+        self.corners().for_each(|p| bounds.include(p));
         bounds
     }
 
@@ -74,14 +72,19 @@ impl LightData for DiskLight {
     }
 
     fn recentre(&mut self, recentring: &Recentring) {
-        // The triangles meet at an f32 corner; the light uses the very same point.
-        self.centre = recentring.point_to_scene(self.centre).as_vec3().as_dvec3();
+        self.centre = recentring.point_to_scene(self.centre);
         self.radius *= recentring.scale();
     }
 
     fn surface(&self) -> Option<EmittingSurface> {
-        let corners = self.fan().map(|p| p.as_vec3()).collect();
-        let triangles = (0..TRIANGLES).map(|i| [0, 1 + i, 1 + (i + 1) % TRIANGLES]).collect();
+        let corners = self.corners().map(|p| p.as_vec3()).collect();
+        // Strips from side to side: a fan's triangles would all meet in one point, where rays slip through.
+        let strip = |i: u32| {
+            let (left, right) = (CORNERS - i, CORNERS - i - 1);
+            [[i, i + 1, left % CORNERS], [i + 1, right, left % CORNERS]]
+        };
+        let triangles = (0..CORNERS / 2).flat_map(strip);
+        let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
         Some(EmittingSurface {
             shape: EmittingShape::Triangles(corners, triangles),
             radiance: self.radiance,

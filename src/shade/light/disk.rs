@@ -23,13 +23,9 @@ pub(super) struct Disk {
 impl Disk {
     pub fn new(light: &DiskLight) -> Self {
         let basis = orthonormal_basis(light.normal);
-        // The narrowest triangle that shows it has a 128th of the rim; a bound for narrower ones holds for it.
+        // As long as the longest of the triangles that show it, and as narrow as the narrowest.
         let (s, t) = (basis.0 * light.radius, basis.1 * light.radius);
-        let facet = Facet::of(&[
-            light.centre,
-            light.centre + s,
-            light.centre + (s + t * 0.04).normalize() * light.radius,
-        ]);
+        let facet = Facet::of(&[light.centre - s, light.centre + s, light.centre + t * 0.024]);
         Self {
             centre: light.centre,
             radius: light.radius,
