@@ -5,7 +5,7 @@
 //! way there is no noise at all, and the ratio is what later frames can reuse. A delta light has one sample.
 
 use super::groups::{CheckRays, Groups};
-use super::light::{LightSample, LightSampler, LightView, ShadowTarget};
+use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
@@ -100,6 +100,22 @@ impl ShadowStarts {
     }
 }
 
+/// Shadow rays of one shading point: to each sample that lies above the horizon.
+struct ShadowRays<'s> {
+    starts: ShadowStarts,
+    scratch: &'s mut ShadowScratch,
+}
+
+impl SampleSink for ShadowRays<'_> {
+    #[inline(always)] // So that the kind of target is known.
+    fn push(&mut self, sample: LightSample) {
+        if sample.weight > 0.0 {
+            self.scratch.rays.push(self.starts.ray_to(&sample.target));
+            self.scratch.weights.push(sample.weight);
+        }
+    }
+}
+
 /// A light that shines in this frame.
 pub(super) struct LightSource {
     pub sampler: LightSampler,
@@ -179,15 +195,6 @@ impl ShadowScratch {
         self.rays.clear();
         self.weights.clear();
         self.spans.clear();
-    }
-
-    /// A shadow ray to the sample, where it lies above the horizon.
-    #[inline(always)] // So that the kind of target is known.
-    fn push_sample(&mut self, starts: &ShadowStarts, sample: &LightSample) {
-        if sample.weight > 0.0 {
-            self.rays.push(starts.ray_to(&sample.target));
-            self.weights.push(sample.weight);
-        }
     }
 
     /// Room for `n` samples of a light, to be given back.
@@ -332,7 +339,7 @@ impl Renderer<'_> {
                         // decides, or the horizon's own shadow would be counted twice.
                         if let Some(sample) = seen.above(point.si.p, point.n) {
                             let starts = s.starts(self, lit, i);
-                            s.push_sample(&starts, &sample);
+                            ShadowRays { starts, scratch: s }.push(sample);
                         }
                     }
                 }
@@ -356,7 +363,7 @@ impl Renderer<'_> {
     ) {
         let point = &lit[i as usize];
         let starts = s.starts(self, lit, i);
-        seen.sample_li(point.si.p, point.n, u, |sample| s.push_sample(&starts, &sample));
+        seen.sample_li(point.si.p, point.n, u, &mut ShadowRays { starts, scratch: s });
     }
 
     /// Casts the check rays that the inference wants, and tells it what they found.

@@ -6,7 +6,7 @@ use crate::math::DVec3;
 use crate::sampling::mix;
 use crate::scene::Light;
 use crate::shade::ShadowStarts;
-use crate::shade::light::{LightSampler, ShadowTarget};
+use crate::shade::light::{LightSample, LightSampler, SampleSink, ShadowTarget};
 use crate::stats::RayCounts;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -86,6 +86,15 @@ struct Lit {
     starts: ShadowStarts,
 }
 
+/// The sample of a light that was drawn.
+struct Drawn(Option<LightSample>);
+
+impl SampleSink for Drawn {
+    fn push(&mut self, sample: LightSample) {
+        self.0 = Some(sample);
+    }
+}
+
 impl Lit {
     /// A ray to a random point of the light that the renderer's sampling gives; `None` where the
     /// light does not shine or the point lies below the horizon.
@@ -94,11 +103,10 @@ impl Lit {
         let seen = sampler.seen_from(self.p, self.n);
         let seen = seen.filter(|_| sampler.unshadowed(self.p, self.n) != 0.0)?;
         let u = if light.is_area() { [rng.random(), rng.random()] } else { [0.5; 2] };
-        let mut ray = None;
-        seen.sample_li(self.p, self.n, &[u], |sample| {
-            ray = (sample.weight > 0.0).then(|| self.starts.ray_to(&sample.target));
-        });
-        ray
+        let mut drawn = Drawn(None);
+        seen.sample_li(self.p, self.n, &[u], &mut drawn);
+        let sample = drawn.0.filter(|sample| sample.weight > 0.0)?;
+        Some(self.starts.ray_to(&sample.target))
     }
 }
 

@@ -20,7 +20,7 @@ impl Directional {
         if is_lit(cos) { cos } else { 0.0 }
     }
 
-    #[inline]
+    #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self) -> LightSample {
         LightSample::of_delta(ShadowTarget::Direction(self.to_light))
     }

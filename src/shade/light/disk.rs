@@ -60,7 +60,7 @@ impl Disk {
     }
 
     /// Uniform over the area.
-    #[inline]
+    #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
         let (x, y, _) = concentric_disk(u);
         let point = self.centre + (self.basis.0 * x + self.basis.1 * y) * self.radius;

@@ -23,7 +23,7 @@ impl Point {
         if is_lit(cos) { cos / d2 } else { 0.0 }
     }
 
-    #[inline]
+    #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self, p: DVec3) -> LightSample {
         let point = self.position;
         // No surface to stop short of: the normal along the ray costs a few ulp.

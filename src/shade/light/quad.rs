@@ -49,7 +49,7 @@ pub(super) struct QuadView<'a> {
 
 impl QuadView<'_> {
     /// Uniform over the area.
-    #[inline]
+    #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
         let point = self.warp.point(u);
         let to_light = point - p;

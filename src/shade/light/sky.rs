@@ -25,7 +25,7 @@ impl SkyView {
     }
 
     /// Weighted by the cosine, so that all samples count alike.
-    #[inline]
+    #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self, n: DVec3, u: [f64; 2]) -> LightSample {
         let direction = to_world(cosine_hemisphere(u), self.basis, n);
         LightSample { target: ShadowTarget::Sky(direction), weight: 1.0 }

@@ -36,7 +36,7 @@ pub(super) struct SphereView {
 
 impl SphereView {
     /// Uniform over the solid angle (Shirley, Wang and Zimmerman, 1996).
-    #[inline]
+    #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
         let (dir, distance) = self.cone.direction(u);
         LightSample { target: self.target(p + dir * distance), weight: dir.dot(n).max(0.0) }
