@@ -155,7 +155,7 @@ impl Lights {
         let mut lights = Self {
             sky: scene.sky.lights && scene.sky.radiance.max_element() > 0.0,
             ambient: scene.sky.ambient.max_element() > 0.0,
-            by_kind: Light::KINDS.map(|kind| (kind, 0)).into(),
+            by_kind: Light::KINDS.iter().map(|kind| (*kind, 0)).collect(),
         };
         let kinds = scene.lights.iter().map(Light::name);
         kinds.for_each(|kind| *lights.by_kind.entry(kind).or_default() += 1);

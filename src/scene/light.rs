@@ -25,28 +25,58 @@ use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// A light. Radiometric units: radiance W/(m²·sr), intensity W/sr, irradiance W/m².
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Light {
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident($data:ident) = $name:literal,)*) => {
+        /// A light. Radiometric units: radiance W/(m²·sr), intensity W/sr, irradiance W/m².
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub enum Light {
+            $($(#[$doc])* $kind($data),)*
+        }
+
+        impl Light {
+            /// Names of all kinds.
+            pub const KINDS: &[&str] = &[$($name),*];
+
+            /// The kind, as scene files and messages call it.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$kind(_) => $name,)*
+                }
+            }
+
+            fn data(&self) -> &dyn LightData {
+                match self {
+                    $(Self::$kind(light) => light,)*
+                }
+            }
+
+            fn data_mut(&mut self) -> &mut dyn LightData {
+                match self {
+                    $(Self::$kind(light) => light,)*
+                }
+            }
+        }
+    };
+}
+
+// A new kind comes last: the order is part of a scene's hash.
+kinds! {
     /// A point that emits alike in all directions.
-    Point(PointLight),
+    Point(PointLight) = "point",
     /// Parallel light from infinitely far.
-    Directional(DirectionalLight),
+    Directional(DirectionalLight) = "directional",
     /// A flat convex quad.
-    Quad(QuadLight),
+    Quad(QuadLight) = "quad",
     /// A sphere that emits outwards.
-    Sphere(SphereLight),
+    Sphere(SphereLight) = "sphere",
     /// A flat disk.
-    Disk(DiskLight),
+    Disk(DiskLight) = "disk",
     /// A cone of light.
-    Spot(SpotLight),
+    Spot(SpotLight) = "spot",
 }
 
 /// What a scene needs to know of a kind of light.
 trait LightData {
-    /// The kind, as scene files and messages call it.
-    fn name(&self) -> &'static str;
-
     /// Whether the light has an extent, so that its shadows are soft and take samples. A delta light has none.
     fn is_area(&self) -> bool;
 
@@ -90,14 +120,6 @@ pub(super) enum EmittingShape {
 }
 
 impl Light {
-    /// Names of all kinds.
-    pub const KINDS: [&str; 6] = ["point", "directional", "quad", "sphere", "disk", "spot"];
-
-    /// The kind, as scene files and messages call it.
-    pub fn name(&self) -> &'static str {
-        self.data().name()
-    }
-
     /// Whether the light has an extent, so that its shadows are soft and take samples.
     pub fn is_area(&self) -> bool {
         self.data().is_area()
@@ -126,27 +148,5 @@ impl Light {
 
     pub(super) fn surface(&self) -> Option<EmittingSurface> {
         self.data().surface()
-    }
-
-    fn data(&self) -> &dyn LightData {
-        match self {
-            Self::Point(light) => light,
-            Self::Directional(light) => light,
-            Self::Quad(light) => light,
-            Self::Sphere(light) => light,
-            Self::Disk(light) => light,
-            Self::Spot(light) => light,
-        }
-    }
-
-    fn data_mut(&mut self) -> &mut dyn LightData {
-        match self {
-            Self::Point(light) => light,
-            Self::Directional(light) => light,
-            Self::Quad(light) => light,
-            Self::Sphere(light) => light,
-            Self::Disk(light) => light,
-            Self::Spot(light) => light,
-        }
     }
 }

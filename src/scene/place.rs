@@ -36,10 +36,10 @@ impl WorldMesh {
 
 impl World {
     /// Moves everything but the sky by `transform`: meshes, spheres and lights. The intensity
-    /// of point lights and the irradiance of directional ones stay.
+    /// of point and spot lights and the irradiance of directional ones stay.
     ///
-    /// Errors: as [`WorldMesh::apply_transform`]; spheres under a transform that is no
-    /// similarity, since they would not stay spheres. The world is then half moved: drop it.
+    /// Errors: as [`WorldMesh::apply_transform`]; spheres, disk lights and spot lights under a transform that is no
+    /// similarity, since they would not stay round. The world is then half moved: drop it.
     pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
         let (_, mirrors) = normal_matrix(transform)?;
         self.meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;

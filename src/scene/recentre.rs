@@ -65,7 +65,7 @@ impl Recentring {
 }
 
 impl World {
-    /// Bounds of all geometry and area lights, world space.
+    /// Bounds of all geometry and of lights that are seen, world space.
     pub fn bounds(&self) -> Bounds3 {
         let mut bounds = Bounds3::EMPTY;
         for mesh in &self.meshes {

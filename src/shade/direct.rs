@@ -147,7 +147,7 @@ pub(super) struct ShadowScratch {
     runs: Runs,
     /// Shading points that the present light must be traced for.
     wanted: Vec<u32>,
-    /// Irradiance without shadows, per unit of radiance, for each shading point and kept channel.
+    /// Irradiance without shadows, per unit of emission, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
     shown: Vec<f32>,

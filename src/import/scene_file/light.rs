@@ -135,7 +135,7 @@ fn inner_angle() -> Crease {
 }
 
 impl SpotLight {
-    /// Errors: an inner angle beyond the outer one; both or neither of `direction` and `target`; a target at the
+    /// Errors: an inner angle beyond the outer one; a cone without an inside; both or neither of `direction` and `target`; a target at the
     /// light's own place; at `span`.
     fn build(&self, source: &Source, span: &Span) -> Result<scene::SpotLight> {
         let position = self.position.vec();
@@ -153,7 +153,12 @@ impl SpotLight {
         };
         let [inner, outer] = [self.inner_angle.0, self.outer_angle.0];
         if inner > outer {
-            let message = "the spot's `inner_angle` is beyond its `outer_angle`";
+            let message =
+                format!("the spot's `inner_angle`, {inner}, is beyond its `outer_angle`, {outer}");
+            return Err(source.fault(span, message).into());
+        }
+        if outer == 0.0 {
+            let message = "the spot's `outer_angle` is 0, so it sends no light";
             return Err(source.fault(span, message).into());
         }
         let [cos_inner, cos_outer] = [inner, outer].map(|angle| libm::cos(angle.to_radians()));

@@ -10,7 +10,7 @@ const MAX_BYTES: u64 = 16 << 20;
 
 /// The kinds of what comes in kinds.
 fn kinds() -> String {
-    let lights = Light::KINDS.map(|kind| format!("`{kind}`")).join(", ");
+    let lights = Light::KINDS.iter().map(|kind| format!("`{kind}`")).collect::<Vec<_>>().join(", ");
     format!(
         "a light has one of {lights}; a step of `transform` one of `translate`, `rotate`, `scale` and \
          `matrix`"

@@ -16,10 +16,6 @@ pub struct DirectionalLight {
 }
 
 impl LightData for DirectionalLight {
-    fn name(&self) -> &'static str {
-        "directional"
-    }
-
     fn is_area(&self) -> bool {
         false
     }

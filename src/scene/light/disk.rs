@@ -7,7 +7,7 @@ use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Corners of the surface that rays see, an even number: its rim is off the circle by 1/3,000 of the radius.
+/// Corners of the surface that rays see, an even number: its rim is off the circle by at most 1/4,000 of the radius.
 const CORNERS: u32 = 128;
 
 /// A flat disk that emits from the side that its normal points to.
@@ -41,10 +41,6 @@ impl DiskLight {
 }
 
 impl LightData for DiskLight {
-    fn name(&self) -> &'static str {
-        "disk"
-    }
-
     fn is_area(&self) -> bool {
         true
     }

@@ -16,10 +16,6 @@ pub struct PointLight {
 }
 
 impl LightData for PointLight {
-    fn name(&self) -> &'static str {
-        "point"
-    }
-
     fn is_area(&self) -> bool {
         false
     }

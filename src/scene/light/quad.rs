@@ -35,10 +35,6 @@ impl QuadLight {
 }
 
 impl LightData for QuadLight {
-    fn name(&self) -> &'static str {
-        "quad"
-    }
-
     fn is_area(&self) -> bool {
         true
     }

@@ -18,10 +18,6 @@ pub struct SphereLight {
 }
 
 impl LightData for SphereLight {
-    fn name(&self) -> &'static str {
-        "sphere"
-    }
-
     fn is_area(&self) -> bool {
         true
     }

@@ -25,10 +25,6 @@ pub struct SpotLight {
 }
 
 impl LightData for SpotLight {
-    fn name(&self) -> &'static str {
-        "spot"
-    }
-
     fn is_area(&self) -> bool {
         self.radius > 0.0
     }

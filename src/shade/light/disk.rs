@@ -105,6 +105,8 @@ struct Circle {
     root: f64,
     /// √((1 − g) / (1 + g)).
     squeeze: f64,
+    /// 1 − g.
+    nearest: f64,
     /// By how much the rim rises over its middle, seen along `n`: towards `s` and towards `t`.
     rise: [f64; 2],
     /// What makes `r(φ)` but for `n`: height over the disk's plane, distance from its axis, radius.
@@ -116,8 +118,9 @@ struct Circle {
 impl Circle {
     fn new(height: f64, distance: f64, radius: f64, n: [f64; 3]) -> Self {
         let [ns, nt, nk] = n;
-        let near = height * height + (distance - radius).powi(2);
-        let far = height * height + (distance + radius).powi(2);
+        let (inwards, outwards) = (distance - radius, distance + radius);
+        let near = height * height + inwards * inwards;
+        let far = height * height + outwards * outwards;
         let d = height * height + distance * distance + radius * radius;
         Self {
             a: radius * (distance * nk - height * ns),
@@ -127,6 +130,7 @@ impl Circle {
             g: 2.0 * radius * distance / d,
             root: (near * far).sqrt() / d,
             squeeze: (near / far).sqrt(),
+            nearest: near / d,
             rise: [radius * ns, radius * nt],
             place: [height, distance, radius],
             n,
@@ -137,11 +141,11 @@ impl Circle {
     fn contour(&self, middle: f64) -> f64 {
         let [rise_s, rise_t] = self.rise;
         let most = (rise_s * rise_s + rise_t * rise_t).sqrt();
+        if middle <= -most || self.root == 0.0 {
+            return 0.0;
+        }
         if middle >= most {
             return self.whole();
-        }
-        if middle <= -most {
-            return 0.0;
         }
         let (top, half) = (libm::atan2(rise_t, rise_s), libm::acos(-middle / most));
         let (first, last) = (top - half, top + half);
@@ -156,22 +160,32 @@ impl Circle {
 
     /// The integral from the angle `first` to `last`, both within 2π of 0.
     fn arc(&self, first: f64, last: f64) -> f64 {
-        let Self { a, b, c, d, g, root, squeeze, .. } = self;
+        let Self { a, b, c, d, g, root, squeeze, nearest, .. } = self;
         let [(sin0, cos0), (sin1, cos1)] = [first, last].map(|x| (libm::sin(x), libm::cos(x)));
         let half = |x: f64| libm::atan2(squeeze * libm::sin(0.5 * x), libm::cos(0.5 * x));
-        // Of 1 / (1 + g cos φ), of cos φ and of sin φ over it.
+        // Of 1 / (1 + g cos φ).
         let one = 2.0 / root * (half(last) - half(first));
-        let cos = if *g > 1e-4 {
-            (last - first - one) / g
-        } else {
-            let of = |x: f64, sin: f64, cos: f64| {
+        if *g <= 1e-4 {
+            // Near the axis: of cos φ over it as a series, and of sin φ.
+            let cos = |x: f64, sin: f64, cos: f64| {
                 sin - g * 0.5 * (x + sin * cos) + g * g * sin * (1.0 - sin * sin / 3.0)
             };
-            of(last, sin1, cos1) - of(first, sin0, cos0)
-        };
-        let step = (cos1 - cos0) / (1.0 + g * cos0);
-        let slope = if g * step == 0.0 { 1.0 } else { libm::log1p(g * step) / (g * step) };
-        (a * cos - b * step * slope + c * one) / d
+            let cos = cos(last, sin1, cos1) - cos(first, sin0, cos0);
+            let step = (cos1 - cos0) / (1.0 + g * cos0);
+            let slope = if g * step == 0.0 { 1.0 } else { libm::log1p(g * step) / (g * step) };
+            return (a * cos - b * step * slope + c * one) / d;
+        }
+        // 1 + g cos φ, at the rim too, where g is 1 as far as f64 can tell.
+        let [from, to] = [first, last].map(|x| {
+            let cos = libm::cos(0.5 * x);
+            nearest + 2.0 * g * cos * cos
+        });
+        // c − a/g, of which both terms are almost equal there.
+        let [height, distance, radius] = self.place;
+        let [ns, _, nk] = self.n;
+        let level = (radius - distance) * (radius + distance) - height * height;
+        let rest = 0.5 * (nk * level + height * ns * d / distance);
+        (a / g * (last - first) + rest * one - b / g * libm::log(to / from)) / d
     }
 
     /// The straight edge between two points of the rim: its angle times the cosine between `n` and the normal of
@@ -268,6 +282,34 @@ mod tests {
         assert!((below - above).abs() < 1e-6, "{below} {above}");
         let axis = at(0.0);
         assert!((axis - at(1e-12)).abs() < 1e-10 && (axis - below).abs() < 1e-3);
+    }
+
+    #[test]
+    fn irradiance_is_finite_and_smooth_at_the_rim() {
+        let mut seed = 11u64;
+        let mut next = || {
+            seed = crate::sampling::mix(seed);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        for _ in 0..2000 {
+            let n = DVec3::new(next(), next(), next()).normalize();
+            let off = DVec3::new(next(), 0.0, -next().abs() - 0.01);
+            let at = |scale: f64| {
+                disk(DVec3::NEG_X * 0.5 - off * scale, DVec3::NEG_Z, 0.5).unshadowed(DVec3::ZERO, n)
+            };
+            // The closer, the more alike: the rim is a straight edge then.
+            let values = [1e-6, 1e-7, 1e-8, 1e-9, 1e-10].map(at);
+            for value in values {
+                assert!((value - values[0]).abs() < 2e-5, "{n} {off}: {values:?}");
+            }
+            // Closer, f64 cannot tell how far it is.
+            let closer = [1e-12, 1e-14, 1e-17].map(at);
+            assert!(closer.iter().all(|value| (0.0..=PI).contains(value)), "{n} {off}: {closer:?}");
+        }
+        for tiny in [1e-100, 1e-160, 1e-200] {
+            let disk = disk(DVec3::new(-0.5, 0.0, tiny), DVec3::NEG_Z, 0.5);
+            assert!(disk.unshadowed(DVec3::ZERO, DVec3::new(0.6, 0.0, 0.8)).is_finite());
+        }
     }
 
     #[test]

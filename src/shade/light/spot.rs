@@ -59,7 +59,8 @@ impl Spot {
     /// The share of the axis' intensity that is sent towards `p`: smooth from 1 to 0 between the two angles, cubic in
     /// the cosine (Pharr, Jakob and Humphreys, 2023, section 12.2.1).
     fn falloff(&self, p: DVec3) -> f64 {
-        let cos = (p - self.position).normalize_or_zero().dot(self.direction);
+        let away = p - self.position;
+        let cos = (away.dot(self.direction) / away.length()).clamp(-1.0, 1.0);
         if cos >= self.cos_inner {
             return 1.0;
         }

@@ -224,6 +224,26 @@ const TOGETHER: &[Case] = &[
         "",
     ),
     (
+        "¦[[light]]\nspot = { position = [0, 5, 0], intensity = 1 }\n",
+        "a spot is aimed by either `direction` or `target`",
+        "",
+    ),
+    (
+        "¦[[light]]\nspot = { position = [0, 5, 0], target = [0, 5, 0], intensity = 1 }\n",
+        "the spot's target is its own position",
+        "",
+    ),
+    (
+        "¦[[light]]\nspot = { position = [0, 5, 0], direction = 'x', intensity = 1, inner_angle = 50 }\n",
+        "`inner_angle`, 50, is beyond its `outer_angle`, 45",
+        "",
+    ),
+    (
+        "¦[[light]]\nspot = { position = [0, 5, 0], direction = 'x', intensity = 1, outer_angle = 0 }\n",
+        "it sends no light",
+        "",
+    ),
+    (
         "¦[[light]]\nquad = { centre = [0, 0, 0], radiance = 1 }\n",
         "by `corner` and `edges`, or",
         "one form",

@@ -92,16 +92,22 @@ fn everything_about_reuse_reaches_its_place() {
 }
 
 #[test]
-fn lights_come_in_four_kinds_and_quads_in_two_forms() {
+fn lights_come_in_kinds_and_quads_and_spots_in_two_forms() {
     let loaded = good(
         "[[light]]\npoint = { position = [1, 2, 3], intensity = 5 }\n\
          [[light]]\ndirectional = { to_light = [0, 10, 0], irradiance = [1, 2, 3] }\n\
          [[light]]\nquad = { centre = [1, 10, 2], normal = '-y', size = [4, 2], radiance = 20 }\n\
          [[light]]\n[light.quad]\ncorner = [0, 0, 0]\nedges = [[1, 0, 0], [0, 1, 0]]\n\
          radiance = 1\ntwo_sided = true\n\
-         [[light]]\nsphere = { centre = [0, 9, 0], radius = 0.5, radiance = 3 }\n",
+         [[light]]\nsphere = { centre = [0, 9, 0], radius = 0.5, radiance = 3 }\n\
+         [[light]]\ndisk = { centre = [0, 9, 0], normal = '-y', radius = 0.5, radiance = 3 }\n\
+         [[light]]\nspot = { position = [0, 9, 0], target = [0, 3, 0], intensity = 3 }\n\
+         [[light]]\n[light.spot]\nposition = [0, 9, 0]\ndirection = '-y'\nintensity = 3\n\
+         outer_angle = 60\ninner_angle = 60\nradius = 0.1\n",
     );
-    let [point, sun, lamp, window, bulb] = &loaded.world.lights[..] else { panic!("5 lights") };
+    let [point, sun, lamp, window, bulb, disk, torch, lantern] = &loaded.world.lights[..] else {
+        panic!("8 lights")
+    };
     assert_eq!(
         *point,
         SceneLight::Point(PointLight {
@@ -117,6 +123,17 @@ fn lights_come_in_four_kinds_and_quads_in_two_forms() {
     let SceneLight::Quad(window) = window else { panic!("a quad") };
     assert_eq!((window.normal(), window.area(), window.two_sided), (DVec3::Z, 1.0, true));
     assert!(matches!(bulb, SceneLight::Sphere(SphereLight { radius: 0.5, .. })));
+    let SceneLight::Disk(disk) = disk else { panic!("a disk") };
+    assert_eq!((disk.normal, disk.radius, disk.two_sided), (DVec3::NEG_Y, 0.5, false));
+    let (SceneLight::Spot(torch), SceneLight::Spot(lantern)) = (torch, lantern) else {
+        panic!("two spots")
+    };
+    assert_eq!((torch.direction, torch.cos_inner, torch.radius), (DVec3::NEG_Y, 1.0, 0.0));
+    assert!((torch.cos_outer - 0.5f64.sqrt()).abs() < 1e-15);
+    assert_eq!((lantern.direction, lantern.radius), (DVec3::NEG_Y, 0.1));
+    assert!((lantern.cos_outer - 0.5).abs() < 1e-15 && lantern.cos_inner == lantern.cos_outer);
+    let soft: Vec<bool> = loaded.world.lights.iter().map(SceneLight::is_area).collect();
+    assert_eq!(soft, [false, false, true, true, true, true, false, true]);
 }
 
 #[test]
