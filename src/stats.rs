@@ -1,4 +1,4 @@
-//! Counts that travel upwards: rays by kind, and samples that are no radiance. Merging is order-free.
+//! Counts that travel upwards: rays by kind, and invalid samples. Merging is order-free.
 
 mod audit;
 
@@ -168,7 +168,7 @@ impl ReuseCounts {
         share(self.direct_inferred + self.specular_inferred, self.direct + self.specular)
     }
 
-    /// That of the points seen in mirrors and through glass.
+    /// Share of the points seen in mirrors and through glass that were inferred, 0 to 1; `None` without any.
     pub fn specular_share(&self) -> Option<f64> {
         share(self.specular_inferred, self.specular)
     }
@@ -187,7 +187,7 @@ impl AddAssign for ReuseCounts {
     }
 }
 
-/// What is wrong with light that is no radiance; later kinds outdo earlier ones.
+/// Why a radiance is invalid; later faults outdo earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
     /// Some channel is negative.
@@ -211,7 +211,7 @@ impl Fault {
     }
 }
 
-/// Camera samples that are no radiance, each counted once, by its worst fault.
+/// Invalid camera samples: NaN, infinite or negative. Each is counted once, by its worst fault.
 ///
 /// They stay in the picture as they are: a pixel that is NaN is NaN in an exr file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]

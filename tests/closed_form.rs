@@ -249,7 +249,7 @@ fn a_clamped_sample_counts_as_much_as_the_clamp_lets_it() {
     assert!(edges > 50, "{edges} pixels at the lamp's edge");
 }
 
-/// What counts is the whole of a sample, not each light's part of it; and a sample that is no radiance
+/// What counts is the whole of a sample, not each light's part of it; and an invalid sample
 /// stays what it is.
 #[test]
 fn the_clamp_is_of_a_sample_s_sum() {

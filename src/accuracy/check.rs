@@ -47,7 +47,7 @@ impl Check {
     /// many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
-    /// Those of tracing and of `image`.
+    /// As [`Stage::trace`](super::stage::Stage::trace), and any that `image` gives.
     pub fn of(
         probe: &Probe,
         foretelling: &Predictor,

@@ -63,7 +63,7 @@ pub struct ErrorModel {
 pub struct Point {
     /// The samples.
     pub samples: Samples,
-    /// Those of the reference that they were held against.
+    /// Samples of the reference that they were compared with.
     pub reference: Samples,
     /// For each frame the mean squared difference from it.
     pub errors: Vec<f64>,

@@ -51,7 +51,7 @@ impl Errors {
     /// Of `frames` against `truth`, which has them all; weighed as `cut` says.
     ///
     /// # Errors
-    /// Those of [`compare`]: sizes that differ.
+    /// As [`compare`]: sizes that differ.
     pub fn of(truth: &Frames, frames: &Frames, cut: &Cut) -> Result<Self> {
         let mut figures = Vec::new();
         for (frame, image) in frames {

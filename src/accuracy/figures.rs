@@ -21,7 +21,7 @@ pub fn doubts(patches: &Patches, truth: &Seen, seen: &Seen) -> Vec<f64> {
 /// The figure of `goal` as it rises with the error: the worst frame's.
 ///
 /// # Errors
-/// Those of [`compare`].
+/// As [`compare`].
 pub fn figure(goal: Goal, patches: &Patches, truth: &Seen, seen: &Seen) -> Result<f64> {
     let mut frames = Vec::new();
     for (truth, seen) in truth.iter().zip(seen) {

@@ -41,7 +41,7 @@ pub struct OracleCrop {
 /// would take the oracle minutes, or where the default is the oracle.
 ///
 /// # Errors
-/// Those of [`Stage::trace`].
+/// As [`Stage::trace`].
 pub fn on_a_crop(stage: &Stage, frame: u32) -> Result<Option<OracleCrop>> {
     let triangles = stage.scene.triangle_count();
     let threads = stage.pool.current_num_threads() as f64;

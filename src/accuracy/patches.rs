@@ -78,7 +78,7 @@ impl Patches {
     /// fall between its samples.
     ///
     /// # Errors
-    /// Those of [`Stage::trace`].
+    /// As [`Stage::trace`].
     pub fn by_contrast(stage: &Stage, frames: &[u32], effort: Effort, lot: u64) -> Result<Self> {
         let mut settings = one_sample(stage.base);
         let scale = effort.picture / (f64::from(settings.width) * f64::from(settings.height));
@@ -98,7 +98,7 @@ impl Patches {
     /// The same by the contrast of the frames themselves, which `image` gives.
     ///
     /// # Errors
-    /// Those of `image`.
+    /// Any that `image` gives.
     pub fn by_contrast_of(
         settings: &Settings,
         frames: &[u32],
@@ -180,7 +180,7 @@ impl Patches {
     /// The patches of whole images of the frames, which `image` gives as displayed.
     ///
     /// # Errors
-    /// Those of `image`.
+    /// Any that `image` gives.
     pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<Seen> {
         let one = |Drawn { frame, corners, .. }: &Drawn| {
             let image = image(*frame)?;

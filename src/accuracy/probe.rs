@@ -98,7 +98,7 @@ impl Probe<'_> {
     pub fn range(&self) -> Range {
         let (base, plan) = (self.stage.base, self.plan());
         // Sobol points are laid out best in powers of two; half way between them is tried where a
-        // step is dear.
+        // step is expensive.
         let numbers = [1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192, 256, 512, 1024];
         let among = |is_free: bool, most: u32, given: u32| match is_free {
             true => numbers.into_iter().filter(|n| *n <= most).collect(),
@@ -116,7 +116,7 @@ impl Probe<'_> {
     /// Patches of the job's frames in which the goal's figure can be taken.
     ///
     /// # Errors
-    /// Those of [`Patches::by_contrast`].
+    /// As [`Patches::by_contrast`].
     pub(super) fn patches(&self, effort: Effort) -> Result<Patches> {
         match self.is_wide() {
             true => {
@@ -134,7 +134,7 @@ impl Probe<'_> {
     /// Patches of finished frames that a check looks at, whose pictures `image` gives; and which frames.
     ///
     /// # Errors
-    /// Those of `image`.
+    /// Any that `image` gives.
     pub(super) fn check_patches(
         &self,
         effort: Effort,

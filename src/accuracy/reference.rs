@@ -85,7 +85,7 @@ pub enum Step<'a> {
 pub struct Convergence<'a> {
     /// The scene.
     pub stage: &'a Stage<'a>,
-    /// Those of the first frames ([`truth_settings`]).
+    /// Settings of the first, coarsest reference ([`truth_settings`]).
     pub settings: Settings,
     /// Which frames.
     pub frames: &'a [u32],
@@ -101,7 +101,7 @@ impl Convergence<'_> {
     /// laid out together are worth more than as many that were not.
     ///
     /// # Errors
-    /// Those of [`Stage::trace`] and of `hear`.
+    /// As [`Stage::trace`], and any that `hear` gives.
     pub fn run(
         &self,
         mut last: Option<Doubling>,

@@ -44,7 +44,7 @@ impl<'a> Stage<'a> {
     /// An intersector for `settings`; `None` where the default's serves.
     ///
     /// # Errors
-    /// Those of [`intersect::build`].
+    /// As [`intersect::build`].
     pub fn own_intersector(
         &self,
         settings: &Settings,

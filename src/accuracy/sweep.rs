@@ -65,7 +65,7 @@ impl Sweep<'_> {
     /// due to chance, below which the truth has to be known.
     ///
     /// # Errors
-    /// Those of building and rendering.
+    /// As [`Stage::trace`].
     pub fn least_noise(&self) -> Result<f64> {
         let best = self.candidates.iter().max_by_key(|c| samples(&c.settings));
         let Some(best) = best else { return Ok(0.0) };

@@ -118,7 +118,7 @@ impl AddAssign for Change {
 pub struct Taken(BTreeMap<u32, Entry>);
 
 impl Taken {
-    /// Those of `candidate` among `entries`.
+    /// The entries of `candidate`, by turn.
     pub fn of(entries: &[Entry], candidate: usize) -> Self {
         let own = entries.iter().filter(|entry| entry.candidate == candidate);
         Self(own.map(|entry| (entry.turn, entry.clone())).collect())

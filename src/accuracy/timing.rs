@@ -155,7 +155,7 @@ impl Probe<'_> {
     }
 }
 
-/// Those of `found` that may turn out to be the fastest.
+/// The predictions that may turn out to be the fastest.
 pub(super) fn likely(mut found: Vec<Prediction>) -> Vec<Prediction> {
     let least = found.iter().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
     found.retain(|f| f.seconds <= SLOWER * least);

@@ -48,7 +48,7 @@ pub struct Writing {
 /// Writes the first frame of the default, and what others need of it, into `folder`, several times.
 ///
 /// # Errors
-/// Those of rendering and writing.
+/// As rendering and writing a frame.
 pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
     let frames = stage.shot.frames;
     let (film, checkpoint) = match stage.base.reuse.policy {

@@ -246,7 +246,7 @@ impl Chooser<'_> {
     /// The choice that the manifest holds, if it answers the same question; else a new one.
     ///
     /// # Errors
-    /// Those of the probe; a target that nothing is foretold to reach.
+    /// Any of the probe's; a target that no setting is predicted to reach.
     pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
             let options = self.options(&before.foretold);

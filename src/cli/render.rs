@@ -349,7 +349,7 @@ fn judge_reuse(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
     None
 }
 
-/// Says which samples are no radiance; an exit code where that is a failure.
+/// Says how many samples are invalid; an exit code where that is a failure.
 fn judge_samples(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
     let bad = stats::bad_of(job.plan, outcome);
     if bad.is_none() {
@@ -362,9 +362,9 @@ fn judge_samples(job: &Frames, outcome: &Outcome, quiet: bool) -> Option<Exit> {
     let place = place.map_or(String::new(), |(frame, [x, y])| {
         format!("; the first at pixel {x},{y} of frame {frame}")
     });
-    let samples = if bad.total() == 1 { "camera sample is" } else { "camera samples are" };
+    let samples = if bad.total() == 1 { "invalid camera sample" } else { "invalid camera samples" };
     let message = format!(
-        "{} {samples} no radiance ({bad}){place}\n  \
+        "{} {samples} ({bad}){place}\n  \
          help: --flag-bad on shows such pixels in magenta",
         bad.total()
     );

@@ -37,7 +37,7 @@ pub struct Request {
     pub pattern: FramePattern,
     /// Whether frames that exist are replaced.
     pub overwrite: bool,
-    /// Whether a sample that is no radiance makes the job fail.
+    /// Whether an invalid sample makes the job fail.
     pub strict: bool,
     /// Frames per second of the video; `None` for no video.
     pub fps: Option<f64>,

@@ -77,7 +77,7 @@ struct Frame<'a> {
     report: &'a FrameReport,
 }
 
-/// Samples that are no radiance, of all frames asked for, rendered now or kept.
+/// Invalid samples of all frames asked for, rendered now or kept.
 pub fn bad_of(plan: &Plan, outcome: &Outcome) -> BadSamples {
     let mut sum = BadSamples::default();
     plan.kept_bad.iter().for_each(|(_, bad)| sum += *bad);

@@ -29,7 +29,7 @@ pub struct Film {
     /// where nothing was audited. Only maps show it: what else is in a frame's files does not depend on
     /// the audit.
     pub audit: Option<Vec<f32>>,
-    /// Camera samples in it that are no radiance.
+    /// Invalid camera samples in it.
     pub bad: BadSamples,
 }
 

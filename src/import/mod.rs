@@ -88,7 +88,7 @@ pub struct Loaded {
     pub video: bool,
     /// Whether existing frames are replaced.
     pub overwrite: bool,
-    /// Whether a sample that is no radiance makes the job fail.
+    /// Whether an invalid sample makes the job fail.
     pub strict: bool,
     /// Rendering threads, where the file says.
     pub threads: Option<u32>,

@@ -141,7 +141,7 @@ impl Facing {
     const EMPTY: Self =
         Self { geom_id: PrimRef::NONE.geom_id, min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// That of a triangle.
+    /// The box of one triangle.
     fn of(geom_id: u32, facts: &MeshFacts, corners: &[Vec3; 3]) -> Self {
         if !facts.closed {
             return Self { geom_id: Self::ANYWHERE, ..Self::EMPTY };

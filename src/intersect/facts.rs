@@ -31,7 +31,7 @@ struct Sums {
 }
 
 impl MeshFacts {
-    /// Those of `mesh`.
+    /// The facts of `mesh`.
     pub fn of(mesh: &Mesh) -> Self {
         let middle = mesh.bounds.centre();
         let parts = mesh.triangles.par_chunks(TASK).map(|triangles| {

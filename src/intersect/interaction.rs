@@ -92,7 +92,7 @@ impl Facet {
     /// Not a triangle: no error.
     pub const EXACT: Self = Self { longest: 0.0, tilt: 0.0 };
 
-    /// That of a triangle.
+    /// The error bound of a triangle's plane, by its corners in scene space.
     pub fn of(corners: &[DVec3; 3]) -> Self {
         let [a, b, c] = *corners;
         let (e1, e2) = ((b - a).length(), (c - a).length());

@@ -123,7 +123,7 @@ pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> R
 /// As [`encode()`], with one attribute of the program's own: name and bytes.
 ///
 /// # Errors
-/// Those of [`encode()`].
+/// As [`encode()`].
 pub fn encode_with(
     width: u32,
     height: u32,

@@ -108,7 +108,7 @@ pub struct Row {
     /// How good the inferred part of it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,
-    /// Camera samples that are no radiance.
+    /// Invalid camera samples.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
     /// Files of its maps of reuse.

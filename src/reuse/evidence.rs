@@ -32,7 +32,7 @@ pub struct Finding {
     pub agreed: bool,
     /// Squared error of the estimate, squares of a display step of the pixel; may be negative.
     pub error: f32,
-    /// That of a trace.
+    /// Squared error of a trace, likewise.
     pub noise: f32,
 }
 

@@ -28,7 +28,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Those of `level` that surround `p`, of mesh `geom_id`.
+    /// The eight cells of `level` around the point `p` (scene space) of mesh `geom_id`.
     pub fn around(level: i32, geom_id: u32, p: DVec3) -> Self {
         let edge = edge_of(level);
         let [x, y, z] = cell_of(p - DVec3::splat(0.5 * edge), edge);

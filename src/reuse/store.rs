@@ -77,7 +77,7 @@ struct Head {
 }
 
 impl Compatibility {
-    /// Those of a job of the world with the hash `world` that keeps `channels`.
+    /// What references of a job must have in common with others: its world's hash `world`, its `channels`, its samples.
     pub fn of(world: &str, channels: &Channels, settings: &Settings) -> Self {
         let name = |channel| match channel {
             Channel::Area(index) => format!("light {}", index + 1),

@@ -79,7 +79,7 @@ impl Taps4 {
         distance: f32x4::ZERO,
     };
 
-    /// Those of `samples` that are `near` and have a weight; `None` where there is none.
+    /// The taps among `samples` that are `near` and have a weight; `None` where there is none.
     fn new(reference: u32, mut samples: [u32; 4], weight: f32x4, near: &Near4) -> Option<Self> {
         let weight = weight & near.is_near & weight.cmp_gt(f32x4::ZERO);
         let some = weight.cmp_gt(f32x4::ZERO).move_mask();

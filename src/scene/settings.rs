@@ -54,7 +54,7 @@ pub struct Settings {
     pub reuse: ReuseSettings,
     /// Which part of the image is rendered; `None` for all of it.
     pub crop: Option<Rect>,
-    /// Show pixels with a sample that is no radiance (NaN, infinite, negative) in magenta.
+    /// Show pixels with an invalid sample (NaN, infinite, negative) in magenta.
     pub flag_bad: bool,
 }
 

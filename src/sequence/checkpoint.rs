@@ -1,6 +1,6 @@
 //! References on disk, so that a job that was killed need not trace them again.
 //!
-//! A job needs few references at a time, and those of key frames are dear. These lie in a hidden
+//! A job needs few references at a time, and those of key frames are expensive. These lie in a hidden
 //! folder beside the frames (`.frame.references` for `frame_####.png`), one file each: a line of JSON
 //! that says what job and frame it belongs to, then the bytes of [`crate::reuse::store`] (policy
 //! `surface`) or the frame's discoveries (`colour`). A file is
@@ -68,7 +68,7 @@ pub struct Checkpoints<'a> {
 }
 
 impl<'a> Checkpoints<'a> {
-    /// Those of the job at `target`. `whole` says whether its frames are traced without a crop.
+    /// The checkpoints of the job at `target`. `whole` says whether its frames are traced without a crop.
     pub fn new(
         target: &'a Target,
         every: Option<Duration>,
@@ -219,7 +219,7 @@ pub fn clear(target: &Target) {
     let _ = fs::remove_dir(folder);
 }
 
-/// Refuses references of other settings, another scene or another version: they may be dear, and a word
+/// Refuses references of other settings, another scene or another version: they may be expensive, and a word
 /// mistyped must not cost them.
 pub(super) fn refuse_others(target: &Target) -> Result<()> {
     let folder = folder(&target.pattern);

@@ -147,7 +147,7 @@ pub struct FrameReport {
     /// How good the inferred part is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,
-    /// Camera samples that are no radiance.
+    /// Invalid camera samples.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
 }

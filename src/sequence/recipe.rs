@@ -29,10 +29,10 @@ pub struct Recipe {
 pub struct Recipes(Vec<Recipe>);
 
 impl Recipes {
-    /// Those of `shot` under `settings`. `keeps_light` says whether frames have anything to look up in
+    /// The recipes of all frames of `shot` under `settings`. `keeps_light` says whether frames have anything to look up in
     /// one another, `with_motion` whether files hold the motion since the frame before.
     ///
-    /// Errors: those of the shot's cameras.
+    /// Errors: as [`Shot::camera`].
     pub fn new(
         shot: &Shot,
         settings: &Settings,
@@ -54,7 +54,7 @@ impl Recipes {
         Ok(Self((1..=shot.frames).into_par_iter().map(recipe).collect()))
     }
 
-    /// That of `frame`, if the shot has it.
+    /// The recipe of `frame`, if the shot has it.
     pub fn get(&self, frame: u32) -> Option<&Recipe> {
         self.0.get(frame.checked_sub(1)? as usize)
     }

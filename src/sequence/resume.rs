@@ -68,7 +68,7 @@ impl Target {
 pub struct Plan {
     /// Frames that exist whole, with the same settings, made of the same.
     pub kept: Vec<u32>,
-    /// Those of the kept frames that have samples which are no radiance.
+    /// Kept frames with invalid samples, and how many.
     pub kept_bad: Vec<(u32, BadSamples)>,
     /// What the audits of the kept frames found, if any was audited.
     pub kept_audit: Option<AuditSums>,
@@ -92,7 +92,7 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
 /// The same, with what [`look`] found where that is known.
 ///
 /// # Errors
-/// Those of [`prepare`].
+/// As [`prepare`].
 pub fn prepare_with(
     target: &Target,
     frames: FrameRange,

@@ -1,6 +1,6 @@
 //! What frames left, on disk for a job that goes on after this one: when it is put there, and when removed.
 //!
-//! Of a [`SurfaceReuse`] only references of key frames: they are dear, and serve long. The others would take
+//! Of a [`SurfaceReuse`] only references of key frames: they are expensive, and serve long. The others would take
 //! more time to put on disk, one after every other frame, than the few of them that are lost take to be
 //! made again.
 

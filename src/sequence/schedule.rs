@@ -21,7 +21,7 @@ pub struct Schedule {
 impl Schedule {
     /// Which frames of `shot` the makers infer from which; `keeps_light`: some light is worth a lookup.
     ///
-    /// Errors: those of the shot's cameras.
+    /// Errors: as [`Shot::camera`].
     pub fn of_shot(shot: &Shot, settings: &Settings, keeps_light: bool) -> Result<Self> {
         let frames = shot.frames;
         let segment = settings.reuse.segment;
@@ -33,7 +33,7 @@ impl Schedule {
         }
     }
 
-    /// That of `shot`, cut as `pyramid` says.
+    /// The schedule of `shot`, cut as `pyramid` says.
     ///
     /// Errors: those of the shot's cameras.
     pub fn new(pyramid: Pyramid, shot: &Shot) -> Result<Self> {
@@ -48,7 +48,7 @@ impl Schedule {
         Ok(Self { pyramid, copies })
     }
 
-    /// That of frames each of which is made for itself, cut as `pyramid` says.
+    /// The schedule where no frame is a copy of another, cut as `pyramid` says.
     pub fn without_copies(pyramid: Pyramid) -> Self {
         Self { pyramid, copies: BTreeMap::new() }
     }

@@ -192,8 +192,8 @@ pub(super) fn with_supplied<'r>(
     all
 }
 
-/// Those of `supplied` that a frame seen by `camera` (scene space) is inferred from: a function of
-/// these alone. Frames in between know only what they discovered, so the nearest ones alone would
+/// The supplied references that a frame seen by `camera` (scene space) is inferred from: a function of
+/// both alone. Frames in between know only what they discovered, so the nearest ones alone would
 /// know little: the two nearest of those with at least half as many samples as the one with most come
 /// first, then the nearest of the others.
 fn nearest<'c>(supplied: &'c [ReferenceInfo], camera: &Camera) -> Vec<&'c ReferenceInfo> {

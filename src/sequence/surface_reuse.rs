@@ -249,7 +249,7 @@ impl<'a> SurfaceReuse<'a> {
         self.shot.camera(frame, settings.width, settings.height)
     }
 
-    /// Those of `originals`, which are in use.
+    /// The references of `originals`, all of them in use.
     fn references(&self, originals: &[u32]) -> Result<Option<Vec<Arc<Reference>>>> {
         originals.iter().map(|original| self.reference(*original)).collect()
     }

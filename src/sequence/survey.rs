@@ -23,7 +23,7 @@ pub struct Survey {
     pub missing: Vec<u32>,
     /// There, but not as they were written, or not in the manifest.
     pub damaged: Vec<u32>,
-    /// Those of the damaged ones that are whole themselves: a map of theirs is not.
+    /// Damaged frames whose picture is whole and one of whose maps is not.
     #[serde(skip)]
     pub without_map: Vec<u32>,
     /// There, but of other settings.

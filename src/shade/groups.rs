@@ -102,7 +102,7 @@ pub(super) struct CheckRays {
     pub first: u32,
     /// How many the run has.
     pub all: usize,
-    /// Those of the run that are the shading point's.
+    /// The part of the run that is the shading point's.
     pub own: Range<usize>,
 }
 

@@ -297,7 +297,7 @@ impl Part<'_> {
 }
 
 /// Does `one` with all of `tiles` on the threads of the current rayon pool: each takes the next tile
-/// when it is done with one, so that none is left with a share that turns out dear. In the order of
+/// when it is done with one, so that none is left with a share that turns out expensive. In the order of
 /// `tiles`; `None` as soon as `one` gives that.
 fn take_turns<S, T: Send>(
     tiles: &[Rect],

@@ -28,7 +28,7 @@ pub(super) struct BlockPixels {
     samples: Vec<Rgb>,
     /// The present chunk's samples.
     chunk: Range<u32>,
-    /// Light of the present chunk of samples that is no radiance: pixel, sample, fault.
+    /// Invalid light of the present chunk of samples: pixel, sample, fault.
     suspects: Vec<(u32, u32, Fault)>,
     /// Pixels with such a sample, once a sample.
     bad: Vec<(u32, Fault)>,
@@ -174,7 +174,7 @@ impl BlockPixels {
         self.places.len()
     }
 
-    /// Adds radiance of one camera sample to its pixel's sum. What is no radiance is added as it
+    /// Adds radiance of one camera sample to its pixel's sum. What is invalid is added as it
     /// is, and noted.
     #[inline]
     pub fn add(&mut self, pixel: u32, sample: u32, radiance: Rgb) {
@@ -211,14 +211,14 @@ impl BlockPixels {
     fn add_clamped(&mut self, most: f32) {
         let samples = self.samples.chunks(self.chunk_len().max(1) as usize);
         for (sum, samples) in self.sums.iter_mut().zip(samples) {
-            // What is no radiance stays what it is.
+            // What is invalid stays what it is.
             let clamped =
                 |light: &Rgb| if light.is_finite() { light.min(Rgb::splat(most)) } else { *light };
             *sum += samples.iter().map(clamped).fold(Rgb::ZERO, |all, light| all + light);
         }
     }
 
-    /// Notes a sample whose light, or weight of light, is no radiance.
+    /// Notes a sample whose light, or weight of light, is invalid.
     #[inline]
     pub fn check(&mut self, pixel: u32, sample: u32, light: Rgb) {
         // The bits of what is finite and has no sign lie below those of infinity.

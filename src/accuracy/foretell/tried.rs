@@ -70,7 +70,7 @@ impl Predictor {
     }
 
     /// A squared error to try. Where nothing reached the goal yet it is no less than a quarter of what was
-    /// tried: the line is only sure near to what it was put through, and what is far too good is dear
+    /// tried: the line is only sure near to what it was put through, and what is far too good is expensive
     /// to try.
     pub(in super::super) fn to_try(&self, goal: Goal) -> f64 {
         let allowed = self.allowed(goal);

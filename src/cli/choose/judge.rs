@@ -19,7 +19,7 @@ impl Chooser<'_> {
     /// Says what came out of `choice`, and makes a tighter one where the target was missed.
     ///
     /// # Errors
-    /// Those of reading frames and tracing.
+    /// A frame that cannot be read or traced.
     pub fn judge(
         &self,
         choice: Choice,

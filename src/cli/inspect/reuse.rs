@@ -142,7 +142,7 @@ impl Progress for Unseen {
 }
 
 impl Plan {
-    /// That of rendering the whole shot in one process.
+    /// The plan of rendering the whole shot in one process.
     pub fn of(renderer: &Renderer, shot: &Shot) -> Result<Self> {
         let Renderer { scene, settings, plan: effects, .. } = renderer;
         let channels = reuse::channels(scene, effects, settings);

@@ -153,7 +153,7 @@ impl EmbreeIntersector<'_> {
         counts[RayKind::Retry] += u64::from(doubtful.count_ones());
         let mut hit = 0;
         let mut left = doubtful;
-        // Few are, mostly: arrays for all of a block would be dear to make.
+        // Few are, mostly: arrays for all of a block would be expensive to make.
         while left != 0 {
             let mut lanes = [0; PART];
             let mut again = [rays[0]; PART];

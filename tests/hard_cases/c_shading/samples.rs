@@ -1,4 +1,4 @@
-//! What is no radiance: counted by name, shown when asked, fatal when asked, never black in silence.
+//! Invalid samples: counted by name, shown when asked, fatal when asked, never black in silence.
 
 use crate::common::{self, Job};
 use crate::suite::{Outcome, Size};
@@ -251,7 +251,7 @@ fn command(outcome: &mut Outcome) {
     let (code, words) = run(&[]);
     let told = has(
         &words,
-        &["warning", "no radiance", "1 infinite", "pixel 4,4 of frame 1", "--flag-bad"],
+        &["warning", "invalid camera sample", "1 infinite", "pixel 4,4 of frame 1", "--flag-bad"],
     );
     outcome.check(code == 0 && told, || format!("plain: {code}, {words}"));
     outcome.check(has(&stats(), &["bad_samples", "\"infinite\": 1"]), stats);
