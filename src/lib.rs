@@ -28,7 +28,7 @@ pub mod measure;
 pub mod output;
 pub mod page;
 
-// Floor 4: radiance along a ray; what earlier rays already told.
+// Floor 4: radiance along a ray; what earlier rays found.
 pub mod reuse;
 pub mod shade;
 

@@ -33,7 +33,7 @@ impl std::fmt::Display for Goal {
 
 impl Goal {
     /// Its figure in words: `figure` rises with the error, so it is what SSIM is less than 1. `None` for
-    /// PSNR, which is told of every setting.
+    /// PSNR, which is reported for every setting.
     pub fn in_words(self, figure: f64) -> Option<String> {
         match self {
             Self::Psnr(_) => None,

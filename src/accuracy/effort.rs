@@ -5,11 +5,11 @@ use super::probe::checked_pixels;
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Frames that errors are told from.
+    /// Frames that errors are estimated from.
     pub frames: u32,
     /// Pixels of each.
     pub pixels: u32,
-    /// Pixels of the pictures that contrast is told from, or more.
+    /// Least pixels of the pictures that contrast is measured on.
     pub picture: f64,
     /// Pixels of the small frames that are timed.
     pub small: f64,

@@ -1,4 +1,4 @@
-//! Patches of frames at their full size, traced alone: what a whole frame's error is told from.
+//! Patches of frames at their full size, traced alone: what a whole frame's error is estimated from.
 //!
 //! A small picture will not do in their place: the smaller, the more of it is edges.
 
@@ -16,7 +16,7 @@ use crate::scene::Settings;
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
-/// How many times as wide and high the pictures are at most that contrast is told from, or the frame.
+/// How many times as wide and high the pictures are at most that contrast is measured on, or the frame.
 const SCALE: f64 = 4.0;
 
 /// Square patches of some frames, with what each counts for.

@@ -1,6 +1,6 @@
 //! A quick look at a scene: what there has to be known to choose its settings.
 //!
-//! Errors are told from some pixels of some frames at the full size, traced at a short sweep of samples
+//! Errors are estimated from some pixels of some frames at the full size, traced at a short sweep of samples
 //! and held against more of them; what the sweep leads to is traced there as well before it is chosen.
 //! Times come from whole frames of a small size.
 

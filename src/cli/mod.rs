@@ -97,7 +97,7 @@ pub fn run() -> ExitCode {
             .into();
         }
     };
-    // The panic was told by the hook above.
+    // The hook above reported the panic.
     std::panic::catch_unwind(|| dispatch(&arguments.command)).unwrap_or(Exit::Failed).into()
 }
 

@@ -111,7 +111,7 @@ pub fn push_vectors(channels: &mut Vec<Channel>, names: [&str; 3], vectors: &[Ve
     }
 }
 
-/// The bytes of a file of these channels. `comment` is told in the metadata.
+/// The bytes of a file of these channels. `comment` goes to the metadata.
 ///
 /// # Errors
 /// [`Error::Usage`] when a channel has not `width · height` samples; [`Error::Failed`] when the

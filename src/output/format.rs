@@ -46,7 +46,7 @@ pub struct WriteOptions {
     pub display: Display,
     /// Bits a channel of png: 8 or 16.
     pub png_bits: u8,
-    /// Frame number, told in the file's metadata.
+    /// Frame number, written to the file's metadata.
     pub frame: Option<u32>,
     /// The settings as short text for the file's metadata; nothing that differs between runs of
     /// the same frame, since the same frame is to be the same bytes.

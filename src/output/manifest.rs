@@ -50,7 +50,7 @@ pub struct Header {
     pub manifest: u32,
     /// Version of the program.
     pub tweenray: String,
-    /// The scene as the user named it; told, never compared.
+    /// The scene as the user named it; reported, never compared.
     pub scene: String,
     /// Hash of the resolved world, the shot left aside, hexadecimal.
     pub scene_hash: String,
@@ -60,16 +60,16 @@ pub struct Header {
     pub scene_parts: BTreeMap<String, String>,
     /// Hash of world and shot; no frame is refused by it, since every row has its own recipe.
     pub shot_hash: String,
-    /// Frames of the whole shot; told, never compared.
+    /// Frames of the whole shot; reported, never compared.
     pub shot_frames: u32,
     /// File name pattern of the frames, without a folder.
     pub files: String,
     /// What traces: intersector, its version and instruction set.
     pub tracer: String,
-    /// The words of the command that started the sequence, program first; told, never compared.
+    /// The words of the command that started the sequence, program first; reported, never compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
-    /// How the program chose the settings, where it did; told, never compared.
+    /// How the program chose the settings, where it did; reported, never compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen: Option<Value>,
     /// Every setting, by name. Kept as JSON, so that a manifest of another version can be read

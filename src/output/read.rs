@@ -1,6 +1,6 @@
 //! Pictures from files: png (8 and 16 bits), ppm and its kin, jpeg, hdr, exr.
 //!
-//! The format is told from the first bytes, not from the name. png, ppm and jpeg are taken as sRGB
+//! The format is recognised by the first bytes, not by the name. png, ppm and jpeg are taken as sRGB
 //! code values, hdr and exr as linear radiance. Grey becomes three equal channels; alpha is left
 //! out, and so are colour profiles.
 

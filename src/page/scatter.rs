@@ -12,7 +12,7 @@ pub struct Point {
     pub id: usize,
     /// What it is called.
     pub name: String,
-    /// What is told of it beside its name.
+    /// What is shown beside its name.
     pub text: String,
     /// Time.
     pub x: f64,

@@ -80,8 +80,8 @@ impl Index {
         keys.flat_map(|key| self.cell(*key))
     }
 
-    /// Whether the cell is there, or another with the same bits: told by memory that stays in the
-    /// cache, since of the cells around a point most hold nothing.
+    /// Whether the index may hold the cell: a Bloom filter that stays in the processor's cache, since most
+    /// cells around a point hold nothing.
     fn may_hold(&self, key: Key) -> bool {
         let bit = bit_of(key, &self.present);
         self.present.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1)

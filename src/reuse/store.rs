@@ -68,9 +68,9 @@ pub struct Compatibility {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Head {
     terms: Compatibility,
-    /// The frame's number in its own shot; told, never used.
+    /// The frame's number in its own shot; reported, never used.
     frame: u32,
-    /// Settings as text; told, never used.
+    /// Settings as text; reported, never used.
     settings: String,
     points: usize,
     findings: usize,

@@ -84,7 +84,7 @@ pub struct Scene {
     pub traced_regions: Vec<Bounds3>,
     /// Bounds of all geometry, f64, scene space.
     pub bounds: Bounds3,
-    /// Meshes that lost triangles to rounding. Nothing traces by it; it is to be told.
+    /// Meshes that lost triangles to rounding. Tracing does not use it; it is reported.
     pub collapsed: Vec<Collapsed>,
 }
 

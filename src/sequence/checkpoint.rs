@@ -63,7 +63,7 @@ pub struct Checkpoints<'a> {
     pub frames_hold_all: bool,
     rows: OnceLock<BTreeMap<u32, Row>>,
     notes: Mutex<Vec<String>>,
-    /// Whether somebody was told that nothing can be written.
+    /// Whether a failed write was reported.
     has_told_unwritten: AtomicBool,
 }
 

@@ -71,7 +71,7 @@ pub trait FrameMaker {
     /// takes to go on later.
     fn stopped(&self) {}
 
-    /// What there is to tell about the frames made so far; each is told once.
+    /// Notes for the user about the frames made so far; each is given once.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }

@@ -134,7 +134,7 @@ pub fn is_worth_a_look(target: &Target) -> Result<bool> {
 pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
     let found: Vec<Result<Found>> =
         frames.into_par_iter().map(|frame| look_at(target, frame)).collect();
-    // Of several faults the first frame's is told, whichever thread was quicker.
+    // Of several faults the first frame's is reported, whichever thread was quicker.
     found.into_iter().collect()
 }
 

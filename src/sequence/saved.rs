@@ -28,7 +28,7 @@ pub(super) struct Saved<T = Arc<[u8]>> {
     pub cost: SaveCost,
 }
 
-/// A maker of frames that keeps on disk what they left.
+/// A maker of frames that keeps on disk what its frames leave for others.
 pub(super) trait Keeps {
     /// What a frame left.
     type Left;
@@ -36,7 +36,8 @@ pub(super) trait Keeps {
     /// Where it is kept; `None` for nowhere.
     fn checkpoints(&self) -> Option<&Checkpoints<'_>>;
 
-    /// Acts on what is kept; told is also of which frames others to come need what they left.
+    /// Calls `act` with what is kept and with a function that says whether a later frame needs what a given frame
+    /// left.
     fn with_saved<R>(
         &self,
         act: impl FnOnce(&mut Saved<Self::Left>, &dyn Fn(u32) -> bool) -> R,

@@ -160,7 +160,7 @@ impl<T> ReferencePool<T> {
         }
     }
 
-    /// An original's reference is wanted by frames that are not told of here, until it is let go.
+    /// Keeps the reference of `original`, which other frames than the schedule's need, until it is released.
     pub fn hold(&mut self, schedule: &Schedule, original: u32) {
         *self.uses.entry(original).or_default() += 1;
         if !self.held.contains_key(&original) && self.due.insert(original) {

@@ -18,8 +18,8 @@ use std::ops::Range;
 const PIXELS: usize = (BLOCK * BLOCK) as usize;
 /// No point.
 const NONE: u32 = u32::MAX;
-/// Behind mirrors and glass neighbours may end far from one another, where a shadow's edge is not
-/// told by samples that far away: a footprint counts as at most this many of a flat mirror's.
+/// Behind mirrors and glass neighbours may end far from one another, and samples that far apart
+/// say nothing of a shadow's edge: a footprint counts as at most this many of a flat mirror's.
 const MOST_WIDER: f32 = 3.0;
 
 /// Light gathered in one channel of one surface point, in shares of what would arrive unshadowed.
@@ -220,7 +220,7 @@ impl Groups {
         }
     }
 
-    /// Behind mirrors and glass a pixel's size on the surface is told by its neighbours: how far
+    /// Behind mirrors and glass a pixel's size on the surface follows from its neighbours: how far
     /// away the same branch of their same sample ends.
     fn measure_footprints(&mut self, lit: &[ShadingPoint], pixels: &BlockPixels) {
         let Self { of_lit, asked: LookupBatch { points, .. }, order, .. } = self;

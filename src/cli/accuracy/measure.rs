@@ -21,7 +21,7 @@ const WRITING: &str = "writing.json";
 /// Name of the machine's load while there was measured, by the last run that did.
 const LOAD: &str = "load.json";
 
-/// A sweep to be measured and told of.
+/// A sweep to be measured and reported.
 pub struct Job<'a> {
     pub args: &'a AccuracyArgs,
     pub sweep: &'a Sweep<'a>,

@@ -82,7 +82,7 @@ impl SurfaceReuse<'_> {
         let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
         let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let share = (first * usual).min(MOST);
-        // Behind mirrors and glass a pixel's footprint is told by the pixels beside it.
+        // Behind mirrors and glass a pixel's footprint follows from the pixels beside it.
         let block = if r.plan.mirror || r.plan.glass { 2 } else { 1 };
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
         let mask = draw.mask(camera.width, camera.height);
