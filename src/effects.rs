@@ -18,7 +18,7 @@ pub struct EffectPlan {
     pub nested_glass: bool,
     /// Diffuse surfaces are lit by area lights with shadow samples.
     pub area_lights: bool,
-    /// Diffuse surfaces are lit by point or directional lights with hard shadows.
+    /// Diffuse surfaces are lit by delta lights, with hard shadows.
     pub delta_lights: bool,
     /// The sky lights diffuse surfaces through sky rays.
     pub sky_light: bool,

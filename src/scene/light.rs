@@ -1,7 +1,7 @@
 //! Lights: plain data, in world space inside a `World` and in scene space inside a `Scene`.
 //!
 //! One file for each kind says all that a scene needs to know of it ([`LightData`]); nothing else in
-//! this room asks for the kind. How a light shines stands in the room `lights`.
+//! this room asks for the kind. How a light shines stands in `shade::light`.
 
 mod directional;
 mod disk;
@@ -19,7 +19,6 @@ pub use sky::Sky;
 pub use sphere::SphereLight;
 pub use spot::SpotLight;
 
-use super::too_small::Size;
 use super::{Recentring, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb, Vec3};
@@ -86,9 +85,6 @@ trait LightData {
     /// The box around what emits, in the light's own space; empty where rays cannot meet it.
     fn bounds(&self) -> Bounds3;
 
-    /// What of its size rounding to f32 must leave, world space; `None` where there is nothing to lose.
-    fn size(&self) -> Option<Size>;
-
     /// Moves the light by `transform`, which `mirrors` or does not.
     ///
     /// Errors: a transform that would deform the light.
@@ -97,7 +93,7 @@ trait LightData {
     /// Moves the light from world to scene space.
     fn recentre(&mut self, recentring: &Recentring);
 
-    /// The surface that rays see, scene space; `None` for a light that is not seen.
+    /// The surface that rays see, in the light's own space; `None` for a light that is not seen.
     fn surface(&self) -> Option<EmittingSurface>;
 }
 
@@ -111,7 +107,7 @@ pub(super) struct EmittingSurface {
     pub two_sided: bool,
 }
 
-/// The shape of a light's surface, scene space.
+/// The shape of a light's surface, in the light's own space.
 pub(super) enum EmittingShape {
     /// Triangles between corners, counter-clockwise on the emitting side.
     Triangles(Vec<Vec3>, Vec<[u32; 3]>),
@@ -131,10 +127,6 @@ impl Light {
 
     pub(super) fn bounds(&self) -> Bounds3 {
         self.data().bounds()
-    }
-
-    pub(super) fn size(&self) -> Option<Size> {
-        self.data().size()
     }
 
     pub(super) fn transform(&mut self, transform: &DAffine3, mirrors: bool) -> Result<()> {

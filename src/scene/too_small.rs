@@ -1,5 +1,6 @@
 //! What rounding to f32 would make nothing of: refused by name, or counted.
 
+use super::light::EmittingShape;
 use super::{Recentring, World};
 use crate::error::{Error, Result};
 use crate::math::{Bounds3, DVec3, Vec3};
@@ -31,21 +32,15 @@ pub(super) fn refuse(world: &World, r: &Recentring) -> Result<()> {
     }
     for (index, light) in world.lights.iter().enumerate() {
         let name = format!("light {}", index + 1);
-        match light.size() {
-            Some(Size::Triangles(bounds)) => refuse_flattened(&name, &bounds, r)?,
-            Some(Size::Exact(width)) => refuse_narrower(&name, width, r, NARROWEST)?,
+        match light.surface().map(|surface| surface.shape) {
+            Some(EmittingShape::Triangles(..)) => refuse_flattened(&name, &light.bounds(), r)?,
+            Some(EmittingShape::Sphere(_, radius)) => {
+                refuse_narrower(&name, 2.0 * radius, r, NARROWEST)?;
+            }
             None => {}
         }
     }
     Ok(())
-}
-
-/// How large something is that rounding to f32 could make nothing of, world space.
-pub(super) enum Size {
-    /// Triangles within this box, whose corners are rounded.
-    Triangles(Bounds3),
-    /// The width of a shape that stays f64.
-    Exact(f64),
 }
 
 /// Widths of scene space: what is narrower has triangles whose determinants underflow in f32.

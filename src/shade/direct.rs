@@ -326,8 +326,10 @@ impl Renderer<'_> {
                     None => source.sampler.unshadowed(point.si.p, point.n),
                 };
                 // What is NaN goes on, to be counted at its pixel.
-                let seen = source.sampler.seen_from(point.si.p, point.n);
-                let seen = seen.filter(|_| exact != 0.0);
+                let seen = match exact {
+                    0.0 => None,
+                    _ => source.sampler.seen_from(point.si.p, point.n),
+                };
                 if let Some(seen) = &seen {
                     if source.is_sampled() {
                         let first = point.place.sample.wrapping_mul(source.samples);
@@ -345,8 +347,8 @@ impl Renderer<'_> {
                 }
                 s.close(seen.map_or(Rgb::ZERO, |_| source.sampler.emission * exact as f32));
             }
-            counts[source.rays] += s.rays.len() as u64;
-            self.settle(lit, group, source.channel, pixels, s, counts);
+            self.trace_shadow_rays(source, s, counts);
+            settle(lit, group, source.channel, pixels, s);
         }
         s.u = u;
         s.wanted = wanted;
@@ -400,10 +402,7 @@ impl Renderer<'_> {
                 s.close(Rgb::ZERO);
             }
             s.runs = runs;
-            counts[source.rays] += s.rays.len() as u64;
-            s.occluded.clear();
-            s.occluded.resize(s.rays.len(), false);
-            self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
+            self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
             for (i, span) in s.spans.iter().enumerate() {
                 let (open, weight) = opened(&s.weights, &s.occluded, start..span.end);
@@ -462,33 +461,41 @@ impl Renderer<'_> {
         pixels.sampler(place.pixel).fill2(first, dimension, u);
     }
 
-    /// Traces the batch of points `group` and adds `weight · unshadowed · ratio` to each one's pixel;
-    /// in a channel that is kept, also to its surface point.
-    fn settle(
+    /// Traces the batch's rays, to a light.
+    fn trace_shadow_rays(
         &self,
-        lit: &[ShadingPoint],
-        group: &[u32],
-        channel: Option<(usize, usize)>,
-        pixels: &mut BlockPixels,
+        source: &LightSource,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
+        counts[source.rays] += s.rays.len() as u64;
         s.occluded.clear();
         s.occluded.resize(s.rays.len(), false);
         self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
-        let mut start = 0;
-        for (&i, span) in group.iter().zip(&s.spans) {
-            let point = &lit[i as usize];
-            let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
-            if let (Some((channel, channels)), true) = (channel, span.end > start) {
-                s.groups.add(i as usize, channel, channels, open, all);
-            }
-            start = span.end;
-            if open > 0.0 {
-                let ratio = (open / all) as f32;
-                let light = point.weight * span.unshadowed * ratio;
-                pixels.add(point.place.pixel, point.place.sample, light);
-            }
+    }
+}
+
+/// Adds `weight · unshadowed · ratio` to the pixel of each point of the traced batch `group`; in a channel that is
+/// kept, the ratio also to its surface point.
+fn settle(
+    lit: &[ShadingPoint],
+    group: &[u32],
+    channel: Option<(usize, usize)>,
+    pixels: &mut BlockPixels,
+    s: &mut ShadowScratch,
+) {
+    let mut start = 0;
+    for (&i, span) in group.iter().zip(&s.spans) {
+        let point = &lit[i as usize];
+        let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
+        if let (Some((channel, channels)), true) = (channel, span.end > start) {
+            s.groups.add(i as usize, channel, channels, open, all);
+        }
+        start = span.end;
+        if open > 0.0 {
+            let ratio = (open / all) as f32;
+            let light = point.weight * span.unshadowed * ratio;
+            pixels.add(point.place.pixel, point.place.sample, light);
         }
     }
 }

@@ -6,6 +6,7 @@
 
 mod directional;
 mod disk;
+mod flat;
 mod point;
 mod quad;
 mod sky;
@@ -19,7 +20,7 @@ use crate::scene::{Light, Sky};
 use directional::Directional;
 use disk::Disk;
 use point::Point;
-use quad::{Quad, QuadView};
+use quad::Quad;
 use sky::{SkyDome, SkyView};
 use sphere::{Sphere, SphereView};
 use spot::Spot;
@@ -50,7 +51,7 @@ pub struct LightView<'a>(View<'a>);
 enum View<'a> {
     Point(&'a Point),
     Directional(&'a Directional),
-    Quad(QuadView<'a>),
+    Quad(&'a Quad),
     Sphere(SphereView),
     Disk(&'a Disk),
     Sky(SkyView),
@@ -124,7 +125,7 @@ impl LightSampler {
         Some(LightView(match &self.shape {
             Shape::Point(light) => View::Point(light),
             Shape::Directional(light) => View::Directional(light),
-            Shape::Quad(light) => View::Quad(light.seen()),
+            Shape::Quad(light) => View::Quad(light),
             Shape::Sphere(light) => View::Sphere(light.seen_from(p)?),
             Shape::Disk(light) => View::Disk(light),
             Shape::Spot(light) => light.seen_from(p)?,

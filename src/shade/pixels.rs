@@ -13,6 +13,7 @@ use std::ops::Range;
 pub(super) const BLOCK: u32 = 8;
 /// What no light looks like.
 const MAGENTA: Rgb = Rgb::new(1.0, 0.0, 1.0);
+
 /// One block's pixels, in 4 x 4 sub-blocks so that the rays of a packet, which follow this order, are
 /// neighbours.
 pub(super) struct BlockPixels {

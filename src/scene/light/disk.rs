@@ -1,6 +1,6 @@
 //! A disk light.
 
-use super::{EmittingShape, EmittingSurface, LightData, Size, place};
+use super::{EmittingShape, EmittingSurface, LightData, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb, orthonormal_basis};
 use crate::scene::Recentring;
@@ -53,10 +53,6 @@ impl LightData for DiskLight {
         let mut bounds = Bounds3::EMPTY;
         self.corners().for_each(|p| bounds.include(p));
         bounds
-    }
-
-    fn size(&self) -> Option<Size> {
-        Some(Size::Triangles(self.bounds()))
     }
 
     fn transform(&mut self, transform: &DAffine3, _mirrors: bool) -> Result<()> {

@@ -1,6 +1,6 @@
 //! A point light.
 
-use super::{EmittingSurface, LightData, Size};
+use super::{EmittingSurface, LightData};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -26,10 +26,6 @@ impl LightData for PointLight {
 
     fn bounds(&self) -> Bounds3 {
         Bounds3::EMPTY
-    }
-
-    fn size(&self) -> Option<Size> {
-        None
     }
 
     fn transform(&mut self, transform: &DAffine3, _mirrors: bool) -> Result<()> {

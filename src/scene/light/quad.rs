@@ -1,6 +1,6 @@
 //! A quad light.
 
-use super::{EmittingShape, EmittingSurface, LightData, Size};
+use super::{EmittingShape, EmittingSurface, LightData};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -47,10 +47,6 @@ impl LightData for QuadLight {
         let mut bounds = Bounds3::EMPTY;
         self.corners.iter().for_each(|c| bounds.include(*c));
         bounds
-    }
-
-    fn size(&self) -> Option<Size> {
-        Some(Size::Triangles(self.bounds()))
     }
 
     fn transform(&mut self, transform: &DAffine3, mirrors: bool) -> Result<()> {

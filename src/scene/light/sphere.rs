@@ -1,6 +1,6 @@
 //! A sphere light.
 
-use super::{EmittingShape, EmittingSurface, LightData, Size, place};
+use super::{EmittingShape, EmittingSurface, LightData, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -31,10 +31,6 @@ impl LightData for SphereLight {
         bounds.include(self.centre - DVec3::splat(self.radius));
         bounds.include(self.centre + DVec3::splat(self.radius));
         bounds
-    }
-
-    fn size(&self) -> Option<Size> {
-        Some(Size::Exact(2.0 * self.radius))
     }
 
     fn transform(&mut self, transform: &DAffine3, _mirrors: bool) -> Result<()> {

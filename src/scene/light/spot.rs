@@ -1,6 +1,6 @@
 //! A spot light.
 
-use super::{EmittingSurface, LightData, Size, place};
+use super::{EmittingSurface, LightData, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -38,10 +38,6 @@ impl LightData for SpotLight {
 
     fn bounds(&self) -> Bounds3 {
         Bounds3::EMPTY
-    }
-
-    fn size(&self) -> Option<Size> {
-        None
     }
 
     fn transform(&mut self, transform: &DAffine3, _mirrors: bool) -> Result<()> {

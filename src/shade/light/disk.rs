@@ -1,7 +1,8 @@
 //! A disk light.
 
-use super::{LightSample, ShadowTarget};
-use crate::intersect::{Facet, Target};
+use super::LightSample;
+use super::flat::Flat;
+use crate::intersect::Facet;
 use crate::math::{DVec3, orthonormal_basis};
 use crate::sampling::concentric_disk;
 use crate::scene::DiskLight;
@@ -11,13 +12,10 @@ use std::f64::consts::TAU;
 pub(super) struct Disk {
     centre: DVec3,
     radius: f64,
-    /// Unit normal of the emitting side.
-    normal: DVec3,
+    plane: Flat,
     /// Unit vectors that span the disk.
     basis: (DVec3, DVec3),
     two_sided: bool,
-    /// What f32 may make of the triangles that show it.
-    facet: Facet,
 }
 
 impl Disk {
@@ -29,10 +27,9 @@ impl Disk {
         Self {
             centre: light.centre,
             radius: light.radius,
-            normal: light.normal,
+            plane: Flat { normal: light.normal, facet },
             basis,
             two_sided: light.two_sided,
-            facet,
         }
     }
 
@@ -41,20 +38,21 @@ impl Disk {
     pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {
         let to_centre = self.centre - p;
         // Negative before the emitting side.
-        let height = to_centre.dot(self.normal);
+        let normal = self.plane.normal;
+        let height = to_centre.dot(normal);
         if height == 0.0 || (height > 0.0 && !self.two_sided) {
             return 0.0;
         }
-        let across = to_centre - self.normal * height;
+        let across = to_centre - normal * height;
         // Once more: near the axis what is left is rounding, in any direction.
-        let across = across - self.normal * across.dot(self.normal);
+        let across = across - normal * across.dot(normal);
         let distance = across.length();
         let s = across.try_normalize().unwrap_or(self.basis.0);
         let circle = Circle::new(
             height,
             distance,
             self.radius,
-            [s, self.normal.cross(s), self.normal].map(|v| v.dot(n)),
+            [s, normal.cross(s), normal].map(|v| v.dot(n)),
         );
         0.5 * circle.contour(to_centre.dot(n)).abs()
     }
@@ -64,16 +62,12 @@ impl Disk {
     pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
         let (x, y, _) = concentric_disk(u);
         let point = self.centre + (self.basis.0 * x + self.basis.1 * y) * self.radius;
-        let to_light = point - p;
-        let d2 = to_light.length_squared();
-        let cos_light = to_light.dot(self.normal).abs();
-        let weight = (to_light.dot(n) * cos_light / (d2 * d2)).max(0.0);
-        LightSample { target: self.target(point), weight }
+        self.plane.sample_li(p, n, point)
     }
 
     /// The middle of the part above the horizon, on the diameter that rises most.
     pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
-        let along = n - self.normal * n.dot(self.normal);
+        let along = n - self.plane.normal * n.dot(self.plane.normal);
         let rise = along.length() * self.radius;
         let height = (self.centre - p).dot(n);
         if height + rise <= 0.0 {
@@ -82,11 +76,7 @@ impl Disk {
         let lowest = (-height / rise).max(-1.0);
         let at = if lowest.is_finite() { 0.5 * (1.0 + lowest) } else { 0.0 };
         let point = self.centre + along.normalize_or_zero() * (self.radius * at);
-        Some(LightSample { target: self.target(point), weight: 1.0 })
-    }
-
-    fn target(&self, point: DVec3) -> ShadowTarget {
-        ShadowTarget::Point(Target { point, normal: self.normal, facet: self.facet })
+        Some(self.plane.alone(point))
     }
 }
 
@@ -206,6 +196,7 @@ impl Circle {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ShadowTarget;
     use super::*;
     use crate::math::Rgb;
     use std::f64::consts::PI;
@@ -224,9 +215,17 @@ mod tests {
             let (s, t) = disk.basis;
             let to = disk.centre + (s * angle.cos() + t * angle.sin()) * r;
             let d2 = to.length_squared();
-            to.dot(n).max(0.0) * to.dot(disk.normal).abs() / (d2 * d2)
+            to.dot(n).max(0.0) * to.dot(disk.plane.normal).abs() / (d2 * d2)
         });
         PI * disk.radius * disk.radius * sent.sum::<f64>() / f64::from(points)
+    }
+
+    /// Random numbers from -1 to 1.
+    fn random(mut seed: u64) -> impl FnMut() -> f64 {
+        move || {
+            seed = crate::sampling::mix(seed);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
     }
 
     #[test]
@@ -241,11 +240,7 @@ mod tests {
 
     #[test]
     fn irradiance_matches_quadrature_from_anywhere() {
-        let mut seed = 7u64;
-        let mut next = || {
-            seed = crate::sampling::mix(seed);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut next = random(7);
         let mut cut = 0;
         for case in 0..300 {
             let far = [0.3, 1.0, 4.0][case % 3];
@@ -286,11 +281,7 @@ mod tests {
 
     #[test]
     fn irradiance_is_finite_and_smooth_at_the_rim() {
-        let mut seed = 11u64;
-        let mut next = || {
-            seed = crate::sampling::mix(seed);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        };
+        let mut next = random(11);
         for _ in 0..2000 {
             let n = DVec3::new(next(), next(), next()).normalize();
             let off = DVec3::new(next(), 0.0, -next().abs() - 0.01);
