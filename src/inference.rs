@@ -31,7 +31,8 @@ pub struct SurfacePoint {
     pub footprint: f32,
     /// Cosine between `n` and the direction back along the ray.
     pub cos: f32,
-    /// Whether a camera ray ends here, not one from a mirror or glass.
+    /// Whether the pixel shows it sharply: a camera ray ends here, not one from a mirror or glass, and it is
+    /// in focus.
     pub direct: bool,
     /// Camera samples that it stands for.
     pub samples: u32,

@@ -13,8 +13,8 @@ use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb, srgb_encode};
 use tweenray::reuse::colour::Rule;
 use tweenray::scene::{
-    CameraPath, DirectionalLight, Easing, Light, Material, QuadLight, Rect, Scene, Settings, Shot,
-    Sky, ToneCurve, World, WorldSphere,
+    CameraPath, DirectionalLight, Light, Material, QuadLight, Rect, Scene, Settings, Shot, Sky,
+    ToneCurve, World, WorldSphere,
 };
 use tweenray::sequence::{ColourMaker, FrameMaker, Made, Tracer, check_upload};
 use tweenray::shade::Renderer;
@@ -64,7 +64,7 @@ impl Move {
             Settings { width: 61, height: 43, spp: 2, shadow_samples: 2, ..Settings::default() };
         let (from, to) = (from.into(), to.into());
         let path = CameraPath::Pan { from, to, target, up: DVec3::Y, roll_degrees: 0.0 };
-        let shot = Shot { path, easing: Easing::Linear, frames: FRAMES, vfov_degrees: 40.0 };
+        let shot = Shot::new(path, FRAMES, 40.0);
         Self { scene: world.into_scene(true).unwrap(), settings, shot, threads: 2 }
     }
 

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use std::sync::atomic::AtomicBool;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
 use tweenray::math::DVec3;
-use tweenray::scene::{CameraPath, Easing, HitRules, Pose, Recheck, Scene, Settings, Shot};
+use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot};
 use tweenray::stats::RayCounts;
 use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, Trial};
 
@@ -18,7 +18,7 @@ mod shapes;
 fn shot() -> Shot {
     let (eye, target, up) = (DVec3::new(0.1, 0.2, 0.3), DVec3::X, DVec3::Y);
     let pose = Pose { eye, target, up, roll_degrees: 0.0 };
-    Shot { path: CameraPath::Still(pose), easing: Easing::Linear, frames: 1, vfov_degrees: 60.0 }
+    Shot::new(CameraPath::Still(pose), 1, 60.0)
 }
 
 fn sphere() -> Scene {

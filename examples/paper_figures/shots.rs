@@ -9,7 +9,7 @@ use tweenray::intersect::{self, Intersector};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::reuse::colour::Rule;
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
+    CameraPath, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
 };
 use tweenray::sequence::{ColourMaker, FrameMaker, Pyramid, SurfaceReuse};
 use tweenray::shade::{Progress, Renderer};
@@ -75,7 +75,7 @@ pub fn rabbit(mesh: WorldMesh) -> Filmed {
 
 fn pan(from: DVec3, to: DVec3, target: DVec3) -> Shot {
     let path = CameraPath::Pan { from, to, target, up: DVec3::Y, roll_degrees: 0.0 };
-    Shot { path, easing: Easing::Linear, frames: FRAMES, vfov_degrees: 36.0 }
+    Shot::new(path, FRAMES, 36.0)
 }
 
 impl Filmed {

@@ -117,7 +117,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
     let plan = EffectPlan::of(&scene, &settings);
     let renderer =
         Renderer { scene: &scene, settings: &settings, plan, intersector: &*intersector };
-    let reasons = EffectPlan::reasons(&scene, &settings);
+    let reasons = EffectPlan::reasons(&scene, &settings, &shot.lens);
     Ok(Inspection {
         scene: args.scene.scene.display().to_string(),
         tracer: intersector.describe(),

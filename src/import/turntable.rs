@@ -10,8 +10,8 @@ use super::{LoadOptions, Loaded, Model, Stage, emission, untextured};
 use crate::error::{Diagnostic, Result};
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::{
-    CameraPath, Easing, Light, Material, NormalPolicy, QuadLight, Settings, Shot, Sky, World,
-    WorldMesh,
+    CameraPath, Easing, Light, Material, NormalPolicy, QuadLight, Settings, Shot, ShotLens, Sky,
+    World, WorldMesh,
 };
 use std::path::Path;
 
@@ -70,6 +70,7 @@ fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<Stage>) {
         easing: Easing::Linear,
         frames: FRAMES,
         vfov_degrees: VFOV_DEGREES,
+        lens: ShotLens::Pinhole,
     };
     (shot, stage)
 }

@@ -16,8 +16,7 @@ use super::evidence::Finding;
 use super::risk::LEVELS;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
-use crate::math::{DVec3, Vec3};
-use crate::scene::limits::MAX_EDGE;
+use crate::math::Vec3;
 use crate::scene::{Camera, Recentring, Rect, Settings};
 use flate2::Compression;
 use flate2::read::{DeflateDecoder, DeflateEncoder};
@@ -29,7 +28,7 @@ use std::path::Path;
 /// The attribute of an exr file that holds it.
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// How the bytes begin: the last letter is the layout's version.
-const MAGIC: &[u8; 8] = b"twrayrf3";
+const MAGIC: &[u8; 8] = b"twrayrf4";
 /// Words of a point beside its ratios.
 const WORDS: usize = 12;
 /// Bytes of a finding.
@@ -44,8 +43,6 @@ const PART: usize = 1 << 20;
 const MOST_BYTES: usize = 1 << 30;
 /// Most bytes of a head.
 const MOST_HEAD: usize = 1 << 20;
-/// Bytes of a camera.
-const CAMERA: usize = 12 * 8 + 2 * 4;
 /// Bit that marks points seen directly, above their number of samples.
 const DIRECT: u32 = 1 << 31;
 /// Cells of a footprint's size along an edge of the scene, at most.
@@ -156,7 +153,7 @@ impl Kept<'_> {
         let json = serde_json::to_vec(&head).ok()?;
         let mut body = (json.len() as u32).to_le_bytes().to_vec();
         body.extend(json);
-        body.extend(camera_bytes(self.camera));
+        body.extend(self.camera.encode());
         let parts: Vec<Vec<u8>> = raw.par_chunks(PART).map(deflated).collect::<Option<_>>()?;
         for part in parts {
             body.extend((part.len() as u32).to_le_bytes());
@@ -238,7 +235,7 @@ pub fn decode(
     if let Some(why) = terms.refusal(&head.terms) {
         return Err(refuse(why));
     }
-    let camera = take(&mut body, CAMERA).and_then(camera_of).ok_or_else(damaged)?;
+    let camera = take(&mut body, Camera::BYTES).and_then(Camera::decode).ok_or_else(damaged)?;
     let (traced, findings) =
         record_of(body, &head, terms.lights.len(), &camera).ok_or_else(damaged)?;
     let camera = camera.to_scene(recentring);
@@ -371,43 +368,10 @@ fn take_u32(bytes: &mut &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(word.try_into().ok()?) as usize)
 }
 
-fn camera_bytes(camera: &Camera) -> Vec<u8> {
-    let vectors = [camera.eye, camera.forward, camera.half_right, camera.half_up];
-    let numbers = vectors.iter().flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes);
-    let edges = [camera.width, camera.height].into_iter().flat_map(u32::to_le_bytes);
-    numbers.chain(edges).collect()
-}
-
-fn camera_of(bytes: &[u8]) -> Option<Camera> {
-    let (vectors, edges) = bytes.split_at_checked(12 * 8)?;
-    let numbers = vectors.chunks_exact(8).map(|b| b.try_into().map(f64::from_le_bytes));
-    let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>().ok()?;
-    let vector = |i: usize| DVec3::new(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
-    let mut edges = edges;
-    let edge = |edges: &mut &[u8]| take_u32(edges).map(|n| n as u32);
-    let (width, height) = (edge(&mut edges)?, edge(&mut edges)?);
-    let camera = Camera {
-        eye: vector(0),
-        forward: vector(1),
-        half_right: vector(2),
-        half_up: vector(3),
-        width,
-        height,
-    };
-    let is_edge = |n: u32| (1..=MAX_EDGE).contains(&n);
-    let is_length = |v: DVec3| v.length_squared().is_normal();
-    let is_sound = is_edge(width)
-        && is_edge(height)
-        && numbers.iter().all(|x| x.is_finite())
-        && (camera.forward.length() - 1.0).abs() < 1e-6
-        && is_length(camera.half_right)
-        && is_length(camera.half_up);
-    is_sound.then_some(camera)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::DVec3;
     use crate::scene::Pose;
 
     fn terms() -> Compatibility {

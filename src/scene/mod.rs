@@ -9,6 +9,7 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod lens;
 mod light;
 pub mod limits;
 mod material;
@@ -24,6 +25,7 @@ mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
+pub use lens::{Lens, ShotLens};
 pub use light::{
     DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
 };

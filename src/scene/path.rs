@@ -10,7 +10,7 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
-use super::{Camera, Pose};
+use super::{Camera, Pose, ShotLens};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use serde::{Deserialize, Serialize};
@@ -26,6 +26,8 @@ pub struct Shot {
     pub frames: u32,
     /// Vertical field of view, degrees.
     pub vfov_degrees: f64,
+    /// What is sharp.
+    pub lens: ShotLens,
 }
 
 /// The curve that a camera follows, as a function of progress in `[0, 1]`.
@@ -119,6 +121,11 @@ impl Easing {
 }
 
 impl Shot {
+    /// A move of `frames` frames along `path`, evenly spread, through a pinhole.
+    pub fn new(path: CameraPath, frames: u32, vfov_degrees: f64) -> Self {
+        Self { path, easing: Easing::Linear, frames, vfov_degrees, lens: ShotLens::Pinhole }
+    }
+
     /// Checks the whole shot: path, lens, and a camera for every frame.
     ///
     /// Errors: [`Error::Usage`] with what is wrong and, where one frame is at fault, its number.
@@ -156,10 +163,13 @@ impl Shot {
     /// The camera at `frame`, world space, for an image of `width` by `height` pixels.
     pub fn camera(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
         let pose = self.pose(frame)?;
-        Camera::new(&pose, self.vfov_degrees, width, height).map_err(|error| match error {
+        let camera = Camera::new(&pose, self.vfov_degrees, width, height);
+        let camera = camera.map_err(|error| match error {
             Error::Usage(what) => Error::Usage(format!("frame {frame} of {}: {what}", self.frames)),
             other => other,
-        })
+        })?;
+        let target = pose.eye.distance(pose.target);
+        Ok(camera.with_lens(self.lens.at(self.progress(frame), target)))
     }
 
     /// Eased progress along the path at `frame`.

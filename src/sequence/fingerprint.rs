@@ -166,7 +166,7 @@ mod tests {
     use super::*;
     use crate::math::{Bounds3, DVec3, Rgb, Vec3};
     use crate::scene::PointLight;
-    use crate::scene::{CameraPath, Easing, Light, Material, Pose};
+    use crate::scene::{CameraPath, Light, Material, Pose};
 
     fn world() -> World {
         World {
@@ -187,7 +187,7 @@ mod tests {
     fn shot() -> Shot {
         let pose = Pose { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
         let path = CameraPath::Still(pose);
-        Shot { path, easing: Easing::Linear, frames: 1, vfov_degrees: 40.0 }
+        Shot::new(path, 1, 40.0)
     }
 
     #[test]

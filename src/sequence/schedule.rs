@@ -7,7 +7,7 @@
 
 use super::pyramid::Pyramid;
 use crate::error::Result;
-use crate::scene::{Camera, Policy, Settings, Shot};
+use crate::scene::{Policy, Settings, Shot};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// What the frames of a shot are made of.
@@ -40,7 +40,7 @@ impl Schedule {
         let mut first = HashMap::new();
         let mut copies = BTreeMap::new();
         for frame in pyramid.by_need() {
-            let original = *first.entry(bits(&shot.camera(frame, 1, 1)?)).or_insert(frame);
+            let original = *first.entry(shot.camera(frame, 1, 1)?.encode()).or_insert(frame);
             if original != frame {
                 copies.insert(frame, original);
             }
@@ -107,15 +107,6 @@ impl Schedule {
         }
         most
     }
-}
-
-/// What tells cameras of a shot apart.
-pub(super) fn bits(camera: &Camera) -> [u64; 12] {
-    let vectors = [camera.eye, camera.forward, camera.half_right, camera.half_up];
-    let mut bits = [0; 12];
-    let numbers = vectors.iter().flat_map(|v| v.to_array());
-    bits.iter_mut().zip(numbers).for_each(|(bits, x)| *bits = x.to_bits());
-    bits
 }
 
 /// References, each held as long as a frame to come is inferred from it.
@@ -247,10 +238,10 @@ impl<T> ReferencePool<T> {
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::{CameraPath, Easing, KeyPose, Pose};
+    use crate::scene::{CameraPath, KeyPose, Pose};
 
     fn shot(frames: u32, path: CameraPath) -> Shot {
-        Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+        Shot::new(path, frames, 40.0)
     }
 
     fn pose(x: f64) -> Pose {
@@ -283,7 +274,7 @@ mod tests {
         for (segment, frames) in [(8, 9), (8, 33), (5, 40), (64, 41), (1, 7)] {
             let shot = returning(frames);
             let schedule = schedule(segment, &shot);
-            let camera = |f| bits(&shot.camera(f, 1, 1).expect("a camera"));
+            let camera = |f| shot.camera(f, 1, 1).expect("a camera").encode();
             let order = schedule.pyramid.by_need();
             let place = |f| order.iter().position(|other| *other == f);
             for frame in 1..=frames {

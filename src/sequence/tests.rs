@@ -4,7 +4,7 @@ use super::*;
 use crate::math::DVec3;
 use crate::output::manifest::{FORMAT, Foreign, Header, Manifest, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
-use crate::scene::{CameraPath, Easing, FrameRange, KeyPose, Pose, Settings};
+use crate::scene::{CameraPath, FrameRange, KeyPose, Pose, Settings};
 use crate::stats::RayKind;
 use std::cell::RefCell;
 use std::fs;
@@ -90,7 +90,7 @@ fn shot(frames: u32) -> Shot {
         KeyPose { at: f64::from(i) / f64::from(frames - 1), pose }
     };
     let path = CameraPath::Keys((0..frames).map(key).collect());
-    Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+    Shot::new(path, frames, 40.0)
 }
 
 fn recipes(shot: &Shot, settings: &Settings) -> Recipes {

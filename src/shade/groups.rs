@@ -1,8 +1,8 @@
 //! The shading points of one chunk as reuse sees them: camera samples of a pixel that end on one surface
 //! are one surface point.
 //!
-//! Points behind mirrors and glass stay apart, since neighbouring samples may end far from one
-//! another there. What is traced is gathered per surface point and becomes a source.
+//! Points behind mirrors and glass and points out of focus stay apart, since neighbouring samples may end far from
+//! one another there. What is traced is gathered per surface point and becomes a source.
 
 use super::direct::ShadingPoint;
 use super::pixels::{BLOCK, BlockPixels};
@@ -413,12 +413,13 @@ fn neighbours(cell: usize) -> impl Iterator<Item = usize> {
 impl ShadingPoint {
     /// The point as reuse sees it.
     fn surface_point(&self, input: &FrameInput) -> SurfacePoint {
-        let direct = self.place.branch == 1;
+        let is_first = self.place.branch == 1;
         // Behind mirrors a first guess, as if they were flat.
-        let along = match direct {
+        let along = match is_first {
             true => (self.si.p - input.camera.eye).dot(input.camera.forward),
             false => (self.si.p - input.camera.eye).length(),
         };
+        let direct = is_first && input.camera.is_in_focus(along);
         let cos = -self.ray.dir.dot(self.n) / self.ray.dir.length();
         SurfacePoint {
             p: self.si.p,

@@ -1,6 +1,6 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
-use super::dimensions;
+use super::{FrameInput, dimensions};
 use crate::film::{GPixel, PixelSource, Provenance};
 use crate::inference::{Origin, SAMPLES_TOGETHER};
 use crate::math::Rgb;
@@ -21,6 +21,8 @@ pub(super) struct BlockPixels {
     film_samplers: Vec<PixelSampler>,
     /// Where the present chunk's samples lie from their pixels' middles, pixel by pixel, pixels.
     offsets: Vec<[f64; 2]>,
+    /// Where they pass the lens, in the unit square; empty where the lens does not care.
+    lens: Vec<[f64; 2]>,
     samplers: Vec<PixelSampler>,
     sums: Vec<Rgb>,
     /// The most that each channel of a sample's radiance may be.
@@ -74,6 +76,18 @@ pub(super) fn offsets_of(
     u.into_iter().take(count).map(move |u| if spp > 1 { filter.offset2(u) } else { [0.0; 2] })
 }
 
+/// Where camera samples, at most [`SAMPLES_TOGETHER`], pass the lens, in the unit square. As their places in the
+/// pixel they do not depend on the frame.
+pub(super) fn lens_positions(
+    sampler: &PixelSampler,
+    samples: Range<u32>,
+) -> impl Iterator<Item = [f64; 2]> {
+    let mut u = [[0.5; 2]; SAMPLES_TOGETHER as usize];
+    let count = samples.len();
+    sampler.fill2(samples.start, dimensions::LENS, &mut u[..count]);
+    u.into_iter().take(count).map(|u| u.map(f64::from))
+}
+
 #[derive(Clone, Copy)]
 struct Record {
     nearest: f64,
@@ -88,6 +102,7 @@ impl BlockPixels {
             places: Vec::new(),
             film_samplers: Vec::new(),
             offsets: Vec::new(),
+            lens: Vec::new(),
             samplers: Vec::new(),
             sums: Vec::new(),
             most,
@@ -194,11 +209,15 @@ impl BlockPixels {
         self.chunk.end - self.chunk.start
     }
 
-    /// Starts a chunk of the `spp` camera samples.
-    pub fn start_samples(&mut self, spp: u32, filter: &PixelFilter, chunk: Range<u32>) {
+    /// Starts a chunk of the `spp` camera samples of a frame.
+    pub fn start_samples(&mut self, spp: u32, input: &FrameInput, chunk: Range<u32>) {
         self.offsets.clear();
+        self.lens.clear();
         for sampler in &self.film_samplers {
-            self.offsets.extend(offsets_of(spp, filter, sampler, chunk.clone()));
+            self.offsets.extend(offsets_of(spp, &input.filter, sampler, chunk.clone()));
+            if input.camera.lens.is_sampled() {
+                self.lens.extend(lens_positions(sampler, chunk.clone()));
+            }
         }
         self.chunk = chunk;
         if self.most.is_some() {
@@ -277,8 +296,18 @@ impl BlockPixels {
         (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
     }
 
+    /// Where one of the present chunk's camera samples passes the lens, in the unit square: in the middle where
+    /// the lens does not care.
+    pub fn lens_position(&self, pixel: usize, sample: u32) -> [f64; 2] {
+        self.lens.get(self.place_in_chunk(pixel, sample)).copied().unwrap_or([0.5; 2])
+    }
+
     fn offset(&self, pixel: usize, sample: u32) -> [f64; 2] {
-        self.offsets[pixel * self.chunk_len() as usize + (sample - self.chunk.start) as usize]
+        self.offsets[self.place_in_chunk(pixel, sample)]
+    }
+
+    fn place_in_chunk(&self, pixel: usize, sample: u32) -> usize {
+        pixel * self.chunk_len() as usize + (sample - self.chunk.start) as usize
     }
 
     /// Whether first-hit records are kept.

@@ -5,7 +5,7 @@ use super::*;
 const UP: DVec3 = DVec3::Y;
 
 fn shot(path: CameraPath, frames: u32) -> Shot {
-    Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+    Shot::new(path, frames, 40.0)
 }
 
 fn pan(from: DVec3, to: DVec3, target: DVec3) -> CameraPath {

@@ -6,8 +6,7 @@ use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, Policy, QuadLight, ReuseSettings, Settings, Shot, World,
-    WorldMesh,
+    CameraPath, Light, Material, Policy, QuadLight, ReuseSettings, Settings, Shot, World, WorldMesh,
 };
 
 /// Traces of a frame that tell how far its pixels scatter.
@@ -61,7 +60,7 @@ fn fence(rows: u32, lamp: f64) -> Set {
         up: DVec3::Y,
         roll_degrees: 0.0,
     };
-    Set::of(world, Shot { path, easing: Easing::Linear, frames: 9, vfov_degrees: 40.0 })
+    Set::of(world, Shot::new(path, 9, 40.0))
 }
 
 /// The box between two corners, faces outwards.

@@ -8,7 +8,7 @@ use crate::import::scene_file::number::{Degrees, Int};
 use crate::import::scene_file::report::Source;
 use crate::import::scene_file::vector::Point;
 use crate::math::DVec3;
-use crate::scene::{CameraPath, KeyPose, Pose, Shot, World};
+use crate::scene::{CameraPath, KeyPose, Pose, Shot, ShotLens, World};
 
 /// The pose that all keys of a camera table agree on.
 struct Common {
@@ -34,6 +34,7 @@ impl Camera {
             path,
             easing: self.easing,
             vfov_degrees: self.fov.0,
+            lens: ShotLens::Pinhole,
         };
         shot.validate().map_err(|error| match error {
             Error::Usage(what) => source.fault(&span, what).into(),
