@@ -19,6 +19,7 @@ mod place;
 mod recentre;
 mod reuse;
 mod settings;
+mod spline;
 mod time;
 mod too_small;
 mod weld;

@@ -6,10 +6,10 @@
 
 mod check;
 mod level;
-mod spline;
 #[cfg(test)]
 mod tests;
 
+use super::spline::{self, Timed, catmull_rom};
 use super::{Camera, Pose, ShotLens};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
@@ -195,12 +195,30 @@ impl CameraPath {
                 let eye = turn(*eye, *target, *axis, degrees * progress);
                 Pose { eye, target: *target, up: *axis, roll_degrees: *roll_degrees }
             }
-            Self::Keys(keys) => spline::key_pose(keys, progress),
+            Self::Keys(keys) => key_pose(keys, progress),
             Self::BSpline { points, target, up, roll_degrees } => {
                 let eye = spline::b_spline(points, progress);
                 Pose { eye, target: *target, up: *up, roll_degrees: *roll_degrees }
             }
         }
+    }
+}
+
+impl Timed for KeyPose {
+    fn at(&self) -> f64 {
+        self.at
+    }
+}
+
+/// The pose at `progress` in `[0, 1]`: eye, target, up and roll each on a spline through the keys.
+///
+/// `up` has length 1 at the keys and vanishes midway between keys with opposite ones.
+fn key_pose(keys: &[KeyPose], progress: f64) -> Pose {
+    Pose {
+        eye: catmull_rom(keys, progress, |key| key.pose.eye),
+        target: catmull_rom(keys, progress, |key| key.pose.target),
+        up: catmull_rom(keys, progress, |key| level::unit(key.pose.up)),
+        roll_degrees: catmull_rom(keys, progress, |key| key.pose.roll_degrees),
     }
 }
 
