@@ -3,6 +3,10 @@
 //! All that differs from lens to lens stands here. [`ShotLens`] is the lens of a move, [`Lens`] that of one
 //! frame's camera. Lengths are world units until [`Lens::to_scene`].
 
+mod thin;
+
+pub use thin::{Focus, LensKey, ThinLens, ThinLensPath};
+
 use super::Recentring;
 use crate::error::Result;
 use crate::math::DVec3;
@@ -14,6 +18,8 @@ pub enum ShotLens {
     /// Everything is sharp.
     #[default]
     Pinhole,
+    /// What lies at one distance is sharp.
+    Thin(ThinLensPath),
 }
 
 /// The lens of a camera.
@@ -22,6 +28,8 @@ pub enum Lens {
     /// Everything is sharp.
     #[default]
     Pinhole,
+    /// What lies at one distance is sharp.
+    Thin(ThinLens),
 }
 
 impl ShotLens {
@@ -31,14 +39,15 @@ impl ShotLens {
     pub(super) fn check(&self) -> Result<()> {
         match self {
             Self::Pinhole => Ok(()),
+            Self::Thin(path) => path.check(),
         }
     }
 
     /// The lens at `progress` in `[0, 1]` of the path, where the camera's target is `target` world units away.
     pub(super) fn at(&self, progress: f64, target: f64) -> Lens {
-        let _ = (progress, target);
         match self {
             Self::Pinhole => Lens::Pinhole,
+            Self::Thin(path) => path.at(progress, target),
         }
     }
 
@@ -46,6 +55,7 @@ impl ShotLens {
     pub fn reason(&self) -> (bool, String) {
         match self {
             Self::Pinhole => (false, "the camera is a pinhole".into()),
+            Self::Thin(path) => path.reason(),
         }
     }
 }
@@ -58,6 +68,7 @@ impl Lens {
     pub fn is_sampled(&self) -> bool {
         match self {
             Self::Pinhole => false,
+            Self::Thin(_) => true,
         }
     }
 
@@ -65,26 +76,26 @@ impl Lens {
     /// direction (not unit), if through the lens's middle it would leave along `toward`, which is 1 long
     /// along the view axis. `right` and `up` are the image's unit directions.
     pub(super) fn bend(&self, toward: DVec3, axes: [DVec3; 2], u: [f64; 2]) -> (DVec3, DVec3) {
-        let _ = (axes, u);
         match self {
             Self::Pinhole => (DVec3::ZERO, toward),
+            Self::Thin(lens) => lens.bend(toward, axes, u),
         }
     }
 
     /// Diameter of the circle, at `depth` along the view axis, from which a ray through one point of the image
     /// may come: the circle of confusion in object space.
     pub fn blur(&self, depth: f64) -> f64 {
-        let _ = depth;
         match self {
             Self::Pinhole => 0.0,
+            Self::Thin(lens) => lens.blur(depth),
         }
     }
 
     /// The same lens in scene space.
     pub(super) fn to_scene(self, recentring: &Recentring) -> Self {
-        let _ = recentring;
         match self {
             Self::Pinhole => Self::Pinhole,
+            Self::Thin(lens) => Self::Thin(lens.to_scene(recentring)),
         }
     }
 
@@ -92,11 +103,15 @@ impl Lens {
     pub(super) fn numbers(&self) -> [f64; Self::NUMBERS] {
         match self {
             Self::Pinhole => [0.0; Self::NUMBERS],
+            Self::Thin(lens) => lens.numbers(),
         }
     }
 
     /// The lens with these [`numbers`](Self::numbers); `None` where no lens has them.
     pub(super) fn from_numbers(numbers: [f64; Self::NUMBERS]) -> Option<Self> {
-        (numbers == [0.0; Self::NUMBERS]).then_some(Self::Pinhole)
+        match numbers == [0.0; Self::NUMBERS] {
+            true => Some(Self::Pinhole),
+            false => ThinLens::from_numbers(numbers).map(Self::Thin),
+        }
     }
 }

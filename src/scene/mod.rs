@@ -26,7 +26,7 @@ mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
-pub use lens::{Lens, ShotLens};
+pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
     DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
 };

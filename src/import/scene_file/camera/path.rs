@@ -8,7 +8,7 @@ use crate::import::scene_file::number::{Degrees, Int};
 use crate::import::scene_file::report::Source;
 use crate::import::scene_file::vector::Point;
 use crate::math::DVec3;
-use crate::scene::{CameraPath, KeyPose, Pose, Shot, ShotLens, World};
+use crate::scene::{CameraPath, KeyPose, Pose, Shot, World};
 
 /// The pose that all keys of a camera table agree on.
 struct Common {
@@ -29,12 +29,13 @@ impl Camera {
         let span = self.only_path(source)?;
         let path = self.path(source, world, aspect)?;
         let moves = !matches!(path, CameraPath::Still(_));
+        let lens = self.lens(&path, source)?;
         let shot = Shot {
             frames: self.frames.map_or(if moves { 48 } else { 1 }, Int::u32),
             path,
             easing: self.easing,
             vfov_degrees: self.fov.0,
-            lens: ShotLens::Pinhole,
+            lens,
         };
         shot.validate().map_err(|error| match error {
             Error::Usage(what) => source.fault(&span, what).into(),
