@@ -123,24 +123,26 @@ fn in_one_segment(settings: Settings) -> Settings {
 
 /// Width of a lamp in whose light the fence's shadows melt together: only a ratio of another
 /// surface would be wrong.
-const WIDE: f64 = 4.0;
+pub const WIDE: f64 = 4.0;
 /// Width, in pickets, of one in whose light they are nearly as fine as the pickets: penumbras of two
 /// pixels.
 const NARROW: f64 = 8.0;
 
 /// No pixel behind a picket shows what another frame had there.
 pub fn disocclusion(size: Size) -> Outcome {
-    let mut outcome = behind_pickets(size, WIDE);
+    let mut outcome = behind_pickets(size, WIDE, |_| ());
     if size == Size::Full {
-        outcome.merge(behind_pickets(size, NARROW * pixel(192)));
+        outcome.merge(behind_pickets(size, NARROW * pixel(192), |_| ()));
     }
     outcome
 }
 
-fn behind_pickets(size: Size, lamp: f64) -> Outcome {
+/// The same in the light of one lamp, after a `change`.
+pub fn behind_pickets(size: Size, lamp: f64, change: impl FnOnce(&mut Set)) -> Outcome {
     let mut outcome = Outcome::default();
     let (width, height) = size.of((64, 48), (256, 192));
-    let set = fence(height, lamp);
+    let mut set = fence(height, lamp);
+    change(&mut set);
     let stage = set.stage(common::threads());
     // As many rays as make it worth a look: by the narrow lamp all but what is above the shadows is traced.
     let settings = in_one_segment(set.settings((width, height), 1, 64));
