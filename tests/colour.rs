@@ -6,7 +6,6 @@ mod common;
 
 use common::Silent;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::error::Result;
 use tweenray::film::{Encoding, Film, Image, Provenance};
 use tweenray::intersect;
@@ -79,13 +78,7 @@ impl Move {
     fn films(&self, rule: Rule, uploads: &[(u32, Image)], frames: &[u32]) -> Result<Vec<Made>> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
-        let plan = EffectPlan::of(&self.scene, &self.settings);
-        let renderer = Renderer {
-            scene: &self.scene,
-            settings: &self.settings,
-            plan,
-            intersector: &*intersector,
-        };
+        let renderer = Renderer::new(&self.scene, &self.settings, &*intersector);
         let stop = AtomicBool::new(false);
         let maker = ColourMaker::new(renderer, &self.shot, &pool, &stop, &Silent, rule, uploads)?;
         maker.expect(frames);
@@ -100,14 +93,8 @@ impl Move {
     fn traced(&self) -> Vec<Film> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
-        let plan = EffectPlan::of(&self.scene, &self.settings);
         let tracer = Tracer {
-            renderer: Renderer {
-                scene: &self.scene,
-                settings: &self.settings,
-                plan,
-                intersector: &*intersector,
-            },
+            renderer: Renderer::new(&self.scene, &self.settings, &*intersector),
             shot: &self.shot,
             pool: &pool,
             with_gbuffer: false,

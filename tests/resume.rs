@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use tweenray::effects::EffectPlan;
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect;
 use tweenray::output::manifest::{FORMAT, Header, manifest_path};
@@ -144,14 +143,13 @@ impl Bed {
         let target = self.target();
         let settings = &self.settings;
         let mut notes = prepare(&target, ALL).expect("ready").notes;
-        let plan = EffectPlan::of(&self.scene, settings);
-        let channels = reuse::channels(&self.scene, &plan, settings);
+        let channels = reuse::channels(&self.scene, settings);
         let terms = Compatibility::of("h", &channels, settings);
         let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
         let every = Some(Duration::ZERO);
         let checkpoints = Checkpoints::new(&target, every, &terms, self.scene.recentring, whole);
         let intersector = intersect::build(&self.scene, settings, 1).expect("a tree");
-        let renderer = Renderer { scene: &self.scene, settings, plan, intersector: &*intersector };
+        let renderer = Renderer::new(&self.scene, settings, &*intersector);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
         let (stop, traced) = (AtomicBool::new(false), Traced::default());
         notes.extend(act(Tools {

@@ -44,15 +44,16 @@ const SMALL: u64 = 8192;
 const PARALLEL_FROM: u64 = 512;
 
 /// What it takes to shade any frame of a job.
+///
+/// The effect plan is made here, of the very scene and settings that it is used with; no other gets in.
 pub struct Renderer<'a> {
     /// The scene, scene space.
-    pub scene: &'a Scene,
+    pub(crate) scene: &'a Scene,
     /// The job's settings.
-    pub settings: &'a Settings,
-    /// What runs.
-    pub plan: EffectPlan,
+    pub(crate) settings: &'a Settings,
+    plan: EffectPlan,
     /// What traces.
-    pub intersector: &'a dyn Intersector,
+    pub(crate) intersector: &'a dyn Intersector,
 }
 
 /// Told about finished tiles, from any worker thread.
@@ -148,6 +149,35 @@ impl TileDone {
 
 type BlockKernel =
     fn(&Renderer, &FrameInput, &mut BlockPixels, &mut Scratch, &mut Left) -> RayCounts;
+
+impl<'a> Renderer<'a> {
+    /// A renderer of `scene` under `settings`, whose rays `intersector` traces: one that was built of
+    /// the same scene ([`intersect::build`](crate::intersect::build)).
+    pub fn new(scene: &'a Scene, settings: &'a Settings, intersector: &'a dyn Intersector) -> Self {
+        Self { scene, settings, plan: EffectPlan::of(scene, settings), intersector }
+    }
+
+    /// Which effects run.
+    pub fn plan(&self) -> EffectPlan {
+        self.plan
+    }
+
+    /// The same by the kernel that leaves no effect out, to measure and test the specialised ones. The
+    /// picture and the rays are the same. (Sky rays stay as they were: of a sky that is seen, the scene says
+    /// whether it also lights.)
+    pub fn with_every_effect(mut self) -> Self {
+        self.plan = EffectPlan { sky_light: self.plan.sky_light, ..EffectPlan::EVERYTHING };
+        self
+    }
+
+    /// The same without any light but what surfaces and sky emit and the ambient term, to measure what
+    /// lights cost.
+    pub fn without_lights(mut self) -> Self {
+        let (area_lights, delta_lights, sky_light) = (false, false, false);
+        self.plan = EffectPlan { area_lights, delta_lights, sky_light, ..self.plan };
+        self
+    }
+}
 
 impl Renderer<'_> {
     /// Renders frame number `frame` (from 1) through `camera` (world space) on the current rayon
