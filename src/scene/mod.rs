@@ -9,6 +9,7 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod check;
 mod light;
 pub mod limits;
 mod material;
