@@ -46,6 +46,31 @@ const PARALLEL_FROM: u64 = 512;
 /// What it takes to shade any frame of a job.
 ///
 /// The effect plan is made here, of the very scene and settings that it is used with; no other gets in.
+///
+/// ```
+/// use std::sync::atomic::AtomicBool;
+/// use tweenray::intersect;
+/// use tweenray::math::{DVec3, Rgb};
+/// use tweenray::scene::{Camera, Material, Pose, Settings, World, WorldSphere};
+/// use tweenray::shade::Renderer;
+///
+/// let mut world = World::default();
+/// let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
+/// world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, grey));
+/// world.sky.radiance = Rgb::ONE;
+/// let settings = Settings { width: 9, height: 9, ..Settings::default() };
+/// let scene = world.into_scene(true)?;
+/// let intersector = intersect::build(&scene, &settings, 1)?;
+/// let pose = Pose::look_at(DVec3::new(0.0, 0.0, 9.0), DVec3::ZERO);
+/// let camera = Camera::new(&pose, 40.0, 9, 9)?;
+/// // A frame is `None` when somebody sets the flag before it is done.
+/// let renderer = Renderer::new(&scene, &settings, &*intersector);
+/// let (film, _) = renderer.render(&camera, 1, false, &AtomicBool::new(false), &()).unwrap();
+/// // A ball under a sky that is the same all round shows its albedo.
+/// assert_eq!(film.rgb[0], Rgb::ONE);
+/// assert!((film.rgb[film.index(4, 4)] - Rgb::splat(0.5)).abs().max_element() < 1e-6);
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 pub struct Renderer<'a> {
     /// The scene, scene space.
     pub(crate) scene: &'a Scene,
@@ -60,6 +85,11 @@ pub struct Renderer<'a> {
 pub trait Progress: Sync {
     /// A tile is done: its share of the frame in `[0, 1]` and the rays it cast.
     fn tile_done(&self, share: f64, rays: &RayCounts);
+}
+
+/// Nobody watches.
+impl Progress for () {
+    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 /// Reuse between frames: what is known before a frame, and what it is to leave behind.
