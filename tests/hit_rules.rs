@@ -190,7 +190,7 @@ fn a_translated_scene_looks_the_same() {
 }
 
 #[test]
-fn senseless_rays_hit_nothing_and_are_counted() {
+fn invalid_rays_hit_nothing_and_are_counted() {
     let scene = tessellated_sphere();
     let intersector = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
     let good = Ray::new(DVec3::ZERO, DVec3::X);
