@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_transforms_are_errors() {
+    fn singular_and_non_finite_transforms_are_errors() {
         for scale in [DVec3::new(1.0, 0.0, 1.0), DVec3::ZERO, DVec3::splat(f64::NAN)] {
             assert!(triangle().apply_transform(&DAffine3::from_scale(scale)).is_err());
         }
