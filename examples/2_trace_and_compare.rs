@@ -9,8 +9,7 @@ use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Camera, Material, Pose, Settings, World, WorldMesh};
 use tweenray::stats::RayCounts;
 
-/// How many rays hit something, by the oracle, and how many miss; and for how many Embree gives another
-/// triangle, or a ray parameter `t` that is off by more than 1e-12.
+/// Rays that hit something, by the oracle; that miss; and of which Embree says otherwise.
 #[derive(Debug, Default)]
 #[allow(missing_docs)]
 pub struct Agreement {

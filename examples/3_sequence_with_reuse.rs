@@ -43,8 +43,7 @@ pub fn render(frames: u32) -> Result<(ReuseCounts, Rmse)> {
     let shot = Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 };
     let intersector = intersect::build(&scene, &settings, 1)?;
     let renderer = Renderer::new(&scene, &settings, &*intersector);
-    let pool = rayon::ThreadPoolBuilder::new().build();
-    let pool = pool.map_err(|error| Error::Failed(error.to_string()))?;
+    let pool = rayon::ThreadPoolBuilder::new().build().map_err(|e| Error::Failed(e.to_string()))?;
     let (pyramid, never) = (Pyramid::whole(frames), AtomicBool::new(false));
     let maker = SurfaceReuse::new(renderer, &shot, &pool, &never, &(), pyramid)?;
     // Both ends, then the middle, then the quarters: each after those that it is inferred from.
