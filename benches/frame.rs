@@ -8,7 +8,6 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::cell::Cell;
 use std::sync::atomic::AtomicBool;
 use support::Candidate;
-use tweenray::effects::EffectPlan;
 use tweenray::import::Loaded;
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::scene::{Camera, Scene, Settings, Shot};
@@ -80,8 +79,7 @@ fn row(
     pools: &[ThreadPool],
 ) -> Vec<String> {
     let intersector = EmbreeIntersector::new(scene, settings.rules, None, 2).expect("a BVH");
-    let plan = EffectPlan::of(scene, settings);
-    let renderer = Renderer { scene, settings, plan, intersector: &intersector };
+    let renderer = Renderer::new(scene, settings, &intersector);
     let camera = shot.camera(FRAME, settings.width, settings.height).expect("a camera");
     let rays = Cell::new(0);
     let mut candidates: Vec<Candidate> = pools

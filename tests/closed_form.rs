@@ -226,7 +226,7 @@ fn a_glass_sphere_in_a_furnace_vanishes() {
 /// A bright lamp before a dark sky: a pixel's colour is the lamp's times the share of its samples that see
 /// it, clamped or not, and the share is the same.
 #[test]
-fn a_clamped_sample_counts_as_much_as_the_clamp_lets_it() {
+fn a_clamped_sample_contributes_the_clamp() {
     let (radiance, exposure, clamp) = (Rgb::new(40.0, 20.0, 0.25), 0.5, 1.5);
     let corners = [(-1.0, -0.7), (0.9, -0.8), (1.0, 0.8), (-0.8, 0.9)];
     let corners = corners.map(|(x, y)| DVec3::new(x, y, 0.0));
@@ -252,7 +252,7 @@ fn a_clamped_sample_counts_as_much_as_the_clamp_lets_it() {
 /// What counts is the whole of a sample, not each light's part of it; and an invalid sample
 /// stays what it is.
 #[test]
-fn the_clamp_is_of_a_sample_s_sum() {
+fn the_clamp_applies_to_a_samples_sum() {
     let mut world = sphere_world(
         Material { mirror: Rgb::splat(0.5), ..Material::diffuse("satin", Rgb::splat(0.5)) },
         false,

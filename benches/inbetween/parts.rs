@@ -5,7 +5,6 @@ use super::moves::{self, Quiet, Set, Stage};
 use super::{Choice, support};
 use std::collections::BTreeMap;
 use support::Candidate;
-use tweenray::effects::EffectPlan;
 use tweenray::inference::{Channels, Inference, LookupBatch, Origin};
 use tweenray::output::{WriteOptions, write_image};
 use tweenray::reuse::{self, Lookup, Reference};
@@ -63,8 +62,7 @@ struct Stand<'a> {
 impl<'a> Stand<'a> {
     /// Renders the frame's ancestors, each from its own.
     fn new(stage: &'a Stage<'a>, settings: &'a Settings, shot: &Shot) -> Self {
-        let plan = EffectPlan::of(&stage.set.scene, settings);
-        let channels = reuse::channels(&stage.set.scene, &plan, settings);
+        let channels = reuse::channels(&stage.set.scene, settings);
         let camera = |f: u32| shot.camera(f, settings.width, settings.height).expect("a camera");
         let rays = channels.iter().map(|channel| reuse::rays_of(channel, settings)).collect();
         let eye = camera(FRAME);
@@ -117,13 +115,7 @@ impl<'a> Stand<'a> {
     /// Renders the frame without lights, to the depth `bounces`.
     fn unlit(&self, bounces: u32) {
         let settings = Settings { bounces, ..self.settings.clone() };
-        let plan = EffectPlan {
-            area_lights: false,
-            delta_lights: false,
-            sky_light: false,
-            ..EffectPlan::of(&self.stage.set.scene, &settings)
-        };
-        let renderer = Renderer { plan, ..self.stage.renderer(&settings) };
+        let renderer = self.stage.renderer(&settings).without_lights();
         let job = FrameJob { reuse: None, ..self.job(&self.camera, FRAME, None) };
         self.render(&renderer, &job);
     }

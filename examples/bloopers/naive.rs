@@ -4,7 +4,6 @@ use super::Still;
 use super::picture::Picture;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::intersect::{self, Hit, Intersector, Ray, SurfaceInteraction};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{DirectionalLight, Light, Scene};
@@ -26,8 +25,7 @@ pub fn render(still: &Still, test: Option<EpsilonTest>) -> Picture {
         Some(naive) => naive,
         None => &*inner,
     };
-    let plan = EffectPlan::of(&scene, settings);
-    let renderer = Renderer { scene: &scene, settings, plan, intersector };
+    let renderer = Renderer::new(&scene, settings, intersector);
     let stop = AtomicBool::new(false);
     let (film, _) = renderer.render(&still.camera, 1, false, &stop, &Silent).unwrap();
     Picture { width: film.width, height: film.height, rgb: film.rgb }

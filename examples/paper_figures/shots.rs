@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::{Film, Image};
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect::{self, Intersector};
@@ -133,8 +132,7 @@ impl Filmed {
         settings: &'a Settings,
         intersector: &'a dyn Intersector,
     ) -> Renderer<'a> {
-        let plan = EffectPlan::of(&self.scene, settings);
-        Renderer { scene: &self.scene, settings, plan, intersector }
+        Renderer::new(&self.scene, settings, intersector)
     }
 }
 

@@ -7,7 +7,6 @@ use super::effort::Effort;
 use super::errors::displayed_rgb;
 use super::probe::one_sample;
 use super::stage::Stage;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
@@ -164,9 +163,7 @@ impl Patches {
     /// # Errors
     /// [`Error::Stopped`]; those of cameras.
     pub fn trace(&self, stage: &Stage, settings: &Settings) -> Result<Seen> {
-        let plan = EffectPlan::of(stage.scene, settings);
-        let renderer =
-            Renderer { scene: stage.scene, settings, plan, intersector: stage.intersector };
+        let renderer = Renderer::new(stage.scene, settings, stage.intersector);
         let one = |Drawn { frame, corners, .. }: &Drawn| {
             let camera = stage.shot.camera(*frame, settings.width, settings.height)?;
             let places: Vec<(u32, u32)> = corners.iter().flat_map(|c| self.pixels(*c)).collect();

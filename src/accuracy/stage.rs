@@ -2,7 +2,6 @@
 //! setting is traced with.
 
 use super::errors::displayed;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::intersect::{self, Intersector};
@@ -68,8 +67,7 @@ impl<'a> Stage<'a> {
         intersector: &dyn Intersector,
         frame: u32,
     ) -> Result<(Image, RayCounts)> {
-        let plan = EffectPlan::of(self.scene, settings);
-        let renderer = Renderer { scene: self.scene, settings, plan, intersector };
+        let renderer = Renderer::new(self.scene, settings, intersector);
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render = || {
             let (film, rays) = renderer.render(&camera, frame, false, self.stop, &Unheard)?;

@@ -141,7 +141,7 @@ impl Probe<'_> {
 
     fn cut(&self, reuse: ReuseSettings) -> Cut {
         let settings = Settings { reuse, ..self.stage.base.clone() };
-        let looks_up = !reuse::channels(self.stage.scene, &self.plan(), &settings).is_empty();
+        let looks_up = !reuse::channels(self.stage.scene, &settings).is_empty();
         Cut::of(&settings, self.stage.shot.frames, looks_up)
     }
 

@@ -3,7 +3,6 @@
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
 use super::stage::{Stage, Unheard};
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::Intersector;
 use crate::reuse;
@@ -43,9 +42,8 @@ pub fn run(
     chosen: &[u32],
 ) -> Result<Trial> {
     let scene = stage.scene_of(settings);
-    let plan = EffectPlan::of(scene, settings);
-    let renderer = Renderer { scene, settings, plan, intersector };
-    let looks_up = !reuse::channels(scene, &plan, settings).is_empty();
+    let renderer = Renderer::new(scene, settings, intersector);
+    let looks_up = !reuse::channels(scene, settings).is_empty();
     let cut = Cut::of(settings, stage.shot.frames, looks_up);
     let maker = maker(stage, renderer, settings)?;
     let order = maker.batches(&cut.with_ancestors(chosen)).concat();

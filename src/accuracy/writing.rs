@@ -2,7 +2,6 @@
 
 use super::frames::Cut;
 use super::stage::{Stage, Unheard};
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::measure::{Interval, median};
@@ -100,7 +99,7 @@ fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[Vec<f64>; 3]> {
 
 fn renderer<'a>(stage: &Stage<'a>) -> Renderer<'a> {
     let Stage { scene, base: settings, intersector, .. } = *stage;
-    Renderer { scene, settings, plan: EffectPlan::of(scene, settings), intersector }
+    Renderer::new(scene, settings, intersector)
 }
 
 fn traced(stage: &Stage) -> Result<Film> {
@@ -113,7 +112,7 @@ fn traced(stage: &Stage) -> Result<Film> {
 /// The first frame, and what its reference takes: seconds, and bytes on disk.
 fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
     let Stage { scene, shot, base, pool, stop, .. } = *stage;
-    let channels = reuse::channels(scene, &EffectPlan::of(scene, base), base);
+    let channels = reuse::channels(scene, base);
     let terms = Compatibility::of("", &channels, base);
     let target = target(stage, folder, !channels.is_empty())?;
     let checkpoints =

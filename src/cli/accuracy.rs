@@ -221,9 +221,9 @@ fn candidates(
     groups: &[Group],
     otherwise: bool,
 ) -> Vec<Candidate> {
-    let plan = |settings: &Settings| EffectPlan::of(scene, settings);
-    let looks_up = |s: &Settings| !reuse::channels(scene, &plan(s), s).is_empty();
-    let mut all = accuracy::candidates(base, &plan(base), frames, &looks_up, groups);
+    let looks_up = |s: &Settings| !reuse::channels(scene, s).is_empty();
+    let mut all =
+        accuracy::candidates(base, &EffectPlan::of(scene, base), frames, &looks_up, groups);
     all.retain(|c| otherwise || c.settings.rules.recentre == base.rules.recentre);
     all
 }

@@ -114,9 +114,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
     warnings.extend(collapsed.iter().map(ToString::to_string));
     warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
     let meshes = own_meshes(&scene, stage);
-    let plan = EffectPlan::of(&scene, &settings);
-    let renderer =
-        Renderer { scene: &scene, settings: &settings, plan, intersector: &*intersector };
+    let renderer = Renderer::new(&scene, &settings, &*intersector);
     let reasons = EffectPlan::reasons(&scene, &settings, &shot.lens);
     Ok(Inspection {
         scene: args.scene.scene.display().to_string(),

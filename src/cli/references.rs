@@ -3,7 +3,6 @@
 use super::exit::as_input;
 use super::machine;
 use crate::cluster::Communicator;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
 use crate::output::FramePattern;
 use crate::reuse;
@@ -25,7 +24,7 @@ pub struct References {
 
 /// On which terms this job's frames and others serve one another, in a world with the hash `world`.
 pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Compatibility {
-    let channels = reuse::channels(scene, &EffectPlan::of(scene, settings), settings);
+    let channels = reuse::channels(scene, settings);
     Compatibility::of(world, &channels, settings)
 }
 

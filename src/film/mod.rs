@@ -12,6 +12,18 @@ pub use image::{Encoding, Image};
 pub use provenance::{PixelSource, Provenance};
 
 /// A rendered image with its AOVs. Row 0 is the top; linear radiance.
+///
+/// ```
+/// use tweenray::film::{Film, Image};
+/// use tweenray::math::Rgb;
+///
+/// let mut film = Film::new(4, 3, false);
+/// let at = film.index(3, 0);
+/// film.rgb[at] = Rgb::new(2.0, 0.0, 0.0);
+/// // What `measure` compares.
+/// let image = Image::of_film(&film);
+/// assert_eq!((image.width, image.height, image.rgb[3]), (4, 3, Rgb::new(2.0, 0.0, 0.0)));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
     /// Columns.

@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_ended_is_dead_though_nobody_asked_how() {
+    fn a_zombie_process_counts_as_ended() {
         let mut child = std::process::Command::new("cat")
             .stdin(std::process::Stdio::piped())
             .stdout(std::process::Stdio::null())
@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn leftovers_of_dead_runs_are_removed_and_nothing_else() {
+    fn temporary_files_of_ended_processes_are_removed_and_no_others() {
         let folder = tempfile::tempdir().expect("a folder");
         let here = this_machine();
         let own = format!(".frame_0001.png.tmp-{here}-{}-3", std::process::id());

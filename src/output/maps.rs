@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_follow_one_another_look_unlike_and_traced_pixels_have_no_frame() {
+    fn consecutive_frames_have_unlike_colours_and_traced_pixels_none() {
         for frame in 1..200 {
             let apart = (by_frame(frame) - by_frame(frame + 1)).abs().max_element();
             assert!(apart > 0.5, "{frame}: {apart}");
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn heat_gets_lighter_all_the_way() {
+    fn luminance_of_the_heat_map_rises_throughout() {
         let light: Vec<f32> = (0..=20).map(|k| luminance(heat(k as f32 / 20.0))).collect();
         assert!(light.windows(2).all(|w| w[0] < w[1]), "{light:?}");
         assert_eq!((heat(f32::NAN), heat(9.0)), (heat(0.0), heat(1.0)));

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_told_from_nothing_and_from_what_is_no_file() {
+    fn files_are_told_from_missing_paths_folders_and_devices() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("frame.png");
         assert!(matches!(PathKind::at(&path), Ok(PathKind::Nothing)));

@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_says_so() {
+    fn a_file_that_is_no_picture_is_refused() {
         let cases: [(&str, &[u8]); 6] = [
             ("empty.png", b""),
             ("text.png", b"hello, this is no picture"),
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_that_promises_too_much_is_refused() {
+    fn a_header_beyond_the_memory_limit_is_refused() {
         let bomb = b"P6 60000 60000 255\n";
         let mut png = Vec::new();
         let mut encoder = png::Encoder::new(&mut png, 100_000, 100_000);

@@ -44,7 +44,8 @@ pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
 }
 
 /// The lights whose ratios are worth keeping.
-pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channels {
+pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
+    let plan = EffectPlan::of(scene, settings);
     let kept = Channels::of(scene, |channel| {
         let runs = match channel {
             Channel::Area(_) => plan.area_lights,
@@ -69,8 +70,8 @@ pub struct LookupReason {
 }
 
 /// What is looked up and what traced, and why: all lights that shine, then the sky.
-pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Vec<LookupReason> {
-    let kept = channels(scene, plan, settings);
+pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
+    let kept = channels(scene, settings);
     let mut reasons = Vec::new();
     for (index, light) in scene.lights.iter().enumerate() {
         let channel = light.is_area().then_some(Channel::Area(index as u32));
@@ -85,7 +86,7 @@ pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> 
             why,
         });
     }
-    if plan.sky_light {
+    if EffectPlan::of(scene, settings).sky_light {
         let looked_up = kept.sky().is_some();
         let why = why(scene, rays_of(Channel::Sky, settings), looked_up, settings.spp);
         reasons.push(LookupReason { light: "sky".into(), looked_up, why });

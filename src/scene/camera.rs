@@ -22,7 +22,26 @@ pub struct Pose {
     pub roll_degrees: f64,
 }
 
+impl Pose {
+    /// A camera at `eye` that looks at `target`, with y up and without roll.
+    pub fn look_at(eye: DVec3, target: DVec3) -> Self {
+        Self { eye, target, up: DVec3::Y, roll_degrees: 0.0 }
+    }
+}
+
 /// A camera at a pose, for one image size.
+///
+/// ```
+/// use tweenray::math::DVec3;
+/// use tweenray::scene::{Camera, Pose};
+///
+/// let pose = Pose::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO);
+/// let camera = Camera::new(&pose, 40.0, 640, 360)?;
+/// // The target projects to the middle of the image; its depth is along the view axis.
+/// assert_eq!(camera.project(DVec3::ZERO), Some((320.0, 180.0, 5.0)));
+/// assert_eq!(camera.direction(320.0, 180.0), -DVec3::Z);
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Eye point.

@@ -9,6 +9,7 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod check;
 mod lens;
 mod light;
 pub mod limits;
@@ -46,7 +47,22 @@ pub(crate) use winding::{borders, closed_volume};
 use crate::math::{Bounds3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// A scene as read: f64 positions in world units (y up unless the file says otherwise).
+/// A scene as read or built: f64 positions in world units (y up unless the file says otherwise).
+///
+/// ```
+/// use tweenray::math::{DVec3, Rgb};
+/// use tweenray::scene::{Material, World, WorldSphere};
+///
+/// let mut world = World::default();
+/// let red = world.add_material(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)));
+/// world.spheres.push(WorldSphere::new("ball", DVec3::new(100.0, 0.0, 0.0), 8.0, red));
+/// // Scene space has its origin in the middle, and about unit size.
+/// let scene = world.into_scene(true)?;
+/// assert_eq!(scene.spheres[0].centre, DVec3::ZERO);
+/// assert_eq!(scene.spheres[0].radius, 1.0);
+/// assert_eq!(scene.recentring.point_to_world(DVec3::ZERO), DVec3::new(100.0, 0.0, 0.0));
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct World {
     /// Placed meshes (transforms already applied).

@@ -1,6 +1,6 @@
 //! Putting worlds together: affine transforms, and one world after another.
 
-use super::{Corners, World, WorldMesh};
+use super::{Corners, Material, MaterialId, World, WorldMesh};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -35,6 +35,12 @@ impl WorldMesh {
 }
 
 impl World {
+    /// Takes in a material; gives the number by which meshes and spheres name it.
+    pub fn add_material(&mut self, material: Material) -> MaterialId {
+        self.materials.push(material);
+        self.materials.len() as MaterialId - 1
+    }
+
     /// Moves everything but the sky by `transform`: meshes, spheres and lights. The intensity
     /// of point and spot lights and the irradiance of directional ones stay.
     ///
@@ -125,7 +131,7 @@ pub(super) fn uniform_scale(what: &str, instead: &str, transform: &DAffine3) -> 
 mod tests {
     use super::*;
     use crate::math::{DQuat, Rgb};
-    use crate::scene::{Light, Material, QuadLight, WorldSphere};
+    use crate::scene::{Light, QuadLight, WorldSphere};
 
     fn triangle() -> WorldMesh {
         WorldMesh {
@@ -170,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_transforms_are_errors() {
+    fn singular_and_non_finite_transforms_are_errors() {
         for scale in [DVec3::new(1.0, 0.0, 1.0), DVec3::ZERO, DVec3::splat(f64::NAN)] {
             assert!(triangle().apply_transform(&DAffine3::from_scale(scale)).is_err());
         }

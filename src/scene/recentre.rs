@@ -81,30 +81,15 @@ impl World {
         bounds
     }
 
-    /// Refuses lights and spheres whose place is no number: no bounds would hold them. (Meshes
-    /// are finite by invariant.)
-    fn check_finite(&self) -> Result<()> {
-        let what = |what: &str| {
-            Err(Error::Usage(format!("the place or size of {what} is not a finite number")))
-        };
-        if let Some(index) = self.lights.iter().position(|l| !l.is_finite()) {
-            return what(&format!("light {}", index + 1));
-        }
-        match self.spheres.iter().find(|s| !(s.centre.is_finite() && s.radius.is_finite())) {
-            Some(sphere) => what(&format!("`{}`", sphere.name)),
-            None => Ok(()),
-        }
-    }
-
     /// Moves the world to scene space and rounds positions to f32, once. Area lights get their
     /// emitting surface. With `recentre` false the world's own coordinates are rounded as they
     /// are: that shows what the rule is worth.
     ///
-    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
+    /// Errors: an index of a material or vertex that there is not; a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
     /// sphere whose place is not finite; a mesh, sphere or area light so small beside the scene
     /// that f32 would crush it, or a mesh of which it would crush most triangles (`recentre` only).
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
-        self.check_finite()?;
+        self.check()?;
         let bounds = self.bounds();
         let size = bounds.extent().max_element();
         let renders = size == 0.0 || (1e-30..=1e30).contains(&size);

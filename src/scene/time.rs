@@ -117,7 +117,7 @@ mod tests {
     }
     /// The forms of sbatch's manual, each with what it means there.
     #[test]
-    fn time_limits_may_be_slurms() {
+    fn time_limits_may_be_in_slurms_notation() {
         let seconds = |text| parse_time_limit(text).map(|t| t.as_secs());
         for (text, is) in [
             ("30", 30 * 60),

@@ -81,7 +81,7 @@ impl<'a> SurfaceReuse<'a> {
         progress: &'a dyn Progress,
         pyramid: Pyramid,
     ) -> Result<Self> {
-        let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
+        let channels = reuse::channels(renderer.scene, renderer.settings);
         // Where nothing is worth a lookup every frame is a key frame.
         let pyramid = if channels.is_empty() { Pyramid { segment: 1, ..pyramid } } else { pyramid };
         Ok(Self {

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::{Film, Provenance};
 use tweenray::import::{self, LoadOptions, Loaded};
 use tweenray::intersect::EmbreeIntersector;
@@ -109,8 +108,7 @@ impl Stage<'_> {
     }
 
     pub fn renderer<'a>(&'a self, settings: &'a Settings) -> Renderer<'a> {
-        let plan = EffectPlan::of(&self.set.scene, settings);
-        Renderer { scene: &self.set.scene, settings, plan, intersector: &self.intersector }
+        Renderer::new(&self.set.scene, settings, &self.intersector)
     }
 
     /// Renders and audits shot `number`, then renders its frames again, traced and converged.

@@ -4,7 +4,6 @@
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::Film;
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect::EmbreeIntersector;
@@ -86,8 +85,7 @@ pub struct Stage<'s> {
 
 impl Stage<'_> {
     pub fn renderer<'a>(&'a self, settings: &'a Settings) -> Renderer<'a> {
-        let plan = EffectPlan::of(&self.set.scene, settings);
-        Renderer { scene: &self.set.scene, settings, plan, intersector: &self.intersector }
+        Renderer::new(&self.set.scene, settings, &self.intersector)
     }
 
     /// The maker that the settings' policy calls for, which expects `frames`.

@@ -69,11 +69,11 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
     let settings = Settings {
         width: w,
         height: h,
-        shadow_samples: 1,
-        sky_samples: 1,
+        shadow_samples: renderer.settings.shadow_samples.min(1),
+        sky_samples: renderer.settings.sky_samples.min(1),
         ..renderer.settings.clone()
     };
-    let small = Renderer { settings: &settings, ..*renderer };
+    let small = Renderer::new(renderer.scene, &settings, renderer.intersector);
     let mut most = 0;
     for frame in [1, shot.frames.div_ceil(2), shot.frames] {
         let camera = shot.camera(frame, w, h)?;
@@ -144,11 +144,11 @@ impl Progress for Unseen {
 impl Plan {
     /// The plan of rendering the whole shot in one process.
     pub fn of(renderer: &Renderer, shot: &Shot) -> Result<Self> {
-        let Renderer { scene, settings, plan: effects, .. } = renderer;
-        let channels = reuse::channels(scene, effects, settings);
+        let Renderer { scene, settings, .. } = renderer;
+        let channels = reuse::channels(scene, settings);
         let policy = settings.reuse.policy;
         let reasons = match policy {
-            Policy::Surface => reuse::lookup_reasons(scene, effects, settings),
+            Policy::Surface => reuse::lookup_reasons(scene, settings),
             Policy::Colour | Policy::Off => Vec::new(),
         };
         let looks_up = policy == Policy::Surface && !channels.is_empty();

@@ -7,7 +7,6 @@ use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use crate::cli::stats::RankStats;
 use crate::cluster::{self, Communicator, Outcome};
-use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::intersect::Intersector;
 use crate::output::{Format, SequenceLock, atomic};
@@ -118,8 +117,7 @@ impl Frames<'_> {
         let Request { scene, settings, shot, pattern, uploads, .. } = self.request;
         let Site { comm, intersector, pool, order, interrupt, quiet, .. } = *self.site;
         let watch = Watch::new(self.plan.kept.len(), self.total(), quiet);
-        let effects = EffectPlan::of(scene, settings);
-        let renderer = Renderer { scene, settings, plan: effects, intersector };
+        let renderer = Renderer::new(scene, settings, intersector);
         let with_gbuffer = pattern.format() == Format::Exr;
         let checkpoints = self.checkpoints();
         let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);

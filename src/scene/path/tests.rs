@@ -185,7 +185,7 @@ fn an_eye_on_its_target_names_the_frame() {
 }
 
 #[test]
-fn faults_of_a_path_are_told() {
+fn invalid_paths_are_errors() {
     let p = DVec3::ONE;
     let text = |path| message(&shot(path, 4));
     assert!(text(b_spline(vec![p; 3])).contains("has 3 control points"));
@@ -210,7 +210,7 @@ fn faults_of_a_path_are_told() {
 }
 
 #[test]
-fn faults_of_a_shot_are_told() {
+fn invalid_shots_are_errors() {
     let good = shot(pan(DVec3::X, DVec3::Z, DVec3::ZERO), 4);
     good.validate().expect("valid");
     assert!(message(&Shot { frames: 0, ..good.clone() }).contains("0 frames"));

@@ -83,7 +83,7 @@ impl SurfaceReuse<'_> {
         let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let share = (first * usual).min(MOST);
         // Behind mirrors and glass a pixel's footprint follows from the pixels beside it.
-        let block = if r.plan.mirror || r.plan.glass { 2 } else { 1 };
+        let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
         let mask = draw.mask(camera.width, camera.height);
         let trace = |stream: u32, lookup| {
