@@ -3,7 +3,7 @@
 use super::scheduler::{Extent, Task};
 use crate::error::Result;
 use crate::output::manifest::Journal;
-use crate::sequence::{self, FrameReport, Left, Shared, Strip, Target};
+use crate::sequence::{self, Exported, FrameReport, Shared, Strip, Target};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
@@ -36,7 +36,7 @@ pub struct Finished {
     /// Report of the last frame written, if any was.
     pub report: Option<FrameReport>,
     /// The strip, or the reference if other frames take it; otherwise empty.
-    pub output: Left,
+    pub output: Exported,
     /// Seconds that the task took.
     pub seconds: f64,
 }
@@ -88,7 +88,7 @@ impl RenderThread<'_> {
             Extent::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: task.is_source };
                 let bytes = self.maker.strip(task.original, strip)?;
-                bytes.map(|bytes| (None, Left { bytes: bytes.into(), discoveries: 0 }))
+                bytes.map(|bytes| (None, Exported { bytes: bytes.into(), discoveries: 0 }))
             }
             Extent::Whole { frames, .. } => {
                 if !strips.is_empty() {
@@ -107,7 +107,7 @@ impl RenderThread<'_> {
         &mut self,
         task: &Task,
         frames: &[u32],
-    ) -> Result<Option<(Option<FrameReport>, Left)>> {
+    ) -> Result<Option<(Option<FrameReport>, Exported)>> {
         if task.is_source {
             self.maker.hold(task.original);
         }

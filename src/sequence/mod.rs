@@ -31,7 +31,7 @@ pub use resume::{
     Found, Plan, Target, is_worth_a_look, look, prepare, prepare_with, refuse_strangers,
 };
 pub use schedule::Schedule;
-pub use shared::{JoinedStrips, Left, Shared, Strip};
+pub use shared::{Exported, JoinedStrips, Shared, Strip};
 pub use supplied::{ReferenceCache, ReferenceInfo};
 pub use surface_reuse::SurfaceReuse;
 pub use tracer::Tracer;

@@ -58,7 +58,7 @@ pub trait Shared: FrameMaker + Sync {
     }
 
     /// What `original`, which is held and was just made, left behind; once.
-    fn export(&self, _original: u32) -> Option<Left> {
+    fn export(&self, _original: u32) -> Option<Exported> {
         None
     }
 
@@ -84,7 +84,7 @@ pub trait Shared: FrameMaker + Sync {
 
 /// What an original left behind.
 #[derive(Debug, Clone, Default)]
-pub struct Left {
+pub struct Exported {
     /// For [`Shared::import`].
     pub bytes: Arc<[u8]>,
     /// How many points or pixels they tell of.

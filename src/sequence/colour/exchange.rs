@@ -4,7 +4,7 @@ use super::ColourMaker;
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::reuse::colour::{Entry, Known};
-use crate::sequence::shared::{Left, Shared};
+use crate::sequence::shared::{Exported, Shared};
 use crate::sequence::strips::{pack, unpack};
 use serde::{Deserialize, Serialize};
 
@@ -44,10 +44,10 @@ impl Shared for ColourMaker<'_> {
         self.checkpoints.is_some_and(|c| c.has(original))
     }
 
-    fn export(&self, original: u32) -> Option<Left> {
+    fn export(&self, original: u32) -> Option<Exported> {
         let known = self.with_state(|s| s.known.get(&original).cloned())?;
         let bytes = self.pool.install(|| encode(&known)).ok()?.into();
-        Some(Left { bytes, discoveries: known.entries.len() as u64 })
+        Some(Exported { bytes, discoveries: known.entries.len() as u64 })
     }
 
     fn import(&self, original: u32, bytes: &[u8]) {

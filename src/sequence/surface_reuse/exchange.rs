@@ -4,7 +4,7 @@
 use super::SurfaceReuse;
 use crate::error::Result;
 use crate::reuse::store;
-use crate::sequence::shared::{Left, Shared, Strip};
+use crate::sequence::shared::{Exported, Shared, Strip};
 use crate::sequence::strips::{self, Unheard};
 use std::path::Path;
 use std::sync::Arc;
@@ -45,11 +45,11 @@ impl Shared for SurfaceReuse<'_> {
         Ok(self.reference(original)?.is_some())
     }
 
-    fn export(&self, original: u32) -> Option<Left> {
+    fn export(&self, original: u32) -> Option<Exported> {
         self.with_state(|s| {
             let bytes = s.exports.remove(&original)?;
             let discoveries = s.references.get(original).map_or(0, |r| r.len() as u64);
-            Some(Left { bytes, discoveries })
+            Some(Exported { bytes, discoveries })
         })
     }
 
