@@ -8,7 +8,7 @@ use common::Silent;
 use std::sync::atomic::AtomicBool;
 use tweenray::effects::EffectPlan;
 use tweenray::error::Result;
-use tweenray::film::{Encoding, Film, Image, Provenance};
+use tweenray::film::{Encoding, Film, Image, ProvenanceKind};
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb, srgb_encode};
 use tweenray::reuse::colour::Rule;
@@ -119,9 +119,9 @@ impl Move {
     }
 }
 
-fn count(film: &Film, provenance: Provenance) -> usize {
-    let sources = film.sources.as_ref().unwrap();
-    sources.iter().filter(|s| s.provenance == provenance).count()
+fn count(film: &Film, kind: ProvenanceKind) -> usize {
+    let sources = film.provenance.as_ref().unwrap();
+    sources.iter().filter(|s| s.kind == kind).count()
 }
 
 #[test]
@@ -130,10 +130,10 @@ fn first_and_last_frame_are_traced_as_without_the_policy() {
     let (made, traced) = (pan.all(USUAL, &[]), pan.traced());
     for k in [0, FRAMES as usize - 1] {
         assert_eq!(made[k].film.rgb, traced[k].rgb);
-        assert_eq!(count(&made[k].film, Provenance::Traced), 61 * 43);
+        assert_eq!(count(&made[k].film, ProvenanceKind::Traced), 61 * 43);
     }
     let between = &made[4];
-    let inferred = count(&between.film, Provenance::Both);
+    let inferred = count(&between.film, ProvenanceKind::Both);
     assert!(inferred > 500, "{inferred} pixels inferred");
     assert_eq!(between.reuse.direct_inferred, inferred as u64);
     assert_eq!(between.reuse.direct, 61 * 43);
@@ -146,7 +146,7 @@ fn where_nothing_agrees_every_frame_is_the_traced_one() {
     let target = DVec3::new(0.0, 0.0, 0.0);
     let down = Move::new(world(true), (-2.0, 3.0, 0.7), (2.2, 3.0, 0.7), target);
     for (made, traced) in down.all(STRICT, &[]).iter().zip(down.traced()) {
-        assert_eq!(count(&made.film, Provenance::Traced), 61 * 43);
+        assert_eq!(count(&made.film, ProvenanceKind::Traced), 61 * 43);
         assert_eq!(made.film.rgb, traced.rgb);
     }
 }
@@ -159,11 +159,11 @@ fn without_epsilons_a_moving_camera_infers_the_sky_and_what_is_traced_is_traced_
     let (made, traced) = (pan.all(STRICT, &[]), pan.traced());
     let sky = pan.scene.sky.radiance;
     for (made, traced) in made.iter().zip(&traced).skip(1).take(FRAMES as usize - 2) {
-        assert!(count(&made.film, Provenance::Both) > 100);
-        let sources = made.film.sources.as_ref().unwrap();
+        assert!(count(&made.film, ProvenanceKind::Both) > 100);
+        let sources = made.film.provenance.as_ref().unwrap();
         for ((source, rgb), truth) in sources.iter().zip(&made.film.rgb).zip(&traced.rgb) {
-            match source.provenance {
-                Provenance::Traced => assert_eq!(rgb, truth),
+            match source.kind {
+                ProvenanceKind::Traced => assert_eq!(rgb, truth),
                 _ => assert_eq!(*rgb, sky),
             }
         }
@@ -175,7 +175,7 @@ fn a_still_camera_in_light_without_noise_traces_two_frames() {
     let still = Move::pan(false, 0.0);
     let made = still.all(STRICT, &[]);
     for between in &made[1..FRAMES as usize - 1] {
-        assert_eq!(count(&between.film, Provenance::Both), 61 * 43);
+        assert_eq!(count(&between.film, ProvenanceKind::Both), 61 * 43);
         assert_eq!(between.rays[RayKind::Camera], 0);
         assert_eq!(between.film.rgb, made[0].film.rgb);
     }

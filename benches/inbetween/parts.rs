@@ -6,7 +6,8 @@ use super::{Choice, support};
 use std::collections::BTreeMap;
 use support::Candidate;
 use tweenray::effects::EffectPlan;
-use tweenray::inference::{Channels, Inference, LookupBatch, Origin};
+use tweenray::film::{Provenance, ProvenanceKind};
+use tweenray::inference::{Channels, Inference, LookupBatch};
 use tweenray::output::{WriteOptions, write_image};
 use tweenray::reuse::{self, Lookup, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
@@ -26,9 +27,9 @@ impl Inference for AllKnown {
         let (points, channels) = (batch.points.len(), batch.unshadowed.len());
         batch.ratios.clear();
         batch.ratios.resize(channels, 1.0);
-        batch.origins.clear();
-        let found = Origin { frame: 1, earlier: true, ..Origin::default() };
-        batch.origins.resize(points, found);
+        batch.provenance.clear();
+        let found = Provenance { kind: ProvenanceKind::Earlier, frame: 1, distance: 0.0 };
+        batch.provenance.resize(points, found);
     }
 }
 

@@ -4,7 +4,7 @@
 //! traces A and B, (I - A)(I - B) is on average the squared error of what is shown, and (A - B)²/2 that of
 //! tracing, whatever the noise of A and B. Each drawn pixel counts by one over its chance.
 
-use crate::film::{PixelSource, Provenance};
+use crate::film::Provenance;
 use crate::math::Rgb;
 use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
@@ -24,7 +24,7 @@ pub struct Shown<'a> {
     /// Radiance, row by row.
     pub rgb: &'a [Rgb],
     /// Where each pixel's light comes from.
-    pub sources: &'a [PixelSource],
+    pub provenance: &'a [Provenance],
     /// How radiance is shown.
     pub display: Display,
 }
@@ -43,7 +43,7 @@ pub struct Drawn {
 impl Shown<'_> {
     /// Whether the pixel was inferred.
     fn is_inferred(&self, i: usize) -> bool {
-        !matches!(self.sources[i].provenance, Provenance::Background | Provenance::Traced)
+        self.provenance[i].is_inferred()
     }
 }
 
@@ -193,9 +193,8 @@ mod tests {
     #[test]
     fn pixels_that_were_drawn_together_are_one_figure() {
         let rgb = vec![Rgb::splat(0.5); 4];
-        let source = PixelSource { provenance: Provenance::Traced, frame: 0, distance: 0.0 };
-        let sources = vec![source; 4];
-        let shown = Shown { rgb: &rgb, sources: &sources, display: LINEAR };
+        let provenance = vec![Provenance::default(); 4];
+        let shown = Shown { rgb: &rgb, provenance: &provenance, display: LINEAR };
         let (a, b) = (vec![Rgb::splat(0.4); 4], vec![Rgb::splat(0.6); 4]);
         let of = |group: fn(u32) -> u64| {
             let drawn: Vec<Drawn> =

@@ -18,7 +18,7 @@
 //! * The paper hashes pixels to lists. Here the entries lie frame by frame, so that those of a frame
 //!   that is not needed any more can be dropped; what is found is the same.
 
-use crate::film::{PixelSource, Provenance};
+use crate::film::{Provenance, ProvenanceKind};
 use crate::math::Rgb;
 
 /// When two entries of a pixel agree.
@@ -125,13 +125,13 @@ fn nearest<'a>(
 impl Inferred {
     /// Where the pixel comes from, as `frame` sees it. A pixel of a frame that was known from the
     /// start is neither traced nor inferred.
-    pub fn source(&self, frame: u32) -> PixelSource {
+    pub fn provenance(&self, frame: u32) -> Provenance {
         let Self { before, after, distance, .. } = *self;
         if before == frame {
-            return PixelSource::default();
+            return Provenance::default();
         }
         let nearer = if frame - before <= after - frame { before } else { after };
-        PixelSource { provenance: Provenance::Both, frame: nearer, distance }
+        Provenance { kind: ProvenanceKind::Both, frame: nearer, distance }
     }
 }
 
@@ -215,14 +215,14 @@ mod tests {
     fn a_frame_that_is_known_is_itself() {
         let frames = [known(1, &[(0, 0.0, 1.0)]), known(2, &[(0, 9.0, f32::NAN)])];
         let found = RULE.infer(&[&frames[0], &frames[1]], 2, 1)[0].expect("known");
-        assert_eq!((found.rgb.x, found.source(2)), (9.0, PixelSource::default()));
+        assert_eq!((found.rgb.x, found.provenance(2)), (9.0, Provenance::default()));
     }
 
     #[test]
     fn the_nearer_frame_is_named() {
         let inferred = Inferred { rgb: Rgb::ZERO, before: 1, after: 9, distance: 0.0 };
-        let source = |frame| inferred.source(frame);
+        let source = |frame| inferred.provenance(frame);
         assert_eq!((source(3).frame, source(7).frame), (1, 9));
-        assert_eq!(source(3).provenance, Provenance::Both);
+        assert_eq!(source(3).kind, ProvenanceKind::Both);
     }
 }

@@ -3,7 +3,8 @@
 use super::Lookup;
 use super::check::agrees;
 use super::evidence::{Compared, Finding, finding_of};
-use crate::inference::{Estimate, Inference, LookupBatch, Origin, SurfacePoint};
+use crate::film::Provenance;
+use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
 
@@ -155,7 +156,7 @@ impl Inference for Probe<'_> {
         if let Some(lookup) = self.lookup {
             lookup.estimate(batch);
             // Nothing of what is shown comes from there.
-            batch.origins.fill(Origin::default());
+            batch.provenance.fill(Provenance::default());
             let is_known = |estimate: &Estimate| !estimate.ratio.is_nan();
             batch.checks.extend(batch.estimates.iter().map(is_known));
         }

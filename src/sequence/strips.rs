@@ -6,7 +6,7 @@
 
 use super::shared::Strip;
 use crate::error::{Error, Result};
-use crate::film::{Film, GBuffer, PixelSource};
+use crate::film::{Film, GBuffer, Provenance};
 use crate::inference::TracedPoints;
 use crate::math::Rgb;
 use crate::shade::{Progress, Rendered};
@@ -26,7 +26,7 @@ const BLOCK: u32 = 8;
 struct Content {
     rgb: Vec<Rgb>,
     gbuffer: Option<GBuffer>,
-    pixel_sources: Option<Vec<PixelSource>>,
+    provenance: Option<Vec<Provenance>>,
     bad: BadSamples,
     rays: RayCounts,
     reuse: ReuseCounts,
@@ -66,7 +66,7 @@ pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
     let content = Content {
         rgb: film.rgb[own.clone()].to_vec(),
         gbuffer: film.gbuffer.as_ref().map(|g| g.part(own.clone())),
-        pixel_sources: film.sources.as_ref().map(|s| s[own].to_vec()),
+        provenance: film.provenance.as_ref().map(|s| s[own].to_vec()),
         bad: film.bad,
         rays,
         reuse,
@@ -90,8 +90,8 @@ pub fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
         if let Some(part) = strip.gbuffer {
             film.gbuffer.get_or_insert_with(|| GBuffer::new(0)).append(part);
         }
-        if let Some(part) = strip.pixel_sources {
-            film.sources.get_or_insert_default().extend(part);
+        if let Some(part) = strip.provenance {
+            film.provenance.get_or_insert_default().extend(part);
         }
         film.bad += strip.bad;
         rays += strip.rays;
@@ -124,7 +124,7 @@ pub fn unpack<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> Result<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Provenance;
+    use crate::film::ProvenanceKind;
     use crate::stats::RayKind;
 
     #[test]
@@ -146,14 +146,14 @@ mod tests {
     fn a_frame_of_strips_is_the_frame() {
         let (width, height) = (5, 20);
         let mut film = Film::new(width, height, true);
-        let mut pixel_sources = vec![PixelSource::default(); film.rgb.len()];
+        let mut provenance = vec![Provenance::default(); film.rgb.len()];
         for (i, rgb) in film.rgb.iter_mut().enumerate() {
             *rgb = Rgb::new(i as f32, -0.0, f32::INFINITY);
-            pixel_sources[i].frame = i as u32;
-            pixel_sources[i].provenance = Provenance::Later;
+            provenance[i].frame = i as u32;
+            provenance[i].kind = ProvenanceKind::Later;
         }
         film.gbuffer.iter_mut().for_each(|g| g.depth[7] = 3.5);
-        film.sources = Some(pixel_sources);
+        film.provenance = Some(provenance);
         let rays = RayCounts::of(RayKind::Camera, 3);
         let rendered = |film: &Film| Rendered {
             film: film.clone(),

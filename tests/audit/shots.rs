@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use tweenray::effects::EffectPlan;
-use tweenray::film::{Film, Provenance};
+use tweenray::film::Film;
 use tweenray::import::{self, LoadOptions, Loaded};
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::math::Rgb;
@@ -167,7 +167,7 @@ impl Truth {
     fn add(&mut self, settings: &Settings, shown: &Film, traced: &Film, converged: &[Film; 2]) {
         let display = Display { exposure: settings.exposure, tone: settings.tone };
         let [a, b] = converged;
-        for (i, source) in shown.sources.as_ref().expect("sources").iter().enumerate() {
+        for (i, source) in shown.provenance.as_ref().expect("sources").iter().enumerate() {
             let error = |c: Rgb| {
                 let [c, a, b] = [c, a.rgb[i], b.rgb[i]].map(|c| display.code(c));
                 (0..3).map(|k| (c[k] - a[k]) * (c[k] - b[k])).sum::<f64>() * 255.0 * 255.0 / 3.0
@@ -175,7 +175,7 @@ impl Truth {
             let own = error(shown.rgb[i]);
             self.shown += own;
             self.traced += error(traced.rgb[i]);
-            if !matches!(source.provenance, Provenance::Background | Provenance::Traced) {
+            if source.is_inferred() {
                 self.inferred += own;
                 self.inferred_pixels += 1;
             }

@@ -1,6 +1,6 @@
 //! From a film to what a frame discovered, and from what others discovered into the film.
 
-use crate::film::{Film, PixelSource, Provenance};
+use crate::film::{Film, Provenance, ProvenanceKind};
 use crate::reuse::colour::{Entry, Inferred, Known};
 use crate::scene::{Camera, Rect, Settings};
 use crate::stats::ReuseCounts;
@@ -35,19 +35,19 @@ pub(super) fn fill(
     settings: &Settings,
 ) -> ReuseCounts {
     let mut counts = ReuseCounts::default();
-    let mut sources = vec![PixelSource::default(); film.rgb.len()];
+    let mut provenance = vec![Provenance::default(); film.rgb.len()];
     for (x, y) in pixels_of(settings) {
         let index = film.index(x, y);
         counts.direct += 1;
         if let Some(known) = &inferred[index] {
             film.rgb[index] = known.rgb;
-            sources[index] = known.source(frame);
+            provenance[index] = known.provenance(frame);
             counts.direct_inferred += 1;
         } else {
-            sources[index].provenance = Provenance::Traced;
+            provenance[index].kind = ProvenanceKind::Traced;
         }
     }
-    film.sources = Some(sources);
+    film.provenance = Some(provenance);
     counts
 }
 

@@ -147,7 +147,7 @@ impl SurfaceReuse<'_> {
             places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
         for &i in &places {
             film.rgb[i] = first.film.rgb[i];
-            if let (Some(to), Some(from)) = (&mut film.sources, &first.film.sources) {
+            if let (Some(to), Some(from)) = (&mut film.provenance, &first.film.provenance) {
                 to[i] = from[i];
             }
             if let (Some(to), Some(from)) = (&mut film.gbuffer, &first.film.gbuffer) {
@@ -208,7 +208,7 @@ impl SurfaceReuse<'_> {
         let settings = self.renderer.settings;
         Shown {
             rgb: &film.rgb,
-            sources: film.sources.as_deref().unwrap_or_default(),
+            provenance: film.provenance.as_deref().unwrap_or_default(),
             display: Display { exposure: settings.exposure, tone: settings.tone },
         }
     }
