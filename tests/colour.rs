@@ -11,7 +11,7 @@ use tweenray::error::Result;
 use tweenray::film::{Encoding, Film, Image, ProvenanceKind};
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb, srgb_encode};
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{
     CameraPath, DirectionalLight, Easing, Light, Material, QuadLight, Rect, Scene, Settings, Shot,
     Sky, ToneCurve, World, WorldSphere,
@@ -55,8 +55,8 @@ struct Move {
 
 const FRAMES: u32 = 9;
 /// That of the settings.
-const USUAL: Rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
-const STRICT: Rule = Rule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
+const USUAL: AgreementRule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+const STRICT: AgreementRule = AgreementRule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
 
 impl Move {
     fn new(world: World, from: (f64, f64, f64), to: (f64, f64, f64), target: DVec3) -> Self {
@@ -76,7 +76,12 @@ impl Move {
     }
 
     /// The films of `frames`, made in this order by one maker.
-    fn films(&self, rule: Rule, uploads: &[(u32, Image)], frames: &[u32]) -> Result<Vec<Made>> {
+    fn films(
+        &self,
+        rule: AgreementRule,
+        uploads: &[(u32, Image)],
+        frames: &[u32],
+    ) -> Result<Vec<Made>> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
         let plan = EffectPlan::of(&self.scene, &self.settings);
@@ -92,7 +97,7 @@ impl Move {
         frames.iter().map(|frame| Ok(maker.make(*frame)?.unwrap())).collect()
     }
 
-    fn all(&self, rule: Rule, uploads: &[(u32, Image)]) -> Vec<Made> {
+    fn all(&self, rule: AgreementRule, uploads: &[(u32, Image)]) -> Vec<Made> {
         self.films(rule, uploads, &(1..=FRAMES).collect::<Vec<_>>()).unwrap()
     }
 
@@ -113,7 +118,7 @@ impl Move {
             with_gbuffer: false,
             stop: &AtomicBool::new(false),
             progress: &Silent,
-            laid: Default::default(),
+            joined: Default::default(),
         };
         (1..=FRAMES).map(|frame| tracer.make(frame).unwrap().unwrap().film).collect()
     }
@@ -185,7 +190,7 @@ fn a_still_camera_in_light_without_noise_traces_two_frames() {
 fn a_larger_epsilon_infers_more() {
     let pan = Move::pan(true, 0.5);
     let inferred = |colour_epsilon, distance_epsilon| {
-        let made = pan.all(Rule { colour_epsilon, distance_epsilon }, &[]);
+        let made = pan.all(AgreementRule { colour_epsilon, distance_epsilon }, &[]);
         made.iter().map(|m| m.reuse.direct_inferred).sum::<u64>()
     };
     let (strict, colour, both) = (inferred(0.0, 0.0), inferred(0.1, 0.0), inferred(0.1, 0.1));
@@ -250,7 +255,7 @@ fn what_passes_between_two_samples_is_missed_and_an_uploaded_picture_shows_it() 
     let traced = pan.traced();
     let redness = |film: &Film| film.rgb.iter().filter(|c| c.x > 2.0 * c.z).count();
     assert!(redness(&traced[4]) > 50 && redness(&traced[0]) == 0 && redness(&traced[8]) == 0);
-    let loose = Rule { colour_epsilon: 0.1, distance_epsilon: 0.1 };
+    let loose = AgreementRule { colour_epsilon: 0.1, distance_epsilon: 0.1 };
     assert_eq!(redness(&pan.all(loose, &[])[4].film), 0);
     let uploads = [(5, picture(&traced[4]))];
     let with_upload = pan.all(loose, &uploads);
@@ -270,7 +275,7 @@ fn an_upload_says_nothing_about_distance() {
     flat.spheres.clear();
     let target = DVec3::new(0.0, 0.0, 0.0);
     let dive = Move::new(flat, (0.0, 2.0, 0.1), (0.0, 4.0, 0.1), target);
-    let apart = Rule { colour_epsilon: 0.01, distance_epsilon: 0.05 };
+    let apart = AgreementRule { colour_epsilon: 0.01, distance_epsilon: 0.05 };
     assert_eq!(dive.all(apart, &[])[4].reuse.direct_inferred, 0);
     let middle = [(5, picture(&dive.traced()[4]))];
     let made = dive.all(apart, &middle);

@@ -17,7 +17,7 @@ use tweenray::film::Film;
 use tweenray::output::manifest::{FORMAT, Header};
 use tweenray::output::{FramePattern, WriteOptions};
 use tweenray::scene::{FrameRange, Settings};
-use tweenray::sequence::{self, FrameMaker, Made, Recipes, Shared, Target};
+use tweenray::sequence::{self, FrameMaker, Made, RankMaker, Recipes, Target};
 use tweenray::stats::{RayCounts, ReuseCounts};
 
 /// First word of a rank's command line.
@@ -52,7 +52,7 @@ impl FrameMaker for Lemon {
     }
 }
 
-impl Shared for Lemon {}
+impl RankMaker for Lemon {}
 
 fn target(folder: &Path) -> Target {
     let settings = Settings { width: SETTINGS.0, height: SETTINGS.1, ..Settings::default() };

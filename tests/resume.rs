@@ -12,12 +12,13 @@ use tweenray::intersect;
 use tweenray::output::manifest::{FORMAT, Header, manifest_path};
 use tweenray::output::{Format, FramePattern, WriteOptions};
 use tweenray::reuse;
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::reuse::store::Compatibility;
 use tweenray::scene::{FrameRange, Policy, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
 use tweenray::sequence::{
-    ColourMaker, FrameMaker, Pyramid, Recipes, Shared, SurfaceReuse, Target, prepare, render_frames,
+    ColourMaker, FrameMaker, Pyramid, RankMaker, Recipes, SurfaceReuse, Target, prepare,
+    render_frames,
 };
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
@@ -127,7 +128,7 @@ impl Bed {
     /// As [`run`](Self::run), under policy `colour`.
     fn run_colour(&self, frames: &[u32], count: usize) -> Run {
         self.with(|tools| {
-            let rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+            let rule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
             let Tools { renderer, pool, stop, traced, checkpoints } = tools;
             let maker = ColourMaker::new(renderer, &self.shot, pool, stop, traced, rule, &[]);
             let mut maker = maker.expect("no pictures");
@@ -213,13 +214,13 @@ fn references_go_from_disk_to_other_ranks_without_a_ray() {
         let bed = killed(ending, None);
         let run = bed.process(|maker, _, terms| {
             maker.exchange = Some(terms.clone());
-            let found: Vec<u32> = (1..=17).filter(|f| maker.lies_on_disk(*f)).collect();
+            let found: Vec<u32> = (1..=17).filter(|f| maker.is_on_disk(*f)).collect();
             let mut expected = on_disk.to_vec();
             expected.sort_unstable();
             assert_eq!(found, expected);
             for frame in on_disk {
                 maker.hold(*frame);
-                assert!(maker.make_source(*frame).expect("read"));
+                assert!(maker.make_reference(*frame).expect("read"));
                 let sent = maker.export(*frame).expect("bytes").bytes;
                 let file = fs::read(bed.reference(1)).unwrap_or_default();
                 assert!(*frame != 1 || file.is_empty() || file.ends_with(&sent));

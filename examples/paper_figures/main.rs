@@ -15,16 +15,17 @@ use shots::{FRAMES, Filmed};
 use std::path::Path;
 use tweenray::film::{Encoding, Film, Image, Provenance, ProvenanceKind};
 use tweenray::measure::{mse, psnr};
-use tweenray::reuse::colour::{Rule, distance_difference};
+use tweenray::reuse::colour::{AgreementRule, distance_difference};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/pictures");
 /// A frame well between any two samples of the figures.
 const FRAME: u32 = 7;
 /// That of `--policy colour`.
-const USUAL: Rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+const USUAL: AgreementRule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
 /// What the paper's figures show is made by larger ones.
-const LENIENT: Rule = Rule { colour_epsilon: 0.1, distance_epsilon: 0.2 };
-const NO_COLOUR: Rule = Rule { colour_epsilon: f32::INFINITY, distance_epsilon: 0.2 };
+const LENIENT: AgreementRule = AgreementRule { colour_epsilon: 0.1, distance_epsilon: 0.2 };
+const NO_COLOUR: AgreementRule =
+    AgreementRule { colour_epsilon: f32::INFINITY, distance_epsilon: 0.2 };
 
 fn main() {
     let mesh = match std::env::args().nth(1) {

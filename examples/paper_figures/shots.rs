@@ -7,7 +7,7 @@ use tweenray::film::{Film, Image};
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect::{self, Intersector};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{
     CameraPath, Easing, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
 };
@@ -88,7 +88,7 @@ impl Filmed {
     }
 
     /// The paper's policy, `uploads` taken for frames.
-    pub fn colour(&self, frame: u32, rule: Rule, uploads: &[(u32, Image)]) -> Film {
+    pub fn colour(&self, frame: u32, rule: AgreementRule, uploads: &[(u32, Image)]) -> Film {
         let intersector = self.intersector();
         let (renderer, stop) = (self.renderer(&self.settings, &*intersector), no_stop());
         let maker =

@@ -2,12 +2,12 @@
 
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use super::stage::{Stage, Unheard};
+use super::stage::{NoProgress, Stage};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::Intersector;
 use crate::reuse;
-use crate::reuse::colour::Rule;
+use crate::reuse::colour::AgreementRule;
 use crate::scene::{Policy, Settings};
 use crate::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use crate::shade::Renderer;
@@ -93,14 +93,14 @@ fn maker<'m>(
     Ok(match settings.reuse.policy {
         Policy::Surface => {
             let pyramid = Pyramid { segment: settings.reuse.segment, frames };
-            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
+            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &NoProgress, pyramid)?)
         }
         Policy::Colour => {
-            let rule = Rule {
+            let rule = AgreementRule {
                 colour_epsilon: settings.reuse.colour_epsilon,
                 distance_epsilon: settings.reuse.distance_epsilon,
             };
-            Box::new(ColourMaker::new(renderer, shot, pool, stop, &Unheard, rule, &[])?)
+            Box::new(ColourMaker::new(renderer, shot, pool, stop, &NoProgress, rule, &[])?)
         }
         Policy::Off => Box::new(Tracer {
             renderer,
@@ -108,8 +108,8 @@ fn maker<'m>(
             pool,
             with_gbuffer: false,
             stop,
-            progress: &Unheard,
-            laid: Default::default(),
+            progress: &NoProgress,
+            joined: Default::default(),
         }),
     })
 }

@@ -3,7 +3,7 @@
 use super::scheduler::{Extent, Task};
 use crate::error::Result;
 use crate::output::manifest::Journal;
-use crate::sequence::{self, Exported, FrameReport, Shared, Strip, Target};
+use crate::sequence::{self, Exported, FrameReport, RankMaker, Strip, Target};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
@@ -44,7 +44,7 @@ pub struct Finished {
 /// Runs the tasks of `inputs` until that channel closes, a task fails, or the job is asked to stop.
 /// `journal` is the path of the journal of `rank`.
 pub fn run(
-    maker: &dyn Shared,
+    maker: &dyn RankMaker,
     target: &Target,
     (rank, journal): (u32, &Path),
     inputs: &Receiver<TaskInput>,
@@ -68,7 +68,7 @@ pub fn run(
 
 /// The state of a rank's render thread.
 struct RenderThread<'a> {
-    maker: &'a dyn Shared,
+    maker: &'a dyn RankMaker,
     target: &'a Target,
     rank: u32,
     /// Path of the journal.
@@ -87,12 +87,12 @@ impl RenderThread<'_> {
         let result = match &task.extent {
             Extent::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: task.is_source };
-                let bytes = self.maker.strip(task.original, strip)?;
+                let bytes = self.maker.render_strip(task.original, strip)?;
                 bytes.map(|bytes| (None, Exported { bytes: bytes.into(), discoveries: 0 }))
             }
             Extent::Whole { frames, .. } => {
                 if !strips.is_empty() {
-                    self.maker.lay(task.original, &strips)?;
+                    self.maker.join_strips(task.original, &strips)?;
                 }
                 self.whole(&task, frames)?
             }
@@ -111,7 +111,7 @@ impl RenderThread<'_> {
         if task.is_source {
             self.maker.hold(task.original);
         }
-        if frames.is_empty() && !self.maker.make_source(task.original)? {
+        if frames.is_empty() && !self.maker.make_reference(task.original)? {
             return Ok(None);
         }
         self.maker.expect(frames);

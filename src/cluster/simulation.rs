@@ -11,7 +11,7 @@ mod tests;
 
 use super::traffic::Traffic;
 use crate::error::Result;
-use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
+use crate::sequence::{FrameMaker, Made, Pyramid, RankMaker};
 
 /// A job: frames, the dependencies between them, and how references are sent.
 #[derive(Debug, Clone, Copy)]
@@ -109,12 +109,12 @@ impl FrameMaker for Job {
     }
 }
 
-impl Shared for Job {
+impl RankMaker for Job {
     fn needs(&self, original: u32) -> Vec<u32> {
         self.pyramid.ancestors(original)
     }
 
-    fn tells_all(&self) -> bool {
+    fn sends_to_all(&self) -> bool {
         self.sends_to_all
     }
 

@@ -23,7 +23,7 @@ use crate::math::Rgb;
 
 /// When two entries of a pixel agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rule {
+pub struct AgreementRule {
     /// Largest difference in any channel, linear radiance.
     pub colour_epsilon: f32,
     /// Largest difference of the distances, as a share of the nearer one.
@@ -44,7 +44,7 @@ pub struct Entry {
 
 /// What is known of one frame: all of it, or its discoveries.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Known {
+pub struct KnownColours {
     /// Its number, from 1.
     pub frame: u32,
     /// Each pixel at most once.
@@ -53,7 +53,7 @@ pub struct Known {
 
 /// An inferred pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inferred {
+pub struct InferredColour {
     /// Linear radiance.
     pub rgb: Rgb,
     /// Frame of the entry before; the frame itself where that is known.
@@ -64,7 +64,7 @@ pub struct Inferred {
     pub distance: f32,
 }
 
-impl Rule {
+impl AgreementRule {
     /// Whether `a` and `b` agree.
     pub fn agree(&self, a: &Entry, b: &Entry) -> bool {
         let apart = (a.rgb - b.rgb).abs().max_element();
@@ -80,7 +80,12 @@ impl Rule {
 
     /// What `known`, in any order, tells of the `pixels` pixels of `frame`; `None` where a pixel
     /// must be traced.
-    pub fn infer(&self, known: &[&Known], frame: u32, pixels: usize) -> Vec<Option<Inferred>> {
+    pub fn infer(
+        &self,
+        known: &[&KnownColours],
+        frame: u32,
+        pixels: usize,
+    ) -> Vec<Option<InferredColour>> {
         let before = nearest(known.iter().filter(|k| k.frame <= frame), frame, pixels);
         let after = nearest(known.iter().filter(|k| k.frame >= frame), frame, pixels);
         let pairs = before.into_iter().zip(after);
@@ -92,13 +97,13 @@ impl Rule {
         (before, a): (u32, &Entry),
         (after, b): (u32, &Entry),
         frame: u32,
-    ) -> Option<Inferred> {
+    ) -> Option<InferredColour> {
         let step = (frame - before) as f32 / (after - before).max(1) as f32;
         // Equal colours stay what they are to the last bit.
         let rgb = a.rgb + (b.rgb - a.rgb) * step;
         // Not a number where a distance is unknown.
         let distance = distance_difference(a.distance, b.distance).max(0.0);
-        self.agree(a, b).then_some(Inferred { rgb, before, after, distance })
+        self.agree(a, b).then_some(InferredColour { rgb, before, after, distance })
     }
 }
 
@@ -109,11 +114,11 @@ pub fn distance_difference(a: f32, b: f32) -> f32 {
 
 /// For each pixel the entry nearest to `frame` in time, with its frame.
 fn nearest<'a>(
-    known: impl Iterator<Item = &'a &'a Known>,
+    known: impl Iterator<Item = &'a &'a KnownColours>,
     frame: u32,
     pixels: usize,
 ) -> Vec<Option<(u32, &'a Entry)>> {
-    let mut known: Vec<&Known> = known.copied().collect();
+    let mut known: Vec<&KnownColours> = known.copied().collect();
     known.sort_by_key(|k| std::cmp::Reverse(k.frame.abs_diff(frame)));
     let mut nearest = vec![None; pixels];
     for (k, entry) in known.iter().flat_map(|k| k.entries.iter().map(move |e| (k.frame, e))) {
@@ -122,7 +127,7 @@ fn nearest<'a>(
     nearest
 }
 
-impl Inferred {
+impl InferredColour {
     /// Where the pixel comes from, as `frame` sees it. A pixel of a frame that was known from the
     /// start is neither traced nor inferred.
     pub fn provenance(&self, frame: u32) -> Provenance {
@@ -139,15 +144,15 @@ impl Inferred {
 mod tests {
     use super::*;
 
-    const RULE: Rule = Rule { colour_epsilon: 0.1, distance_epsilon: 0.25 };
+    const RULE: AgreementRule = AgreementRule { colour_epsilon: 0.1, distance_epsilon: 0.25 };
 
-    fn known(frame: u32, pixels: &[(u32, f32, f32)]) -> Known {
+    fn known(frame: u32, pixels: &[(u32, f32, f32)]) -> KnownColours {
         let entry = |&(pixel, grey, distance)| Entry { pixel, rgb: Rgb::splat(grey), distance };
-        Known { frame, entries: pixels.iter().map(entry).collect() }
+        KnownColours { frame, entries: pixels.iter().map(entry).collect() }
     }
 
     /// What frame 3 has at pixel 0, known in frames 1 and 5.
-    fn middle(rule: Rule, a: (f32, f32), b: (f32, f32)) -> Option<f32> {
+    fn middle(rule: AgreementRule, a: (f32, f32), b: (f32, f32)) -> Option<f32> {
         let (a, b) = (known(1, &[(0, a.0, a.1)]), known(5, &[(0, b.0, b.1)]));
         rule.infer(&[&a, &b], 3, 1)[0].map(|i| i.rgb.x)
     }
@@ -180,11 +185,11 @@ mod tests {
 
     #[test]
     fn no_epsilon_asks_for_equality_and_an_infinite_one_for_finite_numbers() {
-        let none = Rule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
+        let none = AgreementRule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
         assert_eq!(middle(none, (0.3, 4.0), (0.3, 4.0)), Some(0.3));
         assert_eq!(middle(none, (0.3, 4.0), (0.300_001, 4.0)), None);
         assert_eq!(middle(none, (0.3, 4.0), (0.3, 4.000_001)), None);
-        let all = Rule { colour_epsilon: f32::INFINITY, distance_epsilon: f32::INFINITY };
+        let all = AgreementRule { colour_epsilon: f32::INFINITY, distance_epsilon: f32::INFINITY };
         assert_eq!(middle(all, (0.0, 4.0), (9.0, f32::INFINITY)), Some(4.5));
         for odd in [f32::NAN, f32::INFINITY] {
             assert_eq!(middle(all, (odd, 4.0), (0.0, 4.0)), None);
@@ -220,7 +225,7 @@ mod tests {
 
     #[test]
     fn the_nearer_frame_is_named() {
-        let inferred = Inferred { rgb: Rgb::ZERO, before: 1, after: 9, distance: 0.0 };
+        let inferred = InferredColour { rgb: Rgb::ZERO, before: 1, after: 9, distance: 0.0 };
         let source = |frame| inferred.provenance(frame);
         assert_eq!((source(3).frame, source(7).frame), (1, 9));
         assert_eq!(source(3).kind, ProvenanceKind::Both);

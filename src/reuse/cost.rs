@@ -144,7 +144,7 @@ impl PointCost {
 
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
 /// probes found: a share `probed` of the points, each of which is traced once more than it needs to be.
-pub fn is_worth_looking<'f>(
+pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
     (scene, channels, settings): (&Scene, &Channels, &Settings),

@@ -38,7 +38,7 @@ pub struct Finding {
 
 /// What a light of a point showed: estimate and both traces.
 #[derive(Debug, Clone, Copy)]
-pub struct Compared {
+pub struct LightComparison {
     /// What the pixel would show of the light without shadows: luminance, exposure applied.
     pub unshadowed: f32,
     /// What other frames suggest.
@@ -47,7 +47,7 @@ pub struct Compared {
     pub traced: [f32; 2],
 }
 
-impl Compared {
+impl LightComparison {
     /// Takes in what more camera samples showed, their `share` of all. Risk is that of the riskiest.
     pub fn join(&mut self, other: &Self, share: f32) {
         let (own_light, light) = (self.unshadowed * (1.0 - share), other.unshadowed * share);
@@ -71,13 +71,14 @@ impl Compared {
 
 /// What was found at a point that makes up `share` of its pixel, from what its lights showed; `None` where
 /// other frames know none of them.
-pub fn finding_of(share: f32, lights: &[Compared], agreed: bool) -> Option<Finding> {
-    let is_known = |l: &&Compared| {
+pub fn finding_of(share: f32, lights: &[LightComparison], agreed: bool) -> Option<Finding> {
+    let is_known = |l: &&LightComparison| {
         l.unshadowed != 0.0 && !l.estimate.ratio.is_nan() && !l.traced.iter().any(|r| r.is_nan())
     };
     let lights = || lights.iter().filter(is_known);
     let level = lights().next()?.estimate.level;
-    let sum = |ratio: &dyn Fn(&Compared) -> f32| lights().map(|l| l.unshadowed * ratio(l)).sum();
+    let sum =
+        |ratio: &dyn Fn(&LightComparison) -> f32| lights().map(|l| l.unshadowed * ratio(l)).sum();
     let shown = |radiance: f32| f64::from(shown(radiance));
     let estimated = shown(sum(&|l| l.estimate.ratio));
     let [a, b] = [0, 1].map(|k| shown(sum(&|l| l.traced[k])));
@@ -184,7 +185,7 @@ mod tests {
     fn camera_samples_that_were_estimated_apart_are_one_finding() {
         let light = |ratio, traced: [f32; 2], level| {
             let estimate = Estimate { ratio, level };
-            Compared { unshadowed: 0.5, estimate, traced }
+            LightComparison { unshadowed: 0.5, estimate, traced }
         };
         // The estimates are off by the same, the traces by chance.
         let mut one = light(0.5, [0.75, 0.85], 3);
@@ -199,7 +200,7 @@ mod tests {
         one.join(&light(0.5, [0.8; 2], STEPS as u8 + 5), 0.5);
         assert_eq!(one.estimate.level, STEPS as u8 + 5);
         // What no light reached tells nothing.
-        let dark = Compared { unshadowed: 0.0, ..light(f32::NAN, [f32::NAN; 2], 0) };
+        let dark = LightComparison { unshadowed: 0.0, ..light(f32::NAN, [f32::NAN; 2], 0) };
         let before = one.estimate;
         one.join(&dark, 0.5);
         assert_eq!((one.unshadowed, one.estimate), (0.25, before));
@@ -272,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_finding_compares_all_known_lights_together() {
-        let light = |ratio: f32, traced| Compared {
+        let light = |ratio: f32, traced| LightComparison {
             unshadowed: 0.5,
             estimate: Estimate { ratio, level: EDGE },
             traced,

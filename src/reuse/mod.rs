@@ -20,7 +20,7 @@ mod risk;
 pub mod store;
 mod taps;
 
-pub use cost::{LookupReason, channels, is_worth_looking, lookup_reasons, of_frame, rays_of};
+pub use cost::{LookupReason, channels, is_worth_lookups, lookup_reasons, of_frame, rays_of};
 pub use lookup::{Judged, Lookup};
 pub use probe::{PARTS, Probe, ProbeDraw};
 pub use reference::Reference;

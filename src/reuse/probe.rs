@@ -2,7 +2,7 @@
 
 use super::Lookup;
 use super::check::agrees;
-use super::evidence::{Compared, Finding, finding_of};
+use super::evidence::{Finding, LightComparison, finding_of};
 use crate::film::Provenance;
 use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint};
 use crate::sampling::mix;
@@ -81,7 +81,7 @@ pub struct Probe<'a> {
 struct Note {
     pixel: [u32; 2],
     point: SurfacePoint,
-    lights: Vec<Compared>,
+    lights: Vec<LightComparison>,
     /// Whether check rays agreed.
     agreed: bool,
 }
@@ -165,7 +165,7 @@ impl Inference for Probe<'_> {
     fn hear(&self, answered: &LookupBatch) {
         let LookupBatch { points, pixels, unshadowed, ratios, estimates, .. } = answered;
         let channels = self.channels;
-        let light = |at: usize| Compared {
+        let light = |at: usize| LightComparison {
             unshadowed: unshadowed[at],
             estimate: estimates.get(at).copied().unwrap_or(Estimate::UNKNOWN),
             traced: [ratios[at]; 2],

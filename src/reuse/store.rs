@@ -120,7 +120,7 @@ impl Compatibility {
 }
 
 /// A frame's points with what they belong to.
-pub struct Kept<'a> {
+pub struct ReferenceRecord<'a> {
     /// What other jobs must have in common.
     pub terms: &'a Compatibility,
     /// Number of the frame.
@@ -137,7 +137,7 @@ pub struct Kept<'a> {
     pub settings: &'a str,
 }
 
-impl Kept<'_> {
+impl ReferenceRecord<'_> {
     /// The bytes: the same whatever else was traced at the same time. `None` where they would be too
     /// many.
     pub fn encode(&self) -> Option<Vec<u8>> {
@@ -212,7 +212,7 @@ impl Kept<'_> {
     }
 }
 
-/// Reads what [`Kept::encode`] wrote, for a job on `terms` of a scene with `recentring`: a reference
+/// Reads what [`ReferenceRecord::encode`] wrote, for a job on `terms` of a scene with `recentring`: a reference
 /// and a hash that tells it apart. `path` is for messages.
 ///
 /// # Errors
@@ -446,7 +446,7 @@ mod tests {
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
         let (terms, camera, findings) = (terms(), camera(), findings());
         let (terms, camera, findings, settings) = (&terms, &camera, &findings[..], "spp 1");
-        let kept = Kept { terms, frame: 7, camera, crop, traced, findings, settings };
+        let kept = ReferenceRecord { terms, frame: 7, camera, crop, traced, findings, settings };
         kept.encode().expect("small enough")
     }
 

@@ -28,7 +28,7 @@ use super::{FrameMaker, Made, SaveCost, previous_camera};
 use crate::error::{Error, Result};
 use crate::film::{Film, Image};
 use crate::math::Vec2;
-use crate::reuse::colour::{Inferred, Known, Rule};
+use crate::reuse::colour::{AgreementRule, InferredColour, KnownColours};
 use crate::scene::{Camera, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer};
 use pixels::{discoveries, fill};
@@ -52,11 +52,11 @@ pub struct ColourMaker<'a> {
     /// Hears of finished tiles.
     pub progress: &'a dyn Progress,
     /// When cached colours agree.
-    pub rule: Rule,
+    pub rule: AgreementRule,
     /// Where discoveries are kept for a job that goes on after this one; `None` for nowhere.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
     pyramid: Pyramid,
-    uploads: Vec<Known>,
+    uploads: Vec<KnownColours>,
     state: Mutex<State>,
 }
 
@@ -67,10 +67,10 @@ struct State {
     /// Frames whose discoveries other ranks' frames, or later ones, need.
     held: BTreeSet<u32>,
     /// What the frames so far discovered, as far as it is still needed.
-    known: BTreeMap<u32, Arc<Known>>,
+    known: BTreeMap<u32, Arc<KnownColours>>,
     /// The most that all of it took at a time, bytes.
     most_memory: u64,
-    saved: Saved<Arc<Known>>,
+    saved: Saved<Arc<KnownColours>>,
 }
 
 impl<'a> ColourMaker<'a> {
@@ -85,7 +85,7 @@ impl<'a> ColourMaker<'a> {
         pool: &'a rayon::ThreadPool,
         stop: &'a AtomicBool,
         progress: &'a dyn Progress,
-        rule: Rule,
+        rule: AgreementRule,
         uploads: &[(u32, Image)],
     ) -> Result<Self> {
         let mut seen = BTreeSet::new();
@@ -114,7 +114,7 @@ impl<'a> ColourMaker<'a> {
 
     /// Makes `frame` from what its ancestors know, which are made first where they are not at hand;
     /// gives its discoveries too.
-    fn frame(&self, frame: u32) -> Result<Option<(Made, Known)>> {
+    fn frame(&self, frame: u32) -> Result<Option<(Made, KnownColours)>> {
         let mut ancestors = Vec::new();
         for other in self.pyramid.ancestors(frame) {
             match self.known(other)? {
@@ -122,7 +122,8 @@ impl<'a> ColourMaker<'a> {
                 None => return Ok(None),
             }
         }
-        let known: Vec<&Known> = ancestors.iter().map(|k| &**k).chain(&self.uploads).collect();
+        let known: Vec<&KnownColours> =
+            ancestors.iter().map(|k| &**k).chain(&self.uploads).collect();
         let settings = self.renderer.settings;
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let pixels = settings.width as usize * settings.height as usize;
@@ -147,7 +148,7 @@ impl<'a> ColourMaker<'a> {
         frame: u32,
         camera: &Camera,
         film: &mut Film,
-        inferred: &[Option<Inferred>],
+        inferred: &[Option<InferredColour>],
     ) -> Result<()> {
         let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
         self.pool.install(|| self.renderer.note_motion(camera, previous.as_ref(), film));
@@ -161,7 +162,7 @@ impl<'a> ColourMaker<'a> {
         &self,
         frame: u32,
         camera: &Camera,
-        inferred: &[Option<Inferred>],
+        inferred: &[Option<InferredColour>],
     ) -> Option<Rendered> {
         let mask: Vec<bool> = inferred.iter().map(Option::is_none).collect();
         let job = FrameJob {
@@ -177,7 +178,7 @@ impl<'a> ColourMaker<'a> {
     }
 
     /// What `frame` discovered; makes it where nobody did.
-    fn known(&self, frame: u32) -> Result<Option<Arc<Known>>> {
+    fn known(&self, frame: u32) -> Result<Option<Arc<KnownColours>>> {
         if let Some(found) = self.with_state(|s| s.known.get(&frame).cloned()) {
             return Ok(Some(found));
         }
@@ -189,13 +190,13 @@ impl<'a> ColourMaker<'a> {
     }
 
     /// What a frame discovered that was just made, which is worth keeping on disk too.
-    fn made(&self, known: Known) -> Arc<Known> {
+    fn made(&self, known: KnownColours) -> Arc<KnownColours> {
         let known = self.keep(known);
         self.with_state(|s| s.saved.add(known.frame, Arc::clone(&known)));
         known
     }
 
-    fn keep(&self, known: Known) -> Arc<Known> {
+    fn keep(&self, known: KnownColours) -> Arc<KnownColours> {
         let known = Arc::new(known);
         self.with_state(|s| {
             s.known.insert(known.frame, Arc::clone(&known));
@@ -258,6 +259,6 @@ impl FrameMaker for ColourMaker<'_> {
 }
 
 /// Bytes that entries take.
-fn memory<'k>(known: impl IntoIterator<Item = &'k Known>) -> u64 {
+fn memory<'k>(known: impl IntoIterator<Item = &'k KnownColours>) -> u64 {
     known.into_iter().map(|k| size_of_val(&k.entries[..]) as u64).sum()
 }

@@ -28,10 +28,11 @@ pub use fingerprint::{WorldHash, fingerprint, shot_fingerprint};
 pub use pyramid::Pyramid;
 pub use recipe::{Recipe, Recipes, Tag};
 pub use resume::{
-    Found, Plan, Target, is_worth_a_look, look, prepare, prepare_with, refuse_strangers,
+    FrameFiles, Plan, Target, check_files, has_frames_to_check, prepare, prepare_with,
+    refuse_unlisted,
 };
 pub use schedule::Schedule;
-pub use shared::{Exported, JoinedStrips, Shared, Strip};
+pub use shared::{Exported, JoinedStrips, RankMaker, Strip};
 pub use supplied::{ReferenceCache, ReferenceInfo};
 pub use surface_reuse::SurfaceReuse;
 pub use tracer::Tracer;

@@ -13,7 +13,7 @@ use crate::output::{Format, FramePattern, PathKind, WriteOptions, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
-pub use refuse::refuse_strangers;
+pub use refuse::refuse_unlisted;
 use refuse::{by_file, refuse_other_view, refuse_others, refuse_taken};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -89,14 +89,14 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     prepare_with(target, frames, None)
 }
 
-/// The same, with what [`look`] found where that is known.
+/// The same, with what [`check_files`] found where that is known.
 ///
 /// # Errors
 /// As [`prepare`].
 pub fn prepare_with(
     target: &Target,
     frames: FrameRange,
-    found: Option<Vec<Found>>,
+    found: Option<Vec<FrameFiles>>,
 ) -> Result<Plan> {
     atomic::create_folder(target.pattern.folder())?;
     atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE)?;
@@ -107,7 +107,7 @@ pub fn prepare_with(
 
 /// What lies where a frame and its maps belong.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Found {
+pub struct FrameFiles {
     frame: u32,
     /// Hash of the frame's file; `None` where there is none.
     hash: Option<String>,
@@ -119,7 +119,7 @@ pub struct Found {
 ///
 /// # Errors
 /// The manifest cannot be read.
-pub fn is_worth_a_look(target: &Target) -> Result<bool> {
+pub fn has_frames_to_check(target: &Target) -> Result<bool> {
     if target.overwrite {
         return Ok(false);
     }
@@ -131,14 +131,14 @@ pub fn is_worth_a_look(target: &Target) -> Result<bool> {
 ///
 /// # Errors
 /// A file that is there and cannot be read.
-pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
-    let found: Vec<Result<Found>> =
-        frames.into_par_iter().map(|frame| look_at(target, frame)).collect();
+pub fn check_files(target: &Target, frames: Range<u32>) -> Result<Vec<FrameFiles>> {
+    let found: Vec<Result<FrameFiles>> =
+        frames.into_par_iter().map(|frame| check_file(target, frame)).collect();
     // Of several faults the first frame's is reported, whichever thread was quicker.
     found.into_iter().collect()
 }
 
-fn look_at(target: &Target, frame: u32) -> Result<Found> {
+fn check_file(target: &Target, frame: u32) -> Result<FrameFiles> {
     let paths = target.paths(frame);
     let hash = |path: &PathBuf| match PathKind::at(path)? {
         PathKind::Nothing => Ok(None),
@@ -154,10 +154,14 @@ fn look_at(target: &Target, frame: u32) -> Result<Found> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         maps.extend(hash(path)?.map(|hash| (name, hash)));
     }
-    Ok(Found { frame, hash: own, maps })
+    Ok(FrameFiles { frame, hash: own, maps })
 }
 
-fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) -> Result<Plan> {
+fn plan(
+    target: &Target,
+    frames: FrameRange,
+    found_on_disk: Option<Vec<FrameFiles>>,
+) -> Result<Plan> {
     let path = manifest_path(&target.pattern);
     let turn = Turn::take(&path)?;
     let found = match Manifest::read(&path) {
@@ -165,7 +169,7 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
         read => read?,
     };
     let Some(manifest) = found else {
-        refuse_strangers(target, frames)?;
+        refuse_unlisted(target, frames)?;
         if !target.overwrite {
             checkpoint::refuse_others(target)?;
         }
@@ -188,7 +192,7 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
         false => {
             let found = match found_on_disk {
                 Some(found) => found,
-                None => look(target, frames.first..frames.last + 1)?,
+                None => check_files(target, frames.first..frames.last + 1)?,
             };
             let files = by_file(&rows);
             let states =
@@ -261,7 +265,7 @@ impl Damage {
 
 fn state(
     target: &Target,
-    found: &Found,
+    found: &FrameFiles,
     (rows, files): (&BTreeMap<u32, Row>, &HashMap<&str, &Row>),
 ) -> Result<State> {
     let frame = found.frame;
@@ -283,7 +287,7 @@ fn state(
 }
 
 /// Whether all maps of a frame are there, as they were written.
-fn has_maps(found: &Found, row: &Row) -> bool {
+fn has_maps(found: &FrameFiles, row: &Row) -> bool {
     let is_whole = |map: &MapRow| found.maps.contains(&(map.file.clone(), map.blake3.clone()));
     row.maps.len() == Map::ALL.len() && row.maps.iter().all(is_whole)
 }

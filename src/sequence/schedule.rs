@@ -175,7 +175,7 @@ impl<T> ReferencePool<T> {
     }
 
     /// Nobody wants what was held.
-    pub fn let_go(&mut self, schedule: &Schedule, original: u32) {
+    pub fn release(&mut self, schedule: &Schedule, original: u32) {
         self.drop_use(schedule, original);
     }
 
@@ -202,7 +202,7 @@ impl<T> ReferencePool<T> {
     pub fn keep(&mut self, schedule: &Schedule, original: u32, make: impl FnOnce() -> T) {
         if self.due.remove(&original) {
             self.held.insert(original, make());
-            self.release(schedule, original);
+            self.release_ancestors(schedule, original);
         }
     }
 
@@ -213,12 +213,12 @@ impl<T> ReferencePool<T> {
             if *asked == 0 {
                 self.asked.remove(&original);
             }
-            self.release(schedule, original);
+            self.release_ancestors(schedule, original);
         }
     }
 
     /// What `original` was inferred from has one user less.
-    fn release(&mut self, schedule: &Schedule, original: u32) {
+    fn release_ancestors(&mut self, schedule: &Schedule, original: u32) {
         for other in schedule.ancestors(original) {
             self.drop_use(schedule, other);
         }
@@ -232,7 +232,7 @@ impl<T> ReferencePool<T> {
             self.held.remove(&original);
             if self.due.remove(&original) {
                 // All that would be made of it came from elsewhere, so it never was.
-                self.release(schedule, original);
+                self.release_ancestors(schedule, original);
             }
         }
     }
@@ -343,7 +343,7 @@ mod tests {
         pool.done(&schedule, frame);
         assert!(pool.holds(frame) && schedule.ancestors(frame).iter().all(|f| pool.holds(*f)));
         for other in schedule.ancestors(frame).into_iter().chain([frame]) {
-            pool.let_go(&schedule, other);
+            pool.release(&schedule, other);
         }
         assert_eq!(pool.held().count(), 0);
         assert!(pool.uses.is_empty() && pool.due.is_empty());

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 ///
 /// What is handed from one to another are bytes that only makers of the same job understand. A
 /// maker that lacks what another should have sent makes it itself, so the frames never differ.
-pub trait Shared: FrameMaker + Sync {
+pub trait RankMaker: FrameMaker + Sync {
     /// The frame that `frame` is: itself unless another is the same picture.
     fn original(&self, frame: u32) -> u32 {
         frame
@@ -23,18 +23,18 @@ pub trait Shared: FrameMaker + Sync {
 
     /// `originals` (ascending) in the order in which they are best made, cut into lists each of which
     /// one rank makes, and that need little from one another.
-    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
         self.batches(originals)
     }
 
     /// Whether what an original leaves behind was put on disk by an earlier job, so that it is rather
     /// read than made.
-    fn lies_on_disk(&self, _original: u32) -> bool {
+    fn is_on_disk(&self, _original: u32) -> bool {
         false
     }
 
     /// Whether what a frame leaves behind goes to all ranks, needed or not.
-    fn tells_all(&self) -> bool {
+    fn sends_to_all(&self) -> bool {
         false
     }
 
@@ -47,13 +47,13 @@ pub trait Shared: FrameMaker + Sync {
     fn hold(&self, _original: u32) {}
 
     /// No frame to come needs what `original` left.
-    fn let_go(&self, _original: u32) {}
+    fn release(&self, _original: u32) {}
 
     /// Makes what `original` leaves behind, and no frame; `false` when the job was asked to stop.
     ///
     /// # Errors
     /// Whatever making a frame can meet.
-    fn make_source(&self, _original: u32) -> Result<bool> {
+    fn make_reference(&self, _original: u32) -> Result<bool> {
         Ok(true)
     }
 
@@ -69,7 +69,7 @@ pub trait Shared: FrameMaker + Sync {
     ///
     /// # Errors
     /// Whatever making a frame can meet.
-    fn strip(&self, _original: u32, _strip: Strip) -> Result<Option<Vec<u8>>> {
+    fn render_strip(&self, _original: u32, _strip: Strip) -> Result<Option<Vec<u8>>> {
         Ok(None)
     }
 
@@ -77,7 +77,7 @@ pub trait Shared: FrameMaker + Sync {
     ///
     /// # Errors
     /// The strips are no such strips.
-    fn lay(&self, _original: u32, _strips: &[Arc<[u8]>]) -> Result<()> {
+    fn join_strips(&self, _original: u32, _strips: &[Arc<[u8]>]) -> Result<()> {
         Ok(())
     }
 }
@@ -85,7 +85,7 @@ pub trait Shared: FrameMaker + Sync {
 /// What an original left behind.
 #[derive(Debug, Clone, Default)]
 pub struct Exported {
-    /// For [`Shared::import`].
+    /// For [`RankMaker::import`].
     pub bytes: Arc<[u8]>,
     /// How many points or pixels they tell of.
     pub discoveries: u64,

@@ -34,9 +34,9 @@ struct Content {
 }
 
 /// Hears of no tile: a strip is no share of this rank's frames.
-pub struct Unheard;
+pub struct NoProgress;
 
-impl Progress for Unheard {
+impl Progress for NoProgress {
     fn tile_done(&self, _share: f64, _rays: &RayCounts) {}
 }
 

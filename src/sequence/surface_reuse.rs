@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::evidence::Finding;
-use crate::reuse::store::{Compatibility, Kept};
+use crate::reuse::store::{Compatibility, ReferenceRecord};
 use crate::reuse::{self, Judged, Lookup, Reference};
 use crate::scene::{Camera, Rect, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
@@ -48,7 +48,7 @@ pub struct SurfaceReuse<'a> {
     /// On which terms frames serve other ranks as references; `None` where there are none.
     pub exchange: Option<Compatibility>,
     /// Frames that came as strips.
-    laid: JoinedStrips,
+    joined: JoinedStrips,
     pub(super) schedule: Schedule,
     pub(super) channels: Channels,
     state: Mutex<State>,
@@ -95,7 +95,7 @@ impl<'a> SurfaceReuse<'a> {
             terms: None,
             checkpoints: None,
             exchange: None,
-            laid: JoinedStrips::default(),
+            joined: JoinedStrips::default(),
             schedule: Schedule::new(pyramid, shot)?,
             pyramid,
             channels,
@@ -111,7 +111,7 @@ impl<'a> SurfaceReuse<'a> {
         let Some(references) = self.references(&self.schedule.ancestors(frame))? else {
             return Ok(None);
         };
-        let rendered = match self.laid.take(frame) {
+        let rendered = match self.joined.take(frame) {
             Some(rendered) => Some(rendered),
             None => self.rendered(frame, is_due, None, self.progress)?,
         };
@@ -161,7 +161,7 @@ impl<'a> SurfaceReuse<'a> {
             mask: others.as_deref().or(mask),
             beyond_crop: is_due,
         };
-        let Some(probed) = probed.filter(|probed| probed.is_worth_looking) else {
+        let Some(probed) = probed.filter(|probed| probed.is_worth_lookups) else {
             return Ok(self.render(job, None, progress));
         };
         self.with_lookup((frame, &camera), &references, |lookup| {
@@ -240,7 +240,7 @@ impl<'a> SurfaceReuse<'a> {
         (traced, findings): (&TracedPoints, &[Finding]),
     ) -> Option<Arc<[u8]>> {
         let settings = &WriteOptions::of(self.renderer.settings, None).settings;
-        let kept = Kept { terms, frame, camera, crop, traced, findings, settings };
+        let kept = ReferenceRecord { terms, frame, camera, crop, traced, findings, settings };
         self.pool.install(|| kept.encode()).map(Into::into)
     }
 

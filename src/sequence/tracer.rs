@@ -1,7 +1,7 @@
 //! The maker that traces every frame on its own.
 
-use super::shared::{JoinedStrips, Shared, Strip};
-use super::strips::{self, Unheard};
+use super::shared::{JoinedStrips, RankMaker, Strip};
+use super::strips::{self, NoProgress};
 use super::{FrameMaker, Made, previous_camera};
 use crate::error::Result;
 use crate::scene::{Camera, Settings, Shot};
@@ -25,7 +25,7 @@ pub struct Tracer<'a> {
     /// Hears of finished tiles.
     pub progress: &'a dyn Progress,
     /// Frames that came as strips.
-    pub laid: JoinedStrips,
+    pub joined: JoinedStrips,
 }
 
 impl Tracer<'_> {
@@ -56,8 +56,8 @@ impl Tracer<'_> {
 impl FrameMaker for Tracer<'_> {
     fn make(&self, frame: u32) -> Result<Option<Made>> {
         let camera = self.camera(frame)?;
-        let laid = self.laid.take(frame);
-        let rendered = laid.or_else(|| self.render(&camera, frame, None, self.progress));
+        let joined = self.joined.take(frame);
+        let rendered = joined.or_else(|| self.render(&camera, frame, None, self.progress));
         let Some(Rendered { mut film, rays, .. }) = rendered else { return Ok(None) };
         let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
         let note = || self.renderer.note_motion(&camera, previous.as_ref(), &mut film);
@@ -66,21 +66,21 @@ impl FrameMaker for Tracer<'_> {
     }
 }
 
-impl Shared for Tracer<'_> {
+impl RankMaker for Tracer<'_> {
     fn most_strips(&self) -> u32 {
         strips::most(self.renderer.settings.height)
     }
 
-    fn strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
+    fn render_strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
         let camera = self.camera(original)?;
         let mask = strips::mask(strip, camera.width, camera.height);
-        let rendered = self.render(&camera, original, Some(&mask), &Unheard);
+        let rendered = self.render(&camera, original, Some(&mask), &NoProgress);
         rendered.map(|rendered| strips::encode(rendered, strip)).transpose()
     }
 
-    fn lay(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+    fn join_strips(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
         let Settings { width, height, .. } = *self.renderer.settings;
-        self.laid.put(original, strips::join(strips, width, height)?);
+        self.joined.put(original, strips::join(strips, width, height)?);
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ use tweenray::import::{self, LoadOptions};
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::measure::psnr;
 use tweenray::output::Display;
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{Light, Policy, Scene, Settings, Shot, World};
 use tweenray::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use tweenray::shade::{FrameJob, Progress, Renderer};
@@ -109,13 +109,13 @@ impl Stage<'_> {
             Policy::Colour => {
                 let (colour_epsilon, distance_epsilon) =
                     (reuse.colour_epsilon, reuse.distance_epsilon);
-                let rule = Rule { colour_epsilon, distance_epsilon };
+                let rule = AgreementRule { colour_epsilon, distance_epsilon };
                 let maker = ColourMaker::new(renderer, shot, pool, stop, progress, rule, &[]);
                 Box::new(maker.expect("cameras"))
             }
             Policy::Off => {
-                let (with_gbuffer, laid) = (false, Default::default());
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
+                let (with_gbuffer, joined) = (false, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, joined })
             }
         };
         maker.expect(frames);

@@ -11,10 +11,12 @@ use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::intersect::Intersector;
 use crate::output::{Format, SequenceLock, atomic};
-use crate::reuse::colour::Rule;
+use crate::reuse::colour::AgreementRule;
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{ColourMaker, Plan, Pyramid, SaveCost, Shared, SurfaceReuse, Target, Tracer};
+use crate::sequence::{
+    ColourMaker, Plan, Pyramid, RankMaker, SaveCost, SurfaceReuse, Target, Tracer,
+};
 use crate::shade::Renderer;
 use rayon::ThreadPool;
 use std::time::Instant;
@@ -123,7 +125,7 @@ impl Frames<'_> {
         let with_gbuffer = pattern.format() == Format::Exr;
         let checkpoints = self.checkpoints();
         let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
-        let maker: Box<dyn Shared> = match settings.reuse.policy {
+        let maker: Box<dyn RankMaker> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
                 let mut maker = SurfaceReuse::new(renderer, shot, pool, stop, &watch, pyramid)?;
@@ -135,7 +137,7 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Colour => {
-                let rule = Rule {
+                let rule = AgreementRule {
                     colour_epsilon: settings.reuse.colour_epsilon,
                     distance_epsilon: settings.reuse.distance_epsilon,
                 };
@@ -146,8 +148,8 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Off => {
-                let (progress, laid) = (&watch, Default::default());
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
+                let (progress, joined) = (&watch, Default::default());
+                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, joined })
             }
         };
         let done = |report: &_| watch.frame_done(report);

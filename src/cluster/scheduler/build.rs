@@ -1,13 +1,13 @@
 //! The scheduler at the start of a job: the dependency graph, and the initial queue of each rank.
 
 use super::{RankRecord, Scheduler, State, TaskRecord};
-use crate::sequence::Shared;
+use crate::sequence::RankMaker;
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Scheduler {
     /// The schedule of `frames`; each rank's queue starts with a contiguous run of whole batches.
     /// `rank_order` lists the ranks so that neighbours share a node.
-    pub fn new(maker: &(impl Shared + ?Sized), frames: &[u32], rank_order: &[u32]) -> Self {
+    pub fn new(maker: &(impl RankMaker + ?Sized), frames: &[u32], rank_order: &[u32]) -> Self {
         let mut outputs: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for frame in frames {
             outputs.entry(maker.original(*frame)).or_default().push(*frame);
@@ -15,7 +15,7 @@ impl Scheduler {
         let mut users: Vec<u32> = outputs.keys().copied().collect();
         let mut read = BTreeSet::new();
         while let Some(user) = users.pop() {
-            if outputs[&user].is_empty() && maker.lies_on_disk(user) {
+            if outputs[&user].is_empty() && maker.is_on_disk(user) {
                 read.insert(user);
                 continue;
             }
@@ -27,7 +27,7 @@ impl Scheduler {
             }
         }
         let originals: Vec<u32> = outputs.keys().copied().collect();
-        let batches = maker.shares(&originals);
+        let batches = maker.rank_batches(&originals);
         let owners = owners(&batches, rank_order);
         let mut scheduler = Self {
             tasks: Vec::new(),
@@ -42,7 +42,7 @@ impl Scheduler {
             remaining: originals.len(),
             most_strips: maker.most_strips(),
             empty_queues: rank_order.len(),
-            sends_to_all: maker.tells_all(),
+            sends_to_all: maker.sends_to_all(),
             is_stopped: false,
         };
         for (batch, (list, owner)) in batches.into_iter().zip(owners).enumerate() {

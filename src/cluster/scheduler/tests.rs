@@ -3,7 +3,7 @@
 use super::build::owners;
 use super::*;
 use crate::error::Result;
-use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
+use crate::sequence::{FrameMaker, Made, Pyramid, RankMaker};
 use std::collections::BTreeSet;
 
 /// Frames of a pyramid, or independent frames; makes nothing.
@@ -27,16 +27,20 @@ impl FrameMaker for Frames {
     }
 }
 
-impl Shared for Frames {
+impl RankMaker for Frames {
     fn needs(&self, original: u32) -> Vec<u32> {
         if self.is_independent { Vec::new() } else { self.pyramid.ancestors(original) }
     }
 
-    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
-        if self.is_independent { self.batches(originals) } else { self.pyramid.shares(originals) }
+    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+        if self.is_independent {
+            self.batches(originals)
+        } else {
+            self.pyramid.rank_batches(originals)
+        }
     }
 
-    fn lies_on_disk(&self, original: u32) -> bool {
+    fn is_on_disk(&self, original: u32) -> bool {
         self.on_disk.contains(&original)
     }
 

@@ -3,8 +3,8 @@
 use super::ColourMaker;
 use crate::error::Result;
 use crate::math::Rgb;
-use crate::reuse::colour::{Entry, Known};
-use crate::sequence::shared::{Exported, Shared};
+use crate::reuse::colour::{Entry, KnownColours};
+use crate::sequence::shared::{Exported, RankMaker};
 use crate::sequence::strips::{pack, unpack};
 use serde::{Deserialize, Serialize};
 
@@ -16,12 +16,12 @@ struct Columns {
     distances: Vec<f32>,
 }
 
-impl Shared for ColourMaker<'_> {
+impl RankMaker for ColourMaker<'_> {
     fn needs(&self, original: u32) -> Vec<u32> {
         self.pyramid.ancestors(original)
     }
 
-    fn tells_all(&self) -> bool {
+    fn sends_to_all(&self) -> bool {
         true
     }
 
@@ -29,18 +29,18 @@ impl Shared for ColourMaker<'_> {
         self.with_state(|s| s.held.insert(original));
     }
 
-    fn let_go(&self, original: u32) {
+    fn release(&self, original: u32) {
         self.with_state(|s| {
             s.held.remove(&original);
             s.known.remove(&original);
         });
     }
 
-    fn make_source(&self, original: u32) -> Result<bool> {
+    fn make_reference(&self, original: u32) -> Result<bool> {
         Ok(self.known(original)?.is_some())
     }
 
-    fn lies_on_disk(&self, original: u32) -> bool {
+    fn is_on_disk(&self, original: u32) -> bool {
         self.checkpoints.is_some_and(|c| c.has(original))
     }
 
@@ -58,7 +58,7 @@ impl Shared for ColourMaker<'_> {
 }
 
 /// A frame's discoveries as bytes.
-pub(super) fn encode(known: &Known) -> Result<Vec<u8>> {
+pub(super) fn encode(known: &KnownColours) -> Result<Vec<u8>> {
     let entries = || known.entries.iter();
     pack(&Columns {
         pixels: entries().map(|e| e.pixel).collect(),
@@ -68,9 +68,9 @@ pub(super) fn encode(known: &Known) -> Result<Vec<u8>> {
 }
 
 /// What [`encode`] made bytes of; `None` for other bytes.
-pub(super) fn decode(frame: u32, bytes: &[u8]) -> Option<Known> {
+pub(super) fn decode(frame: u32, bytes: &[u8]) -> Option<KnownColours> {
     let Columns { pixels, rgb, distances } = unpack::<Columns>(bytes).ok()?;
     let rest = rgb.into_iter().zip(distances);
     let entry = |(pixel, (rgb, distance))| Entry { pixel, rgb, distance };
-    Some(Known { frame, entries: pixels.into_iter().zip(rest).map(entry).collect() })
+    Some(KnownColours { frame, entries: pixels.into_iter().zip(rest).map(entry).collect() })
 }

@@ -3,14 +3,14 @@
 //! itself.
 
 use super::{ColourMaker, exchange};
-use crate::reuse::colour::Known;
+use crate::reuse::colour::KnownColours;
 use crate::sequence::checkpoint::Checkpoints;
 use crate::sequence::saved::{Keeps, Saved};
 use std::sync::Arc;
 
 impl ColourMaker<'_> {
     /// What `frame` discovered in an earlier run, where that left it.
-    pub(super) fn left_on_disk(&self, frame: u32) -> Option<Arc<Known>> {
+    pub(super) fn left_on_disk(&self, frame: u32) -> Option<Arc<KnownColours>> {
         let bytes = self.checkpoints?.read_bytes(frame)?;
         let known = exchange::decode(frame, &bytes)?;
         self.with_state(|s| s.saved.found(frame));
@@ -19,7 +19,7 @@ impl ColourMaker<'_> {
 }
 
 impl Keeps for ColourMaker<'_> {
-    type Left = Arc<Known>;
+    type Left = Arc<KnownColours>;
 
     fn checkpoints(&self) -> Option<&Checkpoints<'_>> {
         self.checkpoints
@@ -27,12 +27,12 @@ impl Keeps for ColourMaker<'_> {
 
     fn with_saved<R>(
         &self,
-        act: impl FnOnce(&mut Saved<Arc<Known>>, &dyn Fn(u32) -> bool) -> R,
+        act: impl FnOnce(&mut Saved<Arc<KnownColours>>, &dyn Fn(u32) -> bool) -> R,
     ) -> R {
         self.with_state(|s| act(&mut s.saved, &|frame| s.known.contains_key(&frame)))
     }
 
-    fn bytes(&self, known: &Arc<Known>) -> Option<Arc<[u8]>> {
+    fn bytes(&self, known: &Arc<KnownColours>) -> Option<Arc<[u8]>> {
         self.pool.install(|| exchange::encode(known)).ok().map(Into::into)
     }
 }

@@ -4,12 +4,12 @@
 use super::SurfaceReuse;
 use crate::error::Result;
 use crate::reuse::store;
-use crate::sequence::shared::{Exported, Shared, Strip};
-use crate::sequence::strips::{self, Unheard};
+use crate::sequence::shared::{Exported, RankMaker, Strip};
+use crate::sequence::strips::{self, NoProgress};
 use std::path::Path;
 use std::sync::Arc;
 
-impl Shared for SurfaceReuse<'_> {
+impl RankMaker for SurfaceReuse<'_> {
     fn original(&self, frame: u32) -> u32 {
         self.schedule.original(frame)
     }
@@ -18,11 +18,11 @@ impl Shared for SurfaceReuse<'_> {
         self.schedule.ancestors(original)
     }
 
-    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
-        self.pyramid.shares(originals)
+    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+        self.pyramid.rank_batches(originals)
     }
 
-    fn lies_on_disk(&self, original: u32) -> bool {
+    fn is_on_disk(&self, original: u32) -> bool {
         self.checkpoints.is_some_and(|c| c.has(original))
     }
 
@@ -34,14 +34,14 @@ impl Shared for SurfaceReuse<'_> {
         self.with_state(|s| s.references.hold(&self.schedule, original));
     }
 
-    fn let_go(&self, original: u32) {
+    fn release(&self, original: u32) {
         self.with_state(|s| {
             s.exports.remove(&original);
-            s.references.let_go(&self.schedule, original);
+            s.references.release(&self.schedule, original);
         });
     }
 
-    fn make_source(&self, original: u32) -> Result<bool> {
+    fn make_reference(&self, original: u32) -> Result<bool> {
         Ok(self.reference(original)?.is_some())
     }
 
@@ -64,18 +64,18 @@ impl Shared for SurfaceReuse<'_> {
         }
     }
 
-    fn strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
+    fn render_strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
         let camera = self.camera(original)?;
         let mask = strips::mask(strip, camera.width, camera.height);
         self.with_state(|s| s.references.expect(&self.schedule, &[original]));
-        let rendered = self.rendered(original, strip.is_source, Some(&mask), &Unheard);
+        let rendered = self.rendered(original, strip.is_source, Some(&mask), &NoProgress);
         self.with_state(|s| s.references.done(&self.schedule, original));
         rendered?.map(|rendered| strips::encode(rendered, strip)).transpose()
     }
 
-    fn lay(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+    fn join_strips(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
         let settings = self.renderer.settings;
-        self.laid.put(original, strips::join(strips, settings.width, settings.height)?);
+        self.joined.put(original, strips::join(strips, settings.width, settings.height)?);
         Ok(())
     }
 }

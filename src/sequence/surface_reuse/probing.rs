@@ -12,11 +12,11 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
-use crate::reuse::audit::{self, Drawn, Shown};
+use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
+use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_lookups};
 use crate::scene::Camera;
-use crate::sequence::strips::Unheard;
+use crate::sequence::strips::NoProgress;
 use crate::shade::{FrameJob, Rendered};
 use crate::stats::{AuditSums, RayCounts};
 use rayon::prelude::*;
@@ -48,7 +48,7 @@ pub(super) struct Probed {
     /// What may be inferred in each part of the probes, by the findings of the other parts.
     crossed: Vec<Evidence>,
     /// Whether looking up saves more than it costs.
-    pub is_worth_looking: bool,
+    pub is_worth_lookups: bool,
 }
 
 impl Probed {
@@ -78,7 +78,7 @@ impl SurfaceReuse<'_> {
         let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
-        let is_worth = |known: &Evidence| is_worth_looking(known, before(), cast, usual);
+        let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, usual);
         let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
         let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let share = (first * usual).min(MOST);
@@ -90,7 +90,7 @@ impl SurfaceReuse<'_> {
             let probe = Probe::new(lookup, self.channels.len(), r.settings.reuse.tolerance);
             let with_gbuffer = self.with_gbuffer && stream == STREAMS[0];
             let job = self.job(camera, frame | stream, with_gbuffer, Some(&mask));
-            let rendered = self.render(job, Some(&probe as &dyn Inference), &Unheard)?;
+            let rendered = self.render(job, Some(&probe as &dyn Inference), &NoProgress)?;
             Some((rendered, probe))
         };
         let (first, own) = trace(STREAMS[0], Some(lookup))?;
@@ -105,9 +105,9 @@ impl SurfaceReuse<'_> {
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         // The frame's own probes are traced, whatever is done with what they say.
-        let is_worth_looking = is_worth_looking(&evidence, findings.iter(), cast, 0.0);
+        let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
         let traces = [first, second];
-        let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
+        let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_lookups };
         let probed = Arc::new(probed);
         self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
         Some(probed)
@@ -167,9 +167,9 @@ impl SurfaceReuse<'_> {
         let drawn = |i: usize| {
             let (index, weight) = (i as u32, probed.draw.weight());
             let group = probed.draw.group(index % film.width, index / film.width);
-            Drawn { index, weight, group }
+            AuditedPixel { index, weight, group }
         };
-        let drawn: Vec<Drawn> = places.iter().map(|i| drawn(*i)).collect();
+        let drawn: Vec<AuditedPixel> = places.iter().map(|i| drawn(*i)).collect();
         let shown = self.shown(&inferred);
         let traces = [&first.film.rgb[..], &second.film.rgb[..]];
         let mut sums = audit::sums(&shown, &drawn, traces);
@@ -199,14 +199,14 @@ impl SurfaceReuse<'_> {
             let tolerance = self.renderer.settings.reuse.tolerance;
             let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
             let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
-            let inferred = self.render(job, Some(&judged), &Unheard)?;
+            let inferred = self.render(job, Some(&judged), &NoProgress)?;
             Some((inferred.rays, Some(inferred.film)))
         })
     }
 
-    fn shown<'f>(&self, film: &'f Film) -> Shown<'f> {
+    fn shown<'f>(&self, film: &'f Film) -> AuditedFrame<'f> {
         let settings = self.renderer.settings;
-        Shown {
+        AuditedFrame {
             rgb: &film.rgb,
             provenance: film.provenance.as_deref().unwrap_or_default(),
             display: Display { exposure: settings.exposure, tone: settings.tone },
