@@ -16,7 +16,7 @@ use tweenray::scene::{
     CameraPath, DirectionalLight, Easing, Light, Material, QuadLight, Rect, Scene, Settings, Shot,
     Sky, ToneCurve, World, WorldSphere,
 };
-use tweenray::sequence::{ColourMaker, FrameMaker, Made, Tracer, check_upload};
+use tweenray::sequence::{ColourMaker, FrameContext, FrameMaker, Made, Tracer, check_upload};
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
 
@@ -92,9 +92,9 @@ impl Move {
             intersector: &*intersector,
         };
         let stop = AtomicBool::new(false);
-        let maker = ColourMaker::new(renderer, &self.shot, &pool, &stop, &Silent, rule, uploads)?;
+        let maker = ColourMaker::new(self.context(renderer, &pool, &stop), rule, uploads)?;
         maker.expect(frames);
-        frames.iter().map(|frame| Ok(maker.make(*frame)?.unwrap())).collect()
+        frames.iter().map(|frame| maker.make(*frame)).collect()
     }
 
     fn all(&self, rule: AgreementRule, uploads: &[(u32, Image)]) -> Vec<Made> {
@@ -106,21 +106,25 @@ impl Move {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
         let plan = EffectPlan::of(&self.scene, &self.settings);
-        let tracer = Tracer {
-            renderer: Renderer {
-                scene: &self.scene,
-                settings: &self.settings,
-                plan,
-                intersector: &*intersector,
-            },
-            shot: &self.shot,
-            pool: &pool,
-            with_gbuffer: false,
-            stop: &AtomicBool::new(false),
-            progress: &Silent,
-            joined: Default::default(),
+        let renderer = Renderer {
+            scene: &self.scene,
+            settings: &self.settings,
+            plan,
+            intersector: &*intersector,
         };
-        (1..=FRAMES).map(|frame| tracer.make(frame).unwrap().unwrap().film).collect()
+        let stop = AtomicBool::new(false);
+        let tracer = Tracer::new(self.context(renderer, &pool, &stop));
+        (1..=FRAMES).map(|frame| tracer.make(frame).unwrap().film).collect()
+    }
+
+    fn context<'a>(
+        &'a self,
+        renderer: Renderer<'a>,
+        pool: &'a rayon::ThreadPool,
+        stop: &'a AtomicBool,
+    ) -> FrameContext<'a> {
+        let (shot, with_gbuffer, progress) = (&self.shot, false, &Silent);
+        FrameContext { renderer, shot, pool, with_gbuffer, stop, progress }
     }
 }
 

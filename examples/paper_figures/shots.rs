@@ -11,7 +11,7 @@ use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{
     CameraPath, Easing, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
 };
-use tweenray::sequence::{ColourMaker, FrameMaker, Pyramid, SurfaceReuse};
+use tweenray::sequence::{ColourMaker, FrameContext, FrameMaker, Pyramid, SurfaceReuse};
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
 
@@ -90,19 +90,28 @@ impl Filmed {
     /// The paper's policy, `uploads` taken for frames.
     pub fn colour(&self, frame: u32, rule: AgreementRule, uploads: &[(u32, Image)]) -> Film {
         let intersector = self.intersector();
-        let (renderer, stop) = (self.renderer(&self.settings, &*intersector), no_stop());
-        let maker =
-            ColourMaker::new(renderer, &self.shot, &self.pool, &stop, &Silent, rule, uploads);
-        maker.unwrap().make(frame).unwrap().unwrap().film
+        let stop = no_stop();
+        let maker = ColourMaker::new(self.context(&*intersector, &stop), rule, uploads);
+        maker.unwrap().make(frame).unwrap().film
     }
 
     /// Ours.
     pub fn surface(&self, frame: u32) -> Film {
         let intersector = self.intersector();
-        let (renderer, stop) = (self.renderer(&self.settings, &*intersector), no_stop());
+        let stop = no_stop();
         let pyramid = Pyramid { segment: self.settings.reuse.segment, frames: FRAMES };
-        let maker = SurfaceReuse::new(renderer, &self.shot, &self.pool, &stop, &Silent, pyramid);
-        maker.unwrap().make(frame).unwrap().unwrap().film
+        let maker = SurfaceReuse::new(self.context(&*intersector, &stop), pyramid);
+        maker.unwrap().make(frame).unwrap().film
+    }
+
+    fn context<'a>(
+        &'a self,
+        intersector: &'a dyn Intersector,
+        stop: &'a AtomicBool,
+    ) -> FrameContext<'a> {
+        let (shot, pool, with_gbuffer, progress) = (&self.shot, &self.pool, false, &Silent);
+        let renderer = self.renderer(&self.settings, intersector);
+        FrameContext { renderer, shot, pool, with_gbuffer, stop, progress }
     }
 
     /// Every pixel traced at the same settings; with first-hit records.

@@ -7,7 +7,8 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::intersect::{self, Intersector};
 use crate::scene::{Scene, Settings, Shot};
-use crate::shade::{Progress, Renderer};
+use crate::sequence::NoProgress;
+use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
@@ -77,11 +78,4 @@ impl<'a> Stage<'a> {
         };
         self.pool.install(render).ok_or(Error::Stopped)
     }
-}
-
-/// Nobody watches the tiles of a trial.
-pub struct NoProgress;
-
-impl Progress for NoProgress {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

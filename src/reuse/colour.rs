@@ -18,10 +18,15 @@
 //! * The paper hashes pixels to lists. Here the entries lie frame by frame, so that those of a frame
 //!   that is not needed any more can be dropped; what is found is the same.
 
+use super::columns::{self, deflated, inflated};
 use crate::film::{Provenance, ProvenanceKind};
 use crate::math::Rgb;
+use crate::scene::ReuseSettings;
 
-/// When two entries of a pixel agree.
+/// Words of an entry: its pixel, its colour, its distance.
+const WORDS: usize = 5;
+
+/// The condition under which two entries of a pixel agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AgreementRule {
     /// Largest difference in any channel, linear radiance.
@@ -42,7 +47,7 @@ pub struct Entry {
     pub distance: f32,
 }
 
-/// What is known of one frame: all of it, or its discoveries.
+/// The known colours of one frame: of all its pixels, or of those that were traced (its discoveries).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KnownColours {
     /// Its number, from 1.
@@ -65,6 +70,12 @@ pub struct InferredColour {
 }
 
 impl AgreementRule {
+    /// The rule that `settings` ask for.
+    pub fn of(settings: &ReuseSettings) -> Self {
+        let ReuseSettings { colour_epsilon, distance_epsilon, .. } = *settings;
+        Self { colour_epsilon, distance_epsilon }
+    }
+
     /// Whether `a` and `b` agree.
     pub fn agree(&self, a: &Entry, b: &Entry) -> bool {
         let apart = (a.rgb - b.rgb).abs().max_element();
@@ -78,7 +89,7 @@ impl AgreementRule {
         unknown || a == b || distance_difference(a, b) <= self.distance_epsilon
     }
 
-    /// What `known`, in any order, tells of the `pixels` pixels of `frame`; `None` where a pixel
+    /// The colours of the `pixels` pixels of `frame`, inferred from `known` (in any order); `None` where a pixel
     /// must be traced.
     pub fn infer(
         &self,
@@ -125,6 +136,38 @@ fn nearest<'a>(
         nearest[entry.pixel as usize] = Some((k, entry));
     }
     nearest
+}
+
+impl KnownColours {
+    /// The entries as bytes: how many there are, then each in a record of the codec of references. `None`
+    /// where they would be too many.
+    pub fn encode(&self) -> Option<Vec<u8>> {
+        columns::size_of(self.entries.len(), WORDS, 0)?;
+        let raw = columns::planes(self.entries.len(), WORDS, |i, column| {
+            let Entry { pixel, rgb, distance } = self.entries[i];
+            [pixel, rgb.x.to_bits(), rgb.y.to_bits(), rgb.z.to_bits(), distance.to_bits()][column]
+        });
+        Some([&(self.entries.len() as u32).to_le_bytes()[..], &deflated(&raw)?].concat())
+    }
+
+    /// The entries that [`encode`](Self::encode) made bytes of, for frames of `pixels` pixels; `None` for other
+    /// bytes.
+    pub fn decode(frame: u32, mut bytes: &[u8], pixels: u32) -> Option<Self> {
+        let count = columns::take_u32(&mut bytes)?;
+        let raw = inflated(bytes, columns::size_of(count, WORDS, 0)?)?;
+        let entry = |i: usize| {
+            let word = |column| columns::word(&raw, count, i, column);
+            let float = |column| f32::from_bits(word(column));
+            let pixel = Some(word(0)).filter(|pixel| *pixel < pixels)?;
+            Some(Entry { pixel, rgb: Rgb::new(float(1), float(2), float(3)), distance: float(4) })
+        };
+        Some(Self { frame, entries: (0..count).map(entry).collect::<Option<_>>()? })
+    }
+
+    /// Bytes that the entries take in memory.
+    pub fn memory(&self) -> u64 {
+        size_of_val(&self.entries[..]) as u64
+    }
 }
 
 impl InferredColour {
@@ -221,6 +264,17 @@ mod tests {
         let frames = [known(1, &[(0, 0.0, 1.0)]), known(2, &[(0, 9.0, f32::NAN)])];
         let found = RULE.infer(&[&frames[0], &frames[1]], 2, 1)[0].expect("known");
         assert_eq!((found.rgb.x, found.provenance(2)), (9.0, Provenance::default()));
+    }
+
+    #[test]
+    fn entries_come_back_as_they_were_and_other_bytes_are_refused() {
+        let colours = known(3, &[(0, 0.5, 1.0), (7, -0.0, f32::INFINITY)]);
+        let bytes = colours.encode().expect("few");
+        assert_eq!(KnownColours::decode(3, &bytes, 8), Some(colours));
+        assert_eq!(KnownColours::decode(3, &bytes, 7), None);
+        assert!((0..bytes.len()).all(|i| KnownColours::decode(3, &bytes[..i], 8).is_none()));
+        let many = [&[0xff; 4], &bytes[4..]].concat();
+        assert_eq!(KnownColours::decode(3, &many, 8), None);
     }
 
     #[test]

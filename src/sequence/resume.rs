@@ -3,13 +3,12 @@
 mod refuse;
 
 use super::checkpoint;
-use super::recipe::{Recipe, Recipes};
+use super::recipe::Recipe;
+use super::target::{LEFTOVER_AGE, Target};
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{
-    Foreign, Header, Journal, Manifest, MapRow, Row, Turn, manifest_path,
-};
+use crate::output::manifest::{Foreign, Header, Manifest, MapRow, Row, Turn, manifest_path};
 use crate::output::maps::Map;
-use crate::output::{Format, FramePattern, PathKind, WriteOptions, atomic};
+use crate::output::{PathKind, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
@@ -19,51 +18,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-/// Temporary files of other machines' processes are cleared away once they are this old: on a shared
-/// folder a younger one may belong to one that lives.
-pub(super) const LEFTOVER_AGE: Duration = Duration::from_secs(60);
-
-/// Where the frames of a job go, and what they all share.
-#[derive(Debug, Clone)]
-pub struct Target {
-    /// Where frame n lies.
-    pub pattern: FramePattern,
-    /// What the frames share.
-    pub header: Header,
-    /// What each frame of the shot is made of.
-    pub recipes: Recipes,
-    /// How films become files.
-    pub write: WriteOptions,
-    /// Whether frames that exist are replaced.
-    pub overwrite: bool,
-}
-
-impl Target {
-    /// Whether frames have maps in files of their own.
-    pub fn has_map_files(&self) -> bool {
-        self.write.maps.is_some() && self.pattern.format() != Format::Exr
-    }
-
-    /// Where rank `rank` appends its rows: to the manifest itself, at `path`, or its part of that.
-    ///
-    /// # Errors
-    /// It cannot be opened, or is of other settings.
-    pub fn journal(&self, rank: u32, path: &Path) -> Result<Journal> {
-        if rank == 0 { Journal::of(path, &self.header) } else { Journal::open(path) }
-    }
-
-    /// Every file that frame `frame` has.
-    fn paths(&self, frame: u32) -> Vec<PathBuf> {
-        let frame = self.pattern.path(frame);
-        let maps = Map::ALL.iter().filter(|_| self.has_map_files());
-        let maps: Vec<PathBuf> = maps.map(|map| map.path(&frame)).collect();
-        std::iter::once(frame).chain(maps).collect()
-    }
-}
-
-/// What there is to do.
+/// Which frames of a job are kept and which rendered.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Frames that exist whole, with the same settings, made of the same.
@@ -89,7 +45,7 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     prepare_with(target, frames, None)
 }
 
-/// The same, with what [`check_files`] found where that is known.
+/// [`prepare`], with what [`check_files`] found where that is known.
 ///
 /// # Errors
 /// As [`prepare`].
@@ -105,7 +61,7 @@ pub fn prepare_with(
     Ok(plan)
 }
 
-/// What lies where a frame and its maps belong.
+/// The hashes of the files of a frame and its maps, as they lie on disk.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FrameFiles {
     frame: u32,
@@ -115,7 +71,7 @@ pub struct FrameFiles {
     maps: Vec<(String, String)>,
 }
 
-/// Whether there are frames that [`prepare`] would read.
+/// Whether there may be frames on disk that [`prepare`] has to read.
 ///
 /// # Errors
 /// The manifest cannot be read.
@@ -127,7 +83,7 @@ pub fn has_frames_to_check(target: &Target) -> Result<bool> {
     Ok(found.is_some_and(|manifest| manifest.header.first_difference(&target.header).is_none()))
 }
 
-/// Reads whatever lies where `frames` belong.
+/// Reads and hashes the files of `frames`.
 ///
 /// # Errors
 /// A file that is there and cannot be read.
@@ -228,7 +184,7 @@ fn is_made_of(row: &Row, recipe: Option<&Recipe>) -> bool {
     recipe.is_some_and(|recipe| recipe.whole.to_string() == row.recipe)
 }
 
-/// How a frame stands on disk.
+/// The state of a frame on disk.
 #[allow(clippy::large_enum_variant, reason = "most are the large one")]
 enum State {
     Whole(BadSamples, Option<AuditSums>),
@@ -247,8 +203,8 @@ enum Damage {
 }
 
 impl Damage {
-    /// Of frame `first` and so many more, in a line however many they are: of a job that was stopped
-    /// while it replaced frames, all that it did not get to are not in the manifest.
+    /// A line about frame `first` and `more` others: of a job that was stopped while it replaced frames,
+    /// all that it did not get to are not in the manifest.
     fn note(self, first: &Path, more: usize) -> String {
         let why = match (self, more) {
             (Self::Unlisted, 0) => "is not in the manifest",

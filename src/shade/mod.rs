@@ -44,6 +44,7 @@ const SMALL: u64 = 8192;
 const PARALLEL_FROM: u64 = 512;
 
 /// What it takes to shade any frame of a job.
+#[derive(Clone, Copy)]
 pub struct Renderer<'a> {
     /// The scene, scene space.
     pub scene: &'a Scene,

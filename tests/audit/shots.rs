@@ -10,7 +10,7 @@ use tweenray::math::Rgb;
 use tweenray::output::Display;
 use tweenray::reuse::audit::{Rmse, rmse};
 use tweenray::scene::{Camera, CameraPath, ReuseSettings, Scene, Settings, Shot};
-use tweenray::sequence::{FrameMaker, Pyramid, SurfaceReuse};
+use tweenray::sequence::{FrameContext, FrameMaker, Pyramid, SurfaceReuse};
 use tweenray::shade::{FrameJob, Progress, Renderer};
 use tweenray::stats::{AuditSums, RayCounts};
 
@@ -113,6 +113,16 @@ impl Stage<'_> {
         Renderer { scene: &self.set.scene, settings, plan, intersector: &self.intersector }
     }
 
+    pub fn context<'a>(
+        &'a self,
+        settings: &'a Settings,
+        shot: &'a Shot,
+        stop: &'a AtomicBool,
+    ) -> FrameContext<'a> {
+        let (renderer, pool, progress) = (self.renderer(settings), &self.pool, &Quiet);
+        FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress }
+    }
+
     /// Renders and audits shot `number`, then renders its frames again, traced and converged.
     pub fn audited(&self, trial: &Trial, number: u32) -> Audited {
         let (settings, shot) = (self.settings(trial, number), self.shot(trial, number));
@@ -126,12 +136,11 @@ impl Stage<'_> {
         let pyramid = Pyramid { segment: 64, frames: shot.frames };
         let frames: Vec<u32> = pyramid.all().collect();
         let maker =
-            SurfaceReuse::new(self.renderer(settings), shot, &self.pool, &stop, &Quiet, pyramid);
-        let maker = maker.expect("cameras");
+            SurfaceReuse::new(self.context(settings, shot, &stop), pyramid).expect("cameras");
         maker.expect(&frames);
         let (mut sums, mut truth) = (AuditSums::default(), Truth::default());
         for frame in pyramid.order(&frames) {
-            let made = maker.make(frame).expect("made").expect("not stopped");
+            let made = maker.make(frame).expect("made");
             let Some(audit) = made.audit else { continue };
             sums += audit;
             let camera = shot.camera(frame, settings.width, settings.height).expect("a camera");

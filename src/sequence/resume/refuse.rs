@@ -1,10 +1,10 @@
 //! What is in the way of a job, and must not be replaced unasked.
 
-use super::Target;
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Foreign, Manifest, Row};
 use crate::scene::FrameRange;
-use crate::sequence::Recipe;
+use crate::sequence::recipe::Recipe;
+use crate::sequence::target::Target;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
