@@ -141,9 +141,10 @@ pub struct TracedPoints {
 
 impl TracedPoints {
     /// Takes in all of `other`, behind its own.
-    pub fn append(&mut self, mut other: Self) {
-        self.points.append(&mut other.points);
-        self.ratios.append(&mut other.ratios);
+    pub fn append(&mut self, other: Self) {
+        let Self { mut points, mut ratios } = other;
+        self.points.append(&mut points);
+        self.ratios.append(&mut ratios);
     }
 
     /// The same points row by row; those of a pixel stay in their order.

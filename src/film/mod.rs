@@ -127,12 +127,13 @@ impl GBuffer {
 
     /// Takes in the records of more pixels, behind its own.
     pub fn append(&mut self, more: Self) {
-        self.depth.extend(more.depth);
-        self.position.extend(more.position);
-        self.normal.extend(more.normal);
-        self.albedo.extend(more.albedo);
-        self.mesh_id.extend(more.mesh_id);
-        self.motion.extend(more.motion);
+        let Self { depth, position, normal, albedo, mesh_id, motion } = more;
+        self.depth.extend(depth);
+        self.position.extend(position);
+        self.normal.extend(normal);
+        self.albedo.extend(albedo);
+        self.mesh_id.extend(mesh_id);
+        self.motion.extend(motion);
     }
 
     /// One pixel's record.
