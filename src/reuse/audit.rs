@@ -18,7 +18,7 @@ const UNSEEN_INFERRED: f64 = 64.0;
 /// Display steps.
 const STEPS: f64 = 255.0;
 
-/// A frame's pixels as the audit sees them.
+/// The pixels of a frame that is audited.
 #[derive(Clone, Copy)]
 pub struct AuditedFrame<'a> {
     /// Radiance, row by row.
@@ -29,14 +29,14 @@ pub struct AuditedFrame<'a> {
     pub display: Display,
 }
 
-/// A pixel that was drawn.
+/// A pixel that was drawn at random for the audit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AuditedPixel {
     /// Row by row.
     pub index: u32,
     /// One over the probability with which it was drawn.
     pub weight: f64,
-    /// Pixels of one number were drawn together: neighbours, whose errors are alike.
+    /// Pixels with one group number are neighbours that were drawn together; their errors are alike.
     pub group: u64,
 }
 
@@ -47,8 +47,8 @@ impl AuditedFrame<'_> {
     }
 }
 
-/// What two traces `a` and `b` tell about a pixel that is `shown`, squares of a display step, the
-/// mean of the channels.
+/// Squared errors of a pixel as it is shown and of a trace, from two independent traces: squares of a display
+/// step, the mean of the channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SquaredErrors {
     /// Squared error of what is shown; may be negative.
@@ -58,7 +58,7 @@ pub struct SquaredErrors {
 }
 
 impl SquaredErrors {
-    /// Compares radiances.
+    /// The squared errors of the radiance `shown`, from the traces `a` and `b`.
     ///
     /// Traces are right on average in radiance, not in display steps: the display's curve bends
     /// them. So the squared error is not `(I - A)(I - B)` itself but `2f(M) - (f(A) + f(B))/2` with
@@ -148,11 +148,11 @@ impl Part {
 /// Root mean squares with their 95 % intervals, display steps of 255.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rmse {
-    /// Of the inferred pixels.
+    /// RMSE of the inferred pixels.
     pub inferred: Interval,
-    /// Of the audited frames, all their pixels.
+    /// RMSE of all pixels of the audited frames.
     pub shown: Interval,
-    /// Of the same frames, had they been traced.
+    /// RMSE of the same frames, had they been traced.
     pub traced: Interval,
 }
 

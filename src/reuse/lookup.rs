@@ -19,22 +19,22 @@ use crate::inference::{Estimate, Inference, LookupBatch};
 /// Points that are looked up together: the memory that all of them need is asked for before any of it
 /// is waited for.
 pub(super) const TOGETHER: usize = 16;
-/// Least sum of weights, of 1 that a whole reference gives.
+/// Least sum of weights for an estimate; a reference that surrounds the point gives 1.
 pub(super) const LEAST_WEIGHT: f64 = 0.1;
 
-/// Estimates from reference frames, asked in their order.
+/// Estimates ratios from reference frames.
 pub struct Lookup<'a> {
     /// The frame that is inferred.
     pub frame: u32,
-    /// The first two are asked always, the others where those do not tell enough.
+    /// The references in the order of lookup: the first two always, the others where these give too little weight.
     pub references: &'a [&'a Reference],
     /// Shadow rays that tracing casts from a camera sample to each light whose ratios are kept.
     pub rays: &'a [u32],
 }
 
-/// Uses what the evidence allows of a lookup's estimates.
+/// Answers with those estimates of a lookup that the evidence allows.
 pub struct Judged<'a> {
-    /// What estimates.
+    /// The source of estimates.
     pub lookup: &'a Lookup<'a>,
     /// The evidence that judges the estimates of a pixel (column, row).
     pub evidence: &'a (dyn Fn([u32; 2]) -> &'a Evidence + Sync),

@@ -8,7 +8,7 @@ use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
 
-/// Parts of a frame's probes that are judged by one another.
+/// Number of parts that a frame's probes are cut into; each part is judged by the findings of the others.
 pub const PARTS: usize = 4;
 
 /// Which pixels of a frame are probes: one at a random place in each square cell of the image.
@@ -66,7 +66,7 @@ impl ProbeDraw {
     }
 }
 
-/// Notes estimates and traces of probes; answers nothing, so that all is traced.
+/// Records estimates and traces of probes; answers no question, so that all is traced.
 pub struct Probe<'a> {
     /// What estimates; `None` to note the traces alone.
     pub lookup: Option<&'a Lookup<'a>>,
