@@ -11,8 +11,7 @@ use support::Candidate;
 use tweenray::import::Loaded;
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::scene::{Camera, Scene, Settings, Shot};
-use tweenray::shade::{Progress, Renderer};
-use tweenray::stats::RayCounts;
+use tweenray::shade::Renderer;
 
 const FRAME: u32 = 8;
 
@@ -111,16 +110,10 @@ fn row(
 /// Renders a frame and counts its rays.
 fn frame(renderer: &Renderer, camera: &Camera, pool: &ThreadPool) -> u64 {
     let stop = AtomicBool::new(false);
-    let film = pool.install(|| renderer.render(camera, FRAME, false, &stop, &Quiet));
+    let film = pool.install(|| renderer.render(camera, FRAME, false, &stop, &()));
     film.expect("nobody stops it").1.total()
 }
 
 fn say_seconds(seconds: f64) -> String {
     if seconds < 0.1 { format!("{:.2} ms", seconds * 1e3) } else { format!("{seconds:.2} s") }
-}
-
-struct Quiet;
-
-impl Progress for Quiet {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

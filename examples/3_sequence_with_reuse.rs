@@ -13,7 +13,7 @@ use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::reuse::audit::{Rmse, rmse};
 use tweenray::scene::{CameraPath, Light, QuadLight, ReuseSettings, Settings, Shot};
-use tweenray::sequence::{FrameMaker, Pyramid, SurfaceReuse};
+use tweenray::sequence::{FrameContext, FrameMaker, Pyramid, SurfaceReuse};
 use tweenray::shade::Renderer;
 use tweenray::stats::{AuditSums, ReuseCounts};
 
@@ -44,14 +44,16 @@ pub fn render(frames: u32) -> Result<(ReuseCounts, Rmse)> {
     let intersector = intersect::build(&scene, &settings, 1)?;
     let renderer = Renderer::new(&scene, &settings, &*intersector);
     let pool = rayon::ThreadPoolBuilder::new().build().map_err(|e| Error::Failed(e.to_string()))?;
-    let (pyramid, never) = (Pyramid::whole(frames), AtomicBool::new(false));
-    let maker = SurfaceReuse::new(renderer, &shot, &pool, &never, &(), pyramid)?;
+    let (pyramid, stop) = (Pyramid::whole(frames), &AtomicBool::new(false));
+    let (shot, pool, progress) = (&shot, &pool, &());
+    let context = FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress };
+    let maker = SurfaceReuse::new(context, pyramid)?;
     // Both ends, then the middle, then the quarters: each after those that it is inferred from.
     let order = pyramid.by_need();
     maker.expect(&order);
     let (mut reused, mut audit) = (ReuseCounts::default(), AuditSums::default());
     for frame in order {
-        let made = maker.make(frame)?.ok_or(Error::Stopped)?;
+        let made = maker.make(frame)?;
         reused += made.reuse;
         audit += made.audit.unwrap_or_default();
     }

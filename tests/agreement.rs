@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Silent, load_job, render, threads};
+use common::{load_job, render, threads};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use tweenray::film::Film;
@@ -81,5 +81,5 @@ fn on_all_cores(job: &common::Job) -> Film {
     let intersector: Box<dyn Intersector + Send> =
         intersect::build(&scene, &job.settings, threads()).unwrap();
     let renderer = Renderer::new(&scene, &job.settings, &*intersector);
-    renderer.render(&job.camera, 8, false, &AtomicBool::new(false), &Silent).unwrap().0
+    renderer.render(&job.camera, 8, false, &AtomicBool::new(false), &()).unwrap().0
 }

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Job, Silent, job, pose, render, render_scene, render_with_every_effect};
+use common::{Job, job, pose, render, render_scene, render_with_every_effect};
 use std::sync::atomic::AtomicBool;
 use tweenray::effects::EffectPlan;
 use tweenray::embree::floating_point_mode;
@@ -97,7 +97,7 @@ fn on_threads(job: &Job, threads: usize) -> Film {
     let intersector = pool.install(|| intersect::build(&scene, &job.settings, threads)).unwrap();
     let renderer = Renderer::new(&scene, &job.settings, &*intersector);
     let stop = AtomicBool::new(false);
-    let film = pool.install(|| renderer.render(&job.camera, 7, true, &stop, &Silent)).unwrap().0;
+    let film = pool.install(|| renderer.render(&job.camera, 7, true, &stop, &())).unwrap().0;
     assert!(pool.broadcast(|_| floating_point_mode()).iter().all(|mode| *mode == before));
     film
 }
@@ -189,7 +189,7 @@ fn camera_samples_do_not_depend_on_the_frame_but_shading_does() {
     let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
     let renderer = Renderer::new(&scene, &job.settings, &*intersector);
     let stop = AtomicBool::new(false);
-    let frame = |n| renderer.render(&job.camera, n, true, &stop, &Silent).unwrap().0;
+    let frame = |n| renderer.render(&job.camera, n, true, &stop, &()).unwrap().0;
     let (one, two) = (frame(1), frame(2));
     assert!(one.gbuffer == two.gbuffer && one.rgb != two.rgb);
 }
@@ -200,7 +200,7 @@ fn a_stopped_frame_is_no_frame() {
     let scene = job.world.clone().into_scene(true).unwrap();
     let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
     let renderer = Renderer::new(&scene, &job.settings, &*intersector);
-    assert!(renderer.render(&job.camera, 1, true, &AtomicBool::new(true), &Silent).is_none());
+    assert!(renderer.render(&job.camera, 1, true, &AtomicBool::new(true), &()).is_none());
 }
 
 #[test]

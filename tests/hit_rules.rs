@@ -270,7 +270,7 @@ fn of_coincident_faces_the_lowest_number_is_seen() {
         let embree = EmbreeIntersector::new(&scene, job.settings.rules, None, threads).unwrap();
         let renderer = tweenray::shade::Renderer::new(&scene, &job.settings, &embree);
         let stop = std::sync::atomic::AtomicBool::new(false);
-        let (film, _) = renderer.render(&job.camera, 1, false, &stop, &common::Silent).unwrap();
+        let (film, _) = renderer.render(&job.camera, 1, false, &stop, &()).unwrap();
         film.rgb
     };
     let one = picture(1, 1);

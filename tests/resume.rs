@@ -15,12 +15,13 @@ use tweenray::intersect;
 use tweenray::output::manifest::{FORMAT, Header, manifest_path};
 use tweenray::output::{Format, FramePattern, WriteOptions};
 use tweenray::reuse;
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::reuse::store::Compatibility;
 use tweenray::scene::{FrameRange, Policy, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
 use tweenray::sequence::{
-    ColourMaker, FrameMaker, Pyramid, Recipes, Shared, SurfaceReuse, Target, prepare, render_frames,
+    ColourMaker, FrameContext, FrameGraph, FrameMaker, Pyramid, RankMaker, Recipes, SurfaceReuse,
+    Target, prepare, render_frames,
 };
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
@@ -62,10 +63,7 @@ struct Run {
 
 /// What makers are made of.
 struct Tools<'a> {
-    renderer: Renderer<'a>,
-    pool: &'a rayon::ThreadPool,
-    stop: &'a AtomicBool,
-    traced: &'a Traced,
+    context: FrameContext<'a>,
     checkpoints: &'a Checkpoints<'a>,
 }
 
@@ -116,11 +114,10 @@ impl Bed {
     fn process(&self, act: impl FnOnce(&mut SurfaceReuse, &Target, &Compatibility)) -> Run {
         self.with(|tools| {
             let pyramid = Pyramid { segment: 8, frames: 17 };
-            let Tools { renderer, pool, stop, traced, checkpoints } = tools;
-            let maker = SurfaceReuse::new(renderer, &self.shot, pool, stop, traced, pyramid);
-            let mut maker = maker.expect("cameras");
-            maker.with_gbuffer = self.ending == "exr";
-            maker.terms = maker.with_gbuffer.then(|| checkpoints.terms.clone());
+            let Tools { context, checkpoints } = tools;
+            let with_gbuffer = context.with_gbuffer;
+            let mut maker = SurfaceReuse::new(context, pyramid).expect("cameras");
+            maker.terms = with_gbuffer.then(|| checkpoints.terms.clone());
             maker.checkpoints = Some(checkpoints);
             act(&mut maker, checkpoints.target, checkpoints.terms);
             maker.notes()
@@ -130,10 +127,9 @@ impl Bed {
     /// As [`run`](Self::run), under policy `colour`.
     fn run_colour(&self, frames: &[u32], count: usize) -> Run {
         self.with(|tools| {
-            let rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
-            let Tools { renderer, pool, stop, traced, checkpoints } = tools;
-            let maker = ColourMaker::new(renderer, &self.shot, pool, stop, traced, rule, &[]);
-            let mut maker = maker.expect("no pictures");
+            let rule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+            let Tools { context, checkpoints } = tools;
+            let mut maker = ColourMaker::new(context, rule, &[]).expect("no pictures");
             maker.checkpoints = Some(checkpoints);
             maker.expect(frames);
             let (target, frames) = (checkpoints.target, &frames[..count]);
@@ -156,13 +152,15 @@ impl Bed {
         let renderer = Renderer::new(&self.scene, settings, &*intersector);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
         let (stop, traced) = (AtomicBool::new(false), Traced::default());
-        notes.extend(act(Tools {
+        let context = FrameContext {
             renderer,
+            shot: &self.shot,
             pool: &pool,
+            with_gbuffer: self.ending == "exr",
             stop: &stop,
-            traced: &traced,
-            checkpoints: &checkpoints,
-        }));
+            progress: &traced,
+        };
+        notes.extend(act(Tools { context, checkpoints: &checkpoints }));
         let frames = *traced.0.lock().expect("whole");
         Run { frames: frames.round(), notes }
     }
@@ -215,13 +213,13 @@ fn references_go_from_disk_to_other_ranks_without_a_ray() {
         let bed = killed(ending, None);
         let run = bed.process(|maker, _, terms| {
             maker.exchange = Some(terms.clone());
-            let found: Vec<u32> = (1..=17).filter(|f| maker.lies_on_disk(*f)).collect();
+            let found: Vec<u32> = (1..=17).filter(|f| maker.is_on_disk(*f)).collect();
             let mut expected = on_disk.to_vec();
             expected.sort_unstable();
             assert_eq!(found, expected);
             for frame in on_disk {
                 maker.hold(*frame);
-                assert!(maker.make_source(*frame).expect("read"));
+                maker.make_reference(*frame).expect("read");
                 let sent = maker.export(*frame).expect("bytes").bytes;
                 let file = fs::read(bed.reference(1)).unwrap_or_default();
                 assert!(*frame != 1 || file.is_empty() || file.ends_with(&sent));

@@ -1,11 +1,12 @@
 //! Where an in-between frame's time goes: the same frame, more of it each time.
 
 use super::cost::Bare;
-use super::moves::{self, Quiet, Set, Stage};
+use super::moves::{self, Set, Stage};
 use super::{Choice, support};
 use std::collections::BTreeMap;
 use support::Candidate;
-use tweenray::inference::{Channels, Inference, LookupBatch, Origin};
+use tweenray::film::{Provenance, ProvenanceKind};
+use tweenray::inference::{Channels, Inference, LookupBatch};
 use tweenray::output::{WriteOptions, write_image};
 use tweenray::reuse::{self, Lookup, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
@@ -25,9 +26,9 @@ impl Inference for AllKnown {
         let (points, channels) = (batch.points.len(), batch.unshadowed.len());
         batch.ratios.clear();
         batch.ratios.resize(channels, 1.0);
-        batch.origins.clear();
-        let found = Origin { frame: 1, earlier: true, ..Origin::default() };
-        batch.origins.resize(points, found);
+        batch.provenance.clear();
+        let found = Provenance { kind: ProvenanceKind::Earlier, frame: 1, distance: 0.0 };
+        batch.provenance.resize(points, found);
     }
 }
 
@@ -108,7 +109,7 @@ impl<'a> Stand<'a> {
     }
 
     fn render(&self, renderer: &Renderer, job: &FrameJob) -> Rendered {
-        let render = || renderer.render_job(job, &self.stage.stop, &Quiet);
+        let render = || renderer.render_job(job, &self.stage.stop, &());
         self.stage.pool.install(render).expect("not stopped")
     }
 

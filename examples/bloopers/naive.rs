@@ -7,13 +7,8 @@ use std::sync::atomic::AtomicBool;
 use tweenray::intersect::{self, Hit, Intersector, Ray, SurfaceInteraction};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{DirectionalLight, Light, Scene};
-use tweenray::shade::{Progress, Renderer};
+use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
-
-struct Silent;
-impl Progress for Silent {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
-}
 
 /// Our picture; with `test`, every hit must also pass the naive triangle test.
 pub fn render(still: &Still, test: Option<EpsilonTest>) -> Picture {
@@ -27,7 +22,7 @@ pub fn render(still: &Still, test: Option<EpsilonTest>) -> Picture {
     };
     let renderer = Renderer::new(&scene, settings, intersector);
     let stop = AtomicBool::new(false);
-    let (film, _) = renderer.render(&still.camera, 1, false, &stop, &Silent).unwrap();
+    let (film, _) = renderer.render(&still.camera, 1, false, &stop, &()).unwrap();
     Picture { width: film.width, height: film.height, rgb: film.rgb }
 }
 

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::intersect::{self, Intersector};
 use crate::scene::{Scene, Settings, Shot};
-use crate::shade::{Progress, Renderer};
+use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
@@ -70,16 +70,9 @@ impl<'a> Stage<'a> {
         let renderer = Renderer::new(self.scene, settings, intersector);
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render = || {
-            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &Unheard)?;
+            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &())?;
             Some((displayed(&film, settings), rays))
         };
         self.pool.install(render).ok_or(Error::Stopped)
     }
-}
-
-/// Nobody watches the tiles of a trial.
-pub struct Unheard;
-
-impl Progress for Unheard {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

@@ -2,13 +2,13 @@
 
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use super::stage::{Stage, Unheard};
-use crate::error::{Error, Result};
+use super::stage::Stage;
+use crate::error::Result;
 use crate::intersect::Intersector;
 use crate::reuse;
-use crate::reuse::colour::Rule;
+use crate::reuse::colour::AgreementRule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
+use crate::sequence::{ColourMaker, FrameContext, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use std::time::Instant;
@@ -34,7 +34,7 @@ pub struct Trial {
 /// Makes `chosen` frames under `settings`, and what they are inferred from.
 ///
 /// # Errors
-/// [`Error::Stopped`]; those of cameras.
+/// [`Stopped`](crate::error::Error::Stopped); those of cameras.
 pub fn run(
     stage: &Stage,
     settings: &Settings,
@@ -53,7 +53,7 @@ pub fn run(
     let mut all_rays = RayCounts::default();
     for frame in order {
         let (start, cpu_start) = (Instant::now(), cpu_now());
-        let made = maker.make(frame)?.ok_or(Error::Stopped)?;
+        let made = maker.make(frame)?;
         seconds.push((frame, start.elapsed().as_secs_f64()));
         cpu.push((frame, cpu_now() - cpu_start));
         let cast = rays_of(&made);
@@ -87,28 +87,17 @@ fn maker<'m>(
     settings: &Settings,
 ) -> Result<Box<dyn FrameMaker + 'm>> {
     let Stage { shot, pool, stop, .. } = *stage;
-    let frames = shot.frames;
+    let progress = &();
+    let context = FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress };
     Ok(match settings.reuse.policy {
         Policy::Surface => {
-            let pyramid = Pyramid { segment: settings.reuse.segment, frames };
-            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
+            let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
+            Box::new(SurfaceReuse::new(context, pyramid)?)
         }
         Policy::Colour => {
-            let rule = Rule {
-                colour_epsilon: settings.reuse.colour_epsilon,
-                distance_epsilon: settings.reuse.distance_epsilon,
-            };
-            Box::new(ColourMaker::new(renderer, shot, pool, stop, &Unheard, rule, &[])?)
+            Box::new(ColourMaker::new(context, AgreementRule::of(&settings.reuse), &[])?)
         }
-        Policy::Off => Box::new(Tracer {
-            renderer,
-            shot,
-            pool,
-            with_gbuffer: false,
-            stop,
-            progress: &Unheard,
-            laid: Default::default(),
-        }),
+        Policy::Off => Box::new(Tracer::new(context)),
     })
 }
 

@@ -1,7 +1,7 @@
 //! What putting frames and checkpoints on disk takes: time alone, no pixel differs by it.
 
 use super::frames::Cut;
-use super::stage::{Stage, Unheard};
+use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::measure::{Interval, median};
@@ -10,7 +10,7 @@ use crate::output::{FramePattern, WriteOptions, atomic, write_image};
 use crate::reuse::{self, store::Compatibility};
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{FrameMaker, Pyramid, Recipes, SurfaceReuse, Target, Tracer};
+use crate::sequence::{FrameContext, FrameMaker, Pyramid, Recipes, SurfaceReuse, Target, Tracer};
 use crate::shade::Renderer;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -97,21 +97,19 @@ fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[Vec<f64>; 3]> {
     Ok(seconds)
 }
 
-fn renderer<'a>(stage: &Stage<'a>) -> Renderer<'a> {
-    let Stage { scene, base: settings, intersector, .. } = *stage;
-    Renderer::new(scene, settings, intersector)
+fn context<'a>(stage: &Stage<'a>) -> FrameContext<'a> {
+    let Stage { scene, base: settings, intersector, shot, pool, stop, .. } = *stage;
+    let renderer = Renderer::new(scene, settings, intersector);
+    FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress: &() }
 }
 
 fn traced(stage: &Stage) -> Result<Film> {
-    let Stage { shot, pool, stop, .. } = *stage;
-    let (renderer, progress, laid) = (renderer(stage), &Unheard, Default::default());
-    let tracer = Tracer { renderer, shot, pool, with_gbuffer: false, stop, progress, laid };
-    Ok(tracer.make(1)?.ok_or(Error::Stopped)?.film)
+    Ok(Tracer::new(context(stage)).make(1)?.film)
 }
 
 /// The first frame, and what its reference takes: seconds, and bytes on disk.
 fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
-    let Stage { scene, shot, base, pool, stop, .. } = *stage;
+    let Stage { scene, shot, base, .. } = *stage;
     let channels = reuse::channels(scene, base);
     let terms = Compatibility::of("", &channels, base);
     let target = target(stage, folder, !channels.is_empty())?;
@@ -120,11 +118,11 @@ fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, 
     let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
     let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
     for _ in 0..KEY_TIMES {
-        let mut maker = SurfaceReuse::new(renderer(stage), shot, pool, stop, &Unheard, pyramid)?;
+        let mut maker = SurfaceReuse::new(context(stage), pyramid)?;
         maker.checkpoints = Some(&checkpoints);
         let all: Vec<u32> = (1..=shot.frames).collect();
         maker.expect(&all);
-        film = Some(maker.make(1)?.ok_or(Error::Stopped)?.film);
+        film = Some(maker.make(1)?.film);
         let cost = maker.save_cost();
         seconds.push(cost.seconds);
         bytes = cost.bytes;

@@ -10,8 +10,7 @@ mod simulator;
 mod tests;
 
 use super::traffic::Traffic;
-use crate::error::Result;
-use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
+use crate::sequence::{FrameGraph, Pyramid};
 
 /// A job: frames, the dependencies between them, and how references are sent.
 #[derive(Debug, Clone, Copy)]
@@ -99,22 +98,16 @@ impl Job {
     }
 }
 
-impl FrameMaker for Job {
-    fn make(&self, _frame: u32) -> Result<Option<Made>> {
-        Ok(None)
-    }
-
+impl FrameGraph for Job {
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         self.pyramid.batches(frames)
     }
-}
 
-impl Shared for Job {
     fn needs(&self, original: u32) -> Vec<u32> {
         self.pyramid.ancestors(original)
     }
 
-    fn tells_all(&self) -> bool {
+    fn sends_to_all(&self) -> bool {
         self.sends_to_all
     }
 

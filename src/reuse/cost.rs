@@ -7,19 +7,19 @@ use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
-/// A camera ray with the look at its surface: the unit.
+/// Cost of a camera ray with the evaluation of its surface: the unit of cost.
 const CAMERA_RAY: f64 = 1.0;
-/// A ray from a mirror or glass, traced alone.
+/// Cost of a ray from a mirror or glass, traced alone.
 const SPECULAR_RAY: f64 = 2.0;
-/// A shadow ray with its sample, in a scene of a million triangles.
+/// Cost of a shadow ray with its sample, in a scene of a million triangles.
 const SHADOW_RAY: f64 = 1.2;
-/// Looking one surface point up.
+/// Cost of looking up one surface point in the first references.
 const LOOKUP: f64 = 1.5;
-/// The same in all references, with what it costs to keep the point for others.
+/// Cost of looking up one surface point in all references and of keeping the point for other frames.
 const LOOKUP_IN_ALL: f64 = 4.7;
-/// Putting one camera sample to its surface point.
+/// Cost of joining one camera sample to its surface point.
 const JOINING: f64 = 0.75;
-/// A check ray, of a shadow ray that is traced with many others of its point.
+/// Cost of a check ray, in shadow rays that are traced with many others of their point.
 const CHECK_RAY: f64 = 1.7;
 
 /// A shadow ray with its sample in `scene`: the fewer triangles, the flatter is their tree, and the more of it
@@ -110,7 +110,7 @@ fn why(scene: &Scene, rays: u32, looked_up: bool, spp: u32) -> String {
     }
 }
 
-/// What a frame costs that cast `rays` and looked `lookups` surface points up.
+/// The cost of a frame that cast `rays` and looked up `lookups` surface points.
 pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     CAMERA_RAY * rays[RayKind::Camera] as f64
         + SPECULAR_RAY * (rays[RayKind::Mirror] + rays[RayKind::Glass]) as f64
@@ -120,11 +120,11 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
 
 /// What the light of one surface point costs, of the camera samples that are shaded together.
 struct PointCost {
-    /// Tracing it.
+    /// Cost of tracing.
     traced: f64,
-    /// Check rays in place of that.
+    /// Cost of check rays.
     checked: f64,
-    /// Looking it up.
+    /// Cost of the lookup.
     lookup: f64,
 }
 
@@ -145,7 +145,7 @@ impl PointCost {
 
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
 /// probes found: a share `probed` of the points, each of which is traced once more than it needs to be.
-pub fn is_worth_looking<'f>(
+pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
     (scene, channels, settings): (&Scene, &Channels, &Settings),

@@ -56,20 +56,29 @@ impl World {
     }
 
     /// Adds all that `other` holds, with its indices shifted. The sky stays this world's.
-    pub fn append(&mut self, mut other: World) {
-        let materials = self.materials.len() as u32;
-        let textures = self.textures.len() as u32;
-        other.meshes.iter_mut().for_each(|mesh| mesh.material += materials);
-        other.spheres.iter_mut().for_each(|sphere| sphere.material += materials);
-        for texture in other.materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
-            *texture += textures;
+    pub fn append(&mut self, other: World) {
+        let World {
+            mut meshes,
+            mut spheres,
+            mut materials,
+            textures,
+            lights,
+            sky: _,
+            traced_regions,
+        } = other;
+        let first_material = self.materials.len() as u32;
+        let first_texture = self.textures.len() as u32;
+        meshes.iter_mut().for_each(|mesh| mesh.material += first_material);
+        spheres.iter_mut().for_each(|sphere| sphere.material += first_material);
+        for texture in materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
+            *texture += first_texture;
         }
-        self.meshes.append(&mut other.meshes);
-        self.spheres.append(&mut other.spheres);
-        self.materials.append(&mut other.materials);
-        self.textures.append(&mut other.textures);
-        self.lights.append(&mut other.lights);
-        self.traced_regions.append(&mut other.traced_regions);
+        self.meshes.append(&mut meshes);
+        self.spheres.append(&mut spheres);
+        self.materials.append(&mut materials);
+        self.textures.extend(textures);
+        self.lights.extend(lights);
+        self.traced_regions.extend(traced_regions);
     }
 }
 

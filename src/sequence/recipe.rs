@@ -15,12 +15,12 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tag([u8; 16]);
 
-/// What a frame is made of.
+/// Hashes of all that a frame's bytes are a function of, beside world and settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Recipe {
-    /// Its number and camera, and the camera before it where its file holds motion.
+    /// Hash of number and camera, and of the camera before where the frame's file holds motion.
     pub view: Tag,
-    /// The view, and all that it is inferred from.
+    /// Hash of the view and of the numbers and cameras of all frames that it is inferred from.
     pub whole: Tag,
 }
 
@@ -60,7 +60,7 @@ impl Recipes {
     }
 }
 
-/// For each original, by frame, what its traced points are a function of.
+/// For each original, by frame, the hash of all that its traced points are a function of.
 fn sources(schedule: &Schedule, cameras: &[Camera]) -> Vec<Tag> {
     let mut tags = vec![Tag::default(); cameras.len()];
     for frame in schedule.by_need() {

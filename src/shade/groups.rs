@@ -7,8 +7,9 @@
 use super::direct::ShadingPoint;
 use super::pixels::{BLOCK, BlockPixels};
 use super::{FrameInput, Reuse};
+use crate::film::Provenance;
 use crate::inference::{
-    Checked, Estimate, LookupBatch, Origin, SurfacePoint, TracedPoint, TracedPoints, check_rays,
+    Checked, Estimate, LookupBatch, SurfacePoint, TracedPoint, TracedPoints, check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -152,8 +153,8 @@ impl Groups {
         let (count, channels) = (self.asked.points.len(), reuse.channels.len());
         self.asked.ratios.clear();
         self.asked.ratios.resize(count * channels, f32::NAN);
-        self.asked.origins.clear();
-        self.asked.origins.resize(count, Origin::default());
+        self.asked.provenance.clear();
+        self.asked.provenance.resize(count, Provenance::default());
         self.asked.pixels.clear();
         let place = |pixel: &u32| <[u32; 2]>::from(pixels.place(*pixel));
         self.asked.pixels.extend(self.pixels.iter().map(place));
@@ -379,8 +380,8 @@ impl Groups {
             };
             *lit += 1;
             *inferred += u64::from(!self.traced[i]);
-            let origin = (!self.traced[i]).then_some(&self.asked.origins[i]);
-            pixels.set_origin(self.pixels[i], origin);
+            let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
+            pixels.join_provenance(self.pixels[i], inferred);
             if self.traced[i] {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });

@@ -20,7 +20,7 @@ mod scattered;
 mod surface;
 
 use crate::effects::EffectPlan;
-use crate::film::{Film, GPixel, PixelSource};
+use crate::film::{Film, GPixel, Provenance};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::intersect::Intersector;
 use crate::math::Rgb;
@@ -71,6 +71,7 @@ const PARALLEL_FROM: u64 = 512;
 /// assert!((film.rgb[film.index(4, 4)] - Rgb::splat(0.5)).abs().max_element() < 1e-6);
 /// # Ok::<(), tweenray::error::Error>(())
 /// ```
+#[derive(Clone, Copy)]
 pub struct Renderer<'a> {
     /// The scene, scene space.
     pub(crate) scene: &'a Scene,
@@ -160,20 +161,20 @@ struct TileDone {
     /// Where each pixel lies in the film.
     places: Vec<u32>,
     rgb: Vec<Rgb>,
-    /// Empty where none are asked for, as `sources`.
+    /// Empty where none are asked for, as `provenance`.
     records: Vec<GPixel>,
-    sources: Vec<PixelSource>,
+    provenance: Vec<Provenance>,
     rays: RayCounts,
     bad: BadSamples,
     left: Left,
 }
 
 impl TileDone {
-    fn push(&mut self, place: u32, pixel: &FinishedPixel, with_source: bool) {
+    fn push(&mut self, place: u32, pixel: &FinishedPixel, with_provenance: bool) {
         self.places.push(place);
         self.rgb.push(pixel.rgb);
         self.records.extend(pixel.record);
-        self.sources.extend(with_source.then_some(pixel.source));
+        self.provenance.extend(with_provenance.then_some(pixel.provenance));
     }
 }
 
@@ -382,7 +383,7 @@ fn take_turns<S, T: Send>(
 
 fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
     let mut film = Film::new(job.camera.width, job.camera.height, job.with_gbuffer);
-    film.sources = job.reuse.map(|_| vec![PixelSource::default(); film.rgb.len()]);
+    film.provenance = job.reuse.map(|_| vec![Provenance::default(); film.rgb.len()]);
     let mut rays = RayCounts::default();
     let mut left = Left::default();
     for tile in tiles {
@@ -395,8 +396,8 @@ fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
         if let Some(gbuffer) = &mut film.gbuffer {
             places().zip(&tile.records).for_each(|(at, record)| gbuffer.set(at, record));
         }
-        if let Some(sources) = &mut film.sources {
-            places().zip(&tile.sources).for_each(|(at, source)| sources[at] = *source);
+        if let Some(provenance) = &mut film.provenance {
+            places().zip(&tile.provenance).for_each(|(at, own)| provenance[at] = *own);
         }
     }
     Rendered { film, rays, sources: left.sources, reuse: left.reuse }

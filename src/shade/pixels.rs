@@ -1,8 +1,8 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
 use super::{FrameInput, dimensions};
-use crate::film::{GPixel, PixelSource, Provenance};
-use crate::inference::{Origin, SAMPLES_TOGETHER};
+use crate::film::{GPixel, Provenance, ProvenanceKind};
+use crate::inference::SAMPLES_TOGETHER;
 use crate::math::Rgb;
 use crate::sampling::{PixelFilter, PixelSampler};
 use crate::scene::Rect;
@@ -37,7 +37,7 @@ pub(super) struct BlockPixels {
     bad: Vec<(u32, Fault)>,
     records: Vec<Record>,
     with_records: bool,
-    sources: Vec<PixelSource>,
+    provenance: Vec<Provenance>,
 }
 
 /// A pixel as it goes to the film.
@@ -51,7 +51,7 @@ pub(super) struct FinishedPixel {
     /// First hit, where asked for.
     pub record: Option<GPixel>,
     /// Where its light comes from.
-    pub source: PixelSource,
+    pub provenance: Provenance,
 }
 
 /// The sampler of the camera samples' places in a pixel. They do not depend on the frame: frame 0 is
@@ -112,7 +112,7 @@ impl BlockPixels {
             bad: Vec::new(),
             records: Vec::new(),
             with_records,
-            sources: Vec::new(),
+            provenance: Vec::new(),
         }
     }
 
@@ -148,8 +148,8 @@ impl BlockPixels {
         self.sums.resize(self.places.len(), Rgb::ZERO);
         self.suspects.clear();
         self.bad.clear();
-        self.sources.clear();
-        self.sources.resize(self.places.len(), PixelSource::default());
+        self.provenance.clear();
+        self.provenance.resize(self.places.len(), Provenance::default());
         self.records.clear();
         if self.with_records {
             let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
@@ -169,20 +169,9 @@ impl BlockPixels {
     }
 
     /// Notes where the light of a pixel's surface point comes from; `None` where it was traced.
-    pub fn set_origin(&mut self, pixel: u32, origin: Option<&Origin>) {
-        let source = match origin {
-            None => PixelSource { provenance: Provenance::Traced, ..PixelSource::default() },
-            Some(o) => PixelSource {
-                provenance: match (o.earlier, o.later) {
-                    (true, true) => Provenance::Both,
-                    (false, true) => Provenance::Later,
-                    _ => Provenance::Earlier,
-                },
-                frame: o.frame,
-                distance: o.distance,
-            },
-        };
-        self.sources[pixel as usize].join(&source);
+    pub fn join_provenance(&mut self, pixel: u32, inferred: Option<&Provenance>) {
+        let traced = Provenance { kind: ProvenanceKind::Traced, ..Provenance::default() };
+        self.provenance[pixel as usize].join(inferred.unwrap_or(&traced));
     }
 
     /// Pixels in the block.
@@ -340,7 +329,7 @@ impl BlockPixels {
             let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
             let rgb = if flagged { MAGENTA } else { sum * share };
             let record = self.records.get(i).map(|r| r.pixel);
-            FinishedPixel { x, y, rgb, record, source: self.sources[i] }
+            FinishedPixel { x, y, rgb, record, provenance: self.provenance[i] }
         })
     }
 }

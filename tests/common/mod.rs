@@ -7,18 +7,13 @@ use tweenray::film::Film;
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Camera, Material, Pose, Scene, Settings, World, WorldMesh, WorldSphere};
-use tweenray::shade::{Progress, Renderer};
+use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
 
 pub struct Job {
     pub world: World,
     pub camera: Camera,
     pub settings: Settings,
-}
-
-pub struct Silent;
-impl Progress for Silent {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 pub fn job(world: World, pose: Pose, width: u32, height: u32) -> Job {
@@ -48,7 +43,7 @@ pub fn render_with_every_effect(scene: &Scene, job: &Job) -> (Film, RayCounts) {
 }
 
 fn first_frame(renderer: &Renderer, job: &Job) -> (Film, RayCounts) {
-    renderer.render(&job.camera, 1, true, &AtomicBool::new(false), &Silent).unwrap()
+    renderer.render(&job.camera, 1, true, &AtomicBool::new(false), &()).unwrap()
 }
 
 pub fn pixels(film: &Film) -> impl Iterator<Item = (u32, u32, Rgb)> + '_ {

@@ -126,7 +126,7 @@ fn frame(scene: &Scene, shot: &Shot, settings: Settings, layer: &dyn Intersector
     let camera = shot.camera(FRAME, settings.width, settings.height).unwrap();
     let renderer = Renderer::new(scene, &settings, layer);
     let stop = AtomicBool::new(false);
-    renderer.render(&camera, FRAME, false, &stop, &crate::common::Silent).unwrap().0
+    renderer.render(&camera, FRAME, false, &stop, &()).unwrap().0
 }
 
 fn print(primary: &[Times], frames: &[Times], rays: usize) {

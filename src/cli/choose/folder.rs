@@ -21,7 +21,7 @@ impl Chooser<'_> {
         let is_there = |file: &str| folder.join(file).exists();
         let left = |m: &Manifest| m.rows.values().filter(|row| is_there(&row.file)).count();
         let Some((found, left)) = found.map(|m| (left(&m), m)).filter(|(left, _)| *left > 0) else {
-            return sequence::refuse_strangers(&request.target(tracer.into()), request.frames);
+            return sequence::refuse_unlisted(&request.target(tracer.into()), request.frames);
         };
         Err(Error::Usage(format!(
             "{} holds {} {}; --overwrite replaces them\n  \

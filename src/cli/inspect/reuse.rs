@@ -6,8 +6,7 @@ use crate::inference::Channels;
 use crate::reuse::{self, Reference, colour};
 use crate::scene::{Policy, Rect, Scene, Settings, Shot};
 use crate::sequence::Schedule;
-use crate::shade::{FrameJob, Progress, Renderer, Reuse};
-use crate::stats::RayCounts;
+use crate::shade::{FrameJob, Renderer, Reuse};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -85,7 +84,7 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
             mask: None,
             beyond_crop: true,
         };
-        let traced = small.render_job(&job, &AtomicBool::new(false), &Unseen);
+        let traced = small.render_job(&job, &AtomicBool::new(false), &());
         let sources = traced.map(|done| done.sources).unwrap_or_default();
         let camera = camera.to_scene(&renderer.scene.recentring);
         most = most.max(Reference::new(frame, &camera, &sources, channels.len()).memory());
@@ -132,13 +131,6 @@ impl AlwaysTraced {
         });
         (!all.is_empty()).then(|| format!("  always traced: {}{ignored}", all.join(", ")))
     }
-}
-
-/// Nobody looks on.
-struct Unseen;
-
-impl Progress for Unseen {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 impl Plan {

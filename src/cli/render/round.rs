@@ -10,10 +10,12 @@ use crate::cluster::{self, Communicator, Outcome};
 use crate::error::Result;
 use crate::intersect::Intersector;
 use crate::output::{Format, SequenceLock, atomic};
-use crate::reuse::colour::Rule;
+use crate::reuse::colour::AgreementRule;
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{ColourMaker, Plan, Pyramid, SaveCost, Shared, SurfaceReuse, Target, Tracer};
+use crate::sequence::{
+    ColourMaker, FrameContext, Plan, Pyramid, RankMaker, SaveCost, SurfaceReuse, Target, Tracer,
+};
 use crate::shade::Renderer;
 use rayon::ThreadPool;
 use std::time::Instant;
@@ -121,11 +123,12 @@ impl Frames<'_> {
         let with_gbuffer = pattern.format() == Format::Exr;
         let checkpoints = self.checkpoints();
         let (target, plan, stop) = (self.target, self.plan, &interrupt.stop);
-        let maker: Box<dyn Shared> = match settings.reuse.policy {
+        let progress = &watch;
+        let context = FrameContext { renderer, shot, pool, with_gbuffer, stop, progress };
+        let maker: Box<dyn RankMaker> = match settings.reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
-                let mut maker = SurfaceReuse::new(renderer, shot, pool, stop, &watch, pyramid)?;
-                maker.with_gbuffer = with_gbuffer;
+                let mut maker = SurfaceReuse::new(context, pyramid)?;
                 maker.supplied = self.request.references.cache.as_ref();
                 maker.checkpoints = Some(&checkpoints);
                 maker.exchange = (comm.size() > 1).then(|| self.request.terms.clone());
@@ -133,20 +136,12 @@ impl Frames<'_> {
                 Box::new(maker)
             }
             Policy::Colour => {
-                let rule = Rule {
-                    colour_epsilon: settings.reuse.colour_epsilon,
-                    distance_epsilon: settings.reuse.distance_epsilon,
-                };
-                let mut maker =
-                    ColourMaker::new(renderer, shot, pool, stop, &watch, rule, uploads)?;
-                maker.with_gbuffer = with_gbuffer;
+                let rule = AgreementRule::of(&settings.reuse);
+                let mut maker = ColourMaker::new(context, rule, uploads)?;
                 maker.checkpoints = Some(&checkpoints);
                 Box::new(maker)
             }
-            Policy::Off => {
-                let (progress, laid) = (&watch, Default::default());
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
-            }
+            Policy::Off => Box::new(Tracer::new(context)),
         };
         let done = |report: &_| watch.frame_done(report);
         let work = || cluster::render(comm, order, target, plan, &*maker, stop, &done);

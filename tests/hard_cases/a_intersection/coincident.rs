@@ -104,7 +104,7 @@ fn image(job: &Job, scene: &Scene, threads: usize) -> Vec<Rgb> {
     let intersector = tweenray::intersect::build(scene, &job.settings, threads).unwrap();
     let renderer = Renderer::new(scene, &job.settings, &*intersector);
     let never = std::sync::atomic::AtomicBool::new(false);
-    pool.install(|| renderer.render(&job.camera, 1, false, &never, &common::Silent)).unwrap().0.rgb
+    pool.install(|| renderer.render(&job.camera, 1, false, &never, &())).unwrap().0.rgb
 }
 
 /// A ray in a face's plane hits nothing but what lies behind: the convention of both tracers.

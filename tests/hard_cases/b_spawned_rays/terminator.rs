@@ -174,7 +174,7 @@ fn cost(outcome: &mut Outcome) {
             let renderer = tweenray::shade::Renderer::new(&scenes[i], &job.settings, &*intersector);
             let never = std::sync::atomic::AtomicBool::new(false);
             let start = Instant::now();
-            renderer.render(&job.camera, 1, false, &never, &common::Silent).unwrap();
+            renderer.render(&job.camera, 1, false, &never, &()).unwrap();
             times[i].push(start.elapsed().as_secs_f64());
         }
     }

@@ -14,11 +14,8 @@ const UNSEEN: f64 = 0.25;
 /// The lens that opens to `share` of its focus, which lies on the target.
 pub fn lens(set: &mut Set, share: f64) {
     let pose = set.shot.pose(1).unwrap();
-    let key = LensKey {
-        at: 0.0,
-        radius: share * pose.eye.distance(pose.target),
-        focus: Focus::Target,
-    };
+    let key =
+        LensKey { at: 0.0, radius: share * pose.eye.distance(pose.target), focus: Focus::Target };
     let path = ThinLensPath { keys: vec![key], blades: 0, blade_rotation_degrees: 0.0 };
     set.shot.lens = ShotLens::Thin(path);
 }

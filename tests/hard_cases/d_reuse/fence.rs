@@ -165,7 +165,7 @@ pub fn behind_pickets(size: Size, lamp: f64, change: impl FnOnce(&mut Set)) -> O
         outcome.count(u64::from(width * height), bad[0].len() as u64);
         for i in &bad[0] {
             let (x, y) = (*i as u32 % width, *i as u32 / width);
-            let source = made.film.sources.as_ref().unwrap()[*i];
+            let source = made.film.provenance.as_ref().unwrap()[*i];
             outcome.example(format!("lamp {lamp:.2}, frame {frame}, pixel {x},{y}: {source:?}"));
         }
         (control, stale) = (control + traced, stale + bad[1].len());
