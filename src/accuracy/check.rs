@@ -5,7 +5,7 @@ use super::effort::Effort;
 use super::error_model::Samples;
 use super::figures::{doubts, figure, squares};
 use super::foretell::{Prediction, Predictor};
-use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
+use super::probe::{Probe, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
@@ -83,7 +83,7 @@ impl Check {
     /// Wall seconds that a whole check of frames of `samples` is foretold to take.
     pub fn seconds(foretelling: &Predictor, samples: Samples) -> f64 {
         let whole = Effort::WHOLE;
-        let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
+        let pixels = f64::from(whole.frames) * f64::from(whole.checked_pixels());
         pixels * foretelling.patch_seconds(samples_of_reference(samples))
     }
 

@@ -1,9 +1,9 @@
 //! The measured table asked the other way round: which setting for this error, for this time.
 
-use super::errors::Errors;
-use super::foretell::ROUNDING;
+use super::errors::{Errors, ROUNDING};
 use super::knobs::Knob;
-use super::table::{Measured, Row};
+use super::row::Row;
+use super::table::Measured;
 use crate::measure::psnr;
 
 /// An error that is to be reached.

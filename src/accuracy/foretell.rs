@@ -13,9 +13,6 @@ use serde::{Deserialize, Serialize};
 
 pub use line::Line;
 
-/// What rounding to 8 bits adds to a squared error, display steps.
-pub const ROUNDING: f64 = 1.0 / 12.0;
-
 /// Times are not known to a tenth; so much longer may be taken by what is more accurate.
 const ALIKE: f64 = 1.1;
 

@@ -1,7 +1,7 @@
 //! The settings that nothing beats in both time and error.
 
 use super::knobs::Knob;
-use super::table::{Row, Spread};
+use super::row::{Row, Spread};
 use crate::measure::{Median, median};
 
 /// The rows on the front, by `time`, the fastest first: those that may be recommended and that no other
@@ -73,7 +73,7 @@ fn compared(a: &[f64], b: &[f64]) -> Option<Median> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::Change;
+    use super::super::change::Change;
     use super::super::table::tests::measured;
     use super::*;
 

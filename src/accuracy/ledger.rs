@@ -10,9 +10,9 @@
 //!
 //! Not done: no lock keeps two sweeps from writing into the same folder at once.
 
+use super::change::Change;
 use super::errors::{Errors, Frames};
 use super::reference::Doubling;
-use super::table::Change;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::Journal;

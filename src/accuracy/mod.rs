@@ -19,6 +19,7 @@
 //! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
 mod candidates;
+mod change;
 mod check;
 mod choice;
 mod draw;
@@ -37,6 +38,7 @@ mod oracle;
 mod patches;
 mod probe;
 mod reference;
+mod row;
 mod search;
 mod sentences;
 mod stage;
@@ -60,9 +62,10 @@ pub use ledger::{Entry, Ledger};
 pub use oracle::{OracleCrop, on_a_crop};
 pub use probe::{Given, Probe};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
+pub use row::{Row, Spread};
 pub use sentences::{about_knob, about_oracle, about_writing};
 pub use stage::Stage;
 pub use sweep::{Heard, Picture, Sweep};
-pub use table::{Measured, Row, Spread};
+pub use table::Measured;
 pub use timing::{Timer, Timing};
 pub use writing::{Writing, on_disk};

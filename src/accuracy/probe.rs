@@ -7,16 +7,15 @@
 use super::choice::Goal;
 use super::effort::Effort;
 use super::error_model::{Causes, Samples};
-use super::foretell::{Predictor, Range};
-use super::patches::Patches;
+use super::foretell::Range;
+use super::patches::{Patches, one_sample};
 use super::reference::truth_settings;
-use super::search::Search;
 use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::film::Image;
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
-use crate::scene::{FrameRange, Policy, Settings};
+use crate::scene::{FrameRange, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -63,25 +62,8 @@ pub struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Looks at the scene. `heard` hears what is being done.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of rendering.
-    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
-        let effort = self.effort()?;
-        heard("errors of a short sweep");
-        let mut search = Search::begin(self, effort)?;
-        heard("times");
-        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
-        if let Some(goal) = self.goal {
-            heard("errors of what may be chosen");
-            search.try_likely(goal)?;
-        }
-        Ok(search.foretelling)
-    }
-
     /// As much as there is time for.
-    fn effort(&self) -> Result<Effort> {
+    pub(super) fn effort(&self) -> Result<Effort> {
         let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
         let mut settings = one_sample(self.stage.base);
         (settings.width, settings.height) = self.small_size(PILOT);
@@ -150,7 +132,7 @@ impl Probe<'_> {
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.1);
-                let count = checked_pixels(effort);
+                let count = effort.checked_pixels();
                 let patches = Patches::by_contrast_of(base, &frames, image, count, DRAW_OF_CHECK)?;
                 (frames, patches)
             }
@@ -188,19 +170,6 @@ fn between(numbers: &[u32]) -> Vec<u32> {
     let mut all: Vec<u32> = numbers.windows(2).flat_map(steps).collect();
     all.extend(numbers.last());
     all
-}
-
-/// Pixels that a check of `effort` looks at in each frame: more than the probe, since it does so once.
-pub(super) fn checked_pixels(effort: Effort) -> u32 {
-    effort.pixels + effort.pixels / 2
-}
-
-/// The settings of a look: one sample of everything, and every frame traced.
-pub(super) fn one_sample(base: &Settings) -> Settings {
-    let mut settings = base.clone();
-    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
-    settings.reuse.policy = Policy::Off;
-    settings
 }
 
 /// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.

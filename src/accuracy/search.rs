@@ -3,8 +3,9 @@
 use super::choice::Goal;
 use super::effort::Effort;
 use super::error_model::{ErrorModel, Point, Samples};
+use super::errors::ROUNDING;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Figure, Line, Measured, Pace, Predictor, ROUNDING};
+use super::foretell::{Figure, Line, Measured, Pace, Predictor};
 use super::patches::{Patches, Seen, rounded};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
@@ -40,6 +41,25 @@ pub(super) struct Search<'a> {
     found: Vec<Found>,
     /// What it comes to.
     pub foretelling: Predictor,
+}
+
+impl Probe<'_> {
+    /// Looks at the scene. `heard` hears what is being done.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Stopped`]; those of rendering.
+    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
+        let effort = self.effort()?;
+        heard("errors of a short sweep");
+        let mut search = Search::begin(self, effort)?;
+        heard("times");
+        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
+        if let Some(goal) = self.goal {
+            heard("errors of what may be chosen");
+            search.try_likely(goal)?;
+        }
+        Ok(search.foretelling)
+    }
 }
 
 impl<'a> Search<'a> {

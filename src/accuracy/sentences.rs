@@ -1,8 +1,10 @@
 //! A sentence per knob.
 
+use super::change::Change;
 use super::knobs::{Group, Knob};
 use super::oracle::OracleCrop;
-use super::table::{Change, Measured, Row};
+use super::row::Row;
+use super::table::Measured;
 use super::writing::Writing;
 use crate::measure::{Interval, Median};
 use crate::page::words::{bytes, change, count, percent, seconds, short};

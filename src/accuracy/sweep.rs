@@ -5,12 +5,14 @@
 //! The first turn warms up: its pictures count, its times do not. Each turn has a seed of its own,
 //! the same for all candidates.
 
+use super::change::Change;
 use super::errors::Errors;
 use super::knobs::Candidate;
 use super::ledger::{Entry, Ledger};
 use super::reference::{Truth, seed_of_turn};
+use super::row::Taken;
 use super::stage::Stage;
-use super::table::{Change, Measured, Taken};
+use super::table::Measured;
 use super::trial::{self, Trial};
 use crate::error::Result;
 use crate::page;

@@ -117,7 +117,7 @@ fn render(comm: &Communicator, interrupt: &Interrupt, args: &RenderArgs) -> Resu
     interrupt.limit(start, args.output.time_limit);
     // Only one rank talks.
     let quiet = args.output.quiet || !comm.is_root();
-    let mut request = Request::load(comm, args)?;
+    let mut request = Request::load(comm, &args.scene, &args.settings, &args.output)?;
     if args.output.time_limit.is_none() {
         interrupt.limit(start, request.time_limit);
     }

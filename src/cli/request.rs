@@ -3,7 +3,6 @@
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
 use super::exit::as_input;
 use super::references::{self, References};
-use super::render::RenderArgs;
 use super::{job, machine, values};
 use crate::cluster::{self, Communicator};
 use crate::error::{Diagnostic, Error, Result};
@@ -139,8 +138,12 @@ impl Read {
 
 impl Request {
     /// Reads the scene and puts the options over it. All ranks call it.
-    pub fn load(comm: &Communicator, args: &RenderArgs) -> Result<Self> {
-        let RenderArgs { scene, settings, output, .. } = args;
+    pub fn load(
+        comm: &Communicator,
+        scene: &SceneArgs,
+        settings: &SettingArgs,
+        output: &OutputArgs,
+    ) -> Result<Self> {
         // Before the work of reading a scene.
         comm.agree(machine::best_isa())?;
         let read = comm.from_node(|| Read::by(scene, settings, output));

@@ -10,6 +10,7 @@ mod framing;
 mod generators;
 mod lamps;
 mod lines;
+mod mesh_file;
 mod model;
 mod mtl;
 mod normals;
@@ -25,7 +26,8 @@ mod untextured;
 
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
-pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model, load_model};
+pub use mesh_file::load_model;
+pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};

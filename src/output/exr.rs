@@ -9,8 +9,8 @@
 //! The files hold at most one attribute that the crate `exr` keeps in a hash map, whose order differs
 //! from run to run: the same film is the same bytes.
 
-use super::Regular;
 use super::format::SOFTWARE;
+use super::path_kind::{Regular, check_memory};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::math::Vec3;
@@ -168,7 +168,7 @@ fn own_attribute((name, bytes): (&str, &[u8])) -> (Text, AttributeValue) {
 /// `limit` bytes.
 pub fn read_attribute(path: &Path, name: &str, limit: u64) -> Result<Option<Vec<u8>>> {
     let Regular { source, bytes } = Regular::at(path)?;
-    super::read::check_memory(path, bytes, limit)?;
+    check_memory(path, bytes, limit)?;
     let meta = MetaData::read_from_buffered(source, false);
     let meta = meta.map_err(|e| Error::input(path, format!("not a readable exr file: {e}")))?;
     let all = meta.headers.into_iter().flat_map(|header| header.own_attributes.other);
@@ -222,7 +222,7 @@ pub fn decode(path: &Path, source: impl BufRead + Seek, limit: u64) -> Result<Ch
     for header in chunks.headers() {
         let pixels = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
         let needed = pixels.saturating_mul(header.channels.list.len() as u64 * 4);
-        super::read::check_memory(path, needed, limit)?;
+        check_memory(path, needed, limit)?;
         if header.channels.list.iter().any(|c| c.sampling != Vec2(1, 1)) {
             return Err(Error::input(path, "subsampled exr channels are not supported"));
         }

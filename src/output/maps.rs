@@ -8,7 +8,7 @@ mod read;
 pub use read::of_exr;
 
 use super::exr::{Channel, Samples};
-use super::{Display, WriteOptions, Written, write_image};
+use super::{Display, WriteOptions, Written, png};
 use crate::error::Result;
 use crate::film::{Film, PixelSource, Provenance};
 use crate::math::{Rgb, luminance};
@@ -108,7 +108,7 @@ impl Map {
     /// Writes it for the frame at `path`.
     ///
     /// # Errors
-    /// [`write_image`]'s.
+    /// [`crate::error::Error::Io`] when the file cannot be written.
     pub fn write(
         self,
         path: &Path,
@@ -121,7 +121,7 @@ impl Map {
         let farthest = options.maps.unwrap_or(1.0);
         let painted = self.paint(film, &options.display, farthest);
         let options = WriteOptions { display, png_bits: 8, ..options.clone() };
-        write_image(&path, &painted, &options).map(|written| (path, written))
+        png::write(&path, &painted, &options).map(|written| (path, written))
     }
 
     /// It as a channel of an exr frame, `reuse.provenance`.

@@ -16,6 +16,7 @@ mod mesh;
 mod path;
 mod place;
 mod recentre;
+mod recentring;
 mod reuse;
 mod settings;
 mod time;
@@ -30,7 +31,7 @@ pub use light::{
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
-pub use recentre::Recentring;
+pub use recentring::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
     BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,

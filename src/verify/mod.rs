@@ -6,12 +6,13 @@
 //!
 //! Not done: two analytic spheres are compared by the same formula in both intersectors.
 
+mod class;
 mod differ;
 mod judge;
 mod rays;
 mod tally;
 
-pub use judge::{BAND_ULPS, Class, Difference};
+pub use class::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
 pub use tally::{OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally, Worst};
 

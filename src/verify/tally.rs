@@ -1,6 +1,6 @@
 //! Counts of differences. Sums and maxima only, so that the order of merging does not matter.
 
-use super::judge::{Class, Difference};
+use super::class::{Class, Difference};
 use super::rays::{Kind, RayId};
 use crate::measure::proportion_upper_bound;
 use serde::Serialize;
