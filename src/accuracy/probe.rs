@@ -6,7 +6,7 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::{Causes, Samples};
+use super::error_model::{Causes, SampleCounts};
 use super::foretell::Range;
 use super::patches::{Patches, one_sample};
 use super::reference::truth_settings;
@@ -30,7 +30,7 @@ pub const DRAW_OF_CHECK: u64 = 2;
 
 /// What the user set already, which is not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Given {
+pub struct FixedSettings {
     /// Camera samples.
     pub spp: bool,
     /// Shadow samples.
@@ -44,7 +44,7 @@ pub struct Given {
 }
 
 /// The scene and what is wanted of it.
-pub struct Probe<'a> {
+pub struct SettingsProbe<'a> {
     /// What all trials share.
     pub stage: &'a Stage<'a>,
     /// The frames of the job.
@@ -52,7 +52,7 @@ pub struct Probe<'a> {
     /// What is to be reached; `None` where a time is to be kept.
     pub goal: Option<Goal>,
     /// What is not chosen.
-    pub given: Given,
+    pub given: FixedSettings,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
     /// Seconds that the look may take; `None` where it may take as long as need be.
@@ -61,7 +61,7 @@ pub struct Probe<'a> {
     pub ranks: u32,
 }
 
-impl Probe<'_> {
+impl SettingsProbe<'_> {
     /// As much as there is time for.
     pub(super) fn effort(&self) -> Result<Effort> {
         let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
@@ -185,8 +185,8 @@ pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
 }
 
 /// Samples enough to hold `samples` against.
-pub fn samples_of_reference(samples: Samples) -> Samples {
-    Samples {
+pub fn samples_of_reference(samples: SampleCounts) -> SampleCounts {
+    SampleCounts {
         spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
         shadow: samples.shadow.max(4),
         sky: samples.sky.max(2),
@@ -194,7 +194,7 @@ pub fn samples_of_reference(samples: Samples) -> Samples {
 }
 
 /// Settings of a reference of so many samples: its seed is none of a job's or of a sweep's.
-pub fn reference(base: &Settings, samples: Samples) -> Settings {
+pub fn reference(base: &Settings, samples: SampleCounts) -> Settings {
     let mut settings = truth_settings(base, &[]);
     (settings.spp, settings.shadow_samples) = (samples.spp, samples.shadow);
     settings.sky_samples = samples.sky;

@@ -3,7 +3,7 @@
 use super::change::Change;
 use super::errors::Errors;
 use super::knobs::{Candidate, Knob};
-use super::ledger::Entry;
+use super::ledger::TrialRecord;
 use crate::measure::{Median, median};
 use crate::stats::RayCounts;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// A candidate's figures. Seconds, rays: per frame, the mean over the move.
 #[derive(Debug, Clone, Serialize)]
-pub struct Row {
+pub struct CandidateRow {
     /// What it turns.
     pub knob: Knob,
     /// The options that turn it; empty for the default.
@@ -47,7 +47,7 @@ pub struct Row {
     pub on_cpu_front: bool,
 }
 
-impl Row {
+impl CandidateRow {
     /// Whether its pixels were compared with the default's and are the same.
     pub fn has_pixels_of_default(&self) -> bool {
         self.change.is_some_and(|change| change.pixels > 0 && change.differing == 0)
@@ -66,11 +66,11 @@ pub struct Spread {
 
 /// What a candidate's turns gave so far, by turn.
 #[derive(Default)]
-pub struct Taken(pub(super) BTreeMap<u32, Entry>);
+pub struct Taken(pub(super) BTreeMap<u32, TrialRecord>);
 
 impl Taken {
     /// The entries of `candidate`, by turn.
-    pub fn of(entries: &[Entry], candidate: usize) -> Self {
+    pub fn of(entries: &[TrialRecord], candidate: usize) -> Self {
         let own = entries.iter().filter(|entry| entry.candidate == candidate);
         Self(own.map(|entry| (entry.turn, entry.clone())).collect())
     }
@@ -80,7 +80,7 @@ impl Taken {
         self.0.keys().any(|turn| *turn > 0)
     }
 
-    fn timed(&self, of: fn(&Entry) -> f64) -> Vec<f64> {
+    fn timed(&self, of: fn(&TrialRecord) -> f64) -> Vec<f64> {
         self.0.range(1..).map(|(_, entry)| of(entry)).collect()
     }
 
@@ -95,18 +95,18 @@ impl Taken {
     }
 
     /// `of` each turn from the `first` on over that of the same turn of `other`.
-    fn ratios(&self, other: &Self, first: u32, of: fn(&Entry) -> f64) -> Vec<f64> {
-        let ratio = |(turn, entry): (&u32, &Entry)| Some(of(entry) / of(other.0.get(turn)?));
+    fn ratios(&self, other: &Self, first: u32, of: fn(&TrialRecord) -> f64) -> Vec<f64> {
+        let ratio = |(turn, entry): (&u32, &TrialRecord)| Some(of(entry) / of(other.0.get(turn)?));
         self.0.range(first..).filter_map(ratio).collect()
     }
 }
 
 /// The row of `candidate`, whose turns gave `own`, beside the `default`'s; on no front yet.
-pub(super) fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> Row {
+pub(super) fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> CandidateRow {
     let sure = |ratios: &[f64]| median(ratios).filter(|m| m.interval.estimate.is_finite());
     let errors = own.errors();
     let first = own.0.values().next().cloned().unwrap_or_default();
-    Row {
+    CandidateRow {
         knob: candidate.knob,
         options: candidate.options.clone(),
         errors: Errors::mean(&errors),

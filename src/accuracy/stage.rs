@@ -72,7 +72,7 @@ impl<'a> Stage<'a> {
         let renderer = Renderer { scene: self.scene, settings, plan, intersector };
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render = || {
-            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &Unheard)?;
+            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &NoProgress)?;
             Some((displayed(&film, settings), rays))
         };
         self.pool.install(render).ok_or(Error::Stopped)
@@ -80,8 +80,8 @@ impl<'a> Stage<'a> {
 }
 
 /// Nobody watches the tiles of a trial.
-pub struct Unheard;
+pub struct NoProgress;
 
-impl Progress for Unheard {
+impl Progress for NoProgress {
     fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

@@ -2,14 +2,14 @@
 
 use super::front;
 use super::knobs::Candidate;
-use super::row::{Row, Taken, row};
+use super::row::{CandidateRow, Taken, row};
 use serde::Serialize;
 
 /// All rows, the default's first.
 #[derive(Debug, Clone, Serialize)]
 pub struct Measured {
     /// One a candidate.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CandidateRow>,
 }
 
 impl Measured {
@@ -27,7 +27,7 @@ impl Measured {
     }
 
     /// The default's.
-    pub fn default_row(&self) -> &Row {
+    pub fn default_row(&self) -> &CandidateRow {
         &self.rows[0]
     }
 }
@@ -37,7 +37,7 @@ pub(super) mod tests {
     use super::*;
     use crate::accuracy::errors::Errors;
     use crate::accuracy::knobs::Knob;
-    use crate::accuracy::ledger::Entry;
+    use crate::accuracy::ledger::TrialRecord;
     use crate::scene::Settings;
 
     pub fn measured(list: &[(Knob, &str, f64, f64)]) -> Measured {
@@ -58,13 +58,13 @@ pub(super) mod tests {
                 share_over_2: 0.0,
                 flicker: None,
             };
-            let entry = |turn| Entry {
+            let entry = |turn| TrialRecord {
                 turn,
                 seconds: *seconds,
                 default_seconds: default,
                 cpu_seconds: *seconds,
                 errors: errors.into(),
-                ..Entry::default()
+                ..TrialRecord::default()
             };
             Taken((0..=6).map(|turn| (turn, entry(turn))).collect())
         };

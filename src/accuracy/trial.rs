@@ -2,7 +2,7 @@
 
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use super::stage::{Stage, Unheard};
+use super::stage::{NoProgress, Stage};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::Intersector;
@@ -93,14 +93,14 @@ fn maker<'m>(
     Ok(match settings.reuse.policy {
         Policy::Surface => {
             let pyramid = Pyramid { segment: settings.reuse.segment, frames };
-            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
+            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &NoProgress, pyramid)?)
         }
         Policy::Colour => {
             let rule = Rule {
                 colour_epsilon: settings.reuse.colour_epsilon,
                 distance_epsilon: settings.reuse.distance_epsilon,
             };
-            Box::new(ColourMaker::new(renderer, shot, pool, stop, &Unheard, rule, &[])?)
+            Box::new(ColourMaker::new(renderer, shot, pool, stop, &NoProgress, rule, &[])?)
         }
         Policy::Off => Box::new(Tracer {
             renderer,
@@ -108,7 +108,7 @@ fn maker<'m>(
             pool,
             with_gbuffer: false,
             stop,
-            progress: &Unheard,
+            progress: &NoProgress,
             laid: Default::default(),
         }),
     })

@@ -1,7 +1,7 @@
 //! What putting frames and checkpoints on disk takes: time alone, no pixel differs by it.
 
 use super::frames::Cut;
-use super::stage::{Stage, Unheard};
+use super::stage::{NoProgress, Stage};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::Film;
@@ -105,7 +105,7 @@ fn renderer<'a>(stage: &Stage<'a>) -> Renderer<'a> {
 
 fn traced(stage: &Stage) -> Result<Film> {
     let Stage { shot, pool, stop, .. } = *stage;
-    let (renderer, progress, laid) = (renderer(stage), &Unheard, Default::default());
+    let (renderer, progress, laid) = (renderer(stage), &NoProgress, Default::default());
     let tracer = Tracer { renderer, shot, pool, with_gbuffer: false, stop, progress, laid };
     Ok(tracer.make(1)?.ok_or(Error::Stopped)?.film)
 }
@@ -121,7 +121,7 @@ fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, 
     let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
     let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
     for _ in 0..KEY_TIMES {
-        let mut maker = SurfaceReuse::new(renderer(stage), shot, pool, stop, &Unheard, pyramid)?;
+        let mut maker = SurfaceReuse::new(renderer(stage), shot, pool, stop, &NoProgress, pyramid)?;
         maker.checkpoints = Some(&checkpoints);
         let all: Vec<u32> = (1..=shot.frames).collect();
         maker.expect(&all);

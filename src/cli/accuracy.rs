@@ -11,7 +11,8 @@ use super::exit::Exit;
 use super::signals::Interrupt;
 use super::{job, machine, say, values};
 use crate::accuracy::{
-    self, Candidate, Group, Ledger, Measured, OracleCrop, Picture, Stage, Sweep, Truth, Writing,
+    self, Candidate, CandidatePicture, Group, Ledger, Measured, OracleCrop, Stage, Sweep, Truth,
+    Writing,
 };
 use crate::cluster;
 use crate::effects::EffectPlan;
@@ -25,7 +26,7 @@ use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
 use crate::scene::{FrameRange, Scene, Settings};
 use crate::sequence::fingerprint;
 use clap::Args;
-use measure::Job;
+use measure::SweepJob;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -96,7 +97,7 @@ struct Outcome<'a> {
     plan: EffectPlan,
     truth: &'a Truth,
     measured: Measured,
-    pictures: Vec<Picture>,
+    pictures: Vec<CandidatePicture>,
     oracle: Option<OracleCrop>,
     oracle_was_wanted: bool,
     writing: Option<Writing>,
@@ -165,11 +166,11 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let oracle_was_wanted = groups.contains(&Group::Oracle);
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.time_limit.or(time_limit));
-    let job = Job {
+    let job = SweepJob {
         args,
         sweep: &sweep,
         interrupt: &interrupt,
-        line: line::Line::new(args.quiet),
+        line: line::ProgressLine::new(args.quiet),
         oracle_was_wanted,
         writing_is_wanted: groups.contains(&Group::Writing),
         load: machine::load(),

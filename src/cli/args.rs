@@ -3,7 +3,7 @@
 use super::values::{self, Clamp, FrameRequest};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
-    BuildQuality, Filter, IntersectorKind, Interval, Policy, Recheck, Rect, ReuseSettings,
+    BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, SaveInterval,
     Settings, ToneCurve, limits,
 };
 use clap::Args;
@@ -267,7 +267,7 @@ pub struct OutputArgs {
     /// Put what frames to come need on disk every so often, so that a killed job need not trace it
     /// again: 30s, 5m, off [default: 30s]
     #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
-    pub checkpoint: Option<Interval>,
+    pub checkpoint: Option<SaveInterval>,
     /// Of several ranks of an MPI job: how many discoveries (points or pixels that one traced and others
     /// use) a message carries at most [default: 100000]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_EXCHANGE))]

@@ -7,7 +7,9 @@ mod judge;
 use super::args::SettingArgs;
 use super::request::Request;
 use super::{say, spelled, values};
-use crate::accuracy::{Given, Goal, Prediction, Predictor, Probe, Stage, Timer, Verdict};
+use crate::accuracy::{
+    FixedSettings, Goal, Prediction, Predictor, SettingsProbe, Stage, Timer, Verdict,
+};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
@@ -48,7 +50,7 @@ pub struct Choice {
     pub wanted: String,
     /// The settings before, and which of them the user gave.
     base: Value,
-    given: Given,
+    given: FixedSettings,
     /// The squared error that the target allows, display steps.
     allowed: Option<f64>,
     /// What is foretold of the choice.
@@ -71,7 +73,7 @@ pub struct Choice {
 
 /// What is to be done once frames were held against what was wanted.
 #[derive(Serialize, Deserialize)]
-pub enum Judged {
+pub enum Judgement {
     /// All frames are rendered again, under a tighter choice.
     Again(Choice),
     /// Nothing: the choice with what came of it.
@@ -257,7 +259,8 @@ impl Chooser<'_> {
         self.check_folder(tracer)?;
         let start = Instant::now();
         let budget = Budget::of(self);
-        let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
+        let probe =
+            SettingsProbe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
         let (foretelling, aim) = match self.args.target {
             Some(goal) => self.look(goal).map(|(found, aim)| (found, Some(aim)))?,
             None => (probe.look(&|what| self.tell(format!("probe: {what}")))?, None),
@@ -306,7 +309,7 @@ impl Chooser<'_> {
     fn look(&self, goal: Goal) -> Result<(Predictor, f64)> {
         let begun = Instant::now();
         let told = |what: &str| self.tell(format!("probe: {what}"));
-        let brief = Probe { seconds: Some(0.0), ..self.probe() };
+        let brief = SettingsProbe { seconds: Some(0.0), ..self.probe() };
         let first = brief.look(&told)?;
         let (aim, spent) = (first.aim(goal, BRIEFLY), begun.elapsed().as_secs_f64());
         let within = |error| brief.fastest_seconds(&first, error);
@@ -316,7 +319,7 @@ impl Chooser<'_> {
             return Ok((first, aim));
         }
         self.tell("there is time for a longer look".into());
-        let foretelling = Probe { seconds: left, ..self.probe() }.look(&told)?;
+        let foretelling = SettingsProbe { seconds: left, ..self.probe() }.look(&told)?;
         let aim = foretelling.aim(goal, LONGER);
         Ok((foretelling, aim))
     }
@@ -336,7 +339,7 @@ impl Chooser<'_> {
             format!("; of what was tried, {tried} came nearest, to {figure}")
         });
         let nearest = seen.or(best).unwrap_or_default();
-        let fewer = match self.given() == Given::default() {
+        let fewer = match self.given() == FixedSettings::default() {
             true => "",
             false => ", or give fewer options",
         };
@@ -354,9 +357,9 @@ impl Chooser<'_> {
         is_same.then_some(before)
     }
 
-    fn given(&self) -> Given {
+    fn given(&self) -> FixedSettings {
         let s = self.options;
-        Given {
+        FixedSettings {
             spp: s.spp.is_some(),
             shadow: s.shadow_samples.is_some(),
             sky: s.sky_samples.is_some(),
@@ -375,8 +378,8 @@ impl Chooser<'_> {
     }
 
     /// Who looks at the scene for this job.
-    pub fn probe(&self) -> Probe<'_> {
-        Probe {
+    pub fn probe(&self) -> SettingsProbe<'_> {
+        SettingsProbe {
             stage: self.stage,
             frames: self.request.frames,
             goal: self.args.target,

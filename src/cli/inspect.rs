@@ -9,7 +9,7 @@ use super::{job, say};
 use crate::cluster;
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
-use crate::import::{Loaded, Stage};
+use crate::import::{AddedStage, Loaded};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
 use crate::scene::{Light, Mesh, Scene, Settings, Shot};
@@ -54,7 +54,7 @@ struct Inspection {
     camera_start: CameraView,
     camera_end: CameraView,
     memory: Memory,
-    reuse: reuse::Plan,
+    reuse: reuse::ReusePlan,
     effects: Vec<Effect>,
     warnings: Vec<String>,
 }
@@ -141,7 +141,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
-        reuse: reuse::Plan::of(&renderer, &shot)?,
+        reuse: reuse::ReusePlan::of(&renderer, &shot)?,
         effects: reasons
             .into_iter()
             .map(|r| Effect { effect: r.effect, runs: r.runs, why: r.why })
@@ -171,7 +171,7 @@ impl CameraView {
 }
 
 /// The meshes that come from the user's files.
-fn own_meshes(scene: &Scene, stage: Option<Stage>) -> Vec<&Mesh> {
+fn own_meshes(scene: &Scene, stage: Option<AddedStage>) -> Vec<&Mesh> {
     let lamp = stage.map(|s| s.lamp as u32);
     let added = |index: usize, mesh: &Mesh| {
         stage.is_some_and(|s| s.floor == index || mesh.surface.light == lamp)

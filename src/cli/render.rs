@@ -5,7 +5,7 @@ mod round;
 mod videos;
 
 use super::args::{OutputArgs, SceneArgs, SettingArgs};
-use super::choose::{Choice, ChoiceArgs, Judged};
+use super::choose::{Choice, ChoiceArgs, Judgement};
 use super::exit::Exit;
 use super::machine;
 use super::progress::{duration, percent};
@@ -174,11 +174,11 @@ fn render(comm: &Communicator, interrupt: &Interrupt, args: &RenderArgs) -> Resu
             other => other?,
         };
         let verdict = match judged {
-            Some(Judged::Again(tighter)) => {
+            Some(Judgement::Again(tighter)) => {
                 (choice, is_again) = (Some(tighter), true);
                 continue;
             }
-            Some(Judged::Done(choice)) => choice.verdict(),
+            Some(Judgement::Done(choice)) => choice.verdict(),
             None => None,
         };
         let exit = conclude(&job, &round, false)?;

@@ -33,7 +33,7 @@ pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::{FrameRange, Interval, Settings, Shot, World, limits};
+use crate::scene::{FrameRange, SaveInterval, Settings, Shot, World, limits};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -99,7 +99,7 @@ pub struct Loaded {
     /// How long the program may run, where the file says.
     pub time_limit: Option<Duration>,
     /// How often what frames to come need is put on disk, where the file says.
-    pub checkpoint: Option<Interval>,
+    pub checkpoint: Option<SaveInterval>,
     /// How many discoveries a message between ranks carries at most, where the file says.
     pub exchange: Option<u32>,
     /// What the user should know though it is no error.
@@ -107,12 +107,12 @@ pub struct Loaded {
     /// Every file read, in order.
     pub files: Vec<PathBuf>,
     /// What was added around a bare mesh.
-    pub stage: Option<Stage>,
+    pub stage: Option<AddedStage>,
 }
 
 /// Floor and lamp that a bare mesh gets: they are in the world, but not in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stage {
+pub struct AddedStage {
     /// Which of the world's meshes is the floor.
     pub floor: usize,
     /// Which of the world's lights is the lamp.

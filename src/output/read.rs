@@ -45,7 +45,7 @@ pub fn read_image_within(path: impl AsRef<Path>, limit: u64) -> Result<Image> {
 }
 
 /// The picture among an exr file's channels: R, G and B, or Y for grey.
-fn rgb_of(path: &Path, channels: &exr::Channels) -> Result<Image> {
+fn rgb_of(path: &Path, channels: &exr::ExrChannels) -> Result<Image> {
     let find = |name| channels.f32(name).or_else(|| channels.f32("Y"));
     let (Some(r), Some(g), Some(b)) = (find("R"), find("G"), find("B")) else {
         let names: Vec<&str> = channels.list.iter().map(|c| c.name.as_str()).collect();

@@ -36,7 +36,7 @@ pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
     BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
-pub use time::{Interval, parse_time, parse_time_limit};
+pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
 pub(crate) use weld::weld;
 pub(crate) use winding::{borders, closed_volume};

@@ -2,11 +2,11 @@
 
 use super::class::Difference;
 use super::differ::Closely;
-use super::{Answers, Check, Trial};
+use super::{Answers, Check, TracedRay};
 
 impl Check<'_> {
     /// The difference between the two answers, if there is one.
-    pub fn judge(&self, trial: &Trial) -> Option<Difference> {
+    pub fn judge(&self, trial: &TracedRay) -> Option<Difference> {
         match trial.answers {
             Answers::Hits { product: None, oracle: None } => None,
             Answers::Occlusion { product, oracle } if product == oracle => None,

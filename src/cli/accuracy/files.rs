@@ -1,7 +1,7 @@
 //! The figures for other programs: JSON and CSV.
 
 use super::{AccuracyArgs, Outcome};
-use crate::accuracy::{OracleCrop, Row, Writing};
+use crate::accuracy::{CandidateRow, OracleCrop, Writing};
 use crate::cli::machine::Machine;
 use crate::error::{Error, Result};
 use crate::measure::Median;
@@ -31,7 +31,7 @@ struct Document<'a> {
     runs: u32,
     default: Value,
     reference: Reference,
-    rows: &'a [Row],
+    rows: &'a [CandidateRow],
     oracle: Option<OracleCrop>,
     writing: Option<Writing>,
     /// What the page says of each knob.
@@ -89,13 +89,13 @@ const BEFORE_RAYS: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_sec
 /// The columns after those.
 const AFTER_RAYS: &str = "build_seconds,memory_bytes,on_front,on_cpu_front";
 
-fn csv(rows: &[Row]) -> String {
+fn csv(rows: &[CandidateRow]) -> String {
     let rays = RayKind::ALL.map(|kind| format!("rays_{}", kind.key())).join(",");
     let head = format!("{BEFORE_RAYS},{rays},{AFTER_RAYS}\n");
     head + &rows.iter().map(line).collect::<String>()
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &CandidateRow) -> String {
     // No option holds a comma or a quote.
     let number = |x: f64| if x.is_finite() { x.to_string() } else { String::new() };
     let ends = |m: &Median| [m.interval.estimate, m.interval.low, m.interval.high].map(number);

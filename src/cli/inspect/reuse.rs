@@ -23,7 +23,7 @@ const SMALL: u32 = 96;
 
 /// How the frames of the shot come about.
 #[derive(Serialize)]
-pub struct Plan {
+pub struct ReusePlan {
     policy: Policy,
     /// Frames from one key frame to the next; 0 where nothing is looked up.
     segment: u32,
@@ -141,7 +141,7 @@ impl Progress for Unseen {
     fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
-impl Plan {
+impl ReusePlan {
     /// The plan of rendering the whole shot in one process.
     pub fn of(renderer: &Renderer, shot: &Shot) -> Result<Self> {
         let Renderer { scene, settings, plan: effects, .. } = renderer;

@@ -3,7 +3,7 @@
 use super::RenderArgs;
 use super::round::{Frames, Round, Site};
 use crate::accuracy::{Stage, Timer, Timing};
-use crate::cli::choose::{Choice, Chooser, Judged};
+use crate::cli::choose::{Choice, Chooser, Judgement};
 use crate::cli::request::Request;
 use crate::cli::stats;
 use crate::error::{Error, Result};
@@ -49,22 +49,22 @@ impl Choosing<'_> {
         job: &Frames,
         round: &Round,
         choice: Option<Choice>,
-    ) -> Result<Option<Judged>> {
+    ) -> Result<Option<Judgement>> {
         let Some(choice) = choice else { return Ok(None) };
         let (shot, frames) = (&job.target.header.shot_hash, job.request.frames);
         let judge = |chooser: &Chooser, timer: Timer| {
             let choice = choice.clone();
             // A job that was stopped while it was held against what came out is not done with that.
             if round.plan.render.is_empty() && choice.is_checked(shot, frames) {
-                return Ok(Judged::Done(choice));
+                return Ok(Judgement::Done(choice));
             }
             let audit = stats::audit_of(&round.plan, &round.outcome);
             let seconds = round.plan.kept.is_empty().then_some(round.seconds);
             Ok(match chooser.judge(choice, audit.as_ref(), seconds, timer)? {
-                Judged::Done(choice) => {
+                Judgement::Done(choice) => {
                     let choice = choice.checked(shot, frames);
                     keep(job.target, &choice)?;
-                    Judged::Done(choice)
+                    Judgement::Done(choice)
                 }
                 again => again,
             })

@@ -4,7 +4,7 @@ use super::{VerifyArgs, replay_command};
 use crate::cli::say;
 use crate::error::{Error, Result};
 use crate::verify::{
-    BAND_ULPS, Check, Class, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally,
+    BAND_ULPS, Check, Class, ClassRow, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ struct Report {
 #[derive(Serialize)]
 struct ClassReport {
     #[serde(flatten)]
-    row: Row,
+    row: ClassRow,
     replay: Option<String>,
 }
 
@@ -108,7 +108,7 @@ impl Report {
         for explained in [true, false] {
             let _ = writeln!(text, "{}", if explained { "explained" } else { "unexplained" });
             for class in self.classes.iter().filter(|c| c.row.explained == explained) {
-                let Row { class, count, rays, bound, worst, .. } = &class.row;
+                let ClassRow { class, count, rays, bound, worst, .. } = &class.row;
                 let ulps = worst.map_or("-".into(), |w| format!("{:.3}", w.ulps));
                 let ray = worst.map_or("-".into(), |w| w.ray.to_string());
                 let _ = writeln!(

@@ -12,7 +12,7 @@ use tweenray::scene::{
     CameraPath, Easing, HitRules, Pose, Recheck, Scene, Settings, Shot, WorldMesh,
 };
 use tweenray::stats::RayCounts;
-use tweenray::verify::{Answers, Check, Class, Difference, PAST_VERTEX_LIMIT, Trial};
+use tweenray::verify::{Answers, Check, Class, Difference, PAST_VERTEX_LIMIT, TracedRay};
 
 /// Rays a scene.
 const RAYS: u64 = 1024;
@@ -127,7 +127,7 @@ impl Tally {
 fn judged(check: &Check, ray: &Ray, oracle: Option<Hit>) -> (Answers, Option<Difference>) {
     let product = check.product.intersect(ray, &mut RayCounts::default());
     let answers = Answers::Hits { product, oracle };
-    (answers, check.judge(&Trial { ray: *ray, answers }))
+    (answers, check.judge(&TracedRay { ray: *ray, answers }))
 }
 
 /// Calls `then` with a check of `scene`.

@@ -4,8 +4,8 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    BuildQuality, CameraPath, DirectionalLight, Interval, Light as SceneLight, PointLight, Policy,
-    ReuseSettings, Settings as SceneSettings, SphereLight,
+    BuildQuality, CameraPath, DirectionalLight, Light as SceneLight, PointLight, Policy,
+    ReuseSettings, SaveInterval, Settings as SceneSettings, SphereLight,
 };
 use std::time::Duration;
 
@@ -55,7 +55,7 @@ fn every_setting_reaches_its_place() {
     assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
     assert!(loaded.overwrite && !loaded.video);
     assert_eq!(loaded.time_limit, Some(Duration::from_secs(5400)));
-    assert_eq!(loaded.checkpoint, Some(Interval(None)));
+    assert_eq!(loaded.checkpoint, Some(SaveInterval(None)));
     assert_eq!(loaded.exchange, Some(5000));
 }
 
