@@ -125,7 +125,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::new();
     interrupt.listen(true)?;
-    let Loaded { world, shot, settings: base, threads, time_limit, warnings, .. } =
+    let Loaded { world, shot, settings: base, options, warnings, .. } =
         job::load(&args.scene, &args.settings)?;
     if !args.quiet {
         warnings.iter().for_each(say::warning);
@@ -144,7 +144,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let scene = world.into_scene(base.rules.recentre)?;
     let otherwise = otherwise.and_then(|world| world.into_scene(!base.rules.recentre).ok());
     let candidates = candidates(&scene, &base, shot.frames, &groups, otherwise.is_some());
-    let threads = args.threads.or(threads);
+    let threads = args.threads.or(options.threads);
     let threads = threads.map_or_else(cluster::default_threads, |n| n as usize);
     let pool = machine::thread_pool(threads)?;
     let building = Instant::now();
@@ -165,7 +165,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let ledger = Ledger::open(&args.output.join("sweep"), &terms, args.overwrite)?;
     let oracle_was_wanted = groups.contains(&Group::Oracle);
     interrupt.before_slurm_ends();
-    interrupt.limit(start, args.time_limit.or(time_limit));
+    interrupt.limit(start, args.time_limit.or(options.time_limit));
     let job = SweepJob {
         args,
         sweep: &sweep,

@@ -90,6 +90,8 @@ pub struct Chooser<'a> {
     pub stage: &'a Stage<'a>,
     /// The job.
     pub request: &'a Request,
+    /// What traces, as far as frames differ by it.
+    pub tracer: &'a str,
     /// When the program started: a budget counts from then.
     pub started: Instant,
     /// How many ranks share it.
@@ -112,7 +114,9 @@ impl ChoiceArgs {
             () if settings.crop.is_some() => Some("--crop"),
             () if settings.reuse.policy == Policy::Colour => Some("--policy colour"),
             () if !request.references.is_empty() => Some("--references"),
-            () if request.maps && settings.reuse.policy == Policy::Off => Some("--policy off"),
+            () if request.options.maps && settings.reuse.policy == Policy::Off => {
+                Some("--policy off")
+            }
             () => None,
         };
         if let Some(goal) = self.target.filter(|goal| goal.is_beyond_8_bits() && rounds(request)) {
@@ -249,14 +253,14 @@ impl Chooser<'_> {
     ///
     /// # Errors
     /// Any of the probe's; a target that no setting is predicted to reach.
-    pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
-        if let Some(before) = self.before(tracer) {
+    pub fn choose(&self, timer: Timer) -> Result<Choice> {
+        if let Some(before) = self.before() {
             let options = self.options(&before.foretold);
             self.tell(format!("for {}, as chosen before: {options}", before.wanted));
             self.warn_if_long(&before);
             return Ok(before);
         }
-        self.check_folder(tracer)?;
+        self.check_folder()?;
         let start = Instant::now();
         let budget = Budget::of(self);
         let probe =
@@ -349,8 +353,8 @@ impl Chooser<'_> {
         ))
     }
 
-    fn before(&self, tracer: &str) -> Option<Choice> {
-        let before = Choice::of(&self.request.header_before(tracer)?)?;
+    fn before(&self) -> Option<Choice> {
+        let before = Choice::of(&self.request.header_before(self.tracer)?)?;
         let is_same = before.wanted == self.args.words()
             && before.base == Header::settings(self.stage.base)
             && before.given == self.given();
@@ -364,7 +368,7 @@ impl Chooser<'_> {
             shadow: s.shadow_samples.is_some(),
             sky: s.sky_samples.is_some(),
             bounces: s.bounces.is_some(),
-            policy: s.reuse.policy.is_some() || self.request.maps,
+            policy: s.reuse.policy.is_some() || self.request.options.maps,
         }
     }
 

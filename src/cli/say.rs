@@ -44,3 +44,10 @@ pub fn note(what: impl Display) {
 pub fn error(error: &Error) {
     aside(format_args!("error: {error}"));
 }
+
+/// Says each of `lines`, unless nothing is to be said.
+pub fn unless<T>(quiet: bool, lines: &[T], say: fn(&T)) {
+    if !quiet {
+        lines.iter().for_each(say);
+    }
+}

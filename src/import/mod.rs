@@ -33,9 +33,8 @@ pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::{FrameRange, SaveInterval, Settings, Shot, World, limits};
+use crate::scene::{JobOptions, Settings, Shot, World, limits};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
 pub const DEFAULT_CREASE_DEGREES: f64 = 30.0;
@@ -70,8 +69,8 @@ pub enum UpAxis {
     Z,
 }
 
-/// A job as its scene file describes it; the command line may override `settings`, `frames` and
-/// `output` afterwards.
+/// A job as its scene file describes it; the command line may override `settings` and `options`
+/// afterwards.
 #[derive(Debug, Clone)]
 pub struct Loaded {
     /// What is in the scene.
@@ -80,28 +79,10 @@ pub struct Loaded {
     pub shot: Shot,
     /// How to render it.
     pub settings: Settings,
-    /// Frames to render, where the file says.
-    pub frames: Option<FrameRange>,
-    /// Where frames go, where the file says.
-    pub output: Option<OutputName>,
-    /// Frames per second of the preview video.
-    pub fps: f64,
-    /// Whether a preview video is made.
-    pub video: bool,
-    /// Whether existing frames are replaced.
-    pub overwrite: bool,
-    /// Whether an invalid sample makes the job fail.
-    pub strict: bool,
-    /// Rendering threads, where the file says.
-    pub threads: Option<u32>,
-    /// File for statistics, where the file says, relative to the current folder.
-    pub stats: Option<PathBuf>,
-    /// How long the program may run, where the file says.
-    pub time_limit: Option<Duration>,
-    /// How often what frames to come need is put on disk, where the file says.
-    pub checkpoint: Option<SaveInterval>,
-    /// How many discoveries a message between ranks carries at most, where the file says.
-    pub exchange: Option<u32>,
+    /// How the job runs.
+    pub options: JobOptions,
+    /// Where the file says where frames go; the message is still to be said.
+    pub output_place: Option<Diagnostic>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
     /// Every file read, in order.
@@ -119,15 +100,6 @@ pub struct AddedStage {
     pub lamp: usize,
 }
 
-/// Where frames go, as a scene file says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutputName {
-    /// The pattern, relative to the current folder.
-    pub pattern: String,
-    /// Where it stands, for what is wrong with it; the message is still to be said.
-    pub place: Diagnostic,
-}
-
 impl Loaded {
     /// A job that says nothing beyond what to render.
     fn new(world: World, shot: Shot, settings: Settings) -> Self {
@@ -135,17 +107,8 @@ impl Loaded {
             world,
             shot,
             settings,
-            frames: None,
-            output: None,
-            fps: 24.0,
-            video: true,
-            overwrite: false,
-            strict: false,
-            threads: None,
-            stats: None,
-            time_limit: None,
-            checkpoint: None,
-            exchange: None,
+            options: JobOptions::default(),
+            output_place: None,
             warnings: Vec::new(),
             files: Vec::new(),
             stage: None,

@@ -9,6 +9,7 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod job;
 mod light;
 pub mod limits;
 mod material;
@@ -25,6 +26,7 @@ mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
+pub use job::JobOptions;
 pub use light::{
     DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
 };

@@ -41,7 +41,7 @@ impl Budget {
         let there_is = (count, u64::from(settings.width) * u64::from(settings.height));
         let (frames, pixels) = (f64::from(count), there_is.1 as f64);
         let [start, each] = VIDEO;
-        let is_video = request.fps.is_some() && frames > 1.0;
+        let is_video = request.options.video && frames > 1.0;
         let check = CHECK_SHARE * (seconds - started.elapsed().as_secs_f64()).max(0.0);
         let ending = request.pattern.path(request.frames.first);
         let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
