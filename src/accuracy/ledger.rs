@@ -122,7 +122,7 @@ impl Ledger {
             None => {
                 clear(folder)?;
                 atomic::create_folder(folder)?;
-                write_json(&path, terms)?;
+                atomic::write_json(&path, terms)?;
             }
         }
         let trials = folder.join("trials.jsonl");
@@ -195,7 +195,7 @@ impl Ledger {
         }
         let frames: Vec<u32> = reference.frames.keys().copied().collect();
         let stored = StoredReference { number, spp, change, wanted, frames };
-        write_json(&self.folder.join("reference.json"), &stored)?;
+        atomic::write_json(&self.folder.join("reference.json"), &stored)?;
         if let Some(before) = number.checked_sub(1) {
             // Whatever is left takes room, no more.
             let path = |frame: &u32| self.frame_path(before, *frame);
@@ -230,7 +230,7 @@ impl Ledger {
     /// # Errors
     /// [`Error::Io`].
     pub fn keep_note(&self, name: &str, value: &impl Serialize) -> Result<()> {
-        write_json(&self.folder.join(name), value)
+        atomic::write_json(&self.folder.join(name), value)
     }
 }
 
@@ -290,11 +290,6 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
         // What cannot be understood is as good as absent: it is measured again.
         Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
     }
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_vec_pretty(value).map_err(|e| Error::io("write", path, e.into()))?;
-    atomic::write(path, |w| w.write_all(&text)).map(drop)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ mod line;
 mod measure;
 mod page;
 
-use super::args::{SceneArgs, SettingArgs};
+use super::args::{SceneArgs, SettingArgs, whole};
 use super::exit::Exit;
 use super::signals::Interrupt;
 use super::{job, machine, say, values};
@@ -61,11 +61,11 @@ pub struct AccuracyArgs {
     /// How often each setting is timed; 6 and more give intervals of 95 %, fewer than 5 say nothing
     /// about small differences
     #[arg(long, value_name = "N", default_value_t = 6, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=1000))]
+        value_parser = whole(1, 1000))]
     turns: u32,
     /// Most camera samples of the reference, which doubles them until it no longer changes
     #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(64..=i64::from(MAX_SAMPLES)))]
+        value_parser = whole(64, MAX_SAMPLES))]
     reference_spp: u32,
     /// What is turned: reuse, samples, specular, intersection, tree, oracle, writing, combinations
     /// [default: all]
@@ -81,7 +81,7 @@ pub struct AccuracyArgs {
     time_limit: Option<Duration>,
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
+        value_parser = whole(1, MAX_THREADS))]
     threads: Option<u32>,
     /// Say nothing but errors
     #[arg(short, long)]

@@ -225,7 +225,8 @@ impl TracingArgs {
     }
 }
 
-fn whole(least: u32, most: u32) -> clap::builder::RangedI64ValueParser<u32> {
+/// A whole number of this range.
+pub fn whole(least: u32, most: u32) -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(i64::from(least)..=i64::from(most))
 }
 

@@ -8,7 +8,7 @@ use super::findings::findings;
 use super::{job, say};
 use crate::cluster;
 use crate::effects::EffectPlan;
-use crate::error::{Error, Result, counted};
+use crate::error::{Result, counted};
 use crate::import::{AddedStage, Loaded};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
@@ -95,9 +95,7 @@ struct Effect {
 pub fn run(args: &InspectArgs) -> Result<Exit> {
     let inspection = inspect(args)?;
     if args.json {
-        let text = serde_json::to_string_pretty(&inspection)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text)?;
+        say::json(&inspection)?;
     } else {
         say::text(&inspection.to_text())?;
     }

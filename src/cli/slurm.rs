@@ -3,7 +3,7 @@
 
 mod script;
 
-use super::args::SceneArgs;
+use super::args::{SceneArgs, whole};
 use super::exit::Exit;
 use super::render::{self, RenderArgs};
 use super::request::{place, refuse_maps, uploads};
@@ -45,7 +45,7 @@ pub struct SlurmArgs {
     scene: String,
     /// Nodes
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        value_parser = whole(1, 100_000))]
     nodes: u32,
     /// Time limit of a run, as the queue allows: 30m, 4h, 2d, or as Slurm writes it: 30 (minutes),
     /// 00:30:00, 1-12
@@ -53,11 +53,11 @@ pub struct SlurmArgs {
     time: Duration,
     /// Processes on each node; its cores are shared out among them
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=4096))]
+        value_parser = whole(1, 4096))]
     tasks_per_node: u32,
     /// Cores of each process [default: whole nodes, which nobody else uses meanwhile]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=4096))]
+        value_parser = whole(1, 4096))]
     cpus: Option<u32>,
     /// How long before the limit the processes are told to stop [default: 60s, or a quarter of the time]
     #[arg(long, value_name = "TIME", value_parser = values::time)]

@@ -3,7 +3,7 @@
 use super::{AccuracyArgs, Outcome};
 use crate::accuracy::{CandidateRow, OracleCrop, Writing};
 use crate::cli::machine::Machine;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::measure::Median;
 use crate::output::atomic;
 use crate::output::manifest::Header;
@@ -73,11 +73,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
         writing: outcome.writing,
         knobs: super::page::knobs(outcome),
     };
-    let path = folder.join("accuracy.json");
-    let mut text =
-        serde_json::to_vec_pretty(&document).map_err(|e| Error::io("write", &path, e.into()))?;
-    text.push(b'\n');
-    atomic::write(&path, |w| w.write_all(&text))?;
+    atomic::write_json(&folder.join("accuracy.json"), &document)?;
     let csv = csv(&outcome.measured.rows);
     atomic::write(folder.join("accuracy.csv"), |w| w.write_all(csv.as_bytes())).map(drop)
 }

@@ -2,7 +2,7 @@
 
 use super::{VerifyArgs, replay_command};
 use crate::cli::say;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::verify::{
     BAND_ULPS, Check, Class, ClassRow, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally,
 };
@@ -64,9 +64,7 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
         classes: classes.collect(),
     };
     if args.json {
-        let text = serde_json::to_string_pretty(&report)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        return say::result(text);
+        return say::json(&report);
     }
     say::text(&report.to_text())
 }
