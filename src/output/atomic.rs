@@ -41,7 +41,7 @@ pub fn write(
 /// Writes `value` as JSON, with a line end, to the file at `path`.
 ///
 /// # Errors
-/// [`write`]'s; a value that JSON cannot hold.
+/// [`Error::Io`], as [`write()`]; a value that JSON cannot hold.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let text = serde_json::to_vec_pretty(value).map_err(|e| Error::io("write", path, e.into()))?;
     write(path, |w| w.write_all(&text).and_then(|()| w.write_all(b"\n"))).map(drop)
