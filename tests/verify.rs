@@ -9,7 +9,7 @@ use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, 
 use tweenray::math::DVec3;
 use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot};
 use tweenray::stats::RayCounts;
-use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, Trial};
+use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, TracedRay};
 
 #[path = "hard_cases/shapes.rs"]
 mod shapes;
@@ -61,7 +61,7 @@ fn without_a_second_try_hits_are_missed() {
                 let (product, oracle) =
                     (product.intersect(&ray, counts), oracle.intersect(&ray, counts));
                 let difference =
-                    check.judge(&Trial { ray, answers: Answers::Hits { product, oracle } });
+                    check.judge(&TracedRay { ray, answers: Answers::Hits { product, oracle } });
                 if let Some(difference) = difference.filter(|d| !d.class.is_explained()) {
                     assert_eq!(difference.class, Class::Missed);
                     missed += 1;
@@ -258,7 +258,7 @@ fn a_ray_on_the_border_of_a_mesh_may_go_by() {
             continue;
         }
         let answers = Answers::Hits { product: Some(behind.hit), oracle: Some(hits[0].hit) };
-        let difference = check.judge(&Trial { ray, answers }).unwrap();
+        let difference = check.judge(&TracedRay { ray, answers }).unwrap();
         assert_eq!(difference.class, Class::EdgeBand, "{share}: {difference:?}");
         told += 1;
     }

@@ -4,7 +4,7 @@ use super::support::camera_rays::BLOCK;
 use super::support::{self, Candidate};
 use tweenray::embree::{CommittedScene, Packet, QueryFlags};
 use tweenray::intersect::{
-    EmbreeIntersector, Intersector, PlaneError, Ray, SurfaceInteraction, Target,
+    EmbreeIntersector, Intersector, PlaneError, Ray, RayEnd, SurfaceInteraction,
 };
 use tweenray::math::orthonormal_basis;
 use tweenray::sampling::{PixelSampler, QuadWarp, cosine_hemisphere, to_world};
@@ -99,7 +99,7 @@ fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
         sampler.fill2(0, 0, &mut u);
         area.extend(u.map(|u| {
             let point = warp.point(u.map(f64::from));
-            si.spawn_to(&Target { point, normal, plane_error }, true)
+            si.spawn_to(&RayEnd { point, normal, plane_error }, true)
         }));
         sampler.fill2(0, 1, &mut u);
         let n = if si.is_outside(ray.dir) { -si.ng } else { si.ng };

@@ -2,10 +2,10 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::Samples;
+use super::error_model::SampleCounts;
 use super::figures::{doubts, figure, squares};
 use super::foretell::{Prediction, Predictor};
-use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
+use super::probe::{SettingsProbe, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// What was found in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Checked {
+pub struct CheckedFrame {
     /// The frame.
     pub frame: u32,
     /// Its mean squared error, the reference's own left aside, display steps.
@@ -24,9 +24,9 @@ pub struct Checked {
 
 /// What was found in all that were looked at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Check {
+pub struct CheckOutcome {
     /// Frame by frame.
-    pub frames: Vec<Checked>,
+    pub frames: Vec<CheckedFrame>,
     /// The goal's figure of the worst of them: SSIM less than 1 by how much, FLIP, share.
     pub figure: f64,
 }
@@ -42,14 +42,14 @@ pub enum Verdict {
     Missed,
 }
 
-impl Check {
+impl CheckOutcome {
     /// Looks at some finished frames, rendered as `foretold`, at other pixels than the probe did, as
     /// many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
     /// As [`Stage::trace`](super::stage::Stage::trace), and any that `image` gives.
     pub fn of(
-        probe: &Probe,
+        probe: &SettingsProbe,
         foretelling: &Predictor,
         foretold: &Prediction,
         effort: Effort,
@@ -69,7 +69,7 @@ impl Check {
         };
         let found = squares(&patches, &truth, &seen).into_iter().map(of_frame);
         let found = found.zip(doubts(&patches, &truth, &seen));
-        let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| Checked {
+        let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| CheckedFrame {
             frame,
             squared_error,
             doubt,
@@ -81,9 +81,9 @@ impl Check {
     }
 
     /// Wall seconds that a whole check of frames of `samples` is foretold to take.
-    pub fn seconds(foretelling: &Predictor, samples: Samples) -> f64 {
+    pub fn seconds(foretelling: &Predictor, samples: SampleCounts) -> f64 {
         let whole = Effort::WHOLE;
-        let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
+        let pixels = f64::from(whole.frames) * f64::from(whole.checked_pixels());
         pixels * foretelling.patch_seconds(samples_of_reference(samples))
     }
 
@@ -94,7 +94,7 @@ impl Check {
     }
 
     /// The worst frame.
-    pub fn worst(&self) -> Option<Checked> {
+    pub fn worst(&self) -> Option<CheckedFrame> {
         self.frames.iter().copied().max_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
     }
 
@@ -115,7 +115,7 @@ impl Check {
     /// error; 1 and less where it is not surely missed. Half of what so few pixels leave open is to the
     /// good of a frame.
     pub fn excess(&self, goal: Goal, allowed: f64) -> f64 {
-        let sure = |f: &Checked| f.squared_error / (1.0 + 0.5 * f.doubt);
+        let sure = |f: &CheckedFrame| f.squared_error / (1.0 + 0.5 * f.doubt);
         match goal {
             Goal::Psnr(_) => self.frames.iter().map(sure).fold(0.0, f64::max) / allowed,
             // The figure itself decides; it rises no faster than the squared error.
@@ -137,10 +137,10 @@ mod tests {
 
     #[test]
     fn a_goal_is_missed_by_a_frame_beyond_doubt() {
-        let check = |errors: &[f64]| Check {
+        let check = |errors: &[f64]| CheckOutcome {
             frames: errors
                 .iter()
-                .map(|e| Checked { frame: 1, squared_error: *e, doubt: 0.2 })
+                .map(|e| CheckedFrame { frame: 1, squared_error: *e, doubt: 0.2 })
                 .collect(),
             figure: 0.03,
         };

@@ -1,7 +1,5 @@
 //! How much a probe or a check looks at: a part of it where little time is left.
 
-use super::probe::checked_pixels;
-
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -53,10 +51,15 @@ impl Effort {
     /// whole check does in a long one of large frames.
     pub fn looked_at(self, frames: u32, pixels: u64) -> f64 {
         let count = |effort: Self, frames: u32, pixels: u64| {
-            let each = u64::from(checked_pixels(effort)).min(pixels);
+            let each = u64::from(effort.checked_pixels()).min(pixels);
             f64::from(effort.frames.min(frames)) * each as f64
         };
         count(self, frames, pixels) / count(Self::WHOLE, u32::MAX, u64::MAX)
+    }
+
+    /// Pixels that a check looks at in each frame: more than the probe, since it does so once.
+    pub fn checked_pixels(self) -> u32 {
+        self.pixels + self.pixels / 2
     }
 
     /// About `share` of the work.

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 /// Samples a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Samples {
+pub struct SampleCounts {
     /// Camera samples.
     pub spp: u32,
     /// Shadow samples of each, per light.
@@ -60,11 +60,11 @@ pub struct ErrorModel {
 
 /// What some samples came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct ErrorSample {
     /// The samples.
-    pub samples: Samples,
+    pub samples: SampleCounts,
     /// Samples of the reference that they were compared with.
-    pub reference: Samples,
+    pub reference: SampleCounts,
     /// For each frame the mean squared difference from it.
     pub errors: Vec<f64>,
 }
@@ -80,7 +80,7 @@ fn falls(count: u32, power: f64) -> f64 {
 }
 
 impl Powers {
-    fn regressors(&self, causes: Causes, s: Samples) -> Amplitudes {
+    fn regressors(&self, causes: Causes, s: SampleCounts) -> Amplitudes {
         let light = falls(s.spp, self.light);
         let each = |is_there: bool, count: u32| match is_there {
             true => light * falls(count, self.samples),
@@ -94,7 +94,7 @@ impl Powers {
 impl ErrorModel {
     /// The model that comes nearest to `points`, as shares of them. `references` are the samples of what
     /// each was held against, whose own error is part of the difference.
-    pub fn of(causes: Causes, points: &[&Point]) -> Self {
+    pub fn of(causes: Causes, points: &[&ErrorSample]) -> Self {
         let frames = points.first().map_or(0, |point| point.errors.len());
         let mut best = Self {
             causes,
@@ -118,7 +118,7 @@ impl ErrorModel {
         best
     }
 
-    fn with(causes: Causes, powers: Powers, points: &[&Point]) -> Self {
+    fn with(causes: Causes, powers: Powers, points: &[&ErrorSample]) -> Self {
         let rows = points.iter().map(|point| {
             let mut row = powers.regressors(causes, point.samples);
             let [camera, shadow, sky, _] = powers.regressors(causes, point.reference);
@@ -140,13 +140,13 @@ impl ErrorModel {
     }
 
     /// The squared error of each frame looked at.
-    pub fn errors(&self, samples: Samples) -> impl Iterator<Item = f64> + '_ {
+    pub fn errors(&self, samples: SampleCounts) -> impl Iterator<Item = f64> + '_ {
         let row = self.powers.regressors(self.causes, samples);
         self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
     }
 
     /// The model under which `point` comes to what it did, frame by frame.
-    pub fn through(&self, point: &Point) -> Self {
+    pub fn through(&self, point: &ErrorSample) -> Self {
         let own: Vec<f64> = self.errors(point.reference).collect();
         let mut model = self.clone();
         let told = self.errors(point.samples).zip(own).zip(&point.errors);
@@ -174,10 +174,10 @@ fn grid(from: f64, to: f64) -> impl Iterator<Item = f64> {
 mod tests {
     use super::*;
 
-    const REFERENCE: Samples = Samples { spp: 128, shadow: 16, sky: 16 };
+    const REFERENCE: SampleCounts = SampleCounts { spp: 128, shadow: 16, sky: 16 };
     const LIT: Causes = Causes { shadow: true, sky: true };
 
-    fn truth(s: Samples, scale: f64) -> f64 {
+    fn truth(s: SampleCounts, scale: f64) -> f64 {
         let (n, m, k) = (f64::from(s.spp), f64::from(s.shadow), f64::from(s.sky));
         let light = n.powf(-1.1) * (7.0 * m.powf(-1.4) + 3.0 * k.powf(-1.4));
         scale * (20.0 * n.powf(-1.3) + light)
@@ -187,18 +187,18 @@ mod tests {
     #[test]
     fn a_short_sweep_foretells_settings_that_were_not_in_it() {
         let point = |(i, (spp, shadow, sky)): (usize, (u32, u32, u32))| {
-            let s = Samples { spp, shadow, sky };
+            let s = SampleCounts { spp, shadow, sky };
             let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];
             let error = |scale: f64| (truth(s, scale) + truth(REFERENCE, scale)) * off;
-            Point { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
+            ErrorSample { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
         };
         let design =
             [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
-        let points: Vec<Point> = design.into_iter().enumerate().map(point).collect();
+        let points: Vec<ErrorSample> = design.into_iter().enumerate().map(point).collect();
         let model = ErrorModel::of(LIT, &points.iter().collect::<Vec<_>>());
         assert!(model.misfit < 0.05, "{model:?}");
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
-            let s = Samples { spp, shadow, sky };
+            let s = SampleCounts { spp, shadow, sky };
             for (error, scale) in model.errors(s).zip([1.0, 2.0]) {
                 let ratio = error / truth(s, scale);
                 assert!((0.75..1.33).contains(&ratio), "{s:?}: {ratio}");
@@ -226,27 +226,27 @@ mod tests {
     #[test]
     fn an_effect_that_is_not_there_has_no_part() {
         let point = |spp: u32| {
-            let s = Samples { spp, shadow: 16, sky: 16 };
+            let s = SampleCounts { spp, shadow: 16, sky: 16 };
             let errors = vec![9.0 / f64::from(spp) + 9.0 / 128.0];
-            Point { samples: s, reference: REFERENCE, errors }
+            ErrorSample { samples: s, reference: REFERENCE, errors }
         };
         let points = [point(1), point(4), point(16)];
         let model = ErrorModel::of(Causes { shadow: false, sky: false }, &points.each_ref());
         let error =
-            |shadow| model.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
+            |shadow| model.errors(SampleCounts { spp: 8, shadow, sky: 1 }).next().expect("a frame");
         assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{model:?}");
         assert_eq!(error(1), error(64));
     }
 
     #[test]
     fn a_law_is_put_through_what_was_measured() {
-        let s = Samples { spp: 8, shadow: 2, sky: 1 };
+        let s = SampleCounts { spp: 8, shadow: 2, sky: 1 };
         let points = [1, 4, 16].map(|spp| {
-            let s = Samples { spp, ..s };
+            let s = SampleCounts { spp, ..s };
             let errors = vec![truth(s, 1.0), truth(s, 2.0)];
-            Point { samples: s, reference: REFERENCE, errors }
+            ErrorSample { samples: s, reference: REFERENCE, errors }
         });
-        let point = Point { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
+        let point = ErrorSample { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
         let model = ErrorModel::of(LIT, &points.each_ref()).through(&point);
         let [own, _] = [0, 1].map(|i| model.errors(REFERENCE).nth(i).expect("a frame"));
         let now: Vec<f64> = model.errors(s).collect();

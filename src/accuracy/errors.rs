@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 /// Frames by number, as displayed: sRGB code values, not rounded.
 pub type Frames = BTreeMap<u32, Image>;
 
+/// What rounding to 8 bits adds to a squared error, display steps.
+pub const ROUNDING: f64 = 1.0 / 12.0;
+
 /// The film as it is displayed.
 pub fn displayed(film: &Film, settings: &Settings) -> Image {
     let rgb = displayed_rgb(&film.rgb, settings);

@@ -4,17 +4,14 @@ mod line;
 mod tried;
 
 use super::choice::Goal;
-use super::error_model::{ErrorModel, Samples};
+use super::error_model::{ErrorModel, SampleCounts};
 use super::worst::worst;
 use crate::measure::psnr;
 use crate::scene::limits::MAX_BOUNCES;
 use crate::scene::{Policy, ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
-pub use line::Line;
-
-/// What rounding to 8 bits adds to a squared error, display steps.
-pub const ROUNDING: f64 = 1.0 / 12.0;
+pub use line::PowerLaw;
 
 /// Times are not known to a tenth; so much longer may be taken by what is more accurate.
 const ALIKE: f64 = 1.1;
@@ -33,9 +30,9 @@ pub struct Mode {
 
 /// What some samples came to, in each frame looked at.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
+pub struct MeasuredSamples {
     /// The samples.
-    pub samples: Samples,
+    pub samples: SampleCounts,
     /// Squared errors, the reference's own left aside.
     pub errors: Vec<f64>,
     /// How far each may be off, a share: the standard error of pixels drawn.
@@ -57,7 +54,7 @@ pub struct Figure {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pace {
     /// The samples.
-    pub samples: Samples,
+    pub samples: SampleCounts,
     /// Wall seconds a pixel.
     pub seconds: f64,
 }
@@ -68,7 +65,7 @@ pub struct Predictor {
     /// Of samples that were not tried.
     pub model: ErrorModel,
     /// Samples that were tried.
-    pub measured: Vec<Measured>,
+    pub measured: Vec<MeasuredSamples>,
     /// What the probe's frames are off by for their bounces and cut-off.
     pub bias: Vec<f64>,
     /// What rounding to the file's bits adds.
@@ -78,7 +75,7 @@ pub struct Predictor {
     /// Ways to take over light.
     pub modes: Vec<Mode>,
     /// How the goal's figure goes with the squared error, unless it is that.
-    pub line: Option<Line>,
+    pub line: Option<PowerLaw>,
     /// The largest figure that reaches the goal, unless that is the squared error.
     pub most: Option<f64>,
     /// How far each frame's squared error may be off where samples were not tried, a share.
@@ -93,7 +90,7 @@ pub struct Predictor {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// Samples.
-    pub samples: Samples,
+    pub samples: SampleCounts,
     /// Bounces.
     pub bounces: u32,
     /// What is taken over.
@@ -112,7 +109,7 @@ impl Prediction {
 
     /// `base` so set.
     pub fn settings(&self, base: &Settings) -> Settings {
-        let Samples { spp, shadow, sky } = self.samples;
+        let SampleCounts { spp, shadow, sky } = self.samples;
         Settings {
             spp,
             shadow_samples: shadow,
@@ -155,14 +152,14 @@ impl Predictor {
 
     /// Which part of the squared difference between frames of `samples` and of `reference` is the former's
     /// own error.
-    pub fn own_part(&self, samples: Samples, reference: Samples) -> f64 {
+    pub fn own_part(&self, samples: SampleCounts, reference: SampleCounts) -> f64 {
         let sum = |samples| self.model.errors(samples).sum::<f64>();
         let (own, of_reference) = (sum(samples), sum(reference));
         if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
 
     /// What is foretold of `samples` in `mode`, of the worst frame.
-    pub fn of(&self, mode: &Mode, samples: Samples) -> Prediction {
+    pub fn of(&self, mode: &Mode, samples: SampleCounts) -> Prediction {
         let (errors, doubts) = match self.tried(samples) {
             Some(measured) => (measured.errors.clone(), &measured.doubts),
             None => (self.model.errors(samples).collect::<Vec<_>>(), &self.doubts),
@@ -234,12 +231,12 @@ impl Predictor {
     }
 
     /// Wall seconds that it takes to trace a pixel of a patch with `samples`.
-    pub fn patch_seconds(&self, samples: Samples) -> f64 {
+    pub fn patch_seconds(&self, samples: SampleCounts) -> f64 {
         // Patches are traced, whatever the mode.
         let traced = |mode: &&Mode| mode.reuse.policy == Policy::Off;
         let mode = self.modes.iter().find(traced).or(self.modes.first());
         let (Some(mode), Some(pace)) = (mode, self.pace) else { return 0.0 };
-        let of = |s: Samples| {
+        let of = |s: SampleCounts| {
             let [_, camera, shadow, sky] = mode.seconds;
             f64::from(s.spp) * (camera + f64::from(s.shadow) * shadow + f64::from(s.sky) * sky)
         };
@@ -253,7 +250,7 @@ impl Predictor {
     ) -> impl Iterator<Item = Prediction> + 's {
         let lights = move |spp: u32| {
             let skies = move |shadow: u32| {
-                range.sky.iter().map(move |sky| Samples { spp, shadow, sky: *sky })
+                range.sky.iter().map(move |sky| SampleCounts { spp, shadow, sky: *sky })
             };
             range.shadow.iter().flat_map(move |shadow| skies(*shadow))
         };
@@ -264,16 +261,17 @@ impl Predictor {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::error_model::{Causes, Point};
+    use super::super::error_model::{Causes, ErrorSample};
     use super::*;
 
     pub(super) fn foretelling() -> Predictor {
-        let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
-        let error =
-            |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
+        let samples = |spp: u32, shadow: u32| SampleCounts { spp, shadow, sky: 1 };
+        let error = |s: SampleCounts| {
+            40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow))
+        };
         let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)].map(|(n, m)| {
             let (samples, reference) = (samples(n, m), samples(4096, 16));
-            Point { samples, reference, errors: vec![error(samples) + error(reference)] }
+            ErrorSample { samples, reference, errors: vec![error(samples) + error(reference)] }
         });
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
@@ -287,7 +285,7 @@ pub(super) mod tests {
                 Mode { reuse: off, seconds: [0.0, 1.0, 1.0, 0.0] },
                 Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
             ],
-            line: Line::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
+            line: PowerLaw::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
             most: None,
             doubts: vec![0.0],
             pace: None,

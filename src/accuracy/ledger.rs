@@ -10,9 +10,9 @@
 //!
 //! Not done: no lock keeps two sweeps from writing into the same folder at once.
 
+use super::change::Change;
 use super::errors::{Errors, Frames};
 use super::reference::Doubling;
-use super::table::Change;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::Journal;
@@ -35,7 +35,7 @@ const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// A trial that is over.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Entry {
+pub struct TrialRecord {
     /// Which run of the program measured it, from 1.
     pub run: u32,
     /// Which turn; 0 warms up.
@@ -103,7 +103,7 @@ struct StoredReference {
 pub struct Ledger {
     folder: PathBuf,
     journal: Journal,
-    entries: Vec<Entry>,
+    entries: Vec<TrialRecord>,
     run: u32,
 }
 
@@ -122,18 +122,18 @@ impl Ledger {
             None => {
                 clear(folder)?;
                 atomic::create_folder(folder)?;
-                write_json(&path, terms)?;
+                atomic::write_json(&path, terms)?;
             }
         }
         let trials = folder.join("trials.jsonl");
         let journal = Journal::open(&trials)?;
-        let entries: Vec<Entry> = Journal::lines(&trials)?;
+        let entries: Vec<TrialRecord> = Journal::lines(&trials)?;
         let run = entries.iter().map(|entry| entry.run).max().unwrap_or(0) + 1;
         Ok(Self { folder: folder.to_path_buf(), journal, entries, run })
     }
 
     /// All trials that are over.
-    pub fn entries(&self) -> &[Entry] {
+    pub fn entries(&self) -> &[TrialRecord] {
         &self.entries
     }
 
@@ -156,8 +156,8 @@ impl Ledger {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn append(&mut self, entry: Entry) -> Result<()> {
-        let entry = Entry { run: self.run, ..entry };
+    pub fn append(&mut self, entry: TrialRecord) -> Result<()> {
+        let entry = TrialRecord { run: self.run, ..entry };
         self.journal.append(&entry)?;
         self.entries.push(entry);
         Ok(())
@@ -195,7 +195,7 @@ impl Ledger {
         }
         let frames: Vec<u32> = reference.frames.keys().copied().collect();
         let stored = StoredReference { number, spp, change, wanted, frames };
-        write_json(&self.folder.join("reference.json"), &stored)?;
+        atomic::write_json(&self.folder.join("reference.json"), &stored)?;
         if let Some(before) = number.checked_sub(1) {
             // Whatever is left takes room, no more.
             let path = |frame: &u32| self.frame_path(before, *frame);
@@ -230,7 +230,7 @@ impl Ledger {
     /// # Errors
     /// [`Error::Io`].
     pub fn keep_note(&self, name: &str, value: &impl Serialize) -> Result<()> {
-        write_json(&self.folder.join(name), value)
+        atomic::write_json(&self.folder.join(name), value)
     }
 }
 
@@ -275,9 +275,9 @@ fn check(folder: &Path, found: &Map<String, Value>, wanted: &Map<String, Value>)
 }
 
 fn encode(image: &Image) -> Result<Vec<u8>> {
-    let channel = |name: &str, of: fn(&crate::math::Rgb) -> f32| exr::Channel {
+    let channel = |name: &str, of: fn(&crate::math::Rgb) -> f32| exr::ExrChannel {
         name: name.into(),
-        samples: exr::Samples::F32(image.rgb.iter().map(of).collect()),
+        samples: exr::ExrSamples::F32(image.rgb.iter().map(of).collect()),
     };
     let channels = [channel("R", |c| c.x), channel("G", |c| c.y), channel("B", |c| c.z)];
     exr::encode(image.width, image.height, &channels, "display values, not radiance")
@@ -290,11 +290,6 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
         // What cannot be understood is as good as absent: it is measured again.
         Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
     }
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_vec_pretty(value).map_err(|e| Error::io("write", path, e.into()))?;
-    atomic::write(path, |w| w.write_all(&text)).map(drop)
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@
 //! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
 //! and weighed by how many of it the move has.
 //!
-//! [`Probe`] takes a quick look instead, from which the error and the time of any setting are foretold
-//! ([`Predictor`]), and the program chooses one; [`Check`] says afterwards what came out.
+//! [`SettingsProbe`] takes a quick look instead, from which the error and the time of any setting are foretold
+//! ([`Predictor`]), and the program chooses one; [`CheckOutcome`] says afterwards what came out.
 //!
 //! Only that choice is decided by measured times; the sweep only tells them.
 //!
@@ -19,6 +19,7 @@
 //! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
 mod candidates;
+mod change;
 mod check;
 mod choice;
 mod draw;
@@ -37,6 +38,7 @@ mod oracle;
 mod patches;
 mod probe;
 mod reference;
+mod row;
 mod search;
 mod sentences;
 mod stage;
@@ -48,21 +50,22 @@ mod worst;
 mod writing;
 
 pub use candidates::candidates;
-pub use check::{Check, Checked, Verdict};
+pub use check::{CheckOutcome, CheckedFrame, Verdict};
 pub use choice::{Goal, best_within, fastest_reaching, untold};
 pub use effort::Effort;
-pub use error_model::Samples;
+pub use error_model::SampleCounts;
 pub use errors::{Errors, displayed_rgb};
 pub use foretell::{Prediction, Predictor, Range};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};
-pub use ledger::{Entry, Ledger};
+pub use ledger::{Ledger, TrialRecord};
 pub use oracle::{OracleCrop, on_a_crop};
-pub use probe::{Given, Probe};
+pub use probe::{FixedSettings, SettingsProbe};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
+pub use row::{CandidateRow, Spread};
 pub use sentences::{about_knob, about_oracle, about_writing};
 pub use stage::Stage;
-pub use sweep::{Heard, Picture, Sweep};
-pub use table::{Measured, Row, Spread};
+pub use sweep::{CandidatePicture, Heard, Sweep};
+pub use table::Measured;
 pub use timing::{Timer, Timing};
 pub use writing::{Writing, on_disk};

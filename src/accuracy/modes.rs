@@ -2,7 +2,7 @@
 
 use super::fit::fit;
 use super::foretell::Mode;
-use super::probe::Probe;
+use super::probe::SettingsProbe;
 use crate::error::Result;
 use crate::scene::{Policy, ReuseSettings};
 
@@ -24,7 +24,7 @@ impl Spent {
     }
 }
 
-impl Probe<'_> {
+impl SettingsProbe<'_> {
     /// All that may be chosen, with `bounces`, told from frames of about `pixels` pixels.
     pub(super) fn modes(&self, bounces: u32, pixels: f64) -> Result<Vec<Mode>> {
         let causes = self.causes();

@@ -1,8 +1,8 @@
 //! Embree against the oracle on a small crop: what trusting Embree is worth.
 
+use super::change::Change;
 use super::errors::Frames;
 use super::stage::Stage;
-use super::table::Change;
 use crate::error::Result;
 use crate::intersect::{Intersector, Oracle};
 use crate::scene::{Policy, Rect, Settings};

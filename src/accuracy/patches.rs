@@ -5,13 +5,12 @@
 use super::draw::{DrawSeed, draw};
 use super::effort::Effort;
 use super::errors::displayed_rgb;
-use super::probe::one_sample;
 use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
 use crate::sampling::mix;
-use crate::scene::Settings;
+use crate::scene::{Policy, Settings};
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
@@ -47,6 +46,14 @@ struct Contrast {
 
 /// The patches of each frame, as displayed: one image a patch.
 pub type Seen = Vec<Vec<Image>>;
+
+/// The settings of a look: one sample of everything, and every frame traced.
+pub(super) fn one_sample(base: &Settings) -> Settings {
+    let mut settings = base.clone();
+    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+    settings.reuse.policy = Policy::Off;
+    settings
+}
 
 /// The patches in steps of 8 bits.
 pub fn rounded(seen: &Seen) -> Seen {

@@ -6,17 +6,16 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::{Causes, Samples};
-use super::foretell::{Predictor, Range};
-use super::patches::Patches;
+use super::error_model::{Causes, SampleCounts};
+use super::foretell::Range;
+use super::patches::{Patches, one_sample};
 use super::reference::truth_settings;
-use super::search::Search;
 use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::film::Image;
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
-use crate::scene::{FrameRange, Policy, Settings};
+use crate::scene::{FrameRange, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -31,7 +30,7 @@ pub const DRAW_OF_CHECK: u64 = 2;
 
 /// What the user set already, which is not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Given {
+pub struct FixedSettings {
     /// Camera samples.
     pub spp: bool,
     /// Shadow samples.
@@ -45,7 +44,7 @@ pub struct Given {
 }
 
 /// The scene and what is wanted of it.
-pub struct Probe<'a> {
+pub struct SettingsProbe<'a> {
     /// What all trials share.
     pub stage: &'a Stage<'a>,
     /// The frames of the job.
@@ -53,7 +52,7 @@ pub struct Probe<'a> {
     /// What is to be reached; `None` where a time is to be kept.
     pub goal: Option<Goal>,
     /// What is not chosen.
-    pub given: Given,
+    pub given: FixedSettings,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
     /// Seconds that the look may take; `None` where it may take as long as need be.
@@ -62,26 +61,9 @@ pub struct Probe<'a> {
     pub ranks: u32,
 }
 
-impl Probe<'_> {
-    /// Looks at the scene. `heard` hears what is being done.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of rendering.
-    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
-        let effort = self.effort()?;
-        heard("errors of a short sweep");
-        let mut search = Search::begin(self, effort)?;
-        heard("times");
-        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
-        if let Some(goal) = self.goal {
-            heard("errors of what may be chosen");
-            search.try_likely(goal)?;
-        }
-        Ok(search.foretelling)
-    }
-
+impl SettingsProbe<'_> {
     /// As much as there is time for.
-    fn effort(&self) -> Result<Effort> {
+    pub(super) fn effort(&self) -> Result<Effort> {
         let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
         let mut settings = one_sample(self.stage.base);
         (settings.width, settings.height) = self.small_size(PILOT);
@@ -150,7 +132,7 @@ impl Probe<'_> {
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.1);
-                let count = checked_pixels(effort);
+                let count = effort.checked_pixels();
                 let patches = Patches::by_contrast_of(base, &frames, image, count, DRAW_OF_CHECK)?;
                 (frames, patches)
             }
@@ -190,19 +172,6 @@ fn between(numbers: &[u32]) -> Vec<u32> {
     all
 }
 
-/// Pixels that a check of `effort` looks at in each frame: more than the probe, since it does so once.
-pub(super) fn checked_pixels(effort: Effort) -> u32 {
-    effort.pixels + effort.pixels / 2
-}
-
-/// The settings of a look: one sample of everything, and every frame traced.
-pub(super) fn one_sample(base: &Settings) -> Settings {
-    let mut settings = base.clone();
-    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
-    settings.reuse.policy = Policy::Off;
-    settings
-}
-
 /// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.
 pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
     let FrameRange { first, last } = frames;
@@ -216,8 +185,8 @@ pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
 }
 
 /// Samples enough to hold `samples` against.
-pub fn samples_of_reference(samples: Samples) -> Samples {
-    Samples {
+pub fn samples_of_reference(samples: SampleCounts) -> SampleCounts {
+    SampleCounts {
         spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
         shadow: samples.shadow.max(4),
         sky: samples.sky.max(2),
@@ -225,7 +194,7 @@ pub fn samples_of_reference(samples: Samples) -> Samples {
 }
 
 /// Settings of a reference of so many samples: its seed is none of a job's or of a sweep's.
-pub fn reference(base: &Settings, samples: Samples) -> Settings {
+pub fn reference(base: &Settings, samples: SampleCounts) -> Settings {
     let mut settings = truth_settings(base, &[]);
     (settings.spp, settings.shadow_samples) = (samples.spp, samples.shadow);
     settings.sky_samples = samples.sky;

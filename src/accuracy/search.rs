@@ -2,11 +2,12 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::{ErrorModel, Point, Samples};
+use super::error_model::{ErrorModel, ErrorSample, SampleCounts};
+use super::errors::ROUNDING;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Figure, Line, Measured, Pace, Predictor, ROUNDING};
+use super::foretell::{Figure, MeasuredSamples, Pace, PowerLaw, Predictor};
 use super::patches::{Patches, Seen, rounded};
-use super::probe::{Probe, reference, samples_of_reference};
+use super::probe::{SettingsProbe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
 use crate::error::Result;
 use std::time::Instant;
@@ -24,7 +25,7 @@ const ROUNDS_BY_FIGURE: u32 = 10;
 
 /// What samples that were traced came to.
 struct Found {
-    point: Point,
+    point: ErrorSample,
     /// How far each frame's error may be off, a share.
     doubts: Vec<f64>,
     /// The goal's figure, unless that is the squared error.
@@ -33,20 +34,39 @@ struct Found {
 
 /// What is known so far.
 pub(super) struct Search<'a> {
-    probe: &'a Probe<'a>,
+    probe: &'a SettingsProbe<'a>,
     patches: Patches,
     truth: Seen,
-    reference: Samples,
+    reference: SampleCounts,
     found: Vec<Found>,
     /// What it comes to.
     pub foretelling: Predictor,
 }
 
+impl SettingsProbe<'_> {
+    /// Looks at the scene. `heard` hears what is being done.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Stopped`]; those of rendering.
+    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
+        let effort = self.effort()?;
+        heard("errors of a short sweep");
+        let mut search = Search::begin(self, effort)?;
+        heard("times");
+        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
+        if let Some(goal) = self.goal {
+            heard("errors of what may be chosen");
+            search.try_likely(goal)?;
+        }
+        Ok(search.foretelling)
+    }
+}
+
 impl<'a> Search<'a> {
     /// Runs the sweep.
-    pub fn begin(probe: &'a Probe<'a>, effort: Effort) -> Result<Self> {
+    pub fn begin(probe: &'a SettingsProbe<'a>, effort: Effort) -> Result<Self> {
         let patches = probe.patches(effort)?;
-        let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
+        let reference = samples_of_reference(SampleCounts { spp: 8, shadow: 2, sky: 2 });
         let begun = Instant::now();
         let truth =
             patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
@@ -98,8 +118,8 @@ impl<'a> Search<'a> {
 
     /// The samples that would be chosen if squared errors up to `allowed` were, but for those that were
     /// tried.
-    fn untried(&self, allowed: f64) -> Vec<Samples> {
-        let mut new: Vec<Samples> = Vec::new();
+    fn untried(&self, allowed: f64) -> Vec<SampleCounts> {
+        let mut new: Vec<SampleCounts> = Vec::new();
         for found in likely_of(self.foretelling.fastest(&self.probe.range(), allowed)) {
             // Modes may agree on samples, not only neighbours among them.
             if self.foretelling.tried(found.samples).is_none() && !new.contains(&found.samples) {
@@ -110,7 +130,7 @@ impl<'a> Search<'a> {
     }
 
     /// Traces the reference again where it is too coarse to hold `samples` against.
-    fn sharpen(&mut self, samples: Samples) -> Result<()> {
+    fn sharpen(&mut self, samples: SampleCounts) -> Result<()> {
         if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
             let stage = self.probe.stage;
             self.reference = samples_of_reference(samples);
@@ -119,7 +139,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    fn measure(&mut self, samples: Samples) -> Result<()> {
+    fn measure(&mut self, samples: SampleCounts) -> Result<()> {
         let seen = self.traced(samples)?;
         let errors = squares(&self.patches, &self.truth, &seen);
         let of = |goal| -> Result<Figure> {
@@ -132,21 +152,26 @@ impl<'a> Search<'a> {
         let goal = self.probe.goal.filter(|goal| goal.most().is_some());
         let figure = goal.map(of).transpose()?;
         let doubts = doubts(&self.patches, &self.truth, &seen);
-        let point = Point { samples, reference: self.reference, errors };
+        let point = ErrorSample { samples, reference: self.reference, errors };
         self.found.push(Found { point, doubts, figure });
         Ok(())
     }
 
     /// Fits the model to all that was measured, and puts it through the last.
     fn learn(&mut self) {
-        let points: Vec<&Point> = self.found.iter().map(|found| &found.point).collect();
+        let points: Vec<&ErrorSample> = self.found.iter().map(|found| &found.point).collect();
         let model = ErrorModel::of(self.probe.causes(), &points);
         let measured = |Found { point, doubts, figure }: &Found| {
             // The model tells the reference's part of the difference.
             let own = model.errors(point.samples).zip(model.errors(point.reference));
             let parts = own.map(|(s, r)| s / (s + r).max(1e-12));
             let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-            Measured { samples: point.samples, errors, doubts: doubts.clone(), figure: *figure }
+            MeasuredSamples {
+                samples: point.samples,
+                errors,
+                doubts: doubts.clone(),
+                figure: *figure,
+            }
         };
         self.foretelling.measured = self.found.iter().map(measured).collect();
         let last = self.found.last();
@@ -157,7 +182,7 @@ impl<'a> Search<'a> {
 
     /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
     /// say, cannot go on rising.
-    fn line(&self, most: f64) -> Option<Line> {
+    fn line(&self, most: f64) -> Option<PowerLaw> {
         let all =
             self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
         let mut nearest: Vec<(f64, f64)> =
@@ -165,18 +190,18 @@ impl<'a> Search<'a> {
         let off = |found: &(f64, f64)| (found.1 / most).ln().abs();
         nearest.sort_by(|a, b| off(a).total_cmp(&off(b)));
         nearest.truncate(4);
-        let line = Line::through(&nearest)?;
+        let line = PowerLaw::through(&nearest)?;
         nearest.first().map(|found| line.shifted_to(*found))
     }
 
-    fn design(&self) -> Vec<Samples> {
+    fn design(&self) -> Vec<SampleCounts> {
         let (base, causes) = (self.probe.stage.base, self.probe.causes());
         let all = [(1, 1, 1), (4, 1, 1), (4, 8, 1), (4, 1, 8), (2, 4, 4), (16, 1, 1), (8, 2, 2)];
         let mut design = Vec::new();
         for (spp, shadow, sky) in all {
             let shadow = if causes.shadow { shadow } else { base.shadow_samples };
             let sky = if causes.sky { sky } else { base.sky_samples };
-            let samples = Samples { spp, shadow, sky };
+            let samples = SampleCounts { spp, shadow, sky };
             if !design.contains(&samples) {
                 design.push(samples);
             }
@@ -185,7 +210,7 @@ impl<'a> Search<'a> {
     }
 
     /// The patches with the reference's bounces: what samples alone do.
-    fn traced(&self, samples: Samples) -> Result<Seen> {
+    fn traced(&self, samples: SampleCounts) -> Result<Seen> {
         let stage = self.probe.stage;
         let mut settings = reference(stage.base, samples);
         settings.seed = stage.base.seed;
@@ -222,7 +247,7 @@ impl<'a> Search<'a> {
             tried.sort_unstable();
             tried.dedup();
         }
-        let mut settings = reference(base, Samples { spp: 4, shadow: 1, sky: 1 });
+        let mut settings = reference(base, SampleCounts { spp: 4, shadow: 1, sky: 1 });
         settings.seed = base.seed;
         settings.bounces = tried.iter().copied().fold(settings.bounces, u32::max);
         let truth = self.patches.trace(probe.stage, &settings)?;

@@ -1,8 +1,10 @@
 //! A sentence per knob.
 
+use super::change::Change;
 use super::knobs::{Group, Knob};
 use super::oracle::OracleCrop;
-use super::table::{Change, Measured, Row};
+use super::row::CandidateRow;
+use super::table::Measured;
 use super::writing::Writing;
 use crate::measure::{Interval, Median};
 use crate::page::words::{bytes, change, count, percent, seconds, short};
@@ -13,7 +15,7 @@ pub fn about_knob(measured: &Measured, knob: Knob) -> Vec<String> {
     rows.map(|row| sentence(measured.default_row(), row)).collect()
 }
 
-fn sentence(default: &Row, row: &Row) -> String {
+fn sentence(default: &CandidateRow, row: &CandidateRow) -> String {
     let changed = || row.change.map_or(String::new(), |c| pixels(&c));
     let what = match row.knob.group() {
         Some(Group::Intersection) => changed(),
@@ -24,13 +26,13 @@ fn sentence(default: &Row, row: &Row) -> String {
 }
 
 /// What its tree takes.
-fn tree(default: &Row, row: &Row) -> String {
+fn tree(default: &CandidateRow, row: &CandidateRow) -> String {
     let [was, is] = [default, row].map(|r| seconds(r.build_seconds.median.interval.estimate));
     let memory = [default, row].map(|r| bytes(r.memory_bytes));
     format!("built in {is} instead of {was}, {} instead of {} of memory", memory[1], memory[0])
 }
 
-fn time(row: &Row) -> String {
+fn time(row: &CandidateRow) -> String {
     let Some(wall) = row.time_ratio else { return "not timed".into() };
     let told = |ratio: &Median| {
         let [is, low, high] =
@@ -57,7 +59,7 @@ fn time(row: &Row) -> String {
     }
 }
 
-fn error(default: &Row, row: &Row) -> String {
+fn error(default: &CandidateRow, row: &CandidateRow) -> String {
     if row.change.is_some_and(|c| c.differing == 0) {
         return "the same pixels".into();
     }

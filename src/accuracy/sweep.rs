@@ -5,12 +5,14 @@
 //! The first turn warms up: its pictures count, its times do not. Each turn has a seed of its own,
 //! the same for all candidates.
 
+use super::change::Change;
 use super::errors::Errors;
 use super::knobs::Candidate;
-use super::ledger::{Entry, Ledger};
+use super::ledger::{Ledger, TrialRecord};
 use super::reference::{Truth, seed_of_turn};
+use super::row::Taken;
 use super::stage::Stage;
-use super::table::{Change, Measured, Taken};
+use super::table::Measured;
 use super::trial::{self, Trial};
 use crate::error::Result;
 use crate::page;
@@ -48,7 +50,7 @@ pub struct Heard<'a> {
 
 /// A candidate's picture of the frame that pictures are shown of.
 #[derive(Debug, Clone)]
-pub struct Picture {
+pub struct CandidatePicture {
     /// Index of its row.
     pub candidate: usize,
     /// The picture.
@@ -133,7 +135,7 @@ impl Sweep<'_> {
                 let image = &tried.trial.frames[&self.shown_frame()];
                 ledger.keep_picture(*candidate, &page::Picture::png(image)?)?;
             }
-            ledger.append(Entry {
+            ledger.append(TrialRecord {
                 turn,
                 candidate: *candidate,
                 errors: errors.into(),
@@ -169,7 +171,7 @@ impl Sweep<'_> {
 
     /// How long the trials take that are missing: a setting's last one tells of its next one, and by
     /// how many samples they take those that were tried tell of others. `None` before any was tried.
-    fn seconds_left(&self, entries: &[Entry]) -> Option<f64> {
+    fn seconds_left(&self, entries: &[TrialRecord]) -> Option<f64> {
         let work = |candidate: usize| samples(&self.candidates[candidate].settings) as f64;
         let all: f64 = entries.iter().map(|entry| entry.took).sum();
         let pace = all / entries.iter().map(|entry| work(entry.candidate)).sum::<f64>();
@@ -186,7 +188,7 @@ impl Sweep<'_> {
 
     /// What `ledger` tells: a row for every candidate that was timed at least once, and their pictures;
     /// `None` before the default was.
-    pub fn measured(&self, ledger: &Ledger) -> Option<(Measured, Vec<Picture>)> {
+    pub fn measured(&self, ledger: &Ledger) -> Option<(Measured, Vec<CandidatePicture>)> {
         let taken = |k: &usize| Taken::of(ledger.entries(), *k);
         let all: Vec<usize> = (0..self.candidates.len()).filter(|k| taken(k).is_timed()).collect();
         if all.first() != Some(&0) {
@@ -195,7 +197,7 @@ impl Sweep<'_> {
         let candidates: Vec<Candidate> = all.iter().map(|k| self.candidates[*k].clone()).collect();
         let measured = Measured::of(&candidates, &all.iter().map(taken).collect::<Vec<_>>());
         let picture = |(candidate, k): (usize, &usize)| {
-            ledger.picture(*k).map(|picture| Picture { candidate, picture })
+            ledger.picture(*k).map(|picture| CandidatePicture { candidate, picture })
         };
         let pictures = all.iter().enumerate().filter_map(picture).collect();
         Some((measured, pictures))
@@ -216,7 +218,7 @@ impl Sweep<'_> {
         };
         let intersector = own.as_deref().map_or(self.stage.intersector, |own| own as _);
         let trial = trial::run(self.stage, settings, intersector, frames)?;
-        let entry = Entry {
+        let entry = TrialRecord {
             seconds: trial.seconds,
             cpu_seconds: trial.cpu_seconds,
             build_seconds,
@@ -224,7 +226,7 @@ impl Sweep<'_> {
             rays: trial.rays,
             rays_per_frame: trial.rays_per_frame,
             memory: trial.memory,
-            ..Entry::default()
+            ..TrialRecord::default()
         };
         Ok(Tried { trial, entry })
     }
@@ -233,7 +235,7 @@ impl Sweep<'_> {
 /// A trial, and its figures.
 struct Tried {
     trial: Trial,
-    entry: Entry,
+    entry: TrialRecord,
 }
 
 /// Samples a pixel, of the camera and of the lights; roughly what a setting costs.

@@ -1,10 +1,10 @@
 //! How long what may be chosen takes: tried on small frames, and the choice by it.
 
-use super::error_model::Samples;
+use super::error_model::SampleCounts;
 use super::foretell::{Prediction, Predictor};
 use super::frames::{Cut, timed_frames};
 use super::modes::Spent;
-use super::probe::Probe;
+use super::probe::SettingsProbe;
 use super::{effort::Effort, trial};
 use crate::error::Result;
 use crate::reuse;
@@ -36,7 +36,7 @@ pub struct Timing {
 /// the wall seconds that a frame takes one of them.
 pub type Timer<'a> = &'a dyn Fn(&Timing) -> Result<f64>;
 
-impl Probe<'_> {
+impl SettingsProbe<'_> {
     /// Of the fastest setting of each mode the one that is fastest when all are tried.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ impl Probe<'_> {
     pub fn best_within(
         &self,
         foretelling: &Predictor,
-        left: &dyn Fn(Samples) -> f64,
+        left: &dyn Fn(SampleCounts) -> f64,
         timer: Timer,
     ) -> Result<Option<Prediction>> {
         let mut foretelling = foretelling.clone();

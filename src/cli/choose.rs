@@ -1,24 +1,26 @@
 //! `render --target` and `--budget`: settings that the program chooses for a scene.
 
 mod budget;
+mod choice;
 mod folder;
 mod judge;
 
 use super::args::SettingArgs;
 use super::request::Request;
 use super::{say, spelled, values};
-use crate::accuracy::{Given, Goal, Prediction, Predictor, Probe, Stage, Timer, Verdict};
+use crate::accuracy::{FixedSettings, Goal, Prediction, Predictor, SettingsProbe, Stage, Timer};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
 use crate::output::manifest::Header;
 use crate::page::words::seconds;
-use crate::scene::{FrameRange, Policy, Settings};
+use crate::scene::Policy;
 use budget::Budget;
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::time::{Duration, Instant};
+
+pub use choice::{Choice, asks_for_choice};
 
 /// Share of the job that a probe for a target takes: what it saves is to be more.
 const PROBE_SHARE: f64 = 0.1;
@@ -41,37 +43,9 @@ pub struct ChoiceArgs {
     pub budget: Option<Duration>,
 }
 
-/// What was chosen and why; the manifest keeps it, so that a job that goes on chooses nothing anew.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Choice {
-    /// What was wanted, in words.
-    pub wanted: String,
-    /// The settings before, and which of them the user gave.
-    base: Value,
-    given: Given,
-    /// The squared error that the target allows, display steps.
-    allowed: Option<f64>,
-    /// What is foretold of the choice.
-    pub foretold: Prediction,
-    /// All that the probe found out.
-    foretelling: Predictor,
-    /// Wall seconds that rendering and writing all frames is foretold to take.
-    seconds: f64,
-    /// How often it was tightened.
-    pub tightened: u32,
-    /// What was held against what came out: the shot's hash, and frames of it.
-    checked: Option<(String, FrameRange)>,
-    /// How good these came out, in words, if they were looked at.
-    #[serde(default)]
-    pub came_out: Option<String>,
-    /// What came of the target then.
-    #[serde(default)]
-    verdict: Option<Verdict>,
-}
-
 /// What is to be done once frames were held against what was wanted.
 #[derive(Serialize, Deserialize)]
-pub enum Judged {
+pub enum Judgement {
     /// All frames are rendered again, under a tighter choice.
     Again(Choice),
     /// Nothing: the choice with what came of it.
@@ -88,6 +62,8 @@ pub struct Chooser<'a> {
     pub stage: &'a Stage<'a>,
     /// The job.
     pub request: &'a Request,
+    /// What traces, as far as frames differ by it.
+    pub tracer: &'a str,
     /// When the program started: a budget counts from then.
     pub started: Instant,
     /// How many ranks share it.
@@ -110,7 +86,9 @@ impl ChoiceArgs {
             () if settings.crop.is_some() => Some("--crop"),
             () if settings.reuse.policy == Policy::Colour => Some("--policy colour"),
             () if !request.references.is_empty() => Some("--references"),
-            () if request.maps && settings.reuse.policy == Policy::Off => Some("--policy off"),
+            () if request.options.maps && settings.reuse.policy == Policy::Off => {
+                Some("--policy off")
+            }
             () => None,
         };
         if let Some(goal) = self.target.filter(|goal| goal.is_beyond_8_bits() && rounds(request)) {
@@ -136,102 +114,6 @@ impl ChoiceArgs {
     }
 }
 
-impl Choice {
-    /// The settings that were chosen over `base`.
-    pub fn settings(&self, base: &Settings) -> Settings {
-        self.foretold.settings(base)
-    }
-
-    /// As the manifest keeps it.
-    pub fn value(&self) -> Value {
-        serde_json::to_value(self).unwrap_or_default()
-    }
-
-    /// Whether `frames` of the shot of this hash were held against what came out.
-    pub fn is_checked(&self, shot: &str, frames: FrameRange) -> bool {
-        let holds = |seen: &FrameRange| seen.first <= frames.first && frames.last <= seen.last;
-        self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
-    }
-
-    /// The choice whose `frames` were.
-    pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
-        Self { checked: Some((shot.into(), frames)), ..self }
-    }
-
-    /// The choice that a manifest's header holds, if this version can read it.
-    pub fn of(header: &Header) -> Option<Self> {
-        serde_json::from_value(header.chosen.clone()?).ok()
-    }
-
-    /// What came of the target, if there was one and it was looked at.
-    pub fn verdict(&self) -> Option<String> {
-        let came = match self.verdict? {
-            Verdict::Reached => "reached",
-            Verdict::Open => "not told apart from the target by so few pixels",
-            Verdict::Missed => "missed",
-        };
-        Some(format!("{}: {came}", self.wanted))
-    }
-
-    /// All options that stand for it, whether they have a part in the scene or not.
-    pub fn options(&self) -> String {
-        spelled::options(&self.foretold.settings(&Settings::default()), &EffectPlan::EVERYTHING)
-    }
-
-    /// The command that gives the same frames whatever the clock says: what was chosen in place of the
-    /// wish. Options that are given stay.
-    pub fn spelled_out(&self, command: &[String]) -> Vec<String> {
-        let options = self.options();
-        let options: Vec<&str> = options.split(' ').collect();
-        let is_given = |name: &str| command.iter().any(|word| is_option(word, name));
-        let chosen = options.chunks(2).filter(|pair| !is_given(pair[0])).flatten();
-        let mut words = Vec::new();
-        let mut left = command.iter();
-        while let Some(word) = left.next() {
-            if !is_wish(word) {
-                words.push(word.clone());
-                continue;
-            }
-            words.extend(chosen.clone().map(ToString::to_string));
-            if !word.contains('=') {
-                left.next();
-            }
-        }
-        words
-    }
-
-    /// What is foretold of it, in words.
-    pub fn foretold_in_words(&self) -> String {
-        format!(
-            "{}PSNR {} in the worst frame, {} a frame, {} in all",
-            self.figure().map_or(String::new(), |figure| format!("{figure}, ")),
-            decibels(self.foretold.psnr()),
-            seconds(self.foretold.seconds),
-            seconds(self.seconds)
-        )
-    }
-
-    /// What is foretold of it in the target's own unit, unless that is PSNR.
-    fn figure(&self) -> Option<String> {
-        let figure = self.foretelling.foretold_figure(&self.foretold)?;
-        values::goal(&self.wanted).ok()?.in_words(figure)
-    }
-}
-
-/// Whether a command leaves settings to the program.
-pub fn asks_for_choice(command: &[String]) -> bool {
-    command.iter().any(|word| is_wish(word))
-}
-
-fn is_wish(word: &str) -> bool {
-    is_option(word, "--target") || is_option(word, "--budget")
-}
-
-/// Whether a word of a command is the option `name`, with its value or before it.
-fn is_option(word: &str, name: &str) -> bool {
-    word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
-}
-
 /// Whether frames are rounded to 8 bits.
 fn rounds(request: &Request) -> bool {
     request.pattern.format() != Format::Exr && request.settings.png_bits == 8
@@ -247,17 +129,18 @@ impl Chooser<'_> {
     ///
     /// # Errors
     /// Any of the probe's; a target that no setting is predicted to reach.
-    pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
-        if let Some(before) = self.before(tracer) {
+    pub fn choose(&self, timer: Timer) -> Result<Choice> {
+        if let Some(before) = self.before() {
             let options = self.options(&before.foretold);
             self.tell(format!("for {}, as chosen before: {options}", before.wanted));
             self.warn_if_long(&before);
             return Ok(before);
         }
-        self.check_folder(tracer)?;
+        self.check_folder()?;
         let start = Instant::now();
         let budget = Budget::of(self);
-        let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
+        let probe =
+            SettingsProbe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
         let (foretelling, aim) = match self.args.target {
             Some(goal) => self.look(goal).map(|(found, aim)| (found, Some(aim)))?,
             None => (probe.look(&|what| self.tell(format!("probe: {what}")))?, None),
@@ -306,7 +189,7 @@ impl Chooser<'_> {
     fn look(&self, goal: Goal) -> Result<(Predictor, f64)> {
         let begun = Instant::now();
         let told = |what: &str| self.tell(format!("probe: {what}"));
-        let brief = Probe { seconds: Some(0.0), ..self.probe() };
+        let brief = SettingsProbe { seconds: Some(0.0), ..self.probe() };
         let first = brief.look(&told)?;
         let (aim, spent) = (first.aim(goal, BRIEFLY), begun.elapsed().as_secs_f64());
         let within = |error| brief.fastest_seconds(&first, error);
@@ -316,7 +199,7 @@ impl Chooser<'_> {
             return Ok((first, aim));
         }
         self.tell("there is time for a longer look".into());
-        let foretelling = Probe { seconds: left, ..self.probe() }.look(&told)?;
+        let foretelling = SettingsProbe { seconds: left, ..self.probe() }.look(&told)?;
         let aim = foretelling.aim(goal, LONGER);
         Ok((foretelling, aim))
     }
@@ -336,7 +219,7 @@ impl Chooser<'_> {
             format!("; of what was tried, {tried} came nearest, to {figure}")
         });
         let nearest = seen.or(best).unwrap_or_default();
-        let fewer = match self.given() == Given::default() {
+        let fewer = match self.given() == FixedSettings::default() {
             true => "",
             false => ", or give fewer options",
         };
@@ -346,22 +229,22 @@ impl Chooser<'_> {
         ))
     }
 
-    fn before(&self, tracer: &str) -> Option<Choice> {
-        let before = Choice::of(&self.request.header_before(tracer)?)?;
+    fn before(&self) -> Option<Choice> {
+        let before = Choice::of(&self.request.header_before(self.tracer)?)?;
         let is_same = before.wanted == self.args.words()
             && before.base == Header::settings(self.stage.base)
             && before.given == self.given();
         is_same.then_some(before)
     }
 
-    fn given(&self) -> Given {
+    fn given(&self) -> FixedSettings {
         let s = self.options;
-        Given {
+        FixedSettings {
             spp: s.spp.is_some(),
             shadow: s.shadow_samples.is_some(),
             sky: s.sky_samples.is_some(),
             bounces: s.bounces.is_some(),
-            policy: s.reuse.policy.is_some() || self.request.maps,
+            policy: s.reuse.policy.is_some() || self.request.options.maps,
         }
     }
 
@@ -375,8 +258,8 @@ impl Chooser<'_> {
     }
 
     /// Who looks at the scene for this job.
-    pub fn probe(&self) -> Probe<'_> {
-        Probe {
+    pub fn probe(&self) -> SettingsProbe<'_> {
+        SettingsProbe {
             stage: self.stage,
             frames: self.request.frames,
             goal: self.args.target,

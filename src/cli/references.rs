@@ -41,7 +41,7 @@ impl References {
         (scene, settings, terms): (&Scene, &Settings, &Compatibility),
     ) -> Result<Self> {
         if folders.is_empty() {
-            return Ok(Self { cache: None, hash: "none".into() });
+            return Ok(Self::none());
         }
         refuse_policy(settings)?;
         // (Names as they are, which may be no text.)
@@ -62,6 +62,11 @@ impl References {
         let hash = name_of(&infos);
         cache.serve(infos);
         Ok(Self { cache: Some(cache), hash })
+    }
+
+    /// No references.
+    pub fn none() -> Self {
+        Self { cache: None, hash: "none".into() }
     }
 
     /// Whether there are none.

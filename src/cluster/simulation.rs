@@ -24,7 +24,7 @@ pub struct Job {
 }
 
 /// The costs of tasks and messages.
-pub struct Model<'a> {
+pub struct CostModel<'a> {
     /// Core seconds to render and write an original, by its frame number.
     pub seconds: &'a dyn Fn(u32) -> f64,
     /// Core seconds of these for writing, which strips do not share.
@@ -88,12 +88,12 @@ pub struct SimulatedRun {
 
 impl Job {
     /// Simulates the job on `ranks` ranks.
-    pub fn simulate(&self, ranks: u32, model: &Model) -> SimulatedRun {
+    pub fn simulate(&self, ranks: u32, model: &CostModel) -> SimulatedRun {
         simulator::Simulator::new(self, ranks, model).run()
     }
 
     /// Core seconds of all frames on one rank, which sends no messages.
-    pub fn single_rank_seconds(&self, model: &Model) -> f64 {
+    pub fn single_rank_seconds(&self, model: &CostModel) -> f64 {
         self.pyramid.all().map(model.seconds).sum()
     }
 }

@@ -49,7 +49,7 @@ impl SurfaceInteraction {
     }
 
     /// A ray from here to `target` that stops short of its surface. `t` runs from 0 to (almost) 1.
-    pub fn spawn_to(&self, target: &Target, offset: bool) -> Ray {
+    pub fn spawn_to(&self, target: &RayEnd, offset: bool) -> Ray {
         self.towards(target.point - self.p, offset).to(target)
     }
 
@@ -69,7 +69,7 @@ impl SurfaceInteraction {
 
 /// Where a ray is to end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target {
+pub struct RayEnd {
     /// A point of a surface, scene space.
     pub point: DVec3,
     /// The surface's unit normal there, to either side.
@@ -139,7 +139,7 @@ impl SpawnPoint {
 
     /// The ray that ends just before `target`, as [`SurfaceInteraction::spawn_to`].
     #[inline(always)] // Once for each shadow ray: a call costs a tenth of a traced frame.
-    pub fn to(&self, target: &Target) -> Ray {
+    pub fn to(&self, target: &RayEnd) -> Ray {
         let org = self.org;
         let ray = Ray { tfar: 1.0, ..Ray::new(org, target.point - org) };
         if !self.offset {

@@ -16,7 +16,7 @@ mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
 pub use embree::EmbreeIntersector;
-pub use interaction::{PlaneError, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
+pub use interaction::{PlaneError, RayEnd, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 pub use oracle::{CourtHit, Oracle};
 
 use crate::error::Result;

@@ -5,6 +5,7 @@
 //! removes it; what a killed run leaves behind, [`clean_temporaries`] removes.
 
 use crate::error::{Error, Result};
+use serde::Serialize;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -35,6 +36,15 @@ pub fn write(
     file.sync_all().map_err(|e| temporary.error("sync", e))?;
     temporary.rename()?;
     Ok(written)
+}
+
+/// Writes `value` as JSON, with a line end, to the file at `path`.
+///
+/// # Errors
+/// [`Error::Io`], as [`write()`]; a value that JSON cannot hold.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_vec_pretty(value).map_err(|e| Error::io("write", path, e.into()))?;
+    write(path, |w| w.write_all(&text).and_then(|()| w.write_all(b"\n"))).map(drop)
 }
 
 /// Creates a folder and those above it, where missing.

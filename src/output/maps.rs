@@ -7,8 +7,8 @@ mod read;
 
 pub use read::of_exr;
 
-use super::exr::{Channel, Samples};
-use super::{Display, WriteOptions, Written, write_image};
+use super::exr::{ExrChannel, ExrSamples};
+use super::{Display, WriteOptions, Written, png};
 use crate::error::Result;
 use crate::film::{Film, Provenance, ProvenanceKind};
 use crate::math::{Rgb, luminance};
@@ -108,7 +108,7 @@ impl Map {
     /// Writes it for the frame at `path`.
     ///
     /// # Errors
-    /// [`write_image`]'s.
+    /// [`crate::error::Error::Io`] when the file cannot be written.
     pub fn write(
         self,
         path: &Path,
@@ -121,25 +121,25 @@ impl Map {
         let farthest = options.maps.unwrap_or(1.0);
         let painted = self.paint(film, &options.display, farthest);
         let options = WriteOptions { display, png_bits: 8, ..options.clone() };
-        write_image(&path, &painted, &options).map(|written| (path, written))
+        png::write(&path, &painted, &options).map(|written| (path, written))
     }
 
     /// It as a channel of an exr frame, `reuse.provenance`.
-    fn channel(self, film: &Film) -> Channel {
+    fn channel(self, film: &Film) -> ExrChannel {
         let n = film.rgb.len();
         let source = |i: usize| film.provenance.as_ref().map_or(Provenance::default(), |s| s[i]);
         let samples = match self {
-            Self::Provenance => Samples::U32((0..n).map(|i| source(i).kind as u32).collect()),
-            Self::Frame => Samples::U32((0..n).map(|i| source(i).frame).collect()),
-            Self::Distance => Samples::F32((0..n).map(|i| source(i).distance).collect()),
-            Self::Audit => Samples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
+            Self::Provenance => ExrSamples::U32((0..n).map(|i| source(i).kind as u32).collect()),
+            Self::Frame => ExrSamples::U32((0..n).map(|i| source(i).frame).collect()),
+            Self::Distance => ExrSamples::F32((0..n).map(|i| source(i).distance).collect()),
+            Self::Audit => ExrSamples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
         };
-        Channel { name: format!("reuse.{}", self.name()), samples }
+        ExrChannel { name: format!("reuse.{}", self.name()), samples }
     }
 }
 
 /// All maps as channels of an exr frame.
-pub fn channels_of(film: &Film) -> Vec<Channel> {
+pub fn channels_of(film: &Film) -> Vec<ExrChannel> {
     Map::ALL.map(|map| map.channel(film)).into()
 }
 
@@ -281,7 +281,7 @@ mod tests {
         let channels = channels_of(&film());
         let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["reuse.provenance", "reuse.frame", "reuse.distance", "reuse.audit"]);
-        let Samples::U32(provenance) = &channels[0].samples else { panic!("numbers") };
+        let ExrSamples::U32(provenance) = &channels[0].samples else { panic!("numbers") };
         assert_eq!(provenance[..5], [1, 2, 3, 4, 0]);
         assert_eq!(Map::Audit.path(Path::new("o/f_01.ppm")), Path::new("o/f_01_audit.png"));
     }

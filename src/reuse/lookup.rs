@@ -12,13 +12,10 @@ pub(super) use estimate::steps_per_radiance;
 use super::check::agrees;
 use super::evidence::Evidence;
 use super::reference::{NONE, Reference};
-use super::taps::{ALWAYS, Taps, Taps4, sum};
+use super::taps::{ALWAYS, References, TOGETHER, Taps, Taps4, sum};
 use crate::film::{Provenance, ProvenanceKind};
 use crate::inference::{Estimate, Inference, LookupBatch};
 
-/// Points that are looked up together: the memory that all of them need is asked for before any of it
-/// is waited for.
-pub(super) const TOGETHER: usize = 16;
 /// Least sum of weights for an estimate; a reference that surrounds the point gives 1.
 pub(super) const LEAST_WEIGHT: f64 = 0.1;
 
@@ -89,15 +86,16 @@ impl Lookup<'_> {
             .zip(unshadowed.chunks(TOGETHER * channels))
             .zip(estimates.chunks_mut(TOGETHER * channels))
             .zip(provenance.chunks_mut(TOGETHER));
+        let references = References(self.references);
         let mut taps = Taps::new();
         let mut means = Vec::with_capacity(channels);
         for (((points, unshadowed), estimates), provenance) in each {
             let shown = |i: usize| &unshadowed[i * channels..][..channels];
             let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
             let mut found: [[Option<Taps4>; ALWAYS]; TOGETHER] = [[None; ALWAYS]; TOGETHER];
-            self.find(points, is_lit, &mut found);
+            references.find(points, is_lit, &mut found);
             for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
-                self.gather(point, &found[i], &mut taps);
+                references.gather(point, &found[i], &mut taps);
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];
                     self.estimate_all(&taps, point, shown(i), &mut means, own);

@@ -6,7 +6,6 @@ mod image;
 pub(super) use image::ALWAYS;
 
 use super::index::{Cells, level_of};
-use super::lookup::Lookup;
 use super::reference::{NONE, Reference, Sample};
 use crate::inference::SurfacePoint;
 use crate::math::Vec3;
@@ -14,6 +13,9 @@ use wide::{CmpGe, CmpGt, CmpLe, f32x4};
 
 /// Most groups of four samples that one point's estimate is made of.
 const MOST: usize = 8;
+/// Points that are looked up together: the memory that all of them need is asked for before any of it
+/// is waited for.
+pub(super) const TOGETHER: usize = 16;
 /// Sum of weights (a reference that surrounds the point gives 1) from which on no further reference is looked up.
 pub(super) const ENOUGH_WEIGHT: f64 = 0.6;
 /// Least cosine between the normals of point and sample; the weight grows with the square of the excess.
@@ -195,7 +197,10 @@ impl Place {
     }
 }
 
-impl Lookup<'_> {
+/// Reference frames in the order in which they are asked.
+pub(super) struct References<'a>(pub &'a [&'a Reference]);
+
+impl References<'_> {
     /// Gathers the samples about `point` in `taps`, whose samples in the first references are `found`.
     pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
@@ -204,7 +209,7 @@ impl Lookup<'_> {
             return;
         }
         let place = Place::of(point);
-        for (number, reference) in self.references.iter().enumerate().skip(ALWAYS) {
+        for (number, reference) in self.0.iter().enumerate().skip(ALWAYS) {
             if taps.weight >= ENOUGH_WEIGHT {
                 return;
             }
@@ -216,7 +221,7 @@ impl Lookup<'_> {
             let own = level_of(point.footprint);
             let cells =
                 [own, own - 1, own + 1].map(|level| Cells::around(level, point.geom_id, point.p));
-            for number in 0..self.references.len() {
+            for number in 0..self.0.len() {
                 if taps.weight >= ENOUGH_WEIGHT {
                     return;
                 }
@@ -233,7 +238,7 @@ impl Lookup<'_> {
         cells: &[Cells; LEVELS],
         taps: &mut Taps,
     ) {
-        let reference = self.references[number];
+        let reference = self.0[number];
         for cells in cells {
             let reach = cells.edge as f32 / footprint;
             let mut members = reference.index.members(cells);

@@ -10,6 +10,7 @@
 
 mod camera;
 mod check;
+mod job;
 mod lens;
 mod light;
 pub mod limits;
@@ -18,6 +19,7 @@ mod mesh;
 mod path;
 mod place;
 mod recentre;
+mod recentring;
 mod reuse;
 mod settings;
 mod spline;
@@ -27,6 +29,7 @@ mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
+pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
     DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
@@ -34,12 +37,12 @@ pub use light::{
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
-pub use recentre::Recentring;
+pub use recentring::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
     BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
-pub use time::{Interval, parse_time, parse_time_limit};
+pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
 pub(crate) use weld::weld;
 pub(crate) use winding::{borders, closed_volume};

@@ -4,8 +4,8 @@
 //! Points behind mirrors and glass and points out of focus stay apart, since neighbouring samples may end far from
 //! one another there. What is traced is gathered per surface point and becomes a source.
 
-use super::direct::ShadingPoint;
 use super::pixels::{BLOCK, BlockPixels};
+use super::point::ShadingPoint;
 use super::{FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{

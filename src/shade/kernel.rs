@@ -5,10 +5,11 @@
 //! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
-use super::direct::{ShadingPoint, ShadowScratch};
+use super::direct::ShadowScratch;
 use super::medium_stack::{self, MediumStack};
 use super::optics;
 use super::pixels::BlockPixels;
+use super::point::{SamplePlace, ShadingPoint};
 use super::surface::{albedo, emitted};
 use super::{FrameInput, Left, Renderer};
 use crate::film::GPixel;
@@ -364,8 +365,8 @@ struct ScatteredRays<'w> {
 }
 
 impl PathState {
-    fn place(&self) -> super::direct::SamplePlace {
-        super::direct::SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
+    fn place(&self) -> SamplePlace {
+        SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
     }
 }
 

@@ -16,6 +16,7 @@ mod medium_stack;
 mod motion;
 pub mod optics;
 mod pixels;
+mod point;
 mod scattered;
 mod surface;
 

@@ -6,7 +6,7 @@ use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 use tweenray::math::DVec3;
-use tweenray::output::exr::{self, Channels, Samples};
+use tweenray::output::exr::{self, ExrChannels, ExrSamples};
 use tweenray::scene::{Camera, Pose};
 
 /// A cube on a floor under a lamp and a sky, in a mirror.
@@ -30,12 +30,12 @@ fn pan(frames: u32, far: f64) -> String {
     )
 }
 
-fn channels(job: &Job, name: &str) -> Channels {
+fn channels(job: &Job, name: &str) -> ExrChannels {
     let file = fs::File::open(job.path(name)).expect("there");
     exr::decode(Path::new(name), BufReader::new(file), 1 << 26).expect("an exr file")
 }
 
-fn f32s<'c>(channels: &'c Channels, name: &str) -> &'c [f32] {
+fn f32s<'c>(channels: &'c ExrChannels, name: &str) -> &'c [f32] {
     channels.f32(name).unwrap_or_else(|| panic!("no {name}"))
 }
 
@@ -125,8 +125,8 @@ fn exr_frames_hold_their_maps() {
     assert_eq!(job.names("o"), ["f.manifest.jsonl", "f_5.exr"]);
     let held = channels(&job, "o/f_5.exr");
     let u32s = |name: &str| match &held.list.iter().find(|c| c.name == name).expect(name).samples {
-        Samples::U32(v) => v.clone(),
-        Samples::F32(_) => panic!("{name} are numbers"),
+        ExrSamples::U32(v) => v.clone(),
+        ExrSamples::F32(_) => panic!("{name} are numbers"),
     };
     let (provenance, frame) = (u32s("reuse.provenance"), u32s("reuse.frame"));
     assert!((0..=4).all(|kind| kind == 3 || provenance.contains(&kind)));
@@ -161,7 +161,7 @@ fn references_of_a_shorter_shot_save_rays_in_a_denser_and_longer_one() {
     // A key frame is inferred too, from frames that are none of its own shot.
     let first = channels(&job, "warm/f_01.exr");
     let kinds = first.list.iter().find(|c| c.name == "reuse.provenance").expect("the map");
-    let Samples::U32(kinds) = &kinds.samples else { panic!("numbers") };
+    let ExrSamples::U32(kinds) = &kinds.samples else { panic!("numbers") };
     let inferred = kinds.iter().filter(|kind| **kind == 2).count();
     let traced = kinds.iter().filter(|kind| **kind == 1).count();
     assert!(inferred > 10 * traced && !kinds.contains(&3), "{inferred} inferred, {traced} traced");

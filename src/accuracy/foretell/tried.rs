@@ -1,8 +1,8 @@
 //! What the figures of settings that were tried tell of these, and of others.
 
 use super::super::choice::Goal;
-use super::super::error_model::Samples;
-use super::{Measured, Prediction, Predictor};
+use super::super::error_model::SampleCounts;
+use super::{MeasuredSamples, Prediction, Predictor};
 
 /// Where nothing that was tried reaches the goal, the squared error is to come down by so much at a time.
 const STEP: f64 = 4.0;
@@ -23,7 +23,7 @@ impl Goal {
 impl Predictor {
     /// The goal's figure of `samples` if they were tried: as it was found, and the larger for all that is
     /// added to the squared error.
-    pub fn figure(&self, samples: Samples) -> Option<f64> {
+    pub fn figure(&self, samples: SampleCounts) -> Option<f64> {
         self.figure_of(self.tried(samples)?)
     }
 
@@ -34,38 +34,39 @@ impl Predictor {
     }
 
     /// What `samples` came to, if they were tried, which nothing is twice.
-    pub(in super::super) fn tried(&self, samples: Samples) -> Option<&Measured> {
+    pub(in super::super) fn tried(&self, samples: SampleCounts) -> Option<&MeasuredSamples> {
         self.measured.iter().find(|measured| measured.samples == samples)
     }
 
     /// What came nearest to the goal of all that was tried, and its figure as [`Self::figure`].
-    pub fn nearest(&self) -> Option<(Samples, f64)> {
+    pub fn nearest(&self) -> Option<(SampleCounts, f64)> {
         let all = self.measured.iter().filter_map(|m| Some((m.samples, self.figure_of(m)?)));
         all.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Whether `samples` were tried and reached the goal's figure.
-    pub(super) fn reached(&self, samples: Samples) -> bool {
+    pub(super) fn reached(&self, samples: SampleCounts) -> bool {
         let figure = self.figure(samples).zip(self.most);
         figure.is_some_and(|(figure, most)| figure <= most)
     }
 
     /// Whether `samples` were tried and missed the goal's figure; or, untried, are no more in any respect
     /// than some that did.
-    pub(super) fn missed(&self, samples: Samples) -> bool {
+    pub(super) fn missed(&self, samples: SampleCounts) -> bool {
         let Some(most) = self.most else { return false };
         if let Some(figure) = self.figure(samples) {
             return figure > most;
         }
-        let holds =
-            |s: Samples| samples.spp <= s.spp && samples.shadow <= s.shadow && samples.sky <= s.sky;
-        let misses = |m: &Measured| self.figure_of(m).is_some_and(|figure| figure > most);
+        let holds = |s: SampleCounts| {
+            samples.spp <= s.spp && samples.shadow <= s.shadow && samples.sky <= s.sky
+        };
+        let misses = |m: &MeasuredSamples| self.figure_of(m).is_some_and(|figure| figure > most);
         self.measured.iter().any(|m| holds(m.samples) && misses(m))
     }
 
     /// The largest squared error that is foretold of what reached the goal's figure; none is 0.
     pub(super) fn most_that_reached(&self) -> f64 {
-        let reached = |samples: &Samples| self.reached(*samples);
+        let reached = |samples: &SampleCounts| self.reached(*samples);
         self.errors_tried().filter(|(samples, _)| reached(samples)).fold(0.0, |m, (_, e)| m.max(e))
     }
 
@@ -94,15 +95,15 @@ impl Predictor {
         self.errors_tried().fold(f64::INFINITY, |least, (_, e)| least.min(e)) / STEP
     }
 
-    fn errors_tried(&self) -> impl Iterator<Item = (Samples, f64)> + '_ {
-        let of = |m: &Measured| {
+    fn errors_tried(&self) -> impl Iterator<Item = (SampleCounts, f64)> + '_ {
+        let of = |m: &MeasuredSamples| {
             let foretold = self.of(self.modes.first()?, m.samples);
             Some((m.samples, foretold.squared_error))
         };
         self.measured.iter().filter_map(of)
     }
 
-    fn figure_of(&self, tried: &Measured) -> Option<f64> {
+    fn figure_of(&self, tried: &MeasuredSamples) -> Option<f64> {
         let found = tried.figure?;
         let bias = self.bias.iter().copied().fold(0.0, f64::max);
         let all = self.excess * found.squared_error + bias;
@@ -115,17 +116,17 @@ impl Predictor {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{foretelling, range};
-    use super::super::{Figure, Line, Predictor};
+    use super::super::{Figure, PowerLaw, Predictor};
     use super::*;
 
     fn tried(all: &[(u32, u32, f64)]) -> Predictor {
         let mut foretelling = foretelling();
         (foretelling.most, foretelling.rounding, foretelling.bias) = (Some(0.02), 0.0, vec![0.0]);
         let measured = |&(spp, shadow, figure): &(u32, u32, f64)| {
-            let samples = Samples { spp, shadow, sky: 1 };
+            let samples = SampleCounts { spp, shadow, sky: 1 };
             let errors: Vec<f64> = foretelling.model.errors(samples).collect();
             let figure = Some(Figure { figure, squared_error: errors[0] });
-            Measured { samples, errors, doubts: vec![0.0], figure }
+            MeasuredSamples { samples, errors, doubts: vec![0.0], figure }
         };
         foretelling.measured = all.iter().map(measured).collect();
         foretelling
@@ -149,7 +150,7 @@ mod tests {
         assert!(less.0 > 32 || less.1 > 1, "{less:?}");
         // Errors that came out larger than foretold make figures larger too.
         let worse = tried(&[(16, 1, 0.019)]).worse(1.3);
-        assert!(!worse.reached(Samples { spp: 16, shadow: 1, sky: 1 }), "{worse:?}");
+        assert!(!worse.reached(SampleCounts { spp: 16, shadow: 1, sky: 1 }), "{worse:?}");
     }
 
     #[test]
@@ -175,9 +176,9 @@ mod tests {
     #[test]
     fn what_is_tried_is_not_far_beyond_what_missed_nor_is_the_first_that_reaches_taken() {
         let goal = Goal::Flip(0.02);
-        let flat = Line { at_one: 0.022f64.ln(), rise: 0.11 };
+        let flat = PowerLaw { at_one: 0.022f64.ln(), rise: 0.11 };
         let missed = |all: &[(u32, u32, f64)]| Predictor { line: Some(flat), ..tried(all) };
-        let error = |f: &Predictor, spp| f.of(&f.modes[0], Samples { spp, shadow: 1, sky: 1 });
+        let error = |f: &Predictor, spp| f.of(&f.modes[0], SampleCounts { spp, shadow: 1, sky: 1 });
         let none = missed(&[(4, 1, 0.03), (16, 1, 0.025)]);
         let least = error(&none, 16).squared_error / STEP;
         assert!(none.allowed(goal) < least && near(none.to_try(goal), least), "{none:?}");
@@ -202,20 +203,20 @@ mod tests {
         let foretelling = tried(&[(16, 1, 0.019)]);
         let of = |spp| {
             let foretold =
-                foretelling.of(&foretelling.modes[0], Samples { spp, shadow: 1, sky: 1 });
+                foretelling.of(&foretelling.modes[0], SampleCounts { spp, shadow: 1, sky: 1 });
             foretelling.foretold_figure(&foretold).expect("a figure")
         };
         assert!((of(16) - 0.019).abs() < 1e-9);
         // By the line, which is 0.02 at 4: 60/32 at 32 camera samples.
         assert!((of(32) - 0.02 * (60f64 / 32.0 / 4.0).sqrt()).abs() < 1e-3, "{}", of(32));
         let none = Predictor { line: None, ..foretelling.clone() };
-        let foretold = none.of(&none.modes[0], Samples { spp: 32, shadow: 1, sky: 1 });
+        let foretold = none.of(&none.modes[0], SampleCounts { spp: 32, shadow: 1, sky: 1 });
         assert_eq!(none.foretold_figure(&foretold), None);
     }
 
     #[test]
     fn a_line_that_hardly_rises_tells_nothing() {
-        assert!(Line::through(&[(1.0, 0.500), (4.0, 0.501), (16.0, 0.502)]).is_none());
-        assert!(Line::through(&[(1.0, 0.1), (4.0, 0.2), (16.0, 0.4)]).is_some());
+        assert!(PowerLaw::through(&[(1.0, 0.500), (4.0, 0.501), (16.0, 0.502)]).is_none());
+        assert!(PowerLaw::through(&[(1.0, 0.1), (4.0, 0.2), (16.0, 0.4)]).is_some());
     }
 }

@@ -1,6 +1,6 @@
 //! Measuring, going on, and telling what there is.
 
-use super::line::Line;
+use super::line::ProgressLine;
 use super::{AccuracyArgs, Outcome, files, page};
 use crate::accuracy::{self, Convergence, Heard, Ledger, OracleCrop, Step, Sweep, Truth, Writing};
 use crate::cli::exit::Exit;
@@ -22,11 +22,11 @@ const WRITING: &str = "writing.json";
 const LOAD: &str = "load.json";
 
 /// A sweep to be measured and reported.
-pub struct Job<'a> {
+pub struct SweepJob<'a> {
     pub args: &'a AccuracyArgs,
     pub sweep: &'a Sweep<'a>,
     pub interrupt: &'a Interrupt,
-    pub line: Line,
+    pub line: ProgressLine,
     pub oracle_was_wanted: bool,
     pub writing_is_wanted: bool,
     /// Load of the machine over the minute before.
@@ -35,7 +35,7 @@ pub struct Job<'a> {
     pub start: Instant,
 }
 
-impl Job<'_> {
+impl SweepJob<'_> {
     /// Measures what `ledger` has not, and writes the page.
     pub fn run(&self, mut ledger: Ledger) -> Result<Exit> {
         self.greet(&ledger);

@@ -1,7 +1,7 @@
 //! A time that a job is to take, and what is left of it for rendering.
 
 use super::{Choice, Chooser};
-use crate::accuracy::{Check, Effort, Predictor, Samples};
+use crate::accuracy::{CheckOutcome, Effort, Predictor, SampleCounts};
 use crate::film::Film;
 use crate::math::Rgb;
 use crate::output::{WriteOptions, write_image};
@@ -41,7 +41,7 @@ impl Budget {
         let there_is = (count, u64::from(settings.width) * u64::from(settings.height));
         let (frames, pixels) = (f64::from(count), there_is.1 as f64);
         let [start, each] = VIDEO;
-        let is_video = request.fps.is_some() && frames > 1.0;
+        let is_video = request.options.video && frames > 1.0;
         let check = CHECK_SHARE * (seconds - started.elapsed().as_secs_f64()).max(0.0);
         let ending = request.pattern.path(request.frames.first);
         let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
@@ -65,30 +65,35 @@ impl Budget {
     }
 
     /// Seconds that are left, as of now, for tracing frames of `samples`.
-    pub fn left(&self, foretelling: &Predictor, samples: Samples) -> f64 {
+    pub fn left(&self, foretelling: &Predictor, samples: SampleCounts) -> f64 {
         let check = self.kept_back(foretelling, samples);
         let left = self.seconds - self.gone() - check - self.video - self.writing;
         (1.0 - RESERVE) * left.max(0.0)
     }
 
     /// Seconds for the check of frames of `samples`; none where their share is too little for any.
-    fn kept_back(&self, foretelling: &Predictor, samples: Samples) -> f64 {
+    fn kept_back(&self, foretelling: &Predictor, samples: SampleCounts) -> f64 {
         let all = |effort: Effort| self.check_seconds(effort, foretelling, samples);
         self.effort_in(self.check, foretelling, samples).map_or(0.0, all)
     }
 
-    fn check_seconds(&self, effort: Effort, foretelling: &Predictor, samples: Samples) -> f64 {
+    fn check_seconds(&self, effort: Effort, foretelling: &Predictor, samples: SampleCounts) -> f64 {
         let (frames, pixels) = self.there_is;
-        Check::seconds(foretelling, samples) * effort.looked_at(frames, pixels)
+        CheckOutcome::seconds(foretelling, samples) * effort.looked_at(frames, pixels)
     }
 
-    fn effort_in(&self, time: f64, foretelling: &Predictor, samples: Samples) -> Option<Effort> {
+    fn effort_in(
+        &self,
+        time: f64,
+        foretelling: &Predictor,
+        samples: SampleCounts,
+    ) -> Option<Effort> {
         let (frames, pixels) = self.there_is;
-        Effort::of_check(time, Check::seconds(foretelling, samples), frames, pixels)
+        Effort::of_check(time, CheckOutcome::seconds(foretelling, samples), frames, pixels)
     }
 
     /// What there is time for now to look at; else the seconds that the least check would take.
-    pub fn effort(&self, foretelling: &Predictor, samples: Samples) -> Result<Effort, f64> {
+    pub fn effort(&self, foretelling: &Predictor, samples: SampleCounts) -> Result<Effort, f64> {
         let left = self.seconds - self.gone() - self.video;
         let least = || self.check_seconds(Effort::LEAST, foretelling, samples);
         self.effort_in(left, foretelling, samples).ok_or_else(least)

@@ -1,8 +1,8 @@
 //! What came of the settings that were chosen, and tighter ones where a target was missed.
 
 use super::budget::Budget;
-use super::{Choice, Chooser, Judged, decibels};
-use crate::accuracy::{Check, Effort, Prediction, Timer, Verdict, displayed_rgb};
+use super::{Choice, Chooser, Judgement, decibels};
+use crate::accuracy::{CheckOutcome, Effort, Prediction, Timer, Verdict, displayed_rgb};
 use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
@@ -26,7 +26,7 @@ impl Chooser<'_> {
         audit: Option<&AuditRow>,
         rendered: Option<f64>,
         timer: Timer,
-    ) -> Result<Judged> {
+    ) -> Result<Judgement> {
         let samples = choice.foretold.samples;
         let budget = Budget::of(self);
         let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
@@ -34,12 +34,12 @@ impl Chooser<'_> {
             Some(Ok(effort)) => effort,
             Some(Err(least)) => {
                 self.tell_unchecked(&choice, least, rendered);
-                return Ok(Judged::Done(choice));
+                return Ok(Judgement::Done(choice));
             }
         };
         let (foretelling, foretold) = (&choice.foretelling, &choice.foretold);
         let image = |frame| self.image(frame);
-        let check = Check::of(&self.probe(), foretelling, foretold, effort, &image)?;
+        let check = CheckOutcome::of(&self.probe(), foretelling, foretold, effort, &image)?;
         let [mean, worst] = check.psnr().map(decibels);
         let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
@@ -60,7 +60,7 @@ impl Chooser<'_> {
 
     /// How much to look at where no time is to be kept: for a small share of the job.
     fn effort_of_check(&self, choice: &Choice) -> Effort {
-        let whole = Check::seconds(&choice.foretelling, choice.foretold.samples);
+        let whole = CheckOutcome::seconds(&choice.foretelling, choice.foretold.samples);
         let (frames, settings) = (self.request.frames, self.stage.base);
         let pixels = u64::from(settings.width) * u64::from(settings.height);
         let count = frames.last - frames.first + 1;
@@ -72,19 +72,19 @@ impl Chooser<'_> {
     fn weigh(
         &self,
         choice: Choice,
-        check: &Check,
+        check: &CheckOutcome,
         audit: Option<&AuditRow>,
         timer: Timer,
-    ) -> Result<Judged> {
+    ) -> Result<Judgement> {
         let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
-            return Ok(Judged::Done(choice));
+            return Ok(Judgement::Done(choice));
         };
         let excess = check.excess(goal, allowed).max(audited_excess(audit, allowed));
         if excess <= 1.0 {
             let verdict = Some(check.verdict(goal, allowed));
-            return Ok(Judged::Done(Choice { verdict, ..choice }));
+            return Ok(Judgement::Done(Choice { verdict, ..choice }));
         }
-        let missed = |choice| Judged::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
+        let missed = |choice| Judgement::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
         if choice.tightened >= ROUNDS {
             self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
             return Ok(missed(choice));
@@ -92,7 +92,7 @@ impl Chooser<'_> {
         // So much more than foretold.
         let factor = excess * allowed / choice.foretold.squared_error.max(1e-9);
         Ok(match self.tighter(&choice, allowed, factor, timer)? {
-            Some(tighter) => Judged::Again(tighter),
+            Some(tighter) => Judgement::Again(tighter),
             None => missed(choice),
         })
     }

@@ -22,7 +22,7 @@ const SMALL: u32 = 96;
 
 /// How the frames of the shot come about.
 #[derive(Serialize)]
-pub struct Plan {
+pub struct ReusePlan {
     policy: Policy,
     /// Frames from one key frame to the next; 0 where nothing is looked up.
     segment: u32,
@@ -133,7 +133,7 @@ impl AlwaysTraced {
     }
 }
 
-impl Plan {
+impl ReusePlan {
     /// The plan of rendering the whole shot in one process.
     pub fn of(renderer: &Renderer, shot: &Shot) -> Result<Self> {
         let Renderer { scene, settings, .. } = renderer;

@@ -3,7 +3,7 @@
 use super::{Display, Film, Map, Provenance, ProvenanceKind, Rgb};
 use crate::error::{Error, Result};
 use crate::output::DEFAULT_MEMORY_LIMIT;
-use crate::output::exr::{self, Channels, Samples};
+use crate::output::exr::{self, ExrChannels, ExrSamples};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -21,12 +21,12 @@ pub fn of_exr(path: &Path, display: &Display, farthest: f32) -> Result<Vec<(Map,
 }
 
 /// What maps show of a film; `None` where a channel is missing.
-fn film_of(channels: &Channels) -> Option<Film> {
+fn film_of(channels: &ExrChannels) -> Option<Film> {
     let numbers = |name: &str| {
         let found = channels.list.iter().find(|c| c.name == name)?;
         match &found.samples {
-            Samples::U32(numbers) => Some(numbers),
-            Samples::F32(_) => None,
+            ExrSamples::U32(numbers) => Some(numbers),
+            ExrSamples::F32(_) => None,
         }
     };
     let [r, g, b] = [channels.f32("R")?, channels.f32("G")?, channels.f32("B")?];

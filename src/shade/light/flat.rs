@@ -1,7 +1,7 @@
 //! What flat lights have in common.
 
 use super::{LightSample, ShadowTarget};
-use crate::intersect::{PlaneError, Target};
+use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 
 /// The plane of a flat light.
@@ -26,7 +26,7 @@ impl Flat {
     /// `point` of the light where it stands for all of it.
     #[inline(always)]
     pub fn alone(&self, point: DVec3) -> LightSample {
-        let target = Target { point, normal: self.normal, plane_error: self.plane_error };
+        let target = RayEnd { point, normal: self.normal, plane_error: self.plane_error };
         LightSample { target: ShadowTarget::Point(target), weight: 1.0 }
     }
 }

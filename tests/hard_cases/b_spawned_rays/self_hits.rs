@@ -6,8 +6,8 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
 use tweenray::intersect::{
-    EmbreeIntersector, Hit, Intersector, Oracle, PlaneError, PrimRef, Ray, SurfaceInteraction,
-    Target,
+    EmbreeIntersector, Hit, Intersector, Oracle, PlaneError, PrimRef, Ray, RayEnd,
+    SurfaceInteraction,
 };
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{HitRules, Material, Recheck, Scene, World};
@@ -107,7 +107,7 @@ fn pair(i: u64, rays: u64) -> Tally {
         let dir = shapes::direction(&mut rng);
         spawned.push(from.spawn(dir, true));
         bare.push(from.spawn(dir, false));
-        let target = Target { point: to.p, normal: to.ng, plane_error };
+        let target = RayEnd { point: to.p, normal: to.ng, plane_error };
         sent.push(from.spawn_to(&target, true));
         naive.push(from.spawn_to(&target, false));
     }

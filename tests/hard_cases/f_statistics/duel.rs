@@ -10,7 +10,7 @@ use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, Ray};
 use tweenray::math::DVec3;
 use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot, WorldMesh};
 use tweenray::stats::RayCounts;
-use tweenray::verify::{Answers, Check, Class, Difference, PAST_VERTEX_LIMIT, Trial};
+use tweenray::verify::{Answers, Check, Class, Difference, PAST_VERTEX_LIMIT, TracedRay};
 
 /// Rays a scene.
 const RAYS: u64 = 1024;
@@ -125,7 +125,7 @@ impl Tally {
 fn judged(check: &Check, ray: &Ray, oracle: Option<Hit>) -> (Answers, Option<Difference>) {
     let product = check.product.intersect(ray, &mut RayCounts::default());
     let answers = Answers::Hits { product, oracle };
-    (answers, check.judge(&Trial { ray: *ray, answers }))
+    (answers, check.judge(&TracedRay { ray: *ray, answers }))
 }
 
 /// Calls `then` with a check of `scene`.

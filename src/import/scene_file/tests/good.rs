@@ -4,8 +4,8 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    BuildQuality, CameraPath, DirectionalLight, Focus, Interval, Lens, Light as SceneLight,
-    PointLight, Policy, ReuseSettings, Settings as SceneSettings, ShotLens, SphereLight,
+    BuildQuality, CameraPath, DirectionalLight, Focus, Lens, Light as SceneLight, PointLight,
+    Policy, ReuseSettings, Settings as SceneSettings, ShotLens, SphereLight,
 };
 use std::time::Duration;
 
@@ -14,7 +14,10 @@ fn an_empty_file_is_an_empty_scene_with_all_defaults() {
     let loaded = good("");
     assert_eq!(loaded.settings, SceneSettings::default());
     assert_eq!((loaded.shot.frames, loaded.shot.vfov_degrees), (48, 40.0));
-    assert_eq!((loaded.fps, loaded.frames, loaded.output), (24.0, None, None));
+    assert_eq!(
+        (loaded.options.fps, loaded.options.frames, loaded.options.output),
+        (24.0, None, None)
+    );
     assert_eq!(loaded.files.len(), 1);
     assert!(loaded.warnings[0].message.contains("nothing lights the scene"));
     let scene = loaded.world.into_scene(true).expect("an empty scene");
@@ -49,14 +52,14 @@ fn every_setting_reaches_its_place() {
     assert!(r.spawn_offset != rd.spawn_offset && r.recentre != rd.recentre);
     let crop = s.crop.expect("a crop");
     assert_eq!((crop.x0, crop.y0, crop.x1, crop.y1), (1, 2, 30, 40));
-    let frames = loaded.frames.expect("frames");
-    assert_eq!((frames.first, frames.last, loaded.fps), (2, 3, 30.0));
-    assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
-    assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
-    assert!(loaded.overwrite && !loaded.video);
-    assert_eq!(loaded.time_limit, Some(Duration::from_secs(5400)));
-    assert_eq!(loaded.checkpoint, Some(Interval(None)));
-    assert_eq!(loaded.exchange, Some(5000));
+    let options = loaded.options;
+    let frames = options.frames.expect("frames");
+    assert_eq!((frames.first, frames.last, options.fps), (2, 3, 30.0));
+    assert_eq!(options.output.as_deref(), Some("out/f_####.exr"));
+    assert_eq!((options.threads, options.stats), (Some(2), Some("s.json".into())));
+    assert!(options.overwrite && !options.video);
+    assert_eq!(options.time_limit, Some(Duration::from_secs(5400)));
+    assert_eq!((options.checkpoint, options.exchange), (None, 5000));
 }
 
 #[test]
