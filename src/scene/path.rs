@@ -19,11 +19,11 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use tweenray::math::DVec3;
-/// use tweenray::scene::{CameraPath, Easing, Shot};
+/// use tweenray::scene::{CameraPath, Shot};
 ///
 /// let (target, eye, axis) = (DVec3::ZERO, DVec3::new(0.0, 1.0, 4.0), DVec3::Y);
 /// let path = CameraPath::Orbit { target, eye, axis, degrees: 90.0, roll_degrees: 0.0 };
-/// let shot = Shot { path, easing: Easing::Linear, frames: 24, vfov_degrees: 40.0 };
+/// let shot = Shot::new(path, 24, 40.0);
 /// assert_eq!(shot.pose(1)?.eye, eye);
 /// assert!(shot.pose(24)?.eye.distance(DVec3::new(4.0, 1.0, 0.0)) < 1e-12);
 /// assert!(shot.pose(25).is_err());
