@@ -57,7 +57,7 @@ fn frames_left_from_other_settings_are_never_taken_for_this_sequence() {
     job.done(&small("--frames 1..3 -o o/f_#.png"));
     job.done(&small("--frames 2 -o o/f_#.png --seed 7 --overwrite"));
     let left = job.read("o/f_1.png");
-    job.refused(&small("--frames 1..3 -o o/f_#.png --seed 7"), "o/f_1.png … settings");
+    job.refused(&small("--frames 1..3 -o o/f_#.png --seed 7"), "o/f_1.png … other");
     assert_eq!(job.read("o/f_1.png"), left);
     let ran = job.done(&small("--frames 1..3 -o o/f_#.png --seed 7 --overwrite"));
     assert!(ran.out.contains("3 rendered"), "{}", ran.out);
