@@ -4,7 +4,7 @@ use super::choice::Goal;
 use super::effort::Effort;
 use super::error_model::Samples;
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Prediction, Predictor};
+use super::predictor::{Prediction, Predictor};
 use super::probe::{Probe, checked_pixels, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
@@ -43,28 +43,28 @@ pub enum Verdict {
 }
 
 impl Check {
-    /// Looks at some finished frames, rendered as `foretold`, at other pixels than the probe did, as
+    /// Looks at some finished frames, rendered as `predicted`, at other pixels than the probe did, as
     /// many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
     /// As [`Stage::trace`](super::stage::Stage::trace), and any that `image` gives.
     pub fn of(
         probe: &Probe,
-        foretelling: &Predictor,
-        foretold: &Prediction,
+        predictor: &Predictor,
+        prediction: &Prediction,
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<Self> {
         let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
-        let samples = samples_of_reference(foretold.samples);
+        let samples = samples_of_reference(prediction.samples);
         let mut reference = reference(probe.stage.base, samples);
-        reference.bounces = reference.bounces.max(foretold.bounces);
+        reference.bounces = reference.bounces.max(prediction.bounces);
         let truth = patches.trace(probe.stage, &reference)?;
-        let own = foretelling.own_part(foretold.samples, samples);
+        let own = predictor.own_part(prediction.samples, samples);
         // Rounding is all the frame's; of the rest a part is the reference's.
         let of_frame = |error: f64| {
-            let rounding = error.min(foretelling.rounding);
+            let rounding = error.min(predictor.rounding);
             rounding + own * (error - rounding)
         };
         let found = squares(&patches, &truth, &seen).into_iter().map(of_frame);
@@ -80,11 +80,11 @@ impl Check {
         })
     }
 
-    /// Wall seconds that a whole check of frames of `samples` is foretold to take.
-    pub fn seconds(foretelling: &Predictor, samples: Samples) -> f64 {
+    /// Wall seconds that a whole check of frames of `samples` is predicted to take.
+    pub fn seconds(predictor: &Predictor, samples: Samples) -> f64 {
         let whole = Effort::WHOLE;
         let pixels = f64::from(whole.frames) * f64::from(checked_pixels(whole));
-        pixels * foretelling.patch_seconds(samples_of_reference(samples))
+        pixels * predictor.patch_seconds(samples_of_reference(samples))
     }
 
     /// The mean of the frames' squared errors.

@@ -1,8 +1,8 @@
 //! The measured table asked the other way round: which setting for this error, for this time.
 
 use super::errors::Errors;
-use super::foretell::ROUNDING;
 use super::knobs::Knob;
+use super::predictor::ROUNDING;
 use super::table::{Measured, Row};
 use crate::measure::psnr;
 

@@ -24,16 +24,16 @@ pub struct DrawSeed {
     pub number: u32,
 }
 
-/// Draws about `count` of the pixels `among`, whose variance is `foretold` for the whole picture
+/// Draws about `count` of the pixels `among`, whose variance is `variance` for the whole picture
 /// (negative: never drawn): a function of these and the seed alone.
 pub fn draw(
-    foretold: &[f32],
+    variance: &[f32],
     among: impl Iterator<Item = u32> + Clone,
     count: f64,
     seed: DrawSeed,
 ) -> Vec<Drawn> {
     let lit = || {
-        let all = among.clone().map(|i| (i, f64::from(foretold[i as usize])));
+        let all = among.clone().map(|i| (i, f64::from(variance[i as usize])));
         all.filter(|(_, variance)| *variance >= 0.0)
     };
     let (number, sum) = lit().fold((0.0, 0.0), |(n, sum), (_, v)| (n + 1.0, sum + v));
@@ -75,7 +75,7 @@ mod tests {
         (0..n).map(of).sum::<f64>() / f64::from(n)
     }
 
-    fn foretold() -> Vec<f32> {
+    fn variance() -> Vec<f32> {
         // A quarter of the pixels cannot be off, every tenth of the others is risky.
         let one = |i: u32| if i % 4 == 0 { -1.0 } else { f32::from(u8::from(i % 10 == 1)) };
         (0..4000).map(one).collect()
@@ -83,18 +83,18 @@ mod tests {
 
     #[test]
     fn a_draw_has_its_size_favours_risk_and_hits_no_background() {
-        let foretold = foretold();
-        let drawn = draw(&foretold, 0..4000, 150.0, SEED);
-        assert_eq!(drawn, draw(&foretold, 0..4000, 150.0, SEED));
-        assert_ne!(drawn, draw(&foretold, 0..4000, 150.0, DrawSeed { frame: 4, ..SEED }));
-        assert_ne!(drawn, draw(&foretold, 0..4000, 150.0, DrawSeed { number: 1, ..SEED }));
+        let variance = variance();
+        let drawn = draw(&variance, 0..4000, 150.0, SEED);
+        assert_eq!(drawn, draw(&variance, 0..4000, 150.0, SEED));
+        assert_ne!(drawn, draw(&variance, 0..4000, 150.0, DrawSeed { frame: 4, ..SEED }));
+        assert_ne!(drawn, draw(&variance, 0..4000, 150.0, DrawSeed { number: 1, ..SEED }));
         assert!((140..=151).contains(&drawn.len()), "{}", drawn.len());
-        assert!(drawn.iter().all(|d| foretold[d.index as usize] >= 0.0));
-        let risky = drawn.iter().filter(|d| foretold[d.index as usize] > 0.0).count();
+        assert!(drawn.iter().all(|d| variance[d.index as usize] >= 0.0));
+        let risky = drawn.iter().filter(|d| variance[d.index as usize] > 0.0).count();
         assert!((85..=125).contains(&risky), "{risky} of {}", drawn.len());
-        assert!(draw(&foretold, 0..0, 10.0, SEED).is_empty());
-        assert!(draw(&foretold, 0..4000, 0.0, SEED).is_empty());
-        let all = draw(&foretold, 0..4000, 1e9, SEED);
+        assert!(draw(&variance, 0..0, 10.0, SEED).is_empty());
+        assert!(draw(&variance, 0..4000, 0.0, SEED).is_empty());
+        let all = draw(&variance, 0..4000, 1e9, SEED);
         assert_eq!(all.len(), 3000);
         assert!(all.iter().all(|d| d.weight == 1.0));
     }
@@ -103,11 +103,11 @@ mod tests {
     /// right on average.
     #[test]
     fn totals_are_unbiased_over_draws() {
-        let foretold = foretold();
+        let variance = variance();
         let figure = |i: u32| f64::from(i % 7) + if i % 10 == 1 { 30.0 } else { 0.0 };
         let total: f64 = (0..4000).filter(|i| i % 4 != 0).map(figure).sum();
         let estimate = mean(2000, |frame| {
-            let drawn = draw(&foretold, 0..4000, 33.3, DrawSeed { frame, ..SEED });
+            let drawn = draw(&variance, 0..4000, 33.3, DrawSeed { frame, ..SEED });
             drawn.iter().map(|d| d.weight * figure(d.index)).sum()
         });
         assert!((estimate / total - 1.0).abs() < 0.01, "{estimate} of {total}");

@@ -1,6 +1,6 @@
 //! What adds up to a frame's squared error, and by which powers of the samples it falls.
 //!
-//! Squared errors of independent causes add. So a traced frame's is foretold, in squares of a display
+//! Squared errors of independent causes add. So a traced frame's is predicted, in squares of a display
 //! step, by
 //!
 //! ```text
@@ -150,8 +150,8 @@ impl ErrorModel {
         let own: Vec<f64> = self.errors(point.reference).collect();
         let mut model = self.clone();
         let told = self.errors(point.samples).zip(own).zip(&point.errors);
-        for (frame, ((foretold, own), measured)) in model.frames.iter_mut().zip(told) {
-            let factor = measured / f64::max(foretold + own, 1e-12);
+        for (frame, ((prediction, own), measured)) in model.frames.iter_mut().zip(told) {
+            let factor = measured / f64::max(prediction + own, 1e-12);
             frame.iter_mut().for_each(|amplitude| *amplitude *= factor);
         }
         model
@@ -183,9 +183,9 @@ mod tests {
         scale * (20.0 * n.powf(-1.3) + light)
     }
 
-    /// From errors of up to 16 samples, each off by up to 5 %, those of up to 64 are foretold.
+    /// From errors of up to 16 samples, each off by up to 5 %, those of up to 64 are predicted.
     #[test]
-    fn a_short_sweep_foretells_settings_that_were_not_in_it() {
+    fn a_short_sweep_predicts_settings_that_were_not_in_it() {
         let point = |(i, (spp, shadow, sky)): (usize, (u32, u32, u32))| {
             let s = Samples { spp, shadow, sky };
             let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];

@@ -8,7 +8,7 @@
 //! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
 //! and weighed by how many of it the move has.
 //!
-//! [`Probe`] takes a quick look instead, from which the error and the time of any setting are foretold
+//! [`Probe`] takes a quick look instead, from which the error and the time of any setting are predicted
 //! ([`Predictor`]), and the program chooses one; [`Check`] says afterwards what came out.
 //!
 //! Only that choice is decided by measured times; the sweep only tells them.
@@ -27,7 +27,6 @@ mod error_model;
 mod errors;
 mod figures;
 mod fit;
-mod foretell;
 mod frames;
 mod front;
 mod knobs;
@@ -35,6 +34,7 @@ mod ledger;
 mod modes;
 mod oracle;
 mod patches;
+mod predictor;
 mod probe;
 mod reference;
 mod search;
@@ -53,11 +53,11 @@ pub use choice::{Goal, best_within, fastest_reaching, untold};
 pub use effort::Effort;
 pub use error_model::Samples;
 pub use errors::{Errors, displayed_rgb};
-pub use foretell::{Prediction, Predictor, Range};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};
 pub use ledger::{Entry, Ledger};
 pub use oracle::{OracleCrop, on_a_crop};
+pub use predictor::{Prediction, Predictor, Range};
 pub use probe::{Given, Probe};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
 pub use sentences::{about_knob, about_oracle, about_writing};

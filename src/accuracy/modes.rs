@@ -1,7 +1,7 @@
 //! What each way to take over light costs, from whole small frames.
 
 use super::fit::fit;
-use super::foretell::Mode;
+use super::predictor::Mode;
 use super::probe::Probe;
 use crate::error::Result;
 use crate::scene::{Policy, ReuseSettings};

@@ -7,8 +7,8 @@
 use super::choice::Goal;
 use super::effort::Effort;
 use super::error_model::{Causes, Samples};
-use super::foretell::{Predictor, Range};
 use super::patches::Patches;
+use super::predictor::{Predictor, Range};
 use super::reference::truth_settings;
 use super::search::Search;
 use super::stage::Stage;
@@ -72,12 +72,12 @@ impl Probe<'_> {
         heard("errors of a short sweep");
         let mut search = Search::begin(self, effort)?;
         heard("times");
-        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
+        search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
         if let Some(goal) = self.goal {
             heard("errors of what may be chosen");
             search.try_likely(goal)?;
         }
-        Ok(search.foretelling)
+        Ok(search.predictor)
     }
 
     /// As much as there is time for.

@@ -4,8 +4,8 @@ use super::choice::Goal;
 use super::effort::Effort;
 use super::error_model::{ErrorModel, Point, Samples};
 use super::figures::{doubts, figure, squares};
-use super::foretell::{Figure, Line, Measured, Pace, Predictor, ROUNDING};
 use super::patches::{Patches, Seen, rounded};
+use super::predictor::{Figure, Line, Measured, Pace, Predictor, ROUNDING};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
 use crate::error::Result;
@@ -39,7 +39,7 @@ pub(super) struct Search<'a> {
     reference: Samples,
     found: Vec<Found>,
     /// What it comes to.
-    pub foretelling: Predictor,
+    pub predictor: Predictor,
 }
 
 impl<'a> Search<'a> {
@@ -52,7 +52,7 @@ impl<'a> Search<'a> {
             patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
         let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
         let causes = probe.causes();
-        let foretelling = Predictor {
+        let predictor = Predictor {
             model: ErrorModel::of(causes, &[]),
             measured: Vec::new(),
             bias: Vec::new(),
@@ -65,23 +65,23 @@ impl<'a> Search<'a> {
             pace: Some(Pace { samples: reference, seconds }),
             excess: 1.0,
         };
-        let mut search = Self { probe, patches, truth, reference, found: Vec::new(), foretelling };
+        let mut search = Self { probe, patches, truth, reference, found: Vec::new(), predictor };
         for samples in search.design() {
             search.measure(samples)?;
         }
         search.learn();
         let (bounces, bias) = search.bounces(BIAS * search.in_reach())?;
-        (search.foretelling.bounces, search.foretelling.bias) = (bounces, bias);
+        (search.predictor.bounces, search.predictor.bias) = (bounces, bias);
         Ok(search)
     }
 
     /// Tries what would be chosen, until it has been tried.
     pub fn try_likely(&mut self, goal: Goal) -> Result<()> {
-        let is_squared = self.foretelling.most.is_none();
+        let is_squared = self.predictor.most.is_none();
         for _ in 0..if is_squared { ROUNDS } else { ROUNDS_BY_FIGURE } {
-            let mut new = self.untried(self.foretelling.to_try(goal));
+            let mut new = self.untried(self.predictor.to_try(goal));
             if new.is_empty() {
-                let between = self.foretelling.between();
+                let between = self.predictor.between();
                 new = between.map_or(Vec::new(), |allowed| self.untried(allowed));
             }
             if new.is_empty() {
@@ -100,9 +100,9 @@ impl<'a> Search<'a> {
     /// tried.
     fn untried(&self, allowed: f64) -> Vec<Samples> {
         let mut new: Vec<Samples> = Vec::new();
-        for found in likely_of(self.foretelling.fastest(&self.probe.range(), allowed)) {
+        for found in likely_of(self.predictor.fastest(&self.probe.range(), allowed)) {
             // Modes may agree on samples, not only neighbours among them.
-            if self.foretelling.tried(found.samples).is_none() && !new.contains(&found.samples) {
+            if self.predictor.tried(found.samples).is_none() && !new.contains(&found.samples) {
                 new.push(found.samples);
             }
         }
@@ -127,7 +127,7 @@ impl<'a> Search<'a> {
             // As the file will have it: FLIP sees steps of 8 bits all over the picture.
             let filed = if self.probe.rounds { rounded(&seen) } else { seen.clone() };
             let figure = figure(goal, &self.patches, &self.truth, &filed)?;
-            Ok(Figure { figure, squared_error: worst + self.foretelling.rounding })
+            Ok(Figure { figure, squared_error: worst + self.predictor.rounding })
         };
         let goal = self.probe.goal.filter(|goal| goal.most().is_some());
         let figure = goal.map(of).transpose()?;
@@ -148,11 +148,11 @@ impl<'a> Search<'a> {
             let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
             Measured { samples: point.samples, errors, doubts: doubts.clone(), figure: *figure }
         };
-        self.foretelling.measured = self.found.iter().map(measured).collect();
+        self.predictor.measured = self.found.iter().map(measured).collect();
         let last = self.found.last();
-        self.foretelling.doubts = last.map_or(Vec::new(), |last| last.doubts.clone());
-        self.foretelling.model = last.map_or(model.clone(), |last| model.through(&last.point));
-        self.foretelling.line = self.foretelling.most.and_then(|most| self.line(most));
+        self.predictor.doubts = last.map_or(Vec::new(), |last| last.doubts.clone());
+        self.predictor.model = last.map_or(model.clone(), |last| model.through(&last.point));
+        self.predictor.line = self.predictor.most.and_then(|most| self.line(most));
     }
 
     /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
@@ -196,16 +196,16 @@ impl<'a> Search<'a> {
     /// decides, what reached that, if anything did; else no less than a quarter of the least, which
     /// goes for a budget too.
     fn in_reach(&self) -> f64 {
-        let foretelling = &self.foretelling;
+        let predictor = &self.predictor;
         if let Some(goal @ Goal::Psnr(_)) = self.probe.goal {
-            return foretelling.allowed(goal);
+            return predictor.allowed(goal);
         }
         let worst = |found: &Found| found.point.errors.iter().copied().fold(0.0, f64::max);
         let least = BEYOND * self.found.iter().map(worst).fold(f64::INFINITY, f64::min);
-        let Some(most) = foretelling.most else { return least };
+        let Some(most) = predictor.most else { return least };
         let reaches = |found: &&Found| found.figure.is_some_and(|f| f.figure <= most);
         let reached = self.found.iter().filter(reaches).map(worst).fold(0.0, f64::max);
-        let line = foretelling.line.map(|line| line.squared_error(most));
+        let line = predictor.line.map(|line| line.squared_error(most));
         match reached > 0.0 {
             true => line.unwrap_or(f64::INFINITY).min(reached),
             false => line.unwrap_or(0.0).max(least),

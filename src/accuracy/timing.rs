@@ -1,9 +1,9 @@
 //! How long what may be chosen takes: tried on small frames, and the choice by it.
 
 use super::error_model::Samples;
-use super::foretell::{Prediction, Predictor};
 use super::frames::{Cut, timed_frames};
 use super::modes::Spent;
+use super::predictor::{Prediction, Predictor};
 use super::probe::Probe;
 use super::{effort::Effort, trial};
 use crate::error::Result;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// How many times as many pixels the likely choices are timed with as well: the larger a frame, the less
 /// of it is edges, where light is not known from other frames.
 const LARGER: f64 = 3.0;
-/// Ways to take over light foretold to take so many times as long as the fastest are not tried.
+/// Ways to take over light predicted to take so many times as long as the fastest are not tried.
 const SLOWER: f64 = 2.5;
 /// Shares of what is left of a time that the trials of what may fit it take, one after the other.
 const SHARES: [f64; 3] = [0.12, 0.06, 0.04];
@@ -27,7 +27,7 @@ const LEAST: f64 = 600.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// The setting.
-    pub foretold: Prediction,
+    pub prediction: Prediction,
     /// Pixels of the smaller frames.
     pub small: f64,
 }
@@ -43,26 +43,26 @@ impl Probe<'_> {
     /// As [`Self::look`].
     pub fn fastest(
         &self,
-        foretelling: &Predictor,
+        predictor: &Predictor,
         allowed: f64,
         timer: Timer,
     ) -> Result<Option<Prediction>> {
-        let mut found = likely(foretelling.fastest(&self.range(), allowed));
-        for foretold in &mut found {
-            let time = TRIED * foretold.seconds * self.frames_each(foretold.reuse);
-            let small = self.small_within(time, foretold);
+        let mut found = likely(predictor.fastest(&self.range(), allowed));
+        for prediction in &mut found {
+            let time = TRIED * prediction.seconds * self.frames_each(prediction.reuse);
+            let small = self.small_within(time, prediction);
             if small >= LEAST {
-                let timing = Timing { foretold: foretold.clone(), small };
-                foretold.seconds = timer(&timing)?;
+                let timing = Timing { prediction: prediction.clone(), small };
+                prediction.seconds = timer(&timing)?;
             }
         }
         Ok(found.into_iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
     }
 
-    /// Seconds that all frames are foretold to take this rank by the fastest setting whose squared error is
+    /// Seconds that all frames are predicted to take this rank by the fastest setting whose squared error is
     /// `allowed`, without trying any; `None` where there is none.
-    pub fn fastest_seconds(&self, foretelling: &Predictor, allowed: f64) -> Option<f64> {
-        let found = likely(foretelling.fastest(&self.range(), allowed));
+    pub fn fastest_seconds(&self, predictor: &Predictor, allowed: f64) -> Option<f64> {
+        let found = likely(predictor.fastest(&self.range(), allowed));
         found.iter().map(|f| f.seconds * self.frames_each(f.reuse)).min_by(f64::total_cmp)
     }
 
@@ -73,35 +73,32 @@ impl Probe<'_> {
     /// As [`Self::look`].
     pub fn best_within(
         &self,
-        foretelling: &Predictor,
+        predictor: &Predictor,
         left: &dyn Fn(Samples) -> f64,
         timer: Timer,
     ) -> Result<Option<Prediction>> {
-        let mut foretelling = foretelling.clone();
-        let frames: Vec<(ReuseSettings, f64)> = foretelling
-            .modes
-            .iter()
-            .map(|mode| (mode.reuse, self.frames_each(mode.reuse)))
-            .collect();
+        let mut predictor = predictor.clone();
+        let frames: Vec<(ReuseSettings, f64)> =
+            predictor.modes.iter().map(|mode| (mode.reuse, self.frames_each(mode.reuse))).collect();
         let frames = |reuse| frames.iter().find(|(r, _)| *r == reuse).map_or(0.0, |(_, n)| *n);
-        let best = |foretelling: &Predictor| {
+        let best = |predictor: &Predictor| {
             let fits = |f: &Prediction| f.seconds * frames(f.reuse) <= left(f.samples);
-            foretelling.best_within(&self.range(), &fits)
+            predictor.best_within(&self.range(), &fits)
         };
         let mut tried: Vec<Prediction> = Vec::new();
         for share in SHARES {
-            let Some(likely) = best(&foretelling) else { break };
+            let Some(likely) = best(&predictor) else { break };
             let time = share * left(likely.samples);
             let small = self.small_within(time, &likely);
             if tried.iter().any(|tried| is_near(tried, &likely)) || small < LEAST {
                 break;
             }
-            let timing = Timing { foretold: likely, small };
+            let timing = Timing { prediction: likely, small };
             let taken = timer(&timing)?;
-            foretelling.correct(&timing.foretold, taken);
-            tried.push(timing.foretold);
+            predictor.correct(&timing.prediction, taken);
+            tried.push(timing.prediction);
         }
-        Ok(best(&foretelling))
+        Ok(best(&predictor))
     }
 
     /// Seconds that a frame of the full size takes this rank, from frames of two small ones: what edges
@@ -110,7 +107,7 @@ impl Probe<'_> {
     /// # Errors
     /// As [`Self::look`].
     pub fn timed(&self, timing: &Timing) -> Result<f64> {
-        let settings = timing.foretold.settings(self.stage.base);
+        let settings = timing.prediction.settings(self.stage.base);
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let [small, large] = [timing.small, LARGER * timing.small].map(|most| most.min(pixels));
         let by_large = self.small(&settings, large)?;
@@ -125,11 +122,12 @@ impl Probe<'_> {
     }
 
     /// Pixels of the smaller frames that can be tried in `seconds`.
-    fn small_within(&self, seconds: f64, foretold: &Prediction) -> f64 {
+    fn small_within(&self, seconds: f64, prediction: &Prediction) -> f64 {
         let base = self.stage.base;
         let pixels = f64::from(base.width) * f64::from(base.height);
-        let frames = self.cut(foretold.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
-        let each = foretold.seconds / pixels * frames.len() as f64;
+        let frames =
+            self.cut(prediction.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
+        let each = prediction.seconds / pixels * frames.len() as f64;
         (seconds / ((1.0 + LARGER) * each)).min(Effort::WHOLE.small)
     }
 

@@ -32,11 +32,11 @@ const LONGER: f64 = 0.85;
 #[derive(Debug, Default, Clone, Args)]
 #[command(next_help_heading = "Choice")]
 pub struct ChoiceArgs {
-    /// Choose the fastest samples, bounces and reuse foretold to make every frame this good: psnr=DB,
+    /// Choose the fastest samples, bounces and reuse predicted to make every frame this good: psnr=DB,
     /// ssim=S, flip=F or max-share=P% (pixels off by more than 2/255); options that are given stay
     #[arg(long, value_name = "FIGURE=VALUE", value_parser = values::goal, conflicts_with = "budget")]
     pub target: Option<Goal>,
-    /// Choose the most accurate ones foretold to fit this time: 90s, 10m, 1h30m
+    /// Choose the most accurate ones predicted to fit this time: 90s, 10m, 1h30m
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = values::budget)]
     pub budget: Option<Duration>,
 }
@@ -51,11 +51,11 @@ pub struct Choice {
     given: Given,
     /// The squared error that the target allows, display steps.
     allowed: Option<f64>,
-    /// What is foretold of the choice.
-    pub foretold: Prediction,
+    /// What is predicted of the choice.
+    pub predicted: Prediction,
     /// All that the probe found out.
-    foretelling: Predictor,
-    /// Wall seconds that rendering and writing all frames is foretold to take.
+    predictor: Predictor,
+    /// Wall seconds that rendering and writing all frames is predicted to take.
     seconds: f64,
     /// How often it was tightened.
     pub tightened: u32,
@@ -102,7 +102,7 @@ impl ChoiceArgs {
         self.target.is_some() || self.budget.is_some()
     }
 
-    /// Refuses what cannot be foretold.
+    /// Refuses what cannot be predicted.
     pub fn check(&self, request: &Request) -> Result<()> {
         let settings = &request.settings;
         let obstacle = match () {
@@ -122,7 +122,7 @@ impl ChoiceArgs {
         }
         obstacle.map_or(Ok(()), |option| {
             Err(Error::Usage(format!(
-                "what {option} does is not foretold, so --target and --budget cannot go with it"
+                "what {option} does is not predicted, so --target and --budget cannot go with it"
             )))
         })
     }
@@ -139,7 +139,7 @@ impl ChoiceArgs {
 impl Choice {
     /// The settings that were chosen over `base`.
     pub fn settings(&self, base: &Settings) -> Settings {
-        self.foretold.settings(base)
+        self.predicted.settings(base)
     }
 
     /// As the manifest keeps it.
@@ -175,7 +175,7 @@ impl Choice {
 
     /// All options that stand for it, whether they have a part in the scene or not.
     pub fn options(&self) -> String {
-        spelled::options(&self.foretold.settings(&Settings::default()), &EffectPlan::EVERYTHING)
+        spelled::options(&self.predicted.settings(&Settings::default()), &EffectPlan::EVERYTHING)
     }
 
     /// The command that gives the same frames whatever the clock says: what was chosen in place of the
@@ -200,20 +200,20 @@ impl Choice {
         words
     }
 
-    /// What is foretold of it, in words.
-    pub fn foretold_in_words(&self) -> String {
+    /// What is predicted of it, in words.
+    pub fn prediction_in_words(&self) -> String {
         format!(
             "{}PSNR {} in the worst frame, {} a frame, {} in all",
             self.figure().map_or(String::new(), |figure| format!("{figure}, ")),
-            decibels(self.foretold.psnr()),
-            seconds(self.foretold.seconds),
+            decibels(self.predicted.psnr()),
+            seconds(self.predicted.seconds),
             seconds(self.seconds)
         )
     }
 
-    /// What is foretold of it in the target's own unit, unless that is PSNR.
+    /// What is predicted of it in the target's own unit, unless that is PSNR.
     fn figure(&self) -> Option<String> {
-        let figure = self.foretelling.foretold_figure(&self.foretold)?;
+        let figure = self.predictor.predicted_figure(&self.predicted)?;
         values::goal(&self.wanted).ok()?.in_words(figure)
     }
 }
@@ -249,7 +249,7 @@ impl Chooser<'_> {
     /// Any of the probe's; a target that no setting is predicted to reach.
     pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
-            let options = self.options(&before.foretold);
+            let options = self.options(&before.predicted);
             self.tell(format!("for {}, as chosen before: {options}", before.wanted));
             self.warn_if_long(&before);
             return Ok(before);
@@ -258,12 +258,12 @@ impl Chooser<'_> {
         let start = Instant::now();
         let budget = Budget::of(self);
         let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
-        let (foretelling, aim) = match self.args.target {
+        let (predictor, aim) = match self.args.target {
             Some(goal) => self.look(goal).map(|(found, aim)| (found, Some(aim)))?,
             None => (probe.look(&|what| self.tell(format!("probe: {what}")))?, None),
         };
-        let allowed = self.args.target.map(|goal| foretelling.allowed(goal));
-        let aimed = |aim| probe.fastest(&foretelling, aim, timer);
+        let allowed = self.args.target.map(|goal| predictor.allowed(goal));
+        let aimed = |aim| probe.fastest(&predictor, aim, timer);
         let found = match (aim, &budget) {
             // What is just within reach leaves no room to aim at more.
             (Some(aim), _) => match aimed(aim)? {
@@ -271,22 +271,22 @@ impl Chooser<'_> {
                 found => found,
             },
             (_, Some(budget)) => {
-                let left = |samples| budget.left(&foretelling, samples);
-                probe.best_within(&foretelling, &left, timer)?
+                let left = |samples| budget.left(&predictor, samples);
+                probe.best_within(&predictor, &left, timer)?
             }
             _ => None,
         };
-        let foretold = found.ok_or_else(|| self.out_of_reach(&foretelling))?;
+        let predicted = found.ok_or_else(|| self.out_of_reach(&predictor))?;
         let writing = budget.as_ref().map_or(0.0, |budget| budget.writing);
-        let all = foretold.seconds * probe.frames_each(foretold.reuse) + writing;
-        let left = budget.as_ref().map(|b| b.left(&foretelling, foretold.samples) + writing);
+        let all = predicted.seconds * probe.frames_each(predicted.reuse) + writing;
+        let left = budget.as_ref().map(|b| b.left(&predictor, predicted.samples) + writing);
         let choice = Choice {
             wanted: self.args.words(),
             base: Header::settings(self.stage.base),
             given: self.given(),
             allowed,
-            foretold,
-            foretelling,
+            predicted,
+            predictor,
             seconds: all,
             tightened: 0,
             checked: None,
@@ -296,7 +296,7 @@ impl Chooser<'_> {
         self.say_choice(&choice);
         self.tell(format!("the probe took {}", seconds(start.elapsed().as_secs_f64())));
         if left.is_some_and(|left| all > left) {
-            self.warn("no setting is foretold to fit this time; the fastest is taken".into());
+            self.warn("no setting is predicted to fit this time; the fastest is taken".into());
         }
         Ok(choice)
     }
@@ -316,20 +316,20 @@ impl Chooser<'_> {
             return Ok((first, aim));
         }
         self.tell("there is time for a longer look".into());
-        let foretelling = Probe { seconds: left, ..self.probe() }.look(&told)?;
-        let aim = foretelling.aim(goal, LONGER);
-        Ok((foretelling, aim))
+        let predictor = Probe { seconds: left, ..self.probe() }.look(&told)?;
+        let aim = predictor.aim(goal, LONGER);
+        Ok((predictor, aim))
     }
 
     /// What to say where no setting will do.
-    fn out_of_reach(&self, foretelling: &Predictor) -> Error {
-        let best = foretelling.best(&self.probe().range()).map(|best| {
+    fn out_of_reach(&self, predictor: &Predictor) -> Error {
+        let best = predictor.best(&self.probe().range()).map(|best| {
             let took = seconds(best.seconds * self.probe().frames_each(best.reuse));
             let psnr = decibels(best.psnr());
             format!("; {} would come to {psnr}, in {took}", self.options(&best))
         });
         // A figure that goes with no error for sure: what was seen of it.
-        let seen = foretelling.nearest().map(|(tried, figure)| {
+        let seen = predictor.nearest().map(|(tried, figure)| {
             let in_words = |goal: Goal| goal.in_words(figure);
             let figure = self.args.target.and_then(in_words).unwrap_or_default();
             let tried = spelled::samples(tried.spp, tried.shadow, tried.sky, &self.plan());
@@ -341,7 +341,7 @@ impl Chooser<'_> {
             false => ", or give fewer options",
         };
         Error::Usage(format!(
-            "no setting is foretold to reach {}{nearest}\n  help: ask for less{fewer}",
+            "no setting is predicted to reach {}{nearest}\n  help: ask for less{fewer}",
             self.args.words()
         ))
     }
@@ -370,8 +370,8 @@ impl Chooser<'_> {
     }
 
     /// The options that stand for what was chosen, as far as they have a part in the scene.
-    fn options(&self, foretold: &Prediction) -> String {
-        spelled::options(&foretold.settings(self.stage.base), &self.plan())
+    fn options(&self, predicted: &Prediction) -> String {
+        spelled::options(&predicted.settings(self.stage.base), &self.plan())
     }
 
     /// Who looks at the scene for this job.
@@ -389,10 +389,10 @@ impl Chooser<'_> {
 
     fn say_choice(&self, choice: &Choice) {
         self.tell(format!(
-            "for {}: {}\nforetold: {}",
+            "for {}: {}\npredicted: {}",
             choice.wanted,
-            self.options(&choice.foretold),
-            choice.foretold_in_words()
+            self.options(&choice.predicted),
+            choice.prediction_in_words()
         ));
     }
 

@@ -13,7 +13,7 @@ use std::time::Instant;
 /// Shares of what is left when the probe begins: for the probe's sweep, and for the check at most.
 const PROBE_SHARE: f64 = 0.15;
 const CHECK_SHARE: f64 = 0.07;
-/// Kept back of what is left for rendering: times foretold are off by some per cent either way.
+/// Kept back of what is left for rendering: times predicted are off by some per cent either way.
 const RESERVE: f64 = 0.05;
 /// What a video takes: to start its program, and by the pixel; measured.
 const VIDEO: [f64; 2] = [0.2, 4e-8];
@@ -65,52 +65,52 @@ impl Budget {
     }
 
     /// Seconds that are left, as of now, for tracing frames of `samples`.
-    pub fn left(&self, foretelling: &Predictor, samples: Samples) -> f64 {
-        let check = self.kept_back(foretelling, samples);
+    pub fn left(&self, predictor: &Predictor, samples: Samples) -> f64 {
+        let check = self.kept_back(predictor, samples);
         let left = self.seconds - self.gone() - check - self.video - self.writing;
         (1.0 - RESERVE) * left.max(0.0)
     }
 
     /// Seconds for the check of frames of `samples`; none where their share is too little for any.
-    fn kept_back(&self, foretelling: &Predictor, samples: Samples) -> f64 {
-        let all = |effort: Effort| self.check_seconds(effort, foretelling, samples);
-        self.effort_in(self.check, foretelling, samples).map_or(0.0, all)
+    fn kept_back(&self, predictor: &Predictor, samples: Samples) -> f64 {
+        let all = |effort: Effort| self.check_seconds(effort, predictor, samples);
+        self.effort_in(self.check, predictor, samples).map_or(0.0, all)
     }
 
-    fn check_seconds(&self, effort: Effort, foretelling: &Predictor, samples: Samples) -> f64 {
+    fn check_seconds(&self, effort: Effort, predictor: &Predictor, samples: Samples) -> f64 {
         let (frames, pixels) = self.there_is;
-        Check::seconds(foretelling, samples) * effort.looked_at(frames, pixels)
+        Check::seconds(predictor, samples) * effort.looked_at(frames, pixels)
     }
 
-    fn effort_in(&self, time: f64, foretelling: &Predictor, samples: Samples) -> Option<Effort> {
+    fn effort_in(&self, time: f64, predictor: &Predictor, samples: Samples) -> Option<Effort> {
         let (frames, pixels) = self.there_is;
-        Effort::of_check(time, Check::seconds(foretelling, samples), frames, pixels)
+        Effort::of_check(time, Check::seconds(predictor, samples), frames, pixels)
     }
 
     /// What there is time for now to look at; else the seconds that the least check would take.
-    pub fn effort(&self, foretelling: &Predictor, samples: Samples) -> Result<Effort, f64> {
+    pub fn effort(&self, predictor: &Predictor, samples: Samples) -> Result<Effort, f64> {
         let left = self.seconds - self.gone() - self.video;
-        let least = || self.check_seconds(Effort::LEAST, foretelling, samples);
-        self.effort_in(left, foretelling, samples).ok_or_else(least)
+        let least = || self.check_seconds(Effort::LEAST, predictor, samples);
+        self.effort_in(left, predictor, samples).ok_or_else(least)
     }
 }
 
 impl Chooser<'_> {
     /// Warns where frames that are not there yet, under what was chosen for fewer frames or more time,
-    /// are foretold to take longer than there is.
+    /// are predicted to take longer than there is.
     pub(super) fn warn_if_long(&self, before: &Choice) {
         let Some(budget) = Budget::of(self) else { return };
         let (first, last) = (self.request.frames.first, self.request.frames.last);
         let left = (first..=last).filter(|n| !self.request.pattern.path(*n).exists()).count();
         let share = left as f64 / f64::from(last - first + 1);
-        let foretold = &before.foretold;
-        let rendering = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let predicted = &before.predicted;
+        let rendering = predicted.seconds * self.probe().frames_each(predicted.reuse);
         let all = budget.gone() + share * (rendering + budget.writing) + budget.video;
         if left > 0 && all > budget.seconds {
             let [all, asked] = [all, budget.seconds].map(seconds);
             let frames = if left == 1 { "1 frame is" } else { &format!("{left} frames are") };
             self.warn(format!(
-                "{frames} left and the job is foretold to take {all}, not {asked}; --overwrite \
+                "{frames} left and the job is predicted to take {all}, not {asked}; --overwrite \
                  chooses anew"
             ));
         }

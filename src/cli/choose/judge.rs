@@ -27,9 +27,9 @@ impl Chooser<'_> {
         rendered: Option<f64>,
         timer: Timer,
     ) -> Result<Judged> {
-        let samples = choice.foretold.samples;
+        let samples = choice.predicted.samples;
         let budget = Budget::of(self);
-        let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
+        let effort = match budget.map(|budget| budget.effort(&choice.predictor, samples)) {
             None => self.effort_of_check(&choice),
             Some(Ok(effort)) => effort,
             Some(Err(least)) => {
@@ -37,20 +37,20 @@ impl Chooser<'_> {
                 return Ok(Judged::Done(choice));
             }
         };
-        let (foretelling, foretold) = (&choice.foretelling, &choice.foretold);
+        let (predictor, predicted) = (&choice.predictor, &choice.predicted);
         let image = |frame| self.image(frame);
-        let check = Check::of(&self.probe(), foretelling, foretold, effort, &image)?;
+        let check = Check::of(&self.probe(), predictor, predicted, effort, &image)?;
         let [mean, worst] = check.psnr().map(decibels);
         let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
-            "PSNR {mean}, {worst} in the worst of {looked} looked at, foretold {}",
-            decibels(foretold.psnr())
+            "PSNR {mean}, {worst} in the worst of {looked} looked at, predicted {}",
+            decibels(predicted.psnr())
         );
         let figure = self.args.target.and_then(|goal| goal.in_words(check.figure));
         let figure = figure.map_or(String::new(), |came| {
-            let foretold = choice.figure();
-            let foretold = foretold.map_or(String::new(), |words| format!(", foretold {words}"));
-            format!("{came} in the worst{foretold}; ")
+            let predicted = choice.figure();
+            let predicted = predicted.map_or(String::new(), |words| format!(", predicted {words}"));
+            format!("{came} in the worst{predicted}; ")
         });
         let time = self.time(&choice, rendered);
         self.tell(format!("came out: {figure}{psnr}{time}"));
@@ -60,7 +60,7 @@ impl Chooser<'_> {
 
     /// How much to look at where no time is to be kept: for a small share of the job.
     fn effort_of_check(&self, choice: &Choice) -> Effort {
-        let whole = Check::seconds(&choice.foretelling, choice.foretold.samples);
+        let whole = Check::seconds(&choice.predictor, choice.predicted.samples);
         let (frames, settings) = (self.request.frames, self.stage.base);
         let pixels = u64::from(settings.width) * u64::from(settings.height);
         let count = frames.last - frames.first + 1;
@@ -89,8 +89,8 @@ impl Chooser<'_> {
             self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
             return Ok(missed(choice));
         }
-        // So much more than foretold.
-        let factor = excess * allowed / choice.foretold.squared_error.max(1e-9);
+        // So much more than predicted.
+        let factor = excess * allowed / choice.predicted.squared_error.max(1e-9);
         Ok(match self.tighter(&choice, allowed, factor, timer)? {
             Some(tighter) => Judged::Again(tighter),
             None => missed(choice),
@@ -106,13 +106,13 @@ impl Chooser<'_> {
         ));
     }
 
-    /// What rendering took beside what was foretold, if it was all rendered now, and all beside the
+    /// What rendering took beside what was predicted, if it was all rendered now, and all beside the
     /// budget.
     fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
-        let foretold = choice.seconds;
+        let predicted = choice.seconds;
         let rendering = rendered.map_or(String::new(), |took| {
-            let [came, said] = [took, foretold].map(seconds);
-            format!("; rendering took {came}, foretold {said} ({})", beyond(took, foretold))
+            let [came, said] = [took, predicted].map(seconds);
+            format!("; rendering took {came}, predicted {said} ({})", beyond(took, predicted))
         });
         let all = self.started.elapsed().as_secs_f64();
         let budget = self.args.budget.map_or(String::new(), |budget| {
@@ -123,7 +123,7 @@ impl Chooser<'_> {
         rendering + &budget
     }
 
-    /// The choice with errors `factor` times as large as foretold.
+    /// The choice with errors `factor` times as large as predicted.
     fn tighter(
         &self,
         choice: &Choice,
@@ -132,23 +132,23 @@ impl Chooser<'_> {
         timer: Timer,
     ) -> Result<Option<Choice>> {
         // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
-        let mut foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
+        let mut predictor = choice.predictor.worse(1.1 * f64::max(1.0, factor));
         if !self.given().bounces {
-            foretelling = foretelling.with_more_bounces();
+            predictor = predictor.with_more_bounces();
         }
-        let found = self.probe().fastest(&foretelling, allowed, timer)?;
-        let set = |foretold: &Prediction| (foretold.samples, foretold.bounces);
-        let Some(foretold) = found.filter(|found| set(found) != set(&choice.foretold)) else {
+        let found = self.probe().fastest(&predictor, allowed, timer)?;
+        let set = |predicted: &Prediction| (predicted.samples, predicted.bounces);
+        let Some(predicted) = found.filter(|found| set(found) != set(&choice.predicted)) else {
             self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
             return Ok(None);
         };
         let tightened = choice.tightened + 1;
-        let seconds = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let seconds = predicted.seconds * self.probe().frames_each(predicted.reuse);
         let (checked, verdict, came_out) = (None, None, None);
         let before = choice.clone();
         let tighter = Choice {
-            foretold,
-            foretelling,
+            predicted,
+            predictor,
             seconds,
             tightened,
             checked,
@@ -172,7 +172,7 @@ impl Chooser<'_> {
     }
 }
 
-/// By how much what came is more than what was foretold or allowed, in words: a plus is too much.
+/// By how much what came is more than what was predicted or allowed, in words: a plus is too much.
 fn beyond(came: f64, expected: f64) -> String {
     format!("{:+.0} %", 100.0 * (came / expected.max(1e-9) - 1.0))
 }

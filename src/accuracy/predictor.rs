@@ -1,4 +1,4 @@
-//! What a setting is foretold to come to, and the choice among all of them.
+//! What a setting is predicted to come to, and the choice among all of them.
 
 mod line;
 mod tried;
@@ -85,11 +85,11 @@ pub struct Predictor {
     pub doubts: Vec<f64>,
     /// How fast patches are traced.
     pub pace: Option<Pace>,
-    /// How much larger errors came out than foretold.
+    /// How much larger errors came out than predicted.
     pub excess: f64,
 }
 
-/// A setting with what is foretold of it.
+/// A setting with what is predicted of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// Samples.
@@ -149,8 +149,8 @@ impl Predictor {
     /// `share` of the squared error that `goal` allows, to be on the safe side; all of it where nothing but
     /// what was tried tells whether a setting reaches the goal.
     pub fn aim(&self, goal: Goal, share: f64) -> f64 {
-        let is_foretold = goal.most().is_none() || self.line.is_some();
-        self.allowed(goal) * if is_foretold { share } else { 1.0 }
+        let is_predicted = goal.most().is_none() || self.line.is_some();
+        self.allowed(goal) * if is_predicted { share } else { 1.0 }
     }
 
     /// Which part of the squared difference between frames of `samples` and of `reference` is the former's
@@ -161,7 +161,7 @@ impl Predictor {
         if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
 
-    /// What is foretold of `samples` in `mode`, of the worst frame.
+    /// What is predicted of `samples` in `mode`, of the worst frame.
     pub fn of(&self, mode: &Mode, samples: Samples) -> Prediction {
         let (errors, doubts) = match self.tried(samples) {
             Some(measured) => (measured.errors.clone(), &measured.doubts),
@@ -180,7 +180,7 @@ impl Predictor {
         }
     }
 
-    /// For each mode the fastest setting that is foretold to be off by at most `allowed`, or the nearest to
+    /// For each mode the fastest setting that is predicted to be off by at most `allowed`, or the nearest to
     /// the truth of those that are hardly slower. Where the goal's figure was found of a setting, that
     /// alone decides.
     pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Prediction> {
@@ -210,9 +210,9 @@ impl Predictor {
     }
 
     /// Puts the times of a mode through what a setting of it `took`, seconds a frame.
-    pub fn correct(&mut self, foretold: &Prediction, took: f64) {
-        let factor = took / foretold.seconds.max(1e-12);
-        let same = self.modes.iter_mut().filter(|mode| mode.reuse == foretold.reuse);
+    pub fn correct(&mut self, prediction: &Prediction, took: f64) {
+        let factor = took / prediction.seconds.max(1e-12);
+        let same = self.modes.iter_mut().filter(|mode| mode.reuse == prediction.reuse);
         same.flat_map(|mode| &mut mode.seconds).for_each(|seconds| *seconds *= factor);
     }
 
@@ -228,7 +228,7 @@ impl Predictor {
         Self { bounces, ..self }
     }
 
-    /// The setting with the least error foretold.
+    /// The setting with the least error predicted.
     pub fn best(&self, range: &Range) -> Option<Prediction> {
         self.best_within(range, &|_| true)
     }
@@ -267,7 +267,7 @@ pub(super) mod tests {
     use super::super::error_model::{Causes, Point};
     use super::*;
 
-    pub(super) fn foretelling() -> Predictor {
+    pub(super) fn predictor() -> Predictor {
         let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
         let error =
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
@@ -301,47 +301,47 @@ pub(super) mod tests {
 
     #[test]
     fn the_fastest_of_each_mode_reaches_the_goal_and_nothing_cheaper_would() {
-        let foretelling = foretelling();
-        let allowed = foretelling.allowed(Goal::Psnr(psnr(8.0 / (255.0 * 255.0))));
+        let predictor = predictor();
+        let allowed = predictor.allowed(Goal::Psnr(psnr(8.0 / (255.0 * 255.0))));
         assert!((allowed - 8.0).abs() < 1e-9);
-        let found = foretelling.fastest(&range(), allowed);
+        let found = predictor.fastest(&range(), allowed);
         // 40/8 + 20/8 + 0.58 is 8.1: one shadow sample is not enough with 8 camera samples.
         let samples = |f: &Prediction| (f.samples.spp, f.samples.shadow);
         assert_eq!(found.iter().map(samples).collect::<Vec<_>>(), [(16, 1), (8, 4)]);
         assert!(found.iter().all(|f| f.squared_error <= allowed));
         // Shadow samples that hardly cost anything are taken.
-        let cheap = Mode { seconds: [0.0, 2.0, 0.01, 0.0], ..foretelling.modes[1].clone() };
-        let cheap = Predictor { modes: vec![cheap], ..foretelling.clone() };
+        let cheap = Mode { seconds: [0.0, 2.0, 0.01, 0.0], ..predictor.modes[1].clone() };
+        let cheap = Predictor { modes: vec![cheap], ..predictor.clone() };
         assert_eq!(
             cheap.fastest(&range(), allowed).iter().map(samples).collect::<Vec<_>>(),
             [(8, 16)]
         );
-        assert!(foretelling.fastest(&range(), 0.1).is_empty());
+        assert!(predictor.fastest(&range(), 0.1).is_empty());
         // A figure that rises as the root of the squared error.
-        assert!((foretelling.allowed(Goal::Flip(0.02)) - 4.0).abs() < 1e-9);
+        assert!((predictor.allowed(Goal::Flip(0.02)) - 4.0).abs() < 1e-9);
     }
 
     #[test]
     fn bounces_are_more_where_rays_ended_for_too_few() {
-        let some = foretelling().with_more_bounces();
+        let some = predictor().with_more_bounces();
         assert_eq!((some.bounces, some.clone().with_more_bounces().bounces), (8, 16));
-        let none = Predictor { bias: vec![0.0], ..foretelling() };
+        let none = Predictor { bias: vec![0.0], ..predictor() };
         assert_eq!(none.with_more_bounces().bounces, 4);
-        let most = Predictor { bounces: MAX_BOUNCES - 1, ..foretelling() };
+        let most = Predictor { bounces: MAX_BOUNCES - 1, ..predictor() };
         assert_eq!(most.with_more_bounces().bounces, MAX_BOUNCES);
     }
 
     #[test]
     fn the_best_within_a_time_takes_no_longer_and_a_longer_time_is_never_worse() {
-        let foretelling = foretelling();
+        let predictor = predictor();
         let mut last = f64::INFINITY;
         for seconds in [3.0, 10.0, 30.0, 100.0] {
-            let best = foretelling.best_within(&range(), &|f| f.seconds <= seconds).expect("one");
+            let best = predictor.best_within(&range(), &|f| f.seconds <= seconds).expect("one");
             assert!(best.seconds <= seconds && best.squared_error <= last, "{best:?}");
             last = best.squared_error;
         }
-        let fastest = foretelling.best_within(&range(), &|_| false).expect("the fastest");
+        let fastest = predictor.best_within(&range(), &|_| false).expect("the fastest");
         assert_eq!(fastest.samples.spp, 1);
-        assert_eq!(foretelling.best(&range()).expect("one").samples.spp, 64);
+        assert_eq!(predictor.best(&range()).expect("one").samples.spp, 64);
     }
 }

@@ -27,10 +27,10 @@ impl Predictor {
         self.figure_of(self.tried(samples)?)
     }
 
-    /// The goal's figure that is foretold: as it was found if the samples were tried, else by the line.
-    pub fn foretold_figure(&self, foretold: &Prediction) -> Option<f64> {
-        let by_line = || self.line.map(|line| line.figure(foretold.squared_error));
-        self.figure(foretold.samples).or_else(by_line)
+    /// The goal's figure that is predicted: as it was found if the samples were tried, else by the line.
+    pub fn predicted_figure(&self, prediction: &Prediction) -> Option<f64> {
+        let by_line = || self.line.map(|line| line.figure(prediction.squared_error));
+        self.figure(prediction.samples).or_else(by_line)
     }
 
     /// What `samples` came to, if they were tried, which nothing is twice.
@@ -63,7 +63,7 @@ impl Predictor {
         self.measured.iter().any(|m| holds(m.samples) && misses(m))
     }
 
-    /// The largest squared error that is foretold of what reached the goal's figure; none is 0.
+    /// The largest squared error that is predicted of what reached the goal's figure; none is 0.
     pub(super) fn most_that_reached(&self) -> f64 {
         let reached = |samples: &Samples| self.reached(*samples);
         self.errors_tried().filter(|(samples, _)| reached(samples)).fold(0.0, |m, (_, e)| m.max(e))
@@ -96,8 +96,8 @@ impl Predictor {
 
     fn errors_tried(&self) -> impl Iterator<Item = (Samples, f64)> + '_ {
         let of = |m: &Measured| {
-            let foretold = self.of(self.modes.first()?, m.samples);
-            Some((m.samples, foretold.squared_error))
+            let prediction = self.of(self.modes.first()?, m.samples);
+            Some((m.samples, prediction.squared_error))
         };
         self.measured.iter().filter_map(of)
     }
@@ -114,26 +114,26 @@ impl Predictor {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{foretelling, range};
+    use super::super::tests::{predictor, range};
     use super::super::{Figure, Line, Predictor};
     use super::*;
 
     fn tried(all: &[(u32, u32, f64)]) -> Predictor {
-        let mut foretelling = foretelling();
-        (foretelling.most, foretelling.rounding, foretelling.bias) = (Some(0.02), 0.0, vec![0.0]);
+        let mut predictor = predictor();
+        (predictor.most, predictor.rounding, predictor.bias) = (Some(0.02), 0.0, vec![0.0]);
         let measured = |&(spp, shadow, figure): &(u32, u32, f64)| {
             let samples = Samples { spp, shadow, sky: 1 };
-            let errors: Vec<f64> = foretelling.model.errors(samples).collect();
+            let errors: Vec<f64> = predictor.model.errors(samples).collect();
             let figure = Some(Figure { figure, squared_error: errors[0] });
             Measured { samples, errors, doubts: vec![0.0], figure }
         };
-        foretelling.measured = all.iter().map(measured).collect();
-        foretelling
+        predictor.measured = all.iter().map(measured).collect();
+        predictor
     }
 
-    fn first(foretelling: &Predictor) -> Option<(u32, u32)> {
-        let allowed = foretelling.allowed(Goal::Flip(0.02));
-        let found = foretelling.fastest(&range(), allowed);
+    fn first(predictor: &Predictor) -> Option<(u32, u32)> {
+        let allowed = predictor.allowed(Goal::Flip(0.02));
+        let found = predictor.fastest(&range(), allowed);
         found.first().map(|f| (f.samples.spp, f.samples.shadow))
     }
 
@@ -147,7 +147,7 @@ mod tests {
         // Nor what is less in every respect than something that missed.
         let less = first(&tried(&[(32, 1, 0.021)])).expect("another");
         assert!(less.0 > 32 || less.1 > 1, "{less:?}");
-        // Errors that came out larger than foretold make figures larger too.
+        // Errors that came out larger than predicted make figures larger too.
         let worse = tried(&[(16, 1, 0.019)]).worse(1.3);
         assert!(!worse.reached(Samples { spp: 16, shadow: 1, sky: 1 }), "{worse:?}");
     }
@@ -198,19 +198,18 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_is_foretold_of_what_was_tried_and_of_what_was_not() {
-        let foretelling = tried(&[(16, 1, 0.019)]);
+    fn a_figure_is_predicted_of_what_was_tried_and_of_what_was_not() {
+        let predictor = tried(&[(16, 1, 0.019)]);
         let of = |spp| {
-            let foretold =
-                foretelling.of(&foretelling.modes[0], Samples { spp, shadow: 1, sky: 1 });
-            foretelling.foretold_figure(&foretold).expect("a figure")
+            let prediction = predictor.of(&predictor.modes[0], Samples { spp, shadow: 1, sky: 1 });
+            predictor.predicted_figure(&prediction).expect("a figure")
         };
         assert!((of(16) - 0.019).abs() < 1e-9);
         // By the line, which is 0.02 at 4: 60/32 at 32 camera samples.
         assert!((of(32) - 0.02 * (60f64 / 32.0 / 4.0).sqrt()).abs() < 1e-3, "{}", of(32));
-        let none = Predictor { line: None, ..foretelling.clone() };
-        let foretold = none.of(&none.modes[0], Samples { spp: 32, shadow: 1, sky: 1 });
-        assert_eq!(none.foretold_figure(&foretold), None);
+        let none = Predictor { line: None, ..predictor.clone() };
+        let prediction = none.of(&none.modes[0], Samples { spp: 32, shadow: 1, sky: 1 });
+        assert_eq!(none.predicted_figure(&prediction), None);
     }
 
     #[test]
