@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// What was found in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Checked {
+pub struct CheckedFrame {
     /// The frame.
     pub frame: u32,
     /// Its mean squared error, the reference's own left aside, display steps.
@@ -26,7 +26,7 @@ pub struct Checked {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Check {
     /// Frame by frame.
-    pub frames: Vec<Checked>,
+    pub frames: Vec<CheckedFrame>,
     /// The goal's figure of the worst of them: SSIM less than 1 by how much, FLIP, share.
     pub figure: f64,
 }
@@ -47,7 +47,7 @@ impl Check {
     /// many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
-    /// As [`Stage::trace`](super::stage::Stage::trace), and any that `image` gives.
+    /// As [`TrialContext::trace`](super::stage::TrialContext::trace), and any that `image` gives.
     pub fn of(
         probe: &Probe,
         predictor: &Predictor,
@@ -58,9 +58,9 @@ impl Check {
         let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
         let samples = samples_of_reference(prediction.samples);
-        let mut reference = reference(probe.stage.base, samples);
+        let mut reference = reference(probe.context.base, samples);
         reference.bounces = reference.bounces.max(prediction.bounces);
-        let truth = patches.trace(probe.stage, &reference)?;
+        let truth = patches.trace(probe.context, &reference)?;
         let own = predictor.own_part(prediction.samples, samples);
         // Rounding is all the frame's; of the rest a part is the reference's.
         let of_frame = |error: f64| {
@@ -69,7 +69,7 @@ impl Check {
         };
         let found = squares(&patches, &truth, &seen).into_iter().map(of_frame);
         let found = found.zip(doubts(&patches, &truth, &seen));
-        let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| Checked {
+        let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| CheckedFrame {
             frame,
             squared_error,
             doubt,
@@ -94,7 +94,7 @@ impl Check {
     }
 
     /// The worst frame.
-    pub fn worst(&self) -> Option<Checked> {
+    pub fn worst(&self) -> Option<CheckedFrame> {
         self.frames.iter().copied().max_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
     }
 
@@ -115,7 +115,7 @@ impl Check {
     /// error; 1 and less where it is not surely missed. Half of what so few pixels leave open is to the
     /// good of a frame.
     pub fn excess(&self, goal: Goal, allowed: f64) -> f64 {
-        let sure = |f: &Checked| f.squared_error / (1.0 + 0.5 * f.doubt);
+        let sure = |f: &CheckedFrame| f.squared_error / (1.0 + 0.5 * f.doubt);
         match goal {
             Goal::Psnr(_) => self.frames.iter().map(sure).fold(0.0, f64::max) / allowed,
             // The figure itself decides; it rises no faster than the squared error.
@@ -140,7 +140,7 @@ mod tests {
         let check = |errors: &[f64]| Check {
             frames: errors
                 .iter()
-                .map(|e| Checked { frame: 1, squared_error: *e, doubt: 0.2 })
+                .map(|e| CheckedFrame { frame: 1, squared_error: *e, doubt: 0.2 })
                 .collect(),
             figure: 0.03,
         };

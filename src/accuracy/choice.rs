@@ -80,7 +80,7 @@ pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
 
 /// A setting that may be faster than `found`, the one to recommend for `goal`, but was timed in too few
 /// turns to tell: by the estimates the fastest of them.
-pub fn untold<'m>(measured: &'m Measured, goal: Goal, found: &Row) -> Option<&'m Row> {
+pub fn perhaps_faster<'m>(measured: &'m Measured, goal: Goal, found: &Row) -> Option<&'m Row> {
     let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
     let faster = reach.filter(|row| seconds(row) < seconds(found) && is_by_few_turns(row));
     faster.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
@@ -145,7 +145,7 @@ mod tests {
         let goal = Goal::Psnr(20.0);
         let told = |m: &Measured, goal| {
             let row = fastest_reaching(m, goal).expect("some reach");
-            (row.options.clone(), untold(m, goal, row).map(|row| row.options.clone()))
+            (row.options.clone(), perhaps_faster(m, goal, row).map(|row| row.options.clone()))
         };
         assert_eq!(told(&measured, goal), ("--cutoff 0.01".into(), None));
         // All faster in each of three turns, which still may be chance.

@@ -6,7 +6,7 @@ use crate::sampling::mix;
 const EQUAL: f64 = 1.0 / 3.0;
 /// A pixel that was drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drawn {
+pub struct DrawnPixel {
     /// Row by row.
     pub index: u32,
     /// One over the probability with which it was drawn; twice that where it was drawn twice.
@@ -31,7 +31,7 @@ pub fn draw(
     among: impl Iterator<Item = u32> + Clone,
     count: f64,
     seed: DrawSeed,
-) -> Vec<Drawn> {
+) -> Vec<DrawnPixel> {
     let lit = || {
         let all = among.clone().map(|i| (i, f64::from(variance[i as usize])));
         all.filter(|(_, variance)| *variance >= 0.0)
@@ -40,7 +40,7 @@ pub fn draw(
     let equal = if sum > 0.0 { EQUAL } else { 1.0 };
     let (each, by_variance) =
         (count * equal / number, count * (1.0 - equal) / f64::max(sum, 1e-300));
-    let mut drawn: Vec<Drawn> = Vec::new();
+    let mut drawn: Vec<DrawnPixel> = Vec::new();
     let (mut reached, mut next) = (0.0, place(seed, 0));
     let mut unit = 0;
     for (index, variance) in lit() {
@@ -49,7 +49,7 @@ pub fn draw(
         while next < reached {
             match drawn.last_mut().filter(|last| last.index == index) {
                 Some(last) => last.weight += 1.0 / chance,
-                None => drawn.push(Drawn { index, weight: 1.0 / chance }),
+                None => drawn.push(DrawnPixel { index, weight: 1.0 / chance }),
             }
             unit += 1;
             next = f64::from(unit) + place(seed, unit);

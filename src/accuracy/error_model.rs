@@ -1,6 +1,6 @@
 //! What adds up to a frame's squared error, and by which powers of the samples it falls.
 //!
-//! Squared errors of independent causes add. So a traced frame's is predicted, in squares of a display
+//! Squared errors of independent sources add. So a traced frame's is predicted, in squares of a display
 //! step, by
 //!
 //! ```text
@@ -39,9 +39,9 @@ struct Powers {
 /// display steps.
 type Amplitudes = [f64; 4];
 
-/// Which causes there are at all.
+/// Which sources there are at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Causes {
+pub struct NoiseSources {
     /// Area lights.
     pub shadow: bool,
     /// A sky that lights.
@@ -51,7 +51,7 @@ pub struct Causes {
 /// The model of a move's traced frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorModel {
-    causes: Causes,
+    sources: NoiseSources,
     powers: Powers,
     frames: Vec<Amplitudes>,
     /// Root mean square of what the model misses the measurements by, as a share of them.
@@ -60,7 +60,7 @@ pub struct ErrorModel {
 
 /// What some samples came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct SampleErrors {
     /// The samples.
     pub samples: Samples,
     /// Samples of the reference that they were compared with.
@@ -80,35 +80,35 @@ fn falls(count: u32, power: f64) -> f64 {
 }
 
 impl Powers {
-    fn regressors(&self, causes: Causes, s: Samples) -> Amplitudes {
+    fn regressors(&self, sources: NoiseSources, s: Samples) -> Amplitudes {
         let light = falls(s.spp, self.light);
         let each = |is_there: bool, count: u32| match is_there {
             true => light * falls(count, self.samples),
             false => 0.0,
         };
-        let bias = f64::from(u8::from(causes.shadow)) / f64::from(s.shadow.max(1)).powi(2);
-        [falls(s.spp, self.camera), each(causes.shadow, s.shadow), each(causes.sky, s.sky), bias]
+        let bias = f64::from(u8::from(sources.shadow)) / f64::from(s.shadow.max(1)).powi(2);
+        [falls(s.spp, self.camera), each(sources.shadow, s.shadow), each(sources.sky, s.sky), bias]
     }
 }
 
 impl ErrorModel {
     /// The model that comes nearest to `points`, as shares of them. `references` are the samples of what
     /// each was held against, whose own error is part of the difference.
-    pub fn of(causes: Causes, points: &[&Point]) -> Self {
+    pub fn of(sources: NoiseSources, points: &[&SampleErrors]) -> Self {
         let frames = points.first().map_or(0, |point| point.errors.len());
         let mut best = Self {
-            causes,
+            sources,
             powers: Powers { camera: 1.0, light: 1.0, samples: 1.0 },
             frames: vec![[0.0; 4]; frames],
             misfit: f64::INFINITY,
         };
-        let lit = causes.shadow || causes.sky;
+        let lit = sources.shadow || sources.sky;
         for camera in grid(0.9, 1.7) {
             // Without soft light its powers mean nothing.
             for light in grid(1.0, if lit { 1.6 } else { 1.0 }) {
                 for samples in grid(0.8, if lit { 1.8 } else { 0.8 }) {
                     let powers = Powers { camera, light, samples };
-                    let model = Self::with(causes, powers, points);
+                    let model = Self::with(sources, powers, points);
                     if model.misfit < best.misfit {
                         best = model;
                     }
@@ -118,10 +118,10 @@ impl ErrorModel {
         best
     }
 
-    fn with(causes: Causes, powers: Powers, points: &[&Point]) -> Self {
+    fn with(sources: NoiseSources, powers: Powers, points: &[&SampleErrors]) -> Self {
         let rows = points.iter().map(|point| {
-            let mut row = powers.regressors(causes, point.samples);
-            let [camera, shadow, sky, _] = powers.regressors(causes, point.reference);
+            let mut row = powers.regressors(sources, point.samples);
+            let [camera, shadow, sky, _] = powers.regressors(sources, point.reference);
             // Both are biased the same way.
             row.iter_mut().zip([camera, shadow, sky]).for_each(|(x, own)| *x += own);
             row
@@ -136,17 +136,17 @@ impl ErrorModel {
             squares += misfit * misfit;
         }
         let misfit = (squares / count.max(1) as f64).sqrt();
-        Self { causes, powers, frames, misfit }
+        Self { sources, powers, frames, misfit }
     }
 
     /// The squared error of each frame looked at.
     pub fn errors(&self, samples: Samples) -> impl Iterator<Item = f64> + '_ {
-        let row = self.powers.regressors(self.causes, samples);
+        let row = self.powers.regressors(self.sources, samples);
         self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
     }
 
     /// The model under which `point` comes to what it did, frame by frame.
-    pub fn through(&self, point: &Point) -> Self {
+    pub fn through(&self, point: &SampleErrors) -> Self {
         let own: Vec<f64> = self.errors(point.reference).collect();
         let mut model = self.clone();
         let told = self.errors(point.samples).zip(own).zip(&point.errors);
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     const REFERENCE: Samples = Samples { spp: 128, shadow: 16, sky: 16 };
-    const LIT: Causes = Causes { shadow: true, sky: true };
+    const LIT: NoiseSources = NoiseSources { shadow: true, sky: true };
 
     fn truth(s: Samples, scale: f64) -> f64 {
         let (n, m, k) = (f64::from(s.spp), f64::from(s.shadow), f64::from(s.sky));
@@ -190,11 +190,11 @@ mod tests {
             let s = Samples { spp, shadow, sky };
             let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];
             let error = |scale: f64| (truth(s, scale) + truth(REFERENCE, scale)) * off;
-            Point { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
+            SampleErrors { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
         };
         let design =
             [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
-        let points: Vec<Point> = design.into_iter().enumerate().map(point).collect();
+        let points: Vec<SampleErrors> = design.into_iter().enumerate().map(point).collect();
         let model = ErrorModel::of(LIT, &points.iter().collect::<Vec<_>>());
         assert!(model.misfit < 0.05, "{model:?}");
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
@@ -228,10 +228,10 @@ mod tests {
         let point = |spp: u32| {
             let s = Samples { spp, shadow: 16, sky: 16 };
             let errors = vec![9.0 / f64::from(spp) + 9.0 / 128.0];
-            Point { samples: s, reference: REFERENCE, errors }
+            SampleErrors { samples: s, reference: REFERENCE, errors }
         };
         let points = [point(1), point(4), point(16)];
-        let model = ErrorModel::of(Causes { shadow: false, sky: false }, &points.each_ref());
+        let model = ErrorModel::of(NoiseSources { shadow: false, sky: false }, &points.each_ref());
         let error =
             |shadow| model.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
         assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{model:?}");
@@ -244,9 +244,9 @@ mod tests {
         let points = [1, 4, 16].map(|spp| {
             let s = Samples { spp, ..s };
             let errors = vec![truth(s, 1.0), truth(s, 2.0)];
-            Point { samples: s, reference: REFERENCE, errors }
+            SampleErrors { samples: s, reference: REFERENCE, errors }
         });
-        let point = Point { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
+        let point = SampleErrors { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
         let model = ErrorModel::of(LIT, &points.each_ref()).through(&point);
         let [own, _] = [0, 1].map(|i| model.errors(REFERENCE).nth(i).expect("a frame"));
         let now: Vec<f64> = model.errors(s).collect();

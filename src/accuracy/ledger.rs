@@ -35,7 +35,7 @@ const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
 /// A trial that is over.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Entry {
+pub struct TrialRecord {
     /// Which run of the program measured it, from 1.
     pub run: u32,
     /// Which turn; 0 warms up.
@@ -103,7 +103,7 @@ struct StoredReference {
 pub struct Ledger {
     folder: PathBuf,
     journal: Journal,
-    entries: Vec<Entry>,
+    entries: Vec<TrialRecord>,
     run: u32,
 }
 
@@ -127,13 +127,13 @@ impl Ledger {
         }
         let trials = folder.join("trials.jsonl");
         let journal = Journal::open(&trials)?;
-        let entries: Vec<Entry> = Journal::lines(&trials)?;
+        let entries: Vec<TrialRecord> = Journal::lines(&trials)?;
         let run = entries.iter().map(|entry| entry.run).max().unwrap_or(0) + 1;
         Ok(Self { folder: folder.to_path_buf(), journal, entries, run })
     }
 
     /// All trials that are over.
-    pub fn entries(&self) -> &[Entry] {
+    pub fn entries(&self) -> &[TrialRecord] {
         &self.entries
     }
 
@@ -156,8 +156,8 @@ impl Ledger {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn append(&mut self, entry: Entry) -> Result<()> {
-        let entry = Entry { run: self.run, ..entry };
+    pub fn append(&mut self, entry: TrialRecord) -> Result<()> {
+        let entry = TrialRecord { run: self.run, ..entry };
         self.journal.append(&entry)?;
         self.entries.push(entry);
         Ok(())

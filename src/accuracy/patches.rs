@@ -2,11 +2,11 @@
 //!
 //! A small picture will not do in their place: the smaller, the more of it is edges.
 
+use super::context::TrialContext;
 use super::draw::{DrawSeed, draw};
 use super::effort::Effort;
 use super::errors::displayed_rgb;
 use super::probe::one_sample;
-use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
@@ -23,12 +23,12 @@ const SCALE: f64 = 4.0;
 #[derive(Debug, Clone)]
 pub struct Patches {
     edge: u32,
-    frames: Vec<Drawn>,
+    frames: Vec<FramePatches>,
 }
 
 /// A frame's patches.
 #[derive(Debug, Clone, Default)]
-struct Drawn {
+struct FramePatches {
     frame: u32,
     corners: Vec<(u32, u32)>,
     /// What a patch counts for in the frame's mean.
@@ -47,10 +47,10 @@ struct Contrast {
 }
 
 /// The patches of each frame, as displayed: one image a patch.
-pub type Seen = Vec<Vec<Image>>;
+pub type PatchImages = Vec<Vec<Image>>;
 
 /// The patches in steps of 8 bits.
-pub fn rounded(seen: &Seen) -> Seen {
+pub fn rounded(seen: &PatchImages) -> PatchImages {
     let mut seen = seen.clone();
     for rgb in seen.iter_mut().flatten().flat_map(|image| &mut image.rgb) {
         *rgb = (*rgb * 255.0).round() / 255.0;
@@ -60,14 +60,14 @@ pub fn rounded(seen: &Seen) -> Seen {
 
 impl Patches {
     /// Patches of `edge` pixels of each of `frames`, one in each cell of a grid, about `pixels` pixels
-    /// of a frame, at places that `lot` draws.
-    pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, lot: u64) -> Self {
+    /// of a frame, at places that `seed` draws.
+    pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, seed: u64) -> Self {
         let edge = edge.min(settings.width).min(settings.height);
         let draw = |frame: &u32| {
-            let corners = places(settings, edge, pixels, mix(lot ^ u64::from(*frame)));
+            let corners = places(settings, edge, pixels, mix(seed ^ u64::from(*frame)));
             let weights = vec![1.0 / corners.len() as f64; corners.len()];
             let unsure = vec![1.0; corners.len()];
-            Drawn { frame: *frame, corners, weights, unsure }
+            FramePatches { frame: *frame, corners, weights, unsure }
         };
         Self { edge, frames: frames.iter().map(draw).collect() }
     }
@@ -78,9 +78,14 @@ impl Patches {
     /// fall between its samples.
     ///
     /// # Errors
-    /// As [`Stage::trace`].
-    pub fn by_contrast(stage: &Stage, frames: &[u32], effort: Effort, lot: u64) -> Result<Self> {
-        let mut settings = one_sample(stage.base);
+    /// As [`TrialContext::trace`].
+    pub fn by_contrast(
+        context: &TrialContext,
+        frames: &[u32],
+        effort: Effort,
+        seed: u64,
+    ) -> Result<Self> {
+        let mut settings = one_sample(context.base);
         let scale = effort.picture / (f64::from(settings.width) * f64::from(settings.height));
         let (shrink, enlarge) = match scale < 1.0 {
             true => ((1.0 / scale).sqrt().floor().min(SCALE) as u32, 1),
@@ -89,10 +94,10 @@ impl Patches {
         let edge = |length: u32| (length / shrink).max(1) * enlarge;
         (settings.width, settings.height) = (edge(settings.width), edge(settings.height));
         let picture = |frame| {
-            let image = stage.trace(&settings, stage.intersector, frame)?.0;
+            let image = context.trace(&settings, context.intersector, frame)?.0;
             Ok(Contrast::of(&image).reduced(enlarge))
         };
-        Self::drawn(stage.base, frames, &picture, effort.pixels, lot)
+        Self::drawn(context.base, frames, &picture, effort.pixels, seed)
     }
 
     /// The same by the contrast of the frames themselves, which `image` gives.
@@ -104,10 +109,10 @@ impl Patches {
         frames: &[u32],
         image: &dyn Fn(u32) -> Result<Image>,
         count: u32,
-        lot: u64,
+        seed: u64,
     ) -> Result<Self> {
         let contrast = |frame| Ok(Contrast::of(&image(frame)?));
-        Self::drawn(settings, frames, &contrast, count, lot)
+        Self::drawn(settings, frames, &contrast, count, seed)
     }
 
     fn drawn(
@@ -115,17 +120,17 @@ impl Patches {
         frames: &[u32],
         contrast: &dyn Fn(u32) -> Result<Contrast>,
         count: u32,
-        lot: u64,
+        seed: u64,
     ) -> Result<Self> {
         let (width, height) = (settings.width, settings.height);
         let draw = |frame: &u32| {
             let contrast = contrast(*frame)?;
-            let lot = DrawSeed { seed: lot, frame: *frame, number: 0 };
+            let seed = DrawSeed { seed, frame: *frame, number: 0 };
             let among = 0..contrast.each.len() as u32;
-            let mut drawn = Drawn { frame: *frame, ..Drawn::default() };
-            for d in draw(&contrast.each, among, f64::from(count), lot) {
+            let mut drawn = FramePatches { frame: *frame, ..FramePatches::default() };
+            for d in draw(&contrast.each, among, f64::from(count), seed) {
                 // One pixel of those that a pixel of the small picture stands for.
-                let random = mix(mix(lot.seed ^ u64::from(*frame)) ^ u64::from(d.index));
+                let random = mix(mix(seed.seed ^ u64::from(*frame)) ^ u64::from(d.index));
                 let within = |k: u32, of: u32, length: u32, random: u64| {
                     let at = |k: u32| (u64::from(length) * u64::from(k) / u64::from(of)) as u32;
                     let (from, to) = (at(k), at(k + 1).max(at(k) + 1));
@@ -147,7 +152,7 @@ impl Patches {
     /// The mean over each frame of a figure of its patches, and how far it may be off: its standard
     /// error. A pixel that was sure to be drawn leaves nothing open (Horvitz and Thompson, 1952).
     pub fn means(&self, seen: &[Vec<f64>]) -> Vec<(f64, f64)> {
-        let of = |(drawn, figures): (&Drawn, &Vec<f64>)| {
+        let of = |(drawn, figures): (&FramePatches, &Vec<f64>)| {
             let parts: Vec<f64> = drawn.weights.iter().zip(figures).map(|(w, x)| w * x).collect();
             let sum: f64 = parts.iter().sum();
             let open = || parts.iter().zip(&drawn.unsure);
@@ -163,15 +168,15 @@ impl Patches {
     ///
     /// # Errors
     /// [`Error::Stopped`]; those of cameras.
-    pub fn trace(&self, stage: &Stage, settings: &Settings) -> Result<Seen> {
-        let plan = EffectPlan::of(stage.scene, settings);
+    pub fn trace(&self, context: &TrialContext, settings: &Settings) -> Result<PatchImages> {
+        let plan = EffectPlan::of(context.scene, settings);
         let renderer =
-            Renderer { scene: stage.scene, settings, plan, intersector: stage.intersector };
-        let one = |Drawn { frame, corners, .. }: &Drawn| {
-            let camera = stage.shot.camera(*frame, settings.width, settings.height)?;
+            Renderer { scene: context.scene, settings, plan, intersector: context.intersector };
+        let one = |FramePatches { frame, corners, .. }: &FramePatches| {
+            let camera = context.shot.camera(*frame, settings.width, settings.height)?;
             let places: Vec<(u32, u32)> = corners.iter().flat_map(|c| self.pixels(*c)).collect();
-            let trace = || renderer.render_scattered(&camera, *frame, &places, stage.stop);
-            let (rgb, _) = stage.pool.install(trace).ok_or(Error::Stopped)?;
+            let trace = || renderer.render_scattered(&camera, *frame, &places, context.stop);
+            let (rgb, _) = context.pool.install(trace).ok_or(Error::Stopped)?;
             Ok(self.cut(&displayed_rgb(&rgb, settings)))
         };
         self.frames.iter().map(one).collect()
@@ -181,8 +186,8 @@ impl Patches {
     ///
     /// # Errors
     /// Any that `image` gives.
-    pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<Seen> {
-        let one = |Drawn { frame, corners, .. }: &Drawn| {
+    pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<PatchImages> {
+        let one = |FramePatches { frame, corners, .. }: &FramePatches| {
             let image = image(*frame)?;
             let at = |(x, y): (u32, u32)| image.rgb[(y * image.width + x) as usize];
             let rgb: Vec<Rgb> = corners.iter().flat_map(|c| self.pixels(*c)).map(at).collect();
@@ -243,7 +248,7 @@ impl Contrast {
     }
 }
 
-fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u32)> {
+fn places(settings: &Settings, edge: u32, pixels: u32, seed: u64) -> Vec<(u32, u32)> {
     let (width, height) = (settings.width, settings.height);
     let wanted = f64::from(pixels) / f64::from(edge * edge);
     let columns = (wanted * f64::from(width) / f64::from(height)).sqrt().round() as u32;
@@ -254,7 +259,7 @@ fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u3
         from + (random % u64::from(to - from - edge + 1)) as u32
     };
     let cells = (0..rows * columns).map(|cell| {
-        let random = mix(lot ^ u64::from(cell));
+        let random = mix(seed ^ u64::from(cell));
         let x = place(cell % columns, columns, width, random);
         (x, place(cell / columns, rows, height, random >> 32))
     });
@@ -290,7 +295,7 @@ mod tests {
         {
             let settings = Settings { width, height, ..Settings::default() };
             let patches = Patches::grid(&settings, &[1, 9], edge, pixels, 3);
-            let Drawn { corners, weights, .. } = &patches.frames[0];
+            let FramePatches { corners, weights, .. } = &patches.frames[0];
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
             let all = || corners.iter().flat_map(|c| patches.pixels(*c));
             assert!(all().all(|(x, y)| x < width && y < height), "{width}x{height}");

@@ -1,6 +1,6 @@
 //! What a setting is predicted to come to, and the choice among all of them.
 
-mod line;
+mod power_law;
 mod tried;
 
 use super::choice::Goal;
@@ -11,7 +11,7 @@ use crate::scene::limits::MAX_BOUNCES;
 use crate::scene::{Policy, ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
-pub use line::Line;
+pub use power_law::PowerLaw;
 
 /// What rounding to 8 bits adds to a squared error, display steps.
 pub const ROUNDING: f64 = 1.0 / 12.0;
@@ -24,7 +24,7 @@ const ALIKE: f64 = 1.1;
 /// Errors are those of traced frames in every mode: key frames are traced, and must reach a target like
 /// any other; frames between are mostly nearer to the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Mode {
+pub struct ReuseMode {
     /// What is taken over, and with how much care.
     pub reuse: ReuseSettings,
     /// Seconds per frame of the full size: of each frame, and by n, n·s, n·k.
@@ -33,7 +33,7 @@ pub struct Mode {
 
 /// What some samples came to, in each frame looked at.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
+pub struct MeasuredSamples {
     /// The samples.
     pub samples: Samples,
     /// Squared errors, the reference's own left aside.
@@ -55,7 +55,7 @@ pub struct Figure {
 
 /// What patches took to trace.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pace {
+pub struct PatchSpeed {
     /// The samples.
     pub samples: Samples,
     /// Wall seconds a pixel.
@@ -68,7 +68,7 @@ pub struct Predictor {
     /// Of samples that were not tried.
     pub model: ErrorModel,
     /// Samples that were tried.
-    pub measured: Vec<Measured>,
+    pub measured: Vec<MeasuredSamples>,
     /// What the probe's frames are off by for their bounces and cut-off.
     pub bias: Vec<f64>,
     /// What rounding to the file's bits adds.
@@ -76,15 +76,15 @@ pub struct Predictor {
     /// The bounces that go with it.
     pub bounces: u32,
     /// Ways to take over light.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<ReuseMode>,
     /// How the goal's figure goes with the squared error, unless it is that.
-    pub line: Option<Line>,
+    pub line: Option<PowerLaw>,
     /// The largest figure that reaches the goal, unless that is the squared error.
     pub most: Option<f64>,
     /// How far each frame's squared error may be off where samples were not tried, a share.
     pub doubts: Vec<f64>,
     /// How fast patches are traced.
-    pub pace: Option<Pace>,
+    pub pace: Option<PatchSpeed>,
     /// How much larger errors came out than predicted.
     pub excess: f64,
 }
@@ -126,7 +126,7 @@ impl Prediction {
 
 /// Which numbers of samples are thought of.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Range {
+pub struct SampleRange {
     /// Camera samples.
     pub spp: Vec<u32>,
     /// Shadow samples.
@@ -162,7 +162,7 @@ impl Predictor {
     }
 
     /// What is predicted of `samples` in `mode`, of the worst frame.
-    pub fn of(&self, mode: &Mode, samples: Samples) -> Prediction {
+    pub fn of(&self, mode: &ReuseMode, samples: Samples) -> Prediction {
         let (errors, doubts) = match self.tried(samples) {
             Some(measured) => (measured.errors.clone(), &measured.doubts),
             None => (self.model.errors(samples).collect::<Vec<_>>(), &self.doubts),
@@ -183,7 +183,7 @@ impl Predictor {
     /// For each mode the fastest setting that is predicted to be off by at most `allowed`, or the nearest to
     /// the truth of those that are hardly slower. Where the goal's figure was found of a setting, that
     /// alone decides.
-    pub fn fastest(&self, range: &Range, allowed: f64) -> Vec<Prediction> {
+    pub fn fastest(&self, range: &SampleRange, allowed: f64) -> Vec<Prediction> {
         let will_do = |f: &Prediction| {
             self.reached(f.samples) || (f.squared_error <= allowed && !self.missed(f.samples))
         };
@@ -200,7 +200,7 @@ impl Predictor {
     /// lets none.
     pub fn best_within(
         &self,
-        range: &Range,
+        range: &SampleRange,
         fits: &dyn Fn(&Prediction) -> bool,
     ) -> Option<Prediction> {
         let all = || self.modes.iter().flat_map(|mode| self.all(mode, range));
@@ -229,14 +229,14 @@ impl Predictor {
     }
 
     /// The setting with the least error predicted.
-    pub fn best(&self, range: &Range) -> Option<Prediction> {
+    pub fn best(&self, range: &SampleRange) -> Option<Prediction> {
         self.best_within(range, &|_| true)
     }
 
     /// Wall seconds that it takes to trace a pixel of a patch with `samples`.
     pub fn patch_seconds(&self, samples: Samples) -> f64 {
         // Patches are traced, whatever the mode.
-        let traced = |mode: &&Mode| mode.reuse.policy == Policy::Off;
+        let traced = |mode: &&ReuseMode| mode.reuse.policy == Policy::Off;
         let mode = self.modes.iter().find(traced).or(self.modes.first());
         let (Some(mode), Some(pace)) = (mode, self.pace) else { return 0.0 };
         let of = |s: Samples| {
@@ -248,8 +248,8 @@ impl Predictor {
 
     fn all<'s>(
         &'s self,
-        mode: &'s Mode,
-        range: &'s Range,
+        mode: &'s ReuseMode,
+        range: &'s SampleRange,
     ) -> impl Iterator<Item = Prediction> + 's {
         let lights = move |spp: u32| {
             let skies = move |shadow: u32| {
@@ -264,7 +264,7 @@ impl Predictor {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::error_model::{Causes, Point};
+    use super::super::error_model::{NoiseSources, SampleErrors};
     use super::*;
 
     pub(super) fn predictor() -> Predictor {
@@ -273,21 +273,21 @@ pub(super) mod tests {
             |s: Samples| 40.0 / f64::from(s.spp) + 20.0 / (f64::from(s.spp) * f64::from(s.shadow));
         let points = [(1, 1), (4, 1), (16, 1), (4, 16), (16, 16)].map(|(n, m)| {
             let (samples, reference) = (samples(n, m), samples(4096, 16));
-            Point { samples, reference, errors: vec![error(samples) + error(reference)] }
+            SampleErrors { samples, reference, errors: vec![error(samples) + error(reference)] }
         });
         let off = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
         let surface = ReuseSettings::default();
         Predictor {
-            model: ErrorModel::of(Causes { shadow: true, sky: false }, &points.each_ref()),
+            model: ErrorModel::of(NoiseSources { shadow: true, sky: false }, &points.each_ref()),
             measured: Vec::new(),
             bias: vec![0.5],
             rounding: 1.0 / 12.0,
             bounces: 4,
             modes: vec![
-                Mode { reuse: off, seconds: [0.0, 1.0, 1.0, 0.0] },
-                Mode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
+                ReuseMode { reuse: off, seconds: [0.0, 1.0, 1.0, 0.0] },
+                ReuseMode { reuse: surface, seconds: [0.0, 2.0, 0.1, 0.0] },
             ],
-            line: Line::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
+            line: PowerLaw::through(&[(1.0, 0.01), (4.0, 0.02), (16.0, 0.04)]),
             most: None,
             doubts: vec![0.0],
             pace: None,
@@ -295,8 +295,8 @@ pub(super) mod tests {
         }
     }
 
-    pub(super) fn range() -> Range {
-        Range { spp: vec![1, 2, 4, 8, 16, 32, 64], shadow: vec![1, 4, 16], sky: vec![1] }
+    pub(super) fn range() -> SampleRange {
+        SampleRange { spp: vec![1, 2, 4, 8, 16, 32, 64], shadow: vec![1, 4, 16], sky: vec![1] }
     }
 
     #[test]
@@ -310,7 +310,7 @@ pub(super) mod tests {
         assert_eq!(found.iter().map(samples).collect::<Vec<_>>(), [(16, 1), (8, 4)]);
         assert!(found.iter().all(|f| f.squared_error <= allowed));
         // Shadow samples that hardly cost anything are taken.
-        let cheap = Mode { seconds: [0.0, 2.0, 0.01, 0.0], ..predictor.modes[1].clone() };
+        let cheap = ReuseMode { seconds: [0.0, 2.0, 0.01, 0.0], ..predictor.modes[1].clone() };
         let cheap = Predictor { modes: vec![cheap], ..predictor.clone() };
         assert_eq!(
             cheap.fastest(&range(), allowed).iter().map(samples).collect::<Vec<_>>(),

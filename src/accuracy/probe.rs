@@ -5,13 +5,13 @@
 //! Times come from whole frames of a small size.
 
 use super::choice::Goal;
+use super::context::TrialContext;
 use super::effort::Effort;
-use super::error_model::{Causes, Samples};
+use super::error_model::{NoiseSources, Samples};
 use super::patches::Patches;
-use super::predictor::{Predictor, Range};
+use super::predictor::{Predictor, SampleRange};
 use super::reference::truth_settings;
 use super::search::Search;
-use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::film::Image;
@@ -31,7 +31,7 @@ pub const DRAW_OF_CHECK: u64 = 2;
 
 /// What the user set already, which is not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Given {
+pub struct GivenOptions {
     /// Camera samples.
     pub spp: bool,
     /// Shadow samples.
@@ -47,13 +47,13 @@ pub struct Given {
 /// The scene and what is wanted of it.
 pub struct Probe<'a> {
     /// What all trials share.
-    pub stage: &'a Stage<'a>,
+    pub context: &'a TrialContext<'a>,
     /// The frames of the job.
     pub frames: FrameRange,
     /// What is to be reached; `None` where a time is to be kept.
     pub goal: Option<Goal>,
     /// What is not chosen.
-    pub given: Given,
+    pub given: GivenOptions,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
     /// Seconds that the look may take; `None` where it may take as long as need be.
@@ -63,18 +63,18 @@ pub struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Looks at the scene. `heard` hears what is being done.
+    /// Looks at the scene. `progress` hears what is being done.
     ///
     /// # Errors
     /// [`crate::error::Error::Stopped`]; those of rendering.
-    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
+    pub fn look(&self, progress: &dyn Fn(&str)) -> Result<Predictor> {
         let effort = self.effort()?;
-        heard("errors of a short sweep");
+        progress("errors of a short sweep");
         let mut search = Search::begin(self, effort)?;
-        heard("times");
+        progress("times");
         search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
         if let Some(goal) = self.goal {
-            heard("errors of what may be chosen");
+            progress("errors of what may be chosen");
             search.try_likely(goal)?;
         }
         Ok(search.predictor)
@@ -83,11 +83,11 @@ impl Probe<'_> {
     /// As much as there is time for.
     fn effort(&self) -> Result<Effort> {
         let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
-        let mut settings = one_sample(self.stage.base);
+        let mut settings = one_sample(self.context.base);
         (settings.width, settings.height) = self.small_size(PILOT);
         let middle = u32::midpoint(self.frames.first, self.frames.last);
         let begun = Instant::now();
-        self.stage.trace(&settings, self.stage.intersector, middle)?;
+        self.context.trace(&settings, self.context.intersector, middle)?;
         let samples = f64::from(settings.width) * f64::from(settings.height);
         let spent = begun.elapsed().as_secs_f64();
         let FrameRange { first, last } = self.frames;
@@ -95,8 +95,8 @@ impl Probe<'_> {
     }
 
     /// What may be chosen.
-    pub fn range(&self) -> Range {
-        let (base, plan) = (self.stage.base, self.plan());
+    pub fn range(&self) -> SampleRange {
+        let (base, plan) = (self.context.base, self.plan());
         // Sobol points are laid out best in powers of two; half way between them is tried where a
         // step is expensive.
         let numbers = [1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192, 256, 512, 1024];
@@ -105,7 +105,7 @@ impl Probe<'_> {
             false => vec![given],
         };
         let spp = among(!self.given.spp, 1024, base.spp);
-        Range {
+        SampleRange {
             // A time is to be used, not kept by half of it.
             spp: if self.goal.is_none() && spp.len() > 1 { between(&spp) } else { spp },
             shadow: among(plan.area_lights && !self.given.shadow, 64, base.shadow_samples),
@@ -122,11 +122,11 @@ impl Probe<'_> {
             true => {
                 let (frames, edge, pixels) = WIDE;
                 let frames = spread(self.frames, frames, 0.5);
-                Ok(Patches::grid(self.stage.base, &frames, edge, pixels, DRAW_OF_PROBE))
+                Ok(Patches::grid(self.context.base, &frames, edge, pixels, DRAW_OF_PROBE))
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.5);
-                Patches::by_contrast(self.stage, &frames, effort, DRAW_OF_PROBE)
+                Patches::by_contrast(self.context, &frames, effort, DRAW_OF_PROBE)
             }
         }
     }
@@ -140,7 +140,7 @@ impl Probe<'_> {
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<(Vec<u32>, Patches)> {
-        let base = self.stage.base;
+        let base = self.context.base;
         Ok(match self.is_wide() {
             true => {
                 let (frames, edge, pixels) = WIDE;
@@ -162,16 +162,16 @@ impl Probe<'_> {
     }
 
     pub(super) fn plan(&self) -> EffectPlan {
-        EffectPlan::of(self.stage.scene, self.stage.base)
+        EffectPlan::of(self.context.scene, self.context.base)
     }
 
-    pub(super) fn causes(&self) -> Causes {
+    pub(super) fn sources(&self) -> NoiseSources {
         let plan = self.plan();
-        Causes { shadow: plan.area_lights, sky: plan.sky_light }
+        NoiseSources { shadow: plan.area_lights, sky: plan.sky_light }
     }
 
     pub(super) fn small_size(&self, pixels: f64) -> (u32, u32) {
-        let Settings { width, height, .. } = *self.stage.base;
+        let Settings { width, height, .. } = *self.context.base;
         let scale = (pixels / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
         let edge = |length: u32| ((f64::from(length) * scale).round() as u32).max(1);
         (edge(width), edge(height))

@@ -1,8 +1,8 @@
 //! The truth that candidates are held against: traced frames, with twice the samples until they no
 //! longer change.
 
+use super::context::TrialContext;
 use super::errors::{Frames, rms_between};
-use super::stage::Stage;
 use crate::error::Result;
 use crate::scene::limits::MAX_SEED;
 use crate::scene::{Policy, Settings};
@@ -65,7 +65,7 @@ pub struct Doubling {
     pub frames: Frames,
 }
 
-/// What is heard of a reference in the making.
+/// What is progress of a reference in the making.
 pub enum Step<'a> {
     /// A frame of so many camera samples is about to be rendered: number `k` of `of`.
     Frame {
@@ -84,7 +84,7 @@ pub enum Step<'a> {
 /// changes them by less than `wanted` display steps, or more than `most` samples would be needed.
 pub struct Convergence<'a> {
     /// The scene.
-    pub stage: &'a Stage<'a>,
+    pub context: &'a TrialContext<'a>,
     /// Settings of the first, coarsest reference ([`truth_settings`]).
     pub settings: Settings,
     /// Which frames.
@@ -101,16 +101,16 @@ impl Convergence<'_> {
     /// laid out together are worth more than as many that were not.
     ///
     /// # Errors
-    /// As [`Stage::trace`], and any that `hear` gives.
+    /// As [`TrialContext::trace`], and any that `report` gives.
     pub fn run(
         &self,
         mut last: Option<Doubling>,
-        hear: &mut dyn FnMut(Step) -> Result<()>,
+        report: &mut dyn FnMut(Step) -> Result<()>,
     ) -> Result<Truth> {
         loop {
             match last {
                 Some(last) if self.is_done(&last) => return Ok(self.truth(last)),
-                _ => last = Some(self.double(last, hear)?),
+                _ => last = Some(self.double(last, report)?),
             }
         }
     }
@@ -123,27 +123,27 @@ impl Convergence<'_> {
 
     fn settings_of(&self, number: u32) -> Settings {
         let spp = self.settings.spp << number;
-        let seed = seed_of_doubling(self.stage.base.seed, number);
+        let seed = seed_of_doubling(self.context.base.seed, number);
         Settings { spp, seed, ..self.settings.clone() }
     }
 
     fn double(
         &self,
         last: Option<Doubling>,
-        hear: &mut dyn FnMut(Step) -> Result<()>,
+        report: &mut dyn FnMut(Step) -> Result<()>,
     ) -> Result<Doubling> {
         let number = last.as_ref().map_or(0, |last| last.number + 1);
         let settings = self.settings_of(number);
         let (spp, of) = (settings.spp, self.frames.len());
         let mut frames = Frames::new();
         for (k, frame) in self.frames.iter().enumerate() {
-            hear(Step::Frame { spp, k, of })?;
-            let (image, _) = self.stage.trace(&settings, self.stage.intersector, *frame)?;
+            report(Step::Frame { spp, k, of })?;
+            let (image, _) = self.context.trace(&settings, self.context.intersector, *frame)?;
             frames.insert(*frame, image);
         }
         let change = last.map(|last| rms_between(&frames, &last.frames));
         let doubling = Doubling { number, spp, change, frames };
-        hear(Step::Doubled(&doubling))?;
+        report(Step::Doubled(&doubling))?;
         Ok(doubling)
     }
 

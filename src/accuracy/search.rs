@@ -2,10 +2,10 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::{ErrorModel, Point, Samples};
+use super::error_model::{ErrorModel, SampleErrors, Samples};
 use super::figures::{doubts, figure, squares};
-use super::patches::{Patches, Seen, rounded};
-use super::predictor::{Figure, Line, Measured, Pace, Predictor, ROUNDING};
+use super::patches::{PatchImages, Patches, rounded};
+use super::predictor::{Figure, MeasuredSamples, PatchSpeed, PowerLaw, Predictor, ROUNDING};
 use super::probe::{Probe, reference, samples_of_reference};
 use super::timing::likely as likely_of;
 use crate::error::Result;
@@ -24,7 +24,7 @@ const ROUNDS_BY_FIGURE: u32 = 10;
 
 /// What samples that were traced came to.
 struct Found {
-    point: Point,
+    point: SampleErrors,
     /// How far each frame's error may be off, a share.
     doubts: Vec<f64>,
     /// The goal's figure, unless that is the squared error.
@@ -35,7 +35,7 @@ struct Found {
 pub(super) struct Search<'a> {
     probe: &'a Probe<'a>,
     patches: Patches,
-    truth: Seen,
+    truth: PatchImages,
     reference: Samples,
     found: Vec<Found>,
     /// What it comes to.
@@ -48,21 +48,21 @@ impl<'a> Search<'a> {
         let patches = probe.patches(effort)?;
         let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
         let begun = Instant::now();
-        let truth =
-            patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
+        let truth = patches
+            .trace(probe.context, &super::probe::reference(probe.context.base, reference))?;
         let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
-        let causes = probe.causes();
+        let sources = probe.sources();
         let predictor = Predictor {
-            model: ErrorModel::of(causes, &[]),
+            model: ErrorModel::of(sources, &[]),
             measured: Vec::new(),
             bias: Vec::new(),
             rounding: if probe.rounds { ROUNDING } else { 0.0 },
-            bounces: probe.stage.base.bounces,
+            bounces: probe.context.base.bounces,
             modes: Vec::new(),
             line: None,
             most: probe.goal.and_then(Goal::most),
             doubts: Vec::new(),
-            pace: Some(Pace { samples: reference, seconds }),
+            pace: Some(PatchSpeed { samples: reference, seconds }),
             excess: 1.0,
         };
         let mut search = Self { probe, patches, truth, reference, found: Vec::new(), predictor };
@@ -112,9 +112,9 @@ impl<'a> Search<'a> {
     /// Traces the reference again where it is too coarse to hold `samples` against.
     fn sharpen(&mut self, samples: Samples) -> Result<()> {
         if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
-            let stage = self.probe.stage;
+            let context = self.probe.context;
             self.reference = samples_of_reference(samples);
-            self.truth = self.patches.trace(stage, &reference(stage.base, self.reference))?;
+            self.truth = self.patches.trace(context, &reference(context.base, self.reference))?;
         }
         Ok(())
     }
@@ -132,21 +132,26 @@ impl<'a> Search<'a> {
         let goal = self.probe.goal.filter(|goal| goal.most().is_some());
         let figure = goal.map(of).transpose()?;
         let doubts = doubts(&self.patches, &self.truth, &seen);
-        let point = Point { samples, reference: self.reference, errors };
+        let point = SampleErrors { samples, reference: self.reference, errors };
         self.found.push(Found { point, doubts, figure });
         Ok(())
     }
 
     /// Fits the model to all that was measured, and puts it through the last.
     fn learn(&mut self) {
-        let points: Vec<&Point> = self.found.iter().map(|found| &found.point).collect();
-        let model = ErrorModel::of(self.probe.causes(), &points);
+        let points: Vec<&SampleErrors> = self.found.iter().map(|found| &found.point).collect();
+        let model = ErrorModel::of(self.probe.sources(), &points);
         let measured = |Found { point, doubts, figure }: &Found| {
             // The model tells the reference's part of the difference.
             let own = model.errors(point.samples).zip(model.errors(point.reference));
             let parts = own.map(|(s, r)| s / (s + r).max(1e-12));
             let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-            Measured { samples: point.samples, errors, doubts: doubts.clone(), figure: *figure }
+            MeasuredSamples {
+                samples: point.samples,
+                errors,
+                doubts: doubts.clone(),
+                figure: *figure,
+            }
         };
         self.predictor.measured = self.found.iter().map(measured).collect();
         let last = self.found.last();
@@ -157,7 +162,7 @@ impl<'a> Search<'a> {
 
     /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
     /// say, cannot go on rising.
-    fn line(&self, most: f64) -> Option<Line> {
+    fn line(&self, most: f64) -> Option<PowerLaw> {
         let all =
             self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
         let mut nearest: Vec<(f64, f64)> =
@@ -165,17 +170,17 @@ impl<'a> Search<'a> {
         let off = |found: &(f64, f64)| (found.1 / most).ln().abs();
         nearest.sort_by(|a, b| off(a).total_cmp(&off(b)));
         nearest.truncate(4);
-        let line = Line::through(&nearest)?;
+        let line = PowerLaw::through(&nearest)?;
         nearest.first().map(|found| line.shifted_to(*found))
     }
 
     fn design(&self) -> Vec<Samples> {
-        let (base, causes) = (self.probe.stage.base, self.probe.causes());
+        let (base, sources) = (self.probe.context.base, self.probe.sources());
         let all = [(1, 1, 1), (4, 1, 1), (4, 8, 1), (4, 1, 8), (2, 4, 4), (16, 1, 1), (8, 2, 2)];
         let mut design = Vec::new();
         for (spp, shadow, sky) in all {
-            let shadow = if causes.shadow { shadow } else { base.shadow_samples };
-            let sky = if causes.sky { sky } else { base.sky_samples };
+            let shadow = if sources.shadow { shadow } else { base.shadow_samples };
+            let sky = if sources.sky { sky } else { base.sky_samples };
             let samples = Samples { spp, shadow, sky };
             if !design.contains(&samples) {
                 design.push(samples);
@@ -185,11 +190,11 @@ impl<'a> Search<'a> {
     }
 
     /// The patches with the reference's bounces: what samples alone do.
-    fn traced(&self, samples: Samples) -> Result<Seen> {
-        let stage = self.probe.stage;
-        let mut settings = reference(stage.base, samples);
-        settings.seed = stage.base.seed;
-        self.patches.trace(stage, &settings)
+    fn traced(&self, samples: Samples) -> Result<PatchImages> {
+        let context = self.probe.context;
+        let mut settings = reference(context.base, samples);
+        settings.seed = context.base.seed;
+        self.patches.trace(context, &settings)
     }
 
     /// The squared error that the sweep leaves to hope for: what the goal allows. Where its figure alone
@@ -215,7 +220,7 @@ impl<'a> Search<'a> {
     /// The fewest bounces that miss at most `allowed`, or no more than that beyond what the most miss; and
     /// what they miss in each frame. The same random numbers with more bounces tell.
     fn bounces(&self, allowed: f64) -> Result<(u32, Vec<f64>)> {
-        let (probe, base, plan) = (self.probe, self.probe.stage.base, self.probe.plan());
+        let (probe, base, plan) = (self.probe, self.probe.context.base, self.probe.plan());
         let mut tried = vec![base.bounces];
         if !probe.given.bounces && (plan.mirror || plan.glass) {
             tried.extend(BOUNCES);
@@ -225,12 +230,12 @@ impl<'a> Search<'a> {
         let mut settings = reference(base, Samples { spp: 4, shadow: 1, sky: 1 });
         settings.seed = base.seed;
         settings.bounces = tried.iter().copied().fold(settings.bounces, u32::max);
-        let truth = self.patches.trace(probe.stage, &settings)?;
+        let truth = self.patches.trace(probe.context, &settings)?;
         settings.cutoff = base.cutoff;
         let mut all: Vec<(u32, Vec<f64>)> = Vec::new();
         for bounces in tried {
             settings.bounces = bounces;
-            let seen = self.patches.trace(probe.stage, &settings)?;
+            let seen = self.patches.trace(probe.context, &settings)?;
             let bias = squares(&self.patches, &truth, &seen);
             if bias.iter().all(|bias| *bias <= allowed) {
                 return Ok((bounces, bias));

@@ -5,11 +5,11 @@
 //! The first turn warms up: its pictures count, its times do not. Each turn has a seed of its own,
 //! the same for all candidates.
 
+use super::context::TrialContext;
 use super::errors::Errors;
 use super::knobs::Candidate;
-use super::ledger::{Entry, Ledger};
+use super::ledger::{Ledger, TrialRecord};
 use super::reference::{Truth, seed_of_turn};
-use super::stage::Stage;
 use super::table::{Change, Measured, Taken};
 use super::trial::{self, Trial};
 use crate::error::Result;
@@ -20,7 +20,7 @@ use std::time::Instant;
 /// What there is to do.
 pub struct Sweep<'a> {
     /// What all share.
-    pub stage: &'a Stage<'a>,
+    pub context: &'a TrialContext<'a>,
     /// The default first.
     pub candidates: &'a [Candidate],
     /// The frames that are held against the truth.
@@ -31,7 +31,7 @@ pub struct Sweep<'a> {
 
 /// A candidate is about to be tried.
 #[derive(Clone, Copy)]
-pub struct Heard<'a> {
+pub struct SweepProgress<'a> {
     /// What was measured so far.
     pub ledger: &'a Ledger,
     /// Trials done so far.
@@ -65,7 +65,7 @@ impl Sweep<'_> {
     /// due to chance, below which the truth has to be known.
     ///
     /// # Errors
-    /// As [`Stage::trace`].
+    /// As [`TrialContext::trace`].
     pub fn least_noise(&self) -> Result<f64> {
         let best = self.candidates.iter().max_by_key(|c| samples(&c.settings));
         let Some(best) = best else { return Ok(0.0) };
@@ -78,16 +78,16 @@ impl Sweep<'_> {
         Ok(super::errors::rms_between(&frames[0], &frames[1]) / 2f64.sqrt())
     }
 
-    /// Tries every candidate in every turn, as far as `ledger` has not heard of it, and tells it.
+    /// Tries every candidate in every turn, unless `ledger` has its trial; `report` is called after each.
     ///
     /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of building, rendering and writing, and of `hear`. What
+    /// [`crate::error::Error::Stopped`]; those of building, rendering and writing, and of `report`. What
     /// the ledger has by then stays there.
     pub fn run(
         &self,
         truth: &Truth,
         ledger: &mut Ledger,
-        hear: &mut dyn FnMut(Heard) -> Result<()>,
+        report: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         let mut is_warm = false;
         for turn in 0..=self.turns {
@@ -97,11 +97,11 @@ impl Sweep<'_> {
                 continue;
             }
             if turn > 0 && !is_warm {
-                self.heard(ledger, turn, 0, hear)?;
+                self.progress(ledger, turn, 0, report)?;
                 self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
             }
             is_warm = true;
-            self.turn(truth, ledger, turn, &open, hear)?;
+            self.turn(truth, ledger, turn, &open, report)?;
         }
         Ok(())
     }
@@ -113,17 +113,17 @@ impl Sweep<'_> {
         ledger: &mut Ledger,
         turn: u32,
         open: &[usize],
-        hear: &mut dyn FnMut(Heard) -> Result<()>,
+        report: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         // The default goes first, also where an earlier run has had its turn: the others' pixels and
         // times are compared with its.
-        self.heard(ledger, turn, 0, hear)?;
+        self.progress(ledger, turn, 0, report)?;
         let default = self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
         for candidate in open {
             let own = match *candidate {
                 0 => None,
                 k => {
-                    self.heard(ledger, turn, k, hear)?;
+                    self.progress(ledger, turn, k, report)?;
                     Some(self.try_one(&self.with_seed(&self.candidates[k], turn), self.frames)?)
                 }
             };
@@ -133,7 +133,7 @@ impl Sweep<'_> {
                 let image = &tried.trial.frames[&self.shown_frame()];
                 ledger.keep_picture(*candidate, &page::Picture::png(image)?)?;
             }
-            ledger.append(Entry {
+            ledger.append(TrialRecord {
                 turn,
                 candidate: *candidate,
                 errors: errors.into(),
@@ -145,16 +145,23 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    fn heard(
+    fn progress(
         &self,
         ledger: &Ledger,
         turn: u32,
         candidate: usize,
-        hear: &mut dyn FnMut(Heard) -> Result<()>,
+        report: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         let left = self.seconds_left(ledger.entries());
         let candidate = &self.candidates[candidate];
-        hear(Heard { ledger, done: self.done(ledger), of: self.trials(), turn, candidate, left })
+        report(SweepProgress {
+            ledger,
+            done: self.done(ledger),
+            of: self.trials(),
+            turn,
+            candidate,
+            left,
+        })
     }
 
     /// Trials that there are in all.
@@ -169,7 +176,7 @@ impl Sweep<'_> {
 
     /// How long the trials take that are missing: a setting's last one tells of its next one, and by
     /// how many samples they take those that were tried tell of others. `None` before any was tried.
-    fn seconds_left(&self, entries: &[Entry]) -> Option<f64> {
+    fn seconds_left(&self, entries: &[TrialRecord]) -> Option<f64> {
         let work = |candidate: usize| samples(&self.candidates[candidate].settings) as f64;
         let all: f64 = entries.iter().map(|entry| entry.took).sum();
         let pace = all / entries.iter().map(|entry| work(entry.candidate)).sum::<f64>();
@@ -202,21 +209,21 @@ impl Sweep<'_> {
     }
 
     fn with_seed(&self, candidate: &Candidate, turn: u32) -> Settings {
-        let seed = seed_of_turn(self.stage.base.seed, turn);
+        let seed = seed_of_turn(self.context.base.seed, turn);
         Settings { seed, ..candidate.settings.clone() }
     }
 
     fn try_one(&self, settings: &Settings, frames: &[u32]) -> Result<Tried> {
         let start = Instant::now();
         // Other rules build another tree, one at a time: several would not fit beside a large scene.
-        let own = self.stage.own_intersector(settings)?;
+        let own = self.context.own_intersector(settings)?;
         let build_seconds = match own {
             Some(_) => start.elapsed().as_secs_f64(),
-            None => self.stage.build_seconds,
+            None => self.context.build_seconds,
         };
-        let intersector = own.as_deref().map_or(self.stage.intersector, |own| own as _);
-        let trial = trial::run(self.stage, settings, intersector, frames)?;
-        let entry = Entry {
+        let intersector = own.as_deref().map_or(self.context.intersector, |own| own as _);
+        let trial = trial::run(self.context, settings, intersector, frames)?;
+        let entry = TrialRecord {
             seconds: trial.seconds,
             cpu_seconds: trial.cpu_seconds,
             build_seconds,
@@ -224,7 +231,7 @@ impl Sweep<'_> {
             rays: trial.rays,
             rays_per_frame: trial.rays_per_frame,
             memory: trial.memory,
-            ..Entry::default()
+            ..TrialRecord::default()
         };
         Ok(Tried { trial, entry })
     }
@@ -233,7 +240,7 @@ impl Sweep<'_> {
 /// A trial, and its figures.
 struct Tried {
     trial: Trial,
-    entry: Entry,
+    entry: TrialRecord,
 }
 
 /// Samples a pixel, of the camera and of the lights; roughly what a setting costs.

@@ -3,7 +3,7 @@
 use super::errors::{Errors, Frames};
 use super::front;
 use super::knobs::{Candidate, Knob};
-use super::ledger::Entry;
+use super::ledger::TrialRecord;
 use crate::measure::{Median, largest_error, median, share_exceeding};
 use crate::stats::RayCounts;
 use serde::{Deserialize, Serialize};
@@ -115,11 +115,11 @@ impl AddAssign for Change {
 
 /// What a candidate's turns gave so far, by turn.
 #[derive(Default)]
-pub struct Taken(BTreeMap<u32, Entry>);
+pub struct Taken(BTreeMap<u32, TrialRecord>);
 
 impl Taken {
     /// The entries of `candidate`, by turn.
-    pub fn of(entries: &[Entry], candidate: usize) -> Self {
+    pub fn of(entries: &[TrialRecord], candidate: usize) -> Self {
         let own = entries.iter().filter(|entry| entry.candidate == candidate);
         Self(own.map(|entry| (entry.turn, entry.clone())).collect())
     }
@@ -129,7 +129,7 @@ impl Taken {
         self.0.keys().any(|turn| *turn > 0)
     }
 
-    fn timed(&self, of: fn(&Entry) -> f64) -> Vec<f64> {
+    fn timed(&self, of: fn(&TrialRecord) -> f64) -> Vec<f64> {
         self.0.range(1..).map(|(_, entry)| of(entry)).collect()
     }
 
@@ -144,8 +144,8 @@ impl Taken {
     }
 
     /// `of` each turn from the `first` on over that of the same turn of `other`.
-    fn ratios(&self, other: &Self, first: u32, of: fn(&Entry) -> f64) -> Vec<f64> {
-        let ratio = |(turn, entry): (&u32, &Entry)| Some(of(entry) / of(other.0.get(turn)?));
+    fn ratios(&self, other: &Self, first: u32, of: fn(&TrialRecord) -> f64) -> Vec<f64> {
+        let ratio = |(turn, entry): (&u32, &TrialRecord)| Some(of(entry) / of(other.0.get(turn)?));
         self.0.range(first..).filter_map(ratio).collect()
     }
 }
@@ -226,13 +226,13 @@ pub(super) mod tests {
                 share_over_2: 0.0,
                 flicker: None,
             };
-            let entry = |turn| Entry {
+            let entry = |turn| TrialRecord {
                 turn,
                 seconds: *seconds,
                 default_seconds: default,
                 cpu_seconds: *seconds,
                 errors: errors.into(),
-                ..Entry::default()
+                ..TrialRecord::default()
             };
             Taken((0..=6).map(|turn| (turn, entry(turn))).collect())
         };

@@ -2,7 +2,7 @@
 
 use super::error_model::Samples;
 use super::frames::{Cut, timed_frames};
-use super::modes::Spent;
+use super::modes::Times;
 use super::predictor::{Prediction, Predictor};
 use super::probe::Probe;
 use super::{effort::Effort, trial};
@@ -107,7 +107,7 @@ impl Probe<'_> {
     /// # Errors
     /// As [`Self::look`].
     pub fn timed(&self, timing: &Timing) -> Result<f64> {
-        let settings = timing.prediction.settings(self.stage.base);
+        let settings = timing.prediction.settings(self.context.base);
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let [small, large] = [timing.small, LARGER * timing.small].map(|most| most.min(pixels));
         let by_large = self.small(&settings, large)?;
@@ -123,10 +123,10 @@ impl Probe<'_> {
 
     /// Pixels of the smaller frames that can be tried in `seconds`.
     fn small_within(&self, seconds: f64, prediction: &Prediction) -> f64 {
-        let base = self.stage.base;
+        let base = self.context.base;
         let pixels = f64::from(base.width) * f64::from(base.height);
         let frames =
-            self.cut(prediction.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
+            self.cut(prediction.reuse).with_ancestors(&timed_frames(self.context.shot.frames));
         let each = prediction.seconds / pixels * frames.len() as f64;
         (seconds / ((1.0 + LARGER) * each)).min(Effort::WHOLE.small)
     }
@@ -138,18 +138,18 @@ impl Probe<'_> {
     }
 
     fn cut(&self, reuse: ReuseSettings) -> Cut {
-        let settings = Settings { reuse, ..self.stage.base.clone() };
-        let looks_up = !reuse::channels(self.stage.scene, &self.plan(), &settings).is_empty();
-        Cut::of(&settings, self.stage.shot.frames, looks_up)
+        let settings = Settings { reuse, ..self.context.base.clone() };
+        let looks_up = !reuse::channels(self.context.scene, &self.plan(), &settings).is_empty();
+        Cut::of(&settings, self.context.shot.frames, looks_up)
     }
 
     /// What a frame with about `pixels` pixels takes.
-    pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Spent> {
+    pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Times> {
         let mut settings = settings.clone();
         (settings.width, settings.height) = self.small_size(pixels);
-        let frames = timed_frames(self.stage.shot.frames);
-        let trial = trial::run(self.stage, &settings, self.stage.intersector, &frames)?;
-        Ok(Spent { wall: trial.seconds, cpu: trial.cpu_seconds })
+        let frames = timed_frames(self.context.shot.frames);
+        let trial = trial::run(self.context, &settings, self.context.intersector, &frames)?;
+        Ok(Times { wall: trial.seconds, cpu: trial.cpu_seconds })
     }
 }
 

@@ -1,8 +1,8 @@
 //! One candidate, one turn: its frames, made and timed.
 
+use super::context::{NoProgress, TrialContext};
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use super::stage::{Stage, Unheard};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::intersect::Intersector;
@@ -37,17 +37,17 @@ pub struct Trial {
 /// # Errors
 /// [`Error::Stopped`]; those of cameras.
 pub fn run(
-    stage: &Stage,
+    context: &TrialContext,
     settings: &Settings,
     intersector: &dyn Intersector,
     chosen: &[u32],
 ) -> Result<Trial> {
-    let scene = stage.scene_of(settings);
+    let scene = context.scene_of(settings);
     let plan = EffectPlan::of(scene, settings);
     let renderer = Renderer { scene, settings, plan, intersector };
     let looks_up = !reuse::channels(scene, &plan, settings).is_empty();
-    let cut = Cut::of(settings, stage.shot.frames, looks_up);
-    let maker = maker(stage, renderer, settings)?;
+    let cut = Cut::of(settings, context.shot.frames, looks_up);
+    let maker = maker(context, renderer, settings)?;
     let order = maker.batches(&cut.with_ancestors(chosen)).concat();
     maker.expect(&order);
     let mut frames = Frames::new();
@@ -62,7 +62,7 @@ pub fn run(
         rays.push((frame, cast.total() as f64));
         all_rays += cast;
         if chosen.contains(&frame) {
-            let image = stage.pool.install(|| displayed(&made.film, settings));
+            let image = context.pool.install(|| displayed(&made.film, settings));
             frames.insert(frame, image);
         }
     }
@@ -84,23 +84,23 @@ fn rays_of(made: &Made) -> RayCounts {
 }
 
 fn maker<'m>(
-    stage: &Stage<'m>,
+    context: &TrialContext<'m>,
     renderer: Renderer<'m>,
     settings: &Settings,
 ) -> Result<Box<dyn FrameMaker + 'm>> {
-    let Stage { shot, pool, stop, .. } = *stage;
+    let TrialContext { shot, pool, stop, .. } = *context;
     let frames = shot.frames;
     Ok(match settings.reuse.policy {
         Policy::Surface => {
             let pyramid = Pyramid { segment: settings.reuse.segment, frames };
-            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &Unheard, pyramid)?)
+            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &NoProgress, pyramid)?)
         }
         Policy::Colour => {
             let rule = Rule {
                 colour_epsilon: settings.reuse.colour_epsilon,
                 distance_epsilon: settings.reuse.distance_epsilon,
             };
-            Box::new(ColourMaker::new(renderer, shot, pool, stop, &Unheard, rule, &[])?)
+            Box::new(ColourMaker::new(renderer, shot, pool, stop, &NoProgress, rule, &[])?)
         }
         Policy::Off => Box::new(Tracer {
             renderer,
@@ -108,7 +108,7 @@ fn maker<'m>(
             pool,
             with_gbuffer: false,
             stop,
-            progress: &Unheard,
+            progress: &NoProgress,
             laid: Default::default(),
         }),
     })

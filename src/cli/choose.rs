@@ -7,7 +7,9 @@ mod judge;
 use super::args::SettingArgs;
 use super::request::Request;
 use super::{say, spelled, values};
-use crate::accuracy::{Given, Goal, Prediction, Predictor, Probe, Stage, Timer, Verdict};
+use crate::accuracy::{
+    GivenOptions, Goal, Prediction, Predictor, Probe, Timer, TrialContext, Verdict,
+};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
@@ -48,7 +50,7 @@ pub struct Choice {
     pub wanted: String,
     /// The settings before, and which of them the user gave.
     base: Value,
-    given: Given,
+    given: GivenOptions,
     /// The squared error that the target allows, display steps.
     allowed: Option<f64>,
     /// What is predicted of the choice.
@@ -85,7 +87,7 @@ pub struct Chooser<'a> {
     /// What the user set already.
     pub options: &'a SettingArgs,
     /// The scene and all that renders it.
-    pub stage: &'a Stage<'a>,
+    pub context: &'a TrialContext<'a>,
     /// The job.
     pub request: &'a Request,
     /// When the program started: a budget counts from then.
@@ -282,7 +284,7 @@ impl Chooser<'_> {
         let left = budget.as_ref().map(|b| b.left(&predictor, predicted.samples) + writing);
         let choice = Choice {
             wanted: self.args.words(),
-            base: Header::settings(self.stage.base),
+            base: Header::settings(self.context.base),
             given: self.given(),
             allowed,
             predicted,
@@ -336,7 +338,7 @@ impl Chooser<'_> {
             format!("; of what was tried, {tried} came nearest, to {figure}")
         });
         let nearest = seen.or(best).unwrap_or_default();
-        let fewer = match self.given() == Given::default() {
+        let fewer = match self.given() == GivenOptions::default() {
             true => "",
             false => ", or give fewer options",
         };
@@ -349,14 +351,14 @@ impl Chooser<'_> {
     fn before(&self, tracer: &str) -> Option<Choice> {
         let before = Choice::of(&self.request.header_before(tracer)?)?;
         let is_same = before.wanted == self.args.words()
-            && before.base == Header::settings(self.stage.base)
+            && before.base == Header::settings(self.context.base)
             && before.given == self.given();
         is_same.then_some(before)
     }
 
-    fn given(&self) -> Given {
+    fn given(&self) -> GivenOptions {
         let s = self.options;
-        Given {
+        GivenOptions {
             spp: s.spp.is_some(),
             shadow: s.shadow_samples.is_some(),
             sky: s.sky_samples.is_some(),
@@ -366,18 +368,18 @@ impl Chooser<'_> {
     }
 
     fn plan(&self) -> EffectPlan {
-        EffectPlan::of(self.stage.scene, self.stage.base)
+        EffectPlan::of(self.context.scene, self.context.base)
     }
 
     /// The options that stand for what was chosen, as far as they have a part in the scene.
     fn options(&self, predicted: &Prediction) -> String {
-        spelled::options(&predicted.settings(self.stage.base), &self.plan())
+        spelled::options(&predicted.settings(self.context.base), &self.plan())
     }
 
     /// Who looks at the scene for this job.
     pub fn probe(&self) -> Probe<'_> {
         Probe {
-            stage: self.stage,
+            context: self.context,
             frames: self.request.frames,
             goal: self.args.target,
             given: self.given(),

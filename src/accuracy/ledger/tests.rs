@@ -6,7 +6,7 @@ fn terms(size: &str) -> Map<String, Value> {
     Map::from_iter([("size".to_string(), Value::from(size)), ("spp".to_string(), Value::from(4))])
 }
 
-fn entry(turn: u32, candidate: usize) -> Entry {
+fn entry(turn: u32, candidate: usize) -> TrialRecord {
     let errors = Errors {
         mse: 0.0,
         rmse_steps: 0.0,
@@ -16,7 +16,7 @@ fn entry(turn: u32, candidate: usize) -> Entry {
         share_over_2: 0.0,
         flicker: None,
     };
-    Entry { turn, candidate, seconds: 0.1, errors: errors.into(), ..Entry::default() }
+    TrialRecord { turn, candidate, seconds: 0.1, errors: errors.into(), ..TrialRecord::default() }
 }
 
 #[test]

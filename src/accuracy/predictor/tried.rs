@@ -2,7 +2,7 @@
 
 use super::super::choice::Goal;
 use super::super::error_model::Samples;
-use super::{Measured, Prediction, Predictor};
+use super::{MeasuredSamples, Prediction, Predictor};
 
 /// Where nothing that was tried reaches the goal, the squared error is to come down by so much at a time.
 const STEP: f64 = 4.0;
@@ -34,7 +34,7 @@ impl Predictor {
     }
 
     /// What `samples` came to, if they were tried, which nothing is twice.
-    pub(in super::super) fn tried(&self, samples: Samples) -> Option<&Measured> {
+    pub(in super::super) fn tried(&self, samples: Samples) -> Option<&MeasuredSamples> {
         self.measured.iter().find(|measured| measured.samples == samples)
     }
 
@@ -59,7 +59,7 @@ impl Predictor {
         }
         let holds =
             |s: Samples| samples.spp <= s.spp && samples.shadow <= s.shadow && samples.sky <= s.sky;
-        let misses = |m: &Measured| self.figure_of(m).is_some_and(|figure| figure > most);
+        let misses = |m: &MeasuredSamples| self.figure_of(m).is_some_and(|figure| figure > most);
         self.measured.iter().any(|m| holds(m.samples) && misses(m))
     }
 
@@ -95,14 +95,14 @@ impl Predictor {
     }
 
     fn errors_tried(&self) -> impl Iterator<Item = (Samples, f64)> + '_ {
-        let of = |m: &Measured| {
+        let of = |m: &MeasuredSamples| {
             let prediction = self.of(self.modes.first()?, m.samples);
             Some((m.samples, prediction.squared_error))
         };
         self.measured.iter().filter_map(of)
     }
 
-    fn figure_of(&self, tried: &Measured) -> Option<f64> {
+    fn figure_of(&self, tried: &MeasuredSamples) -> Option<f64> {
         let found = tried.figure?;
         let bias = self.bias.iter().copied().fold(0.0, f64::max);
         let all = self.excess * found.squared_error + bias;
@@ -115,7 +115,7 @@ impl Predictor {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{predictor, range};
-    use super::super::{Figure, Line, Predictor};
+    use super::super::{Figure, PowerLaw, Predictor};
     use super::*;
 
     fn tried(all: &[(u32, u32, f64)]) -> Predictor {
@@ -125,7 +125,7 @@ mod tests {
             let samples = Samples { spp, shadow, sky: 1 };
             let errors: Vec<f64> = predictor.model.errors(samples).collect();
             let figure = Some(Figure { figure, squared_error: errors[0] });
-            Measured { samples, errors, doubts: vec![0.0], figure }
+            MeasuredSamples { samples, errors, doubts: vec![0.0], figure }
         };
         predictor.measured = all.iter().map(measured).collect();
         predictor
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn what_is_tried_is_not_far_beyond_what_missed_nor_is_the_first_that_reaches_taken() {
         let goal = Goal::Flip(0.02);
-        let flat = Line { at_one: 0.022f64.ln(), rise: 0.11 };
+        let flat = PowerLaw { at_one: 0.022f64.ln(), rise: 0.11 };
         let missed = |all: &[(u32, u32, f64)]| Predictor { line: Some(flat), ..tried(all) };
         let error = |f: &Predictor, spp| f.of(&f.modes[0], Samples { spp, shadow: 1, sky: 1 });
         let none = missed(&[(4, 1, 0.03), (16, 1, 0.025)]);
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_line_that_hardly_rises_tells_nothing() {
-        assert!(Line::through(&[(1.0, 0.500), (4.0, 0.501), (16.0, 0.502)]).is_none());
-        assert!(Line::through(&[(1.0, 0.1), (4.0, 0.2), (16.0, 0.4)]).is_some());
+        assert!(PowerLaw::through(&[(1.0, 0.500), (4.0, 0.501), (16.0, 0.502)]).is_none());
+        assert!(PowerLaw::through(&[(1.0, 0.1), (4.0, 0.2), (16.0, 0.4)]).is_some());
     }
 }

@@ -36,7 +36,7 @@ impl Budget {
     /// The budget asked for, if any.
     pub fn of(chooser: &Chooser) -> Option<Self> {
         let (started, seconds) = (chooser.started, chooser.args.budget?.as_secs_f64());
-        let (request, settings) = (chooser.request, chooser.stage.base);
+        let (request, settings) = (chooser.request, chooser.context.base);
         let count = request.frames.last - request.frames.first + 1;
         let there_is = (count, u64::from(settings.width) * u64::from(settings.height));
         let (frames, pixels) = (f64::from(count), there_is.1 as f64);

@@ -42,7 +42,7 @@ impl Chooser<'_> {
         }
         let base = |settings: Value, header: Header| Header { settings, ..header };
         let now =
-            base(Header::settings(self.stage.base), self.request.target(tracer.into()).header);
+            base(Header::settings(self.context.base), self.request.target(tracer.into()).header);
         // Where others were given, the first difference may be of one that nobody gave.
         let is_given_alike = chosen.given == self.given();
         let d = base(chosen.base, before.clone()).first_difference(&now).filter(|_| is_given_alike);

@@ -61,7 +61,7 @@ impl Chooser<'_> {
     /// How much to look at where no time is to be kept: for a small share of the job.
     fn effort_of_check(&self, choice: &Choice) -> Effort {
         let whole = Check::seconds(&choice.predictor, choice.predicted.samples);
-        let (frames, settings) = (self.request.frames, self.stage.base);
+        let (frames, settings) = (self.request.frames, self.context.base);
         let pixels = u64::from(settings.width) * u64::from(settings.height);
         let count = frames.last - frames.first + 1;
         let effort = Effort::of_check(CHECK_SHARE * choice.seconds, whole, count, pixels);
@@ -165,7 +165,7 @@ impl Chooser<'_> {
     fn image(&self, frame: u32) -> Result<Image> {
         let mut image = read_image(self.request.pattern.path(frame))?;
         if image.encoding == Encoding::Linear {
-            image.rgb = displayed_rgb(&image.rgb, self.stage.base);
+            image.rgb = displayed_rgb(&image.rgb, self.context.base);
             image.encoding = Encoding::Srgb;
         }
         Ok(image)

@@ -2,7 +2,7 @@
 
 use super::RenderArgs;
 use super::round::{Frames, Round, Site};
-use crate::accuracy::{Stage, Timer, Timing};
+use crate::accuracy::{Timer, Timing, TrialContext};
 use crate::cli::choose::{Choice, Chooser, Judged};
 use crate::cli::request::Request;
 use crate::cli::stats;
@@ -132,7 +132,7 @@ impl Choosing<'_> {
     }
 
     fn ask<T>(&self, request: &Request, question: impl Fn(&Chooser) -> Result<T>) -> Result<T> {
-        let stage = Stage {
+        let context = TrialContext {
             scene: &request.scene,
             otherwise: None,
             shot: &request.shot,
@@ -145,7 +145,7 @@ impl Choosing<'_> {
         question(&Chooser {
             args: &self.args.choice,
             options: &self.args.settings,
-            stage: &stage,
+            context: &context,
             request,
             started: self.site.clock.start,
             ranks: self.site.comm.size(),

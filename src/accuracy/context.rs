@@ -13,7 +13,7 @@ use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
 
 /// The scene and all that renders it.
-pub struct Stage<'a> {
+pub struct TrialContext<'a> {
     /// As `rules.recentre` of the default wants it.
     pub scene: &'a Scene,
     /// The scene with that rule the other way, where a candidate turns it.
@@ -32,7 +32,7 @@ pub struct Stage<'a> {
     pub stop: &'a AtomicBool,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> TrialContext<'a> {
     /// The scene that `settings` are traced on.
     pub fn scene_of(&self, settings: &Settings) -> &'a Scene {
         match self.otherwise {
@@ -72,7 +72,7 @@ impl<'a> Stage<'a> {
         let renderer = Renderer { scene: self.scene, settings, plan, intersector };
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render = || {
-            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &Unheard)?;
+            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &NoProgress)?;
             Some((displayed(&film, settings), rays))
         };
         self.pool.install(render).ok_or(Error::Stopped)
@@ -80,8 +80,8 @@ impl<'a> Stage<'a> {
 }
 
 /// Nobody watches the tiles of a trial.
-pub struct Unheard;
+pub struct NoProgress;
 
-impl Progress for Unheard {
+impl Progress for NoProgress {
     fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

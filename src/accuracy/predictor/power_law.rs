@@ -7,14 +7,14 @@ const LEAST: f64 = 0.1;
 
 /// A figure as a power of the squared error in display steps: both of its logarithms' line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Line {
+pub struct PowerLaw {
     /// Logarithm of the figure where the squared error is 1.
     pub at_one: f64,
     /// Its rise with the logarithm of the squared error.
     pub rise: f64,
 }
 
-impl Line {
+impl PowerLaw {
     /// The line nearest to pairs of squared error and figure; `None` where they do not rise together, or so
     /// little that the figure tells nothing of the error.
     pub fn through(pairs: &[(f64, f64)]) -> Option<Self> {
