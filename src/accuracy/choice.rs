@@ -1,4 +1,4 @@
-//! The measured table asked the other way round: which setting for this error, for this time.
+//! Which setting of a measured sweep to recommend for an error or for a time.
 
 use super::errors::Errors;
 use super::knobs::Knob;
@@ -6,7 +6,7 @@ use super::predictor::ROUNDING;
 use super::table::{Measured, Row};
 use crate::measure::psnr;
 
-/// An error that is to be reached.
+/// An error that frames must not exceed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Goal {
     /// At least this PSNR, dB.
@@ -32,8 +32,17 @@ impl std::fmt::Display for Goal {
 }
 
 impl Goal {
-    /// Its figure in words: `figure` rises with the error, so it is what SSIM is less than 1. `None` for
-    /// PSNR, which is reported for every setting.
+    /// The largest figure that reaches it. Figures rise with the error: the squared error in squares of a
+    /// display step for PSNR, 1 - SSIM, FLIP, the share of pixels.
+    pub fn largest(self) -> f64 {
+        match self {
+            Self::Psnr(least) => 255.0 * 255.0 * 10f64.powf(-least / 10.0),
+            Self::Ssim(least) => 1.0 - least,
+            Self::Flip(most) | Self::MaxShare(most) => most,
+        }
+    }
+
+    /// A figure as [`Self::largest`] has it in words; `None` for PSNR, which is reported for every setting.
     pub fn in_words(self, figure: f64) -> Option<String> {
         match self {
             Self::Psnr(_) => None,
@@ -43,7 +52,7 @@ impl Goal {
         }
     }
 
-    /// Whether rounding to 8 bits alone is more than it allows.
+    /// Whether rounding to 8 bits alone is a larger error than the goal allows.
     pub fn is_beyond_8_bits(self) -> bool {
         matches!(self, Self::Psnr(least) if least > Self::most_of_8_bits())
     }
@@ -53,7 +62,7 @@ impl Goal {
         psnr(ROUNDING / (255.0 * 255.0))
     }
 
-    /// Whether `errors` reach it.
+    /// Whether `errors` reach the goal.
     pub fn is_met(self, errors: &Errors) -> bool {
         match self {
             Self::Psnr(least) => errors.psnr >= least,
@@ -64,9 +73,9 @@ impl Goal {
     }
 }
 
-/// The setting to recommend for `goal` among those that reached it and may be recommended: the fastest.
-/// Where the default does, only what is surely faster takes its place, beyond the spread of the turns: not
-/// what chance made so, and nothing where too few turns tell.
+/// The setting to recommend for `goal`: the fastest that reached it, among those that may be recommended.
+/// Where the default reached it, another setting is recommended only if it is surely faster, beyond the
+/// spread of the turns; none is where there were too few turns.
 pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
     let default_reaches = goal.is_met(&measured.default_row().errors);
     let is_surely_faster = |row: &Row| {
@@ -78,15 +87,15 @@ pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
     reach.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
 }
 
-/// A setting that may be faster than `found`, the one to recommend for `goal`, but was timed in too few
-/// turns to tell: by the estimates the fastest of them.
+/// Of the settings that may be faster than `found`, the one recommended for `goal`, but were timed in too
+/// few turns to be sure, the one with the shortest time estimated.
 pub fn perhaps_faster<'m>(measured: &'m Measured, goal: Goal, found: &Row) -> Option<&'m Row> {
     let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
     let faster = reach.filter(|row| seconds(row) < seconds(found) && is_by_few_turns(row));
     faster.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
 }
 
-/// Whether `row` was timed in too few turns for any difference from the default's time to be sure.
+/// Whether `row` was timed in too few turns to be sure of any difference from the default's time.
 fn is_by_few_turns(row: &Row) -> bool {
     row.knob != Knob::Default && row.time_ratio.is_none_or(|ratio| !ratio.is_sure())
 }

@@ -1,4 +1,4 @@
-//! What every trial shares: the scene, its move, the threads; and which scene and intersector a
+//! What all trials share: the scene, the camera's move, the threads; and the scene and intersector that a
 //! setting is traced with.
 
 use super::errors::displayed;
@@ -12,23 +12,23 @@ use crate::stats::RayCounts;
 use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
 
-/// The scene and all that renders it.
+/// The scene and everything needed to render it.
 pub struct TrialContext<'a> {
-    /// As `rules.recentre` of the default wants it.
+    /// The scene, recentred or not as `rules.recentre` of the default says.
     pub scene: &'a Scene,
-    /// The scene with that rule the other way, where a candidate turns it.
+    /// The scene with `rules.recentre` the other way, where a candidate needs it.
     pub otherwise: Option<&'a Scene>,
     /// The camera's move.
     pub shot: &'a Shot,
     /// The default settings.
     pub base: &'a Settings,
-    /// The default's intersector.
+    /// The intersector of the default settings.
     pub intersector: &'a dyn Intersector,
-    /// Wall seconds that it took to build.
+    /// Wall seconds that `intersector` took to build.
     pub build_seconds: f64,
     /// The threads that render.
     pub pool: &'a ThreadPool,
-    /// Set when the sweep shall stop.
+    /// Set from outside to stop rendering.
     pub stop: &'a AtomicBool,
 }
 
@@ -41,7 +41,7 @@ impl<'a> TrialContext<'a> {
         }
     }
 
-    /// An intersector for `settings`; `None` where the default's serves.
+    /// An intersector for `settings`; `None` where they need no other than [`Self::intersector`].
     ///
     /// # Errors
     /// As [`intersect::build`].
@@ -58,10 +58,10 @@ impl<'a> TrialContext<'a> {
         self.pool.install(|| intersect::build(scene, settings, threads)).map(Some)
     }
 
-    /// Frame `frame` traced whole on the default's scene, as displayed; and the rays cast.
+    /// Frame `frame` of [`Self::scene`], traced whole, as displayed; and the rays cast.
     ///
     /// # Errors
-    /// [`Error::Stopped`]; those of cameras.
+    /// [`Error::Stopped`]; errors of the camera's move.
     pub fn trace(
         &self,
         settings: &Settings,
@@ -79,7 +79,7 @@ impl<'a> TrialContext<'a> {
     }
 }
 
-/// Nobody watches the tiles of a trial.
+/// Progress of tiles that nobody watches.
 pub struct NoProgress;
 
 impl Progress for NoProgress {

@@ -1,31 +1,31 @@
-//! Draws pixels with known probabilities, more often where more is to be found.
+//! Draws pixels with known probabilities, larger where a larger variance is expected.
 
 use crate::sampling::mix;
 
-/// Share of the draw that all pixels have alike.
+/// Share of the draw that is spread evenly over all pixels.
 const EQUAL: f64 = 1.0 / 3.0;
 /// A pixel that was drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawnPixel {
-    /// Row by row.
+    /// Index of the pixel, row by row.
     pub index: u32,
-    /// One over the probability with which it was drawn; twice that where it was drawn twice.
+    /// One over the pixel's probability; twice that where it was drawn twice.
     pub weight: f64,
 }
 
-/// What a draw depends on beside the picture.
+/// The numbers that a draw depends on beside the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DrawSeed {
     /// The job's seed.
     pub seed: u64,
     /// The frame.
     pub frame: u32,
-    /// Which of the frame's draws.
+    /// Number of the draw within the frame.
     pub number: u32,
 }
 
-/// Draws about `count` of the pixels `among`, whose variance is `variance` for the whole picture
-/// (negative: never drawn): a function of these and the seed alone.
+/// Draws about `count` of the pixels `among`, by the `variance` expected of each pixel of the picture; a
+/// pixel of negative variance is never drawn. The same arguments give the same pixels.
 pub fn draw(
     variance: &[f32],
     among: impl Iterator<Item = u32> + Clone,
@@ -58,7 +58,7 @@ pub fn draw(
     drawn
 }
 
-/// A place in [0, 1).
+/// A random number in [0, 1) for the unit number `unit`.
 fn place(seed: DrawSeed, unit: u32) -> f64 {
     let words = [seed.seed, u64::from(seed.frame) << 32 | u64::from(seed.number), u64::from(unit)];
     let v = words.into_iter().fold(0, |v, word| mix(v ^ word));

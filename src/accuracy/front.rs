@@ -1,13 +1,12 @@
-//! The settings that nothing beats in both time and error.
+//! The Pareto front: the settings that no other beats in both time and error.
 
 use super::knobs::Knob;
 use super::table::{Row, Spread};
 use crate::measure::{Median, median};
 
-/// The rows on the front, by `time`, the fastest first: those that may be recommended and that no other
-/// such row beats; the default only by what surely beats it, and never by what has its pixels. Of two
-/// neighbours on it, of which the one is not surely faster or the other not surely nearer to the truth,
-/// only the better one stays: the difference is noise.
+/// Indices of the rows on the front, by `time`, the fastest first. Only rows that may be recommended are
+/// on it. The default leaves it only for a row that surely beats it and whose pixels differ. Of two
+/// neighbours on the front whose difference in time or in error is noise, only the better one stays.
 pub fn of(rows: &[Row], time: fn(&Row) -> &Spread) -> Vec<usize> {
     let seconds = |k: &usize| time(&rows[*k]).median.interval.estimate;
     let mut front: Vec<usize> = (0..rows.len()).filter(|k| is_unbeaten(rows, time, *k)).collect();
@@ -49,7 +48,8 @@ fn is_unbeaten(rows: &[Row], time: fn(&Row) -> &Spread, k: usize) -> bool {
     row.knob.is_ranked() && !rows.iter().enumerate().any(beats)
 }
 
-/// Which of two neighbours, the faster one first, is there for noise alone, if either is.
+/// The index of the one of two neighbours on the front, the faster one first, that differs from the other
+/// by noise alone; `None` where neither does.
 fn noise_of(rows: &[Row], time: fn(&Row) -> &Spread, pair: &[usize]) -> Option<usize> {
     let (fast, near) = (&rows[pair[0]], &rows[pair[1]]);
     // Too few turns tell nothing: then both stay.
@@ -65,7 +65,7 @@ fn noise_of(rows: &[Row], time: fn(&Row) -> &Spread, pair: &[usize]) -> Option<u
     }
 }
 
-/// `a` over `b`, turn by turn; `None` where too few turns tell.
+/// The median of the ratios of `a` to `b`, turn by turn; `None` for too few turns.
 fn compared(a: &[f64], b: &[f64]) -> Option<Median> {
     let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| a / b).collect();
     median(&ratios).filter(|ratio| ratio.is_sure())

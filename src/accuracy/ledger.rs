@@ -1,12 +1,12 @@
-//! What a sweep has measured so far, on disk, so that one that was stopped or killed goes on.
+//! The measurements of a sweep on disk, so that a sweep that was stopped or killed goes on.
 //!
-//! A folder of its own:
+//! They lie in a folder of their own:
 //!
-//! * `sweep.json` says what the figures are of; a sweep of anything else is refused;
+//! * `sweep.json`: everything that the figures depend on; a sweep that differs in any of it is refused;
 //! * `reference.json` and `reference_NNNN.exr`: the reference so far, as display values;
-//! * `trials.jsonl`: a line a trial, appended and synced when the trial is over. A crash can tear the
-//!   last line alone, which is dropped;
-//! * `setting_NNN.png`: each setting's picture of the frame that pictures are shown of.
+//! * `trials.jsonl`: a line for each trial, appended and synced when the trial is over. A crash can damage
+//!   only the last line, which is then dropped;
+//! * `setting_NNN.png`: each setting's picture of the frame shown on the page.
 //!
 //! Not done: no lock keeps two sweeps from writing into the same folder at once.
 
@@ -30,21 +30,21 @@ use std::time::Duration;
 /// Largest picture that is read, bytes.
 const LARGEST: u64 = 4 << 30;
 
-/// How old a temporary file of a dead process is before it is removed.
+/// Age from which a temporary file of a process that died is removed.
 const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
-/// A trial that is over.
+/// The measurements of one trial: one candidate rendered in one turn.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct TrialRecord {
-    /// Which run of the program measured it, from 1.
+    /// Number of the program's run that measured it, from 1.
     pub run: u32,
-    /// Which turn; 0 warms up.
+    /// Number of the turn; 0 warms up.
     pub turn: u32,
     /// Index of the candidate.
     pub candidate: usize,
     /// Wall seconds a frame.
     pub seconds: f64,
-    /// The default's, of the same turn and run.
+    /// Wall seconds a frame of the default, in the same turn and run.
     pub default_seconds: f64,
     /// CPU seconds a frame.
     pub cpu_seconds: f64,
@@ -58,13 +58,13 @@ pub struct TrialRecord {
     pub rays: RayCounts,
     /// Memory of the intersector and of the references, bytes.
     pub memory: u64,
-    /// How far off its frames are.
+    /// Errors of its frames.
     pub errors: StoredErrors,
-    /// How its pixels differ from the default's.
+    /// How its pixels differ from those of the default.
     pub change: Change,
 }
 
-/// [`Errors`] without what follows from the mean squared error: JSON knows no infinity.
+/// [`Errors`] without the figures that follow from the mean squared error: JSON has no infinity.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct StoredErrors {
     mse: f64,
@@ -89,7 +89,7 @@ impl From<StoredErrors> for Errors {
     }
 }
 
-/// `reference.json`.
+/// Content of `reference.json`.
 #[derive(Serialize, Deserialize)]
 struct StoredReference {
     number: u32,
@@ -99,7 +99,7 @@ struct StoredReference {
     frames: Vec<u32>,
 }
 
-/// The folder, and what lies in it.
+/// The folder of a sweep's measurements, and its trials.
 pub struct Ledger {
     folder: PathBuf,
     journal: Journal,
@@ -108,11 +108,11 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens the sweep of `terms`, which are all that its figures depend on, by name; begins one where
-    /// there is none, or where it shall be measured `anew`.
+    /// Opens the sweep whose figures depend on `terms`, by name; begins one where the folder has none, or
+    /// where `anew` is set.
     ///
     /// # Errors
-    /// [`Error::Usage`] where a sweep of other terms is there; those of reading and writing.
+    /// [`Error::Usage`] where the folder has a sweep of other terms; errors of reading and writing.
     pub fn open(folder: &Path, terms: &Map<String, Value>, anew: bool) -> Result<Self> {
         let path = folder.join("sweep.json");
         atomic::clean_temporaries(folder, LEFTOVER_AGE)?;
@@ -132,27 +132,27 @@ impl Ledger {
         Ok(Self { folder: folder.to_path_buf(), journal, entries, run })
     }
 
-    /// All trials that are over.
+    /// All trials so far.
     pub fn entries(&self) -> &[TrialRecord] {
         &self.entries
     }
 
-    /// How many runs of the program have measured any of them.
+    /// How many runs of the program have measured any trial.
     pub fn runs(&self) -> u32 {
         self.entries.iter().map(|entry| entry.run).max().unwrap_or(0)
     }
 
-    /// Whether this run has measured any.
+    /// Whether this run of the program has measured any trial.
     pub fn is_running(&self) -> bool {
         self.runs() == self.run
     }
 
-    /// Whether the candidate's trial of the turn is over.
+    /// Whether the trial of `candidate` in `turn` was measured.
     pub fn has(&self, turn: u32, candidate: usize) -> bool {
         self.entries.iter().any(|entry| (entry.turn, entry.candidate) == (turn, candidate))
     }
 
-    /// Keeps a trial.
+    /// Appends a trial to the file.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -163,7 +163,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Keeps a candidate's picture.
+    /// Writes a candidate's picture.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -181,7 +181,7 @@ impl Ledger {
         self.folder.join(format!("setting_{candidate:03}.png"))
     }
 
-    /// Keeps the reference so far, which is to come nearer than `wanted`.
+    /// Writes the reference so far, whose change by a doubling is to fall below `wanted` display steps.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -204,7 +204,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// The reference so far, and how near it is to come; `None` where there is none that can be read.
+    /// The reference so far, and the `wanted` that it was written with; `None` where none can be read.
     pub fn reference(&self) -> Option<(Doubling, f64)> {
         let stored: StoredReference = read_json(&self.folder.join("reference.json")).ok()??;
         let StoredReference { number, spp, change, wanted, frames } = stored;
@@ -220,12 +220,12 @@ impl Ledger {
         self.folder.join(format!("reference_{frame:04}_{number}.exr"))
     }
 
-    /// What is kept under `name`, if it can be read.
+    /// The value in the JSON file `name`; `None` where it cannot be read.
     pub fn note<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
         read_json(&self.folder.join(name)).ok()?
     }
 
-    /// Keeps something under `name`.
+    /// Writes `value` to the JSON file `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -234,7 +234,7 @@ impl Ledger {
     }
 }
 
-/// Removes what a sweep left in `folder`, and nothing else.
+/// Removes the files of a sweep from `folder`, and no others.
 fn clear(folder: &Path) -> Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),

@@ -4,17 +4,16 @@
 //! gives [`Measured`]: errors against times, from which the program can also be asked for the fastest
 //! setting that reaches an error, or the best one within a time.
 //!
-//! Errors are those of display values: what is seen on a screen, in steps of 1/255. Times are seconds
-//! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
-//! and weighed by how many of it the move has.
+//! Errors are those of display values, as a screen shows them, in display steps of 1/255. Times are
+//! seconds per frame of the whole move: key frames cost more than in-between frames, so each kind is
+//! timed and weighed by how many of it the move has.
 //!
-//! [`Probe`] takes a quick look instead, from which the error and the time of any setting are predicted
-//! ([`Predictor`]), and the program chooses one; [`Check`] says afterwards what came out.
+//! [`Probe`] traces a few pixels and small frames instead. A [`Predictor`] made from these predicts the
+//! error and the time of any setting, and the program chooses one; [`Check`] measures afterwards how good
+//! the frames came out. That choice is the only thing in the program that depends on measured times.
 //!
-//! Only that choice is decided by measured times; the sweep only tells them.
-//!
-//! A [`Ledger`] keeps what was measured on disk, trial by trial, so that a sweep that was stopped or
-//! killed goes on.
+//! A [`Ledger`] keeps the measurements of a sweep on disk, trial by trial, so that a sweep that was
+//! stopped or killed goes on.
 //!
 //! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 

@@ -1,4 +1,4 @@
-//! What each way to take over light costs, from whole small frames.
+//! What frames take under each reuse policy, from whole small frames.
 
 use super::fit::fit;
 use super::predictor::ReuseMode;
@@ -6,11 +6,11 @@ use super::probe::Probe;
 use crate::error::Result;
 use crate::scene::{Policy, ReuseSettings};
 
-/// The least that a shadow or sky sample takes, of what a camera sample does.
+/// The least time of a shadow or sky sample, as a share of that of a camera sample.
 const LEAST: f64 = 0.03;
 
-/// Seconds. Settings are compared by those of CPU, which others on the machine change less; how these
-/// pass on the clock is told by many together.
+/// Seconds that something took. Settings are compared by CPU time, which other programs on the machine
+/// change less; the ratio to wall time is taken from many settings together.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Times {
     pub wall: f64,
@@ -25,7 +25,8 @@ impl Times {
 }
 
 impl Probe<'_> {
-    /// All that may be chosen, with `bounces`, told from frames of about `pixels` pixels.
+    /// The reuse policies to choose from, with what frames take by each: fitted to the times of frames of
+    /// about `pixels` pixels with `bounces`.
     pub(super) fn modes(&self, bounces: u32, pixels: f64) -> Result<Vec<ReuseMode>> {
         let sources = self.sources();
         let mut turned = vec![(1, 1, 1), (6, 1, 1), (2, 4, 4)];
@@ -46,7 +47,7 @@ impl Probe<'_> {
                 measured.push(small.cpu);
                 spent = Times { wall: spent.wall + small.wall, cpu: spent.cpu + small.cpu };
             }
-            let [each, by_spp, by_shadow, by_sky] = fit(&rows, &measured).0;
+            let [each, by_spp, by_shadow, by_sky] = fit(&rows, &measured);
             // Such a sample is never free, whatever the noise says.
             let least = |is_there, by: f64| if is_there { by.max(LEAST * by_spp) } else { 0.0 };
             let (by_shadow, by_sky) =
@@ -56,13 +57,6 @@ impl Probe<'_> {
             modes.push(ReuseMode { reuse, seconds: seconds.map(|cpu| cpu * spent.pace()) });
         }
         Ok(modes)
-    }
-
-    /// Pixels of a frame over those of one of about `pixels`.
-    fn enlargement(&self, pixels: f64) -> f64 {
-        let (width, height) = self.small_size(pixels);
-        let base = self.context.base;
-        f64::from(base.width) * f64::from(base.height) / (f64::from(width) * f64::from(height))
     }
 
     fn kinds_of_reuse(&self) -> Vec<ReuseSettings> {

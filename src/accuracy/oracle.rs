@@ -1,4 +1,4 @@
-//! Embree against the oracle on a small crop: what trusting Embree is worth.
+//! Embree against the oracle on a small crop of a frame: pixels that differ, and times.
 
 use super::context::TrialContext;
 use super::errors::Frames;
@@ -9,21 +9,21 @@ use crate::scene::{Policy, Rect, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Seconds that the oracle may take, roughly.
+/// Rough limit of the oracle's time, seconds.
 const SECONDS: f64 = 10.0;
-/// Seconds that it holds one ray against one triangle, on one thread, roughly.
+/// Rough time in which the oracle tests one ray against one triangle on one thread, seconds.
 const PER_TRIANGLE: f64 = 1e-8;
-/// Rays that a pixel casts with one sample of everything, roughly: glass branches.
+/// Rough number of rays of a pixel with one sample of everything: glass branches.
 const RAYS: f64 = 10.0;
-/// The least and the most edge of the crop, pixels.
+/// Smallest and largest edge of the crop, pixels.
 const EDGE: (f64, f64) = (8.0, 96.0);
 
-/// How the crop came out.
+/// The crop by Embree and by the oracle.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct OracleCrop {
-    /// Columns and rows.
+    /// Width and height, pixels.
     pub size: [u32; 2],
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
     /// Triangles of the scene.
     pub triangles: usize,
@@ -37,8 +37,8 @@ pub struct OracleCrop {
     pub change: Change,
 }
 
-/// Renders the middle of `frame` with both, one sample of everything; `None` where even a few pixels
-/// would take the oracle minutes, or where the default is the oracle.
+/// Renders the middle of `frame` with Embree and with the oracle, one sample of everything. `None` where
+/// the oracle would take minutes for even a few pixels, or where it is the default's intersector.
 ///
 /// # Errors
 /// As [`TrialContext::trace`].
@@ -67,7 +67,7 @@ pub fn on_a_crop(context: &TrialContext, frame: u32) -> Result<Option<OracleCrop
     Ok(Some(OracleCrop { size, frame, triangles, rays, embree_seconds, oracle_seconds, change }))
 }
 
-/// The frame by `intersector`; rays, and wall seconds.
+/// The frame traced by `intersector`; the number of rays, and wall seconds.
 fn timed(
     context: &TrialContext,
     settings: &Settings,

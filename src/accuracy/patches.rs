@@ -1,6 +1,6 @@
-//! Patches of frames at their full size, traced alone: what a whole frame's error is estimated from.
+//! Patches of frames at their full size, from which the errors of whole frames are estimated.
 //!
-//! A small picture will not do in their place: the smaller, the more of it is edges.
+//! A smaller picture of a frame would not do: a larger part of it is edges.
 
 use super::context::TrialContext;
 use super::draw::{DrawSeed, draw};
@@ -16,10 +16,10 @@ use crate::scene::Settings;
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
-/// How many times as wide and high the pictures are at most that contrast is measured on, or the frame.
+/// Largest ratio of the edges of a frame and of the picture that its contrast is measured on.
 const SCALE: f64 = 4.0;
 
-/// Square patches of some frames, with what each counts for.
+/// Square patches of some frames, with their weights.
 #[derive(Debug, Clone)]
 pub struct Patches {
     edge: u32,
@@ -31,14 +31,14 @@ pub struct Patches {
 struct FramePatches {
     frame: u32,
     corners: Vec<(u32, u32)>,
-    /// What a patch counts for in the frame's mean.
+    /// Weight of each patch in the frame's mean.
     weights: Vec<f64>,
-    /// The chance with which it might not have been drawn.
+    /// Probability of each patch not to be drawn.
     unsure: Vec<f64>,
 }
 
-/// For each pixel of a picture how much it and its neighbours differ: the square of the largest
-/// difference of a channel.
+/// Contrast of a picture: for each pixel the square of the largest difference of any channel from any of its
+/// eight neighbours.
 #[derive(Debug, Clone, PartialEq)]
 struct Contrast {
     width: u32,
@@ -46,10 +46,10 @@ struct Contrast {
     each: Vec<f32>,
 }
 
-/// The patches of each frame, as displayed: one image a patch.
+/// For each frame the images of its patches, as displayed.
 pub type PatchImages = Vec<Vec<Image>>;
 
-/// The patches in steps of 8 bits.
+/// `seen` rounded to 8 bits.
 pub fn rounded(seen: &PatchImages) -> PatchImages {
     let mut seen = seen.clone();
     for rgb in seen.iter_mut().flatten().flat_map(|image| &mut image.rgb) {
@@ -59,8 +59,8 @@ pub fn rounded(seen: &PatchImages) -> PatchImages {
 }
 
 impl Patches {
-    /// Patches of `edge` pixels of each of `frames`, one in each cell of a grid, about `pixels` pixels
-    /// of a frame, at places that `seed` draws.
+    /// Patches of `edge` x `edge` pixels of each of `frames`, with about `pixels` pixels of a frame in all:
+    /// one at a random place in each cell of a grid.
     pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, seed: u64) -> Self {
         let edge = edge.min(settings.width).min(settings.height);
         let draw = |frame: &u32| {
@@ -72,10 +72,10 @@ impl Patches {
         Self { edge, frames: frames.iter().map(draw).collect() }
     }
 
-    /// Single pixels, as many as `effort` says, of each of `frames`. Most of a frame's error lies in a
-    /// few pixels at the edges of what is bright, so pixels are drawn by their contrast in a picture of
-    /// one sample a pixel: a small one of a large frame, and a large one of a small frame, lest specks
-    /// fall between its samples.
+    /// Single pixels of each of `frames`, as many as `effort` says. Most of a frame's error lies in a few
+    /// pixels at edges of bright things, so pixels are drawn by their contrast in a picture of one sample
+    /// a pixel. The picture is smaller than a large frame, and larger than a small one, in which specks
+    /// would fall between the samples.
     ///
     /// # Errors
     /// As [`TrialContext::trace`].
@@ -100,7 +100,7 @@ impl Patches {
         Self::drawn(context.base, frames, &picture, effort.pixels, seed)
     }
 
-    /// The same by the contrast of the frames themselves, which `image` gives.
+    /// `count` single pixels of each of `frames`, drawn by the contrast of the frame that `image` gives.
     ///
     /// # Errors
     /// Any that `image` gives.
@@ -149,8 +149,8 @@ impl Patches {
         Ok(Self { edge: 1, frames: frames.iter().map(draw).collect::<Result<_>>()? })
     }
 
-    /// The mean over each frame of a figure of its patches, and how far it may be off: its standard
-    /// error. A pixel that was sure to be drawn leaves nothing open (Horvitz and Thompson, 1952).
+    /// For each frame the weighted mean of a figure of its patches, and its standard error. A patch that
+    /// was sure to be drawn adds nothing to that (Horvitz and Thompson, 1952).
     pub fn means(&self, seen: &[Vec<f64>]) -> Vec<(f64, f64)> {
         let of = |(drawn, figures): (&FramePatches, &Vec<f64>)| {
             let parts: Vec<f64> = drawn.weights.iter().zip(figures).map(|(w, x)| w * x).collect();
@@ -167,7 +167,7 @@ impl Patches {
     /// Traces the patches under `settings`.
     ///
     /// # Errors
-    /// [`Error::Stopped`]; those of cameras.
+    /// [`Error::Stopped`]; errors of the camera's move.
     pub fn trace(&self, context: &TrialContext, settings: &Settings) -> Result<PatchImages> {
         let plan = EffectPlan::of(context.scene, settings);
         let renderer =
@@ -182,7 +182,7 @@ impl Patches {
         self.frames.iter().map(one).collect()
     }
 
-    /// The patches of whole images of the frames, which `image` gives as displayed.
+    /// The patches, cut from the whole frames that `image` gives as displayed.
     ///
     /// # Errors
     /// Any that `image` gives.
@@ -194,12 +194,6 @@ impl Patches {
             Ok(self.cut(&rgb))
         };
         self.frames.iter().map(one).collect()
-    }
-
-    /// Pixels of all patches.
-    pub fn pixels_in_all(&self) -> usize {
-        let patches: usize = self.frames.iter().map(|drawn| drawn.corners.len()).sum();
-        patches * (self.edge * self.edge) as usize
     }
 
     fn pixels(&self, (x, y): (u32, u32)) -> impl Iterator<Item = (u32, u32)> + use<> {
@@ -230,7 +224,7 @@ impl Contrast {
         Self { width: image.width, height: image.height, each }
     }
 
-    /// The means of squares of `edge` pixels, which divides width and height.
+    /// The means over squares of `edge` x `edge` pixels; `edge` divides width and height.
     fn reduced(&self, edge: u32) -> Self {
         if edge == 1 {
             return self.clone();

@@ -1,15 +1,14 @@
-//! A quick look at a scene: what there has to be known to choose its settings.
+//! A probe: the few measurements of a scene that its settings are chosen by.
 //!
-//! Errors are estimated from some pixels of some frames at the full size, traced at a short sweep of samples
-//! and held against more of them; what the sweep leads to is traced there as well before it is chosen.
-//! Times come from whole frames of a small size.
+//! Errors are estimated from some pixels of some frames at the full size, traced with a short sweep of
+//! samples and compared with a reference of more samples. Times come from whole frames of a small size.
 
 use super::choice::Goal;
 use super::context::TrialContext;
 use super::effort::Effort;
 use super::error_model::{NoiseSources, Samples};
 use super::patches::Patches;
-use super::predictor::{Predictor, SampleRange};
+use super::predictor::{Prediction, Predictor, SampleRange};
 use super::reference::truth_settings;
 use super::search::Search;
 use crate::effects::EffectPlan;
@@ -20,16 +19,17 @@ use crate::scene::{FrameRange, Policy, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Frames, edge and pixels of patches in which neighbours count (SSIM, FLIP).
+/// Number of frames, edge of a patch and pixels of a frame for figures that need neighbouring pixels (SSIM,
+/// FLIP).
 const WIDE: (u32, u32, u32) = (4, 48, 9_300);
-/// Pixels of the picture that tells how fast tracing is.
+/// Pixels of the picture that is traced to measure how fast tracing is.
 const PILOT: f64 = 12_000.0;
-/// Draws the patches: of the probe, and of the check.
+/// Seed of the places of the probe's patches.
 pub const DRAW_OF_PROBE: u64 = 1;
-/// See [`DRAW_OF_PROBE`].
+/// Seed of the places of the check's patches.
 pub const DRAW_OF_CHECK: u64 = 2;
 
-/// What the user set already, which is not chosen.
+/// Which settings the user gave: these are not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GivenOptions {
     /// Camera samples.
@@ -44,57 +44,65 @@ pub struct GivenOptions {
     pub policy: bool,
 }
 
-/// The scene and what is wanted of it.
+/// A scene and what is wanted of it.
 pub struct Probe<'a> {
-    /// What all trials share.
+    /// The scene and everything needed to render it.
     pub context: &'a TrialContext<'a>,
     /// The frames of the job.
     pub frames: FrameRange,
-    /// What is to be reached; `None` where a time is to be kept.
+    /// The error to be reached; `None` for a budget of time.
     pub goal: Option<Goal>,
-    /// What is not chosen.
+    /// The settings that are not chosen.
     pub given: GivenOptions,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
-    /// Seconds that the look may take; `None` where it may take as long as need be.
+    /// Seconds that the probe may take; `None` where that goes by the size of the job.
     pub seconds: Option<f64>,
     /// How many ranks share the job.
     pub ranks: u32,
 }
 
 impl Probe<'_> {
-    /// Looks at the scene. `progress` hears what is being done.
+    /// Measures the scene. Where there is a goal, it also gives, for each reuse policy, the fastest setting
+    /// found whose figure was measured to be at most `aim` times the largest that the goal allows, or the
+    /// largest itself where there is no such setting. `progress` is called with what is being done.
     ///
     /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of rendering.
-    pub fn look(&self, progress: &dyn Fn(&str)) -> Result<Predictor> {
+    /// [`crate::error::Error::Stopped`]; errors of rendering.
+    pub fn look(&self, aim: f64, progress: &dyn Fn(&str)) -> Result<(Predictor, Vec<Prediction>)> {
         let effort = self.effort()?;
         progress("errors of a short sweep");
         let mut search = Search::begin(self, effort)?;
         progress("times");
         search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
+        let mut found = Vec::new();
         if let Some(goal) = self.goal {
             progress("errors of what may be chosen");
-            search.try_likely(goal)?;
+            found = search.fastest(goal, aim * goal.largest())?;
+            if found.is_empty() {
+                found = search.fastest(goal, goal.largest())?;
+            }
         }
-        Ok(search.predictor)
+        Ok((search.predictor, found))
     }
 
-    /// As much as there is time for.
+    /// How much to look at: for a budget by the time that there is, for a target by the size of the job.
     fn effort(&self) -> Result<Effort> {
-        let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
+        let FrameRange { first, last } = self.frames;
+        let Settings { width, height, .. } = *self.context.base;
+        let Some(seconds) = self.seconds else {
+            return Ok(Effort::of_job(last - first + 1, u64::from(width) * u64::from(height)));
+        };
         let mut settings = one_sample(self.context.base);
         (settings.width, settings.height) = self.small_size(PILOT);
-        let middle = u32::midpoint(self.frames.first, self.frames.last);
         let begun = Instant::now();
-        self.context.trace(&settings, self.context.intersector, middle)?;
+        self.context.trace(&settings, self.context.intersector, u32::midpoint(first, last))?;
         let samples = f64::from(settings.width) * f64::from(settings.height);
         let spent = begun.elapsed().as_secs_f64();
-        let FrameRange { first, last } = self.frames;
         Ok(Effort::within(seconds - spent, spent / samples).of_frames(last - first + 1))
     }
 
-    /// What may be chosen.
+    /// The numbers of samples to choose from.
     pub fn range(&self) -> SampleRange {
         let (base, plan) = (self.context.base, self.plan());
         // Sobol points are laid out best in powers of two; half way between them is tried where a
@@ -113,7 +121,7 @@ impl Probe<'_> {
         }
     }
 
-    /// Patches of the job's frames in which the goal's figure can be taken.
+    /// Patches of the job's frames from which the goal's figure can be estimated.
     ///
     /// # Errors
     /// As [`Patches::by_contrast`].
@@ -131,7 +139,8 @@ impl Probe<'_> {
         }
     }
 
-    /// Patches of finished frames that a check looks at, whose pictures `image` gives; and which frames.
+    /// The numbers of the finished frames that a check looks at, and patches of these; `image` gives a frame as
+    /// displayed.
     ///
     /// # Errors
     /// Any that `image` gives.
@@ -178,7 +187,7 @@ impl Probe<'_> {
     }
 }
 
-/// `numbers` and about three between each and the next, where there are as many.
+/// `numbers` and up to three numbers between each and the next.
 fn between(numbers: &[u32]) -> Vec<u32> {
     let steps = |pair: &[u32]| {
         let (from, to) = (pair[0], pair[1]);
@@ -190,12 +199,13 @@ fn between(numbers: &[u32]) -> Vec<u32> {
     all
 }
 
-/// Pixels that a check of `effort` looks at in each frame: more than the probe, since it does so once.
+/// Pixels that a check of `effort` looks at in each frame: more than a probe, which traces each several
+/// times.
 pub(super) fn checked_pixels(effort: Effort) -> u32 {
     effort.pixels + effort.pixels / 2
 }
 
-/// The settings of a look: one sample of everything, and every frame traced.
+/// `base` with one sample of everything, and every frame traced.
 pub(super) fn one_sample(base: &Settings) -> Settings {
     let mut settings = base.clone();
     (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
@@ -215,7 +225,7 @@ pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
     all
 }
 
-/// Samples enough to hold `samples` against.
+/// Samples of a reference that frames of `samples` are compared with.
 pub fn samples_of_reference(samples: Samples) -> Samples {
     Samples {
         spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
@@ -224,7 +234,7 @@ pub fn samples_of_reference(samples: Samples) -> Samples {
     }
 }
 
-/// Settings of a reference of so many samples: its seed is none of a job's or of a sweep's.
+/// Settings of a reference with `samples`: its seed is neither the job's nor one of a sweep.
 pub fn reference(base: &Settings, samples: Samples) -> Settings {
     let mut settings = truth_settings(base, &[]);
     (settings.spp, settings.shadow_samples) = (samples.spp, samples.shadow);

@@ -1,4 +1,4 @@
-//! A sentence per knob.
+//! Sentences for the accuracy page, one for each setting.
 
 use super::knobs::{Group, Knob};
 use super::oracle::OracleCrop;
@@ -7,7 +7,7 @@ use super::writing::Writing;
 use crate::measure::{Interval, Median};
 use crate::page::words::{bytes, change, count, percent, seconds, short};
 
-/// What turning `knob` does, one sentence for each of its settings; empty where it was not turned.
+/// What turning `knob` does: a sentence for each of its settings; none where it was not turned.
 pub fn about_knob(measured: &Measured, knob: Knob) -> Vec<String> {
     let rows = measured.rows.iter().filter(|row| row.knob == knob);
     rows.map(|row| sentence(measured.default_row(), row)).collect()
@@ -23,7 +23,7 @@ fn sentence(default: &Row, row: &Row) -> String {
     format!("{}: {}, {what}.", row.options, time(row))
 }
 
-/// What its tree takes.
+/// Time and memory of the setting's tree, beside the default's.
 fn tree(default: &Row, row: &Row) -> String {
     let [was, is] = [default, row].map(|r| seconds(r.build_seconds.median.interval.estimate));
     let memory = [default, row].map(|r| bytes(r.memory_bytes));
@@ -76,7 +76,7 @@ fn error(default: &Row, row: &Row) -> String {
     }
 }
 
-/// How many pixels another rule changes.
+/// How many pixels differ from the default's, and by how much.
 fn pixels(c: &Change) -> String {
     if c.differing == 0 {
         return format!("the same {} pixels", count(c.pixels));
@@ -89,7 +89,7 @@ fn pixels(c: &Change) -> String {
     )
 }
 
-/// What `writing` takes where a frame takes `making` to make, seconds.
+/// What writing frames takes, where rendering one takes `making` seconds.
 pub fn about_writing(writing: &Writing, making: Interval) -> Vec<String> {
     let (w, frame_seconds) = (writing, making.estimate);
     let sync = match w.sync_ends {
@@ -125,7 +125,7 @@ pub fn about_writing(writing: &Writing, making: Interval) -> Vec<String> {
     all
 }
 
-/// What the oracle says.
+/// How Embree and the oracle differ on the crop.
 pub fn about_oracle(crop: &OracleCrop) -> String {
     let [width, height] = crop.size;
     format!(

@@ -1,4 +1,4 @@
-//! All candidates, in turns.
+//! A sweep: all candidates are rendered and timed, in turns.
 //!
 //! A shared machine changes its speed from minute to minute. So the candidates take turns, every
 //! second turn in reverse, and a candidate's time is compared with the default's of the same turn.
@@ -17,52 +17,52 @@ use crate::page;
 use crate::scene::Settings;
 use std::time::Instant;
 
-/// What there is to do.
+/// The candidates and frames of a sweep.
 pub struct Sweep<'a> {
-    /// What all share.
+    /// The scene and everything needed to render it.
     pub context: &'a TrialContext<'a>,
-    /// The default first.
+    /// The candidates, the default first.
     pub candidates: &'a [Candidate],
-    /// The frames that are held against the truth.
+    /// Numbers of the frames that are compared with the reference.
     pub frames: &'a [u32],
-    /// Turns that are timed; one more comes before them.
+    /// Number of timed turns; the turn that warms up comes before them.
     pub turns: u32,
 }
 
-/// A candidate is about to be tried.
+/// How far a sweep has come when a candidate is about to be tried.
 #[derive(Clone, Copy)]
 pub struct SweepProgress<'a> {
-    /// What was measured so far.
+    /// The trials so far.
     pub ledger: &'a Ledger,
-    /// Trials done so far.
+    /// Number of trials so far.
     pub done: usize,
-    /// All trials.
+    /// Number of trials of the whole sweep.
     pub of: usize,
-    /// Which turn; 0 warms up.
+    /// Number of the turn; 0 warms up.
     pub turn: u32,
-    /// Whose turn it is.
+    /// The candidate to be tried.
     pub candidate: &'a Candidate,
-    /// Seconds that are left, if anything is known of it.
+    /// Seconds that the sweep still takes; `None` before any trial.
     pub left: Option<f64>,
 }
 
-/// A candidate's picture of the frame that pictures are shown of.
+/// A candidate's picture of the frame shown on the page.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// Index of its row.
+    /// Index of the candidate's row.
     pub candidate: usize,
     /// The picture.
     pub picture: page::Picture,
 }
 
 impl Sweep<'_> {
-    /// The frame that pictures are shown of: the one in the middle, which by default is inferred.
+    /// The frame shown on the page: the one in the middle, which by default is inferred.
     pub fn shown_frame(&self) -> u32 {
         self.frames.get(self.frames.len() / 2).copied().unwrap_or(1)
     }
 
-    /// How many display steps two of the best-sampled frames differ by, over √2: the error that is
-    /// due to chance, below which the truth has to be known.
+    /// The noise of the candidate with the most samples: root mean square difference of two of its frames
+    /// with different seeds, over √2, in display steps. The reference's error has to be smaller.
     ///
     /// # Errors
     /// As [`TrialContext::trace`].
@@ -81,8 +81,8 @@ impl Sweep<'_> {
     /// Tries every candidate in every turn, unless `ledger` has its trial; `report` is called after each.
     ///
     /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of building, rendering and writing, and of `report`. What
-    /// the ledger has by then stays there.
+    /// [`crate::error::Error::Stopped`]; errors of building, rendering and writing, and of `report`. The
+    /// ledger keeps the trials before.
     pub fn run(
         &self,
         truth: &Truth,
@@ -106,7 +106,7 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    /// The `open` candidates of a turn.
+    /// Tries the candidates `open` in a turn.
     fn turn(
         &self,
         truth: &Truth,
@@ -164,18 +164,18 @@ impl Sweep<'_> {
         })
     }
 
-    /// Trials that there are in all.
+    /// Number of trials of the whole sweep.
     pub fn trials(&self) -> usize {
         self.candidates.len() * (self.turns as usize + 1)
     }
 
-    /// Trials that `ledger` has.
+    /// Number of this sweep's trials in `ledger`.
     pub fn done(&self, ledger: &Ledger) -> usize {
         ledger.entries().iter().filter(|entry| entry.turn <= self.turns).count()
     }
 
-    /// How long the trials take that are missing: a setting's last one tells of its next one, and by
-    /// how many samples they take those that were tried tell of others. `None` before any was tried.
+    /// Seconds that the missing trials take. A candidate takes as long as in its last trial; one without a
+    /// trial as long as the others do for as many samples. `None` before any trial.
     fn seconds_left(&self, entries: &[TrialRecord]) -> Option<f64> {
         let work = |candidate: usize| samples(&self.candidates[candidate].settings) as f64;
         let all: f64 = entries.iter().map(|entry| entry.took).sum();
@@ -191,8 +191,8 @@ impl Sweep<'_> {
         (!entries.is_empty() && left.is_finite()).then_some(left)
     }
 
-    /// What `ledger` tells: a row for every candidate that was timed at least once, and their pictures;
-    /// `None` before the default was.
+    /// The table of `ledger`, with a row for every candidate that was timed at least once, and the
+    /// candidates' pictures; `None` before the default was timed.
     pub fn measured(&self, ledger: &Ledger) -> Option<(Measured, Vec<Picture>)> {
         let taken = |k: &usize| Taken::of(ledger.entries(), *k);
         let all: Vec<usize> = (0..self.candidates.len()).filter(|k| taken(k).is_timed()).collect();
@@ -243,13 +243,13 @@ struct Tried {
     entry: TrialRecord,
 }
 
-/// Samples a pixel, of the camera and of the lights; roughly what a setting costs.
+/// Camera and light samples of a pixel: roughly what a setting costs.
 fn samples(s: &Settings) -> u64 {
     let lights = u64::from(s.shadow_samples) + u64::from(s.sky_samples) + 1;
     u64::from(s.spp) * lights
 }
 
-/// The default, then the others, in every second turn in reverse.
+/// The order of candidates in a turn: the default, then the others, in every second turn in reverse.
 fn order(n: usize, turn: u32) -> Vec<usize> {
     let others: Vec<usize> = match turn % 2 {
         0 => (1..n).collect(),

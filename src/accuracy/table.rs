@@ -1,4 +1,4 @@
-//! What was measured, a row a candidate.
+//! The table of a sweep: a row of figures for each candidate.
 
 use super::errors::{Errors, Frames};
 use super::front;
@@ -13,62 +13,62 @@ use std::ops::AddAssign;
 /// All rows, the default's first.
 #[derive(Debug, Clone, Serialize)]
 pub struct Measured {
-    /// One a candidate.
+    /// A row for each candidate.
     pub rows: Vec<Row>,
 }
 
-/// A candidate's figures. Seconds, rays: per frame, the mean over the move.
+/// The figures of a candidate. Seconds and rays are per frame, means over the move.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// What it turns.
+    /// The knob that the candidate turns.
     pub knob: Knob,
-    /// The options that turn it; empty for the default.
+    /// Command-line options of the setting; empty for the default.
     pub options: String,
-    /// The mean of the turns.
+    /// Errors, means over the turns.
     pub errors: Errors,
     /// Root mean squared error of each turn, display steps.
     pub rmse_of_turns: Vec<f64>,
     /// Wall seconds.
     pub seconds: Spread,
-    /// CPU seconds, all threads together.
+    /// CPU seconds of all threads together.
     pub cpu_seconds: Spread,
     /// Wall seconds to build the intersector, once a job.
     pub build_seconds: Spread,
-    /// Seconds over the default's of the same turn and run; `None` for the default.
+    /// Ratio of wall seconds to the default's of the same turn and run; `None` for the default.
     pub time_ratio: Option<Median>,
-    /// CPU seconds over the default's of the same turn: on a busy machine they tell more.
+    /// Ratio of CPU seconds to the default's of the same turn: on a busy machine it is known better.
     pub cpu_ratio: Option<Median>,
-    /// Root mean squared error over the default's of the same turn.
+    /// Ratio of the root mean squared error to the default's of the same turn.
     pub error_ratio: Option<Median>,
-    /// How its pixels differ from the default's with the same seed.
+    /// How pixels differ from the default's with the same seed.
     pub change: Option<Change>,
     /// Rays a frame.
     pub rays_per_frame: f64,
     /// Rays by kind, of all frames made in a turn.
     pub rays: RayCounts,
-    /// Intersector and references, bytes.
+    /// Memory of the intersector and of the references, bytes.
     pub memory_bytes: u64,
-    /// Whether no other candidate that may be recommended is both faster and nearer to the truth, and
-    /// it is not there for noise alone.
+    /// Whether it is on the front of error and wall time: no other candidate that may be recommended is both
+    /// faster and more accurate.
     pub on_front: bool,
-    /// The same by CPU seconds.
+    /// Whether it is on the front of error and CPU time.
     pub on_cpu_front: bool,
 }
 
 impl Row {
-    /// Whether its pixels were compared with the default's and are the same.
+    /// Whether all pixels are those of the default.
     pub fn has_pixels_of_default(&self) -> bool {
         self.change.is_some_and(|change| change.pixels > 0 && change.differing == 0)
     }
 }
 
-/// A median, and what it is the median of.
+/// A median with the values of the turns.
 #[derive(Debug, Clone, Serialize)]
 pub struct Spread {
-    /// The middle.
+    /// The median and its interval.
     #[serde(flatten)]
     pub median: Median,
-    /// One value a turn.
+    /// A value for each turn.
     pub turns: Vec<f64>,
 }
 

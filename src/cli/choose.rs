@@ -22,13 +22,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::time::{Duration, Instant};
 
-/// Share of the job that a probe for a target takes: what it saves is to be more.
-const PROBE_SHARE: f64 = 0.1;
-/// Shares of the allowed squared error that a choice aims at after a brief and after a longer look: what some
-/// frames showed is off in others, and a miss costs the job once more.
-const BRIEFLY: f64 = 0.7;
-/// See [`BRIEFLY`].
-const LONGER: f64 = 0.85;
+/// The share of the squared error that a target allows that the choice aims at: some frames may be worse than
+/// those that the probe looked at, and a miss costs the job once more.
+const AIM: f64 = 0.85;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
@@ -43,58 +39,58 @@ pub struct ChoiceArgs {
     pub budget: Option<Duration>,
 }
 
-/// What was chosen and why; the manifest keeps it, so that a job that goes on chooses nothing anew.
+/// The settings that were chosen, and why. The manifest keeps them, so that a job that goes on does not choose
+/// again.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Choice {
-    /// What was wanted, in words.
+    /// The target or budget, as on the command line.
     pub wanted: String,
-    /// The settings before, and which of them the user gave.
+    /// The settings before the choice.
     base: Value,
+    /// Which of them the user gave.
     given: GivenOptions,
-    /// The squared error that the target allows, display steps.
-    allowed: Option<f64>,
-    /// What is predicted of the choice.
+    /// The setting that was chosen, with its predicted error and time.
     pub predicted: Prediction,
-    /// All that the probe found out.
+    /// The predictor that the probe made.
     predictor: Predictor,
     /// Wall seconds that rendering and writing all frames is predicted to take.
     seconds: f64,
-    /// How often it was tightened.
+    /// How often the choice was tightened after a miss.
     pub tightened: u32,
-    /// What was held against what came out: the shot's hash, and frames of it.
+    /// The finished frames that were checked: the shot's hash, and the range of frames.
     checked: Option<(String, FrameRange)>,
-    /// How good these came out, in words, if they were looked at.
+    /// The check's result in words; `None` before a check.
     #[serde(default)]
     pub came_out: Option<String>,
-    /// What came of the target then.
+    /// Whether the target was reached; `None` before a check, and for a budget.
     #[serde(default)]
     verdict: Option<Verdict>,
 }
 
-/// What is to be done once frames were held against what was wanted.
+/// What is to be done after a check of the finished frames.
 #[derive(Serialize, Deserialize)]
 pub enum Judged {
-    /// All frames are rendered again, under a tighter choice.
+    /// Render all frames again with this tighter choice.
     Again(Choice),
-    /// Nothing: the choice with what came of it.
+    /// Nothing: the choice with the check's result.
     Done(Choice),
 }
 
-/// Who chooses.
+/// Everything that a choice of settings needs.
 pub struct Chooser<'a> {
-    /// What is wanted.
+    /// The target or budget.
     pub args: &'a ChoiceArgs,
-    /// What the user set already.
+    /// The options that the user gave.
     pub options: &'a SettingArgs,
-    /// The scene and all that renders it.
+    /// The scene and everything needed to render it.
     pub context: &'a TrialContext<'a>,
     /// The job.
     pub request: &'a Request,
     /// When the program started: a budget counts from then.
     pub started: Instant,
-    /// How many ranks share it.
+    /// Number of ranks that share the job.
     pub ranks: u32,
-    /// Whether nothing is said.
+    /// Whether messages are suppressed.
     pub quiet: bool,
 }
 
@@ -104,7 +100,7 @@ impl ChoiceArgs {
         self.target.is_some() || self.budget.is_some()
     }
 
-    /// Refuses what cannot be predicted.
+    /// Refuses options whose effect cannot be predicted.
     pub fn check(&self, request: &Request) -> Result<()> {
         let settings = &request.settings;
         let obstacle = match () {
@@ -139,33 +135,33 @@ impl ChoiceArgs {
 }
 
 impl Choice {
-    /// The settings that were chosen over `base`.
+    /// `base` with the settings that were chosen.
     pub fn settings(&self, base: &Settings) -> Settings {
         self.predicted.settings(base)
     }
 
-    /// As the manifest keeps it.
+    /// The choice as JSON, for the manifest.
     pub fn value(&self) -> Value {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Whether `frames` of the shot of this hash were held against what came out.
+    /// Whether a check was made of a range that has all of `frames`, of the shot of this hash.
     pub fn is_checked(&self, shot: &str, frames: FrameRange) -> bool {
         let holds = |seen: &FrameRange| seen.first <= frames.first && frames.last <= seen.last;
         self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
     }
 
-    /// The choice whose `frames` were.
+    /// The choice with the note that `frames` of the shot of this hash were checked.
     pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
         Self { checked: Some((shot.into(), frames)), ..self }
     }
 
-    /// The choice that a manifest's header holds, if this version can read it.
+    /// The choice in a manifest's header; `None` where there is none that this version can read.
     pub fn of(header: &Header) -> Option<Self> {
         serde_json::from_value(header.chosen.clone()?).ok()
     }
 
-    /// What came of the target, if there was one and it was looked at.
+    /// Whether the target was reached, in words; `None` before a check, and for a budget.
     pub fn verdict(&self) -> Option<String> {
         let came = match self.verdict? {
             Verdict::Reached => "reached",
@@ -175,13 +171,13 @@ impl Choice {
         Some(format!("{}: {came}", self.wanted))
     }
 
-    /// All options that stand for it, whether they have a part in the scene or not.
+    /// All command-line options of the choice, also those without effect in the scene.
     pub fn options(&self) -> String {
         spelled::options(&self.predicted.settings(&Settings::default()), &EffectPlan::EVERYTHING)
     }
 
-    /// The command that gives the same frames whatever the clock says: what was chosen in place of the
-    /// wish. Options that are given stay.
+    /// `command` with the chosen options in place of `--target` or `--budget`: it gives the same frames on any
+    /// machine. Options in `command` stay.
     pub fn spelled_out(&self, command: &[String]) -> Vec<String> {
         let options = self.options();
         let options: Vec<&str> = options.split(' ').collect();
@@ -202,7 +198,7 @@ impl Choice {
         words
     }
 
-    /// What is predicted of it, in words.
+    /// Predicted error and time, in words.
     pub fn prediction_in_words(&self) -> String {
         format!(
             "{}PSNR {} in the worst frame, {} a frame, {} in all",
@@ -213,14 +209,13 @@ impl Choice {
         )
     }
 
-    /// What is predicted of it in the target's own unit, unless that is PSNR.
+    /// The target's figure of the choice as the probe measured it, in words; `None` for PSNR and for budgets.
     fn figure(&self) -> Option<String> {
-        let figure = self.predictor.predicted_figure(&self.predicted)?;
-        values::goal(&self.wanted).ok()?.in_words(figure)
+        values::goal(&self.wanted).ok()?.in_words(self.predicted.figure?)
     }
 }
 
-/// Whether a command leaves settings to the program.
+/// Whether a command has `--target` or `--budget`.
 pub fn asks_for_choice(command: &[String]) -> bool {
     command.iter().any(|word| is_wish(word))
 }
@@ -245,10 +240,10 @@ fn decibels(psnr: f64) -> String {
 }
 
 impl Chooser<'_> {
-    /// The choice that the manifest holds, if it answers the same question; else a new one.
+    /// The manifest's choice, if it was made for the same target or budget and settings; else a new one.
     ///
     /// # Errors
-    /// Any of the probe's; a target that no setting is predicted to reach.
+    /// Errors of the probe; a target that no setting is predicted to reach.
     pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before(tracer) {
             let options = self.options(&before.predicted);
@@ -260,33 +255,23 @@ impl Chooser<'_> {
         let start = Instant::now();
         let budget = Budget::of(self);
         let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
-        let (predictor, aim) = match self.args.target {
-            Some(goal) => self.look(goal).map(|(found, aim)| (found, Some(aim)))?,
-            None => (probe.look(&|what| self.tell(format!("probe: {what}")))?, None),
-        };
-        let allowed = self.args.target.map(|goal| predictor.allowed(goal));
-        let aimed = |aim| probe.fastest(&predictor, aim, timer);
-        let found = match (aim, &budget) {
-            // What is just within reach leaves no room to aim at more.
-            (Some(aim), _) => match aimed(aim)? {
-                None => allowed.map_or(Ok(None), aimed)?,
-                found => found,
-            },
-            (_, Some(budget)) => {
-                let left = |samples| budget.left(&predictor, samples);
-                probe.best_within(&predictor, &left, timer)?
-            }
-            _ => None,
+        let (mut predictor, found) =
+            probe.look(AIM, &|what| self.tell(format!("probe: {what}")))?;
+        let found = match &budget {
+            None => probe.fastest(found, timer)?,
+            Some(budget) => probe.best_within(&predictor, &|_| budget.left(), timer)?,
         };
         let predicted = found.ok_or_else(|| self.out_of_reach(&predictor))?;
+        if budget.is_none() {
+            predictor.correct_error(&predicted);
+        }
         let writing = budget.as_ref().map_or(0.0, |budget| budget.writing);
         let all = predicted.seconds * probe.frames_each(predicted.reuse) + writing;
-        let left = budget.as_ref().map(|b| b.left(&predictor, predicted.samples) + writing);
+        let left = budget.as_ref().map(|b| b.left() + writing);
         let choice = Choice {
             wanted: self.args.words(),
             base: Header::settings(self.context.base),
             given: self.given(),
-            allowed,
             predicted,
             predictor,
             seconds: all,
@@ -303,41 +288,14 @@ impl Chooser<'_> {
         Ok(choice)
     }
 
-    /// Looks at the scene for about as long as `PROBE_SHARE` of the job that `goal` makes: briefly at first, and
-    /// again where that leaves time for much more. With the squared error to aim at.
-    fn look(&self, goal: Goal) -> Result<(Predictor, f64)> {
-        let begun = Instant::now();
-        let told = |what: &str| self.tell(format!("probe: {what}"));
-        let brief = Probe { seconds: Some(0.0), ..self.probe() };
-        let first = brief.look(&told)?;
-        let (aim, spent) = (first.aim(goal, BRIEFLY), begun.elapsed().as_secs_f64());
-        let within = |error| brief.fastest_seconds(&first, error);
-        let job = within(aim).or_else(|| within(first.allowed(goal)));
-        let left = job.map(|job| PROBE_SHARE * job - spent);
-        if left.is_some_and(|left| left < spent) {
-            return Ok((first, aim));
-        }
-        self.tell("there is time for a longer look".into());
-        let predictor = Probe { seconds: left, ..self.probe() }.look(&told)?;
-        let aim = predictor.aim(goal, LONGER);
-        Ok((predictor, aim))
-    }
-
-    /// What to say where no setting will do.
+    /// The error where no setting is found that reaches the target.
     fn out_of_reach(&self, predictor: &Predictor) -> Error {
-        let best = predictor.best(&self.probe().range()).map(|best| {
+        let best = predictor.best_within(&self.probe().range(), &|_| true).map(|best| {
             let took = seconds(best.seconds * self.probe().frames_each(best.reuse));
             let psnr = decibels(best.psnr());
             format!("; {} would come to {psnr}, in {took}", self.options(&best))
         });
-        // A figure that goes with no error for sure: what was seen of it.
-        let seen = predictor.nearest().map(|(tried, figure)| {
-            let in_words = |goal: Goal| goal.in_words(figure);
-            let figure = self.args.target.and_then(in_words).unwrap_or_default();
-            let tried = spelled::samples(tried.spp, tried.shadow, tried.sky, &self.plan());
-            format!("; of what was tried, {tried} came nearest, to {figure}")
-        });
-        let nearest = seen.or(best).unwrap_or_default();
+        let nearest = best.unwrap_or_default();
         let fewer = match self.given() == GivenOptions::default() {
             true => "",
             false => ", or give fewer options",
@@ -371,12 +329,12 @@ impl Chooser<'_> {
         EffectPlan::of(self.context.scene, self.context.base)
     }
 
-    /// The options that stand for what was chosen, as far as they have a part in the scene.
+    /// Command-line options of `predicted` that have an effect in the scene.
     fn options(&self, predicted: &Prediction) -> String {
         spelled::options(&predicted.settings(self.context.base), &self.plan())
     }
 
-    /// Who looks at the scene for this job.
+    /// A probe for this job.
     pub fn probe(&self) -> Probe<'_> {
         Probe {
             context: self.context,

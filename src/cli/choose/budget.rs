@@ -1,7 +1,6 @@
-//! A time that a job is to take, and what is left of it for rendering.
+//! A budget: the time that a job is to take, and how much of it is left for rendering.
 
 use super::{Choice, Chooser};
-use crate::accuracy::{Check, Effort, Predictor, Samples};
 use crate::film::Film;
 use crate::math::Rgb;
 use crate::output::{WriteOptions, write_image};
@@ -10,22 +9,17 @@ use crate::sampling::mix;
 use crate::scene::Settings;
 use std::time::Instant;
 
-/// Shares of what is left when the probe begins: for the probe's sweep, and for the check at most.
+/// Share of the time left when the probe begins that its sweep takes.
 const PROBE_SHARE: f64 = 0.15;
-const CHECK_SHARE: f64 = 0.07;
-/// Kept back of what is left for rendering: times predicted are off by some per cent either way.
-const RESERVE: f64 = 0.05;
-/// What a video takes: to start its program, and by the pixel; measured.
+/// Share of the time left for rendering that is kept back for the check and for errors of predicted times.
+const RESERVE: f64 = 0.1;
+/// Seconds of a video: to start its program, and for each pixel; measured.
 const VIDEO: [f64; 2] = [0.2, 4e-8];
 
 /// A budget, counted from the start of the program.
 pub(super) struct Budget {
     started: Instant,
     seconds: f64,
-    /// Seconds kept back for the check at most.
-    check: f64,
-    /// Frames, and pixels of each: what there is for a check to look at.
-    there_is: (u32, u64),
     /// Seconds for the video.
     video: f64,
     /// Seconds that a rank takes to write its frames.
@@ -33,23 +27,19 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// The budget asked for, if any.
+    /// The job's budget; `None` where there is none.
     pub fn of(chooser: &Chooser) -> Option<Self> {
         let (started, seconds) = (chooser.started, chooser.args.budget?.as_secs_f64());
         let (request, settings) = (chooser.request, chooser.context.base);
-        let count = request.frames.last - request.frames.first + 1;
-        let there_is = (count, u64::from(settings.width) * u64::from(settings.height));
-        let (frames, pixels) = (f64::from(count), there_is.1 as f64);
+        let frames = f64::from(request.frames.last - request.frames.first + 1);
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
         let [start, each] = VIDEO;
         let is_video = request.fps.is_some() && frames > 1.0;
-        let check = CHECK_SHARE * (seconds - started.elapsed().as_secs_f64()).max(0.0);
         let ending = request.pattern.path(request.frames.first);
         let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
         Some(Self {
             started,
             seconds,
-            check,
-            there_is,
             video: if is_video { start + each * pixels * frames } else { 0.0 },
             writing: (frames / f64::from(chooser.ranks)).ceil() * writing(settings, &ending),
         })
@@ -64,40 +54,16 @@ impl Budget {
         PROBE_SHARE * (self.seconds - self.gone()).max(0.0)
     }
 
-    /// Seconds that are left, as of now, for tracing frames of `samples`.
-    pub fn left(&self, predictor: &Predictor, samples: Samples) -> f64 {
-        let check = self.kept_back(predictor, samples);
-        let left = self.seconds - self.gone() - check - self.video - self.writing;
+    /// Seconds that are left, as of now, for tracing frames.
+    pub fn left(&self) -> f64 {
+        let left = self.seconds - self.gone() - self.video - self.writing;
         (1.0 - RESERVE) * left.max(0.0)
-    }
-
-    /// Seconds for the check of frames of `samples`; none where their share is too little for any.
-    fn kept_back(&self, predictor: &Predictor, samples: Samples) -> f64 {
-        let all = |effort: Effort| self.check_seconds(effort, predictor, samples);
-        self.effort_in(self.check, predictor, samples).map_or(0.0, all)
-    }
-
-    fn check_seconds(&self, effort: Effort, predictor: &Predictor, samples: Samples) -> f64 {
-        let (frames, pixels) = self.there_is;
-        Check::seconds(predictor, samples) * effort.looked_at(frames, pixels)
-    }
-
-    fn effort_in(&self, time: f64, predictor: &Predictor, samples: Samples) -> Option<Effort> {
-        let (frames, pixels) = self.there_is;
-        Effort::of_check(time, Check::seconds(predictor, samples), frames, pixels)
-    }
-
-    /// What there is time for now to look at; else the seconds that the least check would take.
-    pub fn effort(&self, predictor: &Predictor, samples: Samples) -> Result<Effort, f64> {
-        let left = self.seconds - self.gone() - self.video;
-        let least = || self.check_seconds(Effort::LEAST, predictor, samples);
-        self.effort_in(left, predictor, samples).ok_or_else(least)
     }
 }
 
 impl Chooser<'_> {
-    /// Warns where frames that are not there yet, under what was chosen for fewer frames or more time,
-    /// are predicted to take longer than there is.
+    /// Warns where the frames still to be rendered are predicted to take longer than the budget leaves: `before`
+    /// may have been chosen for fewer frames.
     pub(super) fn warn_if_long(&self, before: &Choice) {
         let Some(budget) = Budget::of(self) else { return };
         let (first, last) = (self.request.frames.first, self.request.frames.last);
@@ -117,8 +83,7 @@ impl Chooser<'_> {
     }
 }
 
-/// Wall seconds that writing a frame takes, in the temporary folder; 0 where it cannot be tried: the
-/// job itself will say why.
+/// Wall seconds to write a frame in the temporary folder; 0 where that fails: the job itself will say why.
 fn writing(settings: &Settings, ending: &str) -> f64 {
     let Ok(folder) = tempfile::tempdir() else { return 0.0 };
     let mut film = Film::new(settings.width, settings.height, false);

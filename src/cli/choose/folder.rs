@@ -1,4 +1,4 @@
-//! What is in the way of a job whose settings are yet to be chosen.
+//! Files that are in the way of a job whose settings are yet to be chosen.
 
 use super::{Choice, Chooser};
 use crate::error::{Error, Result, counted};
@@ -8,8 +8,8 @@ use crate::sequence;
 use serde_json::Value;
 
 impl Chooser<'_> {
-    /// Refuses, before the probe, what rendering would only refuse after it: a folder that cannot be
-    /// written, and frames that were made for something else.
+    /// Refuses, before the probe, a folder that cannot be written and frames that were made for something
+    /// else, which rendering would refuse only after it.
     pub(super) fn check_folder(&self, tracer: &str) -> Result<()> {
         let request = self.request;
         atomic::make_room(request.pattern.path(request.frames.first))?;
@@ -32,7 +32,8 @@ impl Chooser<'_> {
         )))
     }
 
-    /// For what frames with the header `before` were made, and where only that is the same, what is not.
+    /// The target or budget that the frames with the header `before` were made for; if that is the same, the
+    /// first setting that differs.
     fn made_for(&self, before: &Header, tracer: &str) -> String {
         let Some(chosen) = Choice::of(before) else {
             return "whose settings were not chosen".into();

@@ -1,22 +1,19 @@
-//! What came of the settings that were chosen, and tighter ones where a target was missed.
+//! The check of finished frames, and a tighter choice where a target was missed.
 
-use super::budget::Budget;
 use super::{Choice, Chooser, Judged, decibels};
-use crate::accuracy::{Check, Effort, Prediction, Timer, Verdict, displayed_rgb};
+use crate::accuracy::{Check, Effort, Goal, Prediction, Timer, Verdict, displayed_rgb};
 use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
 use crate::output::read_image;
 use crate::page::words::seconds;
 
-/// How often a target that was missed is tightened.
+/// How often a choice that missed is tightened.
 const ROUNDS: u32 = 2;
 
-/// Share of the job that a look at what came out takes, where no time is to be kept.
-const CHECK_SHARE: f64 = 0.1;
-
 impl Chooser<'_> {
-    /// Says what came out of `choice`, and makes a tighter one where the target was missed.
+    /// Checks the finished frames of `choice`, says how good they are, and makes a tighter choice where the target
+    /// was missed. `rendered` has the seconds that rendering took, if all frames were rendered now.
     ///
     /// # Errors
     /// A frame that cannot be read or traced.
@@ -27,16 +24,9 @@ impl Chooser<'_> {
         rendered: Option<f64>,
         timer: Timer,
     ) -> Result<Judged> {
-        let samples = choice.predicted.samples;
-        let budget = Budget::of(self);
-        let effort = match budget.map(|budget| budget.effort(&choice.predictor, samples)) {
-            None => self.effort_of_check(&choice),
-            Some(Ok(effort)) => effort,
-            Some(Err(least)) => {
-                self.tell_unchecked(&choice, least, rendered);
-                return Ok(Judged::Done(choice));
-            }
-        };
+        let (frames, settings) = (self.request.frames, self.context.base);
+        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let effort = Effort::of_check(frames.last - frames.first + 1, pixels);
         let (predictor, predicted) = (&choice.predictor, &choice.predicted);
         let image = |frame| self.image(frame);
         let check = Check::of(&self.probe(), predictor, predicted, effort, &image)?;
@@ -58,16 +48,6 @@ impl Chooser<'_> {
         self.weigh(Choice { came_out, ..choice }, &check, audit, timer)
     }
 
-    /// How much to look at where no time is to be kept: for a small share of the job.
-    fn effort_of_check(&self, choice: &Choice) -> Effort {
-        let whole = Check::seconds(&choice.predictor, choice.predicted.samples);
-        let (frames, settings) = (self.request.frames, self.context.base);
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let count = frames.last - frames.first + 1;
-        let effort = Effort::of_check(CHECK_SHARE * choice.seconds, whole, count, pixels);
-        effort.unwrap_or(Effort::LEAST)
-    }
-
     /// `choice` with its verdict, or a tighter one where the target was missed and one may be had.
     fn weigh(
         &self,
@@ -76,12 +56,10 @@ impl Chooser<'_> {
         audit: Option<&AuditRow>,
         timer: Timer,
     ) -> Result<Judged> {
-        let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
-            return Ok(Judged::Done(choice));
-        };
-        let excess = check.excess(goal, allowed).max(audited_excess(audit, allowed));
+        let Some(goal) = self.args.target else { return Ok(Judged::Done(choice)) };
+        let excess = check.excess(goal).max(audited_excess(audit, goal));
         if excess <= 1.0 {
-            let verdict = Some(check.verdict(goal, allowed));
+            let verdict = Some(check.verdict(goal));
             return Ok(Judged::Done(Choice { verdict, ..choice }));
         }
         let missed = |choice| Judged::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
@@ -89,25 +67,14 @@ impl Chooser<'_> {
             self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
             return Ok(missed(choice));
         }
-        // So much more than predicted.
-        let factor = excess * allowed / choice.predicted.squared_error.max(1e-9);
-        Ok(match self.tighter(&choice, allowed, factor, timer)? {
+        Ok(match self.tighter(&choice, excess, timer)? {
             Some(tighter) => Judged::Again(tighter),
             None => missed(choice),
         })
     }
 
-    /// Says that there is no time for a look at what came out, which would take `least` seconds.
-    fn tell_unchecked(&self, choice: &Choice, least: f64, rendered: Option<f64>) {
-        self.tell(format!(
-            "came out: not looked at, which would take {} or more{}",
-            seconds(least),
-            self.time(choice, rendered)
-        ));
-    }
-
-    /// What rendering took beside what was predicted, if it was all rendered now, and all beside the
-    /// budget.
+    /// Time of rendering beside the prediction, if `rendered` has it, and of the program beside the budget, in
+    /// words.
     fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
         let predicted = choice.seconds;
         let rendering = rendered.map_or(String::new(), |took| {
@@ -123,20 +90,18 @@ impl Chooser<'_> {
         rendering + &budget
     }
 
-    /// The choice with errors `factor` times as large as predicted.
-    fn tighter(
-        &self,
-        choice: &Choice,
-        allowed: f64,
-        factor: f64,
-        timer: Timer,
-    ) -> Result<Option<Choice>> {
-        // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
-        let mut predictor = choice.predictor.worse(1.1 * f64::max(1.0, factor));
+    /// A choice whose predicted squared error is smaller by the factor `excess`; `None` where there is none.
+    fn tighter(&self, choice: &Choice, excess: f64, timer: Timer) -> Result<Option<Choice>> {
+        let mut predictor = choice.predictor.clone();
         if !self.given().bounces {
             predictor = predictor.with_more_bounces();
         }
-        let found = self.probe().fastest(&predictor, allowed, timer)?;
+        // A tenth beyond what was seen, lest the next round misses by a hair.
+        let allowed = choice.predicted.squared_error / (1.1 * excess);
+        let range = self.probe().range();
+        let of_mode = |mode| predictor.fastest(mode, &range, allowed);
+        let found = predictor.modes.iter().filter_map(of_mode).collect();
+        let found = self.probe().fastest(found, timer)?;
         let set = |predicted: &Prediction| (predicted.samples, predicted.bounces);
         let Some(predicted) = found.filter(|found| set(found) != set(&choice.predicted)) else {
             self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
@@ -172,20 +137,25 @@ impl Chooser<'_> {
     }
 }
 
-/// By how much what came is more than what was predicted or allowed, in words: a plus is too much.
+/// By how much `came` is more than `expected`, in per cent with sign.
 fn beyond(came: f64, expected: f64) -> String {
     format!("{:+.0} %", 100.0 * (came / expected.max(1e-9) - 1.0))
 }
 
-/// By which factor the light's noise alone, by the audit's lower end, exceeds what is allowed.
-fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
+/// The factor by which the noise of light alone, by the lower end of the audit's interval, exceeds what a PSNR
+/// allows.
+fn audited_excess(audit: Option<&AuditRow>, goal: Goal) -> f64 {
     let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
-    low * low / allowed
+    match goal {
+        Goal::Psnr(_) => low * low / goal.largest(),
+        _ => 0.0,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{audited_excess, beyond};
+    use crate::accuracy::Goal;
     use crate::output::manifest::AuditRow;
     use crate::stats::AuditSums;
 
@@ -204,8 +174,11 @@ mod tests {
             rmse_traced: None,
             sums: AuditSums::default(),
         };
-        assert_eq!(audited_excess(None, 1.0), 0.0);
-        assert!(audited_excess(Some(&audit([1.2, 0.9, 1.5])), 1.0) < 1.0);
-        assert_eq!(audited_excess(Some(&audit([3.0, 2.0, 4.0])), 2.0), 2.0);
+        // 48.13 dB allow an RMSE of one display step.
+        let goal = Goal::Psnr(48.13);
+        assert_eq!(audited_excess(None, goal), 0.0);
+        assert!(audited_excess(Some(&audit([1.2, 0.9, 1.5])), goal) < 1.0);
+        assert!((audited_excess(Some(&audit([3.0, 2.0, 4.0])), goal) - 4.0).abs() < 0.01);
+        assert_eq!(audited_excess(Some(&audit([3.0, 2.0, 4.0])), Goal::Flip(0.1)), 0.0);
     }
 }
