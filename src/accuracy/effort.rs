@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(Effort::LEAST.of_frames(100), Effort::LEAST);
         assert_eq!(
             (Effort::LEAST.of_frames(2).pixels, Effort::LEAST.of_frames(1).pixels),
-            (400, 800)
+            (800, 800)
         );
         // A fourth of the time: half the frames, half their pixels.
         let part = Effort::within(2.25, 1e-6);

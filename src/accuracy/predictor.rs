@@ -1,6 +1,7 @@
 //! What each setting is predicted to come to, and the choice among all of them.
 
 use super::error_model::{ErrorModel, Samples};
+use super::worst::worst;
 use crate::measure::psnr;
 use crate::scene::limits::MAX_BOUNCES;
 use crate::scene::{ReuseSettings, Settings};
@@ -106,7 +107,7 @@ impl Predictor {
     /// What is predicted of `samples` under the policy of `mode`.
     pub fn of(&self, mode: &ReuseMode, samples: Samples) -> Prediction {
         let errors: Vec<f64> = self.model.errors(samples).collect();
-        let sampling = self.excess * super::worst::worst(&errors, &self.doubts);
+        let sampling = self.excess * worst(&errors, &self.doubts);
         let n = f64::from(samples.spp);
         let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
         Prediction {

@@ -55,7 +55,7 @@ impl<'a> Search<'a> {
     pub fn begin(probe: &'a Probe<'a>, effort: Effort) -> Result<Self> {
         let (context, patches) = (probe.context, probe.patches(effort)?);
         let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
-        let truth = patches.trace(context, &super::probe::reference(context.base, reference))?;
+        let truth = patches.trace(context, &converged(context.base, reference))?;
         let (mut points, mut doubts) = (Vec::new(), Vec::new());
         for samples in design(probe) {
             let seen = patches.trace(context, &sampled(context.base, samples))?;
@@ -132,7 +132,7 @@ impl<'a> Search<'a> {
         let context = self.probe.context;
         if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
             self.reference = samples_of_reference(samples);
-            self.truth = self.patches.trace(context, &reference(context.base, self.reference))?;
+            self.truth = self.patches.trace(context, &converged(context.base, self.reference))?;
         }
         let (bounces, cutoff) = (self.predictor.bounces, context.base.cutoff);
         let settings = Settings { bounces, cutoff, ..sampled(context.base, samples) };
@@ -162,7 +162,6 @@ impl<'a> Search<'a> {
         let numbers = if probe.given.bounces { &[base.bounces] } else { &BOUNCES[..] };
         let most = *numbers.last().unwrap_or(&base.bounces);
         let mut settings = sampled(base, Samples { spp: 4, shadow: 1, sky: 1 });
-        settings.bounces = settings.bounces.max(most);
         let truth = self.patches.trace(probe.context, &settings)?;
         settings.cutoff = base.cutoff;
         let mut left_out = |bounces: u32| -> Result<f64> {
@@ -198,14 +197,15 @@ impl Default for Bracket {
 
 impl Bracket {
     /// The squared error to try after `tried`, by which the goal `is_reached` or not: `wanted`, if that lies
-    /// between the bounds; else their geometric mean. `None` where the bounds are close, or where nothing
+    /// between the bounds; else their geometric mean. `None` where the bounds are close, or where nothing much
     /// larger than what reached the goal is wanted.
     fn next(&mut self, tried: f64, wanted: f64, is_reached: bool) -> Option<f64> {
         match is_reached {
             true => self.reached = self.reached.max(tried),
             false => self.missed = self.missed.min(tried),
         }
-        if self.missed < CLOSE * self.reached || (is_reached && wanted <= self.reached) {
+        let is_close = is_reached && wanted < CLOSE.sqrt() * self.reached;
+        if is_close || self.missed < CLOSE * self.reached {
             return None;
         }
         let wanted = wanted.clamp(tried / STEP, tried * STEP);
@@ -230,10 +230,17 @@ fn design(probe: &Probe) -> Vec<Samples> {
     design
 }
 
-/// The settings of a reference with `samples` and the job's seed: how far it is off from the reference is
-/// for its samples alone.
+/// The settings of a reference with `samples`, and with as many bounces as may be chosen.
+fn converged(base: &Settings, samples: Samples) -> Settings {
+    let settings = reference(base, samples);
+    let bounces = BOUNCES.into_iter().fold(settings.bounces, u32::max);
+    Settings { bounces, ..settings }
+}
+
+/// The same with the job's seed: frames with these settings differ from the reference for their samples
+/// alone.
 fn sampled(base: &Settings, samples: Samples) -> Settings {
-    Settings { seed: base.seed, ..reference(base, samples) }
+    Settings { seed: base.seed, ..converged(base, samples) }
 }
 
 #[cfg(test)]

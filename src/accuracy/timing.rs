@@ -1,9 +1,8 @@
 //! How long settings take: the likely ones are tried on small frames, and the choice goes by that.
 
-use super::error_model::Samples;
 use super::frames::{Cut, timed_frames};
 use super::modes::Times;
-use super::predictor::{Prediction, Predictor};
+use super::predictor::{Prediction, Predictor, ReuseMode};
 use super::probe::Probe;
 use super::{effort::Effort, trial};
 use crate::error::Result;
@@ -60,20 +59,20 @@ impl Probe<'_> {
     pub fn best_within(
         &self,
         predictor: &Predictor,
-        left: &dyn Fn(Samples) -> f64,
+        left: &dyn Fn() -> f64,
         timer: Timer,
     ) -> Result<Option<Prediction>> {
         let mut predictor = predictor.clone();
-        let of = |mode: &super::predictor::ReuseMode| (mode.reuse, self.frames_each(mode.reuse));
+        let of = |mode: &ReuseMode| (mode.reuse, self.frames_each(mode.reuse));
         let frames: Vec<(ReuseSettings, f64)> = predictor.modes.iter().map(of).collect();
         let frames = |reuse| frames.iter().find(|(r, _)| *r == reuse).map_or(0.0, |(_, n)| *n);
         let best = |predictor: &Predictor| {
-            let fits = |f: &Prediction| f.seconds * frames(f.reuse) <= left(f.samples);
+            let fits = |f: &Prediction| f.seconds * frames(f.reuse) <= left();
             predictor.best_within(&self.range(), &fits)
         };
         for share in SHARES {
             let Some(likely) = best(&predictor) else { break };
-            let time = share * left(likely.samples);
+            let time = share * left();
             let Some(timing) = self.timing(time, &likely) else { break };
             predictor.correct_time(&likely, timer(&timing)?);
         }

@@ -259,7 +259,7 @@ impl Chooser<'_> {
             probe.look(AIM, &|what| self.tell(format!("probe: {what}")))?;
         let found = match &budget {
             None => probe.fastest(found, timer)?,
-            Some(budget) => probe.best_within(&predictor, &|_| budget.left(), timer)?,
+            Some(budget) => probe.best_within(&predictor, &|| budget.left(), timer)?,
         };
         let predicted = found.ok_or_else(|| self.out_of_reach(&predictor))?;
         if budget.is_none() {
