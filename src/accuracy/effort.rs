@@ -95,6 +95,6 @@ mod tests {
         );
         // A fourth of the time: half the frames, half their pixels.
         let part = Effort::within(2.25, 1e-6);
-        assert_eq!((part.frames, part.pixels, part.small), (8, 400, 1750.0));
+        assert_eq!((part.frames, part.pixels, part.small), (8, 400, 2000.0));
     }
 }

@@ -204,11 +204,14 @@ impl Bracket {
             true => self.reached = self.reached.max(tried),
             false => self.missed = self.missed.min(tried),
         }
-        let is_close = is_reached && wanted < CLOSE.sqrt() * self.reached;
+        let step = CLOSE.sqrt();
+        let is_close = is_reached && wanted < step * self.reached;
         if is_close || self.missed < CLOSE * self.reached {
             return None;
         }
-        let wanted = wanted.clamp(tried / STEP, tried * STEP);
+        // What missed by a hair is not approached by hairs.
+        let most = if is_reached { tried * STEP } else { tried / step };
+        let wanted = wanted.clamp(tried / STEP, most);
         let is_between = self.reached < wanted && wanted < self.missed;
         Some(if is_between { wanted } else { (self.reached * self.missed).sqrt() })
     }
