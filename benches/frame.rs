@@ -8,12 +8,10 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::cell::Cell;
 use std::sync::atomic::AtomicBool;
 use support::Candidate;
-use tweenray::effects::EffectPlan;
 use tweenray::import::Loaded;
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::scene::{Camera, Scene, Settings, Shot};
-use tweenray::shade::{Progress, Renderer};
-use tweenray::stats::RayCounts;
+use tweenray::shade::Renderer;
 
 const FRAME: u32 = 8;
 
@@ -80,8 +78,7 @@ fn row(
     pools: &[ThreadPool],
 ) -> Vec<String> {
     let intersector = EmbreeIntersector::new(scene, settings.rules, None, 2).expect("a BVH");
-    let plan = EffectPlan::of(scene, settings);
-    let renderer = Renderer { scene, settings, plan, intersector: &intersector };
+    let renderer = Renderer::new(scene, settings, &intersector);
     let camera = shot.camera(FRAME, settings.width, settings.height).expect("a camera");
     let rays = Cell::new(0);
     let mut candidates: Vec<Candidate> = pools
@@ -113,16 +110,10 @@ fn row(
 /// Renders a frame and counts its rays.
 fn frame(renderer: &Renderer, camera: &Camera, pool: &ThreadPool) -> u64 {
     let stop = AtomicBool::new(false);
-    let film = pool.install(|| renderer.render(camera, FRAME, false, &stop, &Quiet));
+    let film = pool.install(|| renderer.render(camera, FRAME, false, &stop, &()));
     film.expect("nobody stops it").1.total()
 }
 
 fn say_seconds(seconds: f64) -> String {
     if seconds < 0.1 { format!("{:.2} ms", seconds * 1e3) } else { format!("{seconds:.2} s") }
-}
-
-struct Quiet;
-
-impl Progress for Quiet {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

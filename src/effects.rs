@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Scene, Settings};
+use crate::scene::{Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,10 +24,6 @@ pub struct EffectPlan {
     pub sky_light: bool,
     /// A ray-free ambient term is added.
     pub ambient: bool,
-    /// Some material has a texture.
-    pub textures: bool,
-    /// Some mesh has shading normals that differ from its triangles' planes.
-    pub smooth_normals: bool,
 }
 
 /// One line of `inspect`: an effect, whether it runs, and why.
@@ -47,9 +43,21 @@ impl EffectPlan {
         Self::with_reasons(scene, settings).0
     }
 
-    /// Why each effect runs or not.
-    pub fn reasons(scene: &Scene, settings: &Settings) -> Vec<EffectReason> {
-        Self::with_reasons(scene, settings).1
+    /// Why each effect runs or not, what only data decide (textures, normals, the lens) among them.
+    pub fn reasons(scene: &Scene, settings: &Settings, lens: &ShotLens) -> Vec<EffectReason> {
+        let mut reasons = Self::with_reasons(scene, settings).1;
+        let used = UsedMaterials::of(scene);
+        let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
+        let (blurs, lens) = lens.reason();
+        let textures =
+            format!("{} in use{}", counted(used.textured, "textured material"), bare(scene));
+        let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
+        reasons.extend([
+            EffectReason { effect: "textures", runs: used.textured > 0, why: textures },
+            EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
+            EffectReason { effect: "depth of field", runs: blurs, why: lens },
+        ]);
+        reasons
     }
 
     /// The plan that leaves nothing out: for the test that specialised kernels equal it.
@@ -61,8 +69,6 @@ impl EffectPlan {
         delta_lights: true,
         sky_light: true,
         ambient: true,
-        textures: true,
-        smooth_normals: true,
     };
 
     fn with_reasons(scene: &Scene, settings: &Settings) -> (Self, Vec<EffectReason>) {
@@ -73,7 +79,6 @@ impl EffectPlan {
         let bounced = counted(bounces as usize, "bounce");
         let samples = settings.shadow_samples;
         let sky_bright = is_something(scene.sky.radiance);
-        let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
         let mut reasons = Vec::new();
         let mut decide = |effect, runs: bool, why: String| {
             reasons.push(EffectReason { effect, runs, why });
@@ -132,16 +137,6 @@ impl EffectPlan {
                 "ambient term",
                 diffuse && is_something(scene.sky.ambient),
                 if diffuse { format!("ambient {}", scene.sky.ambient) } else { no_diffuse() },
-            ),
-            textures: decide(
-                "textures",
-                used.textured > 0,
-                format!("{} in use{}", counted(used.textured, "textured material"), bare(scene)),
-            ),
-            smooth_normals: decide(
-                "smooth normals",
-                smooth > 0,
-                format!("{smooth} of {} meshes have shading normals", scene.meshes.len()),
             ),
         };
         (plan, reasons)

@@ -4,6 +4,7 @@
 //! `shade` asks an [`Inference`] before it casts shadow rays and never learns where the answer
 //! comes from; `reuse` answers and never traces. All in scene space.
 
+use crate::film::Provenance;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -31,7 +32,8 @@ pub struct SurfacePoint {
     pub footprint: f32,
     /// Cosine between `n` and the direction back along the ray.
     pub cos: f32,
-    /// Whether a camera ray ends here, not one from a mirror or glass.
+    /// Whether the pixel shows it sharply: a camera ray ends here, not one from a mirror or glass, and it is
+    /// in focus.
     pub direct: bool,
     /// Camera samples that it stands for.
     pub samples: u32,
@@ -61,20 +63,6 @@ impl SurfacePoint {
         self.samples = samples;
         share
     }
-}
-
-/// Where an inferred point's light comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Origin {
-    /// Number of the reference frame that gave most; 0 where nothing was found, and for a frame of
-    /// another shot.
-    pub frame: u32,
-    /// Whether an earlier frame gave some.
-    pub earlier: bool,
-    /// Whether a later frame gave some.
-    pub later: bool,
-    /// Weighted mean distance to the samples that gave it, footprints.
-    pub distance: f32,
 }
 
 /// What other frames suggest about one light at a point, and how risky that is.
@@ -124,8 +112,8 @@ pub struct LookupBatch {
     pub ratios: Vec<f32>,
     /// For each point and channel what other frames suggest; room for whoever answers.
     pub estimates: Vec<Estimate>,
-    /// For each point where its ratios come from.
-    pub origins: Vec<Origin>,
+    /// For each point where its ratios come from; the default where no other frame knows any.
+    pub provenance: Vec<Provenance>,
     /// For each point and channel whether check rays shall be cast; empty where none is wanted.
     pub checks: Vec<bool>,
     /// For each point and channel what they found; empty where none was wanted.
@@ -154,9 +142,10 @@ pub struct TracedPoints {
 
 impl TracedPoints {
     /// Takes in all of `other`, behind its own.
-    pub fn append(&mut self, mut other: Self) {
-        self.points.append(&mut other.points);
-        self.ratios.append(&mut other.ratios);
+    pub fn append(&mut self, other: Self) {
+        let Self { mut points, mut ratios } = other;
+        self.points.append(&mut points);
+        self.ratios.append(&mut ratios);
     }
 
     /// The same points row by row; those of a pixel stay in their order.

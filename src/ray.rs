@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn invalid_rays_are_told_apart() {
+    fn invalid_rays_are_recognised() {
         let good = Ray::new(DVec3::ZERO, DVec3::Z);
         assert!(good.is_valid());
         assert!(Ray { dir: DVec3::new(0.0, -0.0, 1e17), ..good }.is_valid());

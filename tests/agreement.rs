@@ -4,10 +4,9 @@
 
 mod common;
 
-use common::{Silent, load_job, render, threads};
+use common::{load_job, render, threads};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::Film;
 use tweenray::intersect::{self, Intersector};
 use tweenray::math::Rgb;
@@ -81,8 +80,6 @@ fn on_all_cores(job: &common::Job) -> Film {
     let scene = job.world.clone().into_scene(true).unwrap();
     let intersector: Box<dyn Intersector + Send> =
         intersect::build(&scene, &job.settings, threads()).unwrap();
-    let plan = EffectPlan::of(&scene, &job.settings);
-    let renderer =
-        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
-    renderer.render(&job.camera, 8, false, &AtomicBool::new(false), &Silent).unwrap().0
+    let renderer = Renderer::new(&scene, &job.settings, &*intersector);
+    renderer.render(&job.camera, 8, false, &AtomicBool::new(false), &()).unwrap().0
 }

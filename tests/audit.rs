@@ -5,7 +5,7 @@
 #[path = "audit/shots.rs"]
 mod shots;
 
-use shots::{Quiet, Set, Stage, Trial};
+use shots::{Set, Stage, Trial};
 use std::sync::atomic::AtomicBool;
 use tweenray::math::Rgb;
 use tweenray::measure::Interval;
@@ -109,11 +109,9 @@ fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {
     let stop = AtomicBool::new(false);
     let pyramid = Pyramid { segment: 64, frames: shot.frames };
     let all: Vec<u32> = pyramid.all().collect();
-    let maker =
-        SurfaceReuse::new(stage.renderer(settings), &shot, &stage.pool, &stop, &Quiet, pyramid)
-            .unwrap();
+    let maker = SurfaceReuse::new(stage.context(settings, &shot, &stop), pyramid).unwrap();
     maker.expect(&all);
-    pyramid.order(&all).into_iter().map(|f| maker.make(f).unwrap().unwrap()).collect()
+    pyramid.order(&all).into_iter().map(|f| maker.make(f).unwrap()).collect()
 }
 
 #[test]

@@ -7,8 +7,8 @@ mod common;
 use common::{job, pose, quad, render, sphere_world};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    Camera, DiskLight, IntersectorKind, Light, Material, PointLight, QuadLight, Sky, SpotLight,
-    World,
+    Camera, DiskLight, IntersectorKind, Lens, Light, Material, PointLight, QuadLight, Sky,
+    SpotLight, ThinLens, World, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -226,7 +226,7 @@ fn a_glass_sphere_in_a_furnace_vanishes() {
 /// A bright lamp before a dark sky: a pixel's colour is the lamp's times the share of its samples that see
 /// it, clamped or not, and the share is the same.
 #[test]
-fn a_clamped_sample_counts_as_much_as_the_clamp_lets_it() {
+fn a_clamped_sample_contributes_the_clamp() {
     let (radiance, exposure, clamp) = (Rgb::new(40.0, 20.0, 0.25), 0.5, 1.5);
     let corners = [(-1.0, -0.7), (0.9, -0.8), (1.0, 0.8), (-0.8, 0.9)];
     let corners = corners.map(|(x, y)| DVec3::new(x, y, 0.0));
@@ -252,7 +252,7 @@ fn a_clamped_sample_counts_as_much_as_the_clamp_lets_it() {
 /// What counts is the whole of a sample, not each light's part of it; and an invalid sample
 /// stays what it is.
 #[test]
-fn the_clamp_is_of_a_sample_s_sum() {
+fn the_clamp_applies_to_a_samples_sum() {
     let mut world = sphere_world(
         Material { mirror: Rgb::splat(0.5), ..Material::diffuse("satin", Rgb::splat(0.5)) },
         false,
@@ -301,4 +301,95 @@ fn from_inside_a_box_no_sky_is_seen() {
             }
         }
     }
+}
+
+/// A thin lens spreads a point out of focus evenly over a disk of the aperture's radius times |1/focus − 1/depth|,
+/// or over its polygon: size, evenness and the light of all of it together.
+#[test]
+fn a_point_out_of_focus_is_a_disk_of_the_size_of_the_circle_of_confusion() {
+    let (depth, ball, size, radius, spp) = (6.0, 0.1, 97, 1.2, 256);
+    for kind in BOTH {
+        // In front of the focus, behind it, and from blades.
+        for (focus, blades) in [(12.0, 0), (4.0, 0), (4.0, 6)] {
+            let mut world = World::default();
+            world.materials.push(Material { emission: Rgb::ONE, ..Material::black("ball") });
+            let (name, centre, always_traced) = ("ball".into(), DVec3::ZERO, false);
+            world.spheres.push(WorldSphere {
+                name,
+                centre,
+                radius: ball,
+                material: 0,
+                always_traced,
+            });
+            let mut job = job(world, pose((0.0, 0.0, depth), (0.0, 0.0, 0.0)), size, size);
+            let blade_rotation_degrees = 0.0;
+            let lens = ThinLens { radius, focus, blades, blade_rotation_degrees };
+            job.camera = job.camera.with_lens(Lens::Thin(lens));
+            (job.settings.intersector, job.settings.spp) = (kind, spp);
+            let (film, _) = render(&job);
+            let pixel = job.camera.pixel_size();
+            let blur = radius * (1.0 / focus - 1.0 / depth).abs() / pixel;
+            assert!(blur > 10.0 && blur < 45.0, "the test's disk is {blur} pixels");
+            let middle = f64::from(size) / 2.0;
+            let off = |x: u32, y: u32| {
+                let place = |x: u32| f64::from(x) + 0.5 - middle;
+                (place(x), place(y))
+            };
+            let (mut all, mut second, mut beyond) = (0.0, 0.0, 0.0f64);
+            for (x, y, rgb) in common::pixels(&film) {
+                let (x, y) = off(x, y);
+                let light = f64::from(rgb.x);
+                all += light;
+                second += light * (x * x + y * y);
+                // The ball's own image, and the pixel filter.
+                if x.hypot(y) > blur + 1.0 + ball / (depth * pixel) + 1.5 {
+                    beyond = beyond.max(light);
+                }
+            }
+            // As many pixels' light as the sharp ball covers, to second order in its size.
+            let sharp = std::f64::consts::PI * (ball / (depth * pixel)).powi(2);
+            assert!((all / sharp - 1.0).abs() < 0.03, "{kind:?} {focus}: {all} for {sharp}");
+            // Mean square distance of a uniform disk, or regular polygon, of circumradius 1.
+            let of_one = match blades {
+                0 => 0.5,
+                n => {
+                    let half = std::f64::consts::PI / f64::from(n);
+                    (2.0 + (2.0 * half).cos()) / 6.0
+                }
+            };
+            let spread = second / all;
+            // The ball's own image and the filter blur a little more.
+            let own = 0.5 * (ball / (depth * pixel)).powi(2) + 0.5;
+            let expected = of_one * blur * blur;
+            assert!(
+                (spread - expected).abs() < 0.02 * expected + own,
+                "{kind:?} {focus} {blades}: {spread} for {expected}"
+            );
+            assert_eq!(beyond, 0.0, "{kind:?} {focus}: light beyond the disk");
+        }
+    }
+}
+
+/// What is at the focus is as sharp as through a pinhole, whatever the lens.
+#[test]
+fn what_is_in_focus_is_what_a_pinhole_shows() {
+    let mut world = floor(0.6);
+    world.materials[0].diffuse = Rgb::ZERO;
+    world.materials[0].emission = Rgb::ONE;
+    let mut job = job(world, pose((0.0, 0.0, 5.0), (0.0, 0.0, 0.0)), 32, 32);
+    // The floor's far edge is 9 behind the middle.
+    job.camera = Camera::new(&pose((0.0, 5.0, 5.0), (0.0, 0.0, -9.0)), 20.0, 32, 32).unwrap();
+    job.settings.spp = 64;
+    let (pinhole, _) = render(&job);
+    let focus = DVec3::new(0.0, -5.0, -14.0).length();
+    let lens = |focus| ThinLens { radius: 0.4, focus, blades: 0, blade_rotation_degrees: 0.0 };
+    let pinhole_camera = job.camera;
+    let mut worst = |focus| {
+        job.camera = pinhole_camera.with_lens(Lens::Thin(lens(focus)));
+        let (film, _) = render(&job);
+        let pairs = film.rgb.iter().zip(&pinhole.rgb);
+        pairs.map(|(a, b)| (a.x - b.x).abs()).fold(0.0, f32::max)
+    };
+    let (sharp, blurred) = (worst(focus), worst(0.5 * focus));
+    assert!(sharp < 0.06 && blurred > 0.2, "off by {sharp} in focus, by {blurred} out of it");
 }

@@ -4,19 +4,17 @@
 
 mod common;
 
-use common::Silent;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::error::Result;
-use tweenray::film::{Encoding, Film, Image, Provenance};
+use tweenray::film::{Encoding, Film, Image, ProvenanceKind};
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb, srgb_encode};
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{
-    CameraPath, DirectionalLight, Easing, Light, Material, QuadLight, Rect, Scene, Settings, Shot,
-    Sky, ToneCurve, World, WorldSphere,
+    CameraPath, DirectionalLight, Light, Material, QuadLight, Rect, Scene, Settings, Shot, Sky,
+    ToneCurve, World, WorldSphere,
 };
-use tweenray::sequence::{ColourMaker, FrameMaker, Made, Tracer, check_upload};
+use tweenray::sequence::{ColourMaker, FrameContext, FrameMaker, Made, Tracer, check_upload};
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
 
@@ -55,8 +53,8 @@ struct Move {
 
 const FRAMES: u32 = 9;
 /// That of the settings.
-const USUAL: Rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
-const STRICT: Rule = Rule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
+const USUAL: AgreementRule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+const STRICT: AgreementRule = AgreementRule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
 
 impl Move {
     fn new(world: World, from: (f64, f64, f64), to: (f64, f64, f64), target: DVec3) -> Self {
@@ -64,7 +62,7 @@ impl Move {
             Settings { width: 61, height: 43, spp: 2, shadow_samples: 2, ..Settings::default() };
         let (from, to) = (from.into(), to.into());
         let path = CameraPath::Pan { from, to, target, up: DVec3::Y, roll_degrees: 0.0 };
-        let shot = Shot { path, easing: Easing::Linear, frames: FRAMES, vfov_degrees: 40.0 };
+        let shot = Shot::new(path, FRAMES, 40.0);
         Self { scene: world.into_scene(true).unwrap(), settings, shot, threads: 2 }
     }
 
@@ -76,23 +74,22 @@ impl Move {
     }
 
     /// The films of `frames`, made in this order by one maker.
-    fn films(&self, rule: Rule, uploads: &[(u32, Image)], frames: &[u32]) -> Result<Vec<Made>> {
+    fn films(
+        &self,
+        rule: AgreementRule,
+        uploads: &[(u32, Image)],
+        frames: &[u32],
+    ) -> Result<Vec<Made>> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
-        let plan = EffectPlan::of(&self.scene, &self.settings);
-        let renderer = Renderer {
-            scene: &self.scene,
-            settings: &self.settings,
-            plan,
-            intersector: &*intersector,
-        };
+        let renderer = Renderer::new(&self.scene, &self.settings, &*intersector);
         let stop = AtomicBool::new(false);
-        let maker = ColourMaker::new(renderer, &self.shot, &pool, &stop, &Silent, rule, uploads)?;
+        let maker = ColourMaker::new(self.context(renderer, &pool, &stop), rule, uploads)?;
         maker.expect(frames);
-        frames.iter().map(|frame| Ok(maker.make(*frame)?.unwrap())).collect()
+        frames.iter().map(|frame| maker.make(*frame)).collect()
     }
 
-    fn all(&self, rule: Rule, uploads: &[(u32, Image)]) -> Vec<Made> {
+    fn all(&self, rule: AgreementRule, uploads: &[(u32, Image)]) -> Vec<Made> {
         self.films(rule, uploads, &(1..=FRAMES).collect::<Vec<_>>()).unwrap()
     }
 
@@ -100,28 +97,26 @@ impl Move {
     fn traced(&self) -> Vec<Film> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
         let intersector = intersect::build(&self.scene, &self.settings, 1).unwrap();
-        let plan = EffectPlan::of(&self.scene, &self.settings);
-        let tracer = Tracer {
-            renderer: Renderer {
-                scene: &self.scene,
-                settings: &self.settings,
-                plan,
-                intersector: &*intersector,
-            },
-            shot: &self.shot,
-            pool: &pool,
-            with_gbuffer: false,
-            stop: &AtomicBool::new(false),
-            progress: &Silent,
-            laid: Default::default(),
-        };
-        (1..=FRAMES).map(|frame| tracer.make(frame).unwrap().unwrap().film).collect()
+        let renderer = Renderer::new(&self.scene, &self.settings, &*intersector);
+        let stop = AtomicBool::new(false);
+        let tracer = Tracer::new(self.context(renderer, &pool, &stop));
+        (1..=FRAMES).map(|frame| tracer.make(frame).unwrap().film).collect()
+    }
+
+    fn context<'a>(
+        &'a self,
+        renderer: Renderer<'a>,
+        pool: &'a rayon::ThreadPool,
+        stop: &'a AtomicBool,
+    ) -> FrameContext<'a> {
+        let (shot, with_gbuffer, progress) = (&self.shot, false, &());
+        FrameContext { renderer, shot, pool, with_gbuffer, stop, progress }
     }
 }
 
-fn count(film: &Film, provenance: Provenance) -> usize {
-    let sources = film.sources.as_ref().unwrap();
-    sources.iter().filter(|s| s.provenance == provenance).count()
+fn count(film: &Film, kind: ProvenanceKind) -> usize {
+    let sources = film.provenance.as_ref().unwrap();
+    sources.iter().filter(|s| s.kind == kind).count()
 }
 
 #[test]
@@ -130,10 +125,10 @@ fn first_and_last_frame_are_traced_as_without_the_policy() {
     let (made, traced) = (pan.all(USUAL, &[]), pan.traced());
     for k in [0, FRAMES as usize - 1] {
         assert_eq!(made[k].film.rgb, traced[k].rgb);
-        assert_eq!(count(&made[k].film, Provenance::Traced), 61 * 43);
+        assert_eq!(count(&made[k].film, ProvenanceKind::Traced), 61 * 43);
     }
     let between = &made[4];
-    let inferred = count(&between.film, Provenance::Both);
+    let inferred = count(&between.film, ProvenanceKind::Both);
     assert!(inferred > 500, "{inferred} pixels inferred");
     assert_eq!(between.reuse.direct_inferred, inferred as u64);
     assert_eq!(between.reuse.direct, 61 * 43);
@@ -146,7 +141,7 @@ fn where_nothing_agrees_every_frame_is_the_traced_one() {
     let target = DVec3::new(0.0, 0.0, 0.0);
     let down = Move::new(world(true), (-2.0, 3.0, 0.7), (2.2, 3.0, 0.7), target);
     for (made, traced) in down.all(STRICT, &[]).iter().zip(down.traced()) {
-        assert_eq!(count(&made.film, Provenance::Traced), 61 * 43);
+        assert_eq!(count(&made.film, ProvenanceKind::Traced), 61 * 43);
         assert_eq!(made.film.rgb, traced.rgb);
     }
 }
@@ -159,11 +154,11 @@ fn without_epsilons_a_moving_camera_infers_the_sky_and_what_is_traced_is_traced_
     let (made, traced) = (pan.all(STRICT, &[]), pan.traced());
     let sky = pan.scene.sky.radiance;
     for (made, traced) in made.iter().zip(&traced).skip(1).take(FRAMES as usize - 2) {
-        assert!(count(&made.film, Provenance::Both) > 100);
-        let sources = made.film.sources.as_ref().unwrap();
+        assert!(count(&made.film, ProvenanceKind::Both) > 100);
+        let sources = made.film.provenance.as_ref().unwrap();
         for ((source, rgb), truth) in sources.iter().zip(&made.film.rgb).zip(&traced.rgb) {
-            match source.provenance {
-                Provenance::Traced => assert_eq!(rgb, truth),
+            match source.kind {
+                ProvenanceKind::Traced => assert_eq!(rgb, truth),
                 _ => assert_eq!(*rgb, sky),
             }
         }
@@ -175,7 +170,7 @@ fn a_still_camera_in_light_without_noise_traces_two_frames() {
     let still = Move::pan(false, 0.0);
     let made = still.all(STRICT, &[]);
     for between in &made[1..FRAMES as usize - 1] {
-        assert_eq!(count(&between.film, Provenance::Both), 61 * 43);
+        assert_eq!(count(&between.film, ProvenanceKind::Both), 61 * 43);
         assert_eq!(between.rays[RayKind::Camera], 0);
         assert_eq!(between.film.rgb, made[0].film.rgb);
     }
@@ -185,7 +180,7 @@ fn a_still_camera_in_light_without_noise_traces_two_frames() {
 fn a_larger_epsilon_infers_more() {
     let pan = Move::pan(true, 0.5);
     let inferred = |colour_epsilon, distance_epsilon| {
-        let made = pan.all(Rule { colour_epsilon, distance_epsilon }, &[]);
+        let made = pan.all(AgreementRule { colour_epsilon, distance_epsilon }, &[]);
         made.iter().map(|m| m.reuse.direct_inferred).sum::<u64>()
     };
     let (strict, colour, both) = (inferred(0.0, 0.0), inferred(0.1, 0.0), inferred(0.1, 0.1));
@@ -250,7 +245,7 @@ fn what_passes_between_two_samples_is_missed_and_an_uploaded_picture_shows_it() 
     let traced = pan.traced();
     let redness = |film: &Film| film.rgb.iter().filter(|c| c.x > 2.0 * c.z).count();
     assert!(redness(&traced[4]) > 50 && redness(&traced[0]) == 0 && redness(&traced[8]) == 0);
-    let loose = Rule { colour_epsilon: 0.1, distance_epsilon: 0.1 };
+    let loose = AgreementRule { colour_epsilon: 0.1, distance_epsilon: 0.1 };
     assert_eq!(redness(&pan.all(loose, &[])[4].film), 0);
     let uploads = [(5, picture(&traced[4]))];
     let with_upload = pan.all(loose, &uploads);
@@ -270,7 +265,7 @@ fn an_upload_says_nothing_about_distance() {
     flat.spheres.clear();
     let target = DVec3::new(0.0, 0.0, 0.0);
     let dive = Move::new(flat, (0.0, 2.0, 0.1), (0.0, 4.0, 0.1), target);
-    let apart = Rule { colour_epsilon: 0.01, distance_epsilon: 0.05 };
+    let apart = AgreementRule { colour_epsilon: 0.01, distance_epsilon: 0.05 };
     assert_eq!(dive.all(apart, &[])[4].reuse.direct_inferred, 0);
     let middle = [(5, picture(&dive.traced()[4]))];
     let made = dive.all(apart, &middle);
@@ -287,7 +282,7 @@ fn pictures_that_do_not_fit_are_refused() {
         assert!(error.contains(&format!("frame {frame}")) && error.contains("1..9"), "{error}");
     }
     let error = refused(&[(2, image.clone()), (2, image.clone())]).to_string();
-    assert!(error.contains("frame 2 has two"), "{error}");
+    assert!(error.contains("frame 2"), "{error}");
     let small = Image::new(2, 1, vec![Rgb::ZERO; 2], Encoding::Srgb).unwrap();
     let error = refused(&[(2, small)]).to_string();
     assert!(error.contains("2x1") && error.contains("61x43"), "{error}");

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Job, Silent, job, pose, render, render_scene};
+use common::{Job, job, pose, render, render_scene, render_with_every_effect};
 use std::sync::atomic::AtomicBool;
 use tweenray::effects::EffectPlan;
 use tweenray::embree::floating_point_mode;
@@ -95,11 +95,9 @@ fn on_threads(job: &Job, threads: usize) -> Film {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let before = floating_point_mode();
     let intersector = pool.install(|| intersect::build(&scene, &job.settings, threads)).unwrap();
-    let plan = EffectPlan::of(&scene, &job.settings);
-    let renderer =
-        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
+    let renderer = Renderer::new(&scene, &job.settings, &*intersector);
     let stop = AtomicBool::new(false);
-    let film = pool.install(|| renderer.render(&job.camera, 7, true, &stop, &Silent)).unwrap().0;
+    let film = pool.install(|| renderer.render(&job.camera, 7, true, &stop, &())).unwrap().0;
     assert!(pool.broadcast(|_| floating_point_mode()).iter().all(|mode| *mode == before));
     film
 }
@@ -169,10 +167,8 @@ fn each_specialised_kernel_equals_the_one_with_everything_on() {
             [plan.mirror, plan.glass, plan.area_lights, plan.sky_light],
             [on(0), on(1), on(2), on(3)]
         );
-        let (film, counts) = render_scene(&scene, &job, plan);
-        // Everything but the sky rays: the scene says whether a visible sky also lights.
-        let everything = EffectPlan { sky_light: plan.sky_light, ..EffectPlan::EVERYTHING };
-        let (full, full_counts) = render_scene(&scene, &job, everything);
+        let (film, counts) = render_scene(&scene, &job);
+        let (full, full_counts) = render_with_every_effect(&scene, &job);
         assert!(film == full, "kernel {bits:04b} differs");
         assert_eq!(counts, full_counts, "kernel {bits:04b} casts other rays");
         let absent = [
@@ -191,11 +187,9 @@ fn camera_samples_do_not_depend_on_the_frame_but_shading_does() {
     let job = busy_job(64, 48);
     let scene = job.world.clone().into_scene(true).unwrap();
     let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
-    let plan = EffectPlan::of(&scene, &job.settings);
-    let renderer =
-        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
+    let renderer = Renderer::new(&scene, &job.settings, &*intersector);
     let stop = AtomicBool::new(false);
-    let frame = |n| renderer.render(&job.camera, n, true, &stop, &Silent).unwrap().0;
+    let frame = |n| renderer.render(&job.camera, n, true, &stop, &()).unwrap().0;
     let (one, two) = (frame(1), frame(2));
     assert!(one.gbuffer == two.gbuffer && one.rgb != two.rgb);
 }
@@ -205,10 +199,8 @@ fn a_stopped_frame_is_no_frame() {
     let job = busy_job(64, 48);
     let scene = job.world.clone().into_scene(true).unwrap();
     let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
-    let plan = EffectPlan::of(&scene, &job.settings);
-    let renderer =
-        Renderer { scene: &scene, settings: &job.settings, plan, intersector: &*intersector };
-    assert!(renderer.render(&job.camera, 1, true, &AtomicBool::new(true), &Silent).is_none());
+    let renderer = Renderer::new(&scene, &job.settings, &*intersector);
+    assert!(renderer.render(&job.camera, 1, true, &AtomicBool::new(true), &()).is_none());
 }
 
 #[test]

@@ -190,7 +190,7 @@ fn a_translated_scene_looks_the_same() {
 }
 
 #[test]
-fn senseless_rays_hit_nothing_and_are_counted() {
+fn invalid_rays_hit_nothing_and_are_counted() {
     let scene = tessellated_sphere();
     let intersector = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
     let good = Ray::new(DVec3::ZERO, DVec3::X);
@@ -268,15 +268,9 @@ fn of_coincident_faces_the_lowest_number_is_seen() {
         let job = job(world_of(copies), pose((2.0, 3.0, 4.0), (0.0, 0.0, 0.0)), 64, 64);
         let scene = job.world.clone().into_scene(true).unwrap();
         let embree = EmbreeIntersector::new(&scene, job.settings.rules, None, threads).unwrap();
-        let plan = tweenray::effects::EffectPlan::of(&scene, &job.settings);
-        let renderer = tweenray::shade::Renderer {
-            scene: &scene,
-            settings: &job.settings,
-            plan,
-            intersector: &embree,
-        };
+        let renderer = tweenray::shade::Renderer::new(&scene, &job.settings, &embree);
         let stop = std::sync::atomic::AtomicBool::new(false);
-        let (film, _) = renderer.render(&job.camera, 1, false, &stop, &common::Silent).unwrap();
+        let (film, _) = renderer.render(&job.camera, 1, false, &stop, &()).unwrap();
         film.rgb
     };
     let one = picture(1, 1);

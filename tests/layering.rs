@@ -1,15 +1,22 @@
 //! The rules of `docs/architecture.md` that a compiler does not check: a room imports only from
-//! lower floors, `unsafe` stays in its rooms, and only the command line prints.
+//! lower floors, files of one room import one another in no circle, a public type's name has one meaning,
+//! `unsafe` stays in its rooms, and only the command line prints.
 //!
 //! The floors are those that `src/lib.rs` states. This reads source text, not types: it sees paths
 //! that begin with `crate::` or climb to the crate's root with `super::`, in any file of `src`.
 
 mod layering {
+    pub mod circles;
     pub mod lexer;
+    pub mod modules;
+    pub mod names;
     pub mod rules;
+    pub mod use_tree;
 }
 
+use layering::modules::{Found, Modules};
 use layering::rules::{Floors, Source, violations};
+use layering::{circles, names};
 use std::path::{Path, PathBuf};
 
 #[test]
@@ -23,6 +30,37 @@ fn the_source_keeps_the_rules() {
     let sources: Vec<Source> = files.iter().map(|path| Source::read(path)).collect();
     let found = violations(&floors, &sources);
     assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+/// Uses that close a circle of imports and may stay, each with its reason.
+const ALLOWED_USES: [circles::Allowed; 0] = [];
+
+#[test]
+fn files_of_a_room_import_one_another_in_no_circle() {
+    let found = circles::violations(&source().uses, &ALLOWED_USES);
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+/// Names that several public types may have, each with its reason.
+const ALLOWED_NAMES: [names::Allowed; 0] = [];
+
+#[test]
+fn a_public_type_has_a_name_of_its_own() {
+    let found = names::violations(&source().types, &ALLOWED_NAMES);
+    assert!(found.is_empty(), "\n{}\n", found.join("\n"));
+}
+
+/// What the files of `src` define and use.
+fn source() -> Found {
+    let mut files = Vec::new();
+    rust_files(Path::new("src"), &mut files);
+    let read = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path).expect("a readable source file");
+        (path.to_string_lossy().into_owned(), text)
+    };
+    let texts: Vec<(String, String)> = files.iter().map(read).collect();
+    let texts: Vec<(&str, &str)> = texts.iter().map(|(p, t)| (p.as_str(), t.as_str())).collect();
+    Modules::read_texts(&texts)
 }
 
 /// All `.rs` files below `dir`.

@@ -17,7 +17,7 @@ use tweenray::film::Film;
 use tweenray::output::manifest::{FORMAT, Header};
 use tweenray::output::{FramePattern, WriteOptions};
 use tweenray::scene::{FrameRange, Settings};
-use tweenray::sequence::{self, FrameMaker, Made, Recipes, Shared, Target};
+use tweenray::sequence::{self, FrameGraph, FrameMaker, Made, RankMaker, Recipes, Target};
 use tweenray::stats::{RayCounts, ReuseCounts};
 
 /// First word of a rank's command line.
@@ -32,7 +32,7 @@ struct Lemon {
 }
 
 impl FrameMaker for Lemon {
-    fn make(&self, frame: u32) -> Result<Option<Made>> {
+    fn make(&self, frame: u32) -> Result<Made> {
         std::thread::sleep(Duration::from_millis(100));
         let is_due = (20..40).contains(&frame);
         match &*self.place {
@@ -42,17 +42,19 @@ impl FrameMaker for Lemon {
             "everywhere" => return Err(Error::Failed("all met a lemon".into())),
             _ => ((), ()),
         };
-        Ok(Some(Made {
+        Ok(Made {
             film: Film::new(SETTINGS.0, SETTINGS.1, false),
             rays: RayCounts::default(),
             reuse: ReuseCounts::default(),
             audit: None,
             reference: None,
-        }))
+        })
     }
 }
 
-impl Shared for Lemon {}
+impl FrameGraph for Lemon {}
+
+impl RankMaker for Lemon {}
 
 fn target(folder: &Path) -> Target {
     let settings = Settings { width: SETTINGS.0, height: SETTINGS.1, ..Settings::default() };

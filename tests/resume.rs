@@ -1,23 +1,27 @@
 //! References that an earlier run left on disk: read where they are whole and its own, made again where
 //! not, and in neither case does a frame differ.
 
+#[path = "common/says.rs"]
+mod says;
+
+use says::says;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use tweenray::effects::EffectPlan;
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect;
 use tweenray::output::manifest::{FORMAT, Header, manifest_path};
 use tweenray::output::{Format, FramePattern, WriteOptions};
 use tweenray::reuse;
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::reuse::store::Compatibility;
 use tweenray::scene::{FrameRange, Policy, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
 use tweenray::sequence::{
-    ColourMaker, FrameMaker, Pyramid, Recipes, Shared, SurfaceReuse, Target, prepare, render_frames,
+    ColourMaker, FrameContext, FrameGraph, FrameMaker, Pyramid, RankMaker, Recipes, SurfaceReuse,
+    Target, prepare, render_frames,
 };
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
@@ -59,10 +63,7 @@ struct Run {
 
 /// What makers are made of.
 struct Tools<'a> {
-    renderer: Renderer<'a>,
-    pool: &'a rayon::ThreadPool,
-    stop: &'a AtomicBool,
-    traced: &'a Traced,
+    context: FrameContext<'a>,
     checkpoints: &'a Checkpoints<'a>,
 }
 
@@ -113,11 +114,10 @@ impl Bed {
     fn process(&self, act: impl FnOnce(&mut SurfaceReuse, &Target, &Compatibility)) -> Run {
         self.with(|tools| {
             let pyramid = Pyramid { segment: 8, frames: 17 };
-            let Tools { renderer, pool, stop, traced, checkpoints } = tools;
-            let maker = SurfaceReuse::new(renderer, &self.shot, pool, stop, traced, pyramid);
-            let mut maker = maker.expect("cameras");
-            maker.with_gbuffer = self.ending == "exr";
-            maker.terms = maker.with_gbuffer.then(|| checkpoints.terms.clone());
+            let Tools { context, checkpoints } = tools;
+            let with_gbuffer = context.with_gbuffer;
+            let mut maker = SurfaceReuse::new(context, pyramid).expect("cameras");
+            maker.terms = with_gbuffer.then(|| checkpoints.terms.clone());
             maker.checkpoints = Some(checkpoints);
             act(&mut maker, checkpoints.target, checkpoints.terms);
             maker.notes()
@@ -127,10 +127,9 @@ impl Bed {
     /// As [`run`](Self::run), under policy `colour`.
     fn run_colour(&self, frames: &[u32], count: usize) -> Run {
         self.with(|tools| {
-            let rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
-            let Tools { renderer, pool, stop, traced, checkpoints } = tools;
-            let maker = ColourMaker::new(renderer, &self.shot, pool, stop, traced, rule, &[]);
-            let mut maker = maker.expect("no pictures");
+            let rule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+            let Tools { context, checkpoints } = tools;
+            let mut maker = ColourMaker::new(context, rule, &[]).expect("no pictures");
             maker.checkpoints = Some(checkpoints);
             maker.expect(frames);
             let (target, frames) = (checkpoints.target, &frames[..count]);
@@ -144,23 +143,24 @@ impl Bed {
         let target = self.target();
         let settings = &self.settings;
         let mut notes = prepare(&target, ALL).expect("ready").notes;
-        let plan = EffectPlan::of(&self.scene, settings);
-        let channels = reuse::channels(&self.scene, &plan, settings);
+        let channels = reuse::channels(&self.scene, settings);
         let terms = Compatibility::of("h", &channels, settings);
         let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
         let every = Some(Duration::ZERO);
         let checkpoints = Checkpoints::new(&target, every, &terms, self.scene.recentring, whole);
         let intersector = intersect::build(&self.scene, settings, 1).expect("a tree");
-        let renderer = Renderer { scene: &self.scene, settings, plan, intersector: &*intersector };
+        let renderer = Renderer::new(&self.scene, settings, &*intersector);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
         let (stop, traced) = (AtomicBool::new(false), Traced::default());
-        notes.extend(act(Tools {
+        let context = FrameContext {
             renderer,
+            shot: &self.shot,
             pool: &pool,
+            with_gbuffer: self.ending == "exr",
             stop: &stop,
-            traced: &traced,
-            checkpoints: &checkpoints,
-        }));
+            progress: &traced,
+        };
+        notes.extend(act(Tools { context, checkpoints: &checkpoints }));
         let frames = *traced.0.lock().expect("whole");
         Run { frames: frames.round(), notes }
     }
@@ -213,13 +213,13 @@ fn references_go_from_disk_to_other_ranks_without_a_ray() {
         let bed = killed(ending, None);
         let run = bed.process(|maker, _, terms| {
             maker.exchange = Some(terms.clone());
-            let found: Vec<u32> = (1..=17).filter(|f| maker.lies_on_disk(*f)).collect();
+            let found: Vec<u32> = (1..=17).filter(|f| maker.is_on_disk(*f)).collect();
             let mut expected = on_disk.to_vec();
             expected.sort_unstable();
             assert_eq!(found, expected);
             for frame in on_disk {
                 maker.hold(*frame);
-                assert!(maker.make_source(*frame).expect("read"));
+                maker.make_reference(*frame).expect("read");
                 let sent = maker.export(*frame).expect("bytes").bytes;
                 let file = fs::read(bed.reference(1)).unwrap_or_default();
                 assert!(*frame != 1 || file.is_empty() || file.ends_with(&sent));
@@ -253,8 +253,8 @@ fn missing_and_damaged_references_are_made_again() {
     flip(&bed.reference(9), length * 3 / 4);
     let run = bed.run(&[2], 1);
     assert_eq!(run.frames, 5.0);
-    assert!(run.notes.len() == 1 && run.notes[0].contains("0000009.reference"), "{:?}", run.notes);
-    assert!(run.notes[0].contains("is damaged; its frame is traced again"), "{:?}", run.notes);
+    let note = "0000009.reference … damaged";
+    assert!(run.notes.len() == 1 && says(&run.notes[0], note), "{:?}", run.notes);
     assert!(bed.frame(2) == whole);
     for at in [0, 40, 1500] {
         let bed = killed("png", None);
@@ -281,13 +281,12 @@ fn references_of_other_settings_are_refused_and_overwrite_removes_them() {
         let before = fs::read(&manifest).ok();
         bed.settings.seed = 7;
         let error = prepare(&bed.target(), ALL).expect_err("refused").to_string();
-        assert!(error.contains("seed was 0, now it is 7"), "{error}");
+        assert!(says(&error, "seed … 0 … 7"), "{error}");
         assert!(error.contains("2 references") && error.contains("--overwrite"), "{error}");
         assert!(bed.reference(1).exists() && fs::read(&manifest).ok() == before);
         let target = Target { overwrite: true, ..bed.target() };
         let notes = prepare(&target, ALL).expect("ready").notes;
-        assert!(notes[0].contains("removed 2 references"), "{notes:?}");
-        assert!(notes[0].contains("seed was 0, now it is 7"), "{notes:?}");
+        assert!(says(&notes[0], "removed 2 references … seed … 0 … 7"), "{notes:?}");
         assert!(!bed.reference(1).exists());
     }
 }
@@ -318,7 +317,7 @@ fn references_of_another_version_are_refused() {
     bytes[start.len()] = b'9';
     fs::write(bed.reference(9), bytes).expect("written");
     let error = prepare(&bed.target(), ALL).expect_err("refused").to_string();
-    assert!(error.contains("1 reference ") && error.contains("another version"), "{error}");
+    assert!(says(&error, "1 reference … version"), "{error}");
 }
 
 #[test]
@@ -327,7 +326,7 @@ fn references_of_another_move_are_removed_with_the_reason() {
     (1..=17).for_each(|f| _ = fs::remove_file(bed.path(&format!("f_{f:02}.png"))));
     bed.shot.vfov_degrees += 1.0;
     let notes = bed.run(&[2], 0).notes;
-    assert!(notes[0].contains("is of another camera move"), "{notes:?}");
+    assert!(says(&notes[0], "camera"), "{notes:?}");
     assert!(!bed.reference(1).exists());
 }
 
@@ -358,7 +357,7 @@ fn discoveries_of_policy_colour_are_read_or_made_again() {
         flip(&bed.reference(17), 1_000_000);
         let run = bed.run_colour(&[2], 1);
         assert_eq!(run.frames, 2.0);
-        assert!(run.notes[0].contains("is damaged"), "{:?}", run.notes);
+        assert!(says(&run.notes[0], "damaged"), "{:?}", run.notes);
         assert!(bed.frame(2) == whole.frame(2), "{ending}");
         let bed = killed();
         fs::remove_dir_all(bed.path(".f.references")).expect("removed");

@@ -175,7 +175,7 @@ fn a_cut_reuses_nothing_from_the_other_side() {
     let settings = set.settings((64, 64), 1, 64);
     let whole = stage.frames(&settings, &shot, &(1..=6).collect::<Vec<_>>());
     for (frame, made) in (1..).zip(&whole) {
-        let others = made.film.sources.as_ref().unwrap().iter().map(|s| s.frame);
+        let others = made.film.provenance.as_ref().unwrap().iter().map(|s| s.frame);
         let across = others.filter(|f| *f > 0 && (*f <= 3) != (frame <= 3)).count();
         assert_eq!(across, 0, "frame {frame}");
         assert!(frame == 1 || frame == 6 || made.reuse.direct_inferred > 1000);

@@ -1,4 +1,4 @@
-//! `verify` catches faults: rules switched off, and an intersector that lies.
+//! `verify` catches faults: rules switched off, and an intersector with faults.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,9 +7,9 @@ use rand_pcg::Pcg64;
 use std::sync::atomic::AtomicBool;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
 use tweenray::math::DVec3;
-use tweenray::scene::{CameraPath, Easing, HitRules, Pose, Recheck, Scene, Settings, Shot};
+use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot};
 use tweenray::stats::RayCounts;
-use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, Trial};
+use tweenray::verify::{Answers, Check, Class, Kind, RayId, Tally, TracedRay};
 
 #[path = "hard_cases/shapes.rs"]
 mod shapes;
@@ -18,7 +18,7 @@ mod shapes;
 fn shot() -> Shot {
     let (eye, target, up) = (DVec3::new(0.1, 0.2, 0.3), DVec3::X, DVec3::Y);
     let pose = Pose { eye, target, up, roll_degrees: 0.0 };
-    Shot { path: CameraPath::Still(pose), easing: Easing::Linear, frames: 1, vfov_degrees: 60.0 }
+    Shot::new(CameraPath::Still(pose), 1, 60.0)
 }
 
 fn sphere() -> Scene {
@@ -61,7 +61,7 @@ fn without_a_second_try_hits_are_missed() {
                 let (product, oracle) =
                     (product.intersect(&ray, counts), oracle.intersect(&ray, counts));
                 let difference =
-                    check.judge(&Trial { ray, answers: Answers::Hits { product, oracle } });
+                    check.judge(&TracedRay { ray, answers: Answers::Hits { product, oracle } });
                 if let Some(difference) = difference.filter(|d| !d.class.is_explained()) {
                     assert_eq!(difference.class, Class::Missed);
                     missed += 1;
@@ -84,7 +84,7 @@ fn without_the_recheck_distances_are_wrong() {
 
 /// What a lying intersector makes of the oracle's answers.
 #[derive(Clone, Copy)]
-enum Lie {
+enum Fault {
     Nothing,
     Neighbour,
     Nearer,
@@ -96,9 +96,9 @@ enum Lie {
 }
 
 /// The oracle, but for one ray in eight, or for the rays at vertices.
-struct Liar<'s>(Oracle<'s>, Lie);
+struct FaultyIntersector<'s>(Oracle<'s>, Fault);
 
-impl Liar<'_> {
+impl FaultyIntersector<'_> {
     /// What lies behind the vertex that the ray hits, if it is the outside of a ball.
     fn past_vertex(&self, ray: &Ray, hit: &Hit) -> Option<Hit> {
         let dir = ray.dir.normalize();
@@ -112,37 +112,37 @@ impl Liar<'_> {
         (at_vertex && shows_outside).then_some(behind)
     }
 
-    fn lies(ray: &Ray) -> bool {
+    fn is_faulty(ray: &Ray) -> bool {
         ray.dir.x.to_bits().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 61 == 0
     }
 }
 
-impl Intersector for Liar<'_> {
+impl Intersector for FaultyIntersector<'_> {
     fn intersect(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit> {
         let hit = self.0.intersect(ray, counts)?;
-        if let Lie::PastVertex = self.1 {
+        if let Fault::PastVertex = self.1 {
             return self.past_vertex(ray, &hit).or(Some(hit));
         }
-        if !Self::lies(ray) {
+        if !Self::is_faulty(ray) {
             return Some(hit);
         }
         match self.1 {
-            Lie::Nothing => None,
-            Lie::Neighbour => {
+            Fault::Nothing => None,
+            Fault::Neighbour => {
                 let count = [4680, 440][hit.prim.geom_id as usize];
                 let prim_id = (hit.prim.prim_id + count / 4) % count;
                 Some(Hit { prim: PrimRef { prim_id, ..hit.prim }, ..hit })
             }
-            Lie::Nearer => Some(Hit { t: hit.t * (1.0 - 1e-5), ..hit }),
-            Lie::Behind => self.0.all_hits(ray).get(1).map(|h| h.hit),
-            Lie::NotOccluded | Lie::Occluded | Lie::PastVertex => Some(hit),
+            Fault::Nearer => Some(Hit { t: hit.t * (1.0 - 1e-5), ..hit }),
+            Fault::Behind => self.0.all_hits(ray).get(1).map(|h| h.hit),
+            Fault::NotOccluded | Fault::Occluded | Fault::PastVertex => Some(hit),
         }
     }
 
     fn occluded(&self, ray: &Ray, counts: &mut RayCounts) -> bool {
-        match (self.1, Self::lies(ray)) {
-            (Lie::NotOccluded, true) => false,
-            (Lie::Occluded, true) => true,
+        match (self.1, Self::is_faulty(ray)) {
+            (Fault::NotOccluded, true) => false,
+            (Fault::Occluded, true) => true,
             _ => self.0.occluded(ray, counts),
         }
     }
@@ -164,22 +164,22 @@ impl Intersector for Liar<'_> {
     }
 }
 
-/// Each lie is told as what it is, and as nothing else that is unexplained.
+/// Each fault is counted in its own class, and in no other that is unexplained.
 #[test]
-fn lies_are_caught_and_named() {
+fn planted_faults_are_found_and_classified() {
     let inner = shapes::sphere(DVec3::new(0.3, 0.2, 0.1), 0.5, 20, 12);
     let mut world = shapes::world_of(shapes::sphere(DVec3::ZERO, 2.0, 60, 40));
     world.meshes.push(inner);
     let scene = world.into_scene(true).unwrap();
-    for (lie, class) in [
-        (Lie::Nothing, Class::Missed),
-        (Lie::Neighbour, Class::Phantom),
-        (Lie::Nearer, Class::WrongDistance),
-        (Lie::Behind, Class::Missed),
-        (Lie::NotOccluded, Class::ShadowLeak),
-        (Lie::Occluded, Class::FalseShadow),
+    for (fault, class) in [
+        (Fault::Nothing, Class::Missed),
+        (Fault::Neighbour, Class::Phantom),
+        (Fault::Nearer, Class::WrongDistance),
+        (Fault::Behind, Class::Missed),
+        (Fault::NotOccluded, Class::ShadowLeak),
+        (Fault::Occluded, Class::FalseShadow),
     ] {
-        let found = tally(&scene, &Liar(Oracle::new(&scene), lie), 512);
+        let found = tally(&scene, &FaultyIntersector(Oracle::new(&scene), fault), 512);
         assert!(found.count(class) > 10, "{class:?}: {found:?}");
         assert_eq!(found.unexplained(), found.count(class), "{class:?}: {found:?}");
         let row = found.rows().into_iter().find(|row| row.class == class).unwrap();
@@ -203,7 +203,7 @@ fn slipping_past_every_vertex_is_explained_but_fails() {
             triangles.for_each(|t| t.swap(1, 2));
         }
         let scene = world.into_scene(true).unwrap();
-        let found = tally(&scene, &Liar(Oracle::new(&scene), Lie::PastVertex), 8192);
+        let found = tally(&scene, &FaultyIntersector(Oracle::new(&scene), Fault::PastVertex), 8192);
         assert_eq!(found.unexplained(), 0, "{inwards}: {found:?}");
         assert_eq!(found.past_vertex_allowed(), 8);
         assert!(found.count(Class::PastVertex) > 100 && !found.passed(), "{inwards}: {found:?}");
@@ -222,7 +222,7 @@ fn slipping_past_vertices_of_an_open_mesh_has_a_class_of_its_own() {
     let mut world = shapes::world_of(outer);
     world.meshes.push(shapes::sphere(DVec3::ZERO, 1.5, 60, 40));
     let scene = world.into_scene(true).unwrap();
-    let found = tally(&scene, &Liar(Oracle::new(&scene), Lie::PastVertex), 4096);
+    let found = tally(&scene, &FaultyIntersector(Oracle::new(&scene), Fault::PastVertex), 4096);
     let slipped = found.count(Class::PastOpenVertex);
     assert_eq!((found.unexplained(), found.count(Class::PastVertex)), (0, 0), "{found:?}");
     assert!(slipped > 50, "{found:?}");
@@ -258,7 +258,7 @@ fn a_ray_on_the_border_of_a_mesh_may_go_by() {
             continue;
         }
         let answers = Answers::Hits { product: Some(behind.hit), oracle: Some(hits[0].hit) };
-        let difference = check.judge(&Trial { ray, answers }).unwrap();
+        let difference = check.judge(&TracedRay { ray, answers }).unwrap();
         assert_eq!(difference.class, Class::EdgeBand, "{share}: {difference:?}");
         told += 1;
     }

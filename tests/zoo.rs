@@ -13,9 +13,18 @@ use making::{FAMILIES, Settings, Specimen};
 
 const SEED: u64 = 1;
 
-/// Families, each with the camera samples of its pixels.
-const SCENES: [(&str, usize); 6] =
-    [("forest", 1), ("grating", 4), ("contact", 4), ("foliage", 1), ("mirrors", 1), ("cornell", 4)];
+/// Families, each with the camera samples of its pixels, and whether a lens blurs.
+const SCENES: [(&str, usize, bool); 9] = [
+    ("forest", 1, false),
+    ("grating", 4, false),
+    ("contact", 4, false),
+    ("foliage", 1, false),
+    ("mirrors", 1, false),
+    ("cornell", 4, false),
+    ("forest", 4, true),
+    ("contact", 1, true),
+    ("mirrors", 4, true),
+];
 
 #[test]
 fn inferred_tiles_are_no_worse_than_traced_ones() {
@@ -23,16 +32,20 @@ fn inferred_tiles_are_no_worse_than_traced_ones() {
     let plan = Plan { size: [96, 64], judged: 4, between_only: true, timed: false };
     let folder = tempfile::tempdir().expect("a folder to work in");
     let mut broken = String::new();
-    for (family, spp) in SCENES {
+    for (family, spp, has_lens) in SCENES {
         let index = FAMILIES.iter().position(|f| f.name == family).expect("a family");
-        let specimen = Specimen::new(SEED, index as u64, 4);
+        let mut specimen = Specimen::new(SEED, index as u64, 4);
+        if has_lens {
+            specimen = specimen.with_lens(SEED);
+        }
         let settings = Settings { spp, light: 16 };
-        let verdict = judge(&program, &specimen, settings, &plan, &folder.path().join(family))
-            .unwrap_or_else(|e| panic!("{family}: {e}"));
+        let verdict =
+            judge(&program, &specimen, settings, &plan, &folder.path().join(&specimen.name))
+                .unwrap_or_else(|e| panic!("{family}: {e}"));
         assert_eq!(verdict.frames.len(), 2, "{family}: frames 2 and 3 are judged");
         for frame in &verdict.frames {
             for tile in frame.tiles.iter().filter(|tile| !tile.keeps()) {
-                broken += &told(family, frame.frame, tile);
+                broken += &told(&specimen.name, frame.frame, tile);
             }
         }
     }

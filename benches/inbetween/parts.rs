@@ -1,12 +1,12 @@
 //! Where an in-between frame's time goes: the same frame, more of it each time.
 
 use super::cost::Bare;
-use super::moves::{self, Quiet, Set, Stage};
+use super::moves::{self, Set, Stage};
 use super::{Choice, support};
 use std::collections::BTreeMap;
 use support::Candidate;
-use tweenray::effects::EffectPlan;
-use tweenray::inference::{Channels, Inference, LookupBatch, Origin};
+use tweenray::film::{Provenance, ProvenanceKind};
+use tweenray::inference::{Channels, Inference, LookupBatch};
 use tweenray::output::{WriteOptions, write_image};
 use tweenray::reuse::{self, Lookup, Reference};
 use tweenray::scene::{Camera, Policy, Settings, Shot};
@@ -26,9 +26,9 @@ impl Inference for AllKnown {
         let (points, channels) = (batch.points.len(), batch.unshadowed.len());
         batch.ratios.clear();
         batch.ratios.resize(channels, 1.0);
-        batch.origins.clear();
-        let found = Origin { frame: 1, earlier: true, ..Origin::default() };
-        batch.origins.resize(points, found);
+        batch.provenance.clear();
+        let found = Provenance { kind: ProvenanceKind::Earlier, frame: 1, distance: 0.0 };
+        batch.provenance.resize(points, found);
     }
 }
 
@@ -63,8 +63,7 @@ struct Stand<'a> {
 impl<'a> Stand<'a> {
     /// Renders the frame's ancestors, each from its own.
     fn new(stage: &'a Stage<'a>, settings: &'a Settings, shot: &Shot) -> Self {
-        let plan = EffectPlan::of(&stage.set.scene, settings);
-        let channels = reuse::channels(&stage.set.scene, &plan, settings);
+        let channels = reuse::channels(&stage.set.scene, settings);
         let camera = |f: u32| shot.camera(f, settings.width, settings.height).expect("a camera");
         let rays = channels.iter().map(|channel| reuse::rays_of(channel, settings)).collect();
         let eye = camera(FRAME);
@@ -110,20 +109,14 @@ impl<'a> Stand<'a> {
     }
 
     fn render(&self, renderer: &Renderer, job: &FrameJob) -> Rendered {
-        let render = || renderer.render_job(job, &self.stage.stop, &Quiet);
+        let render = || renderer.render_job(job, &self.stage.stop, &());
         self.stage.pool.install(render).expect("not stopped")
     }
 
     /// Renders the frame without lights, to the depth `bounces`.
     fn unlit(&self, bounces: u32) {
         let settings = Settings { bounces, ..self.settings.clone() };
-        let plan = EffectPlan {
-            area_lights: false,
-            delta_lights: false,
-            sky_light: false,
-            ..EffectPlan::of(&self.stage.set.scene, &settings)
-        };
-        let renderer = Renderer { plan, ..self.stage.renderer(&settings) };
+        let renderer = self.stage.renderer(&settings).without_lights();
         let job = FrameJob { reuse: None, ..self.job(&self.camera, FRAME, None) };
         self.render(&renderer, &job);
     }

@@ -3,7 +3,9 @@
 use super::support::camera_rays::BLOCK;
 use super::support::{self, Candidate};
 use tweenray::embree::{CommittedScene, Packet, QueryFlags};
-use tweenray::intersect::{EmbreeIntersector, Facet, Intersector, Ray, SurfaceInteraction, Target};
+use tweenray::intersect::{
+    EmbreeIntersector, Intersector, PlaneError, Ray, RayEnd, SurfaceInteraction,
+};
 use tweenray::math::orthonormal_basis;
 use tweenray::sampling::{PixelSampler, QuadWarp, cosine_hemisphere, to_world};
 use tweenray::scene::{HitRules, Light, Recheck, Scene};
@@ -87,7 +89,7 @@ fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
     };
     let (warp, normal) = (QuadWarp::new(quad.corners), quad.normal());
     let [a, b, c, _] = quad.corners;
-    let facet = Facet::of(&[a, b, c]);
+    let plane_error = PlaneError::of(&[a, b, c]);
     let (mut area, mut sky) = (Vec::new(), Vec::new());
     for (k, (ray, hit)) in camera.iter().zip(&hits).enumerate() {
         let Some(hit) = hit.filter(|hit| hit.prim.geom_id == 0) else { continue };
@@ -97,7 +99,7 @@ fn shadow_rays(scene: &Scene, camera: &[Ray]) -> (Vec<Ray>, Vec<Ray>) {
         sampler.fill2(0, 0, &mut u);
         area.extend(u.map(|u| {
             let point = warp.point(u.map(f64::from));
-            si.spawn_to(&Target { point, normal, facet }, true)
+            si.spawn_to(&RayEnd { point, normal, plane_error }, true)
         }));
         sampler.fill2(0, 1, &mut u);
         let n = if si.is_outside(ray.dir) { -si.ng } else { si.ng };

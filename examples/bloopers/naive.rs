@@ -4,17 +4,11 @@ use super::Still;
 use super::picture::Picture;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::intersect::{self, Hit, Intersector, Ray, SurfaceInteraction};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{DirectionalLight, Light, Scene};
-use tweenray::shade::{Progress, Renderer};
+use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
-
-struct Silent;
-impl Progress for Silent {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
-}
 
 /// Our picture; with `test`, every hit must also pass the naive triangle test.
 pub fn render(still: &Still, test: Option<EpsilonTest>) -> Picture {
@@ -26,10 +20,9 @@ pub fn render(still: &Still, test: Option<EpsilonTest>) -> Picture {
         Some(naive) => naive,
         None => &*inner,
     };
-    let plan = EffectPlan::of(&scene, settings);
-    let renderer = Renderer { scene: &scene, settings, plan, intersector };
+    let renderer = Renderer::new(&scene, settings, intersector);
     let stop = AtomicBool::new(false);
-    let (film, _) = renderer.render(&still.camera, 1, false, &stop, &Silent).unwrap();
+    let (film, _) = renderer.render(&still.camera, 1, false, &stop, &()).unwrap();
     Picture { width: film.width, height: film.height, rgb: film.rgb }
 }
 

@@ -13,18 +13,19 @@ mod shots;
 use picture::{by_difference, hit_or_traced, painted, save_grid};
 use shots::{FRAMES, Filmed};
 use std::path::Path;
-use tweenray::film::{Encoding, Film, Image, PixelSource, Provenance};
+use tweenray::film::{Encoding, Film, Image, Provenance, ProvenanceKind};
 use tweenray::measure::{mse, psnr};
-use tweenray::reuse::colour::{Rule, distance_difference};
+use tweenray::reuse::colour::{AgreementRule, distance_difference};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/pictures");
 /// A frame well between any two samples of the figures.
 const FRAME: u32 = 7;
 /// That of `--policy colour`.
-const USUAL: Rule = Rule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
+const USUAL: AgreementRule = AgreementRule { colour_epsilon: 0.02, distance_epsilon: 0.02 };
 /// What the paper's figures show is made by larger ones.
-const LENIENT: Rule = Rule { colour_epsilon: 0.1, distance_epsilon: 0.2 };
-const NO_COLOUR: Rule = Rule { colour_epsilon: f32::INFINITY, distance_epsilon: 0.2 };
+const LENIENT: AgreementRule = AgreementRule { colour_epsilon: 0.1, distance_epsilon: 0.2 };
+const NO_COLOUR: AgreementRule =
+    AgreementRule { colour_epsilon: f32::INFINITY, distance_epsilon: 0.2 };
 
 fn main() {
     let mesh = match std::env::args().nth(1) {
@@ -51,15 +52,15 @@ fn save(name: &str, columns: u32, panels: &[Film]) {
 fn measured(name: &str, truth: &Film, film: Film) -> Film {
     let shown = |film| Image::of_film(film).clipped(Encoding::Srgb);
     let db = psnr(mse(&shown(truth), &shown(&film)));
-    let sources = film.sources.as_deref();
-    let traced = |s: &[PixelSource]| s.iter().filter(|s| is_traced(s)).count() as f64;
+    let sources = film.provenance.as_deref();
+    let traced = |s: &[Provenance]| s.iter().filter(|s| is_traced(s)).count() as f64;
     let share = sources.map_or(1.0, |s| traced(s) / s.len() as f64);
     println!("  {name:<52} {db:5.1} dB  {:5.1} %", 100.0 * share);
     film
 }
 
-fn is_traced(source: &PixelSource) -> bool {
-    source.provenance == Provenance::Traced
+fn is_traced(source: &Provenance) -> bool {
+    source.kind == ProvenanceKind::Traced
 }
 
 /// Figures 3 and 4: where the distance differs from the first sample's; what is traced again.
@@ -69,7 +70,7 @@ fn distances(spheres: &Filmed) {
     let differences =
         painted(&frame, |i| by_difference(distance_difference(depth(&first, i), depth(&frame, i))));
     let lenient = spheres.colour(FRAME, LENIENT, &[]);
-    let sources = lenient.sources.as_ref().unwrap();
+    let sources = lenient.provenance.as_ref().unwrap();
     let traced =
         painted(&lenient, |i| hit_or_traced(&sources[i]).filter(|_| is_traced(&sources[i])));
     save("figure-3-4-distances", 2, &[differences, traced]);
@@ -86,7 +87,7 @@ fn uploads(spheres: &Filmed, truth: &Film) {
     let none = measured("figure 5: colour, none", truth, spheres.colour(FRAME, LENIENT, &[]));
     let ours = measured("figure 5: surface", truth, spheres.surface(FRAME));
     let traced = measured("figure 5: every pixel traced", truth, spheres.traced(FRAME));
-    let sources = none.sources.clone().unwrap();
+    let sources = none.provenance.clone().unwrap();
     let map = painted(&none, |i| hit_or_traced(&sources[i]).filter(|_| is_traced(&sources[i])));
     save("figure-5-uploads", 3, &[traced, three, one, none, map, ours]);
 }
@@ -95,14 +96,14 @@ fn uploads(spheres: &Filmed, truth: &Film) {
 fn hits(spheres: &Filmed, truth: &Film) {
     let colour = measured("figure 6: colour", truth, spheres.colour(FRAME, USUAL, &[]));
     let surface = measured("figure 6: surface", truth, spheres.surface(FRAME));
-    let sources = colour.sources.as_ref().unwrap();
+    let sources = colour.provenance.as_ref().unwrap();
     // Where first and last frame agree, no frame between is ever traced.
-    let middle = spheres.colour(FRAMES.div_ceil(2), USUAL, &[]).sources.unwrap();
-    let map = painted(&colour, |i| match middle[i].provenance {
-        Provenance::Both => None,
+    let middle = spheres.colour(FRAMES.div_ceil(2), USUAL, &[]).provenance.unwrap();
+    let map = painted(&colour, |i| match middle[i].kind {
+        ProvenanceKind::Both => None,
         _ => hit_or_traced(&sources[i]),
     });
-    let sources = surface.sources.clone().unwrap_or_default();
+    let sources = surface.provenance.clone().unwrap_or_default();
     let ours = painted(&surface, |i| sources.get(i).and_then(hit_or_traced));
     save("figure-6-hits", 2, &[colour, map, surface, ours]);
 }

@@ -1,7 +1,7 @@
 //! Panels in a grid, and what is painted over them.
 
 use std::path::Path;
-use tweenray::film::{Film, PixelSource, Provenance};
+use tweenray::film::{Film, Provenance, ProvenanceKind};
 use tweenray::math::Rgb;
 use tweenray::output::{WriteOptions, write_image};
 use tweenray::scene::Settings;
@@ -45,11 +45,11 @@ pub fn painted(film: &Film, paint: impl Fn(usize) -> Paint) -> Film {
 }
 
 /// Figure 6's colours: re-traced pink, taken from the cache red.
-pub fn hit_or_traced(source: &PixelSource) -> Paint {
-    match source.provenance {
-        Provenance::Background => None,
-        Provenance::Traced => Some(PINK),
-        Provenance::Earlier | Provenance::Later | Provenance::Both => Some(RED),
+pub fn hit_or_traced(source: &Provenance) -> Paint {
+    match source.kind {
+        ProvenanceKind::Background => None,
+        ProvenanceKind::Traced => Some(PINK),
+        ProvenanceKind::Earlier | ProvenanceKind::Later | ProvenanceKind::Both => Some(RED),
     }
 }
 

@@ -2,18 +2,16 @@
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::{Film, Image};
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect::{self, Intersector};
 use tweenray::math::{DVec3, Rgb};
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
+    CameraPath, Light, Material, QuadLight, Scene, Settings, Shot, Sky, World, WorldMesh,
 };
-use tweenray::sequence::{ColourMaker, FrameMaker, Pyramid, SurfaceReuse};
-use tweenray::shade::{Progress, Renderer};
-use tweenray::stats::RayCounts;
+use tweenray::sequence::{ColourMaker, FrameContext, FrameMaker, Pyramid, SurfaceReuse};
+use tweenray::shade::Renderer;
 
 /// Frames of each move.
 pub const FRAMES: u32 = 17;
@@ -26,11 +24,6 @@ pub struct Filmed {
     settings: Settings,
     shot: Shot,
     pool: rayon::ThreadPool,
-}
-
-struct Silent;
-impl Progress for Silent {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 /// The paper's test scene under a lamp so bright that shadows show, and a pan close by.
@@ -75,7 +68,7 @@ pub fn rabbit(mesh: WorldMesh) -> Filmed {
 
 fn pan(from: DVec3, to: DVec3, target: DVec3) -> Shot {
     let path = CameraPath::Pan { from, to, target, up: DVec3::Y, roll_degrees: 0.0 };
-    Shot { path, easing: Easing::Linear, frames: FRAMES, vfov_degrees: 36.0 }
+    Shot::new(path, FRAMES, 36.0)
 }
 
 impl Filmed {
@@ -88,21 +81,30 @@ impl Filmed {
     }
 
     /// The paper's policy, `uploads` taken for frames.
-    pub fn colour(&self, frame: u32, rule: Rule, uploads: &[(u32, Image)]) -> Film {
+    pub fn colour(&self, frame: u32, rule: AgreementRule, uploads: &[(u32, Image)]) -> Film {
         let intersector = self.intersector();
-        let (renderer, stop) = (self.renderer(&self.settings, &*intersector), no_stop());
-        let maker =
-            ColourMaker::new(renderer, &self.shot, &self.pool, &stop, &Silent, rule, uploads);
-        maker.unwrap().make(frame).unwrap().unwrap().film
+        let stop = no_stop();
+        let maker = ColourMaker::new(self.context(&*intersector, &stop), rule, uploads);
+        maker.unwrap().make(frame).unwrap().film
     }
 
     /// Ours.
     pub fn surface(&self, frame: u32) -> Film {
         let intersector = self.intersector();
-        let (renderer, stop) = (self.renderer(&self.settings, &*intersector), no_stop());
+        let stop = no_stop();
         let pyramid = Pyramid { segment: self.settings.reuse.segment, frames: FRAMES };
-        let maker = SurfaceReuse::new(renderer, &self.shot, &self.pool, &stop, &Silent, pyramid);
-        maker.unwrap().make(frame).unwrap().unwrap().film
+        let maker = SurfaceReuse::new(self.context(&*intersector, &stop), pyramid);
+        maker.unwrap().make(frame).unwrap().film
+    }
+
+    fn context<'a>(
+        &'a self,
+        intersector: &'a dyn Intersector,
+        stop: &'a AtomicBool,
+    ) -> FrameContext<'a> {
+        let (shot, pool, with_gbuffer, progress) = (&self.shot, &self.pool, false, &());
+        let renderer = self.renderer(&self.settings, intersector);
+        FrameContext { renderer, shot, pool, with_gbuffer, stop, progress }
     }
 
     /// Every pixel traced at the same settings; with first-hit records.
@@ -119,7 +121,7 @@ impl Filmed {
         let camera = self.shot.camera(frame, WIDTH, HEIGHT).unwrap();
         let intersector = self.intersector();
         let (renderer, stop) = (self.renderer(settings, &*intersector), no_stop());
-        let render = || renderer.render(&camera, frame, true, &stop, &Silent);
+        let render = || renderer.render(&camera, frame, true, &stop, &());
         self.pool.install(render).unwrap().0
     }
 
@@ -133,8 +135,7 @@ impl Filmed {
         settings: &'a Settings,
         intersector: &'a dyn Intersector,
     ) -> Renderer<'a> {
-        let plan = EffectPlan::of(&self.scene, settings);
-        Renderer { scene: &self.scene, settings, plan, intersector }
+        Renderer::new(&self.scene, settings, intersector)
     }
 }
 

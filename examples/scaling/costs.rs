@@ -1,7 +1,7 @@
 //! What frames and messages take, as measured.
 
 use crate::real::{Line, Ran, Stage};
-use tweenray::cluster::simulation::{Model, SchedulerCost};
+use tweenray::cluster::simulation::{CostModel, SchedulerCost};
 use tweenray::sequence::Pyramid;
 
 /// What is given, not measured: a cluster whose nodes have 64 ranks and 100 Gbit/s each.
@@ -106,8 +106,8 @@ impl Costs {
         move |frame| frames[frame as usize - 1]
     }
 
-    pub fn model<'a>(&self, seconds: &'a dyn Fn(u32) -> f64) -> Model<'a> {
-        Model {
+    pub fn model<'a>(&self, seconds: &'a dyn Fn(u32) -> f64) -> CostModel<'a> {
+        CostModel {
             seconds,
             write_seconds: self.write_seconds,
             pack_seconds: self.pack_seconds,

@@ -2,7 +2,7 @@
 
 use crate::costs::Costs;
 use crate::real::{Line, Ran, Stage};
-use tweenray::cluster::simulation::{Job, Model};
+use tweenray::cluster::simulation::{CostModel, Job};
 use tweenray::sequence::Pyramid;
 
 const SHOT: Pyramid = Pyramid { segment: 16, frames: 65 };
@@ -96,7 +96,7 @@ fn fit_rank_seconds(costs: &Costs, rows: &[Row]) -> f64 {
 fn say(costs: &Costs, cores: f64, rank_seconds: f64, ranks: u32) -> Said {
     let seconds = costs.as_measured();
     let share = if ranks == 1 { None } else { Some(cores) };
-    let model = Model { cores: share, ..costs.model(&seconds) };
+    let model = CostModel { cores: share, ..costs.model(&seconds) };
     let job = Job { pyramid: SHOT, most_strips: strips(300), sends_to_all: false };
     let run = job.simulate(ranks, &model);
     let own = if ranks == 1 { 0.0 } else { rank_seconds * f64::from(ranks) };

@@ -4,7 +4,7 @@ use crate::costs::Costs;
 use crate::fit::strips;
 use crate::real::{Line, Stage};
 use std::time::Instant;
-use tweenray::cluster::simulation::{Job, Model, SchedulerCost, SimulatedRun};
+use tweenray::cluster::simulation::{CostModel, Job, SchedulerCost, SimulatedRun};
 use tweenray::sequence::Pyramid;
 
 pub const FRAMES: u32 = 262_144;
@@ -73,7 +73,7 @@ pub fn simulate(costs: &Costs, ranks: u32, change: Change) -> (f64, SimulatedRun
     let seconds = costs.seconds(shot, change.swing);
     let plain = costs.model(&seconds);
     let bytes = if change.sends_to_all { costs.discovery_bytes } else { plain.reference_bytes };
-    let model = Model {
+    let model = CostModel {
         reference_bytes: bytes,
         latency: plain.latency * change.latency,
         bandwidth: plain.bandwidth * change.bandwidth,

@@ -43,6 +43,10 @@ fn run(options: &Options) -> Result<bool, Failure> {
     println!("{}", telling::HEAD);
     for index in options.indices()? {
         let specimen = Specimen::new(options.seed, index, options.frames);
+        let specimen = match options.lens {
+            true => specimen.with_lens(options.seed),
+            false => specimen,
+        };
         let settings = options.settings.unwrap_or(specimen.settings);
         let place = folder.join(format!("{index:04}"));
         let verdict = judge(&program, &specimen, settings, &options.plan(), &place)?;

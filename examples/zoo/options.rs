@@ -31,6 +31,9 @@ pub struct Options {
     /// Only scenes of these families
     #[arg(long, value_delimiter = ',')]
     families: Vec<String>,
+    /// Gives every camera a random thin lens
+    #[arg(long)]
+    pub lens: bool,
     /// Only the scene of this index
     #[arg(long)]
     only: Option<u64>,

@@ -4,7 +4,7 @@ use super::choice::Goal;
 use super::effort::Effort;
 use super::figures::{figure, squared_errors};
 use super::predictor::{Prediction, Predictor};
-use super::probe::{Probe, reference, samples_of_reference};
+use super::probe::{SettingsProbe, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
@@ -23,7 +23,7 @@ pub struct CheckedFrame {
 
 /// The errors that were found in all frames looked at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Check {
+pub struct CheckOutcome {
     /// One for each frame looked at.
     pub frames: Vec<CheckedFrame>,
     /// The goal's figure of the worst frame, as [`Goal::largest`] has it.
@@ -41,14 +41,14 @@ pub enum Verdict {
     Missed,
 }
 
-impl Check {
+impl CheckOutcome {
     /// Compares some finished frames, rendered with the settings of `prediction`, with a reference, at
     /// other pixels than the probe's and as many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
     /// As [`TrialContext::trace`](super::context::TrialContext::trace), and any that `image` gives.
     pub fn of(
-        probe: &Probe,
+        probe: &SettingsProbe,
         predictor: &Predictor,
         prediction: &Prediction,
         effort: Effort,
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_goal_is_missed_by_a_frame_beyond_doubt() {
-        let check = |errors: &[f64]| Check {
+        let check = |errors: &[f64]| CheckOutcome {
             frames: errors
                 .iter()
                 .map(|e| CheckedFrame { frame: 1, squared_error: *e, doubt: 0.2 })

@@ -1,9 +1,10 @@
 //! Which setting of a measured sweep to recommend for an error or for a time.
 
 use super::errors::Errors;
+use super::errors::ROUNDING;
 use super::knobs::Knob;
-use super::predictor::ROUNDING;
-use super::table::{Measured, Row};
+use super::row::CandidateRow;
+use super::table::Measured;
 use crate::measure::psnr;
 
 /// An error that frames must not exceed.
@@ -76,9 +77,9 @@ impl Goal {
 /// The setting to recommend for `goal`: the fastest that reached it, among those that may be recommended.
 /// Where the default reached it, another setting is recommended only if it is surely faster, beyond the
 /// spread of the turns; none is where there were too few turns.
-pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
+pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&CandidateRow> {
     let default_reaches = goal.is_met(&measured.default_row().errors);
-    let is_surely_faster = |row: &Row| {
+    let is_surely_faster = |row: &CandidateRow| {
         row.time_ratio.is_some_and(|r| r.differs_from(1.0) && r.interval.estimate < 1.0)
     };
     let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
@@ -89,29 +90,33 @@ pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&Row> {
 
 /// Of the settings that may be faster than `found`, the one recommended for `goal`, but were timed in too
 /// few turns to be sure, the one with the shortest time estimated.
-pub fn perhaps_faster<'m>(measured: &'m Measured, goal: Goal, found: &Row) -> Option<&'m Row> {
+pub fn perhaps_faster<'m>(
+    measured: &'m Measured,
+    goal: Goal,
+    found: &CandidateRow,
+) -> Option<&'m CandidateRow> {
     let reach = recommendable(measured).filter(|row| goal.is_met(&row.errors));
     let faster = reach.filter(|row| seconds(row) < seconds(found) && is_by_few_turns(row));
     faster.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
 }
 
 /// Whether `row` was timed in too few turns to be sure of any difference from the default's time.
-fn is_by_few_turns(row: &Row) -> bool {
+fn is_by_few_turns(row: &CandidateRow) -> bool {
     row.knob != Knob::Default && row.time_ratio.is_none_or(|ratio| !ratio.is_sure())
 }
 
 /// The setting nearest to the truth that took at most `most` seconds a frame, among those that may be
 /// recommended.
-pub fn best_within(measured: &Measured, most: f64) -> Option<&Row> {
+pub fn best_within(measured: &Measured, most: f64) -> Option<&CandidateRow> {
     let within = recommendable(measured).filter(|row| seconds(row) <= most);
     within.min_by(|a, b| a.errors.mse.total_cmp(&b.errors.mse))
 }
 
-fn recommendable(measured: &Measured) -> impl Iterator<Item = &Row> {
+fn recommendable(measured: &Measured) -> impl Iterator<Item = &CandidateRow> {
     measured.rows.iter().filter(|row| row.knob.is_ranked())
 }
 
-fn seconds(row: &Row) -> f64 {
+fn seconds(row: &CandidateRow) -> f64 {
     row.seconds.median.interval.estimate
 }
 
@@ -128,7 +133,7 @@ mod tests {
             (Knob::Tolerance, "--tolerance 0.5", 1.3, 1.2),
             (Knob::Retry, "--retry off", 0.1, 0.1),
         ]);
-        let options = |row: Option<&Row>| row.map(|row| row.options.clone());
+        let options = |row: Option<&CandidateRow>| row.map(|row| row.options.clone());
         let psnr = |steps: f64| crate::measure::psnr((steps / 255.0) * (steps / 255.0)) - 1e-9;
         let fastest = |goal| options(fastest_reaching(&measured, goal));
         assert_eq!(fastest(Goal::Psnr(psnr(2.0))), Some(String::new()));

@@ -2,12 +2,11 @@
 //! setting is traced with.
 
 use super::errors::displayed;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::intersect::{self, Intersector};
 use crate::scene::{Scene, Settings, Shot};
-use crate::shade::{Progress, Renderer};
+use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
@@ -68,20 +67,12 @@ impl<'a> TrialContext<'a> {
         intersector: &dyn Intersector,
         frame: u32,
     ) -> Result<(Image, RayCounts)> {
-        let plan = EffectPlan::of(self.scene, settings);
-        let renderer = Renderer { scene: self.scene, settings, plan, intersector };
+        let renderer = Renderer::new(self.scene, settings, intersector);
         let camera = self.shot.camera(frame, settings.width, settings.height)?;
         let render = || {
-            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &NoProgress)?;
+            let (film, rays) = renderer.render(&camera, frame, false, self.stop, &())?;
             Some((displayed(&film, settings), rays))
         };
         self.pool.install(render).ok_or(Error::Stopped)
     }
-}
-
-/// Progress of tiles that nobody watches.
-pub struct NoProgress;
-
-impl Progress for NoProgress {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }

@@ -22,7 +22,7 @@ const LIGHT: f64 = 1.4;
 
 /// Samples of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Samples {
+pub struct SampleCounts {
     /// Camera samples.
     pub spp: u32,
     /// Shadow samples of each camera sample, per light.
@@ -55,9 +55,9 @@ pub struct ErrorModel {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleErrors {
     /// The samples.
-    pub samples: Samples,
+    pub samples: SampleCounts,
     /// Samples of the reference that the frames were compared with.
-    pub reference: Samples,
+    pub reference: SampleCounts,
     /// The mean squared difference of each frame from the reference, in squares of a display step.
     pub errors: Vec<f64>,
 }
@@ -73,7 +73,7 @@ fn falls(count: u32, power: f64) -> f64 {
 }
 
 /// What each amplitude is multiplied with.
-fn regressors(sources: NoiseSources, s: Samples) -> Amplitudes {
+fn regressors(sources: NoiseSources, s: SampleCounts) -> Amplitudes {
     let light = |is_there: bool, count: u32| match is_there {
         true => falls(s.spp, CAMERA.1) * falls(count, LIGHT),
         false => 0.0,
@@ -102,14 +102,14 @@ impl ErrorModel {
     }
 
     /// The squared error of each frame with `samples`, in squares of a display step.
-    pub fn errors(&self, samples: Samples) -> impl Iterator<Item = f64> + '_ {
+    pub fn errors(&self, samples: SampleCounts) -> impl Iterator<Item = f64> + '_ {
         let row = regressors(self.sources, samples);
         self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
     }
 
     /// Which share of the squared difference between frames of `samples` and of `reference` is the error of
     /// the former.
-    pub fn own_part(&self, samples: Samples, reference: Samples) -> f64 {
+    pub fn own_part(&self, samples: SampleCounts, reference: SampleCounts) -> f64 {
         let [own, of_reference] = [samples, reference].map(|s| self.errors(s).sum::<f64>());
         if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
@@ -119,10 +119,10 @@ impl ErrorModel {
 mod tests {
     use super::*;
 
-    const REFERENCE: Samples = Samples { spp: 128, shadow: 16, sky: 16 };
+    const REFERENCE: SampleCounts = SampleCounts { spp: 128, shadow: 16, sky: 16 };
     const LIT: NoiseSources = NoiseSources { shadow: true, sky: true };
 
-    fn truth(s: Samples, scale: f64) -> f64 {
+    fn truth(s: SampleCounts, scale: f64) -> f64 {
         let (n, m, k) = (f64::from(s.spp), f64::from(s.shadow), f64::from(s.sky));
         let light = n.powf(-1.0) * (7.0 * m.powf(-1.5) + 3.0 * k.powf(-1.3));
         scale * (20.0 * n.powf(-1.4) + light)
@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn a_short_sweep_predicts_settings_that_were_not_in_it() {
         let point = |(i, (spp, shadow, sky)): (usize, (u32, u32, u32))| {
-            let s = Samples { spp, shadow, sky };
+            let s = SampleCounts { spp, shadow, sky };
             let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];
             let error = |scale: f64| (truth(s, scale) + truth(REFERENCE, scale)) * off;
             SampleErrors { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
@@ -143,13 +143,13 @@ mod tests {
         let points: Vec<SampleErrors> = design.into_iter().enumerate().map(point).collect();
         let model = ErrorModel::of(LIT, &points);
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
-            let s = Samples { spp, shadow, sky };
+            let s = SampleCounts { spp, shadow, sky };
             for (error, scale) in model.errors(s).zip([1.0, 2.0]) {
                 let ratio = error / truth(s, scale);
                 assert!((0.6..1.6).contains(&ratio), "{s:?}: {ratio}");
             }
         }
-        let part = model.own_part(Samples { spp: 16, ..REFERENCE }, REFERENCE);
+        let part = model.own_part(SampleCounts { spp: 16, ..REFERENCE }, REFERENCE);
         assert!((0.85..0.98).contains(&part), "{part}");
     }
 
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn a_source_that_is_not_there_has_no_part() {
         let point = |spp: u32| {
-            let s = Samples { spp, shadow: 16, sky: 16 };
+            let s = SampleCounts { spp, shadow: 16, sky: 16 };
             let falls = |spp: u32| f64::from(spp).powf(-1.3);
             let errors = vec![9.0 * (falls(spp) + falls(128))];
             SampleErrors { samples: s, reference: REFERENCE, errors }
@@ -178,7 +178,7 @@ mod tests {
         let dark = NoiseSources { shadow: false, sky: false };
         let model = ErrorModel::of(dark, &[point(1), point(4), point(16)]);
         let error =
-            |shadow| model.errors(Samples { spp: 8, shadow, sky: 1 }).next().expect("a frame");
+            |shadow| model.errors(SampleCounts { spp: 8, shadow, sky: 1 }).next().expect("a frame");
         assert!((error(1) - 9.0 * 8f64.powf(-1.3)).abs() < 0.02, "{model:?}");
         assert_eq!(error(1), error(64));
     }

@@ -1,4 +1,4 @@
-//! Errors of frames against a reference.
+//! How far frames are off, in figures.
 
 use super::frames::Cut;
 use crate::error::Result;
@@ -14,20 +14,23 @@ use std::collections::BTreeMap;
 /// Frames by number, as displayed: sRGB code values, not rounded.
 pub type Frames = BTreeMap<u32, Image>;
 
-/// `film` with exposure and tone curve: sRGB code values.
+/// What rounding to 8 bits adds to a squared error, display steps.
+pub const ROUNDING: f64 = 1.0 / 12.0;
+
+/// The film as it is displayed.
 pub fn displayed(film: &Film, settings: &Settings) -> Image {
     let rgb = displayed_rgb(&film.rgb, settings);
     Image { width: film.width, height: film.height, rgb, encoding: Encoding::Srgb }
 }
 
-/// Linear radiance with exposure and tone curve: sRGB code values.
+/// Radiance as it is displayed.
 pub fn displayed_rgb(rgb: &[Rgb], settings: &Settings) -> Vec<Rgb> {
     let display = Display { exposure: settings.exposure, tone: settings.tone };
     let code = |c: &Rgb| Rgb::from_array(display.code(*c).map(|v| v as f32));
     rgb.par_iter().map(code).collect()
 }
 
-/// Errors of a setting's frames against the reference; means over the move.
+/// How far the frames of a setting are off from the reference; means over the move.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Errors {
     /// Mean squared error of display values in [0, 1].
@@ -42,13 +45,13 @@ pub struct Errors {
     pub flip: f64,
     /// Share of pixels that some channel is off by more than 2 display steps.
     pub share_over_2: f64,
-    /// Flicker: the root mean square of how the error changes from a frame to the next, in display
-    /// steps. `None` where no two neighbouring frames were looked at.
+    /// Root mean square of how the error changes from a frame to the next, display steps: what
+    /// flickers. `None` where no two frames that follow one another were looked at.
     pub flicker: Option<f64>,
 }
 
 impl Errors {
-    /// Errors of `frames` against `truth`, which has all of them; the kinds of frames weigh as `cut` says.
+    /// Of `frames` against `truth`, which has them all; weighed as `cut` says.
     ///
     /// # Errors
     /// As [`compare`]: sizes that differ.
@@ -75,7 +78,7 @@ impl Errors {
         })
     }
 
-    /// The mean of several; of root mean squares the squares are averaged.
+    /// The mean of several; squared errors are averaged, roots taken of them.
     pub fn mean(all: &[Self]) -> Self {
         let n = all.len().max(1) as f64;
         let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / n;
@@ -93,7 +96,7 @@ impl Errors {
     }
 }
 
-/// [`Errors::flicker`] over all pairs of neighbouring frames.
+/// Over all pairs of frames that follow one another: how much the error changes.
 fn flicker(truth: &Frames, frames: &Frames) -> Option<f64> {
     let mut squares = Vec::new();
     for (frame, image) in frames {

@@ -1,13 +1,14 @@
-//! The Pareto front: the settings that no other beats in both time and error.
+//! The settings that nothing beats in both time and error.
 
 use super::knobs::Knob;
-use super::table::{Row, Spread};
+use super::row::{CandidateRow, Spread};
 use crate::measure::{Median, median};
 
-/// Indices of the rows on the front, by `time`, the fastest first. Only rows that may be recommended are
-/// on it. The default leaves it only for a row that surely beats it and whose pixels differ. Of two
-/// neighbours on the front whose difference in time or in error is noise, only the better one stays.
-pub fn of(rows: &[Row], time: fn(&Row) -> &Spread) -> Vec<usize> {
+/// The rows on the front, by `time`, the fastest first: those that may be recommended and that no other
+/// such row beats; the default only by what surely beats it, and never by what has its pixels. Of two
+/// neighbours on it, of which the one is not surely faster or the other not surely nearer to the truth,
+/// only the better one stays: the difference is noise.
+pub fn of(rows: &[CandidateRow], time: fn(&CandidateRow) -> &Spread) -> Vec<usize> {
     let seconds = |k: &usize| time(&rows[*k]).median.interval.estimate;
     let mut front: Vec<usize> = (0..rows.len()).filter(|k| is_unbeaten(rows, time, *k)).collect();
     front.sort_by(|a, b| seconds(a).total_cmp(&seconds(b)));
@@ -18,17 +19,17 @@ pub fn of(rows: &[Row], time: fn(&Row) -> &Spread) -> Vec<usize> {
     front
 }
 
-fn is_unbeaten(rows: &[Row], time: fn(&Row) -> &Spread, k: usize) -> bool {
-    let place = |row: &Row| (time(row).median.interval.estimate, row.errors.mse);
+fn is_unbeaten(rows: &[CandidateRow], time: fn(&CandidateRow) -> &Spread, k: usize) -> bool {
+    let place = |row: &CandidateRow| (time(row).median.interval.estimate, row.errors.mse);
     let row = &rows[k];
     let (seconds, mse) = place(row);
     // Whether `a` is surely less than `b`, in turns.
     let surely = |a: &[f64], b: &[f64]| {
         compared(a, b).is_some_and(|r| r.differs_from(1.0) && r.interval.estimate < 1.0)
     };
-    let faster = |a: &Row, b: &Row| surely(&time(a).turns, &time(b).turns);
-    let nearer = |a: &Row, b: &Row| surely(&a.rmse_of_turns, &b.rmse_of_turns);
-    let beats = |(i, other): (usize, &Row)| {
+    let faster = |a: &CandidateRow, b: &CandidateRow| surely(&time(a).turns, &time(b).turns);
+    let nearer = |a: &CandidateRow, b: &CandidateRow| surely(&a.rmse_of_turns, &b.rmse_of_turns);
+    let beats = |(i, other): (usize, &CandidateRow)| {
         let (s, e) = place(other);
         if i == k || !other.knob.is_ranked() {
             return false;
@@ -48,9 +49,12 @@ fn is_unbeaten(rows: &[Row], time: fn(&Row) -> &Spread, k: usize) -> bool {
     row.knob.is_ranked() && !rows.iter().enumerate().any(beats)
 }
 
-/// The index of the one of two neighbours on the front, the faster one first, that differs from the other
-/// by noise alone; `None` where neither does.
-fn noise_of(rows: &[Row], time: fn(&Row) -> &Spread, pair: &[usize]) -> Option<usize> {
+/// Which of two neighbours, the faster one first, is there for noise alone, if either is.
+fn noise_of(
+    rows: &[CandidateRow],
+    time: fn(&CandidateRow) -> &Spread,
+    pair: &[usize],
+) -> Option<usize> {
     let (fast, near) = (&rows[pair[0]], &rows[pair[1]]);
     // Too few turns tell nothing: then both stay.
     let errors = compared(&near.rmse_of_turns, &fast.rmse_of_turns)?;
@@ -65,7 +69,7 @@ fn noise_of(rows: &[Row], time: fn(&Row) -> &Spread, pair: &[usize]) -> Option<u
     }
 }
 
-/// The median of the ratios of `a` to `b`, turn by turn; `None` for too few turns.
+/// `a` over `b`, turn by turn; `None` where too few turns tell.
 fn compared(a: &[f64], b: &[f64]) -> Option<Median> {
     let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| a / b).collect();
     median(&ratios).filter(|ratio| ratio.is_sure())
@@ -73,7 +77,7 @@ fn compared(a: &[f64], b: &[f64]) -> Option<Median> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::Change;
+    use super::super::change::Change;
     use super::super::table::tests::measured;
     use super::*;
 
@@ -86,7 +90,7 @@ mod tests {
             (Knob::Bounces, "--bounces 8", 1.2, 1.99),
         ])
         .rows;
-        let fronts = |rows: &[Row]| -> Vec<bool> {
+        let fronts = |rows: &[CandidateRow]| -> Vec<bool> {
             let front = of(rows, |row| &row.seconds);
             (0..rows.len()).map(|k| front.contains(&k)).collect()
         };
@@ -109,7 +113,7 @@ mod tests {
         .rows;
         rows[1].change = Some(Change { pixels: 9000, ..Change::default() });
         rows[2].change = Some(Change { pixels: 9000, differing: 9, ..Change::default() });
-        let fronts = |rows: &[Row]| -> Vec<bool> {
+        let fronts = |rows: &[CandidateRow]| -> Vec<bool> {
             let front = of(rows, |row| &row.seconds);
             (0..rows.len()).map(|k| front.contains(&k)).collect()
         };

@@ -1,18 +1,18 @@
-//! The measurements of a sweep on disk, so that a sweep that was stopped or killed goes on.
+//! What a sweep has measured so far, on disk, so that one that was stopped or killed goes on.
 //!
-//! They lie in a folder of their own:
+//! A folder of its own:
 //!
-//! * `sweep.json`: everything that the figures depend on; a sweep that differs in any of it is refused;
+//! * `sweep.json` says what the figures are of; a sweep of anything else is refused;
 //! * `reference.json` and `reference_NNNN.exr`: the reference so far, as display values;
-//! * `trials.jsonl`: a line for each trial, appended and synced when the trial is over. A crash can damage
-//!   only the last line, which is then dropped;
-//! * `setting_NNN.png`: each setting's picture of the frame shown on the page.
+//! * `trials.jsonl`: a line a trial, appended and synced when the trial is over. A crash can tear the
+//!   last line alone, which is dropped;
+//! * `setting_NNN.png`: each setting's picture of the frame that pictures are shown of.
 //!
 //! Not done: no lock keeps two sweeps from writing into the same folder at once.
 
+use super::change::Change;
 use super::errors::{Errors, Frames};
 use super::reference::Doubling;
-use super::table::Change;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::Journal;
@@ -30,21 +30,21 @@ use std::time::Duration;
 /// Largest picture that is read, bytes.
 const LARGEST: u64 = 4 << 30;
 
-/// Age from which a temporary file of a process that died is removed.
+/// How old a temporary file of a dead process is before it is removed.
 const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
-/// The measurements of one trial: one candidate rendered in one turn.
+/// A trial that is over.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct TrialRecord {
-    /// Number of the program's run that measured it, from 1.
+    /// Which run of the program measured it, from 1.
     pub run: u32,
-    /// Number of the turn; 0 warms up.
+    /// Which turn; 0 warms up.
     pub turn: u32,
     /// Index of the candidate.
     pub candidate: usize,
     /// Wall seconds a frame.
     pub seconds: f64,
-    /// Wall seconds a frame of the default, in the same turn and run.
+    /// The default's, of the same turn and run.
     pub default_seconds: f64,
     /// CPU seconds a frame.
     pub cpu_seconds: f64,
@@ -58,13 +58,13 @@ pub struct TrialRecord {
     pub rays: RayCounts,
     /// Memory of the intersector and of the references, bytes.
     pub memory: u64,
-    /// Errors of its frames.
+    /// How far off its frames are.
     pub errors: StoredErrors,
-    /// How its pixels differ from those of the default.
+    /// How its pixels differ from the default's.
     pub change: Change,
 }
 
-/// [`Errors`] without the figures that follow from the mean squared error: JSON has no infinity.
+/// [`Errors`] without what follows from the mean squared error: JSON knows no infinity.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct StoredErrors {
     mse: f64,
@@ -89,7 +89,7 @@ impl From<StoredErrors> for Errors {
     }
 }
 
-/// Content of `reference.json`.
+/// `reference.json`.
 #[derive(Serialize, Deserialize)]
 struct StoredReference {
     number: u32,
@@ -99,7 +99,7 @@ struct StoredReference {
     frames: Vec<u32>,
 }
 
-/// The folder of a sweep's measurements, and its trials.
+/// The folder, and what lies in it.
 pub struct Ledger {
     folder: PathBuf,
     journal: Journal,
@@ -108,11 +108,11 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens the sweep whose figures depend on `terms`, by name; begins one where the folder has none, or
-    /// where `anew` is set.
+    /// Opens the sweep of `terms`, which are all that its figures depend on, by name; begins one where
+    /// there is none, or where it shall be measured `anew`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the folder has a sweep of other terms; errors of reading and writing.
+    /// [`Error::Usage`] where a sweep of other terms is there; those of reading and writing.
     pub fn open(folder: &Path, terms: &Map<String, Value>, anew: bool) -> Result<Self> {
         let path = folder.join("sweep.json");
         atomic::clean_temporaries(folder, LEFTOVER_AGE)?;
@@ -122,7 +122,7 @@ impl Ledger {
             None => {
                 clear(folder)?;
                 atomic::create_folder(folder)?;
-                write_json(&path, terms)?;
+                atomic::write_json(&path, terms)?;
             }
         }
         let trials = folder.join("trials.jsonl");
@@ -132,27 +132,27 @@ impl Ledger {
         Ok(Self { folder: folder.to_path_buf(), journal, entries, run })
     }
 
-    /// All trials so far.
+    /// All trials that are over.
     pub fn entries(&self) -> &[TrialRecord] {
         &self.entries
     }
 
-    /// How many runs of the program have measured any trial.
+    /// How many runs of the program have measured any of them.
     pub fn runs(&self) -> u32 {
         self.entries.iter().map(|entry| entry.run).max().unwrap_or(0)
     }
 
-    /// Whether this run of the program has measured any trial.
+    /// Whether this run has measured any.
     pub fn is_running(&self) -> bool {
         self.runs() == self.run
     }
 
-    /// Whether the trial of `candidate` in `turn` was measured.
+    /// Whether the candidate's trial of the turn is over.
     pub fn has(&self, turn: u32, candidate: usize) -> bool {
         self.entries.iter().any(|entry| (entry.turn, entry.candidate) == (turn, candidate))
     }
 
-    /// Appends a trial to the file.
+    /// Keeps a trial.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -163,7 +163,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Writes a candidate's picture.
+    /// Keeps a candidate's picture.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -181,7 +181,7 @@ impl Ledger {
         self.folder.join(format!("setting_{candidate:03}.png"))
     }
 
-    /// Writes the reference so far, whose change by a doubling is to fall below `wanted` display steps.
+    /// Keeps the reference so far, which is to come nearer than `wanted`.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -195,7 +195,7 @@ impl Ledger {
         }
         let frames: Vec<u32> = reference.frames.keys().copied().collect();
         let stored = StoredReference { number, spp, change, wanted, frames };
-        write_json(&self.folder.join("reference.json"), &stored)?;
+        atomic::write_json(&self.folder.join("reference.json"), &stored)?;
         if let Some(before) = number.checked_sub(1) {
             // Whatever is left takes room, no more.
             let path = |frame: &u32| self.frame_path(before, *frame);
@@ -204,7 +204,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// The reference so far, and the `wanted` that it was written with; `None` where none can be read.
+    /// The reference so far, and how near it is to come; `None` where there is none that can be read.
     pub fn reference(&self) -> Option<(Doubling, f64)> {
         let stored: StoredReference = read_json(&self.folder.join("reference.json")).ok()??;
         let StoredReference { number, spp, change, wanted, frames } = stored;
@@ -220,21 +220,21 @@ impl Ledger {
         self.folder.join(format!("reference_{frame:04}_{number}.exr"))
     }
 
-    /// The value in the JSON file `name`; `None` where it cannot be read.
+    /// What is kept under `name`, if it can be read.
     pub fn note<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
         read_json(&self.folder.join(name)).ok()?
     }
 
-    /// Writes `value` to the JSON file `name`.
+    /// Keeps something under `name`.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn keep_note(&self, name: &str, value: &impl Serialize) -> Result<()> {
-        write_json(&self.folder.join(name), value)
+        atomic::write_json(&self.folder.join(name), value)
     }
 }
 
-/// Removes the files of a sweep from `folder`, and no others.
+/// Removes what a sweep left in `folder`, and nothing else.
 fn clear(folder: &Path) -> Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
@@ -275,9 +275,9 @@ fn check(folder: &Path, found: &Map<String, Value>, wanted: &Map<String, Value>)
 }
 
 fn encode(image: &Image) -> Result<Vec<u8>> {
-    let channel = |name: &str, of: fn(&crate::math::Rgb) -> f32| exr::Channel {
+    let channel = |name: &str, of: fn(&crate::math::Rgb) -> f32| exr::ExrChannel {
         name: name.into(),
-        samples: exr::Samples::F32(image.rgb.iter().map(of).collect()),
+        samples: exr::ExrSamples::F32(image.rgb.iter().map(of).collect()),
     };
     let channels = [channel("R", |c| c.x), channel("G", |c| c.y), channel("B", |c| c.z)];
     exr::encode(image.width, image.height, &channels, "display values, not radiance")
@@ -290,11 +290,6 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
         // What cannot be understood is as good as absent: it is measured again.
         Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
     }
-}
-
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let text = serde_json::to_vec_pretty(value).map_err(|e| Error::io("write", path, e.into()))?;
-    atomic::write(path, |w| w.write_all(&text)).map(drop)
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@
 //! seconds per frame of the whole move: key frames cost more than in-between frames, so each kind is
 //! timed and weighed by how many of it the move has.
 //!
-//! [`Probe`] traces a few pixels and small frames instead. A [`Predictor`] made from these predicts the
-//! error and the time of any setting, and the program chooses one; [`Check`] measures afterwards how good
+//! [`SettingsProbe`] traces a few pixels and small frames instead. A [`Predictor`] made from these predicts the
+//! error and the time of any setting, and the program chooses one; [`CheckOutcome`] measures afterwards how good
 //! the frames came out. That choice is the only thing in the program that depends on measured times.
 //!
 //! A [`Ledger`] keeps the measurements of a sweep on disk, trial by trial, so that a sweep that was
@@ -18,6 +18,7 @@
 //! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
 mod candidates;
+mod change;
 mod check;
 mod choice;
 mod context;
@@ -37,6 +38,7 @@ mod patches;
 mod predictor;
 mod probe;
 mod reference;
+mod row;
 mod search;
 mod sentences;
 mod sweep;
@@ -47,21 +49,22 @@ mod worst;
 mod writing;
 
 pub use candidates::candidates;
-pub use check::{Check, CheckedFrame, Verdict};
+pub use check::{CheckOutcome, CheckedFrame, Verdict};
 pub use choice::{Goal, best_within, fastest_reaching, perhaps_faster};
 pub use context::TrialContext;
 pub use effort::Effort;
-pub use error_model::Samples;
+pub use error_model::SampleCounts;
 pub use errors::{Errors, displayed_rgb};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};
 pub use ledger::{Ledger, TrialRecord};
 pub use oracle::{OracleCrop, on_a_crop};
 pub use predictor::{Prediction, Predictor, SampleRange};
-pub use probe::{GivenOptions, Probe};
+pub use probe::{FixedSettings, SettingsProbe};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
+pub use row::{CandidateRow, Spread};
 pub use sentences::{about_knob, about_oracle, about_writing};
-pub use sweep::{Picture, Sweep, SweepProgress};
-pub use table::{Measured, Row, Spread};
+pub use sweep::{CandidatePicture, Sweep, SweepProgress};
+pub use table::Measured;
 pub use timing::{Timer, Timing};
 pub use writing::{Writing, on_disk};

@@ -2,7 +2,7 @@
 
 use super::fit::fit;
 use super::predictor::ReuseMode;
-use super::probe::Probe;
+use super::probe::SettingsProbe;
 use crate::error::Result;
 use crate::scene::{Policy, ReuseSettings};
 
@@ -24,7 +24,7 @@ impl Times {
     }
 }
 
-impl Probe<'_> {
+impl SettingsProbe<'_> {
     /// The reuse policies to choose from, with what frames take by each: fitted to the times of frames of
     /// about `pixels` pixels with `bounces`.
     pub(super) fn modes(&self, bounces: u32, pixels: f64) -> Result<Vec<ReuseMode>> {

@@ -1,29 +1,29 @@
-//! Embree against the oracle on a small crop of a frame: pixels that differ, and times.
+//! Embree against the oracle on a small crop: what trusting Embree is worth.
 
+use super::change::Change;
 use super::context::TrialContext;
 use super::errors::Frames;
-use super::table::Change;
 use crate::error::Result;
 use crate::intersect::{Intersector, Oracle};
 use crate::scene::{Policy, Rect, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Rough limit of the oracle's time, seconds.
+/// Seconds that the oracle may take, roughly.
 const SECONDS: f64 = 10.0;
-/// Rough time in which the oracle tests one ray against one triangle on one thread, seconds.
+/// Seconds that it holds one ray against one triangle, on one thread, roughly.
 const PER_TRIANGLE: f64 = 1e-8;
-/// Rough number of rays of a pixel with one sample of everything: glass branches.
+/// Rays that a pixel casts with one sample of everything, roughly: glass branches.
 const RAYS: f64 = 10.0;
-/// Smallest and largest edge of the crop, pixels.
+/// The least and the most edge of the crop, pixels.
 const EDGE: (f64, f64) = (8.0, 96.0);
 
-/// The crop by Embree and by the oracle.
+/// How the crop came out.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct OracleCrop {
-    /// Width and height, pixels.
+    /// Columns and rows.
     pub size: [u32; 2],
-    /// Number of the frame.
+    /// The frame.
     pub frame: u32,
     /// Triangles of the scene.
     pub triangles: usize,
@@ -37,8 +37,8 @@ pub struct OracleCrop {
     pub change: Change,
 }
 
-/// Renders the middle of `frame` with Embree and with the oracle, one sample of everything. `None` where
-/// the oracle would take minutes for even a few pixels, or where it is the default's intersector.
+/// Renders the middle of `frame` with both, one sample of everything; `None` where even a few pixels
+/// would take the oracle minutes, or where the default is the oracle.
 ///
 /// # Errors
 /// As [`TrialContext::trace`].
@@ -67,7 +67,7 @@ pub fn on_a_crop(context: &TrialContext, frame: u32) -> Result<Option<OracleCrop
     Ok(Some(OracleCrop { size, frame, triangles, rays, embree_seconds, oracle_seconds, change }))
 }
 
-/// The frame traced by `intersector`; the number of rays, and wall seconds.
+/// The frame by `intersector`; rays, and wall seconds.
 fn timed(
     context: &TrialContext,
     settings: &Settings,

@@ -6,13 +6,11 @@ use super::context::TrialContext;
 use super::draw::{DrawSeed, draw};
 use super::effort::Effort;
 use super::errors::displayed_rgb;
-use super::probe::one_sample;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
 use crate::sampling::mix;
-use crate::scene::Settings;
+use crate::scene::{Policy, Settings};
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
@@ -169,9 +167,7 @@ impl Patches {
     /// # Errors
     /// [`Error::Stopped`]; errors of the camera's move.
     pub fn trace(&self, context: &TrialContext, settings: &Settings) -> Result<PatchImages> {
-        let plan = EffectPlan::of(context.scene, settings);
-        let renderer =
-            Renderer { scene: context.scene, settings, plan, intersector: context.intersector };
+        let renderer = Renderer::new(context.scene, settings, context.intersector);
         let one = |FramePatches { frame, corners, .. }: &FramePatches| {
             let camera = context.shot.camera(*frame, settings.width, settings.height)?;
             let places: Vec<(u32, u32)> = corners.iter().flat_map(|c| self.pixels(*c)).collect();
@@ -258,6 +254,14 @@ fn places(settings: &Settings, edge: u32, pixels: u32, seed: u64) -> Vec<(u32, u
         (x, place(cell / columns, rows, height, random >> 32))
     });
     cells.collect()
+}
+
+/// `base` with one sample of everything, and every frame traced.
+pub(super) fn one_sample(base: &Settings) -> Settings {
+    let mut settings = base.clone();
+    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+    settings.reuse.policy = Policy::Off;
+    settings
 }
 
 #[cfg(test)]

@@ -1,14 +1,11 @@
 //! What each setting is predicted to come to, and the choice among all of them.
 
-use super::error_model::{ErrorModel, Samples};
+use super::error_model::{ErrorModel, SampleCounts};
 use super::worst::worst;
 use crate::measure::psnr;
 use crate::scene::limits::MAX_BOUNCES;
 use crate::scene::{ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
-
-/// The mean squared error of rounding to 8 bits, in squares of a display step.
-pub const ROUNDING: f64 = 1.0 / 12.0;
 
 /// Times are known to about a tenth: of settings that differ by less the most accurate is taken.
 const ALIKE: f64 = 1.1;
@@ -49,7 +46,7 @@ pub struct Predictor {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
     /// Samples of a pixel.
-    pub samples: Samples,
+    pub samples: SampleCounts,
     /// Number of bounces.
     pub bounces: u32,
     /// Reuse policy and its settings.
@@ -70,7 +67,7 @@ impl Prediction {
 
     /// `base` with what was chosen.
     pub fn settings(&self, base: &Settings) -> Settings {
-        let Samples { spp, shadow, sky } = self.samples;
+        let SampleCounts { spp, shadow, sky } = self.samples;
         Settings {
             spp,
             shadow_samples: shadow,
@@ -94,18 +91,18 @@ pub struct SampleRange {
 }
 
 impl SampleRange {
-    fn all(&self) -> impl Iterator<Item = Samples> + '_ {
+    fn all(&self) -> impl Iterator<Item = SampleCounts> + '_ {
         let lights = move |shadow: u32| self.sky.iter().map(move |sky| (shadow, *sky));
         let lights = self.shadow.iter().flat_map(move |shadow| lights(*shadow));
         lights.flat_map(|(shadow, sky)| {
-            self.spp.iter().map(move |spp| Samples { spp: *spp, shadow, sky })
+            self.spp.iter().map(move |spp| SampleCounts { spp: *spp, shadow, sky })
         })
     }
 }
 
 impl Predictor {
     /// What is predicted of `samples` under the policy of `mode`.
-    pub fn of(&self, mode: &ReuseMode, samples: Samples) -> Prediction {
+    pub fn of(&self, mode: &ReuseMode, samples: SampleCounts) -> Prediction {
         let errors: Vec<f64> = self.model.errors(samples).collect();
         let sampling = self.excess * worst(&errors, &self.doubts);
         let n = f64::from(samples.spp);
@@ -175,12 +172,13 @@ impl Predictor {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::error_model::{NoiseSources, SampleErrors};
+    use super::super::errors::ROUNDING;
     use super::*;
     use crate::scene::Policy;
 
     fn predictor() -> Predictor {
-        let samples = |spp: u32, shadow: u32| Samples { spp, shadow, sky: 1 };
-        let error = |s: Samples| {
+        let samples = |spp: u32, shadow: u32| SampleCounts { spp, shadow, sky: 1 };
+        let error = |s: SampleCounts| {
             let [n, m] = [s.spp, s.shadow].map(f64::from);
             40.0 * n.powf(-1.3) + 20.0 * n.powf(-1.1) * m.powf(-1.4)
         };
@@ -225,7 +223,7 @@ pub(super) mod tests {
     #[test]
     fn predictions_go_through_what_was_measured() {
         let mut predictor = predictor();
-        let at = |p: &Predictor, spp| p.of(&p.modes[1], Samples { spp, shadow: 4, sky: 1 });
+        let at = |p: &Predictor, spp| p.of(&p.modes[1], SampleCounts { spp, shadow: 4, sky: 1 });
         let [few, many] = [8, 32].map(|spp| at(&predictor, spp));
         predictor.correct_time(&few, 3.0 * few.seconds);
         assert!((at(&predictor, 32).seconds / many.seconds - 3.0).abs() < 1e-9);

@@ -6,16 +6,15 @@
 use super::choice::Goal;
 use super::context::TrialContext;
 use super::effort::Effort;
-use super::error_model::{NoiseSources, Samples};
-use super::patches::Patches;
-use super::predictor::{Prediction, Predictor, SampleRange};
+use super::error_model::{NoiseSources, SampleCounts};
+use super::patches::{Patches, one_sample};
+use super::predictor::SampleRange;
 use super::reference::truth_settings;
-use super::search::Search;
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::film::Image;
 use crate::scene::limits::{MAX_SAMPLES, MAX_SEED};
-use crate::scene::{FrameRange, Policy, Settings};
+use crate::scene::{FrameRange, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -31,7 +30,7 @@ pub const DRAW_OF_CHECK: u64 = 2;
 
 /// Which settings the user gave: these are not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct GivenOptions {
+pub struct FixedSettings {
     /// Camera samples.
     pub spp: bool,
     /// Shadow samples.
@@ -45,7 +44,7 @@ pub struct GivenOptions {
 }
 
 /// A scene and what is wanted of it.
-pub struct Probe<'a> {
+pub struct SettingsProbe<'a> {
     /// The scene and everything needed to render it.
     pub context: &'a TrialContext<'a>,
     /// The frames of the job.
@@ -53,7 +52,7 @@ pub struct Probe<'a> {
     /// The error to be reached; `None` for a budget of time.
     pub goal: Option<Goal>,
     /// The settings that are not chosen.
-    pub given: GivenOptions,
+    pub given: FixedSettings,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
     /// Seconds that the probe may take; `None` where that goes by the size of the job.
@@ -62,32 +61,9 @@ pub struct Probe<'a> {
     pub ranks: u32,
 }
 
-impl Probe<'_> {
-    /// Measures the scene. Where there is a goal, it also gives, for each reuse policy, the fastest setting
-    /// found whose figure was measured to be at most `aim` times the largest that the goal allows, or the
-    /// largest itself where there is no such setting. `progress` is called with what is being done.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Stopped`]; errors of rendering.
-    pub fn look(&self, aim: f64, progress: &dyn Fn(&str)) -> Result<(Predictor, Vec<Prediction>)> {
-        let effort = self.effort()?;
-        progress("errors of a short sweep");
-        let mut search = Search::begin(self, effort)?;
-        progress("times");
-        search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
-        let mut found = Vec::new();
-        if let Some(goal) = self.goal {
-            progress("errors of what may be chosen");
-            found = search.fastest(goal, aim * goal.largest())?;
-            if found.is_empty() {
-                found = search.fastest(goal, goal.largest())?;
-            }
-        }
-        Ok((search.predictor, found))
-    }
-
+impl SettingsProbe<'_> {
     /// How much to look at: for a budget by the time that there is, for a target by the size of the job.
-    fn effort(&self) -> Result<Effort> {
+    pub(super) fn effort(&self) -> Result<Effort> {
         let FrameRange { first, last } = self.frames;
         let Settings { width, height, .. } = *self.context.base;
         let Some(seconds) = self.seconds else {
@@ -205,14 +181,6 @@ pub(super) fn checked_pixels(effort: Effort) -> u32 {
     effort.pixels + effort.pixels / 2
 }
 
-/// `base` with one sample of everything, and every frame traced.
-pub(super) fn one_sample(base: &Settings) -> Settings {
-    let mut settings = base.clone();
-    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
-    settings.reuse.policy = Policy::Off;
-    settings
-}
-
 /// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.
 pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
     let FrameRange { first, last } = frames;
@@ -226,8 +194,8 @@ pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
 }
 
 /// Samples of a reference that frames of `samples` are compared with.
-pub fn samples_of_reference(samples: Samples) -> Samples {
-    Samples {
+pub fn samples_of_reference(samples: SampleCounts) -> SampleCounts {
+    SampleCounts {
         spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
         shadow: samples.shadow.max(4),
         sky: samples.sky.max(2),
@@ -235,7 +203,7 @@ pub fn samples_of_reference(samples: Samples) -> Samples {
 }
 
 /// Settings of a reference with `samples`: its seed is neither the job's nor one of a sweep.
-pub fn reference(base: &Settings, samples: Samples) -> Settings {
+pub fn reference(base: &Settings, samples: SampleCounts) -> Settings {
     let mut settings = truth_settings(base, &[]);
     (settings.spp, settings.shadow_samples) = (samples.spp, samples.shadow);
     settings.sky_samples = samples.sky;

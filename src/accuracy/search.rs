@@ -3,11 +3,12 @@
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::{ErrorModel, SampleErrors, Samples};
+use super::error_model::{ErrorModel, SampleCounts, SampleErrors};
+use super::errors::ROUNDING;
 use super::figures::{figure, squared_errors};
 use super::patches::{PatchImages, Patches, rounded};
-use super::predictor::{Prediction, Predictor, ROUNDING, ReuseMode};
-use super::probe::{Probe, reference, samples_of_reference};
+use super::predictor::{Prediction, Predictor, ReuseMode};
+use super::probe::{SettingsProbe, reference, samples_of_reference};
 use super::worst::worst;
 use crate::error::Result;
 use crate::scene::Settings;
@@ -28,7 +29,7 @@ const CLOSE: f64 = 1.2;
 /// What a setting was measured to come to.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
-    samples: Samples,
+    samples: SampleCounts,
     /// Of the worst frame, in squares of a display step.
     squared_error: f64,
     /// The goal's.
@@ -37,14 +38,39 @@ struct Measured {
 
 /// A probe that goes on.
 pub(super) struct Search<'a> {
-    probe: &'a Probe<'a>,
+    probe: &'a SettingsProbe<'a>,
     patches: Patches,
     truth: PatchImages,
     /// Samples of `truth`.
-    reference: Samples,
+    reference: SampleCounts,
     measured: Vec<Measured>,
     /// What was found so far.
     pub predictor: Predictor,
+}
+
+impl SettingsProbe<'_> {
+    /// Measures the scene. Where there is a goal, it also gives, for each reuse policy, the fastest setting
+    /// found whose figure was measured to be at most `aim` times the largest that the goal allows, or the
+    /// largest itself where there is no such setting. `progress` is called with what is being done.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Stopped`]; errors of rendering.
+    pub fn look(&self, aim: f64, progress: &dyn Fn(&str)) -> Result<(Predictor, Vec<Prediction>)> {
+        let effort = self.effort()?;
+        progress("errors of a short sweep");
+        let mut search = Search::begin(self, effort)?;
+        progress("times");
+        search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
+        let mut found = Vec::new();
+        if let Some(goal) = self.goal {
+            progress("errors of what may be chosen");
+            found = search.fastest(goal, aim * goal.largest())?;
+            if found.is_empty() {
+                found = search.fastest(goal, goal.largest())?;
+            }
+        }
+        Ok((search.predictor, found))
+    }
 }
 
 impl<'a> Search<'a> {
@@ -52,9 +78,9 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// As [`Patches::trace`].
-    pub fn begin(probe: &'a Probe<'a>, effort: Effort) -> Result<Self> {
+    pub fn begin(probe: &'a SettingsProbe<'a>, effort: Effort) -> Result<Self> {
         let (context, patches) = (probe.context, probe.patches(effort)?);
-        let reference = samples_of_reference(Samples { spp: 8, shadow: 2, sky: 2 });
+        let reference = samples_of_reference(SampleCounts { spp: 8, shadow: 2, sky: 2 });
         let truth = patches.trace(context, &converged(context.base, reference))?;
         let (mut points, mut doubts) = (Vec::new(), Vec::new());
         for samples in design(probe) {
@@ -105,7 +131,9 @@ impl<'a> Search<'a> {
         let (range, is_psnr) = (self.probe.range(), matches!(goal, Goal::Psnr(_)));
         let start = match is_psnr {
             true => allowed,
-            false => self.predictor.of(mode, Samples { spp: 4, shadow: 4, sky: 4 }).squared_error,
+            false => {
+                self.predictor.of(mode, SampleCounts { spp: 4, shadow: 4, sky: 4 }).squared_error
+            }
         };
         let (mut bracket, mut aim, mut best) = (Bracket::default(), Some(start), None);
         for _ in 0..TRIALS {
@@ -125,7 +153,7 @@ impl<'a> Search<'a> {
     }
 
     /// What `samples` come to at the patches, with the bounces chosen; nothing is traced twice.
-    fn measure(&mut self, goal: Goal, samples: Samples) -> Result<Measured> {
+    fn measure(&mut self, goal: Goal, samples: SampleCounts) -> Result<Measured> {
         if let Some(known) = self.measured.iter().find(|known| known.samples == samples) {
             return Ok(*known);
         }
@@ -161,7 +189,7 @@ impl<'a> Search<'a> {
         }
         let numbers = if probe.given.bounces { &[base.bounces] } else { &BOUNCES[..] };
         let most = *numbers.last().unwrap_or(&base.bounces);
-        let mut settings = sampled(base, Samples { spp: 4, shadow: 1, sky: 1 });
+        let mut settings = sampled(base, SampleCounts { spp: 4, shadow: 1, sky: 1 });
         let truth = self.patches.trace(probe.context, &settings)?;
         settings.cutoff = base.cutoff;
         let mut left_out = |bounces: u32| -> Result<f64> {
@@ -218,14 +246,14 @@ impl Bracket {
 }
 
 /// The settings of the sweep.
-fn design(probe: &Probe) -> Vec<Samples> {
+fn design(probe: &SettingsProbe) -> Vec<SampleCounts> {
     let (base, sources) = (probe.context.base, probe.sources());
     let all = [(1, 1, 1), (4, 1, 1), (4, 8, 1), (4, 1, 8), (2, 4, 4), (16, 1, 1), (8, 2, 2)];
     let mut design = Vec::new();
     for (spp, shadow, sky) in all {
         let shadow = if sources.shadow { shadow } else { base.shadow_samples };
         let sky = if sources.sky { sky } else { base.sky_samples };
-        let samples = Samples { spp, shadow, sky };
+        let samples = SampleCounts { spp, shadow, sky };
         if !design.contains(&samples) {
             design.push(samples);
         }
@@ -234,7 +262,7 @@ fn design(probe: &Probe) -> Vec<Samples> {
 }
 
 /// The settings of a reference with `samples`, and with as many bounces as may be chosen.
-fn converged(base: &Settings, samples: Samples) -> Settings {
+fn converged(base: &Settings, samples: SampleCounts) -> Settings {
     let settings = reference(base, samples);
     let bounces = BOUNCES.into_iter().fold(settings.bounces, u32::max);
     Settings { bounces, ..settings }
@@ -242,7 +270,7 @@ fn converged(base: &Settings, samples: Samples) -> Settings {
 
 /// The same with the job's seed: frames with these settings differ from the reference for their samples
 /// alone.
-fn sampled(base: &Settings, samples: Samples) -> Settings {
+fn sampled(base: &Settings, samples: SampleCounts) -> Settings {
     Settings { seed: base.seed, ..converged(base, samples) }
 }
 

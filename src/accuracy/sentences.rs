@@ -1,19 +1,21 @@
-//! Sentences for the accuracy page, one for each setting.
+//! A sentence per knob.
 
+use super::change::Change;
 use super::knobs::{Group, Knob};
 use super::oracle::OracleCrop;
-use super::table::{Change, Measured, Row};
+use super::row::CandidateRow;
+use super::table::Measured;
 use super::writing::Writing;
 use crate::measure::{Interval, Median};
 use crate::page::words::{bytes, change, count, percent, seconds, short};
 
-/// What turning `knob` does: a sentence for each of its settings; none where it was not turned.
+/// What turning `knob` does, one sentence for each of its settings; empty where it was not turned.
 pub fn about_knob(measured: &Measured, knob: Knob) -> Vec<String> {
     let rows = measured.rows.iter().filter(|row| row.knob == knob);
     rows.map(|row| sentence(measured.default_row(), row)).collect()
 }
 
-fn sentence(default: &Row, row: &Row) -> String {
+fn sentence(default: &CandidateRow, row: &CandidateRow) -> String {
     let changed = || row.change.map_or(String::new(), |c| pixels(&c));
     let what = match row.knob.group() {
         Some(Group::Intersection) => changed(),
@@ -23,14 +25,14 @@ fn sentence(default: &Row, row: &Row) -> String {
     format!("{}: {}, {what}.", row.options, time(row))
 }
 
-/// Time and memory of the setting's tree, beside the default's.
-fn tree(default: &Row, row: &Row) -> String {
+/// What its tree takes.
+fn tree(default: &CandidateRow, row: &CandidateRow) -> String {
     let [was, is] = [default, row].map(|r| seconds(r.build_seconds.median.interval.estimate));
     let memory = [default, row].map(|r| bytes(r.memory_bytes));
     format!("built in {is} instead of {was}, {} instead of {} of memory", memory[1], memory[0])
 }
 
-fn time(row: &Row) -> String {
+fn time(row: &CandidateRow) -> String {
     let Some(wall) = row.time_ratio else { return "not timed".into() };
     let told = |ratio: &Median| {
         let [is, low, high] =
@@ -57,7 +59,7 @@ fn time(row: &Row) -> String {
     }
 }
 
-fn error(default: &Row, row: &Row) -> String {
+fn error(default: &CandidateRow, row: &CandidateRow) -> String {
     if row.change.is_some_and(|c| c.differing == 0) {
         return "the same pixels".into();
     }
@@ -76,7 +78,7 @@ fn error(default: &Row, row: &Row) -> String {
     }
 }
 
-/// How many pixels differ from the default's, and by how much.
+/// How many pixels another rule changes.
 fn pixels(c: &Change) -> String {
     if c.differing == 0 {
         return format!("the same {} pixels", count(c.pixels));
@@ -89,7 +91,7 @@ fn pixels(c: &Change) -> String {
     )
 }
 
-/// What writing frames takes, where rendering one takes `making` seconds.
+/// What `writing` takes where a frame takes `making` to make, seconds.
 pub fn about_writing(writing: &Writing, making: Interval) -> Vec<String> {
     let (w, frame_seconds) = (writing, making.estimate);
     let sync = match w.sync_ends {
@@ -125,7 +127,7 @@ pub fn about_writing(writing: &Writing, making: Interval) -> Vec<String> {
     all
 }
 
-/// How Embree and the oracle differ on the crop.
+/// What the oracle says.
 pub fn about_oracle(crop: &OracleCrop) -> String {
     let [width, height] = crop.size;
     format!(

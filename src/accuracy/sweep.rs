@@ -1,68 +1,70 @@
-//! A sweep: all candidates are rendered and timed, in turns.
+//! All candidates, in turns.
 //!
 //! A shared machine changes its speed from minute to minute. So the candidates take turns, every
 //! second turn in reverse, and a candidate's time is compared with the default's of the same turn.
 //! The first turn warms up: its pictures count, its times do not. Each turn has a seed of its own,
 //! the same for all candidates.
 
+use super::change::Change;
 use super::context::TrialContext;
 use super::errors::Errors;
 use super::knobs::Candidate;
 use super::ledger::{Ledger, TrialRecord};
 use super::reference::{Truth, seed_of_turn};
-use super::table::{Change, Measured, Taken};
+use super::row::Taken;
+use super::table::Measured;
 use super::trial::{self, Trial};
 use crate::error::Result;
 use crate::page;
 use crate::scene::Settings;
 use std::time::Instant;
 
-/// The candidates and frames of a sweep.
+/// What there is to do.
 pub struct Sweep<'a> {
-    /// The scene and everything needed to render it.
+    /// What all share.
     pub context: &'a TrialContext<'a>,
-    /// The candidates, the default first.
+    /// The default first.
     pub candidates: &'a [Candidate],
-    /// Numbers of the frames that are compared with the reference.
+    /// The frames that are held against the truth.
     pub frames: &'a [u32],
-    /// Number of timed turns; the turn that warms up comes before them.
+    /// Turns that are timed; one more comes before them.
     pub turns: u32,
 }
 
-/// How far a sweep has come when a candidate is about to be tried.
+/// A candidate is about to be tried.
 #[derive(Clone, Copy)]
 pub struct SweepProgress<'a> {
-    /// The trials so far.
+    /// What was measured so far.
     pub ledger: &'a Ledger,
-    /// Number of trials so far.
+    /// Trials done so far.
     pub done: usize,
-    /// Number of trials of the whole sweep.
+    /// All trials.
     pub of: usize,
-    /// Number of the turn; 0 warms up.
+    /// Which turn; 0 warms up.
     pub turn: u32,
-    /// The candidate to be tried.
+    /// Whose turn it is.
     pub candidate: &'a Candidate,
-    /// Seconds that the sweep still takes; `None` before any trial.
+    /// Seconds that are left, if anything is known of it.
     pub left: Option<f64>,
 }
 
-/// A candidate's picture of the frame shown on the page.
+/// A candidate's picture of the frame that pictures are shown of.
 #[derive(Debug, Clone)]
-pub struct Picture {
-    /// Index of the candidate's row.
+pub struct CandidatePicture {
+    /// Index of its row.
     pub candidate: usize,
     /// The picture.
     pub picture: page::Picture,
 }
 
 impl Sweep<'_> {
-    /// The frame shown on the page: the one in the middle, which by default is inferred.
+    /// The frame that pictures are shown of: the one in the middle, which by default is inferred.
     pub fn shown_frame(&self) -> u32 {
         self.frames.get(self.frames.len() / 2).copied().unwrap_or(1)
     }
 
-    /// The noise of the candidate with the most samples: root mean square difference of two of its frames
-    /// with different seeds, over √2, in display steps. The reference's error has to be smaller.
+    /// How many display steps two of the best-sampled frames differ by, over √2: the error that is
+    /// due to chance, below which the truth has to be known.
     ///
     /// # Errors
     /// As [`TrialContext::trace`].
@@ -78,16 +80,16 @@ impl Sweep<'_> {
         Ok(super::errors::rms_between(&frames[0], &frames[1]) / 2f64.sqrt())
     }
 
-    /// Tries every candidate in every turn, unless `ledger` has its trial; `report` is called after each.
+    /// Tries every candidate in every turn, as far as `ledger` has not heard of it, and tells it.
     ///
     /// # Errors
-    /// [`crate::error::Error::Stopped`]; errors of building, rendering and writing, and of `report`. The
-    /// ledger keeps the trials before.
+    /// [`crate::error::Error::Stopped`]; those of building, rendering and writing, and of `hear`. What
+    /// the ledger has by then stays there.
     pub fn run(
         &self,
         truth: &Truth,
         ledger: &mut Ledger,
-        report: &mut dyn FnMut(SweepProgress) -> Result<()>,
+        hear: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         let mut is_warm = false;
         for turn in 0..=self.turns {
@@ -97,33 +99,33 @@ impl Sweep<'_> {
                 continue;
             }
             if turn > 0 && !is_warm {
-                self.progress(ledger, turn, 0, report)?;
+                self.heard(ledger, turn, 0, hear)?;
                 self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
             }
             is_warm = true;
-            self.turn(truth, ledger, turn, &open, report)?;
+            self.turn(truth, ledger, turn, &open, hear)?;
         }
         Ok(())
     }
 
-    /// Tries the candidates `open` in a turn.
+    /// The `open` candidates of a turn.
     fn turn(
         &self,
         truth: &Truth,
         ledger: &mut Ledger,
         turn: u32,
         open: &[usize],
-        report: &mut dyn FnMut(SweepProgress) -> Result<()>,
+        hear: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         // The default goes first, also where an earlier run has had its turn: the others' pixels and
         // times are compared with its.
-        self.progress(ledger, turn, 0, report)?;
+        self.heard(ledger, turn, 0, hear)?;
         let default = self.try_one(&self.with_seed(&self.candidates[0], turn), self.frames)?;
         for candidate in open {
             let own = match *candidate {
                 0 => None,
                 k => {
-                    self.progress(ledger, turn, k, report)?;
+                    self.heard(ledger, turn, k, hear)?;
                     Some(self.try_one(&self.with_seed(&self.candidates[k], turn), self.frames)?)
                 }
             };
@@ -145,16 +147,16 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    fn progress(
+    fn heard(
         &self,
         ledger: &Ledger,
         turn: u32,
         candidate: usize,
-        report: &mut dyn FnMut(SweepProgress) -> Result<()>,
+        hear: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         let left = self.seconds_left(ledger.entries());
         let candidate = &self.candidates[candidate];
-        report(SweepProgress {
+        hear(SweepProgress {
             ledger,
             done: self.done(ledger),
             of: self.trials(),
@@ -164,18 +166,18 @@ impl Sweep<'_> {
         })
     }
 
-    /// Number of trials of the whole sweep.
+    /// Trials that there are in all.
     pub fn trials(&self) -> usize {
         self.candidates.len() * (self.turns as usize + 1)
     }
 
-    /// Number of this sweep's trials in `ledger`.
+    /// Trials that `ledger` has.
     pub fn done(&self, ledger: &Ledger) -> usize {
         ledger.entries().iter().filter(|entry| entry.turn <= self.turns).count()
     }
 
-    /// Seconds that the missing trials take. A candidate takes as long as in its last trial; one without a
-    /// trial as long as the others do for as many samples. `None` before any trial.
+    /// How long the trials take that are missing: a setting's last one tells of its next one, and by
+    /// how many samples they take those that were tried tell of others. `None` before any was tried.
     fn seconds_left(&self, entries: &[TrialRecord]) -> Option<f64> {
         let work = |candidate: usize| samples(&self.candidates[candidate].settings) as f64;
         let all: f64 = entries.iter().map(|entry| entry.took).sum();
@@ -191,9 +193,9 @@ impl Sweep<'_> {
         (!entries.is_empty() && left.is_finite()).then_some(left)
     }
 
-    /// The table of `ledger`, with a row for every candidate that was timed at least once, and the
-    /// candidates' pictures; `None` before the default was timed.
-    pub fn measured(&self, ledger: &Ledger) -> Option<(Measured, Vec<Picture>)> {
+    /// What `ledger` tells: a row for every candidate that was timed at least once, and their pictures;
+    /// `None` before the default was.
+    pub fn measured(&self, ledger: &Ledger) -> Option<(Measured, Vec<CandidatePicture>)> {
         let taken = |k: &usize| Taken::of(ledger.entries(), *k);
         let all: Vec<usize> = (0..self.candidates.len()).filter(|k| taken(k).is_timed()).collect();
         if all.first() != Some(&0) {
@@ -202,7 +204,7 @@ impl Sweep<'_> {
         let candidates: Vec<Candidate> = all.iter().map(|k| self.candidates[*k].clone()).collect();
         let measured = Measured::of(&candidates, &all.iter().map(taken).collect::<Vec<_>>());
         let picture = |(candidate, k): (usize, &usize)| {
-            ledger.picture(*k).map(|picture| Picture { candidate, picture })
+            ledger.picture(*k).map(|picture| CandidatePicture { candidate, picture })
         };
         let pictures = all.iter().enumerate().filter_map(picture).collect();
         Some((measured, pictures))
@@ -243,13 +245,13 @@ struct Tried {
     entry: TrialRecord,
 }
 
-/// Camera and light samples of a pixel: roughly what a setting costs.
+/// Samples a pixel, of the camera and of the lights; roughly what a setting costs.
 fn samples(s: &Settings) -> u64 {
     let lights = u64::from(s.shadow_samples) + u64::from(s.sky_samples) + 1;
     u64::from(s.spp) * lights
 }
 
-/// The order of candidates in a turn: the default, then the others, in every second turn in reverse.
+/// The default, then the others, in every second turn in reverse.
 fn order(n: usize, turn: u32) -> Vec<usize> {
     let others: Vec<usize> = match turn % 2 {
         0 => (1..n).collect(),

@@ -1,153 +1,15 @@
-//! The table of a sweep: a row of figures for each candidate.
+//! What was measured, a row a candidate.
 
-use super::errors::{Errors, Frames};
 use super::front;
-use super::knobs::{Candidate, Knob};
-use super::ledger::TrialRecord;
-use crate::measure::{Median, largest_error, median, share_exceeding};
-use crate::stats::RayCounts;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::ops::AddAssign;
+use super::knobs::Candidate;
+use super::row::{CandidateRow, Taken, row};
+use serde::Serialize;
 
 /// All rows, the default's first.
 #[derive(Debug, Clone, Serialize)]
 pub struct Measured {
-    /// A row for each candidate.
-    pub rows: Vec<Row>,
-}
-
-/// The figures of a candidate. Seconds and rays are per frame, means over the move.
-#[derive(Debug, Clone, Serialize)]
-pub struct Row {
-    /// The knob that the candidate turns.
-    pub knob: Knob,
-    /// Command-line options of the setting; empty for the default.
-    pub options: String,
-    /// Errors, means over the turns.
-    pub errors: Errors,
-    /// Root mean squared error of each turn, display steps.
-    pub rmse_of_turns: Vec<f64>,
-    /// Wall seconds.
-    pub seconds: Spread,
-    /// CPU seconds of all threads together.
-    pub cpu_seconds: Spread,
-    /// Wall seconds to build the intersector, once a job.
-    pub build_seconds: Spread,
-    /// Ratio of wall seconds to the default's of the same turn and run; `None` for the default.
-    pub time_ratio: Option<Median>,
-    /// Ratio of CPU seconds to the default's of the same turn: on a busy machine it is known better.
-    pub cpu_ratio: Option<Median>,
-    /// Ratio of the root mean squared error to the default's of the same turn.
-    pub error_ratio: Option<Median>,
-    /// How pixels differ from the default's with the same seed.
-    pub change: Option<Change>,
-    /// Rays a frame.
-    pub rays_per_frame: f64,
-    /// Rays by kind, of all frames made in a turn.
-    pub rays: RayCounts,
-    /// Memory of the intersector and of the references, bytes.
-    pub memory_bytes: u64,
-    /// Whether it is on the front of error and wall time: no other candidate that may be recommended is both
-    /// faster and more accurate.
-    pub on_front: bool,
-    /// Whether it is on the front of error and CPU time.
-    pub on_cpu_front: bool,
-}
-
-impl Row {
-    /// Whether all pixels are those of the default.
-    pub fn has_pixels_of_default(&self) -> bool {
-        self.change.is_some_and(|change| change.pixels > 0 && change.differing == 0)
-    }
-}
-
-/// A median with the values of the turns.
-#[derive(Debug, Clone, Serialize)]
-pub struct Spread {
-    /// The median and its interval.
-    #[serde(flatten)]
-    pub median: Median,
-    /// A value for each turn.
-    pub turns: Vec<f64>,
-}
-
-/// How pixels differ from the default's.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Change {
-    /// Pixels compared.
-    pub pixels: u64,
-    /// Pixels that differ at all.
-    pub differing: u64,
-    /// Pixels of which some channel differs by more than 2 display steps.
-    pub over_2: u64,
-    /// The largest difference, display steps.
-    pub largest: f64,
-}
-
-impl Change {
-    /// Between the same frames of two candidates.
-    pub fn between(default: &Frames, other: &Frames) -> Self {
-        let mut change = Self::default();
-        for (frame, image) in other {
-            let reference = &default[frame];
-            let pixels = image.rgb.len() as f64;
-            let differing = image.rgb.iter().zip(&reference.rgb).filter(|(a, b)| a != b).count();
-            change += Self {
-                pixels: pixels as u64,
-                differing: differing as u64,
-                over_2: (share_exceeding(reference, image, 2) * pixels).round() as u64,
-                largest: 255.0 * f64::from(largest_error(reference, image).value),
-            };
-        }
-        change
-    }
-}
-
-impl AddAssign for Change {
-    fn add_assign(&mut self, o: Self) {
-        self.pixels += o.pixels;
-        self.differing += o.differing;
-        self.over_2 += o.over_2;
-        self.largest = self.largest.max(o.largest);
-    }
-}
-
-/// What a candidate's turns gave so far, by turn.
-#[derive(Default)]
-pub struct Taken(BTreeMap<u32, TrialRecord>);
-
-impl Taken {
-    /// The entries of `candidate`, by turn.
-    pub fn of(entries: &[TrialRecord], candidate: usize) -> Self {
-        let own = entries.iter().filter(|entry| entry.candidate == candidate);
-        Self(own.map(|entry| (entry.turn, entry.clone())).collect())
-    }
-
-    /// Whether any turn was timed: the first one warms up.
-    pub fn is_timed(&self) -> bool {
-        self.0.keys().any(|turn| *turn > 0)
-    }
-
-    fn timed(&self, of: fn(&TrialRecord) -> f64) -> Vec<f64> {
-        self.0.range(1..).map(|(_, entry)| of(entry)).collect()
-    }
-
-    fn errors(&self) -> Vec<Errors> {
-        self.0.values().map(|entry| entry.errors.into()).collect()
-    }
-
-    fn change(&self) -> Change {
-        let mut sum = Change::default();
-        self.0.values().for_each(|entry| sum += entry.change);
-        sum
-    }
-
-    /// `of` each turn from the `first` on over that of the same turn of `other`.
-    fn ratios(&self, other: &Self, first: u32, of: fn(&TrialRecord) -> f64) -> Vec<f64> {
-        let ratio = |(turn, entry): (&u32, &TrialRecord)| Some(of(entry) / of(other.0.get(turn)?));
-        self.0.range(first..).filter_map(ratio).collect()
-    }
+    /// One a candidate.
+    pub rows: Vec<CandidateRow>,
 }
 
 impl Measured {
@@ -165,47 +27,17 @@ impl Measured {
     }
 
     /// The default's.
-    pub fn default_row(&self) -> &Row {
+    pub fn default_row(&self) -> &CandidateRow {
         &self.rows[0]
     }
-}
-
-fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -> Row {
-    let sure = |ratios: &[f64]| median(ratios).filter(|m| m.interval.estimate.is_finite());
-    let errors = own.errors();
-    let first = own.0.values().next().cloned().unwrap_or_default();
-    Row {
-        knob: candidate.knob,
-        options: candidate.options.clone(),
-        errors: Errors::mean(&errors),
-        rmse_of_turns: errors.iter().map(|e| e.rmse_steps).collect(),
-        seconds: spread(&own.timed(|e| e.seconds)),
-        cpu_seconds: spread(&own.timed(|e| e.cpu_seconds)),
-        build_seconds: spread(&own.timed(|e| e.build_seconds)),
-        time_ratio: default.and_then(|_| sure(&own.timed(|e| e.seconds / e.default_seconds))),
-        cpu_ratio: default.and_then(|d| sure(&own.ratios(d, 1, |e| e.cpu_seconds))),
-        error_ratio: default
-            .and_then(|d| sure(&own.ratios(d, 0, |e| Errors::from(e.errors).rmse_steps))),
-        change: default.map(|_| own.change()),
-        rays_per_frame: first.rays_per_frame,
-        rays: first.rays,
-        memory_bytes: own.0.values().map(|entry| entry.memory).max().unwrap_or(0),
-        on_front: false,
-        on_cpu_front: false,
-    }
-}
-
-fn spread(turns: &[f64]) -> Spread {
-    const NOTHING: Median = Median {
-        interval: crate::measure::Interval { estimate: f64::NAN, low: f64::NAN, high: f64::NAN },
-        confidence: 0.0,
-    };
-    Spread { median: median(turns).unwrap_or(NOTHING), turns: turns.to_vec() }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::accuracy::errors::Errors;
+    use crate::accuracy::knobs::Knob;
+    use crate::accuracy::ledger::TrialRecord;
     use crate::scene::Settings;
 
     pub fn measured(list: &[(Knob, &str, f64, f64)]) -> Measured {

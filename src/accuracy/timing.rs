@@ -3,7 +3,7 @@
 use super::frames::{Cut, timed_frames};
 use super::modes::Times;
 use super::predictor::{Prediction, Predictor, ReuseMode};
-use super::probe::Probe;
+use super::probe::SettingsProbe;
 use super::{effort::Effort, trial};
 use crate::error::Result;
 use crate::reuse;
@@ -34,7 +34,7 @@ pub struct Timing {
 /// Gives the wall seconds that a rank takes for a frame.
 pub type Timer<'a> = &'a dyn Fn(&Timing) -> Result<f64>;
 
-impl Probe<'_> {
+impl SettingsProbe<'_> {
     /// Of `found` the setting that is fastest when the likely ones are tried, with the seconds that it took.
     ///
     /// # Errors
@@ -114,7 +114,7 @@ impl Probe<'_> {
 
     fn cut(&self, reuse: ReuseSettings) -> Cut {
         let settings = Settings { reuse, ..self.context.base.clone() };
-        let looks_up = !reuse::channels(self.context.scene, &self.plan(), &settings).is_empty();
+        let looks_up = !reuse::channels(self.context.scene, &settings).is_empty();
         Cut::of(&settings, self.context.shot.frames, looks_up)
     }
 

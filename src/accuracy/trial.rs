@@ -1,15 +1,14 @@
 //! One candidate, one turn: its frames, made and timed.
 
-use super::context::{NoProgress, TrialContext};
+use super::context::TrialContext;
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use crate::effects::EffectPlan;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::intersect::Intersector;
 use crate::reuse;
-use crate::reuse::colour::Rule;
+use crate::reuse::colour::AgreementRule;
 use crate::scene::{Policy, Settings};
-use crate::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
+use crate::sequence::{ColourMaker, FrameContext, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
 use crate::shade::Renderer;
 use crate::stats::RayCounts;
 use std::time::Instant;
@@ -35,7 +34,7 @@ pub struct Trial {
 /// Makes `chosen` frames under `settings`, and what they are inferred from.
 ///
 /// # Errors
-/// [`Error::Stopped`]; those of cameras.
+/// [`Stopped`](crate::error::Error::Stopped); those of cameras.
 pub fn run(
     context: &TrialContext,
     settings: &Settings,
@@ -43,9 +42,8 @@ pub fn run(
     chosen: &[u32],
 ) -> Result<Trial> {
     let scene = context.scene_of(settings);
-    let plan = EffectPlan::of(scene, settings);
-    let renderer = Renderer { scene, settings, plan, intersector };
-    let looks_up = !reuse::channels(scene, &plan, settings).is_empty();
+    let renderer = Renderer::new(scene, settings, intersector);
+    let looks_up = !reuse::channels(scene, settings).is_empty();
     let cut = Cut::of(settings, context.shot.frames, looks_up);
     let maker = maker(context, renderer, settings)?;
     let order = maker.batches(&cut.with_ancestors(chosen)).concat();
@@ -55,7 +53,7 @@ pub fn run(
     let mut all_rays = RayCounts::default();
     for frame in order {
         let (start, cpu_start) = (Instant::now(), cpu_now());
-        let made = maker.make(frame)?.ok_or(Error::Stopped)?;
+        let made = maker.make(frame)?;
         seconds.push((frame, start.elapsed().as_secs_f64()));
         cpu.push((frame, cpu_now() - cpu_start));
         let cast = rays_of(&made);
@@ -89,28 +87,17 @@ fn maker<'m>(
     settings: &Settings,
 ) -> Result<Box<dyn FrameMaker + 'm>> {
     let TrialContext { shot, pool, stop, .. } = *context;
-    let frames = shot.frames;
+    let progress = &();
+    let context = FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress };
     Ok(match settings.reuse.policy {
         Policy::Surface => {
-            let pyramid = Pyramid { segment: settings.reuse.segment, frames };
-            Box::new(SurfaceReuse::new(renderer, shot, pool, stop, &NoProgress, pyramid)?)
+            let pyramid = Pyramid { segment: settings.reuse.segment, frames: shot.frames };
+            Box::new(SurfaceReuse::new(context, pyramid)?)
         }
         Policy::Colour => {
-            let rule = Rule {
-                colour_epsilon: settings.reuse.colour_epsilon,
-                distance_epsilon: settings.reuse.distance_epsilon,
-            };
-            Box::new(ColourMaker::new(renderer, shot, pool, stop, &NoProgress, rule, &[])?)
+            Box::new(ColourMaker::new(context, AgreementRule::of(&settings.reuse), &[])?)
         }
-        Policy::Off => Box::new(Tracer {
-            renderer,
-            shot,
-            pool,
-            with_gbuffer: false,
-            stop,
-            progress: &NoProgress,
-            laid: Default::default(),
-        }),
+        Policy::Off => Box::new(Tracer::new(context)),
     })
 }
 

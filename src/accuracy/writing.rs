@@ -1,8 +1,7 @@
 //! What putting frames and checkpoints on disk takes: time alone, no pixel differs by it.
 
-use super::context::{NoProgress, TrialContext};
+use super::context::TrialContext;
 use super::frames::Cut;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::measure::{Interval, median};
@@ -11,7 +10,7 @@ use crate::output::{FramePattern, WriteOptions, atomic, write_image};
 use crate::reuse::{self, store::Compatibility};
 use crate::scene::Policy;
 use crate::sequence::checkpoint::{self, Checkpoints};
-use crate::sequence::{FrameMaker, Pyramid, Recipes, SurfaceReuse, Target, Tracer};
+use crate::sequence::{FrameContext, FrameMaker, Pyramid, Recipes, SurfaceReuse, Target, Tracer};
 use crate::shade::Renderer;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -98,22 +97,20 @@ fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[Vec<f64>; 3]> {
     Ok(seconds)
 }
 
-fn renderer<'a>(context: &TrialContext<'a>) -> Renderer<'a> {
-    let TrialContext { scene, base: settings, intersector, .. } = *context;
-    Renderer { scene, settings, plan: EffectPlan::of(scene, settings), intersector }
+fn frame_context<'a>(context: &TrialContext<'a>) -> FrameContext<'a> {
+    let TrialContext { scene, base: settings, intersector, shot, pool, stop, .. } = *context;
+    let renderer = Renderer::new(scene, settings, intersector);
+    FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress: &() }
 }
 
 fn traced(context: &TrialContext) -> Result<Film> {
-    let TrialContext { shot, pool, stop, .. } = *context;
-    let (renderer, progress, laid) = (renderer(context), &NoProgress, Default::default());
-    let tracer = Tracer { renderer, shot, pool, with_gbuffer: false, stop, progress, laid };
-    Ok(tracer.make(1)?.ok_or(Error::Stopped)?.film)
+    Ok(Tracer::new(frame_context(context)).make(1)?.film)
 }
 
 /// The first frame, and what its reference takes: seconds, and bytes on disk.
 fn with_checkpoints(context: &TrialContext, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
-    let TrialContext { scene, shot, base, pool, stop, .. } = *context;
-    let channels = reuse::channels(scene, &EffectPlan::of(scene, base), base);
+    let TrialContext { scene, shot, base, .. } = *context;
+    let channels = reuse::channels(scene, base);
     let terms = Compatibility::of("", &channels, base);
     let target = target(context, folder, !channels.is_empty())?;
     let checkpoints =
@@ -121,12 +118,11 @@ fn with_checkpoints(context: &TrialContext, folder: &Path) -> Result<(Film, Opti
     let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
     let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
     for _ in 0..KEY_TIMES {
-        let mut maker =
-            SurfaceReuse::new(renderer(context), shot, pool, stop, &NoProgress, pyramid)?;
+        let mut maker = SurfaceReuse::new(frame_context(context), pyramid)?;
         maker.checkpoints = Some(&checkpoints);
         let all: Vec<u32> = (1..=shot.frames).collect();
         maker.expect(&all);
-        film = Some(maker.make(1)?.ok_or(Error::Stopped)?.film);
+        film = Some(maker.make(1)?.film);
         let cost = maker.save_cost();
         seconds.push(cost.seconds);
         bytes = cost.bytes;

@@ -6,13 +6,13 @@ mod line;
 mod measure;
 mod page;
 
-use super::args::{SceneArgs, SettingArgs};
+use super::args::{SceneArgs, SettingArgs, whole};
 use super::exit::Exit;
 use super::signals::Interrupt;
 use super::{job, machine, say, values};
 use crate::accuracy::{
-    self, Candidate, Group, Ledger, Measured, OracleCrop, Picture, Sweep, TrialContext, Truth,
-    Writing,
+    self, Candidate, CandidatePicture, Group, Ledger, Measured, OracleCrop, Sweep, TrialContext,
+    Truth, Writing,
 };
 use crate::cluster;
 use crate::effects::EffectPlan;
@@ -26,7 +26,7 @@ use crate::scene::limits::{MAX_SAMPLES, MAX_THREADS};
 use crate::scene::{FrameRange, Scene, Settings};
 use crate::sequence::fingerprint;
 use clap::Args;
-use measure::Job;
+use measure::SweepJob;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -61,11 +61,11 @@ pub struct AccuracyArgs {
     /// How often each setting is timed; 6 and more give intervals of 95 %, fewer than 5 say nothing
     /// about small differences
     #[arg(long, value_name = "N", default_value_t = 6, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=1000))]
+        value_parser = whole(1, 1000))]
     turns: u32,
     /// Most camera samples of the reference, which doubles them until it no longer changes
     #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(64..=i64::from(MAX_SAMPLES)))]
+        value_parser = whole(64, MAX_SAMPLES))]
     reference_spp: u32,
     /// What is turned: reuse, samples, specular, intersection, tree, oracle, writing, combinations
     /// [default: all]
@@ -81,7 +81,7 @@ pub struct AccuracyArgs {
     time_limit: Option<Duration>,
     /// Rendering threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
+        value_parser = whole(1, MAX_THREADS))]
     threads: Option<u32>,
     /// Say nothing but errors
     #[arg(short, long)]
@@ -97,7 +97,7 @@ struct Outcome<'a> {
     plan: EffectPlan,
     truth: &'a Truth,
     measured: Measured,
-    pictures: Vec<Picture>,
+    pictures: Vec<CandidatePicture>,
     oracle: Option<OracleCrop>,
     oracle_was_wanted: bool,
     writing: Option<Writing>,
@@ -125,7 +125,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let start = Instant::now();
     let interrupt = Interrupt::new();
     interrupt.listen(true)?;
-    let Loaded { world, shot, settings: base, threads, time_limit, warnings, .. } =
+    let Loaded { world, shot, settings: base, options, warnings, .. } =
         job::load(&args.scene, &args.settings)?;
     if !args.quiet {
         warnings.iter().for_each(say::warning);
@@ -144,7 +144,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let scene = world.into_scene(base.rules.recentre)?;
     let otherwise = otherwise.and_then(|world| world.into_scene(!base.rules.recentre).ok());
     let candidates = candidates(&scene, &base, shot.frames, &groups, otherwise.is_some());
-    let threads = args.threads.or(threads);
+    let threads = args.threads.or(options.threads);
     let threads = threads.map_or_else(cluster::default_threads, |n| n as usize);
     let pool = machine::thread_pool(threads)?;
     let building = Instant::now();
@@ -165,12 +165,12 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let ledger = Ledger::open(&args.output.join("sweep"), &terms, args.overwrite)?;
     let oracle_was_wanted = groups.contains(&Group::Oracle);
     interrupt.before_slurm_ends();
-    interrupt.limit(start, args.time_limit.or(time_limit));
-    let job = Job {
+    interrupt.limit(start, args.time_limit.or(options.time_limit));
+    let job = SweepJob {
         args,
         sweep: &sweep,
         interrupt: &interrupt,
-        line: line::Line::new(args.quiet),
+        line: line::ProgressLine::new(args.quiet),
         oracle_was_wanted,
         writing_is_wanted: groups.contains(&Group::Writing),
         load: machine::load(),
@@ -222,9 +222,9 @@ fn candidates(
     groups: &[Group],
     otherwise: bool,
 ) -> Vec<Candidate> {
-    let plan = |settings: &Settings| EffectPlan::of(scene, settings);
-    let looks_up = |s: &Settings| !reuse::channels(scene, &plan(s), s).is_empty();
-    let mut all = accuracy::candidates(base, &plan(base), frames, &looks_up, groups);
+    let looks_up = |s: &Settings| !reuse::channels(scene, s).is_empty();
+    let mut all =
+        accuracy::candidates(base, &EffectPlan::of(scene, base), frames, &looks_up, groups);
     all.retain(|c| otherwise || c.settings.rules.recentre == base.rules.recentre);
     all
 }

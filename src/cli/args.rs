@@ -1,14 +1,17 @@
 //! Options that stand over the scene file: what to render and how.
 
-use super::values::{self, Clamp, FrameRequest};
+mod job;
+
+pub use job::JobArgs;
+
+use super::values::{self, Clamp};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
-    BuildQuality, Filter, IntersectorKind, Interval, Policy, Recheck, Rect, ReuseSettings,
-    Settings, ToneCurve, limits,
+    BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings,
+    ToneCurve, limits,
 };
 use clap::Args;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// The scene and how to read it.
 #[derive(Debug, Args)]
@@ -222,72 +225,8 @@ impl TracingArgs {
     }
 }
 
-/// Frames and output, for `render`.
-#[derive(Debug, Args)]
-pub struct OutputArgs {
-    /// Where frames go; #### is the frame number, the ending chooses png, exr (linear, with AOVs)
-    /// or ppm [default: out/<scene>/frame_####.png]
-    #[arg(short, long, value_name = "PATTERN")]
-    pub output: Option<String>,
-    /// Frames to render, counted from 1, both ends included: 7, 1..16, 5.. [default: all]
-    #[arg(long, value_name = "RANGE", value_parser = values::frames)]
-    pub frames: Option<FrameRequest>,
-    /// Replace frames that exist
-    #[arg(long)]
-    pub overwrite: bool,
-    /// Fail (exit code 1, frames written) where a sample is NaN, infinite or negative, or where inferred
-    /// frames are less true than traced ones
-    #[arg(long)]
-    pub strict: bool,
-    /// Make no video of the sequence
-    #[arg(long, overrides_with = "video")]
-    pub no_video: bool,
-    /// Make a video even where the scene file says not to
-    #[arg(long)]
-    pub video: bool,
-    /// Frames per second of the video [default: 24]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
-    pub fps: Option<f64>,
-    /// Map where each frame's light comes from: traced or inferred, from which frame, from how far
-    /// away, how far off; as pictures beside png and ppm frames, as channels of exr frames
-    #[arg(long, help_heading = "Reuse")]
-    pub maps: bool,
-    /// Surface policy: infer from the exr frames in this folder too, which an earlier job of the same
-    /// scene left; repeatable
-    #[arg(long, value_name = "DIR", help_heading = "Reuse")]
-    pub references: Vec<PathBuf>,
-    /// Colour policy: take this picture (png, ppm, jpeg, exr) for frame FRAME, and infer others
-    /// from it too; repeatable
-    #[arg(long, value_name = "FRAME=FILE", help_heading = "Reuse", value_parser = values::upload)]
-    pub upload: Vec<(u32, PathBuf)>,
-    /// Stop after this long and exit with code 75: 25m, 1h30m, 90s, or as Slurm writes it: 30 (minutes),
-    /// 00:30:00, 1-12; counted from the program's start. In a Slurm job at the latest 30 s before its end
-    #[arg(long, value_name = "TIME", value_parser = values::time_limit)]
-    pub time_limit: Option<Duration>,
-    /// Put what frames to come need on disk every so often, so that a killed job need not trace it
-    /// again: 30s, 5m, off [default: 30s]
-    #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
-    pub checkpoint: Option<Interval>,
-    /// Of several ranks of an MPI job: how many discoveries (points or pixels that one traced and others
-    /// use) a message carries at most [default: 100000]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_EXCHANGE))]
-    pub exchange: Option<u32>,
-    /// Write what the job took to this file, as JSON
-    #[arg(long, value_name = "FILE")]
-    pub stats: Option<PathBuf>,
-    /// Rendering threads [default: the cores this process may use]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_THREADS))]
-    pub threads: Option<u32>,
-    /// Which ranks of an MPI job share a node: a file with a line `RANK NODE` for each; neighbouring
-    /// segments stay on one node [default: as the ranks share memory]
-    #[arg(long, value_name = "FILE")]
-    pub rank_map: Option<PathBuf>,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-fn whole(least: u32, most: u32) -> clap::builder::RangedI64ValueParser<u32> {
+/// A whole number of this range.
+pub fn whole(least: u32, most: u32) -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(i64::from(least)..=i64::from(most))
 }
 

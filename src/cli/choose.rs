@@ -1,25 +1,27 @@
 //! `render --target` and `--budget`: settings that the program chooses for a scene.
 
 mod budget;
+mod choice;
 mod folder;
 mod judge;
+
+pub use choice::{Choice, asks_for_choice};
 
 use super::args::SettingArgs;
 use super::request::Request;
 use super::{say, spelled, values};
 use crate::accuracy::{
-    GivenOptions, Goal, Prediction, Predictor, Probe, Timer, TrialContext, Verdict,
+    FixedSettings, Goal, Prediction, Predictor, SettingsProbe, Timer, TrialContext,
 };
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
 use crate::output::manifest::Header;
 use crate::page::words::seconds;
-use crate::scene::{FrameRange, Policy, Settings};
+use crate::scene::Policy;
 use budget::Budget;
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::time::{Duration, Instant};
 
 /// The share of the squared error that a target allows that the choice aims at: some frames may be worse than
@@ -39,37 +41,9 @@ pub struct ChoiceArgs {
     pub budget: Option<Duration>,
 }
 
-/// The settings that were chosen, and why. The manifest keeps them, so that a job that goes on does not choose
-/// again.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Choice {
-    /// The target or budget, as on the command line.
-    pub wanted: String,
-    /// The settings before the choice.
-    base: Value,
-    /// Which of them the user gave.
-    given: GivenOptions,
-    /// The setting that was chosen, with its predicted error and time.
-    pub predicted: Prediction,
-    /// The predictor that the probe made.
-    predictor: Predictor,
-    /// Wall seconds that rendering and writing all frames is predicted to take.
-    seconds: f64,
-    /// How often the choice was tightened after a miss.
-    pub tightened: u32,
-    /// The finished frames that were checked: the shot's hash, and the range of frames.
-    checked: Option<(String, FrameRange)>,
-    /// The check's result in words; `None` before a check.
-    #[serde(default)]
-    pub came_out: Option<String>,
-    /// Whether the target was reached; `None` before a check, and for a budget.
-    #[serde(default)]
-    verdict: Option<Verdict>,
-}
-
 /// What is to be done after a check of the finished frames.
 #[derive(Serialize, Deserialize)]
-pub enum Judged {
+pub enum Judgement {
     /// Render all frames again with this tighter choice.
     Again(Choice),
     /// Nothing: the choice with the check's result.
@@ -86,6 +60,8 @@ pub struct Chooser<'a> {
     pub context: &'a TrialContext<'a>,
     /// The job.
     pub request: &'a Request,
+    /// What traces, as far as frames differ by it.
+    pub tracer: &'a str,
     /// When the program started: a budget counts from then.
     pub started: Instant,
     /// Number of ranks that share the job.
@@ -108,7 +84,9 @@ impl ChoiceArgs {
             () if settings.crop.is_some() => Some("--crop"),
             () if settings.reuse.policy == Policy::Colour => Some("--policy colour"),
             () if !request.references.is_empty() => Some("--references"),
-            () if request.maps && settings.reuse.policy == Policy::Off => Some("--policy off"),
+            () if request.options.maps && settings.reuse.policy == Policy::Off => {
+                Some("--policy off")
+            }
             () => None,
         };
         if let Some(goal) = self.target.filter(|goal| goal.is_beyond_8_bits() && rounds(request)) {
@@ -134,101 +112,6 @@ impl ChoiceArgs {
     }
 }
 
-impl Choice {
-    /// `base` with the settings that were chosen.
-    pub fn settings(&self, base: &Settings) -> Settings {
-        self.predicted.settings(base)
-    }
-
-    /// The choice as JSON, for the manifest.
-    pub fn value(&self) -> Value {
-        serde_json::to_value(self).unwrap_or_default()
-    }
-
-    /// Whether a check was made of a range that has all of `frames`, of the shot of this hash.
-    pub fn is_checked(&self, shot: &str, frames: FrameRange) -> bool {
-        let holds = |seen: &FrameRange| seen.first <= frames.first && frames.last <= seen.last;
-        self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
-    }
-
-    /// The choice with the note that `frames` of the shot of this hash were checked.
-    pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
-        Self { checked: Some((shot.into(), frames)), ..self }
-    }
-
-    /// The choice in a manifest's header; `None` where there is none that this version can read.
-    pub fn of(header: &Header) -> Option<Self> {
-        serde_json::from_value(header.chosen.clone()?).ok()
-    }
-
-    /// Whether the target was reached, in words; `None` before a check, and for a budget.
-    pub fn verdict(&self) -> Option<String> {
-        let came = match self.verdict? {
-            Verdict::Reached => "reached",
-            Verdict::Open => "not told apart from the target by so few pixels",
-            Verdict::Missed => "missed",
-        };
-        Some(format!("{}: {came}", self.wanted))
-    }
-
-    /// All command-line options of the choice, also those without effect in the scene.
-    pub fn options(&self) -> String {
-        spelled::options(&self.predicted.settings(&Settings::default()), &EffectPlan::EVERYTHING)
-    }
-
-    /// `command` with the chosen options in place of `--target` or `--budget`: it gives the same frames on any
-    /// machine. Options in `command` stay.
-    pub fn spelled_out(&self, command: &[String]) -> Vec<String> {
-        let options = self.options();
-        let options: Vec<&str> = options.split(' ').collect();
-        let is_given = |name: &str| command.iter().any(|word| is_option(word, name));
-        let chosen = options.chunks(2).filter(|pair| !is_given(pair[0])).flatten();
-        let mut words = Vec::new();
-        let mut left = command.iter();
-        while let Some(word) = left.next() {
-            if !is_wish(word) {
-                words.push(word.clone());
-                continue;
-            }
-            words.extend(chosen.clone().map(ToString::to_string));
-            if !word.contains('=') {
-                left.next();
-            }
-        }
-        words
-    }
-
-    /// Predicted error and time, in words.
-    pub fn prediction_in_words(&self) -> String {
-        format!(
-            "{}PSNR {} in the worst frame, {} a frame, {} in all",
-            self.figure().map_or(String::new(), |figure| format!("{figure}, ")),
-            decibels(self.predicted.psnr()),
-            seconds(self.predicted.seconds),
-            seconds(self.seconds)
-        )
-    }
-
-    /// The target's figure of the choice as the probe measured it, in words; `None` for PSNR and for budgets.
-    fn figure(&self) -> Option<String> {
-        values::goal(&self.wanted).ok()?.in_words(self.predicted.figure?)
-    }
-}
-
-/// Whether a command has `--target` or `--budget`.
-pub fn asks_for_choice(command: &[String]) -> bool {
-    command.iter().any(|word| is_wish(word))
-}
-
-fn is_wish(word: &str) -> bool {
-    is_option(word, "--target") || is_option(word, "--budget")
-}
-
-/// Whether a word of a command is the option `name`, with its value or before it.
-fn is_option(word: &str, name: &str) -> bool {
-    word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
-}
-
 /// Whether frames are rounded to 8 bits.
 fn rounds(request: &Request) -> bool {
     request.pattern.format() != Format::Exr && request.settings.png_bits == 8
@@ -244,17 +127,18 @@ impl Chooser<'_> {
     ///
     /// # Errors
     /// Errors of the probe; a target that no setting is predicted to reach.
-    pub fn choose(&self, tracer: &str, timer: Timer) -> Result<Choice> {
-        if let Some(before) = self.before(tracer) {
+    pub fn choose(&self, timer: Timer) -> Result<Choice> {
+        if let Some(before) = self.before() {
             let options = self.options(&before.predicted);
             self.tell(format!("for {}, as chosen before: {options}", before.wanted));
             self.warn_if_long(&before);
             return Ok(before);
         }
-        self.check_folder(tracer)?;
+        self.check_folder()?;
         let start = Instant::now();
         let budget = Budget::of(self);
-        let probe = Probe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
+        let probe =
+            SettingsProbe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
         let (mut predictor, found) =
             probe.look(AIM, &|what| self.tell(format!("probe: {what}")))?;
         let found = match &budget {
@@ -296,7 +180,7 @@ impl Chooser<'_> {
             format!("; {} would come to {psnr}, in {took}", self.options(&best))
         });
         let nearest = best.unwrap_or_default();
-        let fewer = match self.given() == GivenOptions::default() {
+        let fewer = match self.given() == FixedSettings::default() {
             true => "",
             false => ", or give fewer options",
         };
@@ -306,22 +190,22 @@ impl Chooser<'_> {
         ))
     }
 
-    fn before(&self, tracer: &str) -> Option<Choice> {
-        let before = Choice::of(&self.request.header_before(tracer)?)?;
+    fn before(&self) -> Option<Choice> {
+        let before = Choice::of(&self.request.header_before(self.tracer)?)?;
         let is_same = before.wanted == self.args.words()
             && before.base == Header::settings(self.context.base)
             && before.given == self.given();
         is_same.then_some(before)
     }
 
-    fn given(&self) -> GivenOptions {
+    fn given(&self) -> FixedSettings {
         let s = self.options;
-        GivenOptions {
+        FixedSettings {
             spp: s.spp.is_some(),
             shadow: s.shadow_samples.is_some(),
             sky: s.sky_samples.is_some(),
             bounces: s.bounces.is_some(),
-            policy: s.reuse.policy.is_some() || self.request.maps,
+            policy: s.reuse.policy.is_some() || self.request.options.maps,
         }
     }
 
@@ -335,8 +219,8 @@ impl Chooser<'_> {
     }
 
     /// A probe for this job.
-    pub fn probe(&self) -> Probe<'_> {
-        Probe {
+    pub fn probe(&self) -> SettingsProbe<'_> {
+        SettingsProbe {
             context: self.context,
             frames: self.request.frames,
             goal: self.args.target,

@@ -55,9 +55,7 @@ struct Report {
 pub fn run(args: &CompareArgs) -> Result<Exit> {
     let report = compare(&args.reference, &args.other)?;
     if args.json {
-        let text = serde_json::to_string_pretty(&report)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text)?;
+        say::json(&report)?;
     } else {
         report.print()?;
     }

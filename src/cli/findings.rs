@@ -122,7 +122,7 @@ fn sees_nothing(camera: &Camera, intersector: &dyn Intersector) -> bool {
     let pixel = |k: u32| {
         let x = at(k % columns, columns, camera.width);
         let y = at(k / columns, rows, camera.height);
-        Ray::new(camera.eye, camera.direction(x, y))
+        camera.generate_ray(x, y, [0.5; 2])
     };
     let rays: Vec<Ray> = (0..columns * rows).map(pixel).collect();
     trace(&rays, intersector).iter().all(Option::is_none)

@@ -8,8 +8,8 @@ use super::findings::findings;
 use super::{job, say};
 use crate::cluster;
 use crate::effects::EffectPlan;
-use crate::error::{Error, Result, counted};
-use crate::import::{Loaded, Stage};
+use crate::error::{Result, counted};
+use crate::import::{AddedStage, Loaded};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
 use crate::scene::{Light, Mesh, Scene, Settings, Shot};
@@ -54,7 +54,7 @@ struct Inspection {
     camera_start: CameraView,
     camera_end: CameraView,
     memory: Memory,
-    reuse: reuse::Plan,
+    reuse: reuse::ReusePlan,
     effects: Vec<Effect>,
     warnings: Vec<String>,
 }
@@ -95,9 +95,7 @@ struct Effect {
 pub fn run(args: &InspectArgs) -> Result<Exit> {
     let inspection = inspect(args)?;
     if args.json {
-        let text = serde_json::to_string_pretty(&inspection)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text)?;
+        say::json(&inspection)?;
     } else {
         say::text(&inspection.to_text())?;
     }
@@ -114,10 +112,8 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
     warnings.extend(collapsed.iter().map(ToString::to_string));
     warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
     let meshes = own_meshes(&scene, stage);
-    let plan = EffectPlan::of(&scene, &settings);
-    let renderer =
-        Renderer { scene: &scene, settings: &settings, plan, intersector: &*intersector };
-    let reasons = EffectPlan::reasons(&scene, &settings);
+    let renderer = Renderer::new(&scene, &settings, &*intersector);
+    let reasons = EffectPlan::reasons(&scene, &settings, &shot.lens);
     Ok(Inspection {
         scene: args.scene.scene.display().to_string(),
         tracer: intersector.describe(),
@@ -141,7 +137,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
-        reuse: reuse::Plan::of(&renderer, &shot)?,
+        reuse: reuse::ReusePlan::of(&renderer, &shot)?,
         effects: reasons
             .into_iter()
             .map(|r| Effect { effect: r.effect, runs: r.runs, why: r.why })
@@ -171,7 +167,7 @@ impl CameraView {
 }
 
 /// The meshes that come from the user's files.
-fn own_meshes(scene: &Scene, stage: Option<Stage>) -> Vec<&Mesh> {
+fn own_meshes(scene: &Scene, stage: Option<AddedStage>) -> Vec<&Mesh> {
     let lamp = stage.map(|s| s.lamp as u32);
     let added = |index: usize, mesh: &Mesh| {
         stage.is_some_and(|s| s.floor == index || mesh.surface.light == lamp)

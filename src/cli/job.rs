@@ -4,7 +4,7 @@ use super::args::{SceneArgs, SettingArgs};
 use super::exit::as_input;
 use super::machine;
 use crate::error::{Diagnostic, Error, Result};
-use crate::import::{self, Loaded, OutputName};
+use crate::import::{self, Loaded};
 use crate::output::FramePattern;
 use crate::scene::limits::MAX_EDGE;
 use crate::scene::{Collapsed, Scene, Settings};
@@ -58,7 +58,9 @@ pub fn collapsed(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
 
 /// Whether the scene file's output can be a pattern; a fault is shown where it stands.
 fn check_output(loaded: &Loaded) -> Result<()> {
-    let Some(OutputName { pattern, place }) = &loaded.output else { return Ok(()) };
+    let (Some(pattern), Some(place)) = (&loaded.options.output, &loaded.output_place) else {
+        return Ok(());
+    };
     match FramePattern::parse(pattern, loaded.shot.frames) {
         Err(Error::Usage(message)) => Err(Diagnostic { message, ..place.clone() }.into()),
         other => other.map(drop),

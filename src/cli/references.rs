@@ -3,7 +3,6 @@
 use super::exit::as_input;
 use super::machine;
 use crate::cluster::Communicator;
-use crate::effects::EffectPlan;
 use crate::error::{Error, Result, counted};
 use crate::output::FramePattern;
 use crate::reuse;
@@ -25,7 +24,7 @@ pub struct References {
 
 /// On which terms this job's frames and others serve one another, in a world with the hash `world`.
 pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Compatibility {
-    let channels = reuse::channels(scene, &EffectPlan::of(scene, settings), settings);
+    let channels = reuse::channels(scene, settings);
     Compatibility::of(world, &channels, settings)
 }
 
@@ -42,7 +41,7 @@ impl References {
         (scene, settings, terms): (&Scene, &Settings, &Compatibility),
     ) -> Result<Self> {
         if folders.is_empty() {
-            return Ok(Self { cache: None, hash: "none".into() });
+            return Ok(Self::none());
         }
         refuse_policy(settings)?;
         // (Names as they are, which may be no text.)
@@ -63,6 +62,11 @@ impl References {
         let hash = name_of(&infos);
         cache.serve(infos);
         Ok(Self { cache: Some(cache), hash })
+    }
+
+    /// No references.
+    pub fn none() -> Self {
+        Self { cache: None, hash: "none".into() }
     }
 
     /// Whether there are none.

@@ -6,6 +6,7 @@ mod find;
 mod standing;
 mod tables;
 
+use super::args::whole;
 use super::choose::{Choice, asks_for_choice};
 use super::exit::Exit;
 use super::say;
@@ -45,7 +46,7 @@ pub struct ReportArgs {
     output: Option<PathBuf>,
     /// Widest that pictures in the page are, pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 640, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(16..=8192))]
+        value_parser = whole(16, 8192))]
     width: u32,
     /// Show every Nth frame in the player [default: so that there are at most 300]
     #[arg(long, value_name = "N", allow_negative_numbers = true,

@@ -2,6 +2,7 @@
 //! result that is lost otherwise (a full disk) is.
 
 use crate::error::{Error, Result};
+use serde::Serialize;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
@@ -14,6 +15,12 @@ pub fn result(line: impl Display) -> Result<()> {
 pub fn text(text: &str) -> Result<()> {
     let mut out = std::io::stdout();
     told(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// `value` as JSON on stdout.
+pub fn json(value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value);
+    result(text.map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?)
 }
 
 /// What came of writing to stdout.
@@ -43,4 +50,11 @@ pub fn note(what: impl Display) {
 /// `error: …`, with the help lines that the error carries.
 pub fn error(error: &Error) {
     aside(format_args!("error: {error}"));
+}
+
+/// Says each of `lines`, unless nothing is to be said.
+pub fn unless<T>(quiet: bool, lines: &[T], say: fn(&T)) {
+    if !quiet {
+        lines.iter().for_each(say);
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::say;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::import;
 use clap::Args;
 
@@ -18,8 +18,6 @@ pub struct SchemaArgs {}
 
 /// Runs the command.
 pub fn run(_: &SchemaArgs) -> Result<Exit> {
-    let schema = serde_json::to_string_pretty(&import::schema())
-        .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-    say::result(schema)?;
+    say::json(&import::schema())?;
     Ok(Exit::Done)
 }

@@ -3,10 +3,10 @@
 
 mod script;
 
-use super::args::SceneArgs;
+use super::args::{SceneArgs, whole};
 use super::exit::Exit;
 use super::render::{self, RenderArgs};
-use super::request::{frames, pattern, refuse_maps, uploads};
+use super::request::{place, refuse_maps, uploads};
 use super::{job, references, say, values};
 use crate::cluster;
 use crate::error::{Error, Result};
@@ -45,7 +45,7 @@ pub struct SlurmArgs {
     scene: String,
     /// Nodes
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        value_parser = whole(1, 100_000))]
     nodes: u32,
     /// Time limit of a run, as the queue allows: 30m, 4h, 2d, or as Slurm writes it: 30 (minutes),
     /// 00:30:00, 1-12
@@ -53,11 +53,11 @@ pub struct SlurmArgs {
     time: Duration,
     /// Processes on each node; its cores are shared out among them
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=4096))]
+        value_parser = whole(1, 4096))]
     tasks_per_node: u32,
     /// Cores of each process [default: whole nodes, which nobody else uses meanwhile]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=4096))]
+        value_parser = whole(1, 4096))]
     cpus: Option<u32>,
     /// How long before the limit the processes are told to stop [default: 60s, or a quarter of the time]
     #[arg(long, value_name = "TIME", value_parser = values::time)]
@@ -79,11 +79,10 @@ pub fn run(args: &SlurmArgs) -> Result<Exit> {
     let notice = notice(args.time, args.notice)?;
     let render = render::parse(&args.scene, &args.render)?;
     one_line(&args.scene).map_err(Error::Usage)?;
-    let RenderArgs { scene, output, settings, .. } = &render;
-    let loaded = job::load(scene, settings)?;
-    refuse_overwrite(output.overwrite, loaded.overwrite, scene)?;
-    let frames = frames(output, &loaded)?;
-    let pattern = pattern(scene, output, &loaded, frames)?;
+    let RenderArgs { scene, job, settings, .. } = &render;
+    let mut loaded = job::load(scene, settings)?;
+    refuse_overwrite(job.overwrite, loaded.options.overwrite, scene)?;
+    let (frames, pattern) = place(scene, job, &mut loaded)?;
     check_files(&render, &loaded, &pattern, args.nodes * args.tasks_per_node)?;
     let references = checkpoint::folder(&pattern);
     let whole = frames.first == 1 && frames.last == loaded.shot.frames;
@@ -132,12 +131,11 @@ fn check_files(
     pattern: &FramePattern,
     ranks: u32,
 ) -> Result<()> {
-    let RenderArgs { output, .. } = render;
-    let Loaded { shot, settings, .. } = loaded;
-    refuse_maps(output.maps, settings)?;
-    output.rank_map.iter().try_for_each(|map| cluster::check_rank_map(map, ranks))?;
-    references::check(&output.references, pattern, settings)?;
-    uploads(&output.upload, shot, settings).map(drop)
+    let Loaded { shot, settings, options, .. } = loaded;
+    refuse_maps(options, settings)?;
+    render.job.rank_map.iter().try_for_each(|map| cluster::check_rank_map(map, ranks))?;
+    references::check(&options.references, pattern, settings)?;
+    uploads(&options.uploads, shot, settings).map(drop)
 }
 
 /// A requeued job would begin anew again and again.

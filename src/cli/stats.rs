@@ -2,7 +2,7 @@
 
 use super::machine::{Machine, peak_memory};
 use crate::cluster::{Outcome, RankWork};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::output::atomic;
 use crate::output::manifest::{AuditRow, Header};
 use crate::sequence::{FrameReport, Plan, audit_row};
@@ -144,8 +144,5 @@ pub fn write(
         frames: outcome.frames.iter().map(|(rank, report)| Frame { rank: *rank, report }).collect(),
         ranks,
     };
-    let mut text =
-        serde_json::to_vec_pretty(&stats).map_err(|e| Error::io("write", path, e.into()))?;
-    text.push(b'\n');
-    atomic::write(path, |w| w.write_all(&text)).map(drop)
+    atomic::write_json(path, &stats)
 }

@@ -46,9 +46,7 @@ pub fn run(args: &StatusArgs) -> Result<Exit> {
     let manifests = manifests(&args.sequence)?;
     let surveys = manifests.iter().map(|path| survey(path, range)).collect::<Result<Vec<_>>>()?;
     if args.json {
-        let text = serde_json::to_string_pretty(&surveys)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text)?;
+        say::json(&surveys)?;
     } else {
         surveys.iter().try_for_each(|survey| say::text(&words(survey)))?;
     }

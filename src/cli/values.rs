@@ -1,7 +1,7 @@
 //! Values of options as people type them: sizes, frame ranges, crops, choices, numbers in bounds.
 
 use crate::accuracy::Goal;
-use crate::scene::{FrameRange, Interval, Rect, parse_time, parse_time_limit};
+use crate::scene::{FrameRange, Rect, SaveInterval, parse_time, parse_time_limit};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use std::ops::RangeInclusive;
@@ -145,8 +145,8 @@ pub fn time_in_words(time: Duration) -> String {
 }
 
 /// A time, or `off`.
-pub fn time_or_off(text: &str) -> Result<Interval, String> {
-    Interval::parse(text)
+pub fn time_or_off(text: &str) -> Result<SaveInterval, String> {
+    SaveInterval::parse(text)
 }
 
 /// The most that a camera sample may be; `None` is `off`.

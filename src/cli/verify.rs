@@ -3,7 +3,7 @@
 mod replay;
 mod report;
 
-use super::args::{SceneArgs, SettingArgs, TracingArgs};
+use super::args::{SceneArgs, SettingArgs, TracingArgs, whole};
 use super::exit::Exit;
 use super::progress::duration;
 use super::signals::Interrupt;
@@ -52,7 +52,7 @@ pub struct VerifyArgs {
     json: bool,
     /// Threads [default: the cores this process may use]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
+        value_parser = whole(1, MAX_THREADS))]
     threads: Option<u32>,
     /// Say nothing but the result and errors
     #[arg(short, long)]

@@ -11,7 +11,7 @@ use super::message::{Message, Payload, PayloadKind};
 use super::render_thread::{Event, Finished, TaskInput};
 use super::scheduler::{Assignment, Decision, Extent, Scheduler};
 use crate::error::{Error, Result};
-use crate::sequence::{FrameReport, Shared};
+use crate::sequence::{FrameReport, RankMaker};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,7 +26,7 @@ const SENDING_POLL_INTERVAL: Duration = Duration::from_micros(200);
 /// The state of a rank's communication thread.
 pub struct CommThread<'a> {
     comm: &'a Communicator,
-    maker: &'a dyn Shared,
+    maker: &'a dyn RankMaker,
     /// Set when the job was asked to stop.
     stop: &'a AtomicBool,
     /// Called on rank 0 for every finished frame of the job.
@@ -63,7 +63,7 @@ impl<'a> CommThread<'a> {
     /// A thread that starts tasks through `tasks`. `scheduler` is `Some` on rank 0.
     pub fn new(
         comm: &'a Communicator,
-        maker: &'a dyn Shared,
+        maker: &'a dyn RankMaker,
         stop: &'a AtomicBool,
         done: &'a dyn Fn(&FrameReport),
         scheduler: Option<Scheduler>,
@@ -209,7 +209,7 @@ impl<'a> CommThread<'a> {
         self.received.remove(&original);
         self.dropped.insert(original);
         if self.imported.remove(&original) {
-            self.maker.let_go(original);
+            self.maker.release(original);
         }
     }
 
@@ -291,7 +291,7 @@ impl<'a> CommThread<'a> {
             Extent::Whole { .. } if task.is_source => {
                 self.imported.insert(original);
                 let chunks = self.comm.chunks(output.bytes, output.discoveries);
-                if self.maker.tells_all() {
+                if self.maker.sends_to_all() {
                     let others: Vec<u32> = self.others().collect();
                     let kind = PayloadKind::Discoveries;
                     self.comm.send_chunks(&others, kind, original, 0, &chunks)?;

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::output::manifest::{Manifest, manifest_path, part_path};
 use crate::output::{SequenceLock, atomic};
 use crate::scene::FrameRange;
-use crate::sequence::{self, FrameReport, Plan, Shared, Target};
+use crate::sequence::{self, FrameReport, Plan, RankMaker, Target};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -74,9 +74,9 @@ pub fn prepare(
         return pool.install(|| sequence::prepare(target, frames));
     }
     let mut found = None;
-    if comm.from_root(|| sequence::is_worth_a_look(target))? {
+    if comm.from_root(|| sequence::has_frames_to_check(target))? {
         let own = own_share(frames, comm.rank(), comm.size());
-        let own = comm.agree(pool.install(|| sequence::look(target, own)))?;
+        let own = comm.agree(pool.install(|| sequence::check_files(target, own)))?;
         found = Some(comm.gather(&own)?.concat());
     }
     comm.from_root(|| pool.install(|| sequence::prepare_with(target, frames, found)))
@@ -101,7 +101,7 @@ pub fn render(
     rank_order: &[u32],
     target: &Target,
     plan: &Plan,
-    maker: &dyn Shared,
+    maker: &dyn RankMaker,
     stop: &AtomicBool,
     done: &dyn Fn(&FrameReport),
 ) -> Result<Outcome> {
@@ -115,7 +115,7 @@ pub fn render(
 fn render_single(
     target: &Target,
     plan: &Plan,
-    maker: &dyn Shared,
+    maker: &dyn RankMaker,
     done: &dyn Fn(&FrameReport),
 ) -> Result<(Vec<FrameReport>, RankWork)> {
     let start = Instant::now();
@@ -139,7 +139,7 @@ fn render_on_ranks(
     rank_order: &[u32],
     target: &Target,
     plan: &Plan,
-    maker: &dyn Shared,
+    maker: &dyn RankMaker,
     stop: &AtomicBool,
     done: &dyn Fn(&FrameReport),
 ) -> Result<(Vec<FrameReport>, RankWork)> {

@@ -34,13 +34,10 @@ pub use nodes::{check_rank_map, rank_order};
 pub use traffic::{Sent, Traffic};
 
 use crate::error::{Error, Result};
+use crate::scene::JobOptions;
 use launcher::Launcher;
 use std::cell::Cell;
 use std::time::Duration;
-
-/// Default of `--exchange`: most discoveries in one message. `docs/decisions/019-ranks.md` has the
-/// measurement.
-pub const EXCHANGE: u64 = 100_000;
 
 /// All ranks of the job, as one of them sees them.
 pub struct Communicator {
@@ -72,15 +69,15 @@ impl Communicator {
         Self {
             backend,
             sent: Cell::default(),
-            exchange: Cell::new(EXCHANGE),
+            exchange: Cell::new(JobOptions::default().exchange.into()),
             has_unreported_failure: Cell::default(),
             on_failure,
         }
     }
 
     /// Sets the most discoveries in one message. The number affects when bytes arrive, never which.
-    pub fn set_exchange(&self, discoveries: u64) {
-        self.exchange.set(discoveries);
+    pub fn set_exchange(&self, discoveries: u32) {
+        self.exchange.set(discoveries.into());
     }
 
     /// Initialises MPI if a launcher started several processes; otherwise the communicator has one

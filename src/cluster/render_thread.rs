@@ -1,9 +1,9 @@
 //! The render thread of a rank: one task after another, each with the references that it takes.
 
 use super::scheduler::{Extent, Task};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::output::manifest::Journal;
-use crate::sequence::{self, FrameReport, Left, Shared, Strip, Target};
+use crate::sequence::{self, Exported, FrameReport, RankMaker, Strip, Target};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
@@ -27,7 +27,7 @@ pub enum Event {
     /// The job was asked to stop, and the task is not done.
     Stopped,
     /// The task failed.
-    Failed(crate::error::Error),
+    Failed(Error),
 }
 
 /// A task that is done.
@@ -36,7 +36,7 @@ pub struct Finished {
     /// Report of the last frame written, if any was.
     pub report: Option<FrameReport>,
     /// The strip, or the reference if other frames take it; otherwise empty.
-    pub output: Left,
+    pub output: Exported,
     /// Seconds that the task took.
     pub seconds: f64,
 }
@@ -44,7 +44,7 @@ pub struct Finished {
 /// Runs the tasks of `inputs` until that channel closes, a task fails, or the job is asked to stop.
 /// `journal` is the path of the journal of `rank`.
 pub fn run(
-    maker: &dyn Shared,
+    maker: &dyn RankMaker,
     target: &Target,
     (rank, journal): (u32, &Path),
     inputs: &Receiver<TaskInput>,
@@ -54,8 +54,8 @@ pub fn run(
     let mut thread = RenderThread { maker, target, rank, path, journal: None, events };
     for input in inputs {
         let event = match thread.run_task(input) {
-            Ok(Some(finished)) => Event::Finished(Box::new(finished)),
-            Ok(None) => Event::Stopped,
+            Ok(finished) => Event::Finished(Box::new(finished)),
+            Err(Error::Stopped) => Event::Stopped,
             Err(error) => Event::Failed(error),
         };
         let goes_on = matches!(event, Event::Finished(_));
@@ -68,7 +68,7 @@ pub fn run(
 
 /// The state of a rank's render thread.
 struct RenderThread<'a> {
-    maker: &'a dyn Shared,
+    maker: &'a dyn RankMaker,
     target: &'a Target,
     rank: u32,
     /// Path of the journal.
@@ -79,40 +79,36 @@ struct RenderThread<'a> {
 }
 
 impl RenderThread<'_> {
-    /// Runs one task; `None` when the job was asked to stop.
-    fn run_task(&mut self, input: TaskInput) -> Result<Option<Finished>> {
+    /// Runs one task.
+    fn run_task(&mut self, input: TaskInput) -> Result<Finished> {
         let start = Instant::now();
         let TaskInput { task, references, strips } = input;
         references.iter().for_each(|(original, bytes)| self.maker.import(*original, bytes));
-        let result = match &task.extent {
+        let (report, output) = match &task.extent {
             Extent::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: task.is_source };
-                let bytes = self.maker.strip(task.original, strip)?;
-                bytes.map(|bytes| (None, Left { bytes: bytes.into(), discoveries: 0 }))
+                let bytes = self.maker.render_strip(task.original, strip)?;
+                (None, Exported { bytes: bytes.into(), discoveries: 0 })
             }
             Extent::Whole { frames, .. } => {
                 if !strips.is_empty() {
-                    self.maker.lay(task.original, &strips)?;
+                    self.maker.join_strips(task.original, &strips)?;
                 }
                 self.whole(&task, frames)?
             }
         };
         let seconds = start.elapsed().as_secs_f64();
-        Ok(result.map(|(report, output)| Finished { task, report, output, seconds }))
+        Ok(Finished { task, report, output, seconds })
     }
 
     /// Makes an original and writes `frames`. The report of the last frame is returned, and an event
     /// is sent for each of the others.
-    fn whole(
-        &mut self,
-        task: &Task,
-        frames: &[u32],
-    ) -> Result<Option<(Option<FrameReport>, Left)>> {
+    fn whole(&mut self, task: &Task, frames: &[u32]) -> Result<(Option<FrameReport>, Exported)> {
         if task.is_source {
             self.maker.hold(task.original);
         }
-        if frames.is_empty() && !self.maker.make_source(task.original)? {
-            return Ok(None);
+        if frames.is_empty() {
+            self.maker.make_reference(task.original)?;
         }
         self.maker.expect(frames);
         let mut last = None;
@@ -123,12 +119,11 @@ impl RenderThread<'_> {
             };
             let place = (self.rank, journal);
             let report = sequence::render_frame(self.target, *frame, place, self.maker)?;
-            let Some(report) = report else { return Ok(None) };
             if let Some(before) = last.replace(report) {
                 _ = self.events.send(Event::Wrote(Box::new(before)));
             }
         }
         let output = task.is_source.then(|| self.maker.export(task.original)).flatten();
-        Ok(Some((last, output.unwrap_or_default())))
+        Ok((last, output.unwrap_or_default()))
     }
 }

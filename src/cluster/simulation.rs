@@ -10,8 +10,7 @@ mod simulator;
 mod tests;
 
 use super::traffic::Traffic;
-use crate::error::Result;
-use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
+use crate::sequence::{FrameGraph, Pyramid};
 
 /// A job: frames, the dependencies between them, and how references are sent.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +24,7 @@ pub struct Job {
 }
 
 /// The costs of tasks and messages.
-pub struct Model<'a> {
+pub struct CostModel<'a> {
     /// Core seconds to render and write an original, by its frame number.
     pub seconds: &'a dyn Fn(u32) -> f64,
     /// Core seconds of these for writing, which strips do not share.
@@ -89,32 +88,26 @@ pub struct SimulatedRun {
 
 impl Job {
     /// Simulates the job on `ranks` ranks.
-    pub fn simulate(&self, ranks: u32, model: &Model) -> SimulatedRun {
+    pub fn simulate(&self, ranks: u32, model: &CostModel) -> SimulatedRun {
         simulator::Simulator::new(self, ranks, model).run()
     }
 
     /// Core seconds of all frames on one rank, which sends no messages.
-    pub fn single_rank_seconds(&self, model: &Model) -> f64 {
+    pub fn single_rank_seconds(&self, model: &CostModel) -> f64 {
         self.pyramid.all().map(model.seconds).sum()
     }
 }
 
-impl FrameMaker for Job {
-    fn make(&self, _frame: u32) -> Result<Option<Made>> {
-        Ok(None)
-    }
-
+impl FrameGraph for Job {
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         self.pyramid.batches(frames)
     }
-}
 
-impl Shared for Job {
     fn needs(&self, original: u32) -> Vec<u32> {
         self.pyramid.ancestors(original)
     }
 
-    fn tells_all(&self) -> bool {
+    fn sends_to_all(&self) -> bool {
         self.sends_to_all
     }
 

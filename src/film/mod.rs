@@ -9,9 +9,21 @@ mod image;
 mod provenance;
 
 pub use image::{Encoding, Image};
-pub use provenance::{PixelSource, Provenance};
+pub use provenance::{Provenance, ProvenanceKind};
 
 /// A rendered image with its AOVs. Row 0 is the top; linear radiance.
+///
+/// ```
+/// use tweenray::film::{Film, Image};
+/// use tweenray::math::Rgb;
+///
+/// let mut film = Film::new(4, 3, false);
+/// let at = film.index(3, 0);
+/// film.rgb[at] = Rgb::new(2.0, 0.0, 0.0);
+/// // What `measure` compares.
+/// let image = Image::of_film(&film);
+/// assert_eq!((image.width, image.height, image.rgb[3]), (4, 3, Rgb::new(2.0, 0.0, 0.0)));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
     /// Columns.
@@ -23,7 +35,7 @@ pub struct Film {
     /// First-hit records, when asked for.
     pub gbuffer: Option<GBuffer>,
     /// Where each pixel's light comes from; `None` where every frame is traced.
-    pub sources: Option<Vec<PixelSource>>,
+    pub provenance: Option<Vec<Provenance>>,
     /// Where the audit looked, how far each pixel is from its mean of two traces, in display steps
     /// of 255, the mean of the channels, positive where the pixel is brighter; NaN elsewhere. `None`
     /// where nothing was audited. Only maps show it: what else is in a frame's files does not depend on
@@ -88,7 +100,7 @@ impl Film {
             height,
             rgb: vec![Rgb::ZERO; n],
             gbuffer: with_gbuffer.then(|| GBuffer::new(n)),
-            sources: None,
+            provenance: None,
             audit: None,
             bad: BadSamples::default(),
         }
@@ -127,12 +139,13 @@ impl GBuffer {
 
     /// Takes in the records of more pixels, behind its own.
     pub fn append(&mut self, more: Self) {
-        self.depth.extend(more.depth);
-        self.position.extend(more.position);
-        self.normal.extend(more.normal);
-        self.albedo.extend(more.albedo);
-        self.mesh_id.extend(more.mesh_id);
-        self.motion.extend(more.motion);
+        let Self { depth, position, normal, albedo, mesh_id, motion } = more;
+        self.depth.extend(depth);
+        self.position.extend(position);
+        self.normal.extend(normal);
+        self.albedo.extend(albedo);
+        self.mesh_id.extend(mesh_id);
+        self.motion.extend(motion);
     }
 
     /// One pixel's record.

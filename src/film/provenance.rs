@@ -1,11 +1,11 @@
-//! Where a pixel's light comes from.
+//! Where the light of a pixel or of a surface point comes from.
 
 use serde::{Deserialize, Serialize};
 
-/// How the shadow part of a pixel's light came about.
+/// How the shadow part of the light came about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[repr(u8)]
-pub enum Provenance {
+pub enum ProvenanceKind {
     /// There was nothing to infer: sky, emitters, surfaces that no kept light reaches.
     #[default]
     Background,
@@ -19,30 +19,36 @@ pub enum Provenance {
     Both,
 }
 
-/// A pixel's provenance, with what gave most.
+/// Where the shadow part of a pixel's light, or of a surface point's, comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct PixelSource {
-    /// How it came about.
-    pub provenance: Provenance,
-    /// The reference frame that gave most; 0 where nothing was inferred, and for a frame of another
+pub struct Provenance {
+    /// How the light came about.
+    pub kind: ProvenanceKind,
+    /// Number of the reference frame that gave most; 0 where nothing was inferred, and for a frame of another
     /// shot, which counts as earlier.
     pub frame: u32,
-    /// Weighted mean distance to the samples that gave it, in footprints of a pixel. Under policy
-    /// colour by how much the distances of the two entries differ, a share.
+    /// Weighted mean distance to the samples that gave the light, in footprints of a pixel. Under policy
+    /// colour the difference between the distances of the two entries, as a share of the nearer one.
     pub distance: f32,
 }
 
-impl PixelSource {
+impl Provenance {
+    /// Whether the light was inferred from other frames.
+    pub fn is_inferred(&self) -> bool {
+        use ProvenanceKind::{Both, Earlier, Later};
+        matches!(self.kind, Earlier | Later | Both)
+    }
+
     /// Takes in another surface point of the pixel: one traced point makes the pixel traced.
     pub fn join(&mut self, other: &Self) {
-        use Provenance::{Background, Both, Traced};
-        self.provenance = match (self.provenance, other.provenance) {
+        use ProvenanceKind::{Background, Both, Traced};
+        self.kind = match (self.kind, other.kind) {
             (Background, p) | (p, Background) => p,
             (Traced, _) | (_, Traced) => Traced,
             (a, b) if a == b => a,
             _ => Both,
         };
-        if self.provenance == Traced {
+        if self.kind == Traced {
             (self.frame, self.distance) = (0, 0.0);
         } else if self.frame == 0 {
             (self.frame, self.distance) = (other.frame, other.distance);
@@ -54,29 +60,29 @@ impl PixelSource {
 mod tests {
     use super::*;
 
-    fn source(provenance: Provenance, frame: u32) -> PixelSource {
-        PixelSource { provenance, frame, distance: 0.5 }
+    fn source(kind: ProvenanceKind, frame: u32) -> Provenance {
+        Provenance { kind, frame, distance: 0.5 }
     }
 
     #[test]
     fn one_traced_point_makes_a_pixel_traced_in_any_order() {
         let points = [
-            source(Provenance::Earlier, 1),
-            source(Provenance::Traced, 0),
-            source(Provenance::Later, 9),
+            source(ProvenanceKind::Earlier, 1),
+            source(ProvenanceKind::Traced, 0),
+            source(ProvenanceKind::Later, 9),
         ];
         for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2]] {
-            let mut pixel = PixelSource::default();
+            let mut pixel = Provenance::default();
             order.iter().for_each(|i| pixel.join(&points[*i]));
-            assert_eq!(pixel.provenance, Provenance::Traced);
+            assert_eq!(pixel.kind, ProvenanceKind::Traced);
             assert_eq!(pixel.frame, 0);
         }
     }
 
     #[test]
     fn earlier_and_later_make_both() {
-        let mut pixel = source(Provenance::Earlier, 1);
-        pixel.join(&source(Provenance::Later, 9));
-        assert_eq!((pixel.provenance, pixel.frame), (Provenance::Both, 1));
+        let mut pixel = source(ProvenanceKind::Earlier, 1);
+        pixel.join(&source(ProvenanceKind::Later, 9));
+        assert_eq!((pixel.kind, pixel.frame), (ProvenanceKind::Both, 1));
     }
 }

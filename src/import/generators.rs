@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_sizes_are_errors() {
+    fn sizes_out_of_range_are_errors() {
         for (nu, nv, radius) in [(2, 9, 1.0), (9, 1, 1.0), (u32::MAX, u32::MAX, 1.0), (9, 9, 0.0)] {
             assert!(uv_sphere("s", DVec3::ZERO, radius, nu, nv, 0).is_err());
         }

@@ -10,6 +10,7 @@ mod framing;
 mod generators;
 mod lamps;
 mod lines;
+mod mesh_file;
 mod model;
 mod mtl;
 mod normals;
@@ -25,15 +26,15 @@ mod untextured;
 
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
-pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model, load_model};
+pub use mesh_file::load_model;
+pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
-use crate::scene::{FrameRange, Interval, Settings, Shot, World, limits};
+use crate::scene::{JobOptions, Settings, Shot, World, limits};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
 pub const DEFAULT_CREASE_DEGREES: f64 = 30.0;
@@ -68,8 +69,8 @@ pub enum UpAxis {
     Z,
 }
 
-/// A job as its scene file describes it; the command line may override `settings`, `frames` and
-/// `output` afterwards.
+/// A job as its scene file describes it; the command line may override `settings` and `options`
+/// afterwards.
 #[derive(Debug, Clone)]
 pub struct Loaded {
     /// What is in the scene.
@@ -78,52 +79,25 @@ pub struct Loaded {
     pub shot: Shot,
     /// How to render it.
     pub settings: Settings,
-    /// Frames to render, where the file says.
-    pub frames: Option<FrameRange>,
-    /// Where frames go, where the file says.
-    pub output: Option<OutputName>,
-    /// Frames per second of the preview video.
-    pub fps: f64,
-    /// Whether a preview video is made.
-    pub video: bool,
-    /// Whether existing frames are replaced.
-    pub overwrite: bool,
-    /// Whether an invalid sample makes the job fail.
-    pub strict: bool,
-    /// Rendering threads, where the file says.
-    pub threads: Option<u32>,
-    /// File for statistics, where the file says, relative to the current folder.
-    pub stats: Option<PathBuf>,
-    /// How long the program may run, where the file says.
-    pub time_limit: Option<Duration>,
-    /// How often what frames to come need is put on disk, where the file says.
-    pub checkpoint: Option<Interval>,
-    /// How many discoveries a message between ranks carries at most, where the file says.
-    pub exchange: Option<u32>,
+    /// How the job runs.
+    pub options: JobOptions,
+    /// Where the file says where frames go; the message is still to be said.
+    pub output_place: Option<Diagnostic>,
     /// What the user should know though it is no error.
     pub warnings: Vec<Diagnostic>,
     /// Every file read, in order.
     pub files: Vec<PathBuf>,
     /// What was added around a bare mesh.
-    pub stage: Option<Stage>,
+    pub stage: Option<AddedStage>,
 }
 
 /// Floor and lamp that a bare mesh gets: they are in the world, but not in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stage {
+pub struct AddedStage {
     /// Which of the world's meshes is the floor.
     pub floor: usize,
     /// Which of the world's lights is the lamp.
     pub lamp: usize,
-}
-
-/// Where frames go, as a scene file says.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutputName {
-    /// The pattern, relative to the current folder.
-    pub pattern: String,
-    /// Where it stands, for what is wrong with it; the message is still to be said.
-    pub place: Diagnostic,
 }
 
 impl Loaded {
@@ -133,17 +107,8 @@ impl Loaded {
             world,
             shot,
             settings,
-            frames: None,
-            output: None,
-            fps: 24.0,
-            video: true,
-            overwrite: false,
-            strict: false,
-            threads: None,
-            stats: None,
-            time_limit: None,
-            checkpoint: None,
-            exchange: None,
+            options: JobOptions::default(),
+            output_place: None,
             warnings: Vec::new(),
             files: Vec::new(),
             stage: None,

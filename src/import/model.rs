@@ -1,10 +1,9 @@
-//! Mesh files to world-space data: OBJ with MTL, the course's OBJ dialect, PLY.
+//! What the readers of mesh files make.
 
-use super::{normals, obj, ply, source};
-use crate::error::{Diagnostic, Error, Result};
+use crate::error::Diagnostic;
 use crate::math::{Rgb, Vec3};
-use crate::scene::{NormalPolicy, World};
-use std::path::{Path, PathBuf};
+use crate::scene::{Material, MaterialId, World};
+use std::path::PathBuf;
 
 /// Name of the material of faces that have none.
 pub const DEFAULT_MATERIAL: &str = "default";
@@ -23,33 +22,14 @@ pub struct Model {
     pub files: Vec<PathBuf>,
 }
 
-/// Reads a mesh file; the ending and, for `.obj`, the content choose the reader.
-///
-/// Triangles without area are dropped with one warning; so are vertices that no triangle uses.
-///
-/// Errors: `Error::Input` with the line (text) or byte offset (binary), for anything that is
-/// not a finite number, an index out of range, or a file without faces; `Error::Io`.
-pub fn load_model(path: &Path, normals: NormalPolicy) -> Result<Model> {
-    let mut model = read_model(path)?;
-    for mesh in &mut model.world.meshes {
-        normals::apply(mesh, normals);
-    }
-    Ok(model)
-}
-
-/// As [`load_model`]; normals are the file's, or none.
-pub(super) fn read_model(path: &Path) -> Result<Model> {
-    let bytes = source::read(path)?;
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    match ending.as_str() {
-        "obj" => obj::read(path, &bytes),
-        "ply" => ply::read(path, bytes),
-        _ => Err(Error::from(
-            Diagnostic::new(path, format!("`.{ending}` is no mesh format that can be read"))
-                .help("meshes are .obj and .ply; scene files end in .toml"),
-        )),
+impl Model {
+    /// The material of faces without one.
+    pub(super) fn default_material(&mut self) -> MaterialId {
+        let materials = &mut self.world.materials;
+        let at = materials.iter().position(|m| m.name == DEFAULT_MATERIAL);
+        at.unwrap_or_else(|| {
+            materials.push(Material::diffuse(DEFAULT_MATERIAL, DEFAULT_ALBEDO));
+            materials.len() - 1
+        }) as MaterialId
     }
 }
-
-#[cfg(test)]
-mod tests;

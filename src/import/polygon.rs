@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn hopeless_faces_end_too() {
+    fn degenerate_and_self_intersecting_faces_end() {
         run(&[DVec3::ZERO; 9]);
         run(&lift(&[(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]));
         let star: Vec<(f64, f64)> =

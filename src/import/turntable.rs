@@ -6,12 +6,12 @@
 
 use super::framing::{self, Lens};
 use super::scene_file::to_y_up;
-use super::{LoadOptions, Loaded, Model, Stage, emission, untextured};
+use super::{AddedStage, LoadOptions, Loaded, Model, emission, untextured};
 use crate::error::{Diagnostic, Result};
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::{
-    CameraPath, Easing, Light, Material, NormalPolicy, QuadLight, Settings, Shot, Sky, World,
-    WorldMesh,
+    CameraPath, Easing, Light, Material, NormalPolicy, QuadLight, Settings, Shot, ShotLens, Sky,
+    World, WorldMesh,
 };
 use std::path::Path;
 
@@ -50,7 +50,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
 }
 
 /// Adds floor and lights to `world`, where it has no lights, and gives the camera's orbit.
-fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<Stage>) {
+fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<AddedStage>) {
     let own_lights = !world.lights.is_empty();
     let lens = Lens { vfov_degrees: VFOV_DEGREES, aspect };
     let (target, eye) = if own_lights && !world.spheres.is_empty() {
@@ -70,6 +70,7 @@ fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<Stage>) {
         easing: Easing::Linear,
         frames: FRAMES,
         vfov_degrees: VFOV_DEGREES,
+        lens: ShotLens::Pinhole,
     };
     (shot, stage)
 }
@@ -105,8 +106,8 @@ impl Studio {
         Self { floor_height, floor_half: 1.5 * reach, middle, lamp_distance }
     }
 
-    fn build(&self, world: &mut World) -> Stage {
-        let stage = Stage { floor: world.meshes.len(), lamp: world.lights.len() };
+    fn build(&self, world: &mut World) -> AddedStage {
+        let stage = AddedStage { floor: world.meshes.len(), lamp: world.lights.len() };
         let floor = self.floor(world.materials.len() as u32);
         world.materials.push(Material::diffuse("floor", Rgb::splat(0.6)));
         world.meshes.push(floor);

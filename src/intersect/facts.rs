@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sense_is_that_of_the_winding() {
+    fn the_sign_follows_the_winding() {
         let outwards = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let inwards: Vec<[u32; 3]> = outwards.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
         assert_eq!(facts_of(outwards.clone()).sense, 1.0);

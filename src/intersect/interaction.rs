@@ -49,7 +49,7 @@ impl SurfaceInteraction {
     }
 
     /// A ray from here to `target` that stops short of its surface. `t` runs from 0 to (almost) 1.
-    pub fn spawn_to(&self, target: &Target, offset: bool) -> Ray {
+    pub fn spawn_to(&self, target: &RayEnd, offset: bool) -> Ray {
         self.towards(target.point - self.p, offset).to(target)
     }
 
@@ -69,18 +69,19 @@ impl SurfaceInteraction {
 
 /// Where a ray is to end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target {
+pub struct RayEnd {
     /// A point of a surface, scene space.
     pub point: DVec3,
     /// The surface's unit normal there, to either side.
     pub normal: DVec3,
-    /// The triangle that it lies on; [`Facet::EXACT`] for spheres, which are tested in f64.
-    pub facet: Facet,
+    /// Error of the plane of the triangle that the point lies on; [`PlaneError::EXACT`] for spheres, which
+    /// are tested in f64.
+    pub plane_error: PlaneError,
 }
 
-/// What f32 arithmetic may make of a triangle's plane.
+/// How far off the plane of a triangle may be in f32 arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Facet {
+pub struct PlaneError {
     /// Longest edge, scene space.
     longest: f64,
     /// By how much an error of a corner grows along the triangle: about 1, large for slivers, whose
@@ -88,11 +89,11 @@ pub struct Facet {
     tilt: f64,
 }
 
-impl Facet {
+impl PlaneError {
     /// Not a triangle: no error.
     pub const EXACT: Self = Self { longest: 0.0, tilt: 0.0 };
 
-    /// The error bound of a triangle's plane, by its corners in scene space.
+    /// The error of the plane of a triangle with these corners, scene space.
     pub fn of(corners: &[DVec3; 3]) -> Self {
         let [a, b, c] = *corners;
         let (e1, e2) = ((b - a).length(), (c - a).length());
@@ -138,7 +139,7 @@ impl SpawnPoint {
 
     /// The ray that ends just before `target`, as [`SurfaceInteraction::spawn_to`].
     #[inline(always)] // Once for each shadow ray: a call costs a tenth of a traced frame.
-    pub fn to(&self, target: &Target) -> Ray {
+    pub fn to(&self, target: &RayEnd) -> Ray {
         let org = self.org;
         let ray = Ray { tfar: 1.0, ..Ray::new(org, target.point - org) };
         if !self.offset {
@@ -149,7 +150,7 @@ impl SpawnPoint {
         // ulp: with 4, one ray in 3,000 still met its own light; with 16, none of 1e8.
         // A sliver's corners, rounded relative to the origin, tilt its plane besides.
         let grain = ROUNDING * (org.abs().max(target.point.abs())).dot(DVec3::ONE);
-        let Facet { longest, tilt } = target.facet;
+        let PlaneError { longest, tilt } = target.plane_error;
         let bound = 16.0 * grain + tilt * (2.0 * grain + 4.0 * ROUNDING * longest);
         let height = (org - target.point).dot(target.normal);
         if height.abs() > bound {

@@ -16,7 +16,7 @@ mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
 pub use embree::EmbreeIntersector;
-pub use interaction::{Facet, SpawnPoint, SurfaceInteraction, Target, lift_to_smooth};
+pub use interaction::{PlaneError, RayEnd, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 pub use oracle::{CourtHit, Oracle};
 
 use crate::error::Result;
@@ -28,6 +28,28 @@ use crate::stats::RayCounts;
 /// the caller counts the rays themselves, since it knows their kind.
 ///
 /// A ray that is not [`Ray::is_valid`] hits nothing and is never occluded.
+///
+/// ```
+/// use tweenray::intersect::{Intersector, Oracle, PrimRef, Ray};
+/// use tweenray::math::{DVec3, Rgb};
+/// use tweenray::scene::{Material, World, WorldMesh};
+/// use tweenray::stats::RayCounts;
+///
+/// let mut world = World::default();
+/// let white = world.add_material(Material::diffuse("white", Rgb::ONE));
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
+/// world.meshes.push(WorldMesh::new("triangle", corners, vec![[0, 1, 2]], white));
+/// // `false`: in the world's own coordinates.
+/// let scene = world.into_scene(false)?;
+/// let (oracle, mut counts) = (Oracle::new(&scene), RayCounts::default());
+/// let ray = Ray::new(DVec3::new(0.25, 0.5, 2.0), -DVec3::Z);
+/// let hit = oracle.intersect(&ray, &mut counts).expect("the triangle is in the way");
+/// assert_eq!((hit.t, hit.u, hit.v), (2.0, 0.25, 0.5));
+/// assert_eq!(hit.prim, PrimRef { geom_id: 0, prim_id: 0 });
+/// // Something beyond the ray's end does not count.
+/// assert!(!oracle.occluded(&Ray { tfar: 1.0, ..ray }, &mut counts));
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 pub trait Intersector: Sync {
     /// Closest hit, or `None`.
     fn intersect(&self, ray: &Ray, counts: &mut RayCounts) -> Option<Hit>;

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_beside_is_measured_to_the_nearest_corner_or_edge() {
+    fn distance_of_a_line_is_to_the_nearest_corner_or_edge() {
         let beside = |x: f64, y: f64| {
             let ray = Ray::new(DVec3::new(x, y, 2.0), DVec3::new(0.0, 0.0, -2.0));
             nearest_on_outline(&ray, &UNIT).unwrap()
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn many_give_the_bits_of_one() {
+    fn batches_give_the_bits_of_single_tests() {
         let rays: Vec<Ray> = (0..64)
             .map(|k| {
                 let k = f64::from(k);

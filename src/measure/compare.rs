@@ -57,6 +57,18 @@ pub struct Exceeding {
 
 /// Compares `image` with `reference` as the head of [`measure`](super) tells.
 ///
+/// ```
+/// use tweenray::film::{Encoding, Image};
+/// use tweenray::math::Rgb;
+/// use tweenray::measure::compare;
+///
+/// let grey = |value| Image::new(16, 16, vec![Rgb::splat(value); 256], Encoding::Linear);
+/// let found = compare(&grey(0.5)?, &grey(0.25)?)?;
+/// assert_eq!((found.mse, found.rmse), (0.0625, 0.25));
+/// assert!(compare(&grey(0.5)?, &grey(0.5)?)?.psnr.is_infinite());
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Usage`] when the sizes differ.
 pub fn compare(reference: &Image, image: &Image) -> Result<Comparison> {

@@ -3,8 +3,8 @@
 //!
 //! * [`compare`] takes two [`Image`](crate::film::Image)s and gives a [`Comparison`]:
 //!   [`mse`], RMSE, [`psnr`], [`largest_error`], [`ssim`], [`ssim_blocks`] and [`flip`].
-//! * [`proportion_interval`], [`proportion_upper_bound`] and [`mean_interval`] bound shares and
-//!   means at 95 % confidence; [`median`] does so for the middle of a few times.
+//! * [`proportion_upper_bound`] and [`drawn_sum_interval`] bound shares and totals at 95 %
+//!   confidence; [`median`] does so for the middle of a few times.
 //!
 //! **Which numbers are compared.** Two display-encoded files (png, ppm, jpeg) are compared as
 //! they are, in sRGB code values. Two linear files (exr, hdr) are compared in linear radiance
@@ -31,8 +31,6 @@ mod test_images;
 pub use compare::{Comparison, Exceeding, Space, Summary, compare, summarise};
 pub use error_metrics::{LargestError, largest_error, mse, psnr, share_exceeding};
 pub use flip::{PIXELS_PER_DEGREE, flip, flip_map};
-pub use intervals::{
-    Interval, drawn_sum_interval, mean_interval, proportion_interval, proportion_upper_bound,
-};
+pub use intervals::{Interval, drawn_sum_interval, proportion_upper_bound};
 pub use median::{Median, median};
 pub use ssim::{ssim, ssim_blocks};

@@ -5,6 +5,7 @@
 //! removes it; what a killed run leaves behind, [`clean_temporaries`] removes.
 
 use crate::error::{Error, Result};
+use serde::Serialize;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -35,6 +36,15 @@ pub fn write(
     file.sync_all().map_err(|e| temporary.error("sync", e))?;
     temporary.rename()?;
     Ok(written)
+}
+
+/// Writes `value` as JSON, with a line end, to the file at `path`.
+///
+/// # Errors
+/// [`Error::Io`], as [`write()`]; a value that JSON cannot hold.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_vec_pretty(value).map_err(|e| Error::io("write", path, e.into()))?;
+    write(path, |w| w.write_all(&text).and_then(|()| w.write_all(b"\n"))).map(drop)
 }
 
 /// Creates a folder and those above it, where missing.
@@ -343,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_ended_is_dead_though_nobody_asked_how() {
+    fn a_zombie_process_counts_as_ended() {
         let mut child = std::process::Command::new("cat")
             .stdin(std::process::Stdio::piped())
             .stdout(std::process::Stdio::null())
@@ -361,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn leftovers_of_dead_runs_are_removed_and_nothing_else() {
+    fn temporary_files_of_ended_processes_are_removed_and_no_others() {
         let folder = tempfile::tempdir().expect("a folder");
         let here = this_machine();
         let own = format!(".frame_0001.png.tmp-{here}-{}-3", std::process::id());

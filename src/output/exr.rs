@@ -4,13 +4,13 @@
 //! A film's channels are `R G B`; with AOVs also `Z` (distance along the view axis, infinity
 //! where nothing is hit), `P.X P.Y P.Z` (position), `N.X N.Y N.Z` (normal), `albedo.R albedo.G
 //! albedo.B`, `backward.u backward.v` (motion, pixels), all f32, and `mesh_id` (u32, 0 where nothing
-//! is hit). World units throughout. A later AOV is another [`Channel`] in the list.
+//! is hit). World units throughout. A later AOV is another [`ExrChannel`] in the list.
 //!
 //! The files hold at most one attribute that the crate `exr` keeps in a hash map, whose order differs
 //! from run to run: the same film is the same bytes.
 
-use super::Regular;
 use super::format::SOFTWARE;
+use super::path_kind::{Regular, check_memory};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::math::Vec3;
@@ -32,23 +32,23 @@ const OPAQUE: &str = "tweenray";
 
 /// One channel of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Channel {
+pub struct ExrChannel {
     /// `R`, or with a layer's name before a dot, `albedo.R`.
     pub name: String,
     /// The pixels, row by row from the top.
-    pub samples: Samples,
+    pub samples: ExrSamples,
 }
 
 /// A channel's pixels.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Samples {
+pub enum ExrSamples {
     /// Numbers. Half floats of other programs' files are read as these.
     F32(Vec<f32>),
     /// Identifiers.
     U32(Vec<u32>),
 }
 
-impl Samples {
+impl ExrSamples {
     /// Number of pixels.
     pub fn len(&self) -> usize {
         match self {
@@ -65,49 +65,49 @@ impl Samples {
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Channels {
+pub struct ExrChannels {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
     /// The channels, sorted by name.
-    pub list: Vec<Channel>,
+    pub list: Vec<ExrChannel>,
 }
 
-impl Channels {
+impl ExrChannels {
     /// The samples of the f32 channel `name`.
     pub fn f32(&self, name: &str) -> Option<&[f32]> {
         self.list.iter().find(|c| c.name == name).and_then(|c| match &c.samples {
-            Samples::F32(v) => Some(v.as_slice()),
-            Samples::U32(_) => None,
+            ExrSamples::F32(v) => Some(v.as_slice()),
+            ExrSamples::U32(_) => None,
         })
     }
 }
 
 /// The film's channels, its AOVs among them if it has them.
-pub fn channels_of(film: &Film) -> Vec<Channel> {
+pub fn channels_of(film: &Film) -> Vec<ExrChannel> {
     let mut channels = Vec::new();
     push_vectors(&mut channels, ["R", "G", "B"], &film.rgb);
     if let Some(g) = &film.gbuffer {
-        channels.push(Channel { name: "Z".into(), samples: Samples::F32(g.depth.clone()) });
+        channels.push(ExrChannel { name: "Z".into(), samples: ExrSamples::F32(g.depth.clone()) });
         push_vectors(&mut channels, ["P.X", "P.Y", "P.Z"], &g.position);
         push_vectors(&mut channels, ["N.X", "N.Y", "N.Z"], &g.normal);
         push_vectors(&mut channels, ["albedo.R", "albedo.G", "albedo.B"], &g.albedo);
-        let ids = Samples::U32(g.mesh_id.clone());
-        channels.push(Channel { name: "mesh_id".into(), samples: ids });
+        let ids = ExrSamples::U32(g.mesh_id.clone());
+        channels.push(ExrChannel { name: "mesh_id".into(), samples: ids });
         for (i, name) in ["backward.u", "backward.v"].into_iter().enumerate() {
-            let samples = Samples::F32(g.motion.iter().map(|m| m[i]).collect());
-            channels.push(Channel { name: name.into(), samples });
+            let samples = ExrSamples::F32(g.motion.iter().map(|m| m[i]).collect());
+            channels.push(ExrChannel { name: name.into(), samples });
         }
     }
     channels
 }
 
 /// Appends the three components of `vectors` as channels.
-pub fn push_vectors(channels: &mut Vec<Channel>, names: [&str; 3], vectors: &[Vec3]) {
+pub fn push_vectors(channels: &mut Vec<ExrChannel>, names: [&str; 3], vectors: &[Vec3]) {
     for (i, name) in names.into_iter().enumerate() {
-        let samples = Samples::F32(vectors.iter().map(|v| v[i]).collect());
-        channels.push(Channel { name: name.into(), samples });
+        let samples = ExrSamples::F32(vectors.iter().map(|v| v[i]).collect());
+        channels.push(ExrChannel { name: name.into(), samples });
     }
 }
 
@@ -116,7 +116,7 @@ pub fn push_vectors(channels: &mut Vec<Channel>, names: [&str; 3], vectors: &[Ve
 /// # Errors
 /// [`Error::Usage`] when a channel has not `width · height` samples; [`Error::Failed`] when the
 /// format cannot hold them (no channel, two of one name).
-pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> Result<Vec<u8>> {
+pub fn encode(width: u32, height: u32, channels: &[ExrChannel], comment: &str) -> Result<Vec<u8>> {
     encode_with(width, height, channels, comment, None)
 }
 
@@ -127,7 +127,7 @@ pub fn encode(width: u32, height: u32, channels: &[Channel], comment: &str) -> R
 pub fn encode_with(
     width: u32,
     height: u32,
-    channels: &[Channel],
+    channels: &[ExrChannel],
     comment: &str,
     attribute: Option<(&str, &[u8])>,
 ) -> Result<Vec<u8>> {
@@ -168,7 +168,7 @@ fn own_attribute((name, bytes): (&str, &[u8])) -> (Text, AttributeValue) {
 /// `limit` bytes.
 pub fn read_attribute(path: &Path, name: &str, limit: u64) -> Result<Option<Vec<u8>>> {
     let Regular { source, bytes } = Regular::at(path)?;
-    super::read::check_memory(path, bytes, limit)?;
+    check_memory(path, bytes, limit)?;
     let meta = MetaData::read_from_buffered(source, false);
     let meta = meta.map_err(|e| Error::input(path, format!("not a readable exr file: {e}")))?;
     let all = meta.headers.into_iter().flat_map(|header| header.own_attributes.other);
@@ -202,10 +202,10 @@ fn compress(image: &Image<Layer<AnyChannels<FlatSamples>>>) -> exr::error::Resul
     Ok(bytes.into_inner())
 }
 
-fn to_exr(channel: &Channel) -> AnyChannel<FlatSamples> {
+fn to_exr(channel: &ExrChannel) -> AnyChannel<FlatSamples> {
     let samples = match &channel.samples {
-        Samples::F32(v) => FlatSamples::F32(v.clone()),
-        Samples::U32(v) => FlatSamples::U32(v.clone()),
+        ExrSamples::F32(v) => FlatSamples::F32(v.clone()),
+        ExrSamples::U32(v) => FlatSamples::U32(v.clone()),
     };
     AnyChannel::new(channel.name.as_str(), samples)
 }
@@ -216,13 +216,13 @@ fn to_exr(channel: &Channel) -> AnyChannel<FlatSamples> {
 /// # Errors
 /// [`Error::Input`] when the bytes are no exr file, hold deep or subsampled data, or would take
 /// more than `limit` bytes of memory.
-pub fn decode(path: &Path, source: impl BufRead + Seek, limit: u64) -> Result<Channels> {
+pub fn decode(path: &Path, source: impl BufRead + Seek, limit: u64) -> Result<ExrChannels> {
     let refuse = |e: exr::error::Error| Error::input(path, format!("not a readable exr file: {e}"));
     let chunks = exr::block::read(source, false).map_err(refuse)?;
     for header in chunks.headers() {
         let pixels = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
         let needed = pixels.saturating_mul(header.channels.list.len() as u64 * 4);
-        super::read::check_memory(path, needed, limit)?;
+        check_memory(path, needed, limit)?;
         if header.channels.list.iter().any(|c| c.sampling != Vec2(1, 1)) {
             return Err(Error::input(path, "subsampled exr channels are not supported"));
         }
@@ -230,16 +230,16 @@ pub fn decode(path: &Path, source: impl BufRead + Seek, limit: u64) -> Result<Ch
     let read = exr::image::read::read().no_deep_data().largest_resolution_level();
     let read = read.all_channels().first_valid_layer().all_attributes().non_parallel();
     let layer = read.from_chunks(chunks).map_err(refuse)?.layer_data;
-    let from_exr = |channel: AnyChannel<FlatSamples>| Channel {
+    let from_exr = |channel: AnyChannel<FlatSamples>| ExrChannel {
         name: channel.name.to_string(),
         samples: match channel.sample_data {
-            FlatSamples::F16(v) => Samples::F32(v.into_iter().map(|h| h.to_f32()).collect()),
-            FlatSamples::F32(v) => Samples::F32(v),
-            FlatSamples::U32(v) => Samples::U32(v),
+            FlatSamples::F16(v) => ExrSamples::F32(v.into_iter().map(|h| h.to_f32()).collect()),
+            FlatSamples::F32(v) => ExrSamples::F32(v),
+            FlatSamples::U32(v) => ExrSamples::U32(v),
         },
     };
     let list = layer.channel_data.list.into_iter().map(from_exr).collect();
-    Ok(Channels { width: layer.size.0 as u32, height: layer.size.1 as u32, list })
+    Ok(ExrChannels { width: layer.size.0 as u32, height: layer.size.1 as u32, list })
 }
 
 #[cfg(test)]
@@ -269,7 +269,7 @@ mod tests {
         film
     }
 
-    fn sorted(mut channels: Vec<Channel>) -> Vec<Channel> {
+    fn sorted(mut channels: Vec<ExrChannel>) -> Vec<ExrChannel> {
         channels.sort_by(|a, b| a.name.cmp(&b.name));
         channels
     }
@@ -302,8 +302,10 @@ mod tests {
 
     #[test]
     fn wrong_channels_are_errors() {
-        let channel =
-            |name: &str, n| Channel { name: name.into(), samples: Samples::F32(vec![0.0; n]) };
+        let channel = |name: &str, n| ExrChannel {
+            name: name.into(),
+            samples: ExrSamples::F32(vec![0.0; n]),
+        };
         assert!(matches!(encode(2, 2, &[channel("R", 3)], ""), Err(Error::Usage(_))));
         let twice = [channel("R", 4), channel("R", 4)];
         assert!(matches!(encode(2, 2, &twice, ""), Err(Error::Failed(_))));

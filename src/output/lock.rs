@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_jobs_share_it_and_others_are_refused_until_the_last_one_ends() {
+    fn equal_jobs_share_the_lock_and_others_are_refused_until_the_last_one_ends() {
         let folder = tempfile::tempdir().expect("a folder");
         let pattern = &pattern(folder.path());
         let take = |seed, shot| SequenceLock::take(pattern, &header(seed, shot));
@@ -231,7 +231,7 @@ mod tests {
 
     /// As after a crash, of one job before it wrote a word and of another after it.
     #[test]
-    fn a_file_that_nobody_locks_is_in_nobodys_way() {
+    fn an_unlocked_lock_file_blocks_no_job() {
         let folder = tempfile::tempdir().expect("a folder");
         let pattern = pattern(folder.path());
         for words in ["", "{\"process\":", "nonsense"] {
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_that_come_at_once_only_equal_ones_keep_it() {
+    fn of_concurrent_jobs_only_equal_ones_hold_the_lock() {
         let folder = tempfile::tempdir().expect("a folder");
         let pattern = &pattern(folder.path());
         for _ in 0..20 {

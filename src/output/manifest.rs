@@ -18,7 +18,7 @@ mod parts;
 #[cfg(test)]
 mod tests;
 
-pub use difference::Difference;
+pub use difference::HeaderDifference;
 pub use journal::Journal;
 pub use parts::part_path;
 

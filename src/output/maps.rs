@@ -7,10 +7,10 @@ mod read;
 
 pub use read::of_exr;
 
-use super::exr::{Channel, Samples};
-use super::{Display, WriteOptions, Written, write_image};
+use super::exr::{ExrChannel, ExrSamples};
+use super::{Display, WriteOptions, Written, png};
 use crate::error::Result;
-use crate::film::{Film, PixelSource, Provenance};
+use crate::film::{Film, Provenance, ProvenanceKind};
 use crate::math::{Rgb, luminance};
 use crate::scene::ToneCurve;
 use std::path::{Path, PathBuf};
@@ -86,12 +86,12 @@ impl Map {
     }
 
     /// The film in grey under this map's paint, linear display values. The distance `farthest`, in
-    /// the unit of [`PixelSource::distance`], has the hottest colour.
+    /// the unit of [`Provenance::distance`], has the hottest colour.
     pub fn paint(self, film: &Film, display: &Display, farthest: f32) -> Film {
         let mut out = Film::new(film.width, film.height, false);
         for (i, c) in out.rgb.iter_mut().enumerate() {
             let grey = Rgb::splat(luminance(display.tone(film.rgb[i])));
-            let source = film.sources.as_ref().map_or(PixelSource::default(), |s| s[i]);
+            let source = film.provenance.as_ref().map_or(Provenance::default(), |s| s[i]);
             *c = match self {
                 Self::Provenance => by_provenance(&source, grey),
                 Self::Frame => inferred(&source, grey, || by_frame(source.frame)),
@@ -108,7 +108,7 @@ impl Map {
     /// Writes it for the frame at `path`.
     ///
     /// # Errors
-    /// [`write_image`]'s.
+    /// [`crate::error::Error::Io`] when the file cannot be written.
     pub fn write(
         self,
         path: &Path,
@@ -121,25 +121,25 @@ impl Map {
         let farthest = options.maps.unwrap_or(1.0);
         let painted = self.paint(film, &options.display, farthest);
         let options = WriteOptions { display, png_bits: 8, ..options.clone() };
-        write_image(&path, &painted, &options).map(|written| (path, written))
+        png::write(&path, &painted, &options).map(|written| (path, written))
     }
 
     /// It as a channel of an exr frame, `reuse.provenance`.
-    fn channel(self, film: &Film) -> Channel {
+    fn channel(self, film: &Film) -> ExrChannel {
         let n = film.rgb.len();
-        let source = |i: usize| film.sources.as_ref().map_or(PixelSource::default(), |s| s[i]);
+        let source = |i: usize| film.provenance.as_ref().map_or(Provenance::default(), |s| s[i]);
         let samples = match self {
-            Self::Provenance => Samples::U32((0..n).map(|i| source(i).provenance as u32).collect()),
-            Self::Frame => Samples::U32((0..n).map(|i| source(i).frame).collect()),
-            Self::Distance => Samples::F32((0..n).map(|i| source(i).distance).collect()),
-            Self::Audit => Samples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
+            Self::Provenance => ExrSamples::U32((0..n).map(|i| source(i).kind as u32).collect()),
+            Self::Frame => ExrSamples::U32((0..n).map(|i| source(i).frame).collect()),
+            Self::Distance => ExrSamples::F32((0..n).map(|i| source(i).distance).collect()),
+            Self::Audit => ExrSamples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
         };
-        Channel { name: format!("reuse.{}", self.name()), samples }
+        ExrChannel { name: format!("reuse.{}", self.name()), samples }
     }
 }
 
 /// All maps as channels of an exr frame.
-pub fn channels_of(film: &Film) -> Vec<Channel> {
+pub fn channels_of(film: &Film) -> Vec<ExrChannel> {
     Map::ALL.map(|map| map.channel(film)).into()
 }
 
@@ -147,21 +147,18 @@ fn painted(grey: Rgb, paint: Rgb) -> Rgb {
     grey * GREY + paint * (1.0 - GREY)
 }
 
-fn by_provenance(source: &PixelSource, grey: Rgb) -> Rgb {
-    match source.provenance {
-        Provenance::Background => grey * DARK,
-        Provenance::Traced => painted(grey, PINK),
-        Provenance::Earlier => painted(grey, RED),
-        Provenance::Later => painted(grey, BLUE),
-        Provenance::Both => painted(grey, BOTH),
+fn by_provenance(source: &Provenance, grey: Rgb) -> Rgb {
+    match source.kind {
+        ProvenanceKind::Background => grey * DARK,
+        ProvenanceKind::Traced => painted(grey, PINK),
+        ProvenanceKind::Earlier => painted(grey, RED),
+        ProvenanceKind::Later => painted(grey, BLUE),
+        ProvenanceKind::Both => painted(grey, BOTH),
     }
 }
 
-fn inferred(source: &PixelSource, grey: Rgb, paint: impl FnOnce() -> Rgb) -> Rgb {
-    match source.provenance {
-        Provenance::Background | Provenance::Traced => grey * DARK,
-        _ => painted(grey, paint()),
-    }
+fn inferred(source: &Provenance, grey: Rgb, paint: impl FnOnce() -> Rgb) -> Rgb {
+    if source.is_inferred() { painted(grey, paint()) } else { grey * DARK }
 }
 
 /// A colour for each frame; white for what is no frame of the shot.
@@ -222,12 +219,17 @@ mod tests {
     fn film() -> Film {
         let mut film = Film::new(6, 5, false);
         film.rgb.fill(Rgb::splat(0.5));
-        let mut sources = vec![PixelSource::default(); 30];
-        let kinds = [Provenance::Traced, Provenance::Earlier, Provenance::Later, Provenance::Both];
-        for (i, provenance) in kinds.into_iter().enumerate() {
-            sources[i] = PixelSource { provenance, frame: i as u32, distance: 0.5 * i as f32 };
+        let mut sources = vec![Provenance::default(); 30];
+        let kinds = [
+            ProvenanceKind::Traced,
+            ProvenanceKind::Earlier,
+            ProvenanceKind::Later,
+            ProvenanceKind::Both,
+        ];
+        for (i, kind) in kinds.into_iter().enumerate() {
+            sources[i] = Provenance { kind, frame: i as u32, distance: 0.5 * i as f32 };
         }
-        film.sources = Some(sources);
+        film.provenance = Some(sources);
         film
     }
 
@@ -244,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_follow_one_another_look_unlike_and_traced_pixels_have_no_frame() {
+    fn consecutive_frames_have_unlike_colours_and_traced_pixels_none() {
         for frame in 1..200 {
             let apart = (by_frame(frame) - by_frame(frame + 1)).abs().max_element();
             assert!(apart > 0.5, "{frame}: {apart}");
@@ -256,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn heat_gets_lighter_all_the_way() {
+    fn luminance_of_the_heat_map_rises_throughout() {
         let light: Vec<f32> = (0..=20).map(|k| luminance(heat(k as f32 / 20.0))).collect();
         assert!(light.windows(2).all(|w| w[0] < w[1]), "{light:?}");
         assert_eq!((heat(f32::NAN), heat(9.0)), (heat(0.0), heat(1.0)));
@@ -279,7 +281,7 @@ mod tests {
         let channels = channels_of(&film());
         let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["reuse.provenance", "reuse.frame", "reuse.distance", "reuse.audit"]);
-        let Samples::U32(provenance) = &channels[0].samples else { panic!("numbers") };
+        let ExrSamples::U32(provenance) = &channels[0].samples else { panic!("numbers") };
         assert_eq!(provenance[..5], [1, 2, 3, 4, 0]);
         assert_eq!(Map::Audit.path(Path::new("o/f_01.ppm")), Path::new("o/f_01_audit.png"));
     }

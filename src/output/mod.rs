@@ -32,11 +32,13 @@ mod png;
 mod quantise;
 mod read;
 pub mod video;
+mod write;
 
 pub use atomic::Written;
 pub use display::Display;
-pub use format::{Format, VERSION, WriteOptions, write_image};
+pub use format::{Format, VERSION, WriteOptions};
 pub use lock::SequenceLock;
 pub use path_kind::{PathKind, Regular};
 pub use pattern::FramePattern;
 pub use read::{DEFAULT_MEMORY_LIMIT, read_image, read_image_within};
+pub use write::write_image;

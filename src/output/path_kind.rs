@@ -71,12 +71,28 @@ impl Regular {
     }
 }
 
+/// Refuses what would take more memory than `limit`, bytes.
+///
+/// # Errors
+/// [`Error::Input`] with both figures.
+pub(super) fn check_memory(path: &Path, needed: u64, limit: u64) -> Result<()> {
+    if needed <= limit {
+        return Ok(());
+    }
+    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+    let (needed, limit) = (mib(needed), mib(limit));
+    Err(Error::input(
+        path,
+        format!("decoding takes {needed} MiB, more than the {limit} MiB allowed"),
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_told_from_nothing_and_from_what_is_no_file() {
+    fn files_are_told_from_missing_paths_folders_and_devices() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("frame.png");
         assert!(matches!(PathKind::at(&path), Ok(PathKind::Nothing)));

@@ -4,7 +4,8 @@
 //! code values, hdr and exr as linear radiance. Grey becomes three equal channels; alpha is left
 //! out, and so are colour profiles.
 
-use super::{Regular, exr};
+use super::exr;
+use super::path_kind::{Regular, check_memory};
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
@@ -43,21 +44,8 @@ pub fn read_image_within(path: impl AsRef<Path>, limit: u64) -> Result<Image> {
     }
 }
 
-/// Refuses what would take more memory than the limit.
-pub(super) fn check_memory(path: &Path, needed: u64, limit: u64) -> Result<()> {
-    if needed <= limit {
-        return Ok(());
-    }
-    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-    let (needed, limit) = (mib(needed), mib(limit));
-    Err(Error::input(
-        path,
-        format!("decoding takes {needed} MiB, more than the {limit} MiB allowed"),
-    ))
-}
-
 /// The picture among an exr file's channels: R, G and B, or Y for grey.
-fn rgb_of(path: &Path, channels: &exr::Channels) -> Result<Image> {
+fn rgb_of(path: &Path, channels: &exr::ExrChannels) -> Result<Image> {
     let find = |name| channels.f32(name).or_else(|| channels.f32("Y"));
     let (Some(r), Some(g), Some(b)) = (find("R"), find("G"), find("B")) else {
         let names: Vec<&str> = channels.list.iter().map(|c| c.name.as_str()).collect();
@@ -134,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_says_so() {
+    fn a_file_that_is_no_picture_is_refused() {
         let cases: [(&str, &[u8]); 6] = [
             ("empty.png", b""),
             ("text.png", b"hello, this is no picture"),
@@ -155,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_that_promises_too_much_is_refused() {
+    fn a_header_beyond_the_memory_limit_is_refused() {
         let bomb = b"P6 60000 60000 255\n";
         let mut png = Vec::new();
         let mut encoder = png::Encoder::new(&mut png, 100_000, 100_000);

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// A frame in the player.
 #[derive(Debug, Clone, Serialize)]
-pub struct Shown {
+pub struct PlayerFrame {
     /// Its number.
     pub number: u32,
     /// What is said of it.
@@ -33,7 +33,7 @@ pub struct JobPage {
     /// What one wants to know first: name and value.
     pub facts: Vec<(String, String)>,
     /// Frames in the player.
-    pub film: Vec<Shown>,
+    pub film: Vec<PlayerFrame>,
     /// Which frames are in the player, where not all are.
     pub shown: String,
     /// Maps by name, and what each shows.

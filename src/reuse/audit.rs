@@ -4,7 +4,7 @@
 //! traces A and B, (I - A)(I - B) is on average the squared error of what is shown, and (A - B)²/2 that of
 //! tracing, whatever the noise of A and B. Each drawn pixel counts by one over its chance.
 
-use crate::film::{PixelSource, Provenance};
+use crate::film::Provenance;
 use crate::math::Rgb;
 use crate::measure::{Interval, drawn_sum_interval};
 use crate::output::Display;
@@ -18,47 +18,47 @@ const UNSEEN_INFERRED: f64 = 64.0;
 /// Display steps.
 const STEPS: f64 = 255.0;
 
-/// A frame's pixels as the audit sees them.
+/// The pixels of a frame that is audited.
 #[derive(Clone, Copy)]
-pub struct Shown<'a> {
+pub struct AuditedFrame<'a> {
     /// Radiance, row by row.
     pub rgb: &'a [Rgb],
     /// Where each pixel's light comes from.
-    pub sources: &'a [PixelSource],
+    pub provenance: &'a [Provenance],
     /// How radiance is shown.
     pub display: Display,
 }
 
-/// A pixel that was drawn.
+/// A pixel that was drawn at random for the audit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drawn {
+pub struct AuditedPixel {
     /// Row by row.
     pub index: u32,
     /// One over the probability with which it was drawn.
     pub weight: f64,
-    /// Pixels of one number were drawn together: neighbours, whose errors are alike.
+    /// Pixels with one group number are neighbours that were drawn together; their errors are alike.
     pub group: u64,
 }
 
-impl Shown<'_> {
+impl AuditedFrame<'_> {
     /// Whether the pixel was inferred.
     fn is_inferred(&self, i: usize) -> bool {
-        !matches!(self.sources[i].provenance, Provenance::Background | Provenance::Traced)
+        self.provenance[i].is_inferred()
     }
 }
 
-/// What two traces `a` and `b` tell about a pixel that is `shown`, squares of a display step, the
-/// mean of the channels.
+/// Squared errors of a pixel as it is shown and of a trace, from two independent traces: squares of a display
+/// step, the mean of the channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Squares {
+pub struct SquaredErrors {
     /// Squared error of what is shown; may be negative.
     pub error: f64,
     /// Squared error of a trace.
     pub trace: f64,
 }
 
-impl Squares {
-    /// Compares radiances.
+impl SquaredErrors {
+    /// The squared errors of the radiance `shown`, from the traces `a` and `b`.
     ///
     /// Traces are right on average in radiance, not in display steps: the display's curve bends
     /// them. So the squared error is not `(I - A)(I - B)` itself but `2f(M) - (f(A) + f(B))/2` with
@@ -92,14 +92,14 @@ pub fn difference(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> f32 {
 /// The sums over the pixels `drawn` from a frame, as they are `shown` if they are inferred and in the two
 /// `traces` of the frame. Each stands for as many pixels as its weight: itself, which shows its first trace, and
 /// others, which show what it would. How many pixels the frame has is left out.
-pub fn sums(shown: &Shown, drawn: &[Drawn], traces: [&[Rgb]; 2]) -> AuditSums {
+pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -> AuditSums {
     let [a, b] = traces;
     let mut sums = AuditSums { drawn: drawn.len() as u64, ..AuditSums::default() };
     let mut groups: BTreeMap<u64, Group> = BTreeMap::new();
-    for Drawn { index, weight, group } in drawn {
+    for AuditedPixel { index, weight, group } in drawn {
         let group = groups.entry(*group).or_default();
         let i = *index as usize;
-        let squares = Squares::of(&shown.display, shown.rgb[i], a[i], b[i]);
+        let squares = SquaredErrors::of(&shown.display, shown.rgb[i], a[i], b[i]);
         let others = weight - 1.0;
         if shown.is_inferred(i) {
             sums.inferred_pixels += others as u64;
@@ -148,11 +148,11 @@ impl Part {
 /// Root mean squares with their 95 % intervals, display steps of 255.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rmse {
-    /// Of the inferred pixels.
+    /// RMSE of the inferred pixels.
     pub inferred: Interval,
-    /// Of the audited frames, all their pixels.
+    /// RMSE of all pixels of the audited frames.
     pub shown: Interval,
-    /// Of the same frames, had they been traced.
+    /// RMSE of the same frames, had they been traced.
     pub traced: Interval,
 }
 
@@ -193,13 +193,12 @@ mod tests {
     #[test]
     fn pixels_that_were_drawn_together_are_one_figure() {
         let rgb = vec![Rgb::splat(0.5); 4];
-        let source = PixelSource { provenance: Provenance::Traced, frame: 0, distance: 0.0 };
-        let sources = vec![source; 4];
-        let shown = Shown { rgb: &rgb, sources: &sources, display: LINEAR };
+        let provenance = vec![Provenance::default(); 4];
+        let shown = AuditedFrame { rgb: &rgb, provenance: &provenance, display: LINEAR };
         let (a, b) = (vec![Rgb::splat(0.4); 4], vec![Rgb::splat(0.6); 4]);
         let of = |group: fn(u32) -> u64| {
-            let drawn: Vec<Drawn> =
-                (0..4).map(|k| Drawn { index: k, weight: 8.0, group: group(k) }).collect();
+            let drawn: Vec<AuditedPixel> =
+                (0..4).map(|k| AuditedPixel { index: k, weight: 8.0, group: group(k) }).collect();
             sums(&shown, &drawn, [&a, &b]).traced
         };
         let (apart, together) = (of(u64::from), of(|_| 0));
@@ -210,7 +209,7 @@ mod tests {
     #[test]
     fn without_a_curve_the_error_is_the_product_of_differences() {
         let [i, a, b] = [0.5, 0.41, 0.63].map(Rgb::splat);
-        let squares = Squares::of(&LINEAR, i, a, b);
+        let squares = SquaredErrors::of(&LINEAR, i, a, b);
         assert!((squares.error - 0.09 * -0.13 * 255.0 * 255.0).abs() < 1e-2, "{squares:?}");
         assert!((squares.trace - 0.5 * 0.22 * 0.22 * 255.0 * 255.0).abs() < 1e-2, "{squares:?}");
     }
@@ -221,8 +220,9 @@ mod tests {
         for (truth, shown) in [(0.6f32, 0.66f32), (0.2, 0.21), (0.05, 0.04)] {
             let n = 40_000;
             let trace = |k: u32| Rgb::splat(truth * (1.0 + 0.15 * noise(k)).max(0.0));
-            let both =
-                |k: u32| Squares::of(&SRGB, Rgb::splat(shown), trace(2 * k), trace(2 * k + 1));
+            let both = |k: u32| {
+                SquaredErrors::of(&SRGB, Rgb::splat(shown), trace(2 * k), trace(2 * k + 1))
+            };
             let apart = |x: Rgb, y: Rgb| ((SRGB.code(x)[0] - SRGB.code(y)[0]) * 255.0).powi(2);
             let error = apart(Rgb::splat(shown), Rgb::splat(truth));
             let own = mean(2 * n, |k| apart(trace(k), Rgb::splat(truth)));

@@ -18,12 +18,17 @@
 //! * The paper hashes pixels to lists. Here the entries lie frame by frame, so that those of a frame
 //!   that is not needed any more can be dropped; what is found is the same.
 
-use crate::film::{PixelSource, Provenance};
+use super::columns::{self, deflated, inflated};
+use crate::film::{Provenance, ProvenanceKind};
 use crate::math::Rgb;
+use crate::scene::ReuseSettings;
 
-/// When two entries of a pixel agree.
+/// Words of an entry: its pixel, its colour, its distance.
+const WORDS: usize = 5;
+
+/// The condition under which two entries of a pixel agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rule {
+pub struct AgreementRule {
     /// Largest difference in any channel, linear radiance.
     pub colour_epsilon: f32,
     /// Largest difference of the distances, as a share of the nearer one.
@@ -42,9 +47,9 @@ pub struct Entry {
     pub distance: f32,
 }
 
-/// What is known of one frame: all of it, or its discoveries.
+/// The known colours of one frame: of all its pixels, or of those that were traced (its discoveries).
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Known {
+pub struct KnownColours {
     /// Its number, from 1.
     pub frame: u32,
     /// Each pixel at most once.
@@ -53,7 +58,7 @@ pub struct Known {
 
 /// An inferred pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Inferred {
+pub struct InferredColour {
     /// Linear radiance.
     pub rgb: Rgb,
     /// Frame of the entry before; the frame itself where that is known.
@@ -64,7 +69,13 @@ pub struct Inferred {
     pub distance: f32,
 }
 
-impl Rule {
+impl AgreementRule {
+    /// The rule that `settings` ask for.
+    pub fn of(settings: &ReuseSettings) -> Self {
+        let ReuseSettings { colour_epsilon, distance_epsilon, .. } = *settings;
+        Self { colour_epsilon, distance_epsilon }
+    }
+
     /// Whether `a` and `b` agree.
     pub fn agree(&self, a: &Entry, b: &Entry) -> bool {
         let apart = (a.rgb - b.rgb).abs().max_element();
@@ -78,9 +89,14 @@ impl Rule {
         unknown || a == b || distance_difference(a, b) <= self.distance_epsilon
     }
 
-    /// What `known`, in any order, tells of the `pixels` pixels of `frame`; `None` where a pixel
+    /// The colours of the `pixels` pixels of `frame`, inferred from `known` (in any order); `None` where a pixel
     /// must be traced.
-    pub fn infer(&self, known: &[&Known], frame: u32, pixels: usize) -> Vec<Option<Inferred>> {
+    pub fn infer(
+        &self,
+        known: &[&KnownColours],
+        frame: u32,
+        pixels: usize,
+    ) -> Vec<Option<InferredColour>> {
         let before = nearest(known.iter().filter(|k| k.frame <= frame), frame, pixels);
         let after = nearest(known.iter().filter(|k| k.frame >= frame), frame, pixels);
         let pairs = before.into_iter().zip(after);
@@ -92,13 +108,13 @@ impl Rule {
         (before, a): (u32, &Entry),
         (after, b): (u32, &Entry),
         frame: u32,
-    ) -> Option<Inferred> {
+    ) -> Option<InferredColour> {
         let step = (frame - before) as f32 / (after - before).max(1) as f32;
         // Equal colours stay what they are to the last bit.
         let rgb = a.rgb + (b.rgb - a.rgb) * step;
         // Not a number where a distance is unknown.
         let distance = distance_difference(a.distance, b.distance).max(0.0);
-        self.agree(a, b).then_some(Inferred { rgb, before, after, distance })
+        self.agree(a, b).then_some(InferredColour { rgb, before, after, distance })
     }
 }
 
@@ -109,11 +125,11 @@ pub fn distance_difference(a: f32, b: f32) -> f32 {
 
 /// For each pixel the entry nearest to `frame` in time, with its frame.
 fn nearest<'a>(
-    known: impl Iterator<Item = &'a &'a Known>,
+    known: impl Iterator<Item = &'a &'a KnownColours>,
     frame: u32,
     pixels: usize,
 ) -> Vec<Option<(u32, &'a Entry)>> {
-    let mut known: Vec<&Known> = known.copied().collect();
+    let mut known: Vec<&KnownColours> = known.copied().collect();
     known.sort_by_key(|k| std::cmp::Reverse(k.frame.abs_diff(frame)));
     let mut nearest = vec![None; pixels];
     for (k, entry) in known.iter().flat_map(|k| k.entries.iter().map(move |e| (k.frame, e))) {
@@ -122,16 +138,48 @@ fn nearest<'a>(
     nearest
 }
 
-impl Inferred {
+impl KnownColours {
+    /// The entries as bytes: how many there are, then each in a record of the codec of references. `None`
+    /// where they would be too many.
+    pub fn encode(&self) -> Option<Vec<u8>> {
+        columns::size_of(self.entries.len(), WORDS, 0)?;
+        let raw = columns::planes(self.entries.len(), WORDS, |i, column| {
+            let Entry { pixel, rgb, distance } = self.entries[i];
+            [pixel, rgb.x.to_bits(), rgb.y.to_bits(), rgb.z.to_bits(), distance.to_bits()][column]
+        });
+        Some([&(self.entries.len() as u32).to_le_bytes()[..], &deflated(&raw)?].concat())
+    }
+
+    /// The entries that [`encode`](Self::encode) made bytes of, for frames of `pixels` pixels; `None` for other
+    /// bytes.
+    pub fn decode(frame: u32, mut bytes: &[u8], pixels: u32) -> Option<Self> {
+        let count = columns::take_u32(&mut bytes)?;
+        let raw = inflated(bytes, columns::size_of(count, WORDS, 0)?)?;
+        let entry = |i: usize| {
+            let word = |column| columns::word(&raw, count, i, column);
+            let float = |column| f32::from_bits(word(column));
+            let pixel = Some(word(0)).filter(|pixel| *pixel < pixels)?;
+            Some(Entry { pixel, rgb: Rgb::new(float(1), float(2), float(3)), distance: float(4) })
+        };
+        Some(Self { frame, entries: (0..count).map(entry).collect::<Option<_>>()? })
+    }
+
+    /// Bytes that the entries take in memory.
+    pub fn memory(&self) -> u64 {
+        size_of_val(&self.entries[..]) as u64
+    }
+}
+
+impl InferredColour {
     /// Where the pixel comes from, as `frame` sees it. A pixel of a frame that was known from the
     /// start is neither traced nor inferred.
-    pub fn source(&self, frame: u32) -> PixelSource {
+    pub fn provenance(&self, frame: u32) -> Provenance {
         let Self { before, after, distance, .. } = *self;
         if before == frame {
-            return PixelSource::default();
+            return Provenance::default();
         }
         let nearer = if frame - before <= after - frame { before } else { after };
-        PixelSource { provenance: Provenance::Both, frame: nearer, distance }
+        Provenance { kind: ProvenanceKind::Both, frame: nearer, distance }
     }
 }
 
@@ -139,15 +187,15 @@ impl Inferred {
 mod tests {
     use super::*;
 
-    const RULE: Rule = Rule { colour_epsilon: 0.1, distance_epsilon: 0.25 };
+    const RULE: AgreementRule = AgreementRule { colour_epsilon: 0.1, distance_epsilon: 0.25 };
 
-    fn known(frame: u32, pixels: &[(u32, f32, f32)]) -> Known {
+    fn known(frame: u32, pixels: &[(u32, f32, f32)]) -> KnownColours {
         let entry = |&(pixel, grey, distance)| Entry { pixel, rgb: Rgb::splat(grey), distance };
-        Known { frame, entries: pixels.iter().map(entry).collect() }
+        KnownColours { frame, entries: pixels.iter().map(entry).collect() }
     }
 
     /// What frame 3 has at pixel 0, known in frames 1 and 5.
-    fn middle(rule: Rule, a: (f32, f32), b: (f32, f32)) -> Option<f32> {
+    fn middle(rule: AgreementRule, a: (f32, f32), b: (f32, f32)) -> Option<f32> {
         let (a, b) = (known(1, &[(0, a.0, a.1)]), known(5, &[(0, b.0, b.1)]));
         rule.infer(&[&a, &b], 3, 1)[0].map(|i| i.rgb.x)
     }
@@ -180,11 +228,11 @@ mod tests {
 
     #[test]
     fn no_epsilon_asks_for_equality_and_an_infinite_one_for_finite_numbers() {
-        let none = Rule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
+        let none = AgreementRule { colour_epsilon: 0.0, distance_epsilon: 0.0 };
         assert_eq!(middle(none, (0.3, 4.0), (0.3, 4.0)), Some(0.3));
         assert_eq!(middle(none, (0.3, 4.0), (0.300_001, 4.0)), None);
         assert_eq!(middle(none, (0.3, 4.0), (0.3, 4.000_001)), None);
-        let all = Rule { colour_epsilon: f32::INFINITY, distance_epsilon: f32::INFINITY };
+        let all = AgreementRule { colour_epsilon: f32::INFINITY, distance_epsilon: f32::INFINITY };
         assert_eq!(middle(all, (0.0, 4.0), (9.0, f32::INFINITY)), Some(4.5));
         for odd in [f32::NAN, f32::INFINITY] {
             assert_eq!(middle(all, (odd, 4.0), (0.0, 4.0)), None);
@@ -215,14 +263,25 @@ mod tests {
     fn a_frame_that_is_known_is_itself() {
         let frames = [known(1, &[(0, 0.0, 1.0)]), known(2, &[(0, 9.0, f32::NAN)])];
         let found = RULE.infer(&[&frames[0], &frames[1]], 2, 1)[0].expect("known");
-        assert_eq!((found.rgb.x, found.source(2)), (9.0, PixelSource::default()));
+        assert_eq!((found.rgb.x, found.provenance(2)), (9.0, Provenance::default()));
+    }
+
+    #[test]
+    fn entries_come_back_as_they_were_and_other_bytes_are_refused() {
+        let colours = known(3, &[(0, 0.5, 1.0), (7, -0.0, f32::INFINITY)]);
+        let bytes = colours.encode().expect("few");
+        assert_eq!(KnownColours::decode(3, &bytes, 8), Some(colours));
+        assert_eq!(KnownColours::decode(3, &bytes, 7), None);
+        assert!((0..bytes.len()).all(|i| KnownColours::decode(3, &bytes[..i], 8).is_none()));
+        let many = [&[0xff; 4], &bytes[4..]].concat();
+        assert_eq!(KnownColours::decode(3, &many, 8), None);
     }
 
     #[test]
     fn the_nearer_frame_is_named() {
-        let inferred = Inferred { rgb: Rgb::ZERO, before: 1, after: 9, distance: 0.0 };
-        let source = |frame| inferred.source(frame);
+        let inferred = InferredColour { rgb: Rgb::ZERO, before: 1, after: 9, distance: 0.0 };
+        let source = |frame| inferred.provenance(frame);
         assert_eq!((source(3).frame, source(7).frame), (1, 9));
-        assert_eq!(source(3).provenance, Provenance::Both);
+        assert_eq!(source(3).kind, ProvenanceKind::Both);
     }
 }

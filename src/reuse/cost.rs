@@ -7,19 +7,19 @@ use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
-/// A camera ray with the look at its surface: the unit.
+/// Cost of a camera ray with the evaluation of its surface: the unit of cost.
 const CAMERA_RAY: f64 = 1.0;
-/// A ray from a mirror or glass, traced alone.
+/// Cost of a ray from a mirror or glass, traced alone.
 const SPECULAR_RAY: f64 = 2.0;
-/// A shadow ray with its sample, in a scene of a million triangles.
+/// Cost of a shadow ray with its sample, in a scene of a million triangles.
 const SHADOW_RAY: f64 = 1.2;
-/// Looking one surface point up.
+/// Cost of looking up one surface point in the first references.
 const LOOKUP: f64 = 1.5;
-/// The same in all references, with what it costs to keep the point for others.
+/// Cost of looking up one surface point in all references and of keeping the point for other frames.
 const LOOKUP_IN_ALL: f64 = 4.7;
-/// Putting one camera sample to its surface point.
+/// Cost of joining one camera sample to its surface point.
 const JOINING: f64 = 0.75;
-/// A check ray, of a shadow ray that is traced with many others of its point.
+/// Cost of a check ray, in shadow rays that are traced with many others of their point.
 const CHECK_RAY: f64 = 1.7;
 
 /// A shadow ray with its sample in `scene`: the fewer triangles, the flatter is their tree, and the more of it
@@ -44,7 +44,8 @@ pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
 }
 
 /// The lights whose ratios are worth keeping.
-pub fn channels(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Channels {
+pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
+    let plan = EffectPlan::of(scene, settings);
     let kept = Channels::of(scene, |channel| {
         let runs = match channel {
             Channel::Area(_) => plan.area_lights,
@@ -69,8 +70,8 @@ pub struct LookupReason {
 }
 
 /// What is looked up and what traced, and why: all lights that shine, then the sky.
-pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> Vec<LookupReason> {
-    let kept = channels(scene, plan, settings);
+pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
+    let kept = channels(scene, settings);
     let mut reasons = Vec::new();
     for (index, light) in scene.lights.iter().enumerate() {
         let channel = light.is_area().then_some(Channel::Area(index as u32));
@@ -85,7 +86,7 @@ pub fn lookup_reasons(scene: &Scene, plan: &EffectPlan, settings: &Settings) -> 
             why,
         });
     }
-    if plan.sky_light {
+    if EffectPlan::of(scene, settings).sky_light {
         let looked_up = kept.sky().is_some();
         let why = why(scene, rays_of(Channel::Sky, settings), looked_up, settings.spp);
         reasons.push(LookupReason { light: "sky".into(), looked_up, why });
@@ -109,7 +110,7 @@ fn why(scene: &Scene, rays: u32, looked_up: bool, spp: u32) -> String {
     }
 }
 
-/// What a frame costs that cast `rays` and looked `lookups` surface points up.
+/// The cost of a frame that cast `rays` and looked up `lookups` surface points.
 pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     CAMERA_RAY * rays[RayKind::Camera] as f64
         + SPECULAR_RAY * (rays[RayKind::Mirror] + rays[RayKind::Glass]) as f64
@@ -119,11 +120,11 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
 
 /// What the light of one surface point costs, of the camera samples that are shaded together.
 struct PointCost {
-    /// Tracing it.
+    /// Cost of tracing.
     traced: f64,
-    /// Check rays in place of that.
+    /// Cost of check rays.
     checked: f64,
-    /// Looking it up.
+    /// Cost of the lookup.
     lookup: f64,
 }
 
@@ -144,7 +145,7 @@ impl PointCost {
 
 /// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
 /// probes found: a share `probed` of the points, each of which is traced once more than it needs to be.
-pub fn is_worth_looking<'f>(
+pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,
     (scene, channels, settings): (&Scene, &Channels, &Settings),

@@ -11,19 +11,20 @@
 use super::risk::{LEVELS, STEPS, risk_of, shown};
 use crate::inference::Estimate;
 
-/// Findings of so many levels on either side of a level count for it, scaled with the risk.
+/// A level is judged by its own findings and those of so many levels on either side, errors scaled with the
+/// risk.
 const BESIDE: usize = 1;
-/// As large a share of the squared risk counts as an error found once among a level's probes: a few that
-/// find nothing say little where much could be found.
+/// This share of the squared risk is added once to the errors that a level's probes found: a few probes
+/// without an error say little where errors could be large.
 const HIDDEN: f64 = 0.25;
-/// So many times their error must be at most that of tracing: what is right in the frame on the whole is a
-/// little wrong in one tile and better than needed in another.
+/// The error of estimates, times this, must be at most that of tracing: estimates that are good enough in the
+/// mean of a frame are worse in some of its tiles.
 const GUARD: f64 = 1.25;
-/// Of a tile's squared error that nobody sees, the share that a level may use up: errors are rare and large,
-/// so a mean below it leaves tiles that are above.
+/// Share of the squared error that nobody sees in a tile that a level's mean may reach: errors are rare and
+/// large, so some tiles are above the mean.
 const UNSEEN_SHARE: f64 = 0.5;
 
-/// What a probe found at a surface point, all lights together that other frames know.
+/// The errors of estimate and trace at a surface point of a probe, summed over the lights that other frames know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// Level of the estimate's risk.
@@ -36,19 +37,19 @@ pub struct Finding {
     pub noise: f32,
 }
 
-/// What a light of a point showed: estimate and both traces.
+/// Estimate and both traces of one light at a point.
 #[derive(Debug, Clone, Copy)]
-pub struct Compared {
+pub struct LightComparison {
     /// What the pixel would show of the light without shadows: luminance, exposure applied.
     pub unshadowed: f32,
-    /// What other frames suggest.
+    /// The estimate from other frames.
     pub estimate: Estimate,
     /// Traced ratios.
     pub traced: [f32; 2],
 }
 
-impl Compared {
-    /// Takes in what more camera samples showed, their `share` of all. Risk is that of the riskiest.
+impl LightComparison {
+    /// Averages in the comparison of further camera samples, which are `share` of all. The higher risk stays.
     pub fn join(&mut self, other: &Self, share: f32) {
         let (own_light, light) = (self.unshadowed * (1.0 - share), other.unshadowed * share);
         self.unshadowed = own_light + light;
@@ -69,15 +70,16 @@ impl Compared {
     }
 }
 
-/// What was found at a point that makes up `share` of its pixel, from what its lights showed; `None` where
+/// The finding at a point that makes up `share` of its pixel, from the comparisons of its `lights`; `None` where
 /// other frames know none of them.
-pub fn finding_of(share: f32, lights: &[Compared], agreed: bool) -> Option<Finding> {
-    let is_known = |l: &&Compared| {
+pub fn finding_of(share: f32, lights: &[LightComparison], agreed: bool) -> Option<Finding> {
+    let is_known = |l: &&LightComparison| {
         l.unshadowed != 0.0 && !l.estimate.ratio.is_nan() && !l.traced.iter().any(|r| r.is_nan())
     };
     let lights = || lights.iter().filter(is_known);
     let level = lights().next()?.estimate.level;
-    let sum = |ratio: &dyn Fn(&Compared) -> f32| lights().map(|l| l.unshadowed * ratio(l)).sum();
+    let sum =
+        |ratio: &dyn Fn(&LightComparison) -> f32| lights().map(|l| l.unshadowed * ratio(l)).sum();
     let shown = |radiance: f32| f64::from(shown(radiance));
     let estimated = shown(sum(&|l| l.estimate.ratio));
     let [a, b] = [0, 1].map(|k| shown(sum(&|l| l.traced[k])));
@@ -88,7 +90,7 @@ pub fn finding_of(share: f32, lights: &[Compared], agreed: bool) -> Option<Findi
     (error.is_finite() && noise.is_finite()).then_some(Finding { level, agreed, error, noise })
 }
 
-/// Which levels of risk are taken.
+/// The levels of risk whose estimates may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Evidence([bool; LEVELS]);
 
@@ -96,12 +98,12 @@ pub struct Evidence([bool; LEVELS]);
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     count: f64,
-    /// Of the errors, each divided by the risk of its level.
+    /// Sum of the errors, each divided by the risk of its level.
     error: f64,
     noise: f64,
 }
 
-/// Sums over `sums`.
+/// The sum of all `sums`.
 fn total(sums: &[Sums]) -> Sums {
     sums.iter().fold(Sums::default(), |all, own| Sums {
         count: all.count + own.count,
@@ -110,8 +112,8 @@ fn total(sums: &[Sums]) -> Sums {
     })
 }
 
-/// Adds to `taken` which steps of a scale are taken by what its `sums` show; a mean squared error of `unseen` is
-/// not seen.
+/// Marks in `taken` the steps of a scale of risk whose estimates may be used by their `sums`; a mean squared error
+/// of `unseen` is not seen.
 fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
     // What holds of a higher risk holds of a lower one.
     let mut most = f64::INFINITY;
@@ -132,8 +134,7 @@ fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
 }
 
 impl Evidence {
-    /// What `findings` amount to. An error of `tolerance` display steps (root mean square over a tile) is
-    /// not seen.
+    /// The evidence of `findings`. An error of `tolerance` display steps (root mean square over a tile) is not seen.
     pub fn of<'f>(findings: impl Iterator<Item = &'f Finding>, tolerance: f32) -> Self {
         let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
         let mut sums = [Sums::default(); LEVELS];
@@ -184,7 +185,7 @@ mod tests {
     fn camera_samples_that_were_estimated_apart_are_one_finding() {
         let light = |ratio, traced: [f32; 2], level| {
             let estimate = Estimate { ratio, level };
-            Compared { unshadowed: 0.5, estimate, traced }
+            LightComparison { unshadowed: 0.5, estimate, traced }
         };
         // The estimates are off by the same, the traces by chance.
         let mut one = light(0.5, [0.75, 0.85], 3);
@@ -199,7 +200,7 @@ mod tests {
         one.join(&light(0.5, [0.8; 2], STEPS as u8 + 5), 0.5);
         assert_eq!(one.estimate.level, STEPS as u8 + 5);
         // What no light reached tells nothing.
-        let dark = Compared { unshadowed: 0.0, ..light(f32::NAN, [f32::NAN; 2], 0) };
+        let dark = LightComparison { unshadowed: 0.0, ..light(f32::NAN, [f32::NAN; 2], 0) };
         let before = one.estimate;
         one.join(&dark, 0.5);
         assert_eq!((one.unshadowed, one.estimate), (0.25, before));
@@ -272,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_finding_compares_all_known_lights_together() {
-        let light = |ratio: f32, traced| Compared {
+        let light = |ratio: f32, traced| LightComparison {
             unshadowed: 0.5,
             estimate: Estimate { ratio, level: EDGE },
             traced,

@@ -11,7 +11,7 @@ pub(super) const CELLS: usize = 8;
 /// A cell: level of size, mesh and place, hashed.
 type Key = u64;
 
-/// Which samples, which lie sorted by cell, belong to which.
+/// Finds samples by place: for each cell the run of its samples, which lie sorted by cell.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Index {
     /// Open addressing: cell, first sample, one past the last.
@@ -99,7 +99,7 @@ impl Index {
         0..0
     }
 
-    /// Bytes that it holds.
+    /// Memory that the index takes, bytes.
     pub fn memory(&self) -> u64 {
         (size_of_val(&self.table[..]) + size_of_val(&self.present[..])) as u64
     }

@@ -12,28 +12,26 @@ pub(super) use estimate::steps_per_radiance;
 use super::check::agrees;
 use super::evidence::Evidence;
 use super::reference::{NONE, Reference};
-use super::taps::{ALWAYS, Taps, Taps4, sum};
-use crate::inference::{Estimate, Inference, LookupBatch, Origin};
+use super::taps::{ALWAYS, References, TOGETHER, Taps, Taps4, sum};
+use crate::film::{Provenance, ProvenanceKind};
+use crate::inference::{Estimate, Inference, LookupBatch};
 
-/// Points that are looked up together: the memory that all of them need is asked for before any of it
-/// is waited for.
-pub(super) const TOGETHER: usize = 16;
-/// Least sum of weights, of 1 that a whole reference gives.
+/// Least sum of weights for an estimate; a reference that surrounds the point gives 1.
 pub(super) const LEAST_WEIGHT: f64 = 0.1;
 
-/// Estimates from reference frames, asked in their order.
+/// Estimates ratios from reference frames.
 pub struct Lookup<'a> {
     /// The frame that is inferred.
     pub frame: u32,
-    /// The first two are asked always, the others where those do not tell enough.
+    /// The references in the order of lookup: the first two always, the others where these give too little weight.
     pub references: &'a [&'a Reference],
     /// Shadow rays that tracing casts from a camera sample to each light whose ratios are kept.
     pub rays: &'a [u32],
 }
 
-/// Uses what the evidence allows of a lookup's estimates.
+/// Answers with those estimates of a lookup that the evidence allows.
 pub struct Judged<'a> {
-    /// What estimates.
+    /// The source of estimates.
     pub lookup: &'a Lookup<'a>,
     /// The evidence that judges the estimates of a pixel (column, row).
     pub evidence: &'a (dyn Fn([u32; 2]) -> &'a Evidence + Sync),
@@ -44,11 +42,11 @@ pub struct Judged<'a> {
 impl Inference for Judged<'_> {
     fn infer(&self, batch: &mut LookupBatch) {
         self.lookup.estimate(batch);
-        let LookupBatch { points, pixels, ratios, estimates, origins, checks, .. } = batch;
+        let LookupBatch { points, pixels, ratios, estimates, provenance, checks, .. } = batch;
         let channels = self.lookup.rays.len();
         let answers = ratios.chunks_exact_mut(channels).zip(estimates.chunks_exact(channels));
         for (i, (ratios, estimates)) in answers.enumerate() {
-            if origins[i] == Origin::default() {
+            if provenance[i] == Provenance::default() {
                 continue;
             }
             // One level for all lights of a point.
@@ -77,9 +75,9 @@ impl Inference for Judged<'_> {
 }
 
 impl Lookup<'_> {
-    /// Fills estimates and origins for all points.
+    /// Fills estimates and provenance for all points.
     pub fn estimate(&self, batch: &mut LookupBatch) {
-        let LookupBatch { points, unshadowed, estimates, origins, .. } = batch;
+        let LookupBatch { points, unshadowed, estimates, provenance, .. } = batch;
         let channels = self.rays.len();
         estimates.clear();
         estimates.resize(points.len() * channels, Estimate::UNKNOWN);
@@ -87,46 +85,52 @@ impl Lookup<'_> {
             .chunks(TOGETHER)
             .zip(unshadowed.chunks(TOGETHER * channels))
             .zip(estimates.chunks_mut(TOGETHER * channels))
-            .zip(origins.chunks_mut(TOGETHER));
+            .zip(provenance.chunks_mut(TOGETHER));
+        let references = References(self.references);
         let mut taps = Taps::new();
         let mut means = Vec::with_capacity(channels);
-        for (((points, unshadowed), estimates), origins) in each {
+        for (((points, unshadowed), estimates), provenance) in each {
             let shown = |i: usize| &unshadowed[i * channels..][..channels];
             let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
             let mut found: [[Option<Taps4>; ALWAYS]; TOGETHER] = [[None; ALWAYS]; TOGETHER];
-            self.find(points, is_lit, &mut found);
+            references.find(points, is_lit, &mut found);
             for (i, point) in points.iter().enumerate().filter(|(i, _)| is_lit(*i)) {
-                self.gather(point, &found[i], &mut taps);
+                references.gather(point, &found[i], &mut taps);
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];
                     self.estimate_all(&taps, point, shown(i), &mut means, own);
-                    origins[i] = self.origin(&taps);
+                    provenance[i] = self.provenance(&taps);
                 }
             }
         }
     }
 
-    fn origin(&self, taps: &Taps) -> Origin {
-        let mut origin = Origin::default();
+    fn provenance(&self, taps: &Taps) -> Provenance {
+        let (mut earlier, mut later) = (false, false);
+        let mut main = 0;
         let mut most = 0.0;
         let mut distance = 0.0;
         let mut by_reference = 0.0;
         let mut last = NONE;
         for four in taps.fours() {
             let frame = self.references[four.reference as usize].frame;
-            origin.earlier |= frame < self.frame;
-            origin.later |= frame > self.frame;
+            earlier |= frame < self.frame;
+            later |= frame > self.frame;
             distance += sum(four.weight * four.distance);
             let weight = sum(four.weight);
             by_reference = if last == four.reference { by_reference + weight } else { weight };
             last = four.reference;
             if by_reference > most {
                 most = by_reference;
-                origin.frame = frame;
+                main = frame;
             }
         }
-        origin.distance = distance / taps.weight as f32;
-        origin
+        let kind = match (earlier, later) {
+            (true, true) => ProvenanceKind::Both,
+            (false, true) => ProvenanceKind::Later,
+            _ => ProvenanceKind::Earlier,
+        };
+        Provenance { kind, frame: main, distance: distance / taps.weight as f32 }
     }
 }
 

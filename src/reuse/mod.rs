@@ -1,4 +1,4 @@
-//! What traced frames tell about others. Never traces.
+//! Light of frames inferred from what was traced in others. Never traces.
 //!
 //! A [`Reference`] holds a frame's camera and the surface points that were traced for it, with their
 //! ratios. A [`Lookup`] answers from several of them, with evidence: what it cannot vouch for it
@@ -10,6 +10,7 @@
 pub mod audit;
 mod check;
 pub mod colour;
+mod columns;
 mod cost;
 pub mod evidence;
 mod index;
@@ -20,7 +21,7 @@ mod risk;
 pub mod store;
 mod taps;
 
-pub use cost::{LookupReason, channels, is_worth_looking, lookup_reasons, of_frame, rays_of};
+pub use cost::{LookupReason, channels, is_worth_lookups, lookup_reasons, of_frame, rays_of};
 pub use lookup::{Judged, Lookup};
 pub use probe::{PARTS, Probe, ProbeDraw};
 pub use reference::Reference;

@@ -2,12 +2,13 @@
 
 use super::Lookup;
 use super::check::agrees;
-use super::evidence::{Compared, Finding, finding_of};
-use crate::inference::{Estimate, Inference, LookupBatch, Origin, SurfacePoint};
+use super::evidence::{Finding, LightComparison, finding_of};
+use crate::film::Provenance;
+use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
 
-/// Parts of a frame's probes that are judged by one another.
+/// Number of parts that a frame's probes are cut into; each part is judged by the findings of the others.
 pub const PARTS: usize = 4;
 
 /// Which pixels of a frame are probes: one at a random place in each square cell of the image.
@@ -65,7 +66,7 @@ impl ProbeDraw {
     }
 }
 
-/// Notes estimates and traces of probes; answers nothing, so that all is traced.
+/// Records estimates and traces of probes; answers no question, so that all is traced.
 pub struct Probe<'a> {
     /// What estimates; `None` to note the traces alone.
     pub lookup: Option<&'a Lookup<'a>>,
@@ -80,7 +81,7 @@ pub struct Probe<'a> {
 struct Note {
     pixel: [u32; 2],
     point: SurfacePoint,
-    lights: Vec<Compared>,
+    lights: Vec<LightComparison>,
     /// Whether check rays agreed.
     agreed: bool,
 }
@@ -155,7 +156,7 @@ impl Inference for Probe<'_> {
         if let Some(lookup) = self.lookup {
             lookup.estimate(batch);
             // Nothing of what is shown comes from there.
-            batch.origins.fill(Origin::default());
+            batch.provenance.fill(Provenance::default());
             let is_known = |estimate: &Estimate| !estimate.ratio.is_nan();
             batch.checks.extend(batch.estimates.iter().map(is_known));
         }
@@ -164,7 +165,7 @@ impl Inference for Probe<'_> {
     fn hear(&self, answered: &LookupBatch) {
         let LookupBatch { points, pixels, unshadowed, ratios, estimates, .. } = answered;
         let channels = self.channels;
-        let light = |at: usize| Compared {
+        let light = |at: usize| LightComparison {
             unshadowed: unshadowed[at],
             estimate: estimates.get(at).copied().unwrap_or(Estimate::UNKNOWN),
             traced: [ratios[at]; 2],

@@ -15,7 +15,7 @@ use crate::scene::Camera;
 use gather::Gathered;
 use wide::f32x4;
 
-/// No sample.
+/// In place of a sample's number: there is no sample.
 pub(super) const NONE: u32 = u32::MAX;
 /// Edge of a block of pixels whose samples lie together.
 const BLOCK: usize = 8;
@@ -25,18 +25,18 @@ const BLOCK: usize = 8;
 #[repr(C, align(32))]
 pub(super) struct Sample {
     pub p: Vec3,
-    /// A unit of length is [`Sample::UNIT`].
+    /// Normal; a component of 1 is stored as [`Sample::UNIT`].
     n: [i16; 3],
     pub geom_id: u32,
-    /// Of the first channel.
+    /// The ratio and contrasts of the first light (channel 0).
     first: Known,
 }
 
-/// What a sample knows about a light.
+/// The ratio of one light at a sample, and how it changes around the sample.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 struct Known {
-    /// NaN where unknown.
+    /// Ratio of shadowed to unshadowed irradiance; NaN where unknown.
     ratio: f32,
     bend: Level,
     wide: Level,
@@ -69,7 +69,7 @@ impl Level {
     }
 }
 
-/// What four samples know about a light: ratio, and [`Contrast`].
+/// Ratio and [`Contrast`] of one light at four samples.
 pub(super) struct Known4 {
     pub ratio: f32x4,
     pub bend: f32x4,
@@ -80,11 +80,12 @@ pub(super) struct Known4 {
 /// How a ratio changes around a sample on its surface; NaN where too few samples are known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Contrast {
-    /// By how much it is off the mean of those on opposite sides of it, at most: nothing on a plane.
+    /// Largest difference between the ratio and the mean of two samples on opposite sides: 0 where the ratio
+    /// changes linearly.
     pub bend: f32,
-    /// By how much it differs at most from those of the 5 x 5 pixels around it.
+    /// Largest difference between the ratio and those of the 5 x 5 pixels around it.
     pub wide: f32,
-    /// The same of any of these and the 5 x 5 pixels around it: 9 x 9 in all.
+    /// Largest `wide` among these 5 x 5 pixels: it reaches 9 x 9 pixels.
     pub far: f32,
 }
 
@@ -103,7 +104,7 @@ impl Sample {
         Self { p: point.p.as_vec3(), n: n.map(|x| x as i16), geom_id: point.geom_id, first }
     }
 
-    /// Its normal, times [`Sample::UNIT`].
+    /// Normal, times [`Sample::UNIT`].
     pub fn normal(&self) -> [f32; 3] {
         let [x, y, z] = self.n;
         [f32::from(x), f32::from(y), f32::from(z)]
@@ -120,15 +121,15 @@ impl Known {
     }
 }
 
-/// A camera, made ready to see many points.
+/// A camera with what projecting many points needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
     pub eye: DVec3,
     pub forward: DVec3,
-    /// What right and up of the camera are at depth 1, by the length of a pixel there.
+    /// Right and up of the camera, scaled so that their products with a point at depth 1 are in pixels.
     pub right: DVec3,
     pub up: DVec3,
-    /// Where the view axis meets the image, from the middle of its first pixel, pixels.
+    /// The point where the view axis meets the image, from the middle of the first pixel, pixels.
     pub middle: [f64; 2],
     /// Columns and rows.
     pub size: [i32; 2],
@@ -152,45 +153,47 @@ impl View {
         }
     }
 
-    /// Blocks beside one another.
+    /// Number of blocks in a row of blocks.
     fn blocks_across(&self) -> usize {
         (self.size[0] as usize).div_ceil(BLOCK)
     }
 
-    /// Where a pixel within the image stands in an order by blocks.
+    /// The place of a pixel in the order of pixels block by block.
     fn slot(&self, x: usize, y: usize) -> usize {
         let block = y / BLOCK * self.blocks_across() + x / BLOCK;
         block * (BLOCK * BLOCK) + y % BLOCK * BLOCK + x % BLOCK
     }
 
-    /// Places of that order.
+    /// Number of places in the order of pixels block by block, blocks at the edges filled up.
     fn slots(&self) -> usize {
         (self.size[1] as usize).div_ceil(BLOCK) * self.blocks_across() * BLOCK * BLOCK
     }
 }
 
-/// What one frame knows.
+/// A frame as a source for other frames: its camera, its traced surface points (samples) with their ratios,
+/// and the findings of its probes.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// Its number; [`Reference::SUPPLIED`] for one of another shot.
+    /// Number of the frame; [`Reference::SUPPLIED`] for a frame of another shot.
     pub frame: u32,
     /// Scene space.
     pub(super) view: View,
     /// For each pixel, block by block, the sample of what is seen there directly.
     slots: Vec<u32>,
-    /// Those in the order of `slots`, then all others cell by cell of the index.
+    /// The samples of pixels in the order of `slots`, then all others cell by cell of the index.
     pub(super) samples: Vec<Sample>,
-    /// For each sample what it knows in the channels after the first.
+    /// For each sample the ratios and contrasts of the channels after the first.
     more: Vec<Known>,
     channels: usize,
-    /// Samples that are no pixel's own.
+    /// Finds samples that are not in `slots`: points seen in mirrors, through glass or beside another surface.
     pub(super) index: Index,
-    /// What the frame's probes found.
+    /// The findings of the frame's probes.
     findings: Vec<Finding>,
 }
 
 impl Reference {
-    /// What `traced` tells of frame `frame`, seen by `camera` (scene space).
+    /// The reference of frame `frame`, seen by `camera` (scene space), whose `traced` points have `channels` ratios
+    /// each.
     pub fn new(frame: u32, camera: &Camera, traced: &TracedPoints, channels: usize) -> Self {
         let view = View::of(camera);
         let gathered = Gathered::of(traced, channels, &view);
@@ -222,17 +225,17 @@ impl Reference {
         Self { frame, view, slots, samples, more, channels, index, findings: Vec::new() }
     }
 
-    /// The same with what the frame's probes found.
+    /// This reference with the findings of the frame's probes.
     pub fn with_findings(self, findings: Vec<Finding>) -> Self {
         Self { findings, ..self }
     }
 
-    /// What the frame's probes found.
+    /// The findings of the frame's probes.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
     }
 
-    /// Number of references that are frames of another shot: they count as earlier than all.
+    /// Frame number of references from another shot: they count as earlier than all frames.
     pub const SUPPLIED: u32 = 0;
 
     /// Its camera's eye, scene space.
@@ -250,12 +253,12 @@ impl Reference {
         self.samples.len()
     }
 
-    /// Whether it knows nothing.
+    /// Whether it has no samples.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
 
-    /// Bytes that it holds.
+    /// Memory that the reference takes, bytes.
     pub fn memory(&self) -> u64 {
         let samples = size_of_val(&self.samples[..]) + size_of_val(&self.more[..]);
         let findings = size_of_val(&self.findings[..]);
@@ -269,7 +272,7 @@ impl Reference {
         if is_inside { self.slots[self.view.slot(x as usize, y as usize)] } else { NONE }
     }
 
-    /// What samples know in a channel.
+    /// Ratios and contrasts of four samples in a channel.
     pub(super) fn known(&self, samples: &[u32; 4], channel: usize) -> Known4 {
         let [mut ratio, mut bend, mut wide, mut far] = [[0.0; 4]; 4];
         for (k, sample) in samples.iter().enumerate() {

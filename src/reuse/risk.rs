@@ -5,7 +5,7 @@
 
 use crate::math::srgb_encode;
 
-/// Differences below this show as nothing, display steps.
+/// Differences of ratios below this count as none, display steps.
 const CALM: f32 = 0.25;
 /// Steps of the scale, each half an octave of the risk.
 pub const STEPS: usize = 24;
@@ -14,19 +14,19 @@ const HALF_OCTAVE_CUBED: f32 = 2.828_427;
 /// How many steps there are in all. Points seen directly have two scales: one for what noise may have made, and one
 /// for detail, which noise cannot make. So have points seen in mirrors and through glass.
 pub const LEVELS: usize = 4 * STEPS;
-/// A risk of more standard deviations of tracing's noise than that is detail.
+/// A risk above this many standard deviations of tracing's noise is detail, not noise.
 const MOST_OF_NOISE: f32 = 6.0;
 
-/// What a lookup sees of a point's light, all lights together, display steps. NaN where too few samples are
-/// known.
+/// The features of an estimate that its risk follows from, all lights together, display steps. NaN where too few
+/// samples are known.
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
-    /// By how much a tap's ratio is off the mean of those on opposite sides of it, at most: what bends
-    /// there is what a mean of taps misses.
+    /// Largest difference between a tap's ratio and the mean of two samples on opposite sides of it: a mean of taps
+    /// misses such a bend.
     pub bend: f32,
     /// Largest difference between a tap's ratio and those of the 5 x 5 samples about it.
     pub wide: f32,
-    /// The largest of that of the 5 x 5 samples about it, each with its own 5 x 5.
+    /// Largest `wide` among the 5 x 5 samples about a tap.
     pub far: f32,
     /// Standard deviation of a trace of the taps' ratios if its rays were independent: spread over a light as they
     /// are, they show less.
@@ -40,7 +40,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// The level on the scale, below [`LEVELS`].
+    /// The level of risk, below [`LEVELS`].
     pub fn level(&self) -> u8 {
         let cubed = self.risk_cubed();
         let mut step = 0;
@@ -73,7 +73,7 @@ pub fn shown(radiance: f32) -> f32 {
     (255.0 * srgb_encode(f64::from(radiance.clamp(0.0, 1.0)))) as f32
 }
 
-/// The risk of the estimates of `level`, display steps: in the middle of what falls there.
+/// The risk that stands for `level`, display steps: the middle of the risks in it.
 pub fn risk_of(level: usize) -> f64 {
     let step = (level % STEPS) as f64;
     f64::from(CALM) * (0.5 * (step + 0.5)).exp2()

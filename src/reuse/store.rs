@@ -4,32 +4,26 @@
 //! The bytes stand in an attribute of the frame's exr file. Not in channels: a pixel may have several
 //! points, seen in mirrors or on two surfaces, and a file that is opened in a compositor should not
 //! show twenty channels that mean nothing there. The layout: `MAGIC`, the BLAKE3 of all that
-//! follows, the length of a JSON `Head` and the head, the camera (world space, f64), then the
-//! points' words column by column in byte planes, cut into parts that are deflated each. Little
-//! endian throughout.
+//! follows, the length of a JSON `Head` and the head, the camera (world space, f64), then points and
+//! findings as `columns` encodes them. Little endian throughout.
 //!
-//! Whoever reads takes nothing on trust: lengths are held against what is there, memory grows with
-//! what was really read, and every number must be one that tracing could have left.
+//! Whoever reads takes nothing on trust: every number must be one that tracing could have left.
 
 use super::Reference;
+use super::columns::{self, deflated, inflated, take, take_u32};
 use super::evidence::Finding;
 use super::risk::LEVELS;
 use crate::error::{Error, Result};
 use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
-use crate::math::{DVec3, Vec3};
-use crate::scene::limits::MAX_EDGE;
+use crate::math::Vec3;
 use crate::scene::{Camera, Recentring, Rect, Settings};
-use flate2::Compression;
-use flate2::read::{DeflateDecoder, DeflateEncoder};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::io::Read;
 use std::path::Path;
 
-/// The attribute of an exr file that holds it.
+/// Name of the attribute of an exr file that holds the record.
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// How the bytes begin: the last letter is the layout's version.
-const MAGIC: &[u8; 8] = b"twrayrf3";
+const MAGIC: &[u8; 8] = b"twrayrf4";
 /// Words of a point beside its ratios.
 const WORDS: usize = 12;
 /// Bytes of a finding.
@@ -38,14 +32,8 @@ const FINDING: usize = 3 * 4;
 const AGREED: u32 = 1 << 8;
 /// Largest squared error of a finding: from black to white, display steps.
 const MOST_ERROR: f32 = 255.0 * 255.0;
-/// Bytes deflated together.
-const PART: usize = 1 << 20;
-/// Most bytes of points that are written or read.
-const MOST_BYTES: usize = 1 << 30;
 /// Most bytes of a head.
 const MOST_HEAD: usize = 1 << 20;
-/// Bytes of a camera.
-const CAMERA: usize = 12 * 8 + 2 * 4;
 /// Bit that marks points seen directly, above their number of samples.
 const DIRECT: u32 = 1 << 31;
 /// Cells of a footprint's size along an edge of the scene, at most.
@@ -64,7 +52,7 @@ pub struct Compatibility {
     pub rays: Vec<u32>,
 }
 
-/// What the bytes say of themselves.
+/// The head of a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Head {
     terms: Compatibility,
@@ -77,7 +65,7 @@ struct Head {
 }
 
 impl Compatibility {
-    /// What references of a job must have in common with others: its world's hash `world`, its `channels`, its samples.
+    /// The compatibility of references of a job, by the hash of its `world`, its `channels` and its samples.
     pub fn of(world: &str, channels: &Channels, settings: &Settings) -> Self {
         let name = |channel| match channel {
             Channel::Area(index) => format!("light {}", index + 1),
@@ -94,21 +82,22 @@ impl Compatibility {
 
     /// Why references made on the terms `other` cannot serve here.
     fn refusal(&self, other: &Self) -> Option<String> {
-        if self.world != other.world {
+        let Self { world, recentre, lights, rays } = self;
+        if *world != other.world {
             return Some("it shows another scene".into());
         }
-        if self.recentre != other.recentre {
+        if *recentre != other.recentre {
             return Some("it was rendered with another --recentre".into());
         }
-        if self.lights != other.lights {
+        if *lights != other.lights {
             let list = |lights: &[String]| match lights {
                 [] => "none".to_string(),
                 lights => lights.join(", "),
             };
-            let (theirs, ours) = (list(&other.lights), list(&self.lights));
+            let (theirs, ours) = (list(&other.lights), list(lights));
             return Some(format!("it keeps the shadowing of {theirs}, this job that of {ours}"));
         }
-        let pairs = self.rays.iter().zip(&other.rays).zip(&self.lights);
+        let pairs = rays.iter().zip(&other.rays).zip(lights);
         let few = { pairs }.find(|((own, theirs), _)| theirs < own);
         few.map(|((own, theirs), light)| {
             format!(
@@ -119,49 +108,48 @@ impl Compatibility {
     }
 }
 
-/// A frame's points with what they belong to.
-pub struct Kept<'a> {
+/// The traced points of a frame with its camera and findings, as they go into a file.
+pub struct ReferenceRecord<'a> {
     /// What other jobs must have in common.
     pub terms: &'a Compatibility,
     /// Number of the frame.
     pub frame: u32,
-    /// World space.
+    /// The frame's camera, world space.
     pub camera: &'a Camera,
-    /// What is left out lies outside of it.
+    /// Points outside of it are left out; `None` keeps all.
     pub crop: Option<Rect>,
-    /// Scene space.
+    /// The traced points, scene space.
     pub traced: &'a TracedPoints,
-    /// What the frame's probes found, scene space.
+    /// The findings of the frame's probes.
     pub findings: &'a [Finding],
     /// Settings in words.
     pub settings: &'a str,
 }
 
-impl Kept<'_> {
-    /// The bytes: the same whatever else was traced at the same time. `None` where they would be too
-    /// many.
+impl ReferenceRecord<'_> {
+    /// The record as bytes, which do not depend on what was traced outside of the crop. `None` where they would be
+    /// too many.
     pub fn encode(&self) -> Option<Vec<u8>> {
-        let channels = self.terms.lights.len();
+        // `order` takes what lies in the crop.
+        let Self { terms, frame, camera, crop: _, traced: _, findings, settings } = *self;
+        let channels = terms.lights.len();
         let order = self.order();
         let head = Head {
-            terms: self.terms.clone(),
-            frame: self.frame,
-            settings: self.settings.into(),
+            terms: terms.clone(),
+            frame,
+            settings: settings.into(),
             points: order.len(),
-            findings: self.findings.len(),
+            findings: findings.len(),
         };
         size_of_record(head.points, channels, head.findings)?;
-        let mut raw = self.planes(&order, channels);
-        raw.extend(self.findings.iter().flat_map(finding_bytes));
+        let word = |i: usize, column| self.word(order[i], column, channels);
+        let mut raw = columns::planes(order.len(), WORDS + channels, word);
+        raw.extend(findings.iter().flat_map(finding_bytes));
         let json = serde_json::to_vec(&head).ok()?;
         let mut body = (json.len() as u32).to_le_bytes().to_vec();
         body.extend(json);
-        body.extend(camera_bytes(self.camera));
-        let parts: Vec<Vec<u8>> = raw.par_chunks(PART).map(deflated).collect::<Option<_>>()?;
-        for part in parts {
-            body.extend((part.len() as u32).to_le_bytes());
-            body.extend(part);
-        }
+        body.extend(camera.encode());
+        body.extend(deflated(&raw)?);
         Some([MAGIC.as_slice(), blake3::hash(&body).as_bytes(), &body].concat())
     }
 
@@ -177,32 +165,19 @@ impl Kept<'_> {
         order
     }
 
-    /// The words of points, column by column, each column in four planes of bytes.
-    fn planes(&self, order: &[usize], channels: usize) -> Vec<u8> {
-        let count = order.len();
-        let mut raw = vec![0; 4 * (WORDS + channels) * count];
-        let columns = raw.par_chunks_exact_mut((4 * count).max(1)).enumerate();
-        columns.for_each(|(column, planes)| {
-            for (at, i) in order.iter().enumerate() {
-                let bytes = self.word(*i, column, channels).to_le_bytes();
-                bytes.iter().enumerate().for_each(|(b, byte)| planes[b * count + at] = *byte);
-            }
-        });
-        raw
-    }
-
     fn word(&self, i: usize, column: usize, channels: usize) -> u32 {
-        let TracedPoint { x, y, point } = &self.traced.points[i];
-        let flag = if point.direct { DIRECT } else { 0 };
+        let TracedPoint { x, y, point } = self.traced.points[i];
+        let SurfacePoint { p, n, geom_id, footprint, cos, direct, samples } = point;
+        let flag = if direct { DIRECT } else { 0 };
         match column {
-            0 => *x,
-            1 => *y,
-            2 => point.geom_id,
-            3 => point.samples.min(DIRECT - 1) | flag,
-            4..7 => (point.p[column - 4] as f32).to_bits(),
-            7..10 => point.n[column - 7].to_bits(),
-            10 => point.footprint.to_bits(),
-            11 => point.cos.to_bits(),
+            0 => x,
+            1 => y,
+            2 => geom_id,
+            3 => samples.min(DIRECT - 1) | flag,
+            4..7 => (p[column - 4] as f32).to_bits(),
+            7..10 => n[column - 7].to_bits(),
+            10 => footprint.to_bits(),
+            11 => cos.to_bits(),
             _ => match self.traced.ratios[i * channels + column - WORDS] {
                 // One NaN, whatever its bits were.
                 ratio if ratio.is_nan() => f32::NAN.to_bits(),
@@ -212,7 +187,7 @@ impl Kept<'_> {
     }
 }
 
-/// Reads what [`Kept::encode`] wrote, for a job on `terms` of a scene with `recentring`: a reference
+/// Reads what [`ReferenceRecord::encode`] wrote, for a job on `terms` of a scene with `recentring`: a reference
 /// and a hash that tells it apart. `path` is for messages.
 ///
 /// # Errors
@@ -238,7 +213,7 @@ pub fn decode(
     if let Some(why) = terms.refusal(&head.terms) {
         return Err(refuse(why));
     }
-    let camera = take(&mut body, CAMERA).and_then(camera_of).ok_or_else(damaged)?;
+    let camera = take(&mut body, Camera::BYTES).and_then(Camera::decode).ok_or_else(damaged)?;
     let (traced, findings) =
         record_of(body, &head, terms.lights.len(), &camera).ok_or_else(damaged)?;
     let camera = camera.to_scene(recentring);
@@ -248,9 +223,7 @@ pub fn decode(
 
 /// Bytes of `points` with `channels` ratios each, and `findings`; `None` where they are too many.
 fn size_of_record(points: usize, channels: usize, findings: usize) -> Option<usize> {
-    let of_points = points.checked_mul(4 * (WORDS + channels))?;
-    let of_findings = findings.checked_mul(FINDING)?;
-    of_points.checked_add(of_findings).filter(|n| *n <= MOST_BYTES)
+    columns::size_of(points, WORDS + channels, findings.checked_mul(FINDING)?)
 }
 
 fn record_of(
@@ -292,10 +265,7 @@ fn finding_of(mut bytes: &[u8]) -> Option<Finding> {
 
 fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Option<TracedPoints> {
     let columns = WORDS + channels;
-    let word = |i: usize, column: usize| {
-        let byte = |b: usize| raw[(4 * column + b) * count + i];
-        u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])
-    };
+    let word = |i: usize, column: usize| columns::word(raw, count, i, column);
     let mut traced = TracedPoints::default();
     for i in 0..count {
         let float = |column: usize| f32::from_bits(word(i, column));
@@ -327,8 +297,8 @@ fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Opti
 
 /// Whether tracing can have left such a point.
 fn is_point(point: &SurfacePoint) -> bool {
-    let SurfacePoint { n, footprint, cos, samples, .. } = *point;
-    let p = point.p.as_vec3();
+    let SurfacePoint { p, n, geom_id: _, footprint, cos, direct: _, samples } = *point;
+    let p = p.as_vec3();
     p.is_finite()
         && (n.length() - 1.0).abs() < 1e-3
         && footprint.is_finite()
@@ -338,76 +308,10 @@ fn is_point(point: &SurfacePoint) -> bool {
         && samples > 0
 }
 
-fn deflated(raw: &[u8]) -> Option<Vec<u8>> {
-    let mut out = Vec::new();
-    DeflateEncoder::new(raw, Compression::fast()).read_to_end(&mut out).ok()?;
-    Some(out)
-}
-
-/// Exactly `expected` bytes from all parts of `body`.
-fn inflated(mut body: &[u8], expected: usize) -> Option<Vec<u8>> {
-    let mut raw = Vec::new();
-    while raw.len() < expected {
-        let length = take_u32(&mut body)?;
-        let part = take(&mut body, length)?;
-        let wanted = PART.min(expected - raw.len());
-        let before = raw.len();
-        DeflateDecoder::new(part).take(wanted as u64).read_to_end(&mut raw).ok()?;
-        if raw.len() - before != wanted {
-            return None;
-        }
-    }
-    body.is_empty().then_some(raw)
-}
-
-fn take<'b>(bytes: &mut &'b [u8], length: usize) -> Option<&'b [u8]> {
-    let (head, rest) = bytes.split_at_checked(length)?;
-    *bytes = rest;
-    Some(head)
-}
-
-fn take_u32(bytes: &mut &[u8]) -> Option<usize> {
-    let word = take(bytes, 4)?;
-    Some(u32::from_le_bytes(word.try_into().ok()?) as usize)
-}
-
-fn camera_bytes(camera: &Camera) -> Vec<u8> {
-    let vectors = [camera.eye, camera.forward, camera.half_right, camera.half_up];
-    let numbers = vectors.iter().flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes);
-    let edges = [camera.width, camera.height].into_iter().flat_map(u32::to_le_bytes);
-    numbers.chain(edges).collect()
-}
-
-fn camera_of(bytes: &[u8]) -> Option<Camera> {
-    let (vectors, edges) = bytes.split_at_checked(12 * 8)?;
-    let numbers = vectors.chunks_exact(8).map(|b| b.try_into().map(f64::from_le_bytes));
-    let numbers: Vec<f64> = numbers.collect::<std::result::Result<_, _>>().ok()?;
-    let vector = |i: usize| DVec3::new(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
-    let mut edges = edges;
-    let edge = |edges: &mut &[u8]| take_u32(edges).map(|n| n as u32);
-    let (width, height) = (edge(&mut edges)?, edge(&mut edges)?);
-    let camera = Camera {
-        eye: vector(0),
-        forward: vector(1),
-        half_right: vector(2),
-        half_up: vector(3),
-        width,
-        height,
-    };
-    let is_edge = |n: u32| (1..=MAX_EDGE).contains(&n);
-    let is_length = |v: DVec3| v.length_squared().is_normal();
-    let is_sound = is_edge(width)
-        && is_edge(height)
-        && numbers.iter().all(|x| x.is_finite())
-        && (camera.forward.length() - 1.0).abs() < 1e-6
-        && is_length(camera.half_right)
-        && is_length(camera.half_up);
-    is_sound.then_some(camera)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::DVec3;
     use crate::scene::Pose;
 
     fn terms() -> Compatibility {
@@ -446,7 +350,7 @@ mod tests {
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
         let (terms, camera, findings) = (terms(), camera(), findings());
         let (terms, camera, findings, settings) = (&terms, &camera, &findings[..], "spp 1");
-        let kept = Kept { terms, frame: 7, camera, crop, traced, findings, settings };
+        let kept = ReferenceRecord { terms, frame: 7, camera, crop, traced, findings, settings };
         kept.encode().expect("small enough")
     }
 

@@ -6,17 +6,19 @@ mod image;
 pub(super) use image::ALWAYS;
 
 use super::index::{Cells, level_of};
-use super::lookup::Lookup;
 use super::reference::{NONE, Reference, Sample};
 use crate::inference::SurfacePoint;
 use crate::math::Vec3;
 use wide::{CmpGe, CmpGt, CmpLe, f32x4};
 
-/// Lanes of four that one point's answer is made of, at most.
+/// Most groups of four samples that one point's estimate is made of.
 const MOST: usize = 8;
-/// With this sum of weights, of 1 that a whole reference gives, no further reference is asked.
+/// Points that are looked up together: the memory that all of them need is asked for before any of it
+/// is waited for.
+pub(super) const TOGETHER: usize = 16;
+/// Sum of weights (a reference that surrounds the point gives 1) from which on no further reference is looked up.
 pub(super) const ENOUGH_WEIGHT: f64 = 0.6;
-/// Least cosine between normals; samples count by the square of what is above it.
+/// Least cosine between the normals of point and sample; the weight grows with the square of the excess.
 const LEAST_COS: f32 = 0.8;
 /// A sample lies on the point's surface up to this height above its tangent plane, footprints, and
 /// further by this share of its distance along the plane.
@@ -32,11 +34,11 @@ type Vec3x4 = [f32x4; 3];
 #[derive(Clone, Copy)]
 pub(super) struct Taps4 {
     pub reference: u32,
-    /// All of them can be read: those of no weight are another one once more.
+    /// Numbers of the samples. A lane without weight repeats the number of another, so that all can be read.
     pub samples: [u32; 4],
-    /// Of 1 that a whole reference gives.
+    /// Weights; a reference that surrounds the point gives 1 in all.
     pub weight: f32x4,
-    /// Weight in means: more alike than the weights, since that averages more of tracing's noise.
+    /// Weights in means: more even than `weight`, which averages out more of tracing's noise.
     pub share: f32x4,
     /// From the point to the sample, footprints.
     pub distance: f32x4,
@@ -46,12 +48,12 @@ pub(super) struct Taps4 {
 pub(super) struct Taps {
     list: [Taps4; MOST],
     len: usize,
-    /// Lanes of the last four that are taken.
+    /// Number of lanes of the last group that are in use.
     lanes: usize,
     pub weight: f64,
 }
 
-/// A point as samples are compared with it: exact to an f32 of its distance to them, not of its place.
+/// A point to compare samples with, split so that distances, not places, are rounded to f32.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     p: Vec3,
@@ -61,7 +63,7 @@ pub(super) struct Place {
     geom_id: u32,
 }
 
-/// How four samples lie about a point; where they are not on its surface, all is 0.
+/// Distances and normals of four samples relative to a point; 0 for samples that are not on its surface.
 struct Near4 {
     /// All bits set where they are.
     is_near: f32x4,
@@ -105,7 +107,7 @@ impl Taps4 {
 }
 
 impl Taps {
-    /// None yet.
+    /// No taps.
     pub fn new() -> Self {
         Self { list: [Taps4::NONE; MOST], len: 0, lanes: 4, weight: 0.0 }
     }
@@ -143,7 +145,7 @@ impl Taps {
         }
     }
 
-    /// Four by four.
+    /// The taps in groups of four.
     pub fn fours(&self) -> &[Taps4] {
         &self.list[..self.len]
     }
@@ -195,7 +197,10 @@ impl Place {
     }
 }
 
-impl Lookup<'_> {
+/// Reference frames in the order in which they are asked.
+pub(super) struct References<'a>(pub &'a [&'a Reference]);
+
+impl References<'_> {
     /// Gathers the samples about `point` in `taps`, whose samples in the first references are `found`.
     pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
@@ -204,7 +209,7 @@ impl Lookup<'_> {
             return;
         }
         let place = Place::of(point);
-        for (number, reference) in self.references.iter().enumerate().skip(ALWAYS) {
+        for (number, reference) in self.0.iter().enumerate().skip(ALWAYS) {
             if taps.weight >= ENOUGH_WEIGHT {
                 return;
             }
@@ -216,7 +221,7 @@ impl Lookup<'_> {
             let own = level_of(point.footprint);
             let cells =
                 [own, own - 1, own + 1].map(|level| Cells::around(level, point.geom_id, point.p));
-            for number in 0..self.references.len() {
+            for number in 0..self.0.len() {
                 if taps.weight >= ENOUGH_WEIGHT {
                     return;
                 }
@@ -233,7 +238,7 @@ impl Lookup<'_> {
         cells: &[Cells; LEVELS],
         taps: &mut Taps,
     ) {
-        let reference = self.references[number];
+        let reference = self.0[number];
         for cells in cells {
             let reach = cells.edge as f32 / footprint;
             let mut members = reference.index.members(cells);

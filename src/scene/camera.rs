@@ -1,11 +1,12 @@
-//! The pinhole camera: its pose in the world, and rays through its pixels.
+//! The camera: its pose in the world, and rays through its pixels.
 
 #[cfg(test)]
 mod tests;
 
-use super::Recentring;
+use super::{Lens, Recentring, limits};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
+use crate::ray::Ray;
 use serde::{Deserialize, Serialize};
 
 /// Where a camera stands and looks, world space, f64.
@@ -21,7 +22,26 @@ pub struct Pose {
     pub roll_degrees: f64,
 }
 
-/// A pinhole camera at a pose, for one image size.
+impl Pose {
+    /// A camera at `eye` that looks at `target`, with y up and without roll.
+    pub fn look_at(eye: DVec3, target: DVec3) -> Self {
+        Self { eye, target, up: DVec3::Y, roll_degrees: 0.0 }
+    }
+}
+
+/// A camera at a pose, for one image size.
+///
+/// ```
+/// use tweenray::math::DVec3;
+/// use tweenray::scene::{Camera, Pose};
+///
+/// let pose = Pose::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO);
+/// let camera = Camera::new(&pose, 40.0, 640, 360)?;
+/// // The target projects to the middle of the image; its depth is along the view axis.
+/// assert_eq!(camera.project(DVec3::ZERO), Some((320.0, 180.0, 5.0)));
+/// assert_eq!(camera.direction(320.0, 180.0), -DVec3::Z);
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     /// Eye point.
@@ -36,6 +56,8 @@ pub struct Camera {
     pub width: u32,
     /// Image rows.
     pub height: u32,
+    /// What its rays pass.
+    pub lens: Lens,
 }
 
 /// Narrowest field of view, degrees, and distance of the widest from 180: below it the directions
@@ -46,7 +68,10 @@ const LEAST_VFOV: f64 = 1e-6;
 const POLE: f64 = 1e-9;
 
 impl Camera {
-    /// A camera at `pose` with the vertical field of view `vfov_degrees` (1e-6 to 180 − 1e-6).
+    /// Bytes of its [`encode`](Self::encode).
+    pub const BYTES: usize = 8 * (12 + Lens::NUMBERS) + 2 * 4;
+
+    /// A pinhole camera at `pose` with the vertical field of view `vfov_degrees` (1e-6 to 180 − 1e-6).
     ///
     /// Looking along `up`, or an `up` of zero, is allowed: the image's up direction is then the
     /// world axis least aligned with the view, of equal ones the first in the order z, y, x.
@@ -73,7 +98,13 @@ impl Camera {
             half_up: up * half_height,
             width,
             height,
+            lens: Lens::Pinhole,
         })
+    }
+
+    /// The same camera with another lens.
+    pub fn with_lens(self, lens: Lens) -> Self {
+        Self { lens, ..self }
     }
 
     /// Whether a vertical field of view, degrees, is one that [`Camera::new`] takes.
@@ -87,12 +118,40 @@ impl Camera {
         )))
     }
 
-    /// Direction (unit) through image point `(x, y)` in pixels; `(0, 0)` is the upper left corner
-    /// of the image and `(0.5, 0.5)` the middle of its first pixel.
+    /// Direction (unit), from the eye, of the image point `(x, y)` in pixels; `(0, 0)` is the upper left
+    /// corner of the image and `(0.5, 0.5)` the middle of its first pixel.
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+        self.toward(x, y).normalize()
+    }
+
+    /// The same direction, 1 long along the view axis.
+    fn toward(&self, x: f64, y: f64) -> DVec3 {
         let sx = 2.0 * x / f64::from(self.width) - 1.0;
         let sy = 1.0 - 2.0 * y / f64::from(self.height);
-        (self.forward + self.half_right * sx + self.half_up * sy).normalize()
+        self.forward + self.half_right * sx + self.half_up * sy
+    }
+
+    /// The ray through image point `(x, y)`, pixels, that passes the lens at `u` in the unit square, whose
+    /// middle is the lens's. Its direction is unit.
+    pub fn generate_ray(&self, x: f64, y: f64, u: [f64; 2]) -> Ray {
+        let (offset, dir) = self.through_lens(x, y, u);
+        Ray::new(self.eye + offset, dir.normalize())
+    }
+
+    /// Where [`generate_ray`](Self::generate_ray)'s ray starts, seen from the eye, and its direction, 1 long
+    /// along the view axis.
+    pub fn through_lens(&self, x: f64, y: f64, u: [f64; 2]) -> (DVec3, DVec3) {
+        let toward = self.toward(x, y);
+        if !self.lens.is_sampled() {
+            return (DVec3::ZERO, toward);
+        }
+        let axes = [self.half_right.normalize(), self.half_up.normalize()];
+        self.lens.bend(toward, axes, u)
+    }
+
+    /// Whether the rays of one image point meet within a pixel at `depth` along the view axis.
+    pub fn is_in_focus(&self, depth: f64) -> bool {
+        self.lens.blur(depth) <= self.pixel_size() * depth
     }
 
     /// Image point in pixels and depth along `forward` of `p`; `None` behind the eye, and where
@@ -118,7 +177,55 @@ impl Camera {
 
     /// The same camera in scene space.
     pub fn to_scene(&self, recentring: &Recentring) -> Self {
-        Self { eye: recentring.point_to_scene(self.eye), ..*self }
+        let lens = self.lens.to_scene(recentring);
+        Self { eye: recentring.point_to_scene(self.eye), lens, ..*self }
+    }
+
+    /// The camera as bytes, little endian: equal for equal cameras, bit for bit, and for no others.
+    pub fn encode(&self) -> [u8; Self::BYTES] {
+        let Self { eye, forward, half_right, half_up, width, height, lens } = self;
+        let vectors = [eye, forward, half_right, half_up].into_iter().flat_map(|v| v.to_array());
+        let numbers = vectors.chain(lens.numbers()).flat_map(f64::to_le_bytes);
+        let mut bytes = [0; Self::BYTES];
+        let edges = [width, height].into_iter().flat_map(|n| n.to_le_bytes());
+        bytes.iter_mut().zip(numbers.chain(edges)).for_each(|(to, byte)| *to = byte);
+        bytes
+    }
+
+    /// The camera that [`encode`](Self::encode) gave these bytes; `None` where no camera has them.
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
+        let (numbers, edges) = bytes.split_at(Self::BYTES - 8);
+        let number = |i: usize| numbers[8 * i..][..8].try_into().map(f64::from_le_bytes).ok();
+        let edge = |i: usize| edges[4 * i..][..4].try_into().map(u32::from_le_bytes).ok();
+        let vector =
+            |i: usize| Some(DVec3::new(number(3 * i)?, number(3 * i + 1)?, number(3 * i + 2)?));
+        let mut lens = [0.0; Lens::NUMBERS];
+        for (i, of_lens) in lens.iter_mut().enumerate() {
+            *of_lens = number(12 + i)?;
+        }
+        let camera = Self {
+            eye: vector(0)?,
+            forward: vector(1)?,
+            half_right: vector(2)?,
+            half_up: vector(3)?,
+            width: edge(0)?,
+            height: edge(1)?,
+            lens: Lens::from_numbers(lens)?,
+        };
+        camera.is_sound().then_some(camera)
+    }
+
+    /// Whether [`Camera::new`] could have made it.
+    fn is_sound(&self) -> bool {
+        let is_edge = |n: u32| (1..=limits::MAX_EDGE).contains(&n);
+        let is_length = |v: DVec3| v.is_finite() && v.length_squared().is_normal();
+        is_edge(self.width)
+            && is_edge(self.height)
+            && self.eye.is_finite()
+            && (self.forward.length() - 1.0).abs() < 1e-6
+            && is_length(self.half_right)
+            && is_length(self.half_up)
     }
 }
 

@@ -46,6 +46,17 @@ impl Material {
     pub fn diffuse(name: impl Into<String>, albedo: Rgb) -> Self {
         Self { diffuse: albedo, ..Self::black(name) }
     }
+
+    /// A perfect mirror.
+    pub fn mirror(name: impl Into<String>, reflectance: Rgb) -> Self {
+        Self { mirror: reflectance, ..Self::black(name) }
+    }
+
+    /// Clear glass with the index of refraction `ior`.
+    pub fn glass(name: impl Into<String>, ior: f64) -> Self {
+        let glass = Glass { ior, tint: Rgb::ONE, priority: None };
+        Self { glass: Some(glass), ..Self::black(name) }
+    }
 }
 
 /// A smooth dielectric boundary; the mesh's outward normals point to the outside medium.

@@ -74,6 +74,25 @@ pub struct WorldMesh {
     pub always_traced: bool,
 }
 
+impl WorldMesh {
+    /// A mesh that shades flat, without texture coordinates. `triangles` index `positions`,
+    /// counter-clockwise seen from outside; all numbers must be finite.
+    pub fn new(
+        name: impl Into<String>,
+        positions: Vec<DVec3>,
+        triangles: Vec<[u32; 3]>,
+        material: MaterialId,
+    ) -> Self {
+        let (normals, uvs, always_traced) = (None, None, false);
+        Self { name: name.into(), positions, triangles, normals, uvs, material, always_traced }
+    }
+
+    /// The two triangles between four corners, which run counter-clockwise seen from outside.
+    pub fn quad(name: impl Into<String>, corners: [DVec3; 4], material: MaterialId) -> Self {
+        Self::new(name, corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], material)
+    }
+}
+
 /// A mesh in scene space, f32: the very numbers that Embree holds.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Mesh {
@@ -118,6 +137,13 @@ pub struct WorldSphere {
     pub material: MaterialId,
     /// Whether its light is traced in every frame, never reused.
     pub always_traced: bool,
+}
+
+impl WorldSphere {
+    /// A sphere, world units; the radius is positive.
+    pub fn new(name: impl Into<String>, centre: DVec3, radius: f64, material: MaterialId) -> Self {
+        Self { name: name.into(), centre, radius, material, always_traced: false }
+    }
 }
 
 /// An analytic sphere in scene space, f64.

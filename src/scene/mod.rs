@@ -9,6 +9,9 @@
 //! (`docs/decisions`).
 
 mod camera;
+mod check;
+mod job;
+mod lens;
 mod light;
 pub mod limits;
 mod material;
@@ -16,26 +19,30 @@ mod mesh;
 mod path;
 mod place;
 mod recentre;
+mod recentring;
 mod reuse;
 mod settings;
+mod spline;
 mod time;
 mod too_small;
 mod weld;
 mod winding;
 
 pub use camera::{Camera, Pose};
+pub use job::JobOptions;
+pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
     DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
 };
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
-pub use recentre::Recentring;
+pub use recentring::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
     BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
-pub use time::{Interval, parse_time, parse_time_limit};
+pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
 pub(crate) use weld::weld;
 pub(crate) use winding::{borders, closed_volume};
@@ -43,7 +50,22 @@ pub(crate) use winding::{borders, closed_volume};
 use crate::math::{Bounds3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// A scene as read: f64 positions in world units (y up unless the file says otherwise).
+/// A scene as read or built: f64 positions in world units (y up unless the file says otherwise).
+///
+/// ```
+/// use tweenray::math::{DVec3, Rgb};
+/// use tweenray::scene::{Material, World, WorldSphere};
+///
+/// let mut world = World::default();
+/// let red = world.add_material(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)));
+/// world.spheres.push(WorldSphere::new("ball", DVec3::new(100.0, 0.0, 0.0), 8.0, red));
+/// // Scene space has its origin in the middle, and about unit size.
+/// let scene = world.into_scene(true)?;
+/// assert_eq!(scene.spheres[0].centre, DVec3::ZERO);
+/// assert_eq!(scene.spheres[0].radius, 1.0);
+/// assert_eq!(scene.recentring.point_to_world(DVec3::ZERO), DVec3::new(100.0, 0.0, 0.0));
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct World {
     /// Placed meshes (transforms already applied).

@@ -6,16 +6,29 @@
 
 mod check;
 mod level;
-mod spline;
 #[cfg(test)]
 mod tests;
 
-use super::{Camera, Pose};
+use super::spline::{self, Timed, catmull_rom};
+use super::{Camera, Pose, ShotLens};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// A camera move: path, timing and lens.
+///
+/// ```
+/// use tweenray::math::DVec3;
+/// use tweenray::scene::{CameraPath, Easing, Shot};
+///
+/// let (target, eye, axis) = (DVec3::ZERO, DVec3::new(0.0, 1.0, 4.0), DVec3::Y);
+/// let path = CameraPath::Orbit { target, eye, axis, degrees: 90.0, roll_degrees: 0.0 };
+/// let shot = Shot { path, easing: Easing::Linear, frames: 24, vfov_degrees: 40.0 };
+/// assert_eq!(shot.pose(1)?.eye, eye);
+/// assert!(shot.pose(24)?.eye.distance(DVec3::new(4.0, 1.0, 0.0)) < 1e-12);
+/// assert!(shot.pose(25).is_err());
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shot {
     /// The curve the camera follows.
@@ -26,6 +39,8 @@ pub struct Shot {
     pub frames: u32,
     /// Vertical field of view, degrees.
     pub vfov_degrees: f64,
+    /// What is sharp.
+    pub lens: ShotLens,
 }
 
 /// The curve that a camera follows, as a function of progress in `[0, 1]`.
@@ -119,6 +134,11 @@ impl Easing {
 }
 
 impl Shot {
+    /// A move of `frames` frames along `path`, evenly spread, through a pinhole.
+    pub fn new(path: CameraPath, frames: u32, vfov_degrees: f64) -> Self {
+        Self { path, easing: Easing::Linear, frames, vfov_degrees, lens: ShotLens::Pinhole }
+    }
+
     /// Checks the whole shot: path, lens, and a camera for every frame.
     ///
     /// Errors: [`Error::Usage`] with what is wrong and, where one frame is at fault, its number.
@@ -156,10 +176,13 @@ impl Shot {
     /// The camera at `frame`, world space, for an image of `width` by `height` pixels.
     pub fn camera(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
         let pose = self.pose(frame)?;
-        Camera::new(&pose, self.vfov_degrees, width, height).map_err(|error| match error {
+        let camera = Camera::new(&pose, self.vfov_degrees, width, height);
+        let camera = camera.map_err(|error| match error {
             Error::Usage(what) => Error::Usage(format!("frame {frame} of {}: {what}", self.frames)),
             other => other,
-        })
+        })?;
+        let target = pose.eye.distance(pose.target);
+        Ok(camera.with_lens(self.lens.at(self.progress(frame), target)))
     }
 
     /// Eased progress along the path at `frame`.
@@ -185,12 +208,30 @@ impl CameraPath {
                 let eye = turn(*eye, *target, *axis, degrees * progress);
                 Pose { eye, target: *target, up: *axis, roll_degrees: *roll_degrees }
             }
-            Self::Keys(keys) => spline::key_pose(keys, progress),
+            Self::Keys(keys) => key_pose(keys, progress),
             Self::BSpline { points, target, up, roll_degrees } => {
                 let eye = spline::b_spline(points, progress);
                 Pose { eye, target: *target, up: *up, roll_degrees: *roll_degrees }
             }
         }
+    }
+}
+
+impl Timed for KeyPose {
+    fn at(&self) -> f64 {
+        self.at
+    }
+}
+
+/// The pose at `progress` in `[0, 1]`: eye, target, up and roll each on a spline through the keys.
+///
+/// `up` has length 1 at the keys and vanishes midway between keys with opposite ones.
+fn key_pose(keys: &[KeyPose], progress: f64) -> Pose {
+    Pose {
+        eye: catmull_rom(keys, progress, |key| key.pose.eye),
+        target: catmull_rom(keys, progress, |key| key.pose.target),
+        up: catmull_rom(keys, progress, |key| level::unit(key.pose.up)),
+        roll_degrees: catmull_rom(keys, progress, |key| key.pose.roll_degrees),
     }
 }
 

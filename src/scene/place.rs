@@ -1,6 +1,6 @@
 //! Putting worlds together: affine transforms, and one world after another.
 
-use super::{Corners, World, WorldMesh};
+use super::{Corners, Material, MaterialId, World, WorldMesh};
 use crate::error::{Error, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -35,6 +35,12 @@ impl WorldMesh {
 }
 
 impl World {
+    /// Takes in a material; gives the number by which meshes and spheres name it.
+    pub fn add_material(&mut self, material: Material) -> MaterialId {
+        self.materials.push(material);
+        self.materials.len() as MaterialId - 1
+    }
+
     /// Moves everything but the sky by `transform`: meshes, spheres and lights. The intensity
     /// of point and spot lights and the irradiance of directional ones stay.
     ///
@@ -50,20 +56,29 @@ impl World {
     }
 
     /// Adds all that `other` holds, with its indices shifted. The sky stays this world's.
-    pub fn append(&mut self, mut other: World) {
-        let materials = self.materials.len() as u32;
-        let textures = self.textures.len() as u32;
-        other.meshes.iter_mut().for_each(|mesh| mesh.material += materials);
-        other.spheres.iter_mut().for_each(|sphere| sphere.material += materials);
-        for texture in other.materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
-            *texture += textures;
+    pub fn append(&mut self, other: World) {
+        let World {
+            mut meshes,
+            mut spheres,
+            mut materials,
+            textures,
+            lights,
+            sky: _,
+            traced_regions,
+        } = other;
+        let first_material = self.materials.len() as u32;
+        let first_texture = self.textures.len() as u32;
+        meshes.iter_mut().for_each(|mesh| mesh.material += first_material);
+        spheres.iter_mut().for_each(|sphere| sphere.material += first_material);
+        for texture in materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
+            *texture += first_texture;
         }
-        self.meshes.append(&mut other.meshes);
-        self.spheres.append(&mut other.spheres);
-        self.materials.append(&mut other.materials);
-        self.textures.append(&mut other.textures);
-        self.lights.append(&mut other.lights);
-        self.traced_regions.append(&mut other.traced_regions);
+        self.meshes.append(&mut meshes);
+        self.spheres.append(&mut spheres);
+        self.materials.append(&mut materials);
+        self.textures.extend(textures);
+        self.lights.extend(lights);
+        self.traced_regions.extend(traced_regions);
     }
 }
 
@@ -125,7 +140,7 @@ pub(super) fn uniform_scale(what: &str, instead: &str, transform: &DAffine3) -> 
 mod tests {
     use super::*;
     use crate::math::{DQuat, Rgb};
-    use crate::scene::{Light, Material, QuadLight, WorldSphere};
+    use crate::scene::{Light, QuadLight, WorldSphere};
 
     fn triangle() -> WorldMesh {
         WorldMesh {
@@ -170,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_transforms_are_errors() {
+    fn singular_and_non_finite_transforms_are_errors() {
         for scale in [DVec3::new(1.0, 0.0, 1.0), DVec3::ZERO, DVec3::splat(f64::NAN)] {
             assert!(triangle().apply_transform(&DAffine3::from_scale(scale)).is_err());
         }

@@ -1,68 +1,13 @@
-//! From world space (f64, the user's units) to scene space (f32, about unit size).
+//! A world, moved to scene space.
 
 use super::{
-    Collapsed, Corners, Light, Material, Mesh, Scene, Sphere, Surface, World, WorldMesh,
-    WorldSphere,
+    Collapsed, Corners, Light, Material, Mesh, Recentring, Scene, Sphere, Surface, World,
+    WorldMesh, WorldSphere,
     light::{EmittingShape, EmittingSurface},
     too_small, winding,
 };
 use crate::error::{Error, Result};
-use crate::math::{Bounds3, DVec3, Rgb, Vec3};
-use serde::{Deserialize, Serialize};
-
-/// `scene = (world − centre) · 2^log2_scale`. A power of two, so scaling rounds nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Recentring {
-    /// World point that becomes the scene's origin.
-    pub centre: DVec3,
-    /// Exponent of the scale.
-    pub log2_scale: i32,
-}
-
-impl Recentring {
-    /// World and scene space are the same.
-    pub const IDENTITY: Self = Self { centre: DVec3::ZERO, log2_scale: 0 };
-
-    /// The recentring that brings `bounds` (world) to the origin and its longest half edge
-    /// into `(0.5, 1]`.
-    pub fn of(bounds: &Bounds3) -> Self {
-        let half = 0.5 * bounds.extent().max_element();
-        // Exact, unlike a logarithm: a scene twice as large gets a scale half as large, always.
-        let (mantissa, exponent) = libm::frexp(half);
-        let log2_scale = match half {
-            half if half <= 0.0 => 0,
-            _ if mantissa == 0.5 => 1 - exponent,
-            _ => -exponent,
-        };
-        Self { centre: bounds.centre(), log2_scale }
-    }
-
-    /// Scene units in a world unit: a power of two.
-    pub fn scale(&self) -> f64 {
-        libm::ldexp(1.0, self.log2_scale)
-    }
-
-    /// A world point in scene space.
-    pub fn point_to_scene(&self, p: DVec3) -> DVec3 {
-        (p - self.centre) * self.scale()
-    }
-
-    /// A scene point in world space.
-    pub fn point_to_world(&self, p: DVec3) -> DVec3 {
-        p / self.scale() + self.centre
-    }
-
-    /// Radiant intensity in scene units, so that the irradiance intensity/d² stays what it was in world units.
-    pub fn intensity_to_scene(&self, intensity: Rgb) -> Rgb {
-        let scale = self.scale();
-        (intensity.as_dvec3() * scale * scale).as_vec3()
-    }
-
-    /// A scene length in world units.
-    pub fn length_to_world(&self, length: f64) -> f64 {
-        length / self.scale()
-    }
-}
+use crate::math::{Bounds3, DVec3, Vec3};
 
 impl World {
     /// Bounds of all geometry and of lights that are seen, world space.
@@ -81,30 +26,15 @@ impl World {
         bounds
     }
 
-    /// Refuses lights and spheres whose place is no number: no bounds would hold them. (Meshes
-    /// are finite by invariant.)
-    fn check_finite(&self) -> Result<()> {
-        let what = |what: &str| {
-            Err(Error::Usage(format!("the place or size of {what} is not a finite number")))
-        };
-        if let Some(index) = self.lights.iter().position(|l| !l.is_finite()) {
-            return what(&format!("light {}", index + 1));
-        }
-        match self.spheres.iter().find(|s| !(s.centre.is_finite() && s.radius.is_finite())) {
-            Some(sphere) => what(&format!("`{}`", sphere.name)),
-            None => Ok(()),
-        }
-    }
-
     /// Moves the world to scene space and rounds positions to f32, once. Area lights get their
     /// emitting surface. With `recentre` false the world's own coordinates are rounded as they
     /// are: that shows what the rule is worth.
     ///
-    /// Errors: a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
+    /// Errors: an index of a material or vertex that there is not; a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
     /// sphere whose place is not finite; a mesh, sphere or area light so small beside the scene
     /// that f32 would crush it, or a mesh of which it would crush most triangles (`recentre` only).
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
-        self.check_finite()?;
+        self.check()?;
         let bounds = self.bounds();
         let size = bounds.extent().max_element();
         let renders = size == 0.0 || (1e-30..=1e30).contains(&size);
@@ -276,28 +206,5 @@ fn add_emitting_surface(
         EmittingShape::Sphere(centre, radius) => {
             spheres.push(Sphere { name, centre, radius, surface });
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn scale_of(half: f64) -> f64 {
-        let bounds = Bounds3 { min: DVec3::splat(-half), max: DVec3::splat(half) };
-        Recentring::of(&bounds).scale()
-    }
-
-    #[test]
-    fn the_scale_follows_the_size_exactly() {
-        // Just above a power of two: a logarithm rounds to the power itself, but not near 1.
-        for half in [1.0, 1.0 + f64::EPSILON, 1.5, 2.0 - f64::EPSILON] {
-            assert!((0.5..=1.0).contains(&(half * scale_of(half))) && half * scale_of(half) > 0.5);
-            for k in -90..=90 {
-                let power = libm::ldexp(1.0, k);
-                assert_eq!(scale_of(half * power) * power, scale_of(half), "{half} times 2^{k}");
-            }
-        }
-        assert_eq!(scale_of(0.0), 1.0);
     }
 }

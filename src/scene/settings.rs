@@ -5,6 +5,15 @@ use serde::{Deserialize, Serialize};
 
 /// The settings of a job. All of them reach the manifest, since a frame is a pure function of
 /// scene, settings and frame number (threads and output places excepted, which are not here).
+///
+/// ```
+/// use tweenray::scene::{Policy, ReuseSettings, Settings};
+///
+/// // The defaults are those of the command line; what is named differs from them.
+/// let reuse = ReuseSettings { policy: Policy::Off, ..ReuseSettings::default() };
+/// let settings = Settings { width: 1280, height: 720, reuse, ..Settings::default() };
+/// assert_eq!((settings.spp, settings.region().x1), (4, 1280));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Image columns.

@@ -82,9 +82,9 @@ fn clock_part(text: &str) -> Result<u64, String> {
 
 /// How often something is done, if ever.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interval(pub Option<Duration>);
+pub struct SaveInterval(pub Option<Duration>);
 
-impl Interval {
+impl SaveInterval {
     /// A time, or `off`.
     ///
     /// # Errors
@@ -111,13 +111,13 @@ mod tests {
         for text in ["", "25", "m", "1.5h", "-3s", "5 m x", "99999999999s", "5é", "1h30"] {
             assert!(parse_time(text).is_err(), "{text}");
         }
-        assert_eq!(Interval::parse("off"), Ok(Interval(None)));
-        assert_eq!(Interval::parse("30s"), Ok(Interval(Some(Duration::from_secs(30)))));
-        assert!(Interval::parse("never").is_err_and(|how| how.ends_with("or off")));
+        assert_eq!(SaveInterval::parse("off"), Ok(SaveInterval(None)));
+        assert_eq!(SaveInterval::parse("30s"), Ok(SaveInterval(Some(Duration::from_secs(30)))));
+        assert!(SaveInterval::parse("never").is_err_and(|how| how.ends_with("or off")));
     }
     /// The forms of sbatch's manual, each with what it means there.
     #[test]
-    fn time_limits_may_be_slurms() {
+    fn time_limits_may_be_in_slurms_notation() {
         let seconds = |text| parse_time_limit(text).map(|t| t.as_secs());
         for (text, is) in [
             ("30", 30 * 60),

@@ -113,7 +113,7 @@ mod tests {
     use crate::scene::{Material, WorldMesh};
 
     #[test]
-    fn what_would_be_crushed_is_refused_by_name() {
+    fn what_rounding_would_flatten_is_refused_by_name() {
         const DIRECTIONS: [DVec3; 6] =
             [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         let with = |radius: f64, at: f64| {

@@ -8,8 +8,7 @@
 //! frame holds its own reference, and is read where there is one. What is damaged or belongs to another
 //! job is never read: its frame is traced again.
 
-use super::Target;
-use super::resume::LEFTOVER_AGE;
+use super::target::{LEFTOVER_AGE, Target};
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{self, Header, Manifest, Row, manifest_path};
 use crate::output::{Format, FramePattern, Regular, atomic, exr};
@@ -26,7 +25,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Version of the files.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Ending of the files.
 const ENDING: &str = ".reference";
 /// Longest first line that is read, bytes.
@@ -40,9 +39,9 @@ struct Head {
     /// [`FORMAT`].
     checkpoint: u32,
     frame: u32,
-    /// What the frame was made of.
+    /// The frame's [`Recipe::whole`](super::Recipe::whole).
     recipe: String,
-    /// Of what follows.
+    /// Hash of the bytes after this line.
     #[serde(default)]
     blake3: String,
     /// What the job's frames share.
@@ -55,16 +54,16 @@ pub struct Checkpoints<'a> {
     pub target: &'a Target,
     /// How much time of tracing may be lost; `None` to write none and read those that are there.
     pub every: Option<Duration>,
-    /// On which terms references serve.
+    /// What a reference must have in common with the job.
     pub terms: &'a Compatibility,
-    /// Where the scene was moved.
+    /// How world and scene space of the job belong together.
     pub recentring: Recentring,
     /// Whether the job's frame files hold all that was traced in their frames.
     pub frames_hold_all: bool,
     rows: OnceLock<BTreeMap<u32, Row>>,
     notes: Mutex<Vec<String>>,
     /// Whether a failed write was reported.
-    has_told_unwritten: AtomicBool,
+    has_noted_unwritten: AtomicBool,
 }
 
 impl<'a> Checkpoints<'a> {
@@ -84,7 +83,7 @@ impl<'a> Checkpoints<'a> {
             frames_hold_all: whole && target.pattern.format() == Format::Exr,
             rows: OnceLock::new(),
             notes: Mutex::default(),
-            has_told_unwritten: AtomicBool::default(),
+            has_noted_unwritten: AtomicBool::default(),
         }
     }
 
@@ -97,7 +96,7 @@ impl<'a> Checkpoints<'a> {
         Some((found, bytes))
     }
 
-    /// Whether there is such a file; it is not looked into.
+    /// Whether there is a file that may hold the reference of a frame; it is not read.
     pub fn has(&self, frame: u32) -> bool {
         self.row(frame).is_some() || self.path(frame).exists()
     }
@@ -177,14 +176,14 @@ impl<'a> Checkpoints<'a> {
         let _ = fs::remove_file(self.path(frame));
     }
 
-    /// What there is to tell: why references were not taken.
+    /// Notes for the user: why references on disk were not used. Each is returned once.
     pub fn notes(&self) -> Vec<String> {
         std::mem::take(&mut *self.notes.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Tells once why references do not get on disk.
+    /// Notes, once, why references cannot be written.
     pub(super) fn note_unwritten(&self, why: &Error) {
-        if !self.has_told_unwritten.swap(true, Ordering::Relaxed) {
+        if !self.has_noted_unwritten.swap(true, Ordering::Relaxed) {
             self.note(format!(
                 "{why}; a job that goes on after a kill will have to trace it again"
             ));
@@ -236,7 +235,7 @@ pub(super) fn refuse_others(target: &Target) -> Result<()> {
     )))
 }
 
-/// Removes references that cannot serve the job at `target`; says so.
+/// Removes references that cannot serve the job at `target`; returns notes about them.
 pub(super) fn sweep(target: &Target) -> Result<Vec<String>> {
     let folder = folder(&target.pattern);
     atomic::clean_temporaries(&folder, LEFTOVER_AGE)?;

@@ -16,217 +16,152 @@
 
 mod exchange;
 mod pixels;
-mod saved;
 mod upload;
 
 pub use upload::check_upload;
 
 use super::checkpoint::Checkpoints;
+use super::context::FrameContext;
+use super::pool::SharedPool;
 use super::pyramid::Pyramid;
-use super::saved::{Keeps, Saved};
-use super::{FrameMaker, Made, SaveCost, previous_camera};
+use super::schedule::Schedule;
+use super::{FrameGraph, FrameMaker, Made, SaveCost};
 use crate::error::{Error, Result};
 use crate::film::{Film, Image};
 use crate::math::Vec2;
-use crate::reuse::colour::{Inferred, Known, Rule};
-use crate::scene::{Camera, Shot};
-use crate::shade::{FrameJob, Progress, Rendered, Renderer};
+use crate::reuse::colour::{AgreementRule, InferredColour, KnownColours};
+use crate::shade::FrameJob;
 use pixels::{discoveries, fill};
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeSet;
+use std::sync::Arc;
 use upload::known_of_upload;
 
 /// Infers frames from colours.
 pub struct ColourMaker<'a> {
-    /// What traces.
-    pub renderer: Renderer<'a>,
-    /// Where the camera is when.
-    pub shot: &'a Shot,
-    /// The threads that render.
-    pub pool: &'a rayon::ThreadPool,
-    /// Whether films get their first-hit records.
-    pub with_gbuffer: bool,
-    /// Set when the job shall stop.
-    pub stop: &'a AtomicBool,
-    /// Hears of finished tiles.
-    pub progress: &'a dyn Progress,
-    /// When cached colours agree.
-    pub rule: Rule,
-    /// Where discoveries are kept for a job that goes on after this one; `None` for nowhere.
+    /// Where discoveries are saved for a job that goes on after this one; `None` for nowhere. Few frames
+    /// are needed at a time, about as many as the shot's length has binary digits. A rank saves what it
+    /// made itself.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
+    context: FrameContext<'a>,
+    rule: AgreementRule,
     pyramid: Pyramid,
-    uploads: Vec<Known>,
-    state: Mutex<State>,
-}
-
-#[derive(Default)]
-struct State {
-    /// Frames that are still to come.
-    to_come: BTreeSet<u32>,
-    /// Frames whose discoveries other ranks' frames, or later ones, need.
-    held: BTreeSet<u32>,
-    /// What the frames so far discovered, as far as it is still needed.
-    known: BTreeMap<u32, Arc<Known>>,
-    /// The most that all of it took at a time, bytes.
-    most_memory: u64,
-    saved: Saved<Arc<Known>>,
+    schedule: Schedule,
+    uploads: Vec<KnownColours>,
+    /// The discoveries of frames.
+    known: SharedPool<Arc<KnownColours>, Arc<KnownColours>>,
 }
 
 impl<'a> ColourMaker<'a> {
-    /// A maker of frames of `shot`, which takes `uploads` for the frames that they name.
+    /// A maker of the frames of `context`, which takes `uploads` for the frames that they name.
     ///
     /// # Errors
     /// [`check_upload`]'s, and a frame that has two `uploads`.
-    #[allow(clippy::too_many_arguments, reason = "each is a field")]
     pub fn new(
-        renderer: Renderer<'a>,
-        shot: &'a Shot,
-        pool: &'a rayon::ThreadPool,
-        stop: &'a AtomicBool,
-        progress: &'a dyn Progress,
-        rule: Rule,
+        context: FrameContext<'a>,
+        rule: AgreementRule,
         uploads: &[(u32, Image)],
     ) -> Result<Self> {
+        let settings = context.renderer.settings;
         let mut seen = BTreeSet::new();
         let mut known = Vec::new();
         for (frame, image) in uploads {
-            check_upload(*frame, image, shot, renderer.settings)?;
+            check_upload(*frame, image, context.shot, settings)?;
             if !seen.insert(*frame) {
                 return Err(Error::Usage(format!("frame {frame} has two uploaded pictures")));
             }
-            known.push(known_of_upload(*frame, image, renderer.settings));
+            known.push(known_of_upload(*frame, image, settings));
         }
-        Ok(Self {
-            renderer,
-            shot,
-            pool,
-            with_gbuffer: false,
-            stop,
-            progress,
-            rule,
-            checkpoints: None,
-            pyramid: Pyramid::whole(shot.frames),
-            uploads: known,
-            state: Mutex::default(),
-        })
+        let pyramid = Pyramid::whole(context.shot.frames);
+        let schedule = Schedule::without_copies(pyramid);
+        let (checkpoints, uploads) = (None, known);
+        let known = SharedPool::default();
+        Ok(Self { checkpoints, context, rule, pyramid, schedule, uploads, known })
     }
 
     /// Makes `frame` from what its ancestors know, which are made first where they are not at hand;
-    /// gives its discoveries too.
-    fn frame(&self, frame: u32) -> Result<Option<(Made, Known)>> {
-        let mut ancestors = Vec::new();
-        for other in self.pyramid.ancestors(frame) {
-            match self.known(other)? {
-                Some(known) => ancestors.push(known),
-                None => return Ok(None),
-            }
-        }
-        let known: Vec<&Known> = ancestors.iter().map(|k| &**k).chain(&self.uploads).collect();
-        let settings = self.renderer.settings;
-        let camera = self.shot.camera(frame, settings.width, settings.height)?;
+    /// keeps its discoveries where they are due.
+    fn frame(&self, frame: u32) -> Result<Made> {
+        let ancestors = self.pyramid.ancestors(frame).into_iter().map(|other| self.known(other));
+        let ancestors = ancestors.collect::<Result<Vec<_>>>()?;
+        let known: Vec<&KnownColours> =
+            ancestors.iter().map(|k| &**k).chain(&self.uploads).collect();
+        let settings = self.context.renderer.settings;
+        let camera = self.context.camera(frame)?;
         let pixels = settings.width as usize * settings.height as usize;
         let inferred = self.rule.infer(&known, frame, pixels);
-        let Some(mut traced) = self.trace(frame, &camera, &inferred) else { return Ok(None) };
+        let mask: Vec<bool> = inferred.iter().map(Option::is_none).collect();
+        // Distances come from first-hit records.
+        let (with_gbuffer, mask) = (true, Some(&mask[..]));
+        let job = FrameJob { with_gbuffer, mask, ..self.context.job(frame, &camera) };
+        let mut traced = self.context.render(&job, self.context.progress)?;
         let discoveries = discoveries(frame, &traced.film, &inferred, &camera, settings);
         let reuse = fill(&mut traced.film, frame, &inferred, settings);
-        if self.with_gbuffer {
-            self.note_motion(frame, &camera, &mut traced.film, &inferred)?;
+        if self.context.with_gbuffer {
+            self.note_motion(frame, &mut traced.film, &inferred)?;
         } else {
             traced.film.gbuffer = None;
         }
-        Ok(Some((
-            Made { film: traced.film, rays: traced.rays, reuse, audit: None, reference: None },
-            discoveries,
-        )))
+        let discoveries = Arc::new(discoveries);
+        self.keep(&discoveries);
+        self.known.lock().set_unsaved(frame, Some(discoveries));
+        Ok(Made { film: traced.film, rays: traced.rays, reuse, audit: None, reference: None })
     }
 
     /// Fills in how the traced pixels moved; of the others no first hit is known.
     fn note_motion(
         &self,
         frame: u32,
-        camera: &Camera,
         film: &mut Film,
-        inferred: &[Option<Inferred>],
+        inferred: &[Option<InferredColour>],
     ) -> Result<()> {
-        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
-        self.pool.install(|| self.renderer.note_motion(camera, previous.as_ref(), film));
+        self.context.note_motion(frame, film)?;
         let motion = film.gbuffer.iter_mut().flat_map(|g| &mut g.motion);
         motion.zip(inferred).filter(|(_, i)| i.is_some()).for_each(|(m, _)| *m = Vec2::ZERO);
         Ok(())
     }
 
-    /// Traces what could not be inferred.
-    fn trace(
-        &self,
-        frame: u32,
-        camera: &Camera,
-        inferred: &[Option<Inferred>],
-    ) -> Option<Rendered> {
-        let mask: Vec<bool> = inferred.iter().map(Option::is_none).collect();
-        let job = FrameJob {
-            camera,
-            stream: frame,
-            // Distances come from it.
-            with_gbuffer: true,
-            reuse: None,
-            mask: Some(&mask),
-            beyond_crop: false,
-        };
-        self.pool.install(|| self.renderer.render_job(&job, self.stop, self.progress))
-    }
-
-    /// What `frame` discovered; makes it where nobody did.
-    fn known(&self, frame: u32) -> Result<Option<Arc<Known>>> {
-        if let Some(found) = self.with_state(|s| s.known.get(&frame).cloned()) {
-            return Ok(Some(found));
+    /// The discoveries of `frame`, which is in use: from memory, from disk, or made.
+    fn known(&self, frame: u32) -> Result<Arc<KnownColours>> {
+        let found = self.known.lock().get(frame).cloned();
+        if let Some(found) = found.or_else(|| self.read_from_disk(frame)) {
+            return Ok(found);
         }
-        if let Some(found) = self.left_on_disk(frame) {
-            return Ok(Some(found));
-        }
-        let Some((_, known)) = self.frame(frame)? else { return Ok(None) };
-        Ok(Some(self.made(known)))
+        self.frame(frame)?;
+        let lost = || Error::Failed(format!("the discoveries of frame {frame} are lost"));
+        self.known.lock().get(frame).cloned().ok_or_else(lost)
     }
 
-    /// What a frame discovered that was just made, which is worth keeping on disk too.
-    fn made(&self, known: Known) -> Arc<Known> {
-        let known = self.keep(known);
-        self.with_state(|s| s.saved.add(known.frame, Arc::clone(&known)));
-        known
+    /// The discoveries of `frame` that an earlier run saved.
+    fn read_from_disk(&self, frame: u32) -> Option<Arc<KnownColours>> {
+        let bytes = self.checkpoints?.read_bytes(frame)?;
+        let known = Arc::new(self.decode(frame, &bytes)?);
+        self.keep(&known);
+        self.known.lock().note_on_disk(frame);
+        Some(known)
     }
 
-    fn keep(&self, known: Known) -> Arc<Known> {
-        let known = Arc::new(known);
-        self.with_state(|s| {
-            s.known.insert(known.frame, Arc::clone(&known));
-            s.most_memory = s.most_memory.max(memory(s.known.values().map(|k| &**k)));
-        });
-        known
+    fn decode(&self, frame: u32, bytes: &[u8]) -> Option<KnownColours> {
+        let settings = self.context.renderer.settings;
+        let pixels = settings.width * settings.height;
+        self.context.pool.install(|| KnownColours::decode(frame, bytes, pixels))
     }
 
-    /// Drops what no frame to come is inferred from.
-    fn forget(&self, done: u32) {
-        self.with_state(|s| {
-            s.to_come.remove(&done);
-            let ancestors = |frame: &u32| self.pyramid.ancestors(*frame);
-            let needed: BTreeSet<u32> = s.to_come.iter().flat_map(ancestors).collect();
-            let State { known, held, .. } = s;
-            known.retain(|frame, _| needed.contains(frame) || held.contains(frame));
-        });
+    /// Keeps discoveries in memory where they are due.
+    fn keep(&self, known: &Arc<KnownColours>) {
+        let mut pool = self.known.lock();
+        pool.keep(&self.schedule, known.frame, || Arc::clone(known));
+        pool.note_memory(|known, _| known.memory());
     }
 
-    fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
-        act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
+    fn save(&self, is_stopping: bool) {
+        let encode = |known: &Arc<KnownColours>| self.context.pool.install(|| known.encode());
+        self.known.save(self.checkpoints, is_stopping, |known| encode(known).map(Into::into));
     }
 }
 
-impl FrameMaker for ColourMaker<'_> {
-    fn make(&self, frame: u32) -> Result<Option<Made>> {
-        let Some((made, known)) = self.frame(frame)? else { return Ok(None) };
-        self.made(known);
-        self.forget(frame);
-        self.put_away(false);
-        Ok(Some(made))
+impl FrameGraph for ColourMaker<'_> {
+    fn needs(&self, original: u32) -> Vec<u32> {
+        self.pyramid.ancestors(original)
     }
 
     /// First and last frame, then each between after its ancestors.
@@ -236,12 +171,30 @@ impl FrameMaker for ColourMaker<'_> {
         ordered.into_iter().map(|frame| vec![frame]).collect()
     }
 
+    fn is_on_disk(&self, original: u32) -> bool {
+        self.checkpoints.is_some_and(|c| c.has(original))
+    }
+
+    fn sends_to_all(&self) -> bool {
+        true
+    }
+}
+
+impl FrameMaker for ColourMaker<'_> {
+    fn make(&self, frame: u32) -> Result<Made> {
+        self.known.lock().expect_once(&self.schedule, frame);
+        let made = self.frame(frame)?;
+        self.known.lock().done(&self.schedule, frame);
+        self.save(false);
+        Ok(made)
+    }
+
     fn expect(&self, frames: &[u32]) {
-        self.with_state(|s| s.to_come.extend(frames));
+        self.known.lock().expect(&self.schedule, frames);
     }
 
     fn stopped(&self) {
-        self.put_away(true);
+        self.save(true);
     }
 
     fn notes(&self) -> Vec<String> {
@@ -249,15 +202,11 @@ impl FrameMaker for ColourMaker<'_> {
     }
 
     fn save_cost(&self) -> SaveCost {
-        self.with_state(|s| s.saved.cost)
+        self.known.lock().save_cost
     }
 
     fn reference_memory(&self) -> u64 {
-        memory(&self.uploads) + self.with_state(|s| s.most_memory)
+        let uploads: u64 = self.uploads.iter().map(KnownColours::memory).sum();
+        uploads + self.known.lock().most_memory
     }
-}
-
-/// Bytes that entries take.
-fn memory<'k>(known: impl IntoIterator<Item = &'k Known>) -> u64 {
-    known.into_iter().map(|k| size_of_val(&k.entries[..]) as u64).sum()
 }

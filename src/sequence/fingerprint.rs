@@ -3,7 +3,7 @@
 //! So a comment, a renamed file or a setting that moves between scene file and command line keeps
 //! the frames, while a vertex, a light or a key pose that changes does not.
 
-use crate::scene::{Corners, Material, Shot, Texture, World, WorldMesh};
+use crate::scene::{Corners, Material, Shot, Texture, World, WorldMesh, WorldSphere};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
@@ -25,43 +25,45 @@ pub fn shot_fingerprint(world: &str, shot: &Shot) -> String {
 /// A world's hash, part by part, so that what has changed can be named. A large world takes a while to
 /// hash: it is done once.
 pub struct WorldHash {
-    /// Every part, in order: what it is called, and the hash of what reaches a pixel.
+    /// Every part in order: its name for messages, and the hash of what of it reaches a pixel.
     parts: Vec<(String, blake3::Hash)>,
-    /// What is to be traced in every frame, where anything is.
+    /// Hash of what is traced in every frame; `None` where nothing is.
     traced: Option<blake3::Hash>,
 }
 
 impl WorldHash {
     /// Hashes everything in `world` that reaches a pixel.
     pub fn of(world: &World) -> Self {
+        let World { meshes, spheres, materials, textures, lights, sky, traced_regions } = world;
         let mut parts = Vec::new();
-        for (n, mesh) in (1..).zip(&world.meshes) {
+        // Names are for people.
+        for (n, mesh) in (1..).zip(meshes) {
             let shape = Hash::of(|hash| hash.shape(mesh));
             parts.push((format!("mesh {n} `{}`", mesh.name), shape));
         }
-        for (n, texture) in (1..).zip(&world.textures) {
+        for (n, texture) in (1..).zip(textures) {
             parts.push((format!("texture {n}"), Hash::of(|hash| hash.texture(texture))));
         }
-        for (n, sphere) in (1..).zip(&world.spheres) {
-            let hash = Hash::of(|hash| hash.text(&(sphere.centre, sphere.radius)));
+        for (n, sphere) in (1..).zip(spheres) {
+            let WorldSphere { name: _, centre, radius, material: _, always_traced: _ } = sphere;
+            let hash = Hash::of(|hash| hash.text(&(centre, radius)));
             parts.push((format!("sphere {n}"), hash));
         }
-        for material in &world.materials {
-            // Names are for people.
+        for material in materials {
             let unnamed = Material { name: String::new(), ..material.clone() };
             parts.push((format!("material `{}`", material.name), Hash::of(|h| h.text(&unnamed))));
         }
-        for (n, light) in (1..).zip(&world.lights) {
+        for (n, light) in (1..).zip(lights) {
             parts.push((format!("light {n}"), Hash::of(|hash| hash.text(light))));
         }
-        parts.push(("the sky".into(), Hash::of(|hash| hash.text(&world.sky))));
-        let wearers = world.meshes.iter().map(|mesh| mesh.material);
-        let wearers: Vec<u32> = wearers.chain(world.spheres.iter().map(|s| s.material)).collect();
+        parts.push(("the sky".into(), Hash::of(|hash| hash.text(sky))));
+        let wearers = meshes.iter().map(|mesh| mesh.material);
+        let wearers: Vec<u32> = wearers.chain(spheres.iter().map(|s| s.material)).collect();
         parts.push(("which material goes where".into(), Hash::of(|hash| hash.array(&wearers))));
-        let flags = world.meshes.iter().map(|mesh| mesh.always_traced);
-        let flags: Vec<bool> = flags.chain(world.spheres.iter().map(|s| s.always_traced)).collect();
-        let names_any = flags.contains(&true) || !world.traced_regions.is_empty();
-        let traced = names_any.then(|| Hash::of(|hash| hash.text(&(flags, &world.traced_regions))));
+        let flags = meshes.iter().map(|mesh| mesh.always_traced);
+        let flags: Vec<bool> = flags.chain(spheres.iter().map(|s| s.always_traced)).collect();
+        let names_any = flags.contains(&true) || !traced_regions.is_empty();
+        let traced = names_any.then(|| Hash::of(|hash| hash.text(&(flags, traced_regions))));
         Self { parts, traced }
     }
 
@@ -70,8 +72,8 @@ impl WorldHash {
         self.joined(self.traced.as_ref())
     }
 
-    /// The same, but for what is to be traced in every frame: that changes nothing of what was traced,
-    /// so frames that name other things serve one another as references.
+    /// The hash of everything but what is traced in every frame, hexadecimal. That choice changes no traced
+    /// light, so scenes that differ in it alone serve one another as references.
     pub fn light(&self) -> String {
         self.joined(None)
     }
@@ -127,24 +129,36 @@ impl Hash {
     }
 
     fn shape(&mut self, mesh: &WorldMesh) {
-        self.array(&mesh.positions);
-        self.array(&mesh.triangles);
-        self.attribute(mesh.normals.as_ref());
-        self.attribute(mesh.uvs.as_ref());
+        // The name is for people; the others are parts of their own.
+        let WorldMesh {
+            name: _,
+            positions,
+            triangles,
+            normals,
+            uvs,
+            material: _,
+            always_traced: _,
+        } = mesh;
+        self.array(positions);
+        self.array(triangles);
+        self.attribute(normals.as_ref());
+        self.attribute(uvs.as_ref());
     }
 
     fn attribute<T: bytemuck::NoUninit>(&mut self, attribute: Option<&Corners<T>>) {
         let Some(attribute) = attribute else { return self.text(&"none") };
-        self.array(&attribute.values);
-        match &attribute.corners {
+        let Corners { values, corners } = attribute;
+        self.array(values);
+        match corners {
             Some(corners) => self.array(corners),
             None => self.text(&"as positions"),
         }
     }
 
     fn texture(&mut self, texture: &Texture) {
-        self.text(&(texture.width, texture.height));
-        self.array(&texture.texels);
+        let Texture { name: _, width, height, texels } = texture;
+        self.text(&(width, height));
+        self.array(texels);
     }
 
     /// The length goes first, so that no two lists of arrays run together into the same bytes.
@@ -166,7 +180,7 @@ mod tests {
     use super::*;
     use crate::math::{Bounds3, DVec3, Rgb, Vec3};
     use crate::scene::PointLight;
-    use crate::scene::{CameraPath, Easing, Light, Material, Pose};
+    use crate::scene::{CameraPath, Light, Material, Pose};
 
     fn world() -> World {
         World {
@@ -187,7 +201,7 @@ mod tests {
     fn shot() -> Shot {
         let pose = Pose { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
         let path = CameraPath::Still(pose);
-        Shot { path, easing: Easing::Linear, frames: 1, vfov_degrees: 40.0 }
+        Shot::new(path, 1, 40.0)
     }
 
     #[test]

@@ -123,7 +123,7 @@ impl Pyramid {
 
     /// The same, but a key frame lies in the list of the segment that it starts, in front. So where
     /// each list is made by another rank, nobody waits for what another makes last.
-    pub fn shares(&self, frames: &[u32]) -> Vec<Vec<u32>> {
+    pub fn rank_batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         let started = |frame: &u32| (frame - 1) / self.segment;
         let mut ordered = self.order(frames);
         ordered.sort_by_key(|frame| (started(frame), !self.is_key(*frame)));
@@ -217,7 +217,7 @@ mod tests {
         let pyramid = Pyramid { segment: 4, frames: 11 };
         let batches = pyramid.batches(&[2, 3, 7, 11, 5]);
         assert_eq!(batches, [vec![5, 3, 2], vec![7], vec![11]]);
-        let shares = pyramid.shares(&[2, 3, 7, 11, 5]);
-        assert_eq!(shares, [vec![3, 2], vec![5, 7], vec![11]]);
+        let batches = pyramid.rank_batches(&[2, 3, 7, 11, 5]);
+        assert_eq!(batches, [vec![3, 2], vec![5, 7], vec![11]]);
     }
 }

@@ -5,7 +5,7 @@
 //! is allowed there is found out. A longer shot changes few of them, so that its finished frames can be
 //! told from those that must be made again.
 
-use super::schedule::{Schedule, bits};
+use super::schedule::Schedule;
 use crate::error::Result;
 use crate::scene::{Camera, Settings, Shot};
 use rayon::prelude::*;
@@ -15,12 +15,12 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tag([u8; 16]);
 
-/// What a frame is made of.
+/// Hashes of all that a frame's bytes are a function of, beside world and settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Recipe {
-    /// Its number and camera, and the camera before it where its file holds motion.
+    /// Hash of number and camera, and of the camera before where the frame's file holds motion.
     pub view: Tag,
-    /// The view, and all that it is inferred from.
+    /// Hash of the view and of the numbers and cameras of all frames that it is inferred from.
     pub whole: Tag,
 }
 
@@ -60,7 +60,7 @@ impl Recipes {
     }
 }
 
-/// For each original, by frame, what its traced points are a function of.
+/// For each original, by frame, the hash of all that its traced points are a function of.
 fn sources(schedule: &Schedule, cameras: &[Camera]) -> Vec<Tag> {
     let mut tags = vec![Tag::default(); cameras.len()];
     for frame in schedule.by_need() {
@@ -74,8 +74,8 @@ fn sources(schedule: &Schedule, cameras: &[Camera]) -> Vec<Tag> {
 
 fn number_and_camera(frame: u32, camera: &Camera) -> Tag {
     let mut hash = blake3::Hasher::new();
-    hash.update(bytemuck::cast_slice(&[frame.to_le(), camera.width, camera.height]));
-    hash.update(bytemuck::cast_slice(&bits(camera)));
+    hash.update(&frame.to_le_bytes());
+    hash.update(&camera.encode());
     Tag::first_half(&hash)
 }
 
@@ -103,7 +103,7 @@ impl fmt::Display for Tag {
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::{CameraPath, Easing, KeyPose, Policy, Pose, ReuseSettings};
+    use crate::scene::{CameraPath, KeyPose, Policy, Pose, ReuseSettings};
 
     /// A key pose a frame, as a program exports them.
     fn shot(frames: u32) -> Shot {
@@ -113,7 +113,7 @@ mod tests {
             KeyPose { at: f64::from(i) / f64::from(frames - 1), pose }
         };
         let path = CameraPath::Keys((0..frames).map(key).collect());
-        Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+        Shot::new(path, frames, 40.0)
     }
 
     fn settings(policy: Policy) -> Settings {

@@ -3,67 +3,23 @@
 mod refuse;
 
 use super::checkpoint;
-use super::recipe::{Recipe, Recipes};
+use super::recipe::Recipe;
+use super::target::{LEFTOVER_AGE, Target};
 use crate::error::{Error, Result, counted};
-use crate::output::manifest::{
-    Foreign, Header, Journal, Manifest, MapRow, Row, Turn, manifest_path,
-};
+use crate::output::manifest::{Foreign, Header, Manifest, MapRow, Row, Turn, manifest_path};
 use crate::output::maps::Map;
-use crate::output::{Format, FramePattern, PathKind, WriteOptions, atomic};
+use crate::output::{PathKind, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
 use rayon::prelude::*;
-pub use refuse::refuse_strangers;
+pub use refuse::refuse_unlisted;
 use refuse::{by_file, refuse_other_view, refuse_others, refuse_taken};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-/// Temporary files of other machines' processes are cleared away once they are this old: on a shared
-/// folder a younger one may belong to one that lives.
-pub(super) const LEFTOVER_AGE: Duration = Duration::from_secs(60);
-
-/// Where the frames of a job go, and what they all share.
-#[derive(Debug, Clone)]
-pub struct Target {
-    /// Where frame n lies.
-    pub pattern: FramePattern,
-    /// What the frames share.
-    pub header: Header,
-    /// What each frame of the shot is made of.
-    pub recipes: Recipes,
-    /// How films become files.
-    pub write: WriteOptions,
-    /// Whether frames that exist are replaced.
-    pub overwrite: bool,
-}
-
-impl Target {
-    /// Whether frames have maps in files of their own.
-    pub fn has_map_files(&self) -> bool {
-        self.write.maps.is_some() && self.pattern.format() != Format::Exr
-    }
-
-    /// Where rank `rank` appends its rows: to the manifest itself, at `path`, or its part of that.
-    ///
-    /// # Errors
-    /// It cannot be opened, or is of other settings.
-    pub fn journal(&self, rank: u32, path: &Path) -> Result<Journal> {
-        if rank == 0 { Journal::of(path, &self.header) } else { Journal::open(path) }
-    }
-
-    /// Every file that frame `frame` has.
-    fn paths(&self, frame: u32) -> Vec<PathBuf> {
-        let frame = self.pattern.path(frame);
-        let maps = Map::ALL.iter().filter(|_| self.has_map_files());
-        let maps: Vec<PathBuf> = maps.map(|map| map.path(&frame)).collect();
-        std::iter::once(frame).chain(maps).collect()
-    }
-}
-
-/// What there is to do.
+/// Which frames of a job are kept and which rendered.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Frames that exist whole, with the same settings, made of the same.
@@ -89,14 +45,14 @@ pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     prepare_with(target, frames, None)
 }
 
-/// The same, with what [`look`] found where that is known.
+/// [`prepare`], with what [`check_files`] found where that is known.
 ///
 /// # Errors
 /// As [`prepare`].
 pub fn prepare_with(
     target: &Target,
     frames: FrameRange,
-    found: Option<Vec<Found>>,
+    found: Option<Vec<FrameFiles>>,
 ) -> Result<Plan> {
     atomic::create_folder(target.pattern.folder())?;
     atomic::clean_temporaries(target.pattern.folder(), LEFTOVER_AGE)?;
@@ -105,9 +61,9 @@ pub fn prepare_with(
     Ok(plan)
 }
 
-/// What lies where a frame and its maps belong.
+/// The hashes of the files of a frame and its maps, as they lie on disk.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Found {
+pub struct FrameFiles {
     frame: u32,
     /// Hash of the frame's file; `None` where there is none.
     hash: Option<String>,
@@ -115,11 +71,11 @@ pub struct Found {
     maps: Vec<(String, String)>,
 }
 
-/// Whether there are frames that [`prepare`] would read.
+/// Whether there may be frames on disk that [`prepare`] has to read.
 ///
 /// # Errors
 /// The manifest cannot be read.
-pub fn is_worth_a_look(target: &Target) -> Result<bool> {
+pub fn has_frames_to_check(target: &Target) -> Result<bool> {
     if target.overwrite {
         return Ok(false);
     }
@@ -127,18 +83,18 @@ pub fn is_worth_a_look(target: &Target) -> Result<bool> {
     Ok(found.is_some_and(|manifest| manifest.header.first_difference(&target.header).is_none()))
 }
 
-/// Reads whatever lies where `frames` belong.
+/// Reads and hashes the files of `frames`.
 ///
 /// # Errors
 /// A file that is there and cannot be read.
-pub fn look(target: &Target, frames: Range<u32>) -> Result<Vec<Found>> {
-    let found: Vec<Result<Found>> =
-        frames.into_par_iter().map(|frame| look_at(target, frame)).collect();
+pub fn check_files(target: &Target, frames: Range<u32>) -> Result<Vec<FrameFiles>> {
+    let found: Vec<Result<FrameFiles>> =
+        frames.into_par_iter().map(|frame| check_file(target, frame)).collect();
     // Of several faults the first frame's is reported, whichever thread was quicker.
     found.into_iter().collect()
 }
 
-fn look_at(target: &Target, frame: u32) -> Result<Found> {
+fn check_file(target: &Target, frame: u32) -> Result<FrameFiles> {
     let paths = target.paths(frame);
     let hash = |path: &PathBuf| match PathKind::at(path)? {
         PathKind::Nothing => Ok(None),
@@ -154,10 +110,14 @@ fn look_at(target: &Target, frame: u32) -> Result<Found> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         maps.extend(hash(path)?.map(|hash| (name, hash)));
     }
-    Ok(Found { frame, hash: own, maps })
+    Ok(FrameFiles { frame, hash: own, maps })
 }
 
-fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) -> Result<Plan> {
+fn plan(
+    target: &Target,
+    frames: FrameRange,
+    found_on_disk: Option<Vec<FrameFiles>>,
+) -> Result<Plan> {
     let path = manifest_path(&target.pattern);
     let turn = Turn::take(&path)?;
     let found = match Manifest::read(&path) {
@@ -165,7 +125,7 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
         read => read?,
     };
     let Some(manifest) = found else {
-        refuse_strangers(target, frames)?;
+        refuse_unlisted(target, frames)?;
         if !target.overwrite {
             checkpoint::refuse_others(target)?;
         }
@@ -188,7 +148,7 @@ fn plan(target: &Target, frames: FrameRange, found_on_disk: Option<Vec<Found>>) 
         false => {
             let found = match found_on_disk {
                 Some(found) => found,
-                None => look(target, frames.first..frames.last + 1)?,
+                None => check_files(target, frames.first..frames.last + 1)?,
             };
             let files = by_file(&rows);
             let states =
@@ -224,7 +184,7 @@ fn is_made_of(row: &Row, recipe: Option<&Recipe>) -> bool {
     recipe.is_some_and(|recipe| recipe.whole.to_string() == row.recipe)
 }
 
-/// How a frame stands on disk.
+/// The state of a frame on disk.
 #[allow(clippy::large_enum_variant, reason = "most are the large one")]
 enum State {
     Whole(BadSamples, Option<AuditSums>),
@@ -243,8 +203,8 @@ enum Damage {
 }
 
 impl Damage {
-    /// Of frame `first` and so many more, in a line however many they are: of a job that was stopped
-    /// while it replaced frames, all that it did not get to are not in the manifest.
+    /// A line about frame `first` and `more` others: of a job that was stopped while it replaced frames,
+    /// all that it did not get to are not in the manifest.
     fn note(self, first: &Path, more: usize) -> String {
         let why = match (self, more) {
             (Self::Unlisted, 0) => "is not in the manifest",
@@ -261,7 +221,7 @@ impl Damage {
 
 fn state(
     target: &Target,
-    found: &Found,
+    found: &FrameFiles,
     (rows, files): (&BTreeMap<u32, Row>, &HashMap<&str, &Row>),
 ) -> Result<State> {
     let frame = found.frame;
@@ -283,7 +243,7 @@ fn state(
 }
 
 /// Whether all maps of a frame are there, as they were written.
-fn has_maps(found: &Found, row: &Row) -> bool {
+fn has_maps(found: &FrameFiles, row: &Row) -> bool {
     let is_whole = |map: &MapRow| found.maps.contains(&(map.file.clone(), map.blake3.clone()));
     row.maps.len() == Map::ALL.len() && row.maps.iter().all(is_whole)
 }

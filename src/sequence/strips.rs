@@ -4,19 +4,20 @@
 //! bytes are those of [`postcard`], deflated; no file holds them, and the two ends are the same
 //! program.
 
-use super::shared::Strip;
 use crate::error::{Error, Result};
-use crate::film::{Film, GBuffer, PixelSource};
+use crate::film::{Film, GBuffer, Provenance};
 use crate::inference::TracedPoints;
 use crate::math::Rgb;
-use crate::shade::{Progress, Rendered};
+use crate::scene::Settings;
+use crate::shade::Rendered;
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use flate2::Compression;
 use flate2::read::{DeflateDecoder, DeflateEncoder};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Edge of the blocks that frames are traced in, pixels.
 const BLOCK: u32 = 8;
@@ -26,18 +27,43 @@ const BLOCK: u32 = 8;
 struct Content {
     rgb: Vec<Rgb>,
     gbuffer: Option<GBuffer>,
-    pixel_sources: Option<Vec<PixelSource>>,
+    provenance: Option<Vec<Provenance>>,
     bad: BadSamples,
     rays: RayCounts,
     reuse: ReuseCounts,
     sources: TracedPoints,
 }
 
-/// Hears of no tile: a strip is no share of this rank's frames.
-pub struct Unheard;
+/// One of several strips of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Strip {
+    /// Number of the strip, from the top, from 0.
+    pub number: u32,
+    /// How many strips the frame is cut into.
+    pub of: u32,
+    /// Whether other frames are inferred from this one.
+    pub is_source: bool,
+}
 
-impl Progress for Unheard {
-    fn tile_done(&self, _share: f64, _rays: &RayCounts) {}
+/// Frames that were joined from strips, until they are asked for.
+#[derive(Default)]
+pub struct JoinedStrips(Mutex<BTreeMap<u32, Rendered>>);
+
+impl JoinedStrips {
+    /// Joins all `strips` of `frame`, in order.
+    ///
+    /// # Errors
+    /// They are no strips of a frame of the size in `settings`.
+    pub fn join(&self, frame: u32, strips: &[Arc<[u8]>], settings: &Settings) -> Result<()> {
+        let rendered = join(strips, settings.width, settings.height)?;
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(frame, rendered);
+        Ok(())
+    }
+
+    /// The frame, once, if it was joined.
+    pub fn take(&self, frame: u32) -> Option<Rendered> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&frame)
+    }
 }
 
 /// How many strips a frame of `height` rows has at most.
@@ -52,8 +78,9 @@ fn rows(strip: Strip, height: u32) -> Range<u32> {
     edge(strip.number).min(height)..edge(strip.number + 1).min(height)
 }
 
-/// Which pixels of an image of `width` by `height` are in the strip.
-pub fn mask(strip: Strip, width: u32, height: u32) -> Vec<bool> {
+/// Which pixels of a frame are in the strip, row by row.
+pub fn mask(strip: Strip, settings: &Settings) -> Vec<bool> {
+    let Settings { width, height, .. } = *settings;
     let rows = rows(strip, height);
     (0..height).flat_map(|y| std::iter::repeat_n(rows.contains(&y), width as usize)).collect()
 }
@@ -63,11 +90,13 @@ pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
     let Rendered { film, rays, sources, reuse } = rendered;
     let Range { start, end } = rows(strip, film.height);
     let own = film.index(0, start)..film.index(0, end);
+    // The audit is made once the strips are joined.
+    let Film { width: _, height: _, rgb, gbuffer, provenance, audit: _, bad } = film;
     let content = Content {
-        rgb: film.rgb[own.clone()].to_vec(),
-        gbuffer: film.gbuffer.as_ref().map(|g| g.part(own.clone())),
-        pixel_sources: film.sources.as_ref().map(|s| s[own].to_vec()),
-        bad: film.bad,
+        rgb: rgb[own.clone()].to_vec(),
+        gbuffer: gbuffer.map(|g| g.part(own.clone())),
+        provenance: provenance.map(|p| p[own].to_vec()),
+        bad,
         rays,
         reuse,
         sources,
@@ -79,24 +108,25 @@ pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// They are no strips of a frame of this size.
-pub fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
+fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
     let mut film = Film::new(width, height, false);
     film.rgb.clear();
     let (mut rays, mut reuse) = (RayCounts::default(), ReuseCounts::default());
     let mut sources = TracedPoints::default();
     for bytes in strips {
-        let strip: Content = unpack(bytes)?;
-        film.rgb.extend(strip.rgb);
-        if let Some(part) = strip.gbuffer {
+        let Content { rgb, gbuffer, provenance, bad, rays: cast, reuse: counts, sources: points } =
+            unpack(bytes)?;
+        film.rgb.extend(rgb);
+        if let Some(part) = gbuffer {
             film.gbuffer.get_or_insert_with(|| GBuffer::new(0)).append(part);
         }
-        if let Some(part) = strip.pixel_sources {
-            film.sources.get_or_insert_default().extend(part);
+        if let Some(part) = provenance {
+            film.provenance.get_or_insert_default().extend(part);
         }
-        film.bad += strip.bad;
-        rays += strip.rays;
-        reuse += strip.reuse;
-        sources.append(strip.sources);
+        film.bad += bad;
+        rays += cast;
+        reuse += counts;
+        sources.append(points);
     }
     if film.rgb.len() as u64 != u64::from(width) * u64::from(height) {
         return Err(Error::Failed("strips of another rank do not make a frame".into()));
@@ -104,17 +134,16 @@ pub fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
     Ok(Rendered { film, rays, sources, reuse })
 }
 
-/// `value` as bytes for another rank.
-pub fn pack<T: Serialize>(value: &T) -> Result<Vec<u8>> {
-    let raw = postcard::to_stdvec(value).map_err(|e| Error::Failed(format!("cannot pack: {e}")))?;
+fn pack(content: &Content) -> Result<Vec<u8>> {
+    let raw =
+        postcard::to_stdvec(content).map_err(|e| Error::Failed(format!("cannot pack: {e}")))?;
     let mut packed = Vec::new();
     let read = DeflateEncoder::new(&raw[..], Compression::fast()).read_to_end(&mut packed);
     read.map_err(|e| Error::Failed(format!("cannot pack: {e}")))?;
     Ok(packed)
 }
 
-/// What [`pack`] made bytes of.
-pub fn unpack<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> Result<T> {
+fn unpack(bytes: &[u8]) -> Result<Content> {
     let wrong = |e: String| Error::Failed(format!("cannot understand another rank: {e}"));
     let mut raw = Vec::new();
     DeflateDecoder::new(bytes).read_to_end(&mut raw).map_err(|e| wrong(e.to_string()))?;
@@ -124,7 +153,7 @@ pub fn unpack<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> Result<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Provenance;
+    use crate::film::ProvenanceKind;
     use crate::stats::RayKind;
 
     #[test]
@@ -146,14 +175,14 @@ mod tests {
     fn a_frame_of_strips_is_the_frame() {
         let (width, height) = (5, 20);
         let mut film = Film::new(width, height, true);
-        let mut pixel_sources = vec![PixelSource::default(); film.rgb.len()];
+        let mut provenance = vec![Provenance::default(); film.rgb.len()];
         for (i, rgb) in film.rgb.iter_mut().enumerate() {
             *rgb = Rgb::new(i as f32, -0.0, f32::INFINITY);
-            pixel_sources[i].frame = i as u32;
-            pixel_sources[i].provenance = Provenance::Later;
+            provenance[i].frame = i as u32;
+            provenance[i].kind = ProvenanceKind::Later;
         }
         film.gbuffer.iter_mut().for_each(|g| g.depth[7] = 3.5);
-        film.sources = Some(pixel_sources);
+        film.provenance = Some(provenance);
         let rays = RayCounts::of(RayKind::Camera, 3);
         let rendered = |film: &Film| Rendered {
             film: film.clone(),

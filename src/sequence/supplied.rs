@@ -17,27 +17,27 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Largest file that is read.
 const LARGEST: u64 = 2 << 30;
 
-/// How many of those that know much a frame asks, and how many of the others.
+/// How many references with many samples a frame is inferred from, and how many of the others.
 const DENSE: usize = 2;
 const OTHERS: usize = 6;
 
-/// What is known of a supplied reference before it is read again.
+/// A supplied reference without its samples: enough to choose those that serve a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceInfo {
-    /// Where it lies in the list of all files.
+    /// Index of its file in the list of all files.
     pub file: usize,
-    /// Of its content.
+    /// Hash of its content.
     pub hash: [u8; 32],
-    /// Where its camera stands, scene space.
+    /// Eye of its camera, scene space.
     eye: DVec3,
-    /// Where it looks.
+    /// View direction of its camera.
     forward: DVec3,
     /// How many samples it has.
     samples: usize,
 }
 
 impl ReferenceInfo {
-    /// Of what was read from the `file`-th file.
+    /// The info of a reference that was read from the `file`-th file.
     pub fn of(file: usize, hash: [u8; 32], reference: &Reference) -> Self {
         let (eye, forward) = (reference.eye(), reference.forward());
         Self { file, hash, eye, forward, samples: reference.len() }
@@ -47,12 +47,12 @@ impl ReferenceInfo {
 /// Reads a file's reference, and the hash of its content.
 type Read = Box<dyn Fn(&Path) -> Result<(Reference, [u8; 32])> + Send + Sync>;
 
-/// All that is supplied.
+/// The references that are supplied with `--references`, read when a frame needs them.
 pub struct ReferenceCache {
     files: Vec<PathBuf>,
     infos: Vec<ReferenceInfo>,
     read: Read,
-    /// Most memory that references take as long as nobody needs them at this moment, bytes.
+    /// Most memory of references that no frame in work needs, bytes.
     budget: u64,
     held: Mutex<Held>,
 }
@@ -92,7 +92,7 @@ impl ReferenceCache {
         Self { files, infos: Vec::new(), read, budget, held: Mutex::default() }
     }
 
-    /// Looks into the `file`-th file; holds what it read if it `is_kept`.
+    /// Reads the `file`-th file; holds its reference if it `is_kept`.
     ///
     /// # Errors
     /// The file cannot be read, or cannot serve.
@@ -107,8 +107,7 @@ impl ReferenceCache {
         Ok(info)
     }
 
-    /// These serve, of all files, by what was seen in them. Their order counts; those that know nothing
-    /// are left out.
+    /// Sets the references that serve, in an order that frames depend on; those without samples are left out.
     pub fn serve(&mut self, infos: Vec<ReferenceInfo>) {
         self.infos = infos.into_iter().filter(|info| info.samples > 0).collect();
     }
@@ -118,7 +117,7 @@ impl ReferenceCache {
         self.held().most_memory
     }
 
-    /// Those that a frame seen by `camera` (scene space) is inferred from.
+    /// The references that a frame seen by `camera` (scene space) is inferred from.
     ///
     /// # Errors
     /// One of them cannot be read, or has changed.
@@ -164,7 +163,7 @@ impl Held {
         reference
     }
 
-    /// Lets those go that were asked for longest ago.
+    /// Drops the references that were used longest ago.
     fn shrink(&mut self, budget: u64) {
         while self.memory > budget {
             let oldest = self.references.iter().min_by_key(|(_, (last, _))| *last);

@@ -4,139 +4,111 @@ mod exchange;
 mod probing;
 
 use super::checkpoint::Checkpoints;
+use super::context::FrameContext;
+use super::pool::SharedPool;
 use super::pyramid::Pyramid;
-use super::saved::{Keeps, Saved};
-use super::schedule::{ReferencePool, Schedule};
-use super::shared::JoinedStrips;
+use super::schedule::Schedule;
+use super::strips::{self, JoinedStrips};
 use super::supplied::{ReferenceCache, with_supplied};
-use super::{FrameMaker, Made, SaveCost, previous_camera};
+use super::{FrameGraph, FrameMaker, Made, SaveCost};
 use crate::error::{Error, Result};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::output::WriteOptions;
 use crate::reuse::evidence::Finding;
-use crate::reuse::store::{Compatibility, Kept};
+use crate::reuse::store::{Compatibility, ReferenceRecord};
 use crate::reuse::{self, Judged, Lookup, Reference};
-use crate::scene::{Camera, Rect, Shot};
-use crate::shade::{FrameJob, Progress, Rendered, Renderer, Reuse};
+use crate::scene::{Camera, Rect};
+use crate::shade::{FrameJob, Progress, Rendered, Reuse};
 use probing::Probed;
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 /// Infers in-between frames.
 pub struct SurfaceReuse<'a> {
-    /// What traces and shades.
-    pub renderer: Renderer<'a>,
-    /// Where the camera is when.
-    pub shot: &'a Shot,
-    /// The threads that render.
-    pub pool: &'a rayon::ThreadPool,
-    /// Whether films get their first-hit records.
-    pub with_gbuffer: bool,
-    /// Set when the job shall stop.
-    pub stop: &'a AtomicBool,
-    /// Hears of finished tiles.
-    pub progress: &'a dyn Progress,
-    /// Which frames depend on which.
-    pub pyramid: Pyramid,
-    /// Frames of other shots that all frames, key frames too, are inferred from.
+    /// References from other jobs, from which all frames, key frames too, are inferred.
     pub supplied: Option<&'a ReferenceCache>,
-    /// On which terms frames serve later jobs as references; `None` where none is kept.
+    /// What later jobs must have in common to use the references in the frames' files; `None` where files
+    /// hold none.
     pub terms: Option<Compatibility>,
-    /// Where references are kept for a job that goes on after this one; `None` for nowhere.
+    /// Where references are saved for a job that goes on after this one; `None` for nowhere.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
-    /// On which terms frames serve other ranks as references; `None` where there are none.
+    /// The same for references that are sent to other ranks; `None` where there are none.
     pub exchange: Option<Compatibility>,
-    /// Frames that came as strips.
-    laid: JoinedStrips,
-    pub(super) schedule: Schedule,
-    pub(super) channels: Channels,
+    context: FrameContext<'a>,
+    pyramid: Pyramid,
+    schedule: Schedule,
+    channels: Channels,
+    joined: JoinedStrips,
+    references: SharedPool<Arc<Reference>>,
     state: Mutex<State>,
 }
 
 #[derive(Default)]
-pub(super) struct State {
-    pub(super) references: ReferencePool<Arc<Reference>>,
-    /// Originals that were made as references before they were asked for.
+struct State {
+    /// Originals that were made for their references before they were asked for.
     early: BTreeMap<u32, Made>,
-    /// The last original that is asked for again, as its copies are.
+    /// The last original of which a copy is still asked for.
     again: Option<(u32, Made)>,
-    pub(super) saved: Saved,
-    most_memory: u64,
     /// The frame whose probes were rendered last.
     probed: Option<(u32, Arc<Probed>)>,
-    /// References for other ranks, until they are fetched.
-    pub(super) exports: BTreeMap<u32, Arc<[u8]>>,
 }
 
 impl<'a> SurfaceReuse<'a> {
-    /// A maker of frames of `shot`.
+    /// A maker of the frames of `context`, whose key frames `pyramid` names.
     ///
-    /// Errors: those of the shot's cameras.
-    pub fn new(
-        renderer: Renderer<'a>,
-        shot: &'a Shot,
-        pool: &'a rayon::ThreadPool,
-        stop: &'a AtomicBool,
-        progress: &'a dyn Progress,
-        pyramid: Pyramid,
-    ) -> Result<Self> {
-        let channels = reuse::channels(renderer.scene, &renderer.plan, renderer.settings);
+    /// # Errors
+    /// Those of the shot's cameras.
+    pub fn new(context: FrameContext<'a>, pyramid: Pyramid) -> Result<Self> {
+        let renderer = &context.renderer;
+        let channels = reuse::channels(renderer.scene, renderer.settings);
         // Where nothing is worth a lookup every frame is a key frame.
         let pyramid = if channels.is_empty() { Pyramid { segment: 1, ..pyramid } } else { pyramid };
         Ok(Self {
-            renderer,
-            shot,
-            pool,
-            with_gbuffer: false,
-            stop,
-            progress,
             supplied: None,
             terms: None,
             checkpoints: None,
             exchange: None,
-            laid: JoinedStrips::default(),
-            schedule: Schedule::new(pyramid, shot)?,
+            schedule: Schedule::new(pyramid, context.shot)?,
+            context,
             pyramid,
             channels,
+            joined: JoinedStrips::default(),
+            references: SharedPool::default(),
             state: Mutex::default(),
         })
     }
 
-    /// Renders an original from the references that it depends on, which are made first where they
-    /// are not at hand; leaves a reference where one is needed.
-    fn frame(&self, frame: u32) -> Result<Option<Made>> {
-        let camera = self.camera(frame)?;
-        let is_due = self.with_state(|s| s.references.is_due(frame));
-        let Some(references) = self.references(&self.schedule.ancestors(frame))? else {
-            return Ok(None);
+    /// Makes an original from the references that it needs, which are made first where they are not at
+    /// hand; keeps its own reference where one is due.
+    fn frame(&self, frame: u32) -> Result<Made> {
+        let camera = self.context.camera(frame)?;
+        let is_due = self.references.lock().is_due(frame);
+        let references = self.references(&self.schedule.ancestors(frame))?;
+        let mut rendered = match self.joined.take(frame) {
+            Some(rendered) => rendered,
+            None => self.rendered(frame, is_due, None, self.context.progress)?,
         };
-        let rendered = match self.laid.take(frame) {
-            Some(rendered) => Some(rendered),
-            None => self.rendered(frame, is_due, None, self.progress)?,
-        };
-        let Some(mut rendered) = rendered else { return Ok(None) };
-        let Some(probed) = self.probes(frame, &camera, &references)? else { return Ok(None) };
+        let probed = self.probes(frame, &camera, &references)?;
         let mut audit = None;
         let mut findings = &[][..];
         if let Some(probed) = &probed {
-            let shown = self.show_probes(frame, &camera, &references, probed, &mut rendered)?;
-            let Some(shown) = shown else { return Ok(None) };
-            (audit, findings) = (shown, &probed.findings);
+            audit = self.show_probes(frame, &camera, &references, probed, &mut rendered)?;
+            findings = &probed.findings;
         }
         let Rendered { film, rays, reuse, sources } = rendered;
         // In one order, however the frame was cut for tracing, and as they come back from a file.
-        let sources = self.pool.install(|| sources.in_rows());
+        let sources = self.context.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources, findings);
         if is_due {
-            let own = camera.to_scene(&self.renderer.scene.recentring);
+            let own = camera.to_scene(&self.context.renderer.scene.recentring);
             let channels = self.channels.len();
-            let reference = self.pool.install(|| Reference::new(frame, &own, &sources, channels));
-            let reference = reference.with_findings(findings.to_vec());
-            self.with_state(|s| s.keep(&self.schedule, frame, reference));
-            self.leave(frame, &camera, (&sources, findings), kept.as_ref());
+            let new = || Reference::new(frame, &own, &sources, channels);
+            let reference = self.context.pool.install(new).with_findings(findings.to_vec());
+            self.keep(frame, reference);
+            self.save_later(frame, &camera, (&sources, findings), kept.as_ref());
         }
-        Ok(Some(Made { film, rays, reuse, audit, reference: kept }))
+        Ok(Made { film, rays, reuse, audit, reference: kept })
     }
 
     /// Renders the pixels of an original that `mask` names, or all, but for its probes.
@@ -146,66 +118,57 @@ impl<'a> SurfaceReuse<'a> {
         is_due: bool,
         mask: Option<&[bool]>,
         progress: &dyn Progress,
-    ) -> Result<Option<Rendered>> {
-        let Some(references) = self.references(&self.schedule.ancestors(frame))? else {
-            return Ok(None);
-        };
-        let camera = self.camera(frame)?;
-        let Some(probed) = self.probes(frame, &camera, &references)? else { return Ok(None) };
+    ) -> Result<Rendered> {
+        let references = self.references(&self.schedule.ancestors(frame))?;
+        let camera = self.context.camera(frame)?;
+        let probed = self.probes(frame, &camera, &references)?;
         let others = probed.as_ref().map(|probed| probed.others(mask));
-        let job = FrameJob {
-            camera: &camera,
-            stream: frame,
-            with_gbuffer: self.with_gbuffer,
-            reuse: None,
-            mask: others.as_deref().or(mask),
-            beyond_crop: is_due,
-        };
-        let Some(probed) = probed.filter(|probed| probed.is_worth_looking) else {
-            return Ok(self.render(job, None, progress));
+        let mask = others.as_deref().or(mask);
+        let job = FrameJob { mask, beyond_crop: is_due, ..self.context.job(frame, &camera) };
+        let Some(probed) = probed.filter(|probed| probed.is_worth_lookups) else {
+            return self.render(job, None, progress);
         };
         self.with_lookup((frame, &camera), &references, |lookup| {
             let evidence = |_| &probed.evidence;
-            let tolerance = self.renderer.settings.reuse.tolerance;
+            let tolerance = self.context.renderer.settings.reuse.tolerance;
             let judged =
                 lookup.as_ref().map(|lookup| Judged { lookup, evidence: &evidence, tolerance });
             self.render(job, judged.as_ref().map(|judged| judged as &dyn Inference), progress)
         })
     }
 
-    /// The probes of an original; the inner `None` where nothing can be inferred, the outer one when the
-    /// job shall stop.
+    /// The probes of an original; `None` where nothing can be inferred.
     fn probes(
         &self,
         frame: u32,
         camera: &Camera,
         references: &[Arc<Reference>],
-    ) -> Result<Option<Option<Arc<Probed>>>> {
-        if self.renderer.settings.reuse.probes == 0.0 {
-            return Ok(Some(None));
+    ) -> Result<Option<Arc<Probed>>> {
+        if self.context.renderer.settings.reuse.probes == 0.0 {
+            return Ok(None);
         }
         self.with_lookup((frame, camera), references, |lookup| {
-            lookup.map_or(Some(None), |lookup| self.probe(frame, camera, &lookup).map(Some))
+            lookup.map(|lookup| self.probe(frame, camera, &lookup)).transpose()
         })
     }
 
-    /// Lets `act` use what `references`, and those of other shots, tell about `frame`, which `camera` sees;
-    /// `None` where there is none.
+    /// Calls `act` with the lookup of `frame`, which `camera` (world space) sees, in `references` and in
+    /// those of other jobs; with `None` where there are no references.
     fn with_lookup<T>(
         &self,
         (frame, camera): (u32, &Camera),
         references: &[Arc<Reference>],
-        act: impl FnOnce(Option<Lookup>) -> T,
+        act: impl FnOnce(Option<Lookup>) -> Result<T>,
     ) -> Result<T> {
-        let own = camera.to_scene(&self.renderer.scene.recentring);
+        let own = camera.to_scene(&self.context.renderer.scene.recentring);
         let references = references.iter().map(|r| &**r).filter(|r| !r.is_empty()).collect();
-        let nearest = |cache: &ReferenceCache| self.pool.install(|| cache.nearest(&own));
+        let nearest = |cache: &ReferenceCache| self.context.pool.install(|| cache.nearest(&own));
         let supplied = self.supplied.map_or(Ok(Vec::new()), nearest)?;
         let references = with_supplied(references, &supplied);
-        let settings = self.renderer.settings;
+        let settings = self.context.renderer.settings;
         let rays: Vec<u32> = self.channels.iter().map(|c| reuse::rays_of(c, settings)).collect();
         let lookup = Lookup { frame, references: &references, rays: &rays };
-        Ok(act((!references.is_empty()).then_some(lookup)))
+        act((!references.is_empty()).then_some(lookup))
     }
 
     fn render(
@@ -213,13 +176,13 @@ impl<'a> SurfaceReuse<'a> {
         job: FrameJob,
         inference: Option<&dyn Inference>,
         progress: &dyn Progress,
-    ) -> Option<Rendered> {
+    ) -> Result<Rendered> {
         let reuse = Reuse { channels: &self.channels, inference };
-        let job = FrameJob { reuse: (!self.channels.is_empty()).then_some(reuse), ..job };
-        self.pool.install(|| self.renderer.render_job(&job, self.stop, progress))
+        let reuse = (!self.channels.is_empty()).then_some(reuse);
+        self.context.render(&FrameJob { reuse, ..job }, progress)
     }
 
-    /// What the file of `frame` keeps for later jobs.
+    /// The reference that the file of `frame` holds for later jobs.
     fn kept(
         &self,
         frame: u32,
@@ -227,11 +190,11 @@ impl<'a> SurfaceReuse<'a> {
         traced: &TracedPoints,
         findings: &[Finding],
     ) -> Option<Arc<[u8]>> {
-        let crop = self.renderer.settings.crop;
+        let crop = self.context.renderer.settings.crop;
         self.encode(self.terms.as_ref()?, frame, camera, crop, (traced, findings))
     }
 
-    pub(super) fn encode(
+    fn encode(
         &self,
         terms: &Compatibility,
         frame: u32,
@@ -239,131 +202,179 @@ impl<'a> SurfaceReuse<'a> {
         crop: Option<Rect>,
         (traced, findings): (&TracedPoints, &[Finding]),
     ) -> Option<Arc<[u8]>> {
-        let settings = &WriteOptions::of(self.renderer.settings, None).settings;
-        let kept = Kept { terms, frame, camera, crop, traced, findings, settings };
-        self.pool.install(|| kept.encode()).map(Into::into)
-    }
-
-    pub(super) fn camera(&self, frame: u32) -> Result<Camera> {
-        let settings = self.renderer.settings;
-        self.shot.camera(frame, settings.width, settings.height)
+        let settings = &WriteOptions::of(self.context.renderer.settings, None).settings;
+        let record = ReferenceRecord { terms, frame, camera, crop, traced, findings, settings };
+        self.context.pool.install(|| record.encode()).map(Into::into)
     }
 
     /// The references of `originals`, all of them in use.
-    fn references(&self, originals: &[u32]) -> Result<Option<Vec<Arc<Reference>>>> {
+    fn references(&self, originals: &[u32]) -> Result<Vec<Arc<Reference>>> {
         originals.iter().map(|original| self.reference(*original)).collect()
     }
 
-    /// The reference of an original, which is in use.
-    fn reference(&self, frame: u32) -> Result<Option<Arc<Reference>>> {
-        if let Some(found) = self.with_state(|s| s.references.get(frame).cloned()) {
-            return Ok(Some(found));
+    /// The reference of an original, which is in use: from memory, from disk, or made.
+    fn reference(&self, frame: u32) -> Result<Arc<Reference>> {
+        let found = self.references.lock().get(frame).cloned();
+        if let Some(found) = found.or_else(|| self.read_from_disk(frame)) {
+            return Ok(found);
         }
-        if let Some(found) = self.left_on_disk(frame) {
-            return Ok(Some(found));
+        let made = self.frame(frame)?;
+        let pool = self.references.lock();
+        if pool.asked(frame) > 0 {
+            self.with_state(|s| s.early.insert(frame, made));
         }
-        let Some(made) = self.frame(frame)? else { return Ok(None) };
-        self.with_state(|s| {
-            if s.references.asked(frame) > 0 {
-                s.early.insert(frame, made);
-            }
-            match s.references.get(frame) {
-                Some(reference) => Ok(Some(reference.clone())),
-                None => Err(Error::Failed(format!("the reference of frame {frame} is lost"))),
-            }
-        })
+        let lost = || Error::Failed(format!("the reference of frame {frame} is lost"));
+        pool.get(frame).cloned().ok_or_else(lost)
     }
 
-    fn hand_out(&self, original: u32, made: Made) -> Result<Made> {
-        self.with_state(|s| s.hand_out(&self.schedule, original, &made));
-        self.put_away(false);
-        Ok(made)
+    /// The reference of an original that an earlier run saved. Not where the original itself is asked for:
+    /// then it is made anyway.
+    fn read_from_disk(&self, frame: u32) -> Option<Arc<Reference>> {
+        let checkpoints = self.checkpoints?;
+        if self.references.lock().asked(frame) > 0 {
+            return None;
+        }
+        let (reference, bytes) = self.context.pool.install(|| checkpoints.read(frame))?;
+        self.keep(frame, reference);
+        let mut pool = self.references.lock();
+        pool.note_on_disk(frame);
+        if self.exchange.is_some() {
+            pool.set_export(frame, bytes);
+        }
+        pool.get(frame).cloned()
     }
 
-    /// With what `frame` does not share with its original: its motion.
-    fn finished(&self, frame: u32, mut made: Made) -> Result<Made> {
-        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
-        let camera = self.camera(frame)?;
-        let film = &mut made.film;
-        self.pool.install(|| self.renderer.note_motion(&camera, previous.as_ref(), film));
-        Ok(made)
+    /// Keeps a reference in memory where it is due.
+    fn keep(&self, frame: u32, reference: Reference) {
+        let mut pool = self.references.lock();
+        pool.keep(&self.schedule, frame, || Arc::new(reference));
+        pool.note_memory(memory);
     }
 
-    pub(super) fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
+    /// Keeps the new reference of a frame as bytes too where they may be wanted: for other ranks, and on disk.
+    /// Only those of key frames are saved there: they are expensive, and serve long. The others would take
+    /// more time to write, one after every other frame, than the few of them that are lost take to be made
+    /// again. `kept` is the reference that the frame's file will hold.
+    fn save_later(
+        &self,
+        frame: u32,
+        camera: &Camera,
+        traced: (&TracedPoints, &[Finding]),
+        kept: Option<&Arc<[u8]>>,
+    ) {
+        let saves = |c: &&Checkpoints| c.every.is_some() && self.pyramid.is_key(frame);
+        let saved = self.checkpoints.filter(saves);
+        let Some(terms) = self.exchange.as_ref().or(saved.map(|c| c.terms)) else {
+            return;
+        };
+        let start = Instant::now();
+        // A cropped frame's file holds less.
+        let bytes = match kept.filter(|_| self.context.renderer.settings.crop.is_none()) {
+            Some(bytes) => Some(Arc::clone(bytes)),
+            None => self.encode(terms, frame, camera, None, traced),
+        };
+        let Some(bytes) = bytes else { return };
+        let mut pool = self.references.lock();
+        if self.exchange.is_some() {
+            pool.set_export(frame, Arc::clone(&bytes));
+        }
+        if saved.is_some() {
+            pool.set_unsaved(frame, Some(bytes));
+            pool.save_cost.seconds += start.elapsed().as_secs_f64();
+            drop(pool);
+            self.save(false);
+        }
+    }
+
+    fn save(&self, is_stopping: bool) {
+        self.references.save(self.checkpoints, is_stopping, |bytes| Some(Arc::clone(bytes)));
+    }
+
+    fn with_state<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
         act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
+/// Bytes of a reference and of what is to be written of it.
+fn memory(reference: &Arc<Reference>, unsaved: Option<&Arc<[u8]>>) -> u64 {
+    reference.memory() + unsaved.map_or(0, |bytes| bytes.len() as u64)
+}
+
 impl State {
-    pub(super) fn keep(&mut self, schedule: &Schedule, frame: u32, reference: Reference) {
-        self.references.keep(schedule, frame, || Arc::new(reference));
-        self.note_memory();
+    /// A copy of an original that was handed out already, or the original where it was made early.
+    fn take(&mut self, original: u32) -> Option<Made> {
+        let early = self.early.remove(&original);
+        let again = self.again.as_ref().filter(|(other, _)| *other == original);
+        again.map(|(_, made)| made.copy()).or(early)
     }
 
-    /// Takes in a reference that another rank made.
-    fn take(&mut self, frame: u32, reference: Reference) {
-        self.references.take(frame, Arc::new(reference));
-        self.note_memory();
-    }
-
-    fn note_memory(&mut self) {
-        let held: u64 = self.references.held().map(|r| r.memory()).sum();
-        self.most_memory = self.most_memory.max(held + self.saved.memory());
-    }
-
-    /// One more of an original that went out already.
-    fn copy_of(&self, frame: u32) -> Option<Made> {
-        self.again.as_ref().filter(|(other, _)| *other == frame).map(|(_, made)| made.copy())
-    }
-
-    /// An original goes out; it is held while the next copy of it may follow.
-    fn hand_out(&mut self, schedule: &Schedule, frame: u32, made: &Made) {
-        self.references.done(schedule, frame);
-        let is_held = self.again.as_ref().is_some_and(|(other, _)| *other == frame);
-        if self.references.asked(frame) == 0 {
-            self.again = self.again.take().filter(|(other, _)| *other != frame);
-        } else if !is_held {
-            self.again = Some((frame, made.copy()));
+    /// Notes that an original was handed out and is asked for `asked` times more: it is held while the next
+    /// copy of it may follow.
+    fn hand_out(&mut self, original: u32, made: &Made, asked: u32) {
+        let is_held = self.again.as_ref().is_some_and(|(other, _)| *other == original);
+        if asked == 0 && is_held {
+            self.again = None;
+        } else if asked > 0 && !is_held {
+            self.again = Some((original, made.copy()));
         }
     }
 }
 
-impl FrameMaker for SurfaceReuse<'_> {
-    fn make(&self, frame: u32) -> Result<Option<Made>> {
-        let original = self.schedule.original(frame);
-        let made = self.with_state(|s| {
-            if s.references.asked(original) == 0 {
-                s.references.expect(&self.schedule, &[frame]);
-            }
-            (s.early.remove(&original), s.copy_of(original))
-        });
-        let made = match made {
-            (_, Some(copy)) => {
-                return self.finished(frame, self.hand_out(original, copy)?).map(Some);
-            }
-            (Some(made), None) => made,
-            (None, None) => match self.frame(original)? {
-                Some(made) => made,
-                None => return Ok(None),
-            },
-        };
-        if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
-            // Its own file is about to hold it.
-            self.with_state(|s| s.saved.has_file(original));
-        }
-        self.finished(frame, self.hand_out(original, made)?).map(Some)
+impl FrameGraph for SurfaceReuse<'_> {
+    fn original(&self, frame: u32) -> u32 {
+        self.schedule.original(frame)
+    }
+
+    fn needs(&self, original: u32) -> Vec<u32> {
+        self.schedule.ancestors(original)
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         self.pyramid.batches(frames)
     }
 
+    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+        self.pyramid.rank_batches(originals)
+    }
+
+    fn is_on_disk(&self, original: u32) -> bool {
+        self.checkpoints.is_some_and(|c| c.has(original))
+    }
+
+    fn most_strips(&self) -> u32 {
+        strips::most(self.context.renderer.settings.height)
+    }
+}
+
+impl FrameMaker for SurfaceReuse<'_> {
+    fn make(&self, frame: u32) -> Result<Made> {
+        let original = self.schedule.original(frame);
+        self.references.lock().expect_once(&self.schedule, frame);
+        let mut made = match self.with_state(|s| s.take(original)) {
+            Some(made) => made,
+            None => self.frame(original)?,
+        };
+        let mut pool = self.references.lock();
+        if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
+            // Its own file is about to hold it.
+            pool.set_unsaved(original, None);
+        }
+        pool.done(&self.schedule, original);
+        let asked = pool.asked(original);
+        drop(pool);
+        self.with_state(|s| s.hand_out(original, &made, asked));
+        self.save(false);
+        // What a frame does not share with its original.
+        self.context.note_motion(frame, &mut made.film)?;
+        Ok(made)
+    }
+
     fn expect(&self, frames: &[u32]) {
-        self.with_state(|s| s.references.expect(&self.schedule, frames));
+        self.references.lock().expect(&self.schedule, frames);
     }
 
     fn stopped(&self) {
-        self.put_away(true);
+        self.save(true);
     }
 
     fn notes(&self) -> Vec<String> {
@@ -371,11 +382,11 @@ impl FrameMaker for SurfaceReuse<'_> {
     }
 
     fn save_cost(&self) -> SaveCost {
-        self.with_state(|s| s.saved.cost)
+        self.references.lock().save_cost
     }
 
     fn reference_memory(&self) -> u64 {
         let supplied = self.supplied.map_or(0, ReferenceCache::most_memory);
-        supplied + self.with_state(|s| s.most_memory)
+        supplied + self.references.lock().most_memory
     }
 }

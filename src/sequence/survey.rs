@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
-/// Frames of a sequence by how they stand; each list ascends.
+/// The frames of a sequence by their state on disk; each list ascends.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Survey {
     /// Where its frames lie, as a pattern.
@@ -34,7 +34,7 @@ pub struct Survey {
     pub beyond: Vec<u32>,
 }
 
-/// How the sequence of the manifest at `path` stands. `range` picks frames from its shot's number of
+/// The state of the frames in the manifest at `path`. `range` picks frames from its shot's number of
 /// frames; without it all are asked about.
 ///
 /// Errors: there is no manifest, or none that can be read; `range`'s.
@@ -56,14 +56,15 @@ pub fn survey_of(
     let FrameRange { first, last } = range(manifest.header.shot_frames)?;
     let files = folder.join(&manifest.header.files).display().to_string();
     let pattern = FramePattern::parse(&files, last - first + 1)?;
-    let stand = |frame| Ok((frame, stands(&pattern, folder, frame, manifest)?));
-    let frames: Vec<Result<(u32, Stands)>> = (first..=last).into_par_iter().map(stand).collect();
+    let stand = |frame| Ok((frame, state_of(&pattern, folder, frame, manifest)?));
+    let frames: Vec<Result<(u32, FrameState)>> =
+        (first..=last).into_par_iter().map(stand).collect();
     let frames = frames.into_iter().collect::<Result<Vec<_>>>()?;
-    let any = |wanted: &[Stands]| -> Vec<u32> {
+    let any = |wanted: &[FrameState]| -> Vec<u32> {
         frames.iter().filter(|(_, s)| wanted.contains(s)).map(|(f, _)| *f).collect()
     };
     let all = |wanted| any(&[wanted]);
-    let done = all(Stands::Done);
+    let done = all(FrameState::Done);
     let beyond = manifest.rows.values().filter(|row| row.frame > manifest.header.shot_frames);
     let is_there = |row: &&Row| folder.join(&row.file).exists();
     Ok(Survey {
@@ -71,17 +72,17 @@ pub fn survey_of(
         complete: done.len() == frames.len(),
         total: last - first + 1,
         done,
-        missing: all(Stands::Missing),
-        damaged: any(&[Stands::Damaged, Stands::WithoutMap]),
-        without_map: all(Stands::WithoutMap),
-        other_settings: all(Stands::Foreign(Foreign::OtherSettings)),
-        other_move: all(Stands::Foreign(Foreign::OtherMove)),
+        missing: all(FrameState::Missing),
+        damaged: any(&[FrameState::Damaged, FrameState::WithoutMap]),
+        without_map: all(FrameState::WithoutMap),
+        other_settings: all(FrameState::Foreign(Foreign::OtherSettings)),
+        other_move: all(FrameState::Foreign(Foreign::OtherMove)),
         beyond: beyond.filter(is_there).map(|row| row.frame).collect(),
     })
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Stands {
+enum FrameState {
     Done,
     Missing,
     Damaged,
@@ -89,27 +90,27 @@ enum Stands {
     Foreign(Foreign),
 }
 
-fn stands(
+fn state_of(
     pattern: &FramePattern,
     folder: &Path,
     frame: u32,
     manifest: &Manifest,
-) -> Result<Stands> {
+) -> Result<FrameState> {
     let path = pattern.path(frame);
     let Some(row) = manifest.rows.get(&frame) else {
-        return Ok(if path.exists() { Stands::Damaged } else { Stands::Missing });
+        return Ok(if path.exists() { FrameState::Damaged } else { FrameState::Missing });
     };
     let Some(is_whole) = is_whole(&path, Some(row.bytes), &row.blake3)? else {
-        return Ok(Stands::Missing);
+        return Ok(FrameState::Missing);
     };
     let same_name = path.file_name().is_some_and(|name| name == row.file.as_str());
     let maps = row.maps.iter().map(|map| is_whole_map(folder, map));
     let with_maps = maps.collect::<Result<Vec<bool>>>()?;
     Ok(match row.stray {
-        Some(stray) => Stands::Foreign(stray),
-        None if !same_name || !is_whole => Stands::Damaged,
-        None if with_maps.iter().all(|m| *m) => Stands::Done,
-        None => Stands::WithoutMap,
+        Some(stray) => FrameState::Foreign(stray),
+        None if !same_name || !is_whole => FrameState::Damaged,
+        None if with_maps.iter().all(|m| *m) => FrameState::Done,
+        None => FrameState::WithoutMap,
     })
 }
 
@@ -121,7 +122,7 @@ pub fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
     Ok(is_whole(&folder.join(&map.file), None, &map.blake3)? == Some(true))
 }
 
-/// Whether what lies there is a file of so many bytes with this hash; `None` where nothing does.
+/// Whether `path` is a file of so many `bytes` with this hash; `None` where nothing is there.
 fn is_whole(path: &Path, bytes: Option<u64>, hash: &str) -> Result<Option<bool>> {
     let file = match PathKind::at(path)? {
         PathKind::Nothing => return Ok(None),

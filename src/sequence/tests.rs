@@ -1,10 +1,11 @@
 //! Sequences on disk, with a maker that needs no scene.
 
 use super::*;
+use crate::film::Film;
 use crate::math::DVec3;
 use crate::output::manifest::{FORMAT, Foreign, Header, Manifest, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
-use crate::scene::{CameraPath, Easing, FrameRange, KeyPose, Pose, Settings};
+use crate::scene::{CameraPath, FrameRange, KeyPose, Pose, Settings, Shot};
 use crate::stats::RayKind;
 use std::cell::RefCell;
 use std::fs;
@@ -19,16 +20,18 @@ struct Plain {
     made: RefCell<Vec<u32>>,
 }
 
+impl FrameGraph for Plain {}
+
 impl FrameMaker for Plain {
-    fn make(&self, frame: u32) -> Result<Option<Made>> {
+    fn make(&self, frame: u32) -> Result<Made> {
         if frame == self.stop_before {
-            return Ok(None);
+            return Err(Error::Stopped);
         }
         self.made.borrow_mut().push(frame);
         let mut film = Film::new(4, 2, false);
         film.rgb[0].x = frame as f32 / 255.0 * self.settings.exposure;
         let rays = RayCounts::of(RayKind::Camera, 8);
-        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
+        Ok(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None })
     }
 }
 
@@ -90,7 +93,7 @@ fn shot(frames: u32) -> Shot {
         KeyPose { at: f64::from(i) / f64::from(frames - 1), pose }
     };
     let path = CameraPath::Keys((0..frames).map(key).collect());
-    Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+    Shot::new(path, frames, 40.0)
 }
 
 fn recipes(shot: &Shot, settings: &Settings) -> Recipes {

@@ -1,86 +1,60 @@
 //! The maker that traces every frame on its own.
 
-use super::shared::{JoinedStrips, Shared, Strip};
-use super::strips::{self, Unheard};
-use super::{FrameMaker, Made, previous_camera};
+use super::context::FrameContext;
+use super::strips::{self, JoinedStrips, Strip};
+use super::{FrameGraph, FrameMaker, Made, RankMaker};
 use crate::error::Result;
-use crate::scene::{Camera, Settings, Shot};
-use crate::shade::{FrameJob, Progress, Rendered, Renderer};
+use crate::shade::{FrameJob, Progress, Rendered};
 use crate::stats::ReuseCounts;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Traces each frame through the shot's camera.
 pub struct Tracer<'a> {
-    /// What renders a film.
-    pub renderer: Renderer<'a>,
-    /// Where the camera is when.
-    pub shot: &'a Shot,
-    /// The threads that render.
-    pub pool: &'a rayon::ThreadPool,
-    /// Whether films get their first-hit records.
-    pub with_gbuffer: bool,
-    /// Set when the job shall stop.
-    pub stop: &'a AtomicBool,
-    /// Hears of finished tiles.
-    pub progress: &'a dyn Progress,
-    /// Frames that came as strips.
-    pub laid: JoinedStrips,
+    context: FrameContext<'a>,
+    joined: JoinedStrips,
 }
 
-impl Tracer<'_> {
+impl<'a> Tracer<'a> {
+    /// A maker of the frames of `context`.
+    pub fn new(context: FrameContext<'a>) -> Self {
+        Self { context, joined: JoinedStrips::default() }
+    }
+
     fn render(
         &self,
-        camera: &Camera,
         frame: u32,
         mask: Option<&[bool]>,
         progress: &dyn Progress,
-    ) -> Option<Rendered> {
-        let job = FrameJob {
-            camera,
-            stream: frame,
-            with_gbuffer: self.with_gbuffer,
-            reuse: None,
-            mask,
-            beyond_crop: false,
-        };
-        self.pool.install(|| self.renderer.render_job(&job, self.stop, progress))
+    ) -> Result<Rendered> {
+        let camera = self.context.camera(frame)?;
+        self.context.render(&FrameJob { mask, ..self.context.job(frame, &camera) }, progress)
     }
+}
 
-    fn camera(&self, frame: u32) -> Result<Camera> {
-        let settings = self.renderer.settings;
-        self.shot.camera(frame, settings.width, settings.height)
+impl FrameGraph for Tracer<'_> {
+    fn most_strips(&self) -> u32 {
+        strips::most(self.context.renderer.settings.height)
     }
 }
 
 impl FrameMaker for Tracer<'_> {
-    fn make(&self, frame: u32) -> Result<Option<Made>> {
-        let camera = self.camera(frame)?;
-        let laid = self.laid.take(frame);
-        let rendered = laid.or_else(|| self.render(&camera, frame, None, self.progress));
-        let Some(Rendered { mut film, rays, .. }) = rendered else { return Ok(None) };
-        let previous = previous_camera(self.shot, frame, self.renderer.settings)?;
-        let note = || self.renderer.note_motion(&camera, previous.as_ref(), &mut film);
-        self.pool.install(note);
-        Ok(Some(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None }))
+    fn make(&self, frame: u32) -> Result<Made> {
+        let Rendered { mut film, rays, .. } = match self.joined.take(frame) {
+            Some(rendered) => rendered,
+            None => self.render(frame, None, self.context.progress)?,
+        };
+        self.context.note_motion(frame, &mut film)?;
+        Ok(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None })
     }
 }
 
-impl Shared for Tracer<'_> {
-    fn most_strips(&self) -> u32 {
-        strips::most(self.renderer.settings.height)
+impl RankMaker for Tracer<'_> {
+    fn render_strip(&self, original: u32, strip: Strip) -> Result<Vec<u8>> {
+        let mask = strips::mask(strip, self.context.renderer.settings);
+        strips::encode(self.render(original, Some(&mask), &())?, strip)
     }
 
-    fn strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
-        let camera = self.camera(original)?;
-        let mask = strips::mask(strip, camera.width, camera.height);
-        let rendered = self.render(&camera, original, Some(&mask), &Unheard);
-        rendered.map(|rendered| strips::encode(rendered, strip)).transpose()
-    }
-
-    fn lay(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
-        let Settings { width, height, .. } = *self.renderer.settings;
-        self.laid.put(original, strips::join(strips, width, height)?);
-        Ok(())
+    fn join_strips(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+        self.joined.join(original, strips, self.context.renderer.settings)
     }
 }

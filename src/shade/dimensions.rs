@@ -3,9 +3,12 @@
 //! A pair of random numbers is a function of seed, frame, pixel, sample and dimension
 //! ([`PixelSampler`](crate::sampling::PixelSampler)). Two uses of one pixel's sampler never share a dimension.
 
-/// The place of a camera sample in its pixel: the only use of the film's own sampler, which does not depend
-/// on the frame.
+/// The place of a camera sample in its pixel. This and [`LENS`] are of the film's own sampler, which does not
+/// depend on the frame; all others are of the frame's.
 pub(super) const FILM: u32 = 0;
+
+/// Where a camera sample passes the lens.
+pub(super) const LENS: u32 = 1;
 
 /// A light as seen from the end of a branch of a path: `light` is its number among the scene's `lights`, the
 /// sky last.

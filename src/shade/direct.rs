@@ -7,53 +7,15 @@
 use super::groups::{CheckRays, Groups};
 use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
 use super::pixels::BlockPixels;
+use super::point::{SamplePlace, ShadingPoint};
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance};
 use crate::scene::{Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
-use std::f32::consts::FRAC_1_PI;
 
 /// Shadow rays traced together.
 const BATCH: usize = 256;
-
-/// Which camera sample and which branch of its tree a point belongs to.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SamplePlace {
-    pub pixel: u32,
-    pub sample: u32,
-    pub branch: u32,
-}
-
-/// A diffuse point that waits for light.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct ShadingPoint {
-    pub si: SurfaceInteraction,
-    /// What hit it.
-    pub ray: Ray,
-    hit: Hit,
-    /// Geometric normal on the viewer's side.
-    ng: DVec3,
-    /// Shading normal on the viewer's side.
-    pub n: DVec3,
-    /// Radiance towards the camera per unit of irradiance.
-    weight: Rgb,
-    pub place: SamplePlace,
-}
-
-impl ShadingPoint {
-    /// The point `si` where `ray` hit, seen from `wo`, whose reflected light reaches the camera
-    /// times `reflectance`.
-    pub fn new(
-        (si, ray, hit): (&SurfaceInteraction, &Ray, &Hit),
-        wo: DVec3,
-        reflectance: Rgb,
-        place: SamplePlace,
-    ) -> Self {
-        let (n, ng) = if si.is_outside(wo) { (si.ns, si.ng) } else { (-si.ns, -si.ng) };
-        Self { si: *si, ray: *ray, hit: *hit, ng, n, weight: reflectance * FRAC_1_PI, place }
-    }
-}
 
 /// Where shadow rays leave a shading point.
 #[derive(Debug, Clone, Copy)]

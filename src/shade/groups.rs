@@ -1,14 +1,15 @@
 //! The shading points of one chunk as reuse sees them: camera samples of a pixel that end on one surface
 //! are one surface point.
 //!
-//! Points behind mirrors and glass stay apart, since neighbouring samples may end far from one
-//! another there. What is traced is gathered per surface point and becomes a source.
+//! Points behind mirrors and glass and points out of focus stay apart, since neighbouring samples may end far from
+//! one another there. What is traced is gathered per surface point and becomes a source.
 
-use super::direct::ShadingPoint;
 use super::pixels::{BLOCK, BlockPixels};
+use super::point::ShadingPoint;
 use super::{FrameInput, Reuse};
+use crate::film::Provenance;
 use crate::inference::{
-    Checked, Estimate, LookupBatch, Origin, SurfacePoint, TracedPoint, TracedPoints, check_rays,
+    Checked, Estimate, LookupBatch, SurfacePoint, TracedPoint, TracedPoints, check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -152,8 +153,8 @@ impl Groups {
         let (count, channels) = (self.asked.points.len(), reuse.channels.len());
         self.asked.ratios.clear();
         self.asked.ratios.resize(count * channels, f32::NAN);
-        self.asked.origins.clear();
-        self.asked.origins.resize(count, Origin::default());
+        self.asked.provenance.clear();
+        self.asked.provenance.resize(count, Provenance::default());
         self.asked.pixels.clear();
         let place = |pixel: &u32| <[u32; 2]>::from(pixels.place(*pixel));
         self.asked.pixels.extend(self.pixels.iter().map(place));
@@ -379,8 +380,8 @@ impl Groups {
             };
             *lit += 1;
             *inferred += u64::from(!self.traced[i]);
-            let origin = (!self.traced[i]).then_some(&self.asked.origins[i]);
-            pixels.set_origin(self.pixels[i], origin);
+            let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
+            pixels.join_provenance(self.pixels[i], inferred);
             if self.traced[i] {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });
@@ -413,12 +414,13 @@ fn neighbours(cell: usize) -> impl Iterator<Item = usize> {
 impl ShadingPoint {
     /// The point as reuse sees it.
     fn surface_point(&self, input: &FrameInput) -> SurfacePoint {
-        let direct = self.place.branch == 1;
+        let is_first = self.place.branch == 1;
         // Behind mirrors a first guess, as if they were flat.
-        let along = match direct {
+        let along = match is_first {
             true => (self.si.p - input.camera.eye).dot(input.camera.forward),
             false => (self.si.p - input.camera.eye).length(),
         };
+        let direct = is_first && input.camera.is_in_focus(along);
         let cos = -self.ray.dir.dot(self.n) / self.ray.dir.length();
         SurfacePoint {
             p: self.si.p,

@@ -5,10 +5,11 @@
 //! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
-use super::direct::{ShadingPoint, ShadowScratch};
+use super::direct::ShadowScratch;
 use super::medium_stack::{self, MediumStack};
 use super::optics;
 use super::pixels::BlockPixels;
+use super::point::{SamplePlace, ShadingPoint};
 use super::surface::{albedo, emitted};
 use super::{FrameInput, Left, Renderer};
 use crate::film::GPixel;
@@ -52,6 +53,18 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
+    /// Notes the bodies of ranked glass around each camera ray's start.
+    fn start_interiors(&mut self, renderer: &Renderer, input: &FrameInput) {
+        self.interiors.clear();
+        if input.camera.lens.is_sampled() {
+            // A boundary may lie across the lens.
+            let around = |ray: &Ray| MediumStack::at(renderer, ray.org, ray.dir);
+            self.interiors.extend(self.rays.iter().map(around));
+        } else {
+            self.interiors.resize(self.rays.len(), input.around_eye);
+        }
+    }
+
     /// Makes the next generation of rays the present one, branch by branch: what neighbouring pixels
     /// reflect is coherent, what one of them reflects and refracts is not.
     fn advance(&mut self) {
@@ -90,12 +103,11 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     let mut first = 0;
     while first < renderer.settings.spp {
         let last = first.saturating_add(SAMPLES_TOGETHER).min(renderer.settings.spp);
-        pixels.start_samples(renderer.settings.spp, &input.filter, first..last);
+        pixels.start_samples(renderer.settings.spp, input, first..last);
         camera_rays(input, pixels, first..last, scratch);
         counts[RayKind::Camera] += scratch.rays.len() as u64;
         if NESTED {
-            scratch.interiors.clear();
-            scratch.interiors.resize(scratch.rays.len(), input.around_eye);
+            scratch.start_interiors(renderer, input);
         }
         trace_paths::<MIRROR, GLASS, NESTED>(renderer, input, pixels, scratch, &mut counts);
         let Scratch { lit, shadow, .. } = scratch;
@@ -120,7 +132,8 @@ fn camera_rays(
     for sample in samples {
         for pixel in 0..pixels.len() {
             let (x, y) = pixels.sample_position(pixel, sample);
-            scratch.rays.push(Ray::new(input.camera.eye, input.camera.direction(x, y)));
+            let lens = pixels.lens_position(pixel, sample);
+            scratch.rays.push(input.camera.generate_ray(x, y, lens));
             let throughput = Rgb::ONE;
             scratch.states.push(PathState { throughput, pixel: pixel as u32, sample, branch: 1 });
         }
@@ -352,8 +365,8 @@ struct ScatteredRays<'w> {
 }
 
 impl PathState {
-    fn place(&self) -> super::direct::SamplePlace {
-        super::direct::SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
+    fn place(&self) -> SamplePlace {
+        SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
     }
 }
 

@@ -14,7 +14,7 @@ mod sphere;
 mod spot;
 
 use super::irradiance;
-use crate::intersect::Target;
+use crate::intersect::RayEnd;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Light, Sky};
 use directional::Directional;
@@ -78,7 +78,7 @@ pub trait SampleSink {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ShadowTarget {
     /// To a point of a light.
-    Point(Target),
+    Point(RayEnd),
     /// Along this direction without end, from the smooth surface that the facet stands for.
     Direction(DVec3),
     /// Along this direction without end, from the facet.

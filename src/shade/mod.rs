@@ -16,11 +16,12 @@ mod medium_stack;
 mod motion;
 pub mod optics;
 mod pixels;
+mod point;
 mod scattered;
 mod surface;
 
 use crate::effects::EffectPlan;
-use crate::film::{Film, GPixel, PixelSource};
+use crate::film::{Film, GPixel, Provenance};
 use crate::inference::{Channels, Inference, TracedPoints};
 use crate::intersect::Intersector;
 use crate::math::Rgb;
@@ -44,21 +45,53 @@ const SMALL: u64 = 8192;
 const PARALLEL_FROM: u64 = 512;
 
 /// What it takes to shade any frame of a job.
+///
+/// The effect plan is made here, of the very scene and settings that it is used with; no other gets in.
+///
+/// ```
+/// use std::sync::atomic::AtomicBool;
+/// use tweenray::intersect;
+/// use tweenray::math::{DVec3, Rgb};
+/// use tweenray::scene::{Camera, Material, Pose, Settings, World, WorldSphere};
+/// use tweenray::shade::Renderer;
+///
+/// let mut world = World::default();
+/// let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
+/// world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, grey));
+/// world.sky.radiance = Rgb::ONE;
+/// let settings = Settings { width: 9, height: 9, ..Settings::default() };
+/// let scene = world.into_scene(true)?;
+/// let intersector = intersect::build(&scene, &settings, 1)?;
+/// let pose = Pose::look_at(DVec3::new(0.0, 0.0, 9.0), DVec3::ZERO);
+/// let camera = Camera::new(&pose, 40.0, 9, 9)?;
+/// // A frame is `None` when somebody sets the flag before it is done.
+/// let renderer = Renderer::new(&scene, &settings, &*intersector);
+/// let (film, _) = renderer.render(&camera, 1, false, &AtomicBool::new(false), &()).unwrap();
+/// // A ball under a sky that is the same all round shows its albedo.
+/// assert_eq!(film.rgb[0], Rgb::ONE);
+/// assert!((film.rgb[film.index(4, 4)] - Rgb::splat(0.5)).abs().max_element() < 1e-6);
+/// # Ok::<(), tweenray::error::Error>(())
+/// ```
+#[derive(Clone, Copy)]
 pub struct Renderer<'a> {
     /// The scene, scene space.
-    pub scene: &'a Scene,
+    pub(crate) scene: &'a Scene,
     /// The job's settings.
-    pub settings: &'a Settings,
-    /// What runs.
-    pub plan: EffectPlan,
+    pub(crate) settings: &'a Settings,
+    plan: EffectPlan,
     /// What traces.
-    pub intersector: &'a dyn Intersector,
+    pub(crate) intersector: &'a dyn Intersector,
 }
 
 /// Told about finished tiles, from any worker thread.
 pub trait Progress: Sync {
     /// A tile is done: its share of the frame in `[0, 1]` and the rays it cast.
     fn tile_done(&self, share: f64, rays: &RayCounts);
+}
+
+/// Nobody watches.
+impl Progress for () {
+    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 /// Reuse between frames: what is known before a frame, and what it is to leave behind.
@@ -129,25 +162,54 @@ struct TileDone {
     /// Where each pixel lies in the film.
     places: Vec<u32>,
     rgb: Vec<Rgb>,
-    /// Empty where none are asked for, as `sources`.
+    /// Empty where none are asked for, as `provenance`.
     records: Vec<GPixel>,
-    sources: Vec<PixelSource>,
+    provenance: Vec<Provenance>,
     rays: RayCounts,
     bad: BadSamples,
     left: Left,
 }
 
 impl TileDone {
-    fn push(&mut self, place: u32, pixel: &FinishedPixel, with_source: bool) {
+    fn push(&mut self, place: u32, pixel: &FinishedPixel, with_provenance: bool) {
         self.places.push(place);
         self.rgb.push(pixel.rgb);
         self.records.extend(pixel.record);
-        self.sources.extend(with_source.then_some(pixel.source));
+        self.provenance.extend(with_provenance.then_some(pixel.provenance));
     }
 }
 
 type BlockKernel =
     fn(&Renderer, &FrameInput, &mut BlockPixels, &mut Scratch, &mut Left) -> RayCounts;
+
+impl<'a> Renderer<'a> {
+    /// A renderer of `scene` under `settings`, whose rays `intersector` traces: one that was built of
+    /// the same scene ([`intersect::build`](crate::intersect::build)).
+    pub fn new(scene: &'a Scene, settings: &'a Settings, intersector: &'a dyn Intersector) -> Self {
+        Self { scene, settings, plan: EffectPlan::of(scene, settings), intersector }
+    }
+
+    /// Which effects run.
+    pub fn plan(&self) -> EffectPlan {
+        self.plan
+    }
+
+    /// The same by the kernel that leaves no effect out, to measure and test the specialised ones. The
+    /// picture and the rays are the same. (Sky rays stay as they were: of a sky that is seen, the scene says
+    /// whether it also lights.)
+    pub fn with_every_effect(mut self) -> Self {
+        self.plan = EffectPlan { sky_light: self.plan.sky_light, ..EffectPlan::EVERYTHING };
+        self
+    }
+
+    /// The same without any light but what surfaces and sky emit and the ambient term, to measure what
+    /// lights cost.
+    pub fn without_lights(mut self) -> Self {
+        let (area_lights, delta_lights, sky_light) = (false, false, false);
+        self.plan = EffectPlan { area_lights, delta_lights, sky_light, ..self.plan };
+        self
+    }
+}
 
 impl Renderer<'_> {
     /// Renders frame number `frame` (from 1) through `camera` (world space) on the current rayon
@@ -322,7 +384,7 @@ fn take_turns<S, T: Send>(
 
 fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
     let mut film = Film::new(job.camera.width, job.camera.height, job.with_gbuffer);
-    film.sources = job.reuse.map(|_| vec![PixelSource::default(); film.rgb.len()]);
+    film.provenance = job.reuse.map(|_| vec![Provenance::default(); film.rgb.len()]);
     let mut rays = RayCounts::default();
     let mut left = Left::default();
     for tile in tiles {
@@ -335,8 +397,8 @@ fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
         if let Some(gbuffer) = &mut film.gbuffer {
             places().zip(&tile.records).for_each(|(at, record)| gbuffer.set(at, record));
         }
-        if let Some(sources) = &mut film.sources {
-            places().zip(&tile.sources).for_each(|(at, source)| sources[at] = *source);
+        if let Some(provenance) = &mut film.provenance {
+            places().zip(&tile.provenance).for_each(|(at, own)| provenance[at] = *own);
         }
     }
     Rendered { film, rays, sources: left.sources, reuse: left.reuse }

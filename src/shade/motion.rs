@@ -3,7 +3,7 @@
 //! Computed from the records of a finished film, not while it is traced: frames with the same camera
 //! share one tracing, but not the camera before them.
 
-use super::pixels::{film_sampler, offsets_of};
+use super::pixels::{film_sampler, lens_positions, offsets_of};
 use super::{Renderer, pixel_filter};
 use crate::film::Film;
 use crate::inference::SAMPLES_TOGETHER;
@@ -29,42 +29,57 @@ impl Renderer<'_> {
             let y = y as u32;
             for ((x, out), depth) in (0..).zip(motion).zip(depth) {
                 let moved = is_wanted(x, y)
-                    .then(|| displacement(camera, previous, self.nearest(x, y), *depth));
+                    .then(|| displacement(camera, previous, &self.nearest(camera, x, y), *depth));
                 *out = moved.flatten().unwrap_or_default();
             }
         });
     }
 
-    /// Image point of the camera sample nearest the pixel's middle, the one that is recorded.
-    fn nearest(&self, x: u32, y: u32) -> (f64, f64) {
+    /// The camera sample nearest the pixel's middle, the one that is recorded.
+    fn nearest(&self, camera: &Camera, x: u32, y: u32) -> CameraSample {
         let filter = pixel_filter(self.settings.filter);
         let sampler = film_sampler(self.settings.seed, x, y);
-        let mut best = (f64::INFINITY, [0.0; 2]);
+        let mut best = (f64::INFINITY, [0.0; 2], 0);
         let spp = self.settings.spp;
         for first in (0..spp).step_by(SAMPLES_TOGETHER as usize) {
             let chunk = first..first.saturating_add(SAMPLES_TOGETHER).min(spp);
-            for [dx, dy] in offsets_of(spp, &filter, &sampler, chunk) {
+            for (sample, [dx, dy]) in (first..).zip(offsets_of(spp, &filter, &sampler, chunk)) {
                 let distance = dx * dx + dy * dy;
                 if distance < best.0 {
-                    best = (distance, [dx, dy]);
+                    best = (distance, [dx, dy], sample);
                 }
             }
         }
-        (f64::from(x) + 0.5 + best.1[0], f64::from(y) + 0.5 + best.1[1])
+        let (_, [dx, dy], sample) = best;
+        let mut lens = [0.5; 2];
+        if camera.lens.is_sampled() {
+            lens_positions(&sampler, sample..sample + 1).for_each(|u| lens = u);
+        }
+        CameraSample { image: (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy), lens }
     }
 }
 
-/// Where what `camera` sees at the image point `(x, y)`, `depth` along its view axis, stood in
-/// `previous`'s image, less where it stands; y up. `None` behind `previous`.
+/// A camera sample of a pixel.
+struct CameraSample {
+    /// Image point, pixels.
+    image: (f64, f64),
+    /// Where its ray passes the lens, in the unit square.
+    lens: [f64; 2],
+}
+
+/// Where what `camera` sees with `sample`, `depth` along its view axis, stood in `previous`'s image, less
+/// where it stands; y up. `None` behind `previous`. Both are what the lenses' middles see.
 fn displacement(
     camera: &Camera,
     previous: &Camera,
-    (x, y): (f64, f64),
+    sample: &CameraSample,
     depth: f32,
 ) -> Option<Vec2> {
-    let direction = camera.direction(x, y);
+    let (x, y) = sample.image;
+    let (offset, direction) = camera.through_lens(x, y, sample.lens);
+    let direction = direction.normalize();
     let (to, from) = if depth.is_finite() {
-        let to = direction * (f64::from(depth) / direction.dot(camera.forward));
+        let to = offset + direction * (f64::from(depth) / direction.dot(camera.forward));
         (to, to + (camera.eye - previous.eye))
     } else {
         (direction, direction)
@@ -87,12 +102,16 @@ mod tests {
         Camera::new(&pose, 60.0, 64, 48).expect("a camera")
     }
 
+    fn seen(image: (f64, f64)) -> CameraSample {
+        CameraSample { image, lens: [0.5; 2] }
+    }
+
     #[test]
     fn a_camera_that_stands_still_moves_nothing_at_all() {
         let still = camera(3.7, DVec3::new(0.3, 0.1, -1.0));
         for (i, depth) in [1e-6, 0.3, 7.0, 1e20, f32::INFINITY].into_iter().enumerate() {
             let at = (3.1 + 11.0 * i as f64, 40.3 - 7.0 * i as f64);
-            assert_eq!(displacement(&still, &still, at, depth), Some(Vec2::ZERO));
+            assert_eq!(displacement(&still, &still, &seen(at), depth), Some(Vec2::ZERO));
         }
     }
 
@@ -102,11 +121,11 @@ mod tests {
         let (now, then) = (camera(0.5, -DVec3::Z), camera(0.0, -DVec3::Z));
         let focal = 24.0 / 30f64.to_radians().tan();
         for depth in [1.0, 4.0f32] {
-            let moved = displacement(&now, &then, (20.5, 11.5), depth).expect("in front");
+            let moved = displacement(&now, &then, &seen((20.5, 11.5)), depth).expect("in front");
             let expected = focal * 0.5 / f64::from(depth);
             assert!((f64::from(moved.x) - expected).abs() < 1e-4 && moved.y.abs() < 1e-5);
         }
-        let sky = displacement(&now, &then, (20.5, 11.5), f32::INFINITY);
+        let sky = displacement(&now, &then, &seen((20.5, 11.5)), f32::INFINITY);
         assert_eq!(sky, Some(Vec2::ZERO));
     }
 
@@ -115,10 +134,11 @@ mod tests {
         // The middle of the image looks up by 0.1; in the frame before that stood above the middle.
         let tilted = DVec3::new(0.0, 0.1f64.sin(), -(0.1f64.cos()));
         let (now, then) = (camera(0.0, tilted), camera(0.0, -DVec3::Z));
-        let moved = displacement(&now, &then, (32.0, 24.0), f32::INFINITY).expect("in front");
+        let moved =
+            displacement(&now, &then, &seen((32.0, 24.0)), f32::INFINITY).expect("in front");
         let expected = 24.0 / 30f64.to_radians().tan() * 0.1f64.tan();
         assert!((f64::from(moved.y) - expected).abs() < 1e-4 && moved.x.abs() < 1e-5, "{moved}");
         let behind = camera(0.0, DVec3::Z);
-        assert_eq!(displacement(&now, &behind, (32.0, 24.0), 3.0), None);
+        assert_eq!(displacement(&now, &behind, &seen((32.0, 24.0)), 3.0), None);
     }
 }

@@ -1,8 +1,8 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
-use super::dimensions;
-use crate::film::{GPixel, PixelSource, Provenance};
-use crate::inference::{Origin, SAMPLES_TOGETHER};
+use super::{FrameInput, dimensions};
+use crate::film::{GPixel, Provenance, ProvenanceKind};
+use crate::inference::SAMPLES_TOGETHER;
 use crate::math::Rgb;
 use crate::sampling::{PixelFilter, PixelSampler};
 use crate::scene::Rect;
@@ -21,6 +21,8 @@ pub(super) struct BlockPixels {
     film_samplers: Vec<PixelSampler>,
     /// Where the present chunk's samples lie from their pixels' middles, pixel by pixel, pixels.
     offsets: Vec<[f64; 2]>,
+    /// Where they pass the lens, in the unit square; empty where the lens does not care.
+    lens: Vec<[f64; 2]>,
     samplers: Vec<PixelSampler>,
     sums: Vec<Rgb>,
     /// The most that each channel of a sample's radiance may be.
@@ -35,7 +37,7 @@ pub(super) struct BlockPixels {
     bad: Vec<(u32, Fault)>,
     records: Vec<Record>,
     with_records: bool,
-    sources: Vec<PixelSource>,
+    provenance: Vec<Provenance>,
 }
 
 /// A pixel as it goes to the film.
@@ -49,7 +51,7 @@ pub(super) struct FinishedPixel {
     /// First hit, where asked for.
     pub record: Option<GPixel>,
     /// Where its light comes from.
-    pub source: PixelSource,
+    pub provenance: Provenance,
 }
 
 /// The sampler of the camera samples' places in a pixel. They do not depend on the frame: frame 0 is
@@ -74,6 +76,18 @@ pub(super) fn offsets_of(
     u.into_iter().take(count).map(move |u| if spp > 1 { filter.offset2(u) } else { [0.0; 2] })
 }
 
+/// Where camera samples, at most [`SAMPLES_TOGETHER`], pass the lens, in the unit square. As their places in the
+/// pixel they do not depend on the frame.
+pub(super) fn lens_positions(
+    sampler: &PixelSampler,
+    samples: Range<u32>,
+) -> impl Iterator<Item = [f64; 2]> {
+    let mut u = [[0.5; 2]; SAMPLES_TOGETHER as usize];
+    let count = samples.len();
+    sampler.fill2(samples.start, dimensions::LENS, &mut u[..count]);
+    u.into_iter().take(count).map(|u| u.map(f64::from))
+}
+
 #[derive(Clone, Copy)]
 struct Record {
     nearest: f64,
@@ -88,6 +102,7 @@ impl BlockPixels {
             places: Vec::new(),
             film_samplers: Vec::new(),
             offsets: Vec::new(),
+            lens: Vec::new(),
             samplers: Vec::new(),
             sums: Vec::new(),
             most,
@@ -97,7 +112,7 @@ impl BlockPixels {
             bad: Vec::new(),
             records: Vec::new(),
             with_records,
-            sources: Vec::new(),
+            provenance: Vec::new(),
         }
     }
 
@@ -133,8 +148,8 @@ impl BlockPixels {
         self.sums.resize(self.places.len(), Rgb::ZERO);
         self.suspects.clear();
         self.bad.clear();
-        self.sources.clear();
-        self.sources.resize(self.places.len(), PixelSource::default());
+        self.provenance.clear();
+        self.provenance.resize(self.places.len(), Provenance::default());
         self.records.clear();
         if self.with_records {
             let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
@@ -154,20 +169,9 @@ impl BlockPixels {
     }
 
     /// Notes where the light of a pixel's surface point comes from; `None` where it was traced.
-    pub fn set_origin(&mut self, pixel: u32, origin: Option<&Origin>) {
-        let source = match origin {
-            None => PixelSource { provenance: Provenance::Traced, ..PixelSource::default() },
-            Some(o) => PixelSource {
-                provenance: match (o.earlier, o.later) {
-                    (true, true) => Provenance::Both,
-                    (false, true) => Provenance::Later,
-                    _ => Provenance::Earlier,
-                },
-                frame: o.frame,
-                distance: o.distance,
-            },
-        };
-        self.sources[pixel as usize].join(&source);
+    pub fn join_provenance(&mut self, pixel: u32, inferred: Option<&Provenance>) {
+        let traced = Provenance { kind: ProvenanceKind::Traced, ..Provenance::default() };
+        self.provenance[pixel as usize].join(inferred.unwrap_or(&traced));
     }
 
     /// Pixels in the block.
@@ -194,11 +198,15 @@ impl BlockPixels {
         self.chunk.end - self.chunk.start
     }
 
-    /// Starts a chunk of the `spp` camera samples.
-    pub fn start_samples(&mut self, spp: u32, filter: &PixelFilter, chunk: Range<u32>) {
+    /// Starts a chunk of the `spp` camera samples of a frame.
+    pub fn start_samples(&mut self, spp: u32, input: &FrameInput, chunk: Range<u32>) {
         self.offsets.clear();
+        self.lens.clear();
         for sampler in &self.film_samplers {
-            self.offsets.extend(offsets_of(spp, filter, sampler, chunk.clone()));
+            self.offsets.extend(offsets_of(spp, &input.filter, sampler, chunk.clone()));
+            if input.camera.lens.is_sampled() {
+                self.lens.extend(lens_positions(sampler, chunk.clone()));
+            }
         }
         self.chunk = chunk;
         if self.most.is_some() {
@@ -277,8 +285,18 @@ impl BlockPixels {
         (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)
     }
 
+    /// Where one of the present chunk's camera samples passes the lens, in the unit square: in the middle where
+    /// the lens does not care.
+    pub fn lens_position(&self, pixel: usize, sample: u32) -> [f64; 2] {
+        self.lens.get(self.place_in_chunk(pixel, sample)).copied().unwrap_or([0.5; 2])
+    }
+
     fn offset(&self, pixel: usize, sample: u32) -> [f64; 2] {
-        self.offsets[pixel * self.chunk_len() as usize + (sample - self.chunk.start) as usize]
+        self.offsets[self.place_in_chunk(pixel, sample)]
+    }
+
+    fn place_in_chunk(&self, pixel: usize, sample: u32) -> usize {
+        pixel * self.chunk_len() as usize + (sample - self.chunk.start) as usize
     }
 
     /// Whether first-hit records are kept.
@@ -311,7 +329,7 @@ impl BlockPixels {
             let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
             let rgb = if flagged { MAGENTA } else { sum * share };
             let record = self.records.get(i).map(|r| r.pixel);
-            FinishedPixel { x, y, rgb, record, source: self.sources[i] }
+            FinishedPixel { x, y, rgb, record, provenance: self.provenance[i] }
         })
     }
 }

@@ -1,7 +1,7 @@
 //! A ray looked at closely: where it passes the primitives that the two intersectors name.
 
 use super::Check;
-use super::judge::{BAND_ULPS, Class, Difference};
+use super::class::{BAND_ULPS, Class, Difference};
 use crate::intersect::court::{Line, Place};
 use crate::intersect::{CourtHit, Hit, PrimRef, Ray, SurfaceInteraction};
 use crate::math::{DVec3, orthonormal_basis};

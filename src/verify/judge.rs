@@ -1,88 +1,12 @@
-//! What a difference between two answers is.
+//! The difference between two answers, if there is one.
 
+use super::class::Difference;
 use super::differ::Closely;
-use super::{Answers, Check, Kind, Trial};
-use serde::Serialize;
-
-/// Width of the band at an edge in which f32 rays may go either way: ulp (2⁻²³) of the largest
-/// scene-space coordinate of ray origin and triangle, measured across the ray.
-pub const BAND_ULPS: f64 = 4.0;
-
-/// Why two answers differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Class {
-    /// Another triangle at the same place: coincident, or adjacent and the ray within the band of
-    /// their edge. Explained.
-    Tie,
-    /// A ray no further than [`BAND_ULPS`] beside this one has the product's answer. Explained.
-    EdgeBand,
-    /// The hit lies within [`BAND_ULPS`] of the ray's own start or end. Explained.
-    RayEnd,
-    /// Past a vertex, within the band, onto the outside of something behind: what Embree's robust
-    /// mode leaves open and no second try can see. (An inside there would have given it away, and
-    /// nothing at all, too.) Explained, but only so many: [`super::PAST_VERTEX_LIMIT`].
-    PastVertex,
-    /// The same past a vertex of a mesh that is not closed: whoever goes through its one side need not
-    /// come upon a back behind, so nothing calls for a second try. Explained, but only so many:
-    /// [`super::OPEN_VERTEX_LIMIT`].
-    PastOpenVertex,
-    /// A hit that is not on its triangle.
-    Phantom,
-    /// A hit that the product does not have, or has something behind it for.
-    Missed,
-    /// The right triangle at the wrong distance.
-    WrongDistance,
-    /// Not occluded, though it is.
-    ShadowLeak,
-    /// Occluded by nothing.
-    FalseShadow,
-}
-
-impl Class {
-    /// All classes.
-    pub const ALL: [Self; 10] = [
-        Self::Tie,
-        Self::EdgeBand,
-        Self::RayEnd,
-        Self::PastVertex,
-        Self::PastOpenVertex,
-        Self::Phantom,
-        Self::Missed,
-        Self::WrongDistance,
-        Self::ShadowLeak,
-        Self::FalseShadow,
-    ];
-
-    /// Whether such a difference is no fault of the product.
-    pub fn is_explained(self) -> bool {
-        let past = matches!(self, Self::PastVertex | Self::PastOpenVertex);
-        past || matches!(self, Self::Tie | Self::EdgeBand | Self::RayEnd)
-    }
-
-    /// Whether rays of `kind` can show it.
-    pub fn befalls(self, kind: Kind) -> bool {
-        match self {
-            Self::EdgeBand | Self::RayEnd => true,
-            Self::ShadowLeak | Self::FalseShadow => kind == Kind::Shadow,
-            _ => kind != Kind::Shadow,
-        }
-    }
-}
-
-/// One difference.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Difference {
-    /// Its class.
-    pub class: Class,
-    /// How far from no difference, in ulp: a phantom's distance from its triangle, a missed hit's
-    /// from the nearest edge (a false shadow's is infinite), along the ray for ties and distances.
-    pub ulps: f64,
-}
+use super::{Answers, Check, TracedRay};
 
 impl Check<'_> {
     /// The difference between the two answers, if there is one.
-    pub fn judge(&self, trial: &Trial) -> Option<Difference> {
+    pub fn judge(&self, trial: &TracedRay) -> Option<Difference> {
         match trial.answers {
             Answers::Hits { product: None, oracle: None } => None,
             Answers::Occlusion { product, oracle } if product == oracle => None,

@@ -6,14 +6,15 @@
 //!
 //! Not done: two analytic spheres are compared by the same formula in both intersectors.
 
+mod class;
 mod differ;
 mod judge;
 mod rays;
 mod tally;
 
-pub use judge::{BAND_ULPS, Class, Difference};
+pub use class::{BAND_ULPS, Class, Difference};
 pub use rays::{Kind, RayId};
-pub use tally::{OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally, Worst};
+pub use tally::{ClassRow, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally, Worst};
 
 use crate::intersect::{CourtHit, Hit, Intersector, Oracle, PrimRef, Ray};
 use crate::math::DVec3;
@@ -59,7 +60,7 @@ pub struct Check<'a> {
 
 /// One ray, traced by both.
 #[derive(Debug, Clone, Copy)]
-pub struct Trial {
+pub struct TracedRay {
     /// The ray, scene space.
     pub ray: Ray,
     /// What each said.
@@ -88,7 +89,7 @@ pub enum Answers {
 /// One ray with everything that can be said of it.
 pub struct Replay {
     /// Ray and answers.
-    pub trial: Trial,
+    pub trial: TracedRay,
     /// All that the ray hits between its ends, by the court.
     pub all_hits: Vec<CourtHit>,
     /// The difference, if there is one.
@@ -187,7 +188,7 @@ impl<'a> Check<'a> {
     }
 
     /// Makes and traces the rays of one group: each with its index. `None` when told to stop.
-    fn trace(&self, kind: Kind, group: u64, stop: &AtomicBool) -> Option<Vec<(u64, Trial)>> {
+    fn trace(&self, kind: Kind, group: u64, stop: &AtomicBool) -> Option<Vec<(u64, TracedRay)>> {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
@@ -198,7 +199,7 @@ impl<'a> Check<'a> {
             Kind::Shadow => self.occlusion(&rays, stop),
             _ => self.hits(kind, &rays, stop),
         }?;
-        let trials = rays.into_iter().zip(answers).map(|(ray, answers)| Trial { ray, answers });
+        let trials = rays.into_iter().zip(answers).map(|(ray, answers)| TracedRay { ray, answers });
         Some(indices.into_iter().zip(trials).collect())
     }
 

@@ -143,7 +143,11 @@ impl Check<'_> {
         let camera = camera.to_scene(&self.scene.recentring);
         let at = |rng: &mut Pcg64, size: u32| rng.random::<f64>() * f64::from(size);
         let (x, y) = (at(rng, width), at(rng, height));
-        Some(Ray::new(camera.eye, camera.direction(x, y)))
+        let lens = match camera.lens.is_sampled() {
+            true => [rng.random(), rng.random()],
+            false => [0.5; 2],
+        };
+        Some(camera.generate_ray(x, y, lens))
     }
 
     fn random_ray(&self, rng: &mut Pcg64) -> Option<Ray> {

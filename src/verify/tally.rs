@@ -1,6 +1,6 @@
 //! Counts of differences. Sums and maxima only, so that the order of merging does not matter.
 
-use super::judge::{Class, Difference};
+use super::class::{Class, Difference};
 use super::rays::{Kind, RayId};
 use crate::measure::proportion_upper_bound;
 use serde::Serialize;
@@ -38,7 +38,7 @@ pub struct Worst {
 
 /// What was found of one class.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct ClassRow {
     /// The class.
     pub class: Class,
     /// Whether such a difference is no fault.
@@ -118,17 +118,17 @@ impl Tally {
     }
 
     /// Every class with what was found of it.
-    pub fn rows(&self) -> Vec<Row> {
+    pub fn rows(&self) -> Vec<ClassRow> {
         Class::ALL.iter().map(|class| self.row(*class)).collect()
     }
 
-    fn row(&self, class: Class) -> Row {
+    fn row(&self, class: Class) -> ClassRow {
         let kinds = Kind::ALL.iter().filter(|kind| class.befalls(**kind));
         let by_kind: BTreeMap<Kind, u64> =
             kinds.map(|kind| (*kind, self.found[*kind as usize][class as usize])).collect();
         let count = by_kind.values().sum();
         let rays = by_kind.keys().map(|kind| self.rays(*kind)).sum();
-        Row {
+        ClassRow {
             class,
             explained: class.is_explained(),
             count,

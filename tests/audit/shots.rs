@@ -2,17 +2,16 @@
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
-use tweenray::film::{Film, Provenance};
+use tweenray::film::Film;
 use tweenray::import::{self, LoadOptions, Loaded};
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::math::Rgb;
 use tweenray::output::Display;
 use tweenray::reuse::audit::{Rmse, rmse};
 use tweenray::scene::{Camera, CameraPath, ReuseSettings, Scene, Settings, Shot};
-use tweenray::sequence::{FrameMaker, Pyramid, SurfaceReuse};
-use tweenray::shade::{FrameJob, Progress, Renderer};
-use tweenray::stats::{AuditSums, RayCounts};
+use tweenray::sequence::{FrameContext, FrameMaker, Pyramid, SurfaceReuse};
+use tweenray::shade::{FrameJob, Renderer};
+use tweenray::stats::AuditSums;
 
 /// How the shots of a trial are rendered.
 #[derive(Debug, Clone, Copy)]
@@ -40,11 +39,6 @@ pub struct Audited {
     pub sums: AuditSums,
     pub rmse: Rmse,
     pub truth: Truth,
-}
-
-pub struct Quiet;
-impl Progress for Quiet {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 /// A scene of `scenes/`, read.
@@ -109,8 +103,17 @@ impl Stage<'_> {
     }
 
     pub fn renderer<'a>(&'a self, settings: &'a Settings) -> Renderer<'a> {
-        let plan = EffectPlan::of(&self.set.scene, settings);
-        Renderer { scene: &self.set.scene, settings, plan, intersector: &self.intersector }
+        Renderer::new(&self.set.scene, settings, &self.intersector)
+    }
+
+    pub fn context<'a>(
+        &'a self,
+        settings: &'a Settings,
+        shot: &'a Shot,
+        stop: &'a AtomicBool,
+    ) -> FrameContext<'a> {
+        let (renderer, pool, progress) = (self.renderer(settings), &self.pool, &());
+        FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress }
     }
 
     /// Renders and audits shot `number`, then renders its frames again, traced and converged.
@@ -126,12 +129,11 @@ impl Stage<'_> {
         let pyramid = Pyramid { segment: 64, frames: shot.frames };
         let frames: Vec<u32> = pyramid.all().collect();
         let maker =
-            SurfaceReuse::new(self.renderer(settings), shot, &self.pool, &stop, &Quiet, pyramid);
-        let maker = maker.expect("cameras");
+            SurfaceReuse::new(self.context(settings, shot, &stop), pyramid).expect("cameras");
         maker.expect(&frames);
         let (mut sums, mut truth) = (AuditSums::default(), Truth::default());
         for frame in pyramid.order(&frames) {
-            let made = maker.make(frame).expect("made").expect("not stopped");
+            let made = maker.make(frame).expect("made");
             let Some(audit) = made.audit else { continue };
             sums += audit;
             let camera = shot.camera(frame, settings.width, settings.height).expect("a camera");
@@ -156,7 +158,7 @@ impl Stage<'_> {
             beyond_crop: false,
         };
         let stop = AtomicBool::new(false);
-        let render = || self.renderer(settings).render_job(&job, &stop, &Quiet);
+        let render = || self.renderer(settings).render_job(&job, &stop, &());
         self.pool.install(render).expect("not stopped").film
     }
 }
@@ -167,7 +169,7 @@ impl Truth {
     fn add(&mut self, settings: &Settings, shown: &Film, traced: &Film, converged: &[Film; 2]) {
         let display = Display { exposure: settings.exposure, tone: settings.tone };
         let [a, b] = converged;
-        for (i, source) in shown.sources.as_ref().expect("sources").iter().enumerate() {
+        for (i, source) in shown.provenance.as_ref().expect("sources").iter().enumerate() {
             let error = |c: Rgb| {
                 let [c, a, b] = [c, a.rgb[i], b.rgb[i]].map(|c| display.code(c));
                 (0..3).map(|k| (c[k] - a[k]) * (c[k] - b[k])).sum::<f64>() * 255.0 * 255.0 / 3.0
@@ -175,7 +177,7 @@ impl Truth {
             let own = error(shown.rgb[i]);
             self.shown += own;
             self.traced += error(traced.rgb[i]);
-            if !matches!(source.provenance, Provenance::Background | Provenance::Traced) {
+            if source.is_inferred() {
                 self.inferred += own;
                 self.inferred_pixels += 1;
             }

@@ -7,7 +7,10 @@ mod mtl;
 mod mutations;
 mod obj;
 mod ply;
+#[path = "../common/says.rs"]
+mod says;
 
+use says::says;
 use std::path::Path;
 use tweenray::error::{Error, Result};
 use tweenray::import::{Model, load_model};
@@ -15,11 +18,11 @@ use tweenray::scene::NormalPolicy;
 
 /// What must come of a file.
 pub(crate) enum Expect {
-    /// `Error::Input` on this line, whose message contains this.
+    /// `Error::Input` on this line, whose message [`says`] this.
     Line(usize, &'static str),
-    /// `Error::Input` without a line (binary data say the byte), whose message contains this.
+    /// `Error::Input` without a line (binary data say the byte), whose message [`says`] this.
     File(&'static str),
-    /// A model, with a warning on this line that contains this.
+    /// A model, with a warning on this line that [`says`] this.
     Warns(usize, &'static str),
     /// A model without a warning.
     Fine,
@@ -49,18 +52,18 @@ pub(crate) fn check(what: &str, outcome: Result<Model>, expect: &Expect) {
         }
         (Ok(model), Expect::Warns(line, part)) => {
             let found =
-                model.warnings.iter().any(|w| w.line == Some(*line) && w.message.contains(part));
+                model.warnings.iter().any(|w| w.line == Some(*line) && says(&w.message, part));
             assert!(found, "{what}: no warning `{part}` on line {line} in {:?}", model.warnings);
             sound(&model);
         }
         (Err(Error::Input(d)), Expect::Line(line, part)) => {
             assert!(
-                d.line == Some(*line) && d.message.contains(part),
+                d.line == Some(*line) && says(&d.message, part),
                 "{what}: `{d}` instead of `{part}` on line {line}"
             );
         }
         (Err(Error::Input(d)), Expect::File(part)) => {
-            assert!(d.line.is_none() && d.message.contains(part), "{what}: `{d}`, not `{part}`");
+            assert!(d.line.is_none() && says(&d.message, part), "{what}: `{d}`, not `{part}`");
         }
         (Ok(model), _) => panic!("{what}: accepted, with {:?}", model.warnings),
         (Err(error), _) => panic!("{what}: `{error}`"),

@@ -115,7 +115,7 @@ proptest! {
     }
 
     #[test]
-    fn noise_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         try_out("obj", &bytes, &bytes);
         try_out("obj", OBJ, &bytes);
         let header = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n\

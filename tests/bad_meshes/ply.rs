@@ -55,7 +55,7 @@ const ASCII: &[(&str, Expect)] = &[
          POINTS3 0 1 2\n",
         Line(7, "has no list `vertex_indices`"),
     ),
-    ("TRIANGLE3 0 1 3\n", Line(13, "vertex index 3, but the file has only 3")),
+    ("TRIANGLE3 0 1 3\n", Line(13, "vertex index 3 … 3")),
     ("TRIANGLE3 0 1 -1\n", Line(13, "vertex index -1")),
     ("TRIANGLE3 0 1 1.5\n", Line(13, "1.5 is no vertex index")),
     ("TRIANGLE3 0 1\n", Line(13, "a list of 3 items, more than the file holds")),
@@ -80,7 +80,7 @@ const ASCII: &[(&str, Expect)] = &[
     (
         "HEADelement vertex 3\nXYZproperty uchar red\nelement face 1\nLISTend_header\n\
          0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n",
-        Warns(3, "vertex colours were ignored"),
+        Warns(3, "vertex colours"),
     ),
     (
         "HEADelement vertex 3\nXYZelement edge 1\nproperty int a\nelement face 1\nLISTend_header\n\

@@ -1,6 +1,6 @@
 //! Jobs that are stopped, politely or not, and go on.
 
-use super::job::{Job, Ran};
+use super::job::{Job, Ran, lines_that_say, says};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
@@ -30,7 +30,7 @@ fn send(signal: &str, child: &Child) {
 }
 
 /// Waits until the program listens for SIGTERM.
-fn wait_for_ears(child: &Child) {
+fn wait_for_handler(child: &Child) {
     let listens = || {
         let text = fs::read_to_string(format!("/proc/{}/status", child.id())).expect("a process");
         let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).expect("a mask");
@@ -64,15 +64,14 @@ fn a_signal_while_the_scene_is_read_says_to_give_the_same_command_again() {
     // On a busy machine the scene may be read before the signal comes.
     let mut told = (0..10).map(|_| {
         let child = job.command(line).stderr(Stdio::piped()).spawn().expect("it starts");
-        wait_for_ears(&child);
+        wait_for_handler(&child);
         send("TERM", &child);
         let ran = Ran::of(&child.wait_with_output().expect("it ends"));
         assert_eq!(ran.code, Some(75), "{}", ran.err);
         ran.err
     });
-    let says = "stopped by SIGTERM before the first frame; give the same command again\n";
-    let is_late = |err: &String| err.ends_with("the same command goes on from here\n");
-    assert_eq!(told.find(|err| !is_late(err)).as_deref(), Some(says));
+    let early = |err: &String| says(err, "SIGTERM … before the first frame … same command");
+    assert!(told.any(|err| err.lines().count() == 1 && early(&err)));
 }
 
 /// All frames are there, and the same command would replace them.
@@ -101,9 +100,8 @@ fn a_signal_while_the_video_is_made_says_to_leave_overwrite_out() {
     send("TERM", &child);
     let ran = Ran::of(&child.wait_with_output().expect("it ends"));
     assert_eq!(ran.code, Some(75), "{}", ran.err);
-    let how = "the same command without --overwrite goes on from here";
-    let says = "stopped by SIGTERM: 3 of 3 frames are finished";
-    assert!(ran.err.contains(says) && ran.err.contains(how), "{}", ran.err);
+    let stopped = "SIGTERM … 3 of 3 frames … same command without --overwrite";
+    assert!(says(&ran.err, stopped), "{}", ran.err);
     // Nobody goes on writing, and nothing half done is left.
     assert!(!Path::new("/proc").join(pid.trim()).exists(), "ffmpeg runs on");
     assert!(!job.names("o").iter().any(|name| name.contains(".mp4")), "{:?}", job.names("o"));
@@ -118,11 +116,11 @@ fn a_job_that_was_stopped_while_it_replaced_frames_goes_on_with_one_line() {
     let (child, err) = after_first_frame(&job, "o --overwrite");
     send("TERM", &child);
     let words = rest(err);
-    assert!(words.contains("the same command without --overwrite goes on"), "{words}");
+    assert!(says(&words, "same command without --overwrite"), "{words}");
     let ran = job.done(&format!("{SLOW} -o o/f_##.png"));
-    let says = "more are not in the manifest; rendered again";
-    let notes = ran.err.lines().filter(|line| line.starts_with("note: ")).count();
-    assert_eq!((notes, ran.err.matches(says).count()), (1, 1), "{}", ran.err);
+    let notes =
+        ["note: ", "note: … not in the manifest"].map(|words| lines_that_say(&ran.err, words));
+    assert_eq!(notes, [1, 1], "{}", ran.err);
     assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
     job.done(&format!("{SLOW} -o whole/f_##.png"));
     assert_same_frames(&job, "o", "whole");
@@ -147,9 +145,8 @@ fn a_signal_while_frames_are_checked_says_how_to_go_on_without_replacing_them() 
     let code = child.wait().expect("it ends").code();
     let words = rest(err);
     assert_eq!(code, Some(75), "{words}");
-    let how = "the same command without --overwrite goes on from here";
-    assert!(words.contains("stopped by SIGINT: 3 of 3 frames are finished in "), "{words}");
-    assert!(words.contains(how) && !words.contains("error:"), "{words}");
+    let stopped = "SIGINT … 3 of 3 frames … same command without --overwrite";
+    assert!(says(&words, stopped) && !words.contains("error:"), "{words}");
     let ran = job.done(line);
     assert!(
         ran.out.contains("0 rendered, 3 kept") && ran.err.contains("came out: "),
@@ -173,8 +170,7 @@ fn a_signal_stops_within_a_second_and_the_same_command_goes_on() {
         assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());
         let words = rest(err);
         assert_eq!(code, Some(75), "{words}");
-        assert!(words.contains("of 4 frames are finished"), "{words}");
-        assert!(words.contains(&format!("stopped by SIG{signal}")), "{words}");
+        assert!(says(&words, &format!("SIG{signal} … of 4 frames")), "{words}");
         assert!(job.names(signal).iter().all(|name| !name.contains(".tmp")), "no torn file");
         let ran = job.done(&format!("{SLOW} -o {signal}/f_##.png"));
         assert!(!ran.out.contains(" 0 kept"), "{}", ran.out);
@@ -204,10 +200,10 @@ fn a_scene_file_sets_time_limit_and_checkpoint() {
     let text = "[settings]\nspp = 4096\nvideo = false\ntime_limit = '1s'\ncheckpoint = 'off'\n\
                 [[mesh]]\nfile = 'cube.obj'\n[sky]\nradiance = 1\n";
     std::fs::write(job.path("scene.toml"), text).expect("written");
-    for (option, says) in [("", "time limit of 1.0 s"), ("--time-limit 2s", "time limit of 2.0 s")]
+    for (option, limit) in [("", "time limit … 1.0 s"), ("--time-limit 2s", "time limit … 2.0 s")]
     {
         let ran = job.run(&format!("render scene.toml -o o/f_##.png {option}"));
-        assert!(ran.code == Some(75) && ran.err.contains(says), "{}", ran.err);
+        assert!(ran.code == Some(75) && says(&ran.err, limit), "{}", ran.err);
     }
 }
 
@@ -220,24 +216,19 @@ fn stops_in_time(limit: &str, variables: &[(&str, String)], reason: &str) {
     let ran = Ran::of(&output);
     assert!(start.elapsed() < Duration::from_secs(11), "{:?}", start.elapsed());
     assert_eq!(ran.code, Some(75), "{}", ran.err);
-    assert!(
-        ran.err.contains(reason) && ran.err.contains("the same command goes on"),
-        "{}",
-        ran.err
-    );
+    assert!(says(&ran.err, &format!("{reason} … same command")), "{}", ran.err);
 }
 
 #[test]
 fn a_job_ends_by_its_time_limit_and_before_its_allocation() {
-    stops_in_time("--time-limit 1s", &[], "stopped at the time limit of 1.0 s: 0 of 48 frames");
+    stops_in_time("--time-limit 1s", &[], "time limit … 1.0 s … 0 of 48 frames");
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a clock");
     let end = ("SLURM_JOB_END_TIME", (now.as_secs() + 33).to_string());
-    let reason = "stopped shortly before the Slurm job ends";
-    stops_in_time("--time-limit 1h", &[end], reason);
+    stops_in_time("--time-limit 1h", &[end], "Slurm");
     let job = Job::new();
-    for (limit, says) in
-        [("25x", "hours:minutes:seconds"), ("0:75", "75 in 0:75"), ("0", "leave it out")]
+    for (limit, words) in
+        [("25x", "25x … hours:minutes:seconds"), ("0:75", "75 in 0:75"), ("0", "--time-limit … 0")]
     {
-        job.refused(&format!("render cube.obj --time-limit {limit}"), says);
+        job.refused(&format!("render cube.obj --time-limit {limit}"), words);
     }
 }

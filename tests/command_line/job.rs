@@ -5,6 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
+#[path = "../common/says.rs"]
+mod says;
+pub use says::says;
+
 /// A temporary folder in which the program runs.
 pub struct Job(tempfile::TempDir);
 
@@ -62,11 +66,12 @@ impl Job {
         ran
     }
 
-    /// Runs and insists on exit code 2 and on `says` in the error.
-    pub fn refused(&self, line: &str, says: &str) {
+    /// Runs and insists on exit code 2 and on an error that [`says`] these words.
+    pub fn refused(&self, line: &str, words: &str) {
         let ran = self.run(line);
         assert_eq!(ran.code, Some(2), "{line}\n{}", ran.err);
-        assert!(ran.err.contains("error: ") && ran.err.contains(says), "{line}\n{}", ran.err);
+        let error = ran.err.split_once("error: ").map_or("", |(_, error)| error);
+        assert!(says(error, words), "{line}: not {words}\n{}", ran.err);
         assert!(!ran.err.contains("panic"), "{}", ran.err);
     }
 
@@ -86,6 +91,11 @@ impl Job {
         names.sort();
         names
     }
+}
+
+/// Lines of `text` that [`says`] finds the words in.
+pub fn lines_that_say(text: &str, words: &str) -> usize {
+    text.lines().filter(|line| says(line, words)).count()
 }
 
 impl Ran {

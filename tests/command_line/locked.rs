@@ -1,6 +1,6 @@
 //! Jobs of other settings that start in one folder at the same time.
 
-use super::job::{Job, Ran};
+use super::job::{Job, Ran, says};
 use super::killed::visible;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -42,8 +42,7 @@ fn of_two_jobs_of_other_settings_one_gets_the_folder() {
         };
         assert_eq!((winners.len(), loser.code), (1, Some(2)), "{told}");
         assert!(loser.err.contains("k/f_##.png") && loser.err.contains("-o"), "{told}");
-        by_lock +=
-            usize::from(loser.err.contains("is being rendered by a job of other settings: seed"));
+        by_lock += usize::from(says(&loser.err, "is being rendered … seed"));
         let now = visible(&job, "k");
         let expected = &whole[winners[0]];
         assert!(now.keys().eq(expected.keys()), "{told}");
@@ -72,11 +71,7 @@ fn parts_of_one_shot_share_a_folder_and_another_move_is_kept_out() {
     let second = run("--spp 64 --frames 5..8");
     let turned = job.run(&format!("{line} --spp 64 --up z --frames 1..4 -o k/f_##.png"));
     assert_eq!(turned.code, Some(2), "{}", turned.err);
-    assert!(
-        turned.err.contains("is being rendered by a job of other settings: scene content"),
-        "{}",
-        turned.err
-    );
+    assert!(says(&turned.err, "is being rendered … scene content"), "{}", turned.err);
     for child in [first, second] {
         let ran = Ran::of(&child.wait_with_output().expect("it ends"));
         assert_eq!(ran.code, Some(0), "{}", ran.err);
@@ -86,7 +81,7 @@ fn parts_of_one_shot_share_a_folder_and_another_move_is_kept_out() {
 
 /// The lock is the process's, not the file's.
 #[test]
-fn a_killed_job_locks_nobody_out() {
+fn the_lock_of_a_killed_job_keeps_no_other_job_out() {
     let job = Job::new();
     let mut child = start(&job, "--spp 256 --seed 1");
     let since = Instant::now();

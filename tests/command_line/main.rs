@@ -1,5 +1,8 @@
 //! The program as a user meets it: words, exit codes, files.
 
+mod arguments;
+#[cfg(feature = "mpi")]
+mod bytes_on_ranks;
 mod choosing;
 mod comparing;
 mod full_disk;
@@ -30,7 +33,4 @@ mod reuse;
 mod side_by_side;
 mod slurm;
 mod sweeps;
-#[cfg(feature = "mpi")]
-mod together;
 mod verify;
-mod words;

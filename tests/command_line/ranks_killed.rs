@@ -1,9 +1,9 @@
 //! Jobs of several ranks of which one is killed, or all, at any moment, again and again.
 
+use super::bytes_on_ranks::small;
 use super::job::Job;
 use super::killed::{Moments, visible};
 use super::regrouped::{send, start};
-use super::together::small;
 use std::collections::BTreeMap;
 use std::fs;
 use std::process::Child;

@@ -1,12 +1,12 @@
 //! What exr frames keep beside the picture: motion, maps, and references for later jobs.
 
-use super::job::Job;
+use super::job::{Job, says};
 use serde_json::Value;
 use std::fs;
 use std::io::BufReader;
 use std::path::Path;
 use tweenray::math::DVec3;
-use tweenray::output::exr::{self, Channels, Samples};
+use tweenray::output::exr::{self, ExrChannels, ExrSamples};
 use tweenray::scene::{Camera, Pose};
 
 /// A cube on a floor under a lamp and a sky, in a mirror.
@@ -30,12 +30,12 @@ fn pan(frames: u32, far: f64) -> String {
     )
 }
 
-fn channels(job: &Job, name: &str) -> Channels {
+fn channels(job: &Job, name: &str) -> ExrChannels {
     let file = fs::File::open(job.path(name)).expect("there");
     exr::decode(Path::new(name), BufReader::new(file), 1 << 26).expect("an exr file")
 }
 
-fn f32s<'c>(channels: &'c Channels, name: &str) -> &'c [f32] {
+fn f32s<'c>(channels: &'c ExrChannels, name: &str) -> &'c [f32] {
     channels.f32(name).unwrap_or_else(|| panic!("no {name}"))
 }
 
@@ -97,7 +97,7 @@ fn motion_leads_to_where_the_surface_was() {
 fn maps_lie_beside_their_frames_and_come_back_when_lost() {
     let job = Job::new();
     scene(&job, "scene.toml", &pan(9, 1.0));
-    job.refused("render scene.toml --maps --policy off", "--policy off every frame is traced");
+    job.refused("render scene.toml --maps --policy off", "--maps … --policy off");
     job.done("render scene.toml -o o/f_#.png --frames 1..3 --maps");
     assert_eq!(job.names("o").len(), 3 * 5 + 1);
     let map = job.read("o/f_2_provenance.png");
@@ -109,10 +109,7 @@ fn maps_lie_beside_their_frames_and_come_back_when_lost() {
     fs::remove_file(job.path("o/f_2_provenance.png")).expect("removed");
     fs::write(job.path("o/f_3_audit.png"), "torn").expect("written");
     let again = job.done("render scene.toml -o o/f_#.png --frames 1..3 --maps");
-    assert!(
-        again.out.contains("2 rendered, 1 kept")
-            && again.err.contains("and 1 more lack their maps")
-    );
+    assert!(again.out.contains("2 rendered, 1 kept") && says(&again.err, "1 more … maps"));
     assert!(job.read("o/f_2_provenance.png") == map);
     // Somebody's own picture is in the way.
     fs::create_dir(job.path("p")).expect("made");
@@ -128,8 +125,8 @@ fn exr_frames_hold_their_maps() {
     assert_eq!(job.names("o"), ["f.manifest.jsonl", "f_5.exr"]);
     let held = channels(&job, "o/f_5.exr");
     let u32s = |name: &str| match &held.list.iter().find(|c| c.name == name).expect(name).samples {
-        Samples::U32(v) => v.clone(),
-        Samples::F32(_) => panic!("{name} are numbers"),
+        ExrSamples::U32(v) => v.clone(),
+        ExrSamples::F32(_) => panic!("{name} are numbers"),
     };
     let (provenance, frame) = (u32s("reuse.provenance"), u32s("reuse.frame"));
     assert!((0..=4).all(|kind| kind == 3 || provenance.contains(&kind)));
@@ -139,11 +136,11 @@ fn exr_frames_hold_their_maps() {
     assert!(f32s(&held, "reuse.distance").iter().any(|d| *d > 0.0));
     let audited = f32s(&held, "reuse.audit").iter().filter(|e| !e.is_nan()).count();
     assert!((1..64 * 36 / 2).contains(&audited), "{audited}");
-    job.refused("render scene.toml -o o/f_#.exr --frames 5", "maps was true, now it is false");
+    job.refused("render scene.toml -o o/f_#.exr --frames 5", "maps … true … false");
 }
 
 #[test]
-fn a_denser_and_longer_move_starts_warm() {
+fn references_of_a_shorter_shot_save_rays_in_a_denser_and_longer_one() {
     let job = Job::new();
     scene(&job, "short.toml", &pan(9, 1.0));
     scene(&job, "long.toml", &pan(21, 1.5));
@@ -164,7 +161,7 @@ fn a_denser_and_longer_move_starts_warm() {
     // A key frame is inferred too, from frames that are none of its own shot.
     let first = channels(&job, "warm/f_01.exr");
     let kinds = first.list.iter().find(|c| c.name == "reuse.provenance").expect("the map");
-    let Samples::U32(kinds) = &kinds.samples else { panic!("numbers") };
+    let ExrSamples::U32(kinds) = &kinds.samples else { panic!("numbers") };
     let inferred = kinds.iter().filter(|kind| **kind == 2).count();
     let traced = kinds.iter().filter(|kind| **kind == 1).count();
     assert!(inferred > 10 * traced && !kinds.contains(&3), "{inferred} inferred, {traced} traced");
@@ -211,14 +208,14 @@ fn references_that_cannot_serve_are_refused_by_name() {
     scene(&job, "scene.toml", &pan(3, 1.0));
     job.done("render scene.toml -o base/f_#.exr --frames 1");
     let line = "render scene.toml -o o/f_#.exr --frames 1 --references";
-    job.refused(&format!("{line} nowhere"), "--references nowhere: cannot read the folder");
+    job.refused(&format!("{line} nowhere"), "--references nowhere … folder");
     fs::create_dir(job.path("empty")).expect("made");
-    job.refused(&format!("{line} empty"), "no exr frame is in there");
-    job.refused(&format!("{line} base --policy off"), "--references needs --policy surface");
-    job.refused(&format!("{line} base --shadow-samples 64"), "48 shadow rays a pixel to light 1");
-    job.refused(&format!("{line} base --sky-samples 0"), "keeps the shadowing of light 1, sky");
+    job.refused(&format!("{line} empty"), "empty … exr");
+    job.refused(&format!("{line} base --policy off"), "--references … --policy surface");
+    job.refused(&format!("{line} base --shadow-samples 64"), "48 … light 1");
+    job.refused(&format!("{line} base --sky-samples 0"), "light 1, sky");
     job.refused(&format!("{line} o"), "o: ");
-    job.refused("render scene.toml -o base/g_#.exr --references base", "own frames go");
+    job.refused("render scene.toml -o base/g_#.exr --references base", "base … own frames");
     // Another camera move is the same scene, another lamp is not.
     scene(&job, "other.toml", &pan(5, 2.0));
     job.done("render other.toml -o other/f_#.exr --frames 2 --references base");
@@ -230,9 +227,9 @@ fn references_that_cannot_serve_are_refused_by_name() {
     fs::write(job.path("named.toml"), named).expect("ok");
     job.done("render named.toml -o named/f_#.exr --frames 1 --references base");
     fs::write(job.path("lamp.toml"), text.replace("radiance = 20", "radiance = 21")).expect("ok");
-    job.refused("render lamp.toml -o l/f_#.exr --references base", "f_1.exr: cannot serve");
+    job.refused("render lamp.toml -o l/f_#.exr --references base", "base/f_1.exr … serve");
     job.done("render scene.toml -o off/f_#.exr --frames 1 --policy off");
-    job.refused(&format!("{line} off"), "off/f_1.exr: cannot serve as a reference");
+    job.refused(&format!("{line} off"), "off/f_1.exr … serve");
     let whole = job.read("base/f_1.exr");
     fs::create_dir(job.path("bad")).expect("made");
     for at in (0..whole.len().min(4000)).step_by(97) {

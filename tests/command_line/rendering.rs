@@ -1,6 +1,6 @@
 //! `tweenray render`: files, resuming, refusing, the words around them.
 
-use super::job::Job;
+use super::job::{Job, says};
 use std::fs;
 
 const SMALL: &str = "--size 48x27 --spp 1 --bounces 1 --sky-samples 2 --no-video";
@@ -15,7 +15,7 @@ fn frames_are_kept_and_the_rest_rendered() {
     job.done(&small("--frames 1..2 -o o/f_##.png"));
     let before = job.changed("o/f_01.png");
     let ran = job.done(&small("--frames 1..4 -o o/f_##.png"));
-    assert!(ran.out.contains("4 frames in o/f_##.png (2 rendered, 2 kept)"), "{}", ran.out);
+    assert!(says(&ran.out, "4 frames … o/f_##.png … 2 rendered, 2 kept"), "{}", ran.out);
     assert_eq!(job.changed("o/f_01.png"), before);
     let names = ["f.manifest.jsonl", "f_01.png", "f_02.png", "f_03.png", "f_04.png"];
     assert_eq!(job.names("o"), names);
@@ -26,7 +26,7 @@ fn frames_are_kept_and_the_rest_rendered() {
     }
     fs::write(job.path("o/f_03.png"), "torn").expect("written");
     let ran = job.done(&small("--frames 1..4 -o o/f_##.png"));
-    assert!(ran.err.contains("note: o/f_03.png is damaged"), "{}", ran.err);
+    assert!(says(&ran.err, "note: o/f_03.png … damaged"), "{}", ran.err);
     assert!(ran.out.contains("1 rendered, 3 kept"), "{}", ran.out);
 }
 
@@ -35,14 +35,14 @@ fn another_setting_is_refused_by_name_and_overwrite_replaces() {
     let job = Job::new();
     job.done(&small("--frames 1 -o o/f_##.png"));
     let before = job.read("o/f_01.png");
-    for (option, says) in [
-        ("--seed 7", "seed was 0, now it is 7"),
-        ("--shadow-samples 3", "shadow-samples was 16, now it is 3"),
-        ("--recheck always", "recheck was risky, now it is always"),
-        ("--crop 0,0,9,9", "crop was none, now it is 0,0,9,9"),
-        ("--intersector oracle", "intersector was embree, now it is oracle"),
+    for (option, words) in [
+        ("--seed 7", "seed … 0 … 7"),
+        ("--shadow-samples 3", "shadow-samples … 16 … 3"),
+        ("--recheck always", "recheck … risky … always"),
+        ("--crop 0,0,9,9", "crop … none … 0,0,9,9"),
+        ("--intersector oracle", "intersector … embree … oracle"),
     ] {
-        job.refused(&small(&format!("--frames 1 -o o/f_##.png {option}")), says);
+        job.refused(&small(&format!("--frames 1 -o o/f_##.png {option}")), words);
     }
     assert_eq!(job.read("o/f_01.png"), before);
     fs::write(job.path("cube.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
@@ -56,8 +56,8 @@ fn frames_left_from_other_settings_are_never_taken_for_this_sequence() {
     let job = Job::new();
     job.done(&small("--frames 1..3 -o o/f_#.png"));
     job.done(&small("--frames 2 -o o/f_#.png --seed 7 --overwrite"));
-    let left = job.read("o/f_1.png");
-    job.refused(&small("--frames 1..3 -o o/f_#.png --seed 7"), "o/f_1.png holds a frame of other");
+    let left = job.read("o/f_1.png … settings");
+    job.refused(&small("--frames 1..3 -o o/f_#.png --seed 7"), "o/f_1.png");
     assert_eq!(job.read("o/f_1.png"), left);
     let ran = job.done(&small("--frames 1..3 -o o/f_#.png --seed 7 --overwrite"));
     assert!(ran.out.contains("3 rendered"), "{}", ran.out);
@@ -68,7 +68,7 @@ fn frames_left_from_other_settings_are_never_taken_for_this_sequence() {
 fn another_frame_under_the_same_name_is_refused() {
     let job = Job::new();
     job.done(&small("--frames 1 -o o/look.png"));
-    job.refused(&small("--frames 2 -o o/look.png"), "o/look.png holds frame 1");
+    job.refused(&small("--frames 2 -o o/look.png"), "o/look.png … frame 1");
     job.done(&small("--frames 2 -o o/look.png --overwrite"));
 }
 
@@ -76,7 +76,7 @@ fn another_frame_under_the_same_name_is_refused() {
 fn statistics_replace_neither_the_scene_nor_a_link() {
     let job = Job::new();
     let before = job.read("cube.obj");
-    job.refused(&small("--frames 1 -o o/f.png --stats cube.obj"), "would replace a file");
+    job.refused(&small("--frames 1 -o o/f.png --stats cube.obj"), "--stats cube.obj … scene");
     assert_eq!(job.read("cube.obj"), before);
     fs::write(job.path("real.json"), "").expect("written");
     std::os::unix::fs::symlink(job.path("real.json"), job.path("link.json")).expect("a link");
@@ -86,10 +86,10 @@ fn statistics_replace_neither_the_scene_nor_a_link() {
 }
 
 #[test]
-fn somebody_elses_frames_are_not_touched() {
+fn files_that_no_manifest_lists_are_not_overwritten() {
     let job = Job::new();
     fs::write(job.path("f_01.png"), "mine").expect("written");
-    job.refused(&small("--frames 1..2 -o f_##.png"), "f_01.png exists");
+    job.refused(&small("--frames 1..2 -o f_##.png"), "f_01.png … exist");
     assert_eq!(job.read("f_01.png"), b"mine");
 }
 
@@ -115,7 +115,7 @@ fn threads_ranges_and_crops_do_not_change_bytes() {
 }
 
 #[test]
-fn quiet_says_nothing_and_otherwise_a_line_a_frame() {
+fn quiet_prints_nothing_and_otherwise_each_frame_a_line() {
     let job = Job::new();
     let ran = job.done(&small("--frames 1..2 --quiet -o q/f_##.png"));
     assert_eq!((ran.out.as_str(), ran.err.as_str()), ("", ""));
@@ -123,7 +123,7 @@ fn quiet_says_nothing_and_otherwise_a_line_a_frame() {
     let lines: Vec<&str> = ran.err.lines().collect();
     assert_eq!(lines.len(), 2, "{}", ran.err);
     assert!(lines[0].starts_with("frame 1 of 2  "), "{}", ran.err);
-    assert!(lines[0].contains(" Mrays/s  0 % reused  left "), "{}", ran.err);
+    assert!(says(lines[0], "Mrays/s … 0 % reused … left"), "{}", ran.err);
 }
 
 #[test]
@@ -166,11 +166,11 @@ fn the_default_output_is_named_after_the_scene() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_fails() {
+fn a_folder_that_cannot_be_created_is_an_error() {
     let job = Job::new();
     let ran = job.run(&small("--frames 1 -o cube.obj/f_##.png"));
     assert_eq!(ran.code, Some(1), "{}", ran.err);
-    assert!(ran.err.contains("error: cannot create the folder cube.obj"), "{}", ran.err);
+    assert!(says(&ran.err, "error: … cube.obj"), "{}", ran.err);
 }
 
 #[test]
@@ -204,7 +204,7 @@ fn options_may_stand_in_the_scene_file_and_the_command_line_wins() {
     // The same setting by the other way is the same job.
     fs::write(job.path("scene.toml"), scene.replace("seed = 5\n", "")).expect("written");
     assert!(job.done("render scene.toml --seed 5").out.contains("2 kept"));
-    job.refused("render scene.toml", "seed was 5, now it is 0");
+    job.refused("render scene.toml", "seed … 5 … 0");
     job.done("render scene.toml --seed 5 --frames 1 --size 16x9 -o p.png --stats other.json");
     assert_eq!(job.names("o").len(), 3);
     assert!(job.path("p.png").exists() && job.path("other.json").exists());
@@ -217,7 +217,7 @@ fn an_uploaded_picture_is_the_frame_and_decides_the_others() {
     job.done(&colour("--frames 1..3 -o o/f_##.png"));
     job.done(&colour("--frames 2 -o p/f_##.png --seed 5"));
     let upload = "--upload 2=p/f_02.png";
-    job.refused(&colour(&format!("--frames 1..3 -o o/f_##.png {upload}")), "upload was");
+    job.refused(&colour(&format!("--frames 1..3 -o o/f_##.png {upload}")), "upload");
     job.done(&colour(&format!("--frames 1..3 -o q/f_##.png {upload}")));
     let ran = job.run("compare p/f_02.png q/f_02.png");
     assert_eq!(ran.code, Some(0), "{}{}", ran.out, ran.err);
@@ -234,13 +234,13 @@ fn pictures_that_cannot_be_a_frame_are_refused() {
     let job = Job::new();
     job.done(&small("--frames 1 -o o/f_##.png"));
     let colour = |rest: &str| small(&format!("--policy colour -o p/f_##.png {rest}"));
-    job.refused(&small("--policy off --upload 1=o/f_01.png"), "--upload needs --policy colour");
+    job.refused(&small("--policy off --upload 1=o/f_01.png"), "--upload … --policy colour");
     job.refused(&colour("--upload o/f_01.png"), "FRAME=FILE");
     job.refused(&colour("--upload 999=o/f_01.png"), "frame 999");
     job.refused(&colour("--upload 1=o/none.png"), "none.png");
     job.refused(&colour("--upload 1=cube.obj"), "cube.obj");
-    job.refused(&colour("--upload 1=o/f_01.png --upload 1=o/f_01.png"), "two uploaded");
-    job.refused(&colour("--upload 1=o/f_01.png --tone filmic"), "tone curve");
+    job.refused(&colour("--upload 1=o/f_01.png --upload 1=o/f_01.png"), "frame 1 … two");
+    job.refused(&colour("--upload 1=o/f_01.png --tone filmic"), "tone");
     fs::write(job.path("a.ppm"), b"P6 1 1 255\nabc").expect("written");
     job.refused(&colour("--upload 1=a.ppm"), "1x1");
 }

@@ -1,7 +1,7 @@
 //! Reuse between frames as a user meets it: the policies, their words, and the same bytes however a
 //! job is cut.
 
-use super::job::Job;
+use super::job::{Job, lines_that_say, says};
 use serde_json::Value;
 use std::fs;
 
@@ -41,7 +41,7 @@ fn rows(job: &Job, folder: &str) -> Vec<Value> {
 }
 
 #[test]
-fn the_words_of_reuse_are_checked() {
+fn values_of_reuse_options_are_checked() {
     let job = Job::new();
     job.refused("render cube.obj --policy surfaces", "'surface'");
     job.refused("render cube.obj --segmnt 4", "'--segment'");
@@ -50,26 +50,26 @@ fn the_words_of_reuse_are_checked() {
     job.refused("render cube.obj --probes 1.5", "from 0 to 1");
     job.refused("render cube.obj --tolerance nan", "from 0 to 255");
     job.refused("inspect cube.obj --colour-epsilon -1", "from 0 to 1e30");
-    job.refused("inspect cube.obj --distance-epsilon x", "not a number");
+    job.refused("inspect cube.obj --distance-epsilon x", "'x' … --distance-epsilon … number");
     let help = job.done("render --help").out;
     assert!(help.contains("\nReuse:\n") && help.contains("--probes <SHARE>"), "{help}");
 }
 
 #[test]
-fn each_setting_of_reuse_keeps_frames_apart() {
+fn frames_of_other_reuse_settings_are_refused() {
     let job = Job::new();
     scene(&job, PAN, "probes = 0.02");
     job.done("render scene.toml --frames 1 -o o/f_#.png");
-    for (option, says) in [
-        ("--policy off", "policy was surface, now it is off"),
-        ("--policy colour", "policy was surface, now it is colour"),
-        ("--segment 5", "segment was 4, now it is 5"),
-        ("--tolerance 2", "tolerance was 0.25, now it is 2"),
-        ("--probes 0.5", "probes was 0.02, now it is 0.5"),
-        ("--colour-epsilon 1", "colour-epsilon was 0.02, now it is 1"),
-        ("--distance-epsilon 1", "distance-epsilon was 0.02, now it is 1"),
+    for (option, words) in [
+        ("--policy off", "policy … surface … off"),
+        ("--policy colour", "policy … surface … colour"),
+        ("--segment 5", "segment … 4 … 5"),
+        ("--tolerance 2", "tolerance … 0.25 … 2"),
+        ("--probes 0.5", "probes … 0.02 … 0.5"),
+        ("--colour-epsilon 1", "colour-epsilon … 0.02 … 1"),
+        ("--distance-epsilon 1", "distance-epsilon … 0.02 … 1"),
     ] {
-        job.refused(&format!("render scene.toml --frames 1 -o o/f_#.png {option}"), says);
+        job.refused(&format!("render scene.toml --frames 1 -o o/f_#.png {option}"), words);
     }
     scene(&job, PAN, "probes = 0.02\ntraced = [{ min = [0, 0, 0], max = [1, 1, 1] }]");
     job.refused("render scene.toml --frames 1 -o o/f_#.png", "scene content");
@@ -80,7 +80,7 @@ fn the_bytes_do_not_depend_on_threads_ranges_order_or_resuming() {
     let job = Job::new();
     scene(&job, PAN, "");
     let ran = job.done("render scene.toml --threads 4 -o all/f_#.png");
-    assert!(ran.err.contains(" % reused  left ") && ran.out.contains(" reused"), "{}", ran.out);
+    assert!(says(&ran.err, "% reused … left") && ran.out.contains(" reused"), "{}", ran.out);
     let all = frames(&job, "all", 1..=9);
     for threads in [1, 2] {
         let folder = format!("t{threads}");
@@ -171,7 +171,7 @@ fn a_cut_to_another_view_reuses_nothing() {
 }
 
 #[test]
-fn what_is_named_is_traced_in_every_frame() {
+fn named_meshes_and_regions_are_traced_in_every_frame() {
     let job = Job::new();
     let inferred = |more: &str, folder: &str| {
         scene(&job, PAN, more);
@@ -206,17 +206,17 @@ fn inspect_says_what_is_looked_up_and_what_it_takes() {
         + "[[light]]\npoint = { position = [0, 4, 0], intensity = 5 }\n";
     fs::write(job.path("scene.toml"), text).expect("written");
     let text = job.done("inspect scene.toml").out;
-    for says in [
-        "policy surface: 3 key frames, one every 4 frames",
-        "light 1, quad        looked up  one lookup costs less than a pixel's 48 shadow rays",
-        "light 2, point       traced     one hard shadow ray is not worth a lookup",
-        "sky                  looked up",
-        "references held at a time: ",
+    for words in [
+        "policy surface … 3 key frames … 4 frames",
+        "light 1, quad … looked up … 48 shadow rays",
+        "light 2, point … traced … one hard shadow ray",
+        "sky … looked up",
+        "references held",
     ] {
-        assert!(text.contains(says), "{says}\n{text}");
+        assert_eq!(lines_that_say(&text, words), 1, "{words}\n{text}");
     }
     let none = job.done("inspect scene.toml --shadow-samples 1 --sky-samples 1").out;
-    assert!(none.contains("no light is worth a lookup"), "{none}");
+    assert!(says(&none, "no light … lookup"), "{none}");
     assert!(job.done("inspect scene.toml --policy off").out.contains("every frame is traced"));
     let json = job.done("inspect scene.toml --json").out;
     let json: Value = serde_json::from_str(&json).expect("JSON");
@@ -239,9 +239,9 @@ fn inspect_knows_what_policy_colour_holds() {
     assert_eq!(json["reuse"]["key_frames"], 2, "both ends");
     let predicted = json["reuse"]["references"]["bytes"].as_u64().expect("bytes");
     let text = job.done("inspect scene.toml").out;
-    assert!(text.contains("pixels held at a time: 2 key frames and "), "{text}");
+    assert!(says(&text, "pixels held … 2 key frames"), "{text}");
     let ran = job.done("render scene.toml -o o/f_#.png --stats s.json");
-    assert!(ran.out.contains(" % of the pixels were reused"), "{}", ran.out);
+    assert!(says(&ran.out, "% of the pixels … reused"), "{}", ran.out);
     let stats: Value = serde_json::from_slice(&job.read("s.json")).expect("JSON");
     let taken = stats["reference_bytes"].as_u64().expect("bytes");
     assert!(taken <= predicted && predicted < 3 * taken, "{predicted}, in fact {taken}");
@@ -257,12 +257,12 @@ fn inspect_says_what_is_always_traced_and_which_box_is_empty() {
     let text =
         text.replace("file = 'cube.obj'", "file = 'cube.obj'\nname = 'crate'\nreuse = false");
     fs::write(job.path("scene.toml"), text).expect("written");
-    let says = job.done("inspect scene.toml").out;
-    assert!(says.contains("  always traced: mesh crate, 2 boxes\n"), "{says}");
-    assert!(says.contains("warning: box 2 of [[reuse.traced]] holds nothing"), "{says}");
-    assert!(!says.contains("box 1 of"), "{says}");
+    let text = job.done("inspect scene.toml").out;
+    assert!(says(&text, "always traced: … mesh crate … 2 boxes"), "{text}");
+    assert!(says(&text, "warning: … box 2 … [[reuse.traced]]"), "{text}");
+    assert!(!text.contains("box 1 of"), "{text}");
     let colour = job.done("inspect scene.toml --policy colour").out;
-    assert!(colour.contains("2 boxes, which policy colour ignores"), "{colour}");
+    assert!(says(&colour, "2 boxes … policy colour"), "{colour}");
     let json = job.done("inspect scene.toml --json").out;
     let json: Value = serde_json::from_str(&json).expect("JSON");
     let traced = &json["reuse"]["always_traced"];

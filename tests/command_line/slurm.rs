@@ -150,7 +150,7 @@ fn a_run_that_gets_no_further_is_the_last() {
 }
 
 #[test]
-fn a_script_holds_what_was_asked_for_and_mistakes_are_told_before_the_queue() {
+fn a_script_holds_what_was_asked_for_and_invalid_options_are_refused_before_the_queue() {
     let job = Job::new();
     let out = job.done(&format!("{LINE} --sbatch partition=long --cpus 8 --tasks-per-node 2")).out;
     for line in [
@@ -174,22 +174,22 @@ fn a_script_holds_what_was_asked_for_and_mistakes_are_told_before_the_queue() {
         ("--nodes 2", "--time"),
         ("--nodes 0 --time 30m", "1..=100000"),
         ("--nodes 2 --time 30s", "at least 1m"),
-        ("--nodes 2 --time 2m --notice 2m", "as long as --time"),
-        ("--nodes 2 --time 30m --notice 1d", "as long as --time"),
-        ("--nodes 2 --time 20d --notice 1d", "65535s at most"),
-        ("--nodes 2 --time 9999999d", "longer than a year"),
+        ("--nodes 2 --time 2m --notice 2m", "--notice … --time"),
+        ("--nodes 2 --time 30m --notice 1d", "--notice … --time"),
+        ("--nodes 2 --time 20d --notice 1d", "--notice … 65535s"),
+        ("--nodes 2 --time 9999999d", "--time … year"),
         ("--nodes 2 --time 30m --sbatch=", "NAME=VALUE"),
         ("--nodes 2 --time 30m --sbatch=--", "NAME=VALUE"),
-        ("--nodes 2 --time 30m -- --rank-map none", "none: cannot read the map of ranks"),
-        ("--nodes 2 --time 30m -- --rank-map cube.obj", "line 1: expected a rank"),
-        ("--nodes 2 --time 30m -- --references none", "none: cannot read the folder"),
-        ("--nodes 2 --time 30m -- --references .", "no exr frame is in there"),
-        ("--nodes 2 --time 30m -- --policy colour --references .", "needs --policy surface"),
+        ("--nodes 2 --time 30m -- --rank-map none", "none … ranks"),
+        ("--nodes 2 --time 30m -- --rank-map cube.obj", "cube.obj … line 1"),
+        ("--nodes 2 --time 30m -- --references none", "--references none … folder"),
+        ("--nodes 2 --time 30m -- --references .", "--references . … exr"),
+        ("--nodes 2 --time 30m -- --policy colour --references .", "--policy surface"),
         ("--nodes 2 --time 30m -- --policy colour --upload 1=none.png", "none.png"),
         ("--nodes 2 --time 30m -- --policy off --maps", "--maps"),
-        ("--nodes 2 --time 30m -- --sp 4", "unexpected argument '--sp'"),
-        ("--nodes 2 --time 30m -- --frames 900", "lies outside the shot"),
-        ("--nodes 2 --time 30m -- --overwrite", "begin anew"),
+        ("--nodes 2 --time 30m -- --sp 4", "'--sp'"),
+        ("--nodes 2 --time 30m -- --frames 900", "900 … 1..48"),
+        ("--nodes 2 --time 30m -- --overwrite", "--overwrite … -o"),
         ("--nodes 2 --time 30m -- -o a.gif", ".png, .exr or .ppm"),
     ] {
         job.refused(&format!("slurm cube.obj {line}"), says);

@@ -1,6 +1,6 @@
 //! Sweeps of `accuracy` that are stopped or killed, and go on.
 
-use super::job::{Job, Ran};
+use super::job::{Job, Ran, says};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
@@ -70,7 +70,7 @@ fn a_sweep_that_is_killed_again_and_again_measures_what_a_whole_one_does() {
     assert_same(&job, "whole", "o");
     // Nothing is left to be measured.
     let again = job.done(&format!("{LINE} -o o"));
-    assert!(again.err.contains("all of it is measured"), "{}", again.err);
+    assert!(says(&again.err, "measured"), "{}", again.err);
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn a_sweep_that_is_stopped_has_a_page_that_says_so_and_goes_on() {
     assert!(Command::new("sh").args(["-c", &kill]).status().expect("a shell").success());
     err.read_to_string(&mut told).expect("text");
     assert_eq!(child.wait().expect("a child").code(), Some(75), "{told}");
-    assert!(told.contains("stopped by SIGTERM") && told.contains("goes on"), "{told}");
+    assert!(says(&told, "SIGTERM … same command"), "{told}");
     let page = || String::from_utf8(job.read("o/report.html")).expect("UTF-8");
     assert!(page().contains("not complete"));
     let trials = json(&job, "o")["trials"].clone();
@@ -106,7 +106,7 @@ fn a_sweep_that_is_stopped_has_a_page_that_says_so_and_goes_on() {
         (trials[1].clone(), 2.into())
     });
     // What is there is of these settings alone, unless it is measured anew.
-    job.refused(&format!("{line} --seed 3"), "seed was 0, now it is 3");
+    job.refused(&format!("{line} --seed 3"), "seed … 0 … 3");
     let more = line.replace("--turns 2", "--turns 3");
     assert!(job.done(&more).err.contains("going on: "));
     assert!(!job.done(&format!("{line} --seed 3 --overwrite")).err.contains("going on"));
@@ -120,5 +120,5 @@ fn a_sweep_obeys_the_time_limit_of_the_scene_file() {
     std::fs::write(job.path("limited.toml"), scene).expect("written");
     let ran = job.run("accuracy limited.toml -o o --size 640x360 --reference-spp 4096");
     assert_eq!(ran.code, Some(75), "{}", ran.err);
-    assert!(ran.err.contains("stopped at the time limit of 1.0 s"), "{}", ran.err);
+    assert!(says(&ran.err, "time limit … 1.0 s"), "{}", ran.err);
 }

@@ -1,6 +1,6 @@
 //! `tweenray verify`.
 
-use super::job::{Job, Ran};
+use super::job::{Job, Ran, says};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -20,11 +20,11 @@ fn scenes_pass_and_every_class_is_listed() {
         [("cornell", 300), ("reflective_spheres", 300), ("demo", 64), ("spheres_on_terrain", 16)]
     {
         let ran = job.done(&format!("verify {} --rays {rays}", scene(name)));
-        assert!(ran.out.contains("passed: every difference is explained"), "{}", ran.out);
+        assert!(ran.out.contains("passed"), "{}", ran.out);
         for word in ["phantom hit", "missed hit", "wrong distance", "shadow leak", "false shadow"] {
             assert!(ran.out.contains(word), "{}", ran.out);
         }
-        assert!(ran.err.contains(&format!("6 x {rays} rays against")), "{}", ran.err);
+        assert!(says(&ran.err, &format!("6 x {rays} rays")), "{}", ran.err);
     }
     assert_eq!(job.names("."), ["cube.obj"], "verify writes nothing");
 }
@@ -71,21 +71,21 @@ fn a_fault_ends_with_1_and_its_command_shows_that_ray() {
 }
 
 #[test]
-fn mistakes_are_told() {
+fn invalid_arguments_are_refused() {
     let job = Job::new();
     job.refused("verify", "<SCENE>");
     job.refused("verify nothing.obj", "nothing.obj");
     job.refused("verify cube.obj --rays 0", "1..=");
-    job.refused("verify cube.obj --ray side:1", "kinds are camera, shadow, mirror");
-    job.refused("verify cube.obj --ray edge:1 --rays 5", "cannot be used with");
+    job.refused("verify cube.obj --ray side:1", "side:1 … camera, shadow, mirror");
+    job.refused("verify cube.obj --ray edge:1 --rays 5", "--ray … --rays");
     job.refused("verify cube.obj --threads 0", "1..=4096");
-    job.refused("verify cube.obj --intersector oracle", "help: --intersector embree");
+    job.refused("verify cube.obj --intersector oracle", "--intersector embree");
     job.refused("verify cube.obj --spp 4", "'--spp'");
 }
 
 /// Only options that change what is compared are offered.
 #[test]
-fn help_lists_what_matters_alone() {
+fn help_lists_only_options_that_change_what_is_compared() {
     let help = Job::new().done("verify --help").out;
     for word in ["--size", "--seed", "--recheck", "--isa", "--retry", "--rays", "--up"] {
         assert!(help.contains(word), "{word}\n{help}");
@@ -97,21 +97,21 @@ fn help_lists_what_matters_alone() {
 }
 
 #[test]
-fn a_folder_is_no_scene_and_an_empty_scene_nothing_to_compare() {
+fn a_folder_and_an_empty_scene_are_refused() {
     let job = Job::new();
-    job.refused("verify .", "help: give a file in it: ./cube.obj");
+    job.refused("verify .", "./cube.obj");
     fs::write(job.path("scene.toml"), "").expect("written");
-    job.refused("verify .", "help: give a file in it: ./scene.toml");
-    job.refused("render .", "is a folder");
+    job.refused("verify .", "./scene.toml");
+    job.refused("render .", "folder");
     fs::create_dir(job.path("bare")).expect("a folder");
-    job.refused("verify bare", "a scene is a .toml, .obj or .ply file");
-    job.refused("verify scene.toml", "nothing to compare: the scene has no geometry");
+    job.refused("verify bare", ".toml, .obj or .ply");
+    job.refused("verify scene.toml", "no geometry");
 }
 
 /// A name that is not UTF-8 can be verified; it is printed as well as it can be.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_name_that_is_not_utf8_is_no_fault() {
+fn a_file_name_that_is_not_utf8_is_accepted() {
     use std::os::unix::ffi::OsStrExt;
     let job = Job::new();
     let name = std::ffi::OsStr::from_bytes(b"cub\xe9.obj");
@@ -119,11 +119,11 @@ fn a_name_that_is_not_utf8_is_no_fault() {
     let output = job.command("verify --rays 100 -q").arg(name).output().expect("it starts");
     let ran = Ran::of(&output);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-    assert!(ran.out.contains("the worst rays again:\n  tweenray verify "), "{}", ran.out);
+    assert!(ran.out.contains("\n  tweenray verify "), "{}", ran.out);
 }
 
 #[test]
-fn stopped_it_tells_within_a_second_what_was_found() {
+fn a_stopped_verification_reports_within_a_second() {
     // Other tests run beside it: the fastest of some tells what the program needs.
     let took = (0..8).map(|_| stopped()).find(|took| *took < Duration::from_secs(1));
     assert!(took.is_some(), "eight times longer than a second");

@@ -3,23 +3,17 @@
 #![allow(dead_code, clippy::unwrap_used, missing_docs)]
 
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::Film;
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Camera, Material, Pose, Scene, Settings, World, WorldMesh, WorldSphere};
-use tweenray::shade::{Progress, Renderer};
+use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
 
 pub struct Job {
     pub world: World,
     pub camera: Camera,
     pub settings: Settings,
-}
-
-pub struct Silent;
-impl Progress for Silent {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
 }
 
 pub fn job(world: World, pose: Pose, width: u32, height: u32) -> Job {
@@ -33,13 +27,23 @@ pub fn pose(eye: (f64, f64, f64), target: (f64, f64, f64)) -> Pose {
 
 pub fn render(job: &Job) -> (Film, RayCounts) {
     let scene = job.world.clone().into_scene(job.settings.rules.recentre).unwrap();
-    render_scene(&scene, job, EffectPlan::of(&scene, &job.settings))
+    render_scene(&scene, job)
 }
 
-pub fn render_scene(scene: &Scene, job: &Job, plan: EffectPlan) -> (Film, RayCounts) {
+pub fn render_scene(scene: &Scene, job: &Job) -> (Film, RayCounts) {
     let intersector = intersect::build(scene, &job.settings, 1).unwrap();
-    let renderer = Renderer { scene, settings: &job.settings, plan, intersector: &*intersector };
-    renderer.render(&job.camera, 1, true, &AtomicBool::new(false), &Silent).unwrap()
+    first_frame(&Renderer::new(scene, &job.settings, &*intersector), job)
+}
+
+/// By the kernel that leaves no effect out.
+pub fn render_with_every_effect(scene: &Scene, job: &Job) -> (Film, RayCounts) {
+    let intersector = intersect::build(scene, &job.settings, 1).unwrap();
+    let renderer = Renderer::new(scene, &job.settings, &*intersector).with_every_effect();
+    first_frame(&renderer, job)
+}
+
+fn first_frame(renderer: &Renderer, job: &Job) -> (Film, RayCounts) {
+    renderer.render(&job.camera, 1, true, &AtomicBool::new(false), &()).unwrap()
 }
 
 pub fn pixels(film: &Film) -> impl Iterator<Item = (u32, u32, Rgb)> + '_ {

@@ -4,27 +4,22 @@
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::Film;
 use tweenray::import::{self, LoadOptions};
 use tweenray::intersect::EmbreeIntersector;
 use tweenray::measure::psnr;
 use tweenray::output::Display;
-use tweenray::reuse::colour::Rule;
+use tweenray::reuse::colour::AgreementRule;
 use tweenray::scene::{Light, Policy, Scene, Settings, Shot, World};
-use tweenray::sequence::{ColourMaker, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer};
-use tweenray::shade::{FrameJob, Progress, Renderer};
-use tweenray::stats::RayCounts;
+use tweenray::sequence::{
+    ColourMaker, FrameContext, FrameMaker, Made, Pyramid, SurfaceReuse, Tracer,
+};
+use tweenray::shade::{FrameJob, Renderer};
 
 /// The scenes of `scenes/`.
 pub const SCENES: [&str; 4] = ["spheres_on_terrain", "cornell", "reflective_spheres", "demo"];
 /// Added to a frame's number for random numbers that nothing else in a job uses.
 pub const CONVERGED: u32 = 5 << 27;
-
-pub struct Quiet;
-impl Progress for Quiet {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
-}
 
 /// A scene and the move through it.
 pub struct Set {
@@ -86,8 +81,7 @@ pub struct Stage<'s> {
 
 impl Stage<'_> {
     pub fn renderer<'a>(&'a self, settings: &'a Settings) -> Renderer<'a> {
-        let plan = EffectPlan::of(&self.set.scene, settings);
-        Renderer { scene: &self.set.scene, settings, plan, intersector: &self.intersector }
+        Renderer::new(&self.set.scene, settings, &self.intersector)
     }
 
     /// The maker that the settings' policy calls for, which expects `frames`.
@@ -98,25 +92,19 @@ impl Stage<'_> {
         frames: &[u32],
     ) -> Box<dyn FrameMaker + 'a> {
         let renderer = self.renderer(settings);
-        let (pool, stop, progress) = (&self.pool, &self.stop, &Quiet);
+        let (pool, stop, progress, with_gbuffer) = (&self.pool, &self.stop, &(), false);
+        let context = FrameContext { renderer, shot, pool, with_gbuffer, stop, progress };
         let reuse = &settings.reuse;
         let maker: Box<dyn FrameMaker + 'a> = match reuse.policy {
             Policy::Surface => {
                 let pyramid = Pyramid { segment: reuse.segment, frames: shot.frames };
-                let maker = SurfaceReuse::new(renderer, shot, pool, stop, progress, pyramid);
-                Box::new(maker.expect("cameras"))
+                Box::new(SurfaceReuse::new(context, pyramid).expect("cameras"))
             }
             Policy::Colour => {
-                let (colour_epsilon, distance_epsilon) =
-                    (reuse.colour_epsilon, reuse.distance_epsilon);
-                let rule = Rule { colour_epsilon, distance_epsilon };
-                let maker = ColourMaker::new(renderer, shot, pool, stop, progress, rule, &[]);
+                let maker = ColourMaker::new(context, AgreementRule::of(reuse), &[]);
                 Box::new(maker.expect("cameras"))
             }
-            Policy::Off => {
-                let (with_gbuffer, laid) = (false, Default::default());
-                Box::new(Tracer { renderer, shot, pool, with_gbuffer, stop, progress, laid })
-            }
+            Policy::Off => Box::new(Tracer::new(context)),
         };
         maker.expect(frames);
         maker
@@ -146,7 +134,7 @@ impl Stage<'_> {
             mask: None,
             beyond_crop: false,
         };
-        let render = || self.renderer(settings).render_job(&job, &self.stop, &Quiet);
+        let render = || self.renderer(settings).render_job(&job, &self.stop, &());
         self.pool.install(render).expect("not stopped").film
     }
 
@@ -160,7 +148,7 @@ impl Stage<'_> {
 
 /// A frame of a maker that nobody stops.
 pub fn make(maker: &dyn FrameMaker, frame: u32) -> Made {
-    maker.make(frame).expect("made").expect("not stopped")
+    maker.make(frame).expect("made")
 }
 
 /// Channels as a png shows them, in [0, 1].

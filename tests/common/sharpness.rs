@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, luminance};
 use tweenray::scene::{
-    CameraPath, Easing, KeyPose, Light, Material, Pose, QuadLight, Shot, World, WorldMesh,
+    CameraPath, KeyPose, Light, Material, Pose, QuadLight, Shot, World, WorldMesh,
 };
 
 /// Half the width of the strip around the edge that is looked at, pixels.
@@ -59,7 +59,7 @@ pub fn shadow_edge(frames: u32, pixels: f64) -> Set {
         KeyPose { at, pose: Pose { eye, target, up: p(0.0, 0.0, -1.0), roll_degrees: 0.0 } }
     };
     let path = CameraPath::Keys(vec![key(0.0, -half), key(1.0, half)]);
-    Set::of(world, Shot { path, easing: Easing::Linear, frames, vfov_degrees })
+    Set::of(world, Shot::new(path, frames, vfov_degrees))
 }
 
 /// The line x = `at` + `slope` · y in pixels.

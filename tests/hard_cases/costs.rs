@@ -3,7 +3,6 @@
 use crate::suite::Size;
 use crate::support::{self, Candidate, Times, camera_rays};
 use std::sync::atomic::AtomicBool;
-use tweenray::effects::EffectPlan;
 use tweenray::film::Film;
 use tweenray::intersect::{EmbreeIntersector, Intersector, Ray, SurfaceInteraction};
 use tweenray::scene::{HitRules, Recheck, Scene, Settings, Shot};
@@ -125,10 +124,9 @@ fn look(scene: &Scene, layer: &dyn Intersector, rays: &[Ray]) {
 
 fn frame(scene: &Scene, shot: &Shot, settings: Settings, layer: &dyn Intersector) -> Film {
     let camera = shot.camera(FRAME, settings.width, settings.height).unwrap();
-    let plan = EffectPlan::of(scene, &settings);
-    let renderer = Renderer { scene, settings: &settings, plan, intersector: layer };
+    let renderer = Renderer::new(scene, &settings, layer);
     let stop = AtomicBool::new(false);
-    renderer.render(&camera, FRAME, false, &stop, &crate::common::Silent).unwrap().0
+    renderer.render(&camera, FRAME, false, &stop, &()).unwrap().0
 }
 
 fn print(primary: &[Times], frames: &[Times], rays: usize) {

@@ -1,6 +1,7 @@
 //! D. Reuse between frames.
 
 mod audited;
+mod defocus;
 mod fence;
 mod identity;
 mod specular;
@@ -17,4 +18,5 @@ cases! {
     50 no_accumulated_blur "Yang et al., 2009: blur that grows from frame to frame" => still::no_accumulated_blur;
     51 scene_change "V-Ray: the cache is the user's to delete" => identity::scene_change;
     52 order_independence "LuxCore 668: it depends on the threads" => identity::order_independence;
+    64 reuse_under_defocus "no public test: caches of the field know pinholes" => defocus::defocus;
 }

@@ -22,7 +22,8 @@ pub struct Settings {
 pub struct Specimen {
     /// The seed of its zoo and its number there: what it is a function of.
     pub index: u64,
-    /// The family's name, `forest`, with a `+` where things of other kinds were added.
+    /// The family's name, `forest`, with a `+` where things of other kinds were added
+    /// and a `~` where a lens blurs.
     pub name: String,
     /// Which of [`FAMILIES`].
     pub family: usize,
@@ -32,6 +33,8 @@ pub struct Specimen {
     pub fov: f64,
     /// One for each frame.
     pub poses: Vec<Pose>,
+    /// `lens` of the scene file; empty for a pinhole.
+    lens: String,
     /// What it is rendered with unless the command line says otherwise.
     pub settings: Settings,
     builder: Builder,
@@ -59,7 +62,22 @@ impl Specimen {
         // Drawn last, so that the number of frames changes nothing else.
         let poses = kind.poses(&mut dice, &stage, frames);
         let name = format!("{name}{}", if is_mixed { "+" } else { "" });
-        Self { index, name, family, kind, fov, poses, settings, builder }
+        Self { index, name, family, kind, fov, poses, lens: String::new(), settings, builder }
+    }
+
+    /// With a random thin lens: from hardly any blur to a strong one, focused on the target, before or behind it.
+    pub fn with_lens(mut self, seed: u64) -> Self {
+        let mut dice = Dice::new(!seed, self.index);
+        let distance = self.poses.first().map_or(1.0, |pose| pose.eye.distance(pose.target));
+        let radius = distance * dice.scale(0.002, 0.04);
+        let focus = match dice.chance(0.5) {
+            true => "\"target\"".to_string(),
+            false => format!("{:?}", distance * dice.scale(0.4, 2.0)),
+        };
+        let blades = dice.pick(&["", ", blades = 5", ", blades = 8"]);
+        self.lens = format!("lens = {{ radius = {radius:?}, focus = {focus}{blades} }}\n");
+        self.name.push('~');
+        self
     }
 
     /// Writes the scene file `name` and what it needs into `folder`: a move through `poses`, of
@@ -85,7 +103,7 @@ impl Specimen {
     /// The camera's part of a scene file.
     fn camera(&self, poses: &[Pose], first: usize) -> String {
         let frames = first + poses.len() - 1;
-        let mut text = format!("[camera]\nfov = {:.3}\nframes = {frames}\n", self.fov);
+        let mut text = format!("[camera]\nfov = {:.3}\nframes = {frames}\n{}", self.fov, self.lens);
         let at = |frame: usize| (frame - 1) as f64 / (frames - 1) as f64;
         let mut key = |at: f64, pose: &Pose| {
             let (eye, target) = (triple(pose.eye), triple(pose.target));

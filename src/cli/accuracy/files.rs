@@ -1,9 +1,9 @@
 //! The figures for other programs: JSON and CSV.
 
 use super::{AccuracyArgs, Outcome};
-use crate::accuracy::{OracleCrop, Row, Writing};
+use crate::accuracy::{CandidateRow, OracleCrop, Writing};
 use crate::cli::machine::Machine;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::measure::Median;
 use crate::output::atomic;
 use crate::output::manifest::Header;
@@ -31,7 +31,7 @@ struct Document<'a> {
     runs: u32,
     default: Value,
     reference: Reference,
-    rows: &'a [Row],
+    rows: &'a [CandidateRow],
     oracle: Option<OracleCrop>,
     writing: Option<Writing>,
     /// What the page says of each knob.
@@ -73,11 +73,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
         writing: outcome.writing,
         knobs: super::page::knobs(outcome),
     };
-    let path = folder.join("accuracy.json");
-    let mut text =
-        serde_json::to_vec_pretty(&document).map_err(|e| Error::io("write", &path, e.into()))?;
-    text.push(b'\n');
-    atomic::write(&path, |w| w.write_all(&text))?;
+    atomic::write_json(&folder.join("accuracy.json"), &document)?;
     let csv = csv(&outcome.measured.rows);
     atomic::write(folder.join("accuracy.csv"), |w| w.write_all(csv.as_bytes())).map(drop)
 }
@@ -89,13 +85,13 @@ const BEFORE_RAYS: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_sec
 /// The columns after those.
 const AFTER_RAYS: &str = "build_seconds,memory_bytes,on_front,on_cpu_front";
 
-fn csv(rows: &[Row]) -> String {
+fn csv(rows: &[CandidateRow]) -> String {
     let rays = RayKind::ALL.map(|kind| format!("rays_{}", kind.key())).join(",");
     let head = format!("{BEFORE_RAYS},{rays},{AFTER_RAYS}\n");
     head + &rows.iter().map(line).collect::<String>()
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &CandidateRow) -> String {
     // No option holds a comma or a quote.
     let number = |x: f64| if x.is_finite() { x.to_string() } else { String::new() };
     let ends = |m: &Median| [m.interval.estimate, m.interval.low, m.interval.high].map(number);

@@ -10,13 +10,13 @@ use std::time::Instant;
 const UNITS: f64 = 1000.0;
 
 /// Who hears of progress, and how.
-pub struct Line {
+pub struct ProgressLine {
     start: Instant,
     bar: Option<ProgressBar>,
     is_plain: bool,
 }
 
-impl Line {
+impl ProgressLine {
     /// `quiet` says nothing at all.
     pub fn new(quiet: bool) -> Self {
         let is_terminal = std::io::stderr().is_terminal();

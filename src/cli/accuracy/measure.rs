@@ -1,6 +1,6 @@
 //! Measuring, going on, and telling what there is.
 
-use super::line::Line;
+use super::line::ProgressLine;
 use super::{AccuracyArgs, Outcome, files, page};
 use crate::accuracy::{
     self, Convergence, Ledger, OracleCrop, Step, Sweep, SweepProgress, Truth, Writing,
@@ -24,11 +24,11 @@ const WRITING: &str = "writing.json";
 const LOAD: &str = "load.json";
 
 /// A sweep to be measured and reported.
-pub struct Job<'a> {
+pub struct SweepJob<'a> {
     pub args: &'a AccuracyArgs,
     pub sweep: &'a Sweep<'a>,
     pub interrupt: &'a Interrupt,
-    pub line: Line,
+    pub line: ProgressLine,
     pub oracle_was_wanted: bool,
     pub writing_is_wanted: bool,
     /// Load of the machine over the minute before.
@@ -37,7 +37,7 @@ pub struct Job<'a> {
     pub start: Instant,
 }
 
-impl Job<'_> {
+impl SweepJob<'_> {
     /// Measures what `ledger` has not, and writes the page.
     pub fn run(&self, mut ledger: Ledger) -> Result<Exit> {
         self.greet(&ledger);
@@ -84,19 +84,19 @@ impl Job<'_> {
         }
         let truth = self.truth(ledger)?;
         let last_turn = Cell::new(None);
-        let mut report = |progress: SweepProgress| {
-            self.show(&progress);
+        let mut hear = |heard: SweepProgress| {
+            self.heard(&heard);
             // After each turn: whoever kills the program has a page of what there was.
-            if last_turn.replace(Some(progress.turn)).is_some_and(|turn| turn != progress.turn) {
-                self.publish(&truth, progress.ledger)?;
+            if last_turn.replace(Some(heard.turn)).is_some_and(|turn| turn != heard.turn) {
+                self.publish(&truth, heard.ledger)?;
             }
             Ok(())
         };
-        self.sweep.run(&truth, ledger, &mut report)
+        self.sweep.run(&truth, ledger, &mut hear)
     }
 
-    fn show(&self, progress: &SweepProgress) {
-        let SweepProgress { done, of, turn, candidate, left, .. } = progress;
+    fn heard(&self, heard: &SweepProgress) {
+        let SweepProgress { done, of, turn, candidate, left, .. } = heard;
         let turn = if *turn == 0 { "warm-up".into() } else { format!("turn {turn}") };
         let name = page::name_of(&candidate.options);
         let text = format!("{} of {of}  {turn}  {name}", (done + 1).min(*of));
@@ -122,7 +122,7 @@ impl Job<'_> {
             most: self.args.reference_spp,
         };
         let start = Cell::new(Instant::now());
-        let mut report = |step: Step| match step {
+        let mut hear = |step: Step| match step {
             Step::Frame { spp, k, of } => {
                 if k == 0 {
                     start.set(Instant::now());
@@ -151,7 +151,7 @@ impl Job<'_> {
                 Ok(())
             }
         };
-        convergence.run(last, &mut report)
+        convergence.run(last, &mut hear)
     }
 
     /// What there is so far; `None` before the default was timed.

@@ -6,8 +6,8 @@ mod tables;
 use super::given::{Given, given, with_given};
 use super::{AccuracyArgs, Outcome};
 use crate::accuracy::{
-    Goal, Knob, Row, about_knob, about_oracle, about_writing, best_within, fastest_reaching,
-    perhaps_faster,
+    CandidateRow, Goal, Knob, about_knob, about_oracle, about_writing, best_within,
+    fastest_reaching, perhaps_faster,
 };
 use crate::cli::spelled;
 use crate::error::Result;
@@ -52,7 +52,7 @@ pub fn name_of(options: &str) -> String {
     if options.is_empty() { "default".into() } else { options.into() }
 }
 
-fn median_of(row: &Row) -> f64 {
+fn median_of(row: &CandidateRow) -> f64 {
     row.seconds.median.interval.estimate
 }
 
@@ -70,7 +70,7 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     let half = best_within(&outcome.measured, time * 1.02).filter(|row| row.knob != Knob::Default);
     let beyond_noise = |ratio: &Option<Median>| ratio.is_some_and(|r| r.differs_from(1.0));
     // That it takes no longer has to be told by as many turns as that it is nearer.
-    let is_timed = |row: &&Row| row.time_ratio.is_some_and(|ratio| ratio.is_sure());
+    let is_timed = |row: &&CandidateRow| row.time_ratio.is_some_and(|ratio| ratio.is_sure());
     if let Some(row) = half.filter(is_timed).filter(|row| beyond_noise(&row.error_ratio)) {
         lines.push(format!(
             "In the same time {} comes nearer: {}/255.",
@@ -218,7 +218,7 @@ fn with_changes(ratio: &Median) -> String {
 }
 
 fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
-    let detail = |(id, row): (usize, &Row)| {
+    let detail = |(id, row): (usize, &CandidateRow)| {
         let e = &row.errors;
         let mut figures = vec![
             ("Seconds a frame", with_ends(&row.seconds.median, short)),

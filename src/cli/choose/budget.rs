@@ -34,7 +34,7 @@ impl Budget {
         let frames = f64::from(request.frames.last - request.frames.first + 1);
         let pixels = f64::from(settings.width) * f64::from(settings.height);
         let [start, each] = VIDEO;
-        let is_video = request.fps.is_some() && frames > 1.0;
+        let is_video = request.options.video && frames > 1.0;
         let ending = request.pattern.path(request.frames.first);
         let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
         Some(Self {

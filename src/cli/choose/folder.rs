@@ -1,19 +1,19 @@
-//! Files that are in the way of a job whose settings are yet to be chosen.
+//! What is in the way of a job whose settings are yet to be chosen.
 
 use super::{Choice, Chooser};
 use crate::error::{Error, Result, counted};
 use crate::output::atomic;
 use crate::output::manifest::{Header, Manifest, manifest_path};
-use crate::sequence;
+use crate::sequence::{self, Target};
 use serde_json::Value;
 
 impl Chooser<'_> {
-    /// Refuses, before the probe, a folder that cannot be written and frames that were made for something
-    /// else, which rendering would refuse only after it.
-    pub(super) fn check_folder(&self, tracer: &str) -> Result<()> {
+    /// Refuses, before the probe, what rendering would only refuse after it: a folder that cannot be
+    /// written, and frames that were made for something else.
+    pub(super) fn check_folder(&self) -> Result<()> {
         let request = self.request;
         atomic::make_room(request.pattern.path(request.frames.first))?;
-        if request.overwrite {
+        if request.options.overwrite {
             return Ok(());
         }
         let folder = request.pattern.folder();
@@ -21,33 +21,37 @@ impl Chooser<'_> {
         let is_there = |file: &str| folder.join(file).exists();
         let left = |m: &Manifest| m.rows.values().filter(|row| is_there(&row.file)).count();
         let Some((found, left)) = found.map(|m| (left(&m), m)).filter(|(left, _)| *left > 0) else {
-            return sequence::refuse_strangers(&request.target(tracer.into()), request.frames);
+            return sequence::refuse_unlisted(&self.target()?, request.frames);
         };
         Err(Error::Usage(format!(
             "{} holds {} {}; --overwrite replaces them\n  \
              help: or choose another output with -o",
             request.pattern,
             counted(found, "frame"),
-            self.made_for(&left.header, tracer)
+            self.made_for(&left.header)?
         )))
     }
 
-    /// The target or budget that the frames with the header `before` were made for; if that is the same, the
-    /// first setting that differs.
-    fn made_for(&self, before: &Header, tracer: &str) -> String {
+    /// Where frames would go, were nothing chosen.
+    fn target(&self) -> Result<Target> {
+        let setup = self.request.setup(self.context.base.clone())?;
+        Ok(self.request.target(&setup, self.tracer))
+    }
+
+    /// For what frames with the header `before` were made, and where only that is the same, what is not.
+    fn made_for(&self, before: &Header) -> Result<String> {
         let Some(chosen) = Choice::of(before) else {
-            return "whose settings were not chosen".into();
+            return Ok("whose settings were not chosen".into());
         };
         if chosen.wanted != self.args.words() {
-            return format!("made for {}", chosen.wanted);
+            return Ok(format!("made for {}", chosen.wanted));
         }
         let base = |settings: Value, header: Header| Header { settings, ..header };
-        let now =
-            base(Header::settings(self.context.base), self.request.target(tracer.into()).header);
+        let now = base(Header::settings(self.context.base), self.target()?.header);
         // Where others were given, the first difference may be of one that nobody gave.
         let is_given_alike = chosen.given == self.given();
         let d = base(chosen.base, before.clone()).first_difference(&now).filter(|_| is_given_alike);
         let why = d.map_or("other options were given".into(), |d| d.was_and_is());
-        format!("made for {} too, but {why}", chosen.wanted)
+        Ok(format!("made for {} too, but {why}", chosen.wanted))
     }
 }

@@ -1,7 +1,7 @@
 //! The check of finished frames, and a tighter choice where a target was missed.
 
-use super::{Choice, Chooser, Judged, decibels};
-use crate::accuracy::{Check, Effort, Goal, Prediction, Timer, Verdict, displayed_rgb};
+use super::{Choice, Chooser, Judgement, decibels};
+use crate::accuracy::{CheckOutcome, Effort, Goal, Prediction, Timer, Verdict, displayed_rgb};
 use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
@@ -23,13 +23,13 @@ impl Chooser<'_> {
         audit: Option<&AuditRow>,
         rendered: Option<f64>,
         timer: Timer,
-    ) -> Result<Judged> {
+    ) -> Result<Judgement> {
         let (frames, settings) = (self.request.frames, self.context.base);
         let pixels = u64::from(settings.width) * u64::from(settings.height);
         let effort = Effort::of_check(frames.last - frames.first + 1, pixels);
         let (predictor, predicted) = (&choice.predictor, &choice.predicted);
         let image = |frame| self.image(frame);
-        let check = Check::of(&self.probe(), predictor, predicted, effort, &image)?;
+        let check = CheckOutcome::of(&self.probe(), predictor, predicted, effort, &image)?;
         let [mean, worst] = check.psnr().map(decibels);
         let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
@@ -52,23 +52,23 @@ impl Chooser<'_> {
     fn weigh(
         &self,
         choice: Choice,
-        check: &Check,
+        check: &CheckOutcome,
         audit: Option<&AuditRow>,
         timer: Timer,
-    ) -> Result<Judged> {
-        let Some(goal) = self.args.target else { return Ok(Judged::Done(choice)) };
+    ) -> Result<Judgement> {
+        let Some(goal) = self.args.target else { return Ok(Judgement::Done(choice)) };
         let excess = check.excess(goal).max(audited_excess(audit, goal));
         if excess <= 1.0 {
             let verdict = Some(check.verdict(goal));
-            return Ok(Judged::Done(Choice { verdict, ..choice }));
+            return Ok(Judgement::Done(Choice { verdict, ..choice }));
         }
-        let missed = |choice| Judged::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
+        let missed = |choice| Judgement::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
         if choice.tightened >= ROUNDS {
             self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
             return Ok(missed(choice));
         }
         Ok(match self.tighter(&choice, excess, timer)? {
-            Some(tighter) => Judged::Again(tighter),
+            Some(tighter) => Judgement::Again(tighter),
             None => missed(choice),
         })
     }

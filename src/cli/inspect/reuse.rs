@@ -6,8 +6,7 @@ use crate::inference::Channels;
 use crate::reuse::{self, Reference, colour};
 use crate::scene::{Policy, Rect, Scene, Settings, Shot};
 use crate::sequence::Schedule;
-use crate::shade::{FrameJob, Progress, Renderer, Reuse};
-use crate::stats::RayCounts;
+use crate::shade::{FrameJob, Renderer, Reuse};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -23,7 +22,7 @@ const SMALL: u32 = 96;
 
 /// How the frames of the shot come about.
 #[derive(Serialize)]
-pub struct Plan {
+pub struct ReusePlan {
     policy: Policy,
     /// Frames from one key frame to the next; 0 where nothing is looked up.
     segment: u32,
@@ -69,11 +68,11 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
     let settings = Settings {
         width: w,
         height: h,
-        shadow_samples: 1,
-        sky_samples: 1,
+        shadow_samples: renderer.settings.shadow_samples.min(1),
+        sky_samples: renderer.settings.sky_samples.min(1),
         ..renderer.settings.clone()
     };
-    let small = Renderer { settings: &settings, ..*renderer };
+    let small = Renderer::new(renderer.scene, &settings, renderer.intersector);
     let mut most = 0;
     for frame in [1, shot.frames.div_ceil(2), shot.frames] {
         let camera = shot.camera(frame, w, h)?;
@@ -85,7 +84,7 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
             mask: None,
             beyond_crop: true,
         };
-        let traced = small.render_job(&job, &AtomicBool::new(false), &Unseen);
+        let traced = small.render_job(&job, &AtomicBool::new(false), &());
         let sources = traced.map(|done| done.sources).unwrap_or_default();
         let camera = camera.to_scene(&renderer.scene.recentring);
         most = most.max(Reference::new(frame, &camera, &sources, channels.len()).memory());
@@ -134,21 +133,14 @@ impl AlwaysTraced {
     }
 }
 
-/// Nobody looks on.
-struct Unseen;
-
-impl Progress for Unseen {
-    fn tile_done(&self, _: f64, _: &RayCounts) {}
-}
-
-impl Plan {
+impl ReusePlan {
     /// The plan of rendering the whole shot in one process.
     pub fn of(renderer: &Renderer, shot: &Shot) -> Result<Self> {
-        let Renderer { scene, settings, plan: effects, .. } = renderer;
-        let channels = reuse::channels(scene, effects, settings);
+        let Renderer { scene, settings, .. } = renderer;
+        let channels = reuse::channels(scene, settings);
         let policy = settings.reuse.policy;
         let reasons = match policy {
-            Policy::Surface => reuse::lookup_reasons(scene, effects, settings),
+            Policy::Surface => reuse::lookup_reasons(scene, settings),
             Policy::Colour | Policy::Off => Vec::new(),
         };
         let looks_up = policy == Policy::Surface && !channels.is_empty();

@@ -3,7 +3,7 @@
 //! A job of some frames makes the video of these. Where they complete the shot, whoever made the others, it
 //! makes that of the whole shot too: several jobs may have shared its frames, and any may be the last.
 
-use super::round::Frames;
+use super::round::{RenderJob, Round};
 use crate::cli::request::Request;
 use crate::error::Result;
 use crate::output::manifest::{Manifest, beside, manifest_path};
@@ -15,26 +15,26 @@ use crate::sequence::survey::survey_of;
 /// their numbers to the name, replaces no video of all.
 const WHOLE: &str = ".mp4";
 
-/// Makes the videos at `fps` frames a second; gives the lines to print.
-pub(super) fn make(job: &Frames, fps: f64) -> Result<Vec<String>> {
+/// Makes the videos; gives the lines to print.
+pub(super) fn make(job: &RenderJob, round: &Round) -> Result<Vec<String>> {
     let Request { frames, shot, pattern, .. } = job.request;
     let whole = FrameRange { first: 1, last: shot.frames };
     let is_whole = frames.first == whole.first && frames.last == whole.last;
     let mut lines = Vec::new();
     if !is_whole && frames.first < frames.last {
         let ending = format!("_{}-{}{WHOLE}", frames.first, frames.last);
-        lines.push(of(job, *frames, &ending, fps)?);
+        lines.push(of(job, *frames, &ending)?);
     }
     // The shot's video is made once: by the job that brought the last frame, or where there is none.
-    let is_due = is_whole || !job.plan.render.is_empty() || !beside(pattern, WHOLE).exists();
+    let is_due = is_whole || !round.plan.render.is_empty() || !beside(pattern, WHOLE).exists();
     if shot.frames > 1 && is_due && (is_whole || is_complete(job)?) {
-        lines.push(of(job, whole, WHOLE, fps)?);
+        lines.push(of(job, whole, WHOLE)?);
     }
     Ok(lines)
 }
 
 /// Whether every frame of the shot is there, as the manifest has it by now.
-fn is_complete(job: &Frames) -> Result<bool> {
+fn is_complete(job: &RenderJob) -> Result<bool> {
     let path = manifest_path(&job.target.pattern);
     let Some(manifest) = Manifest::as_of_now(&path)? else { return Ok(false) };
     // Before files are read: most jobs of a few frames are not the last.
@@ -47,13 +47,13 @@ fn is_complete(job: &Frames) -> Result<bool> {
     Ok(is_this_shot && survey_of(&manifest, &path, all)?.complete)
 }
 
-fn of(job: &Frames, frames: FrameRange, ending: &str, fps: f64) -> Result<String> {
+fn of(job: &RenderJob, frames: FrameRange, ending: &str) -> Result<String> {
     let pattern = &job.request.pattern;
     let clip = Clip {
         pattern,
         first: frames.first,
         count: frames.last - frames.first + 1,
-        fps,
+        fps: job.request.options.fps,
         display: job.target.write.display,
     };
     let (out, stop) = (beside(pattern, ending), &job.site.interrupt.stop);

@@ -7,7 +7,7 @@ use crate::math::Rgb;
 use crate::output::manifest::{MapRow, Row};
 use crate::output::maps::{self, Map};
 use crate::output::{Display, read_image};
-use crate::page::job::Shown;
+use crate::page::job::PlayerFrame;
 use crate::page::{Picture, words};
 use crate::scene::ToneCurve;
 use crate::sequence::survey::is_whole_map;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// One frame in `every`, at most `width` pixels wide, and the numbers of those that cannot be read.
-pub fn pictures(job: &Job, every: usize, width: u32) -> (Vec<Shown>, Vec<u32>) {
+pub fn pictures(job: &Job, every: usize, width: u32) -> (Vec<PlayerFrame>, Vec<u32>) {
     let maps = offered(job);
     let chosen: Vec<&Row> = job.rows.iter().step_by(every).collect();
     // One frame that was whole and is no more, a running job's say, is no reason for no page.
@@ -36,13 +36,13 @@ fn offered(job: &Job) -> Vec<Map> {
 }
 
 /// The maps that the film has, with their meanings.
-pub fn maps_of(film: &[Shown]) -> Vec<(String, String)> {
+pub fn maps_of(film: &[PlayerFrame]) -> Vec<(String, String)> {
     let has = |map: &Map| film.iter().any(|frame| frame.maps.contains_key(map.name()));
     let maps = Map::ALL.into_iter().filter(has);
     maps.map(|map| (map.name().into(), map.meaning().into())).collect()
 }
 
-fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<Shown> {
+fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<PlayerFrame> {
     let path = job.folder.join(&row.file);
     let settings = &job.settings;
     let display = Display { exposure: settings.exposure, tone: settings.tone };
@@ -70,7 +70,7 @@ fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<Shown> {
             pictures.insert(map.name().into(), Picture::jpeg(&read_image(&path)?, width)?);
         }
     }
-    Ok(Shown { number: row.frame, text, picture, maps: pictures })
+    Ok(PlayerFrame { number: row.frame, text, picture, maps: pictures })
 }
 
 /// Linear radiance as it is displayed.

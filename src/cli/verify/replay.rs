@@ -69,9 +69,7 @@ pub fn run(args: &VerifyArgs, check: &Check, id: RayId) -> Result<Exit> {
     };
     let report = Report::new(check, id, &replay);
     if args.json {
-        let text = serde_json::to_string_pretty(&report)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        say::result(text)?;
+        say::json(&report)?;
     } else {
         say::text(&report.to_text())?;
     }

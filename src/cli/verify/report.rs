@@ -2,9 +2,9 @@
 
 use super::{VerifyArgs, replay_command};
 use crate::cli::say;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::verify::{
-    BAND_ULPS, Check, Class, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Row, Tally,
+    BAND_ULPS, Check, Class, ClassRow, Kind, OPEN_VERTEX_LIMIT, PAST_VERTEX_LIMIT, Tally,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ struct Report {
 #[derive(Serialize)]
 struct ClassReport {
     #[serde(flatten)]
-    row: Row,
+    row: ClassRow,
     replay: Option<String>,
 }
 
@@ -64,9 +64,7 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
         classes: classes.collect(),
     };
     if args.json {
-        let text = serde_json::to_string_pretty(&report)
-            .map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?;
-        return say::result(text);
+        return say::json(&report);
     }
     say::text(&report.to_text())
 }
@@ -108,7 +106,7 @@ impl Report {
         for explained in [true, false] {
             let _ = writeln!(text, "{}", if explained { "explained" } else { "unexplained" });
             for class in self.classes.iter().filter(|c| c.row.explained == explained) {
-                let Row { class, count, rays, bound, worst, .. } = &class.row;
+                let ClassRow { class, count, rays, bound, worst, .. } = &class.row;
                 let ulps = worst.map_or("-".into(), |w| format!("{:.3}", w.ulps));
                 let ray = worst.map_or("-".into(), |w| w.ray.to_string());
                 let _ = writeln!(

@@ -1,25 +1,25 @@
 //! The scheduler at the start of a job: the dependency graph, and the initial queue of each rank.
 
 use super::{RankRecord, Scheduler, State, TaskRecord};
-use crate::sequence::Shared;
+use crate::sequence::FrameGraph;
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Scheduler {
-    /// The schedule of `frames`; each rank's queue starts with a contiguous run of whole batches.
+    /// The schedule of `frames` by their `graph`; each rank's queue starts with a contiguous run of whole batches.
     /// `rank_order` lists the ranks so that neighbours share a node.
-    pub fn new(maker: &(impl Shared + ?Sized), frames: &[u32], rank_order: &[u32]) -> Self {
+    pub fn new(graph: &(impl FrameGraph + ?Sized), frames: &[u32], rank_order: &[u32]) -> Self {
         let mut outputs: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for frame in frames {
-            outputs.entry(maker.original(*frame)).or_default().push(*frame);
+            outputs.entry(graph.original(*frame)).or_default().push(*frame);
         }
         let mut users: Vec<u32> = outputs.keys().copied().collect();
         let mut read = BTreeSet::new();
         while let Some(user) = users.pop() {
-            if outputs[&user].is_empty() && maker.lies_on_disk(user) {
+            if outputs[&user].is_empty() && graph.is_on_disk(user) {
                 read.insert(user);
                 continue;
             }
-            for need in maker.needs(user) {
+            for need in graph.needs(user) {
                 outputs.entry(need).or_insert_with(|| {
                     users.push(need);
                     Vec::new()
@@ -27,7 +27,7 @@ impl Scheduler {
             }
         }
         let originals: Vec<u32> = outputs.keys().copied().collect();
-        let batches = maker.shares(&originals);
+        let batches = graph.rank_batches(&originals);
         let owners = owners(&batches, rank_order);
         let mut scheduler = Self {
             tasks: Vec::new(),
@@ -40,9 +40,9 @@ impl Scheduler {
             next_thief: 0,
             changed: BTreeSet::new(),
             remaining: originals.len(),
-            most_strips: maker.most_strips(),
+            most_strips: graph.most_strips(),
             empty_queues: rank_order.len(),
-            sends_to_all: maker.tells_all(),
+            sends_to_all: graph.sends_to_all(),
             is_stopped: false,
         };
         for (batch, (list, owner)) in batches.into_iter().zip(owners).enumerate() {
@@ -54,7 +54,7 @@ impl Scheduler {
             scheduler.batches.push(first..scheduler.tasks.len());
         }
         let needs = |original| {
-            if read.contains(&original) { Vec::new() } else { maker.needs(original) }
+            if read.contains(&original) { Vec::new() } else { graph.needs(original) }
         };
         scheduler.connect(needs);
         scheduler.tasks.iter_mut().for_each(|task| task.is_read = read.contains(&task.original));

@@ -2,11 +2,10 @@
 
 use super::build::owners;
 use super::*;
-use crate::error::Result;
-use crate::sequence::{FrameMaker, Made, Pyramid, Shared};
+use crate::sequence::{FrameGraph, Pyramid};
 use std::collections::BTreeSet;
 
-/// Frames of a pyramid, or independent frames; makes nothing.
+/// Frames of a pyramid, or independent frames.
 struct Frames {
     pyramid: Pyramid,
     is_independent: bool,
@@ -14,29 +13,27 @@ struct Frames {
     on_disk: Vec<u32>,
 }
 
-impl FrameMaker for Frames {
-    fn make(&self, _frame: u32) -> Result<Option<Made>> {
-        Ok(None)
-    }
-
+impl FrameGraph for Frames {
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         match self.is_independent {
             true => frames.iter().map(|frame| vec![*frame]).collect(),
             false => self.pyramid.batches(frames),
         }
     }
-}
 
-impl Shared for Frames {
     fn needs(&self, original: u32) -> Vec<u32> {
         if self.is_independent { Vec::new() } else { self.pyramid.ancestors(original) }
     }
 
-    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
-        if self.is_independent { self.batches(originals) } else { self.pyramid.shares(originals) }
+    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+        if self.is_independent {
+            self.batches(originals)
+        } else {
+            self.pyramid.rank_batches(originals)
+        }
     }
 
-    fn lies_on_disk(&self, original: u32) -> bool {
+    fn is_on_disk(&self, original: u32) -> bool {
         self.on_disk.contains(&original)
     }
 

@@ -2,14 +2,14 @@
 
 use super::super::message::PayloadKind;
 use super::super::scheduler::{Assignment, Decision, Extent, Scheduler, Task};
-use super::{Job, Model, SchedulerCost, SimulatedRun};
+use super::{CostModel, Job, SchedulerCost, SimulatedRun};
 use crate::sequence::Pyramid;
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
 
 /// A job that is being simulated. Times are in seconds since its start.
 pub struct Simulator<'a> {
-    pub(super) model: &'a Model<'a>,
+    pub(super) model: &'a CostModel<'a>,
     pyramid: Pyramid,
     sends_to_all: bool,
     scheduler: Scheduler,
@@ -104,7 +104,7 @@ impl<T> PartialEq for Timed<T> {
 impl<T> Eq for Timed<T> {}
 
 impl<'a> Simulator<'a> {
-    pub fn new(job: &Job, ranks: u32, model: &'a Model<'a>) -> Self {
+    pub fn new(job: &Job, ranks: u32, model: &'a CostModel<'a>) -> Self {
         let frames: Vec<u32> = job.pyramid.all().collect();
         let rank_order: Vec<u32> = (0..ranks).collect();
         Self {

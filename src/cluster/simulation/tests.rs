@@ -6,8 +6,8 @@ fn job(segment: u32, frames: u32) -> Job {
     Job { pyramid: Pyramid { segment, frames }, most_strips: 16, sends_to_all: false }
 }
 
-fn with(seconds: &dyn Fn(u32) -> f64) -> Model<'_> {
-    Model {
+fn with(seconds: &dyn Fn(u32) -> f64) -> CostModel<'_> {
+    CostModel {
         seconds,
         write_seconds: 0.01,
         pack_seconds: 0.01,
@@ -32,7 +32,7 @@ fn frame_seconds(job: &Job) -> impl Fn(u32) -> f64 + use<> {
     move |frame| if pyramid.is_key(frame) { 1.0 } else { 0.25 }
 }
 
-fn efficiency(job: &Job, ranks: u32, model: &Model) -> f64 {
+fn efficiency(job: &Job, ranks: u32, model: &CostModel) -> f64 {
     job.single_rank_seconds(model) / (job.simulate(ranks, model).seconds * f64::from(ranks))
 }
 
@@ -64,8 +64,9 @@ fn the_same_job_takes_the_same_time_again() {
 fn efficiency_falls_with_latency_and_with_less_bandwidth() {
     let job = job(16, 16 * 32 + 1);
     let seconds = frame_seconds(&job);
-    let at =
-        |latency, bandwidth| efficiency(&job, 32, &Model { latency, bandwidth, ..with(&seconds) });
+    let at = |latency, bandwidth| {
+        efficiency(&job, 32, &CostModel { latency, bandwidth, ..with(&seconds) })
+    };
     let falls = [at(1e-5, 1e9), at(0.1, 1e9), at(1.0, 1e9)];
     assert!(falls[0] > 0.8 && falls.is_sorted_by(|a, b| a > b), "{falls:?}");
     assert!(falls[2] < 0.6, "{falls:?}");
@@ -78,7 +79,7 @@ fn sending_discoveries_to_all_costs_more_with_more_ranks() {
     let simulate = |ranks, sends_to_all| {
         let job = Job { sends_to_all, ..job(16, 16 * 2 * ranks + 1) };
         let seconds = frame_seconds(&job);
-        let model = Model { bandwidth: 2e7, ..with(&seconds) };
+        let model = CostModel { bandwidth: 2e7, ..with(&seconds) };
         let run = job.simulate(ranks, &model);
         assert_eq!(run.frames, u64::from(16 * 2 * ranks + 1));
         (efficiency(&job, ranks, &model), run.sent.discoveries.bytes / u64::from(ranks))
@@ -93,7 +94,7 @@ fn sending_discoveries_to_all_costs_more_with_more_ranks() {
 fn ranks_that_share_cores_get_no_more_than_these() {
     let job = job(16, 257);
     let seconds = frame_seconds(&job);
-    let model = Model { cores: Some(2.0), ..with(&seconds) };
+    let model = CostModel { cores: Some(2.0), ..with(&seconds) };
     let (two, eight) = (job.simulate(2, &model), job.simulate(8, &model));
     for run in [&two, &eight] {
         assert!(run.seconds >= run.busy_seconds / 2.0 - 1e-9);
@@ -107,8 +108,9 @@ fn ranks_that_share_cores_get_no_more_than_these() {
 fn communication_threads_that_take_a_tenth_leave_nine_tenths() {
     let job = job(16, 257);
     let seconds = frame_seconds(&job);
-    let seconds_with =
-        |ranks, comm_share| job.simulate(ranks, &Model { comm_share, ..with(&seconds) }).seconds;
+    let seconds_with = |ranks, comm_share| {
+        job.simulate(ranks, &CostModel { comm_share, ..with(&seconds) }).seconds
+    };
     let ratio = seconds_with(4, 0.1) / seconds_with(4, 0.0);
     assert!((ratio - 1.0 / 0.9).abs() < 0.03, "{ratio}");
     assert!((seconds_with(1, 0.1) - seconds_with(1, 0.0)).abs() < 1e-9);

@@ -8,7 +8,7 @@ mod write_ply;
 
 pub use write_ply::{PlyReport, write_ply};
 
-use super::model::read_model;
+use super::mesh_file::read_model;
 use crate::error::{Diagnostic, Error, Result};
 use std::fs;
 use std::io::{self, Write};

@@ -12,7 +12,6 @@
 mod statements;
 
 use super::model::Model;
-use super::obj::default_material;
 use super::source::{self, Notes};
 use super::texture::{self, TextureCache};
 use super::{lamps, polygon, tidy};
@@ -76,7 +75,7 @@ fn add_spheres(file: &File, materials: &[CourseMaterial], model: &mut Model) {
         if radiance != Rgb::ZERO {
             model.world.lights.push(Light::Sphere(SphereLight { centre, radius, radiance }));
         } else {
-            let material = sphere.material.unwrap_or_else(|| default_material(model));
+            let material = sphere.material.unwrap_or_else(|| model.default_material());
             let name = format!("sphere {}", number + 1);
             model.world.spheres.push(WorldSphere {
                 name,
@@ -115,7 +114,7 @@ fn add_faces(
                 }
             }
             known => {
-                let id = known.map_or_else(|| default_material(model), |_| slot as MaterialId);
+                let id = known.map_or_else(|| model.default_material(), |_| slot as MaterialId);
                 let mut mesh = mesh_of(file, &faces, id, &mut dropped)
                     .map_err(|message| Error::input(path, message))?;
                 mesh.name = model.world.materials[id as usize].name.clone();

@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::{CameraPath, Easing, Shot, WorldMesh, WorldSphere};
+use crate::scene::{CameraPath, Shot, WorldMesh, WorldSphere};
 
 /// A box of points without triangles.
 fn cloud(min: DVec3, max: DVec3) -> WorldMesh {
@@ -17,7 +17,7 @@ fn cloud(min: DVec3, max: DVec3) -> WorldMesh {
 fn fill(world: &World, target: DVec3, eye: DVec3, axis: DVec3, lens: &Lens) -> f64 {
     let frames = 720;
     let path = CameraPath::Orbit { target, eye, axis, degrees: 360.0, roll_degrees: 0.0 };
-    let shot = Shot { path, easing: Easing::Linear, frames, vfov_degrees: lens.vfov_degrees };
+    let shot = Shot::new(path, frames, lens.vfov_degrees);
     let (width, height) = ((1000.0 * lens.aspect) as u32, 1000);
     let mut points: Vec<DVec3> = world.meshes.iter().flat_map(|m| m.positions.clone()).collect();
     for s in &world.spheres {

@@ -6,7 +6,6 @@ mod front;
 mod meaning;
 
 use super::model::Model;
-use super::obj::default_material;
 use super::source;
 use super::texture::{self, TextureCache};
 use crate::error::{Diagnostic, Result};
@@ -88,7 +87,7 @@ impl Libraries {
         let Some(entry) = self.entries.get(name) else {
             let message = format!("no material `{name}`: plain grey in its place");
             model.warnings.push(Diagnostic::new(obj, message).line(line));
-            return Ok(default_material(model));
+            return Ok(model.default_material());
         };
         let place = |message: String| {
             Diagnostic::new(&entry.library, format!("material `{name}`: {message}"))

@@ -1,6 +1,5 @@
 //! From checked chunks to one mesh per material.
 
-use super::default_material;
 use super::face::{Faces, MISSING};
 use super::parse::Part;
 use crate::error::{Diagnostic, Result};
@@ -67,7 +66,7 @@ pub(super) fn assemble(
         let Some(mut mesh) = meshes.build(triangles, &mut dropped) else { continue };
         mesh.material = match &name {
             Some((line, name)) => libraries.material(path, *line, name, model)?,
-            None => default_material(model),
+            None => model.default_material(),
         };
         mesh.name = match name {
             Some((_, name)) => name,

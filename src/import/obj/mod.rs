@@ -19,7 +19,6 @@ use super::model::Model;
 use super::source::{Fault, Notes};
 use super::{course, mtl};
 use crate::error::{Error, Result};
-use crate::scene::{Material, MaterialId};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -88,18 +87,6 @@ fn is_course_dialect(text: &[u8]) -> bool {
         }
     }
     false
-}
-
-/// The material of faces without one.
-pub(super) fn default_material(model: &mut Model) -> MaterialId {
-    let world = &mut model.world;
-    let at = world.materials.iter().position(|m| m.name == super::model::DEFAULT_MATERIAL);
-    at.unwrap_or_else(|| {
-        world
-            .materials
-            .push(Material::diffuse(super::model::DEFAULT_MATERIAL, super::model::DEFAULT_ALBEDO));
-        world.materials.len() - 1
-    }) as MaterialId
 }
 
 /// The name that follows a keyword, as text.

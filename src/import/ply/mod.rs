@@ -16,7 +16,6 @@ mod header;
 mod vertex;
 
 use super::model::Model;
-use super::obj::default_material;
 use super::source::Notes;
 use super::{normals, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
@@ -43,7 +42,7 @@ fn read_by(path: &Path, bytes: &[u8], fast: bool) -> Result<Model> {
     let warnings = notes.into_warnings(path);
     if let Some(mesh) = build(path, vertices, faces, &mut model)? {
         model.world.meshes.push(mesh);
-        model.world.meshes[0].material = default_material(&mut model);
+        model.world.meshes[0].material = model.default_material();
     }
     model.warnings.extend(warnings);
     Ok(model)

@@ -1,5 +1,6 @@
 //! `[camera]`: lens, timing and path.
 
+mod lens;
 mod path;
 
 use super::at::At;
@@ -7,6 +8,7 @@ use super::number::{Degrees, FieldOfView, Int, Share};
 use super::vector::{Direction, Point};
 use crate::math::DVec3;
 use crate::scene::Easing;
+use lens::{KeyLens, Lens};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -37,6 +39,8 @@ pub(super) struct Camera {
     /// Turn about the view axis, degrees; positive tilts the camera clockwise.
     #[serde(default = "no_roll")]
     roll: Degrees,
+    /// A lens that blurs what is out of focus. Absent: all is sharp.
+    lens: Option<At<Lens>>,
     /// A camera that does not move.
     still: Option<At<Still>>,
     /// A straight move with a fixed point of interest.
@@ -101,6 +105,8 @@ pub(super) struct Key {
     up: Option<Direction>,
     /// Turn about the view axis, degrees. Absent: the camera's `roll`.
     roll: Option<Degrees>,
+    /// The lens here. Absent: the camera's `lens`.
+    lens: Option<At<KeyLens>>,
 }
 
 /// A uniform cubic B-spline with a fixed point of interest.
@@ -142,6 +148,7 @@ impl Default for Camera {
             easing: linear(),
             up: y_up(),
             roll: no_roll(),
+            lens: None,
             still: None,
             pan: None,
             orbit: None,

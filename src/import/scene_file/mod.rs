@@ -96,7 +96,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
         Some(camera) => camera.build(&source, &world, aspect)?,
         None => Camera::default().build(&source, &world, aspect)?,
     };
-    let mut loaded = Loaded { warnings, files, ..Loaded::new(world, shot, settings) };
-    file.settings.job(&source, &mut loaded)?;
-    Ok(loaded)
+    let options = file.settings.job(&source, shot.frames)?;
+    let output_place = file.settings.output_place(&source);
+    Ok(Loaded { options, output_place, warnings, files, ..Loaded::new(world, shot, settings) })
 }

@@ -82,6 +82,11 @@ number!(
     { "type": "number", "minimum": limits::FACTOR.start(), "maximum": limits::FACTOR.end() }
 );
 number!(
+    /// A length that may be nothing.
+    NotNegative: "a number from 0 to 1e30", |x| (0.0..=1e30).contains(&x),
+    { "type": "number", "minimum": 0, "maximum": 1e30 }
+);
+number!(
     /// An amount of light in one channel.
     Amount: "a number from 0 to 1e30", |x| limits::AMOUNT.contains(&x),
     { "type": "number", "minimum": 0, "maximum": 1e30 }

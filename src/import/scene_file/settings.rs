@@ -7,11 +7,10 @@ use super::number::{FrameRate, Int, Positive, Share};
 use super::report::Source;
 use super::time::{Time, TimeOrOff};
 use super::vector::List;
-use crate::error::Result;
-use crate::import::{Loaded, OutputName};
+use crate::error::{Diagnostic, Result};
 use crate::scene::{
-    self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Rect, ReuseSettings,
-    ToneCurve, limits,
+    self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, JobOptions, Rect,
+    ReuseSettings, ToneCurve, limits,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -108,6 +107,7 @@ pub(super) struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         let s = scene::Settings::default();
+        let job = JobOptions::default();
         Self {
             size: List([s.width, s.height].map(|x| Int::clamped(x.into()))),
             spp: Int::clamped(s.spp.into()),
@@ -129,12 +129,12 @@ impl Default for Settings {
             rules: Rules::default(),
             crop: None,
             flag_bad: s.flag_bad,
-            strict: false,
+            strict: job.strict,
             frames: None,
             output: None,
-            fps: FrameRate(24.0),
-            video: true,
-            overwrite: false,
+            fps: FrameRate(job.fps),
+            video: job.video,
+            overwrite: job.overwrite,
             threads: None,
             stats: None,
             time_limit: None,
@@ -192,30 +192,38 @@ impl Settings {
         Err(source.fault(&crop.span, message).help(help).into())
     }
 
-    /// Writes to `loaded` what does not decide a frame's bytes.
+    /// What does not decide a frame's bytes, in a shot of `shot_frames` frames.
     ///
     /// Errors: frames that the camera's move has not, an empty output pattern.
-    pub fn job(&self, source: &Source, loaded: &mut Loaded) -> Result<()> {
-        if let Some(frames) = &self.frames {
-            loaded.frames = Some(frame_range(frames, source, loaded.shot.frames)?);
+    pub fn job(&self, source: &Source, shot_frames: u32) -> Result<JobOptions> {
+        let frames = self.frames.as_ref();
+        let frames = frames.map(|f| frame_range(f, source, shot_frames)).transpose()?;
+        if let Some(output) = self.output.as_ref().filter(|output| output.is_empty()) {
+            return Err(source.fault(&output.span, "the output pattern is empty").into());
         }
-        if let Some(output) = &self.output {
-            if output.is_empty() {
-                return Err(source.fault(&output.span, "the output pattern is empty").into());
-            }
-            let place = source.fault(&output.span, "");
-            loaded.output = Some(OutputName { pattern: output.value.clone(), place });
-        }
-        loaded.fps = self.fps.0;
-        loaded.video = self.video;
-        loaded.strict = self.strict;
-        loaded.overwrite = self.overwrite;
-        loaded.threads = self.threads.map(Int::u32);
-        loaded.stats.clone_from(&self.stats);
-        loaded.time_limit = self.time_limit.map(|limit| limit.0);
-        loaded.checkpoint = self.checkpoint.map(|interval| interval.0);
-        loaded.exchange = self.exchange.map(Int::u32);
-        Ok(())
+        let default = JobOptions::default();
+        Ok(JobOptions {
+            frames,
+            output: self.output.as_ref().map(|output| output.value.clone()),
+            overwrite: self.overwrite,
+            strict: self.strict,
+            video: self.video,
+            fps: self.fps.0,
+            time_limit: self.time_limit.map(|limit| limit.0),
+            checkpoint: self.checkpoint.map_or(default.checkpoint, |interval| interval.0.0),
+            exchange: self.exchange.map_or(default.exchange, Int::u32),
+            stats: self.stats.clone(),
+            threads: self.threads.map(Int::u32),
+            // The command line alone has these.
+            maps: default.maps,
+            references: default.references,
+            uploads: default.uploads,
+        })
+    }
+
+    /// Where the output pattern stands, for what is wrong with it.
+    pub fn output_place(&self, source: &Source) -> Option<Diagnostic> {
+        self.output.as_ref().map(|output| source.fault(&output.span, ""))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Times in a scene file: text with units, the same as on the command line.
 
-use crate::scene::{Interval, parse_time_limit};
+use crate::scene::{SaveInterval, parse_time_limit};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
@@ -13,7 +13,7 @@ pub(super) struct Time(pub Duration);
 
 /// A time, or `"off"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct TimeOrOff(pub Interval);
+pub(super) struct TimeOrOff(pub SaveInterval);
 
 impl<'de> Deserialize<'de> for Time {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -25,7 +25,7 @@ impl<'de> Deserialize<'de> for Time {
 impl<'de> Deserialize<'de> for TimeOrOff {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = String::deserialize(deserializer)?;
-        Interval::parse(&text).map(Self).map_err(D::Error::custom)
+        SaveInterval::parse(&text).map(Self).map_err(D::Error::custom)
     }
 }
 

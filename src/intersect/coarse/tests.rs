@@ -53,7 +53,7 @@ fn may_meet(balls: Vec<WorldMesh>, dir: DVec3) -> bool {
 }
 
 #[test]
-fn out_of_a_closed_mesh_only_others_are_met() {
+fn a_ray_that_leaves_a_closed_mesh_meets_only_other_meshes() {
     let own = |whole| ball(DVec3::ZERO, whole);
     let far = |dir: DVec3| ball(dir.normalize() * 5.0, true);
     for dir in [DVec3::new(0.1, -0.3, 1.0), DVec3::new(0.3, -0.6, 1.0)] {

@@ -12,7 +12,7 @@ fn down(x: f64, y: f64) -> Line {
 }
 
 #[test]
-fn places_are_told_apart_to_the_last_bit() {
+fn inside_edge_and_outside_differ_to_the_last_bit() {
     let below = f64::EPSILON / 4.0;
     for (x, y, place) in [
         (0.25, 0.25, Place::Inside),

@@ -91,7 +91,7 @@ fn no_ray_leaves_a_closed_mesh_and_crossings_are_odd() {
 }
 
 #[test]
-fn the_sieve_loses_no_triangle_that_the_court_would_accept() {
+fn the_conservative_filter_loses_no_triangle_that_the_exact_predicate_accepts() {
     let far_off = |mut mesh: WorldMesh, by: f64| {
         mesh.positions.iter_mut().for_each(|p| *p = *p * 1e-3 + DVec3::splat(by));
         mesh

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn the_threads_do_not_show() {
+    fn flip_does_not_depend_on_the_number_of_threads() {
         let (_, a, b) = pairs().swap_remove(0);
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();

@@ -10,7 +10,7 @@ const MOST: usize = 3;
 
 /// A setting that keeps two headers apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Difference {
+pub struct HeaderDifference {
     /// Its name as the command line spells it, or what else differs.
     pub name: String,
     /// Its value in the manifest.
@@ -21,7 +21,7 @@ pub struct Difference {
     parts: Option<String>,
 }
 
-impl Difference {
+impl HeaderDifference {
     /// `spp was 4, now it is 16`.
     pub fn was_and_is(&self) -> String {
         match &self.parts {
@@ -41,14 +41,14 @@ impl Difference {
 
 impl Header {
     /// The first entry in which a job with the header `now` would differ from this one.
-    pub fn first_difference(&self, now: &Self) -> Option<Difference> {
+    pub fn first_difference(&self, now: &Self) -> Option<HeaderDifference> {
         let (before, after) = (self.entries(), now.entries());
         let names = after.iter().chain(&before).map(|(name, _)| name);
         let value = |entries: &[(String, String)], name: &str| {
             let found = entries.iter().find(|(n, _)| n == name);
             found.map_or_else(|| "not set".to_string(), |(_, v)| v.clone())
         };
-        let difference = |name: &String| Difference {
+        let difference = |name: &String| HeaderDifference {
             name: name.clone(),
             before: value(&before, name),
             now: value(&after, name),
@@ -56,7 +56,7 @@ impl Header {
         };
         let first = names.map(difference).find(|d| d.before != d.now)?;
         let parts = (first.name == SCENE).then(|| changes(&self.scene_parts, &now.scene_parts));
-        Some(Difference { parts: parts.flatten(), ..first })
+        Some(HeaderDifference { parts: parts.flatten(), ..first })
     }
 }
 

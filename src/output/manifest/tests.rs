@@ -62,7 +62,7 @@ fn rows_do_not_get_under_another_header() {
 }
 
 #[test]
-fn of_two_formats_that_is_told_first_and_what_one_lacks_is_not_set() {
+fn another_file_format_is_named_first_and_a_missing_setting_is_not_set() {
     let png = Header { files: "f_####.png".into(), ..header(0) };
     let settings = serde_json::json!({ "seed": 0, "reuse": { "maps": false } });
     let exr = Header { files: "f_####.exr".into(), settings, ..header(0) };

@@ -1,9 +1,9 @@
 //! Maps back from an exr frame that holds them as channels.
 
-use super::{Display, Film, Map, PixelSource, Provenance, Rgb};
+use super::{Display, Film, Map, Provenance, ProvenanceKind, Rgb};
 use crate::error::{Error, Result};
 use crate::output::DEFAULT_MEMORY_LIMIT;
-use crate::output::exr::{self, Channels, Samples};
+use crate::output::exr::{self, ExrChannels, ExrSamples};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -21,32 +21,29 @@ pub fn of_exr(path: &Path, display: &Display, farthest: f32) -> Result<Vec<(Map,
 }
 
 /// What maps show of a film; `None` where a channel is missing.
-fn film_of(channels: &Channels) -> Option<Film> {
+fn film_of(channels: &ExrChannels) -> Option<Film> {
     let numbers = |name: &str| {
         let found = channels.list.iter().find(|c| c.name == name)?;
         match &found.samples {
-            Samples::U32(numbers) => Some(numbers),
-            Samples::F32(_) => None,
+            ExrSamples::U32(numbers) => Some(numbers),
+            ExrSamples::F32(_) => None,
         }
     };
     let [r, g, b] = [channels.f32("R")?, channels.f32("G")?, channels.f32("B")?];
-    let provenance = numbers("reuse.provenance")?;
+    let kind = numbers("reuse.provenance")?;
     let (frame, distance) = (numbers("reuse.frame")?, channels.f32("reuse.distance")?);
     let mut film = Film::new(channels.width, channels.height, false);
     film.rgb = (0..r.len()).map(|i| Rgb::new(r[i], g[i], b[i])).collect();
-    let source = |i: usize| PixelSource {
-        provenance: known(provenance[i]),
-        frame: frame[i],
-        distance: distance[i],
-    };
-    film.sources = Some((0..r.len()).map(source).collect());
+    let source =
+        |i: usize| Provenance { kind: known(kind[i]), frame: frame[i], distance: distance[i] };
+    film.provenance = Some((0..r.len()).map(source).collect());
     film.audit = channels.f32("reuse.audit").map(<[f32]>::to_vec);
     Some(film)
 }
 
-fn known(number: u32) -> Provenance {
-    let all = [Provenance::Traced, Provenance::Earlier, Provenance::Later, Provenance::Both];
-    all.into_iter().find(|p| *p as u32 == number).unwrap_or_default()
+fn known(number: u32) -> ProvenanceKind {
+    use ProvenanceKind::{Both, Earlier, Later, Traced};
+    [Traced, Earlier, Later, Both].into_iter().find(|p| *p as u32 == number).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -60,9 +57,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let mut film = Film::new(3, 2, false);
         film.rgb.fill(Rgb::splat(0.5));
-        let source =
-            |i: u32| PixelSource { provenance: known(i % 5), frame: i, distance: i as f32 / 4.0 };
-        film.sources = Some((0..6).map(source).collect());
+        let source = |i: u32| Provenance { kind: known(i % 5), frame: i, distance: i as f32 / 4.0 };
+        film.provenance = Some((0..6).map(source).collect());
         film.audit = Some(vec![f32::NAN, 3.0, f32::NAN, -8.0, f32::NAN, f32::NAN]);
         let options = WriteOptions { maps: Some(2.0), ..WriteOptions::default() };
         let path = folder.path().join("a.exr");

@@ -71,7 +71,7 @@ fn the_command_is_spelled_out() {
 }
 
 #[test]
-fn without_ffmpeg_the_command_is_told_and_nothing_is_left() {
+fn without_ffmpeg_the_command_is_reported_and_no_file_is_left() {
     let folder = tempfile::tempdir().expect("a folder");
     let pattern = FramePattern::parse("f_####.png", 5).expect("a pattern");
     let out = folder.path().join("out.mp4");
@@ -82,7 +82,7 @@ fn without_ffmpeg_the_command_is_told_and_nothing_is_left() {
 }
 
 #[test]
-fn a_clip_of_nothing_is_a_usage_error() {
+fn a_video_without_frames_is_a_usage_error() {
     let pattern = FramePattern::parse("f_####.png", 5).expect("a pattern");
     let out = Path::new("out.mp4");
     for (count, fps) in [(0, 24.0), (5, 0.0), (5, f64::NAN), (5, -1.0), (5, f64::INFINITY)] {
@@ -92,7 +92,7 @@ fn a_clip_of_nothing_is_a_usage_error() {
 }
 
 #[test]
-fn a_failure_is_told_in_ffmpegs_words_and_leaves_nothing() {
+fn a_failure_is_reported_in_ffmpegs_words_and_leaves_no_file() {
     if !has_ffmpeg() {
         return;
     }

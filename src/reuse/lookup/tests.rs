@@ -1,7 +1,8 @@
 //! What other surfaces tell is refused, and what is uncertain counts as that.
 
 use super::Lookup;
-use crate::inference::{Estimate, LookupBatch, Origin, SurfacePoint, TracedPoint, TracedPoints};
+use crate::film::Provenance;
+use crate::inference::{Estimate, LookupBatch, SurfacePoint, TracedPoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::reuse::Reference;
 use crate::reuse::risk::STEPS;
@@ -52,7 +53,7 @@ fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
         unshadowed: vec![1.0],
         ratios: vec![f32::NAN],
         estimates: Vec::new(),
-        origins: vec![Origin::default()],
+        provenance: vec![Provenance::default()],
         ..LookupBatch::default()
     };
     lookup.estimate(&mut asked);
@@ -213,7 +214,7 @@ fn lights_share_their_level() {
             unshadowed: vec![1.0, second],
             ratios: vec![f32::NAN; 2],
             estimates: Vec::new(),
-            origins: vec![Origin::default()],
+            provenance: vec![Provenance::default()],
             ..LookupBatch::default()
         };
         lookup.estimate(&mut asked);

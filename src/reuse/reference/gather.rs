@@ -4,7 +4,7 @@ use super::contrast::contrasts;
 use super::{Contrast, NONE, View};
 use crate::inference::{SurfacePoint, TracedPoints};
 
-/// A frame's points before they are laid out.
+/// A frame's points before they are put in the order of a reference.
 pub(super) struct Gathered {
     pub points: Vec<SurfacePoint>,
     /// For each of them the ratio in each channel; NaN where unknown.

@@ -1,8 +1,7 @@
 //! Where a point is seen in a reference, and the samples there.
 
-use super::{Place, Taps4};
+use super::{Place, References, TOGETHER, Taps4};
 use crate::inference::SurfacePoint;
-use crate::reuse::lookup::{Lookup, TOGETHER};
 use crate::reuse::reference::Reference;
 use wide::f32x4;
 
@@ -32,7 +31,7 @@ pub(super) struct Image {
 /// A point's images in the references that are asked about every point.
 type Images = [Option<Image>; ALWAYS];
 
-impl Lookup<'_> {
+impl References<'_> {
     /// Finds the samples about those of `points` that `is_wanted` wants, in the references that are asked
     /// about every point.
     ///
@@ -45,7 +44,7 @@ impl Lookup<'_> {
         found: &mut [[Option<Taps4>; ALWAYS]],
     ) {
         let mut images: [Images; TOGETHER] = [[None; ALWAYS]; TOGETHER];
-        for (k, reference) in self.references.iter().take(ALWAYS).enumerate() {
+        for (k, reference) in self.0.iter().take(ALWAYS).enumerate() {
             for (i, point) in points.iter().enumerate() {
                 images[i][k] = is_wanted(i).then(|| self.image(reference, point)).flatten();
             }
@@ -92,7 +91,7 @@ impl Lookup<'_> {
     /// The four samples around a point's image in a reference.
     pub(super) fn screen_taps(&self, number: usize, place: &Place, image: &Image) -> Option<Taps4> {
         let Image { fx, fy, footprint, reach, samples } = *image;
-        let reference = self.references[number];
+        let reference = self.0[number];
         let near = place.near(reference, &samples, (footprint, reach));
         let across = f32x4::from([1.0 - fx, fx, 1.0 - fx, fx]);
         let down = f32x4::from([1.0 - fy, 1.0 - fy, fy, fy]);

@@ -22,6 +22,7 @@ pub fn shot(shot: &Shot) -> Result<()> {
         return fault(format!("the shot has {} frames; 1 to {MOST_FRAMES} can be", shot.frames));
     }
     Camera::check_vfov(shot.vfov_degrees)?;
+    shot.lens.check()?;
     match &shot.path {
         CameraPath::Still(p) => pose(p, "the camera"),
         CameraPath::Pan { from, to, target, up, roll_degrees } => {

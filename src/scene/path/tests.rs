@@ -1,11 +1,12 @@
 //! Whole shots: ends, timing, poles and errors.
 
 use super::*;
+use proptest::prelude::*;
 
 const UP: DVec3 = DVec3::Y;
 
 fn shot(path: CameraPath, frames: u32) -> Shot {
-    Shot { path, easing: Easing::Linear, frames, vfov_degrees: 40.0 }
+    Shot::new(path, frames, 40.0)
 }
 
 fn pan(from: DVec3, to: DVec3, target: DVec3) -> CameraPath {
@@ -184,7 +185,7 @@ fn an_eye_on_its_target_names_the_frame() {
 }
 
 #[test]
-fn faults_of_a_path_are_told() {
+fn invalid_paths_are_errors() {
     let p = DVec3::ONE;
     let text = |path| message(&shot(path, 4));
     assert!(text(b_spline(vec![p; 3])).contains("has 3 control points"));
@@ -209,7 +210,7 @@ fn faults_of_a_path_are_told() {
 }
 
 #[test]
-fn faults_of_a_shot_are_told() {
+fn invalid_shots_are_errors() {
     let good = shot(pan(DVec3::X, DVec3::Z, DVec3::ZERO), 4);
     good.validate().expect("valid");
     assert!(message(&Shot { frames: 0, ..good.clone() }).contains("0 frames"));
@@ -217,5 +218,60 @@ fn faults_of_a_shot_are_told() {
     assert!(lens.starts_with("the vertical field of view"), "{lens}");
     for frame in [0, 5] {
         assert!(good.pose(frame).expect_err("no such frame").to_string().contains("1 to 4"));
+    }
+}
+
+fn rolled_key(at: f64, x: f64, roll: f64) -> KeyPose {
+    let pose = Pose { eye: DVec3::X * x, target: DVec3::Z, up: DVec3::Y, roll_degrees: roll };
+    KeyPose { at, pose }
+}
+
+#[test]
+fn keys_are_met_at_their_times_and_two_keys_make_a_line() {
+    let keys = [
+        rolled_key(0.0, 1.0, 0.0),
+        rolled_key(0.1, -3.0, 5.0),
+        rolled_key(0.7, 9.0, 0.0),
+        rolled_key(1.0, 2.0, 1.0),
+    ];
+    for k in &keys {
+        assert_eq!(key_pose(&keys, k.at), k.pose);
+    }
+    let line = [rolled_key(0.0, 1.0, 0.0), rolled_key(1.0, 5.0, 90.0)];
+    let middle = key_pose(&line, 0.25);
+    assert_eq!((middle.eye.x, middle.roll_degrees), (2.0, 22.5));
+    assert_eq!(middle.up, DVec3::Y);
+    let held = [rolled_key(0.25, 1.0, 0.0), rolled_key(0.5, 5.0, 90.0)];
+    assert_eq!(key_pose(&held, 0.1), held[0].pose);
+    assert_eq!(key_pose(&held, 0.9), held[1].pose);
+    assert_eq!(key_pose(&held[..1], 0.3), held[0].pose);
+}
+
+#[test]
+fn uneven_key_times_reproduce_a_parabola_inside() {
+    // Slopes are those of parabolas: away from the ends quadratic motion is exact.
+    let times = [0.0, 0.1, 0.35, 0.4, 0.8, 1.0];
+    let keys: Vec<KeyPose> = times.iter().map(|t| rolled_key(*t, t * t - 3.0 * t, *t)).collect();
+    for i in 0..=70 {
+        let t = 0.1 + 0.01 * f64::from(i);
+        let found = key_pose(&keys, t);
+        assert!((found.eye.x - (t * t - 3.0 * t)).abs() < 1e-14);
+        assert!((found.roll_degrees - t).abs() < 1e-14);
+    }
+}
+
+proptest! {
+    #[test]
+    fn key_paths_are_smooth(xs in prop::collection::vec(-10.0f64..10.0, 3..8)) {
+        let last = (xs.len() - 1) as f64;
+        let time = |i: usize| (i as f64 / last).powi(2);
+        let keys: Vec<KeyPose> =
+            xs.iter().enumerate().map(|(i, x)| rolled_key(time(i), *x, 0.0)).collect();
+        for i in 1..xs.len() - 1 {
+            let (t, h) = (time(i), 1e-8);
+            let at = |t| key_pose(&keys, t).eye.x;
+            let (before, after) = ((at(t) - at(t - h)) / h, (at(t + h) - at(t)) / h);
+            prop_assert!((before - after).abs() < 1e-2, "{before} {after} at key {i}");
+        }
     }
 }

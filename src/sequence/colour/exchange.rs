@@ -1,76 +1,33 @@
-//! What the colour maker gives to other ranks and takes from them: discoveries, all of them to all.
+//! Discoveries between ranks: those of every frame go to all ranks.
 
 use super::ColourMaker;
 use crate::error::Result;
-use crate::math::Rgb;
-use crate::reuse::colour::{Entry, Known};
-use crate::sequence::shared::{Left, Shared};
-use crate::sequence::strips::{pack, unpack};
-use serde::{Deserialize, Serialize};
+use crate::sequence::{Exported, RankMaker};
+use std::sync::Arc;
 
-/// A frame's discoveries, column by column, which deflates better.
-#[derive(Serialize, Deserialize)]
-struct Columns {
-    pixels: Vec<u32>,
-    rgb: Vec<Rgb>,
-    distances: Vec<f32>,
-}
-
-impl Shared for ColourMaker<'_> {
-    fn needs(&self, original: u32) -> Vec<u32> {
-        self.pyramid.ancestors(original)
-    }
-
-    fn tells_all(&self) -> bool {
-        true
-    }
-
+impl RankMaker for ColourMaker<'_> {
     fn hold(&self, original: u32) {
-        self.with_state(|s| s.held.insert(original));
+        self.known.lock().hold(&self.schedule, original);
     }
 
-    fn let_go(&self, original: u32) {
-        self.with_state(|s| {
-            s.held.remove(&original);
-            s.known.remove(&original);
-        });
+    fn release(&self, original: u32) {
+        self.known.lock().release(&self.schedule, original);
     }
 
-    fn make_source(&self, original: u32) -> Result<bool> {
-        Ok(self.known(original)?.is_some())
+    fn make_reference(&self, original: u32) -> Result<()> {
+        self.known(original).map(drop)
     }
 
-    fn lies_on_disk(&self, original: u32) -> bool {
-        self.checkpoints.is_some_and(|c| c.has(original))
-    }
-
-    fn export(&self, original: u32) -> Option<Left> {
-        let known = self.with_state(|s| s.known.get(&original).cloned())?;
-        let bytes = self.pool.install(|| encode(&known)).ok()?.into();
-        Some(Left { bytes, discoveries: known.entries.len() as u64 })
+    fn export(&self, original: u32) -> Option<Exported> {
+        let known = self.known.lock().get(original).cloned()?;
+        let bytes = self.context.pool.install(|| known.encode())?.into();
+        Some(Exported { bytes, discoveries: known.entries.len() as u64 })
     }
 
     fn import(&self, original: u32, bytes: &[u8]) {
-        let Some(known) = self.pool.install(|| decode(original, bytes)) else { return };
-        self.with_state(|s| s.held.insert(original));
-        self.keep(known);
+        let Some(known) = self.decode(original, bytes) else { return };
+        let mut pool = self.known.lock();
+        pool.import(original, Arc::new(known));
+        pool.note_memory(|known, _| known.memory());
     }
-}
-
-/// A frame's discoveries as bytes.
-pub(super) fn encode(known: &Known) -> Result<Vec<u8>> {
-    let entries = || known.entries.iter();
-    pack(&Columns {
-        pixels: entries().map(|e| e.pixel).collect(),
-        rgb: entries().map(|e| e.rgb).collect(),
-        distances: entries().map(|e| e.distance).collect(),
-    })
-}
-
-/// What [`encode`] made bytes of; `None` for other bytes.
-pub(super) fn decode(frame: u32, bytes: &[u8]) -> Option<Known> {
-    let Columns { pixels, rgb, distances } = unpack::<Columns>(bytes).ok()?;
-    let rest = rgb.into_iter().zip(distances);
-    let entry = |(pixel, (rgb, distance))| Entry { pixel, rgb, distance };
-    Some(Known { frame, entries: pixels.into_iter().zip(rest).map(entry).collect() })
 }

@@ -1,7 +1,7 @@
 //! From a film to what a frame discovered, and from what others discovered into the film.
 
-use crate::film::{Film, PixelSource, Provenance};
-use crate::reuse::colour::{Entry, Inferred, Known};
+use crate::film::{Film, Provenance, ProvenanceKind};
+use crate::reuse::colour::{Entry, InferredColour, KnownColours};
 use crate::scene::{Camera, Rect, Settings};
 use crate::stats::ReuseCounts;
 
@@ -9,10 +9,10 @@ use crate::stats::ReuseCounts;
 pub(super) fn discoveries(
     frame: u32,
     film: &Film,
-    inferred: &[Option<Inferred>],
+    inferred: &[Option<InferredColour>],
     camera: &Camera,
     settings: &Settings,
-) -> Known {
+) -> KnownColours {
     let mut entries = Vec::new();
     for (x, y) in pixels_of(settings) {
         let index = film.index(x, y);
@@ -24,30 +24,30 @@ pub(super) fn discoveries(
             entries.push(Entry { pixel: index as u32, rgb: film.rgb[index], distance });
         }
     }
-    Known { frame, entries }
+    KnownColours { frame, entries }
 }
 
 /// Puts inferred pixels into the film, and says of each pixel where it comes from.
 pub(super) fn fill(
     film: &mut Film,
     frame: u32,
-    inferred: &[Option<Inferred>],
+    inferred: &[Option<InferredColour>],
     settings: &Settings,
 ) -> ReuseCounts {
     let mut counts = ReuseCounts::default();
-    let mut sources = vec![PixelSource::default(); film.rgb.len()];
+    let mut provenance = vec![Provenance::default(); film.rgb.len()];
     for (x, y) in pixels_of(settings) {
         let index = film.index(x, y);
         counts.direct += 1;
         if let Some(known) = &inferred[index] {
             film.rgb[index] = known.rgb;
-            sources[index] = known.source(frame);
+            provenance[index] = known.provenance(frame);
             counts.direct_inferred += 1;
         } else {
-            sources[index].provenance = Provenance::Traced;
+            provenance[index].kind = ProvenanceKind::Traced;
         }
     }
-    film.sources = Some(sources);
+    film.provenance = Some(provenance);
     counts
 }
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::{Rgb, srgb_decode};
-use crate::reuse::colour::{Entry, Known};
+use crate::reuse::colour::{Entry, KnownColours};
 use crate::scene::{Settings, Shot, ToneCurve};
 
 /// Whether `image` can stand for frame `frame`.
@@ -36,12 +36,12 @@ pub fn check_upload(frame: u32, image: &Image, shot: &Shot, settings: &Settings)
 }
 
 /// An uploaded picture as entries: display values become radiance again, distances are not known.
-pub(super) fn known_of_upload(frame: u32, image: &Image, settings: &Settings) -> Known {
+pub(super) fn known_of_upload(frame: u32, image: &Image, settings: &Settings) -> KnownColours {
     let decode = |v: f32| (srgb_decode(f64::from(v)) / f64::from(settings.exposure)) as f32;
     let radiance = |c: &Rgb| match image.encoding {
         Encoding::Linear => *c,
         Encoding::Srgb => Rgb::new(decode(c.x), decode(c.y), decode(c.z)),
     };
     let entry = |(pixel, c)| Entry { pixel, rgb: radiance(c), distance: f32::NAN };
-    Known { frame, entries: (0..).zip(&image.rgb).map(entry).collect() }
+    KnownColours { frame, entries: (0..).zip(&image.rgb).map(entry).collect() }
 }

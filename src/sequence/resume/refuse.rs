@@ -1,10 +1,10 @@
 //! What is in the way of a job, and must not be replaced unasked.
 
-use super::Target;
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Foreign, Manifest, Row};
 use crate::scene::FrameRange;
-use crate::sequence::Recipe;
+use crate::sequence::recipe::Recipe;
+use crate::sequence::target::Target;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
@@ -58,7 +58,7 @@ pub(super) fn refuse_taken(
 /// Refuses frames that no manifest vouches for: they may be somebody's work.
 ///
 /// Errors: `Error::Usage` with the first of them.
-pub fn refuse_strangers(target: &Target, frames: FrameRange) -> Result<()> {
+pub fn refuse_unlisted(target: &Target, frames: FrameRange) -> Result<()> {
     let mut in_the_way = (frames.first..=frames.last).flat_map(|f| target.paths(f));
     match in_the_way.find(|path| path.exists()) {
         Some(path) if !target.overwrite => Err(Error::Usage(format!(
@@ -80,7 +80,7 @@ pub(super) fn refuse_others(
     let folder = target.pattern.folder();
     let left = manifest.rows.values().filter(|row| folder.join(&row.file).exists()).count();
     if left == 0 {
-        return refuse_strangers(target, frames);
+        return refuse_unlisted(target, frames);
     }
     Err(Error::Usage(format!(
         "{} holds {} of other settings: {}\n  \

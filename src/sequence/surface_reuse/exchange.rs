@@ -1,81 +1,54 @@
-//! What the inferring maker gives to other ranks and takes from them: references, encoded as in exr
-//! files, and strips of frames.
+//! References, encoded as in exr files, and strips of frames between ranks.
 
-use super::SurfaceReuse;
+use super::{SurfaceReuse, memory};
 use crate::error::Result;
 use crate::reuse::store;
-use crate::sequence::shared::{Left, Shared, Strip};
-use crate::sequence::strips::{self, Unheard};
+use crate::sequence::strips::{self, Strip};
+use crate::sequence::{Exported, RankMaker};
 use std::path::Path;
 use std::sync::Arc;
 
-impl Shared for SurfaceReuse<'_> {
-    fn original(&self, frame: u32) -> u32 {
-        self.schedule.original(frame)
-    }
-
-    fn needs(&self, original: u32) -> Vec<u32> {
-        self.schedule.ancestors(original)
-    }
-
-    fn shares(&self, originals: &[u32]) -> Vec<Vec<u32>> {
-        self.pyramid.shares(originals)
-    }
-
-    fn lies_on_disk(&self, original: u32) -> bool {
-        self.checkpoints.is_some_and(|c| c.has(original))
-    }
-
-    fn most_strips(&self) -> u32 {
-        strips::most(self.renderer.settings.height)
-    }
-
+impl RankMaker for SurfaceReuse<'_> {
     fn hold(&self, original: u32) {
-        self.with_state(|s| s.references.hold(&self.schedule, original));
+        self.references.lock().hold(&self.schedule, original);
     }
 
-    fn let_go(&self, original: u32) {
-        self.with_state(|s| {
-            s.exports.remove(&original);
-            s.references.let_go(&self.schedule, original);
-        });
+    fn release(&self, original: u32) {
+        self.references.lock().release(&self.schedule, original);
     }
 
-    fn make_source(&self, original: u32) -> Result<bool> {
-        Ok(self.reference(original)?.is_some())
+    fn make_reference(&self, original: u32) -> Result<()> {
+        self.reference(original).map(drop)
     }
 
-    fn export(&self, original: u32) -> Option<Left> {
-        self.with_state(|s| {
-            let bytes = s.exports.remove(&original)?;
-            let discoveries = s.references.get(original).map_or(0, |r| r.len() as u64);
-            Some(Left { bytes, discoveries })
-        })
+    fn export(&self, original: u32) -> Option<Exported> {
+        let mut pool = self.references.lock();
+        let bytes = pool.take_export(original)?;
+        Some(Exported { bytes, discoveries: pool.get(original)?.len() as u64 })
     }
 
     /// Bytes that are no reference are as good as none: the frame that needs it makes it.
     fn import(&self, original: u32, bytes: &[u8]) {
         let Some(terms) = &self.exchange else { return };
-        let recentring = &self.renderer.scene.recentring;
+        let recentring = &self.context.renderer.scene.recentring;
         let decode = || store::decode(Path::new("another rank"), bytes, terms, recentring);
-        if let Ok((mut reference, _)) = self.pool.install(decode) {
+        if let Ok((mut reference, _)) = self.context.pool.install(decode) {
             reference.frame = original;
-            self.with_state(|s| s.take(original, reference));
+            let mut pool = self.references.lock();
+            pool.import(original, Arc::new(reference));
+            pool.note_memory(memory);
         }
     }
 
-    fn strip(&self, original: u32, strip: Strip) -> Result<Option<Vec<u8>>> {
-        let camera = self.camera(original)?;
-        let mask = strips::mask(strip, camera.width, camera.height);
-        self.with_state(|s| s.references.expect(&self.schedule, &[original]));
-        let rendered = self.rendered(original, strip.is_source, Some(&mask), &Unheard);
-        self.with_state(|s| s.references.done(&self.schedule, original));
-        rendered?.map(|rendered| strips::encode(rendered, strip)).transpose()
+    fn render_strip(&self, original: u32, strip: Strip) -> Result<Vec<u8>> {
+        let mask = strips::mask(strip, self.context.renderer.settings);
+        self.references.lock().expect(&self.schedule, &[original]);
+        let rendered = self.rendered(original, strip.is_source, Some(&mask), &());
+        self.references.lock().done(&self.schedule, original);
+        strips::encode(rendered?, strip)
     }
 
-    fn lay(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
-        let settings = self.renderer.settings;
-        self.laid.put(original, strips::join(strips, settings.width, settings.height)?);
-        Ok(())
+    fn join_strips(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+        self.joined.join(original, strips, self.context.renderer.settings)
     }
 }

@@ -12,11 +12,10 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::inference::Inference;
 use crate::output::Display;
-use crate::reuse::audit::{self, Drawn, Shown};
+use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
 use crate::reuse::evidence::{Evidence, Finding};
-use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_looking};
+use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_lookups};
 use crate::scene::Camera;
-use crate::sequence::strips::Unheard;
 use crate::shade::{FrameJob, Rendered};
 use crate::stats::{AuditSums, RayCounts};
 use rayon::prelude::*;
@@ -30,7 +29,7 @@ const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
 const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
 /// Where a frame is small, as many pixels are probed as if it had this many.
 const LEAST: f64 = 25_000.0;
-/// Share of the usual that is probed where the frames before say that looking up does not pay.
+/// Share of the usual number of probes where the findings of other frames say that lookups do not pay.
 const HOPELESS: f64 = 0.25;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
@@ -41,14 +40,14 @@ pub(super) struct Probed {
     /// For each pixel whether it is a probe.
     mask: Vec<bool>,
     traces: [Rendered; 2],
-    /// What they found: what frames that are inferred from this one learn.
+    /// Findings of the probes, which travel with the frame's reference.
     pub findings: Vec<Finding>,
-    /// What may be inferred in the frame.
+    /// The evidence for the rest of the frame.
     pub evidence: Evidence,
-    /// What may be inferred in each part of the probes, by the findings of the other parts.
+    /// For each part of the probes the evidence from the findings of the other parts.
     crossed: Vec<Evidence>,
-    /// Whether looking up saves more than it costs.
-    pub is_worth_looking: bool,
+    /// Whether lookups save more than they cost.
+    pub is_worth_lookups: bool,
 }
 
 impl Probed {
@@ -60,38 +59,37 @@ impl Probed {
 }
 
 impl SurfaceReuse<'_> {
-    /// Renders the probes of `frame`, seen by `camera`, where `lookup` can estimate. `None` when the job
-    /// shall stop.
+    /// Renders the probes of `frame`, seen by `camera`, where `lookup` can estimate.
     pub(super) fn probe(
         &self,
         frame: u32,
         camera: &Camera,
         lookup: &Lookup,
-    ) -> Option<Arc<Probed>> {
+    ) -> Result<Arc<Probed>> {
         if let Some((_, probed)) = self.with_state(|s| s.probed.clone()).filter(|p| p.0 == frame) {
-            return Some(probed);
+            return Ok(probed);
         }
-        let r = &self.renderer;
+        let r = &self.context.renderer;
         let tolerance = r.settings.reuse.tolerance;
         let cast = (r.scene, &self.channels, r.settings);
         let before = || lookup.references.iter().flat_map(|r| r.findings());
         let known = lookup.references.iter().filter(|r| !r.findings().is_empty()).count();
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let usual = f64::from(r.settings.reuse.probes) * (LEAST / pixels).max(1.0);
-        let is_worth = |known: &Evidence| is_worth_looking(known, before(), cast, usual);
+        let is_worth = |known: &Evidence| is_worth_lookups(known, before(), cast, usual);
         let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
         let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let share = (first * usual).min(MOST);
         // Behind mirrors and glass a pixel's footprint follows from the pixels beside it.
-        let block = if r.plan.mirror || r.plan.glass { 2 } else { 1 };
+        let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
         let mask = draw.mask(camera.width, camera.height);
         let trace = |stream: u32, lookup| {
             let probe = Probe::new(lookup, self.channels.len(), r.settings.reuse.tolerance);
-            let with_gbuffer = self.with_gbuffer && stream == STREAMS[0];
+            let with_gbuffer = self.context.with_gbuffer && stream == STREAMS[0];
             let job = self.job(camera, frame | stream, with_gbuffer, Some(&mask));
-            let rendered = self.render(job, Some(&probe as &dyn Inference), &Unheard)?;
-            Some((rendered, probe))
+            let rendered = self.render(job, Some(&probe as &dyn Inference), &())?;
+            Result::Ok((rendered, probe))
         };
         let (first, own) = trace(STREAMS[0], Some(lookup))?;
         let (second, again) = trace(STREAMS[1], None)?;
@@ -101,19 +99,20 @@ impl SurfaceReuse<'_> {
             let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
             Evidence::of(before().chain(others.flat_map(|(_, findings)| findings)), tolerance)
         };
-        let crossed = self.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
+        let crossed =
+            self.context.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
         // The frame's own probes are traced, whatever is done with what they say.
-        let is_worth_looking = is_worth_looking(&evidence, findings.iter(), cast, 0.0);
+        let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
         let traces = [first, second];
-        let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_looking };
+        let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_lookups };
         let probed = Arc::new(probed);
         self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
-        Some(probed)
+        Ok(probed)
     }
 
-    /// A job that leaves sources, all over the image.
+    /// The job that traces the pixels of `mask` and gathers their surface points, beyond the crop too.
     fn job<'j>(
         &self,
         camera: &'j Camera,
@@ -121,11 +120,12 @@ impl SurfaceReuse<'_> {
         with_gbuffer: bool,
         mask: Option<&'j [bool]>,
     ) -> FrameJob<'j> {
-        FrameJob { camera, stream, with_gbuffer, reuse: None, mask, beyond_crop: true }
+        let job = self.context.job(stream, camera);
+        FrameJob { with_gbuffer, mask, beyond_crop: true, ..job }
     }
 
-    /// Puts the probes of `frame` in `rendered`, which is the rest of it. Gives what they say about the
-    /// inferred pixels; the inner `None` where there are none. The outer one when the job shall stop.
+    /// Puts the probes of `frame` in `rendered`, which is the rest of it. Returns the audit of the
+    /// inferred pixels; `None` where there are none.
     pub(super) fn show_probes(
         &self,
         frame: u32,
@@ -133,21 +133,20 @@ impl SurfaceReuse<'_> {
         references: &[Arc<Reference>],
         probed: &Probed,
         rendered: &mut Rendered,
-    ) -> Result<Option<Option<AuditSums>>> {
+    ) -> Result<Option<AuditSums>> {
         let [first, second] = &probed.traces;
         let is_inferred = rendered.reuse.is_inferred();
-        let audit = match is_inferred {
+        let (rays, inferred) = match is_inferred {
             true => self.audit(frame, camera, references, probed)?,
-            false => Some((RayCounts::default(), None)),
+            false => (RayCounts::default(), None),
         };
-        let Some((rays, inferred)) = audit else { return Ok(None) };
         let film = &mut rendered.film;
         let places = probed.mask.iter().enumerate().filter(|(_, is_probe)| **is_probe);
         let places: Vec<usize> =
             places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
         for &i in &places {
             film.rgb[i] = first.film.rgb[i];
-            if let (Some(to), Some(from)) = (&mut film.sources, &first.film.sources) {
+            if let (Some(to), Some(from)) = (&mut film.provenance, &first.film.provenance) {
                 to[i] = from[i];
             }
             if let (Some(to), Some(from)) = (&mut film.gbuffer, &first.film.gbuffer) {
@@ -162,14 +161,14 @@ impl SurfaceReuse<'_> {
         }
         let Some(inferred) = inferred else {
             rendered.rays += second.rays;
-            return Ok(Some(None));
+            return Ok(None);
         };
         let drawn = |i: usize| {
             let (index, weight) = (i as u32, probed.draw.weight());
             let group = probed.draw.group(index % film.width, index / film.width);
-            Drawn { index, weight, group }
+            AuditedPixel { index, weight, group }
         };
-        let drawn: Vec<Drawn> = places.iter().map(|i| drawn(*i)).collect();
+        let drawn: Vec<AuditedPixel> = places.iter().map(|i| drawn(*i)).collect();
         let shown = self.shown(&inferred);
         let traces = [&first.film.rgb[..], &second.film.rgb[..]];
         let mut sums = audit::sums(&shown, &drawn, traces);
@@ -182,7 +181,7 @@ impl SurfaceReuse<'_> {
             map[i] = audit::difference(&shown.display, inferred.rgb[i], a, b);
         }
         film.audit = Some(map);
-        Ok(Some(Some(sums)))
+        Ok(Some(sums))
     }
 
     /// The probes inferred by one another's evidence, and the rays that this took.
@@ -192,23 +191,23 @@ impl SurfaceReuse<'_> {
         camera: &Camera,
         references: &[Arc<Reference>],
         probed: &Probed,
-    ) -> Result<Option<(RayCounts, Option<Film>)>> {
+    ) -> Result<(RayCounts, Option<Film>)> {
         self.with_lookup((frame, camera), references, |lookup| {
-            let Some(lookup) = lookup else { return Some((RayCounts::default(), None)) };
+            let Some(lookup) = lookup else { return Ok((RayCounts::default(), None)) };
             let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.part(x, y)];
-            let tolerance = self.renderer.settings.reuse.tolerance;
+            let tolerance = self.context.renderer.settings.reuse.tolerance;
             let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
             let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
-            let inferred = self.render(job, Some(&judged), &Unheard)?;
-            Some((inferred.rays, Some(inferred.film)))
+            let inferred = self.render(job, Some(&judged), &())?;
+            Ok((inferred.rays, Some(inferred.film)))
         })
     }
 
-    fn shown<'f>(&self, film: &'f Film) -> Shown<'f> {
-        let settings = self.renderer.settings;
-        Shown {
+    fn shown<'f>(&self, film: &'f Film) -> AuditedFrame<'f> {
+        let settings = self.context.renderer.settings;
+        AuditedFrame {
             rgb: &film.rgb,
-            sources: film.sources.as_deref().unwrap_or_default(),
+            provenance: film.provenance.as_deref().unwrap_or_default(),
             display: Display { exposure: settings.exposure, tone: settings.tone },
         }
     }
@@ -216,7 +215,7 @@ impl SurfaceReuse<'_> {
     /// Whether a pixel lies in the crop.
     fn is_shown(&self, film: &Film, i: usize) -> bool {
         let (x, y) = (i as u32 % film.width, i as u32 / film.width);
-        let crop = self.renderer.settings.crop;
+        let crop = self.context.renderer.settings.crop;
         crop.is_none_or(|c| (c.x0..c.x1).contains(&x) && (c.y0..c.y1).contains(&y))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::LightSample;
 use super::flat::Flat;
-use crate::intersect::Facet;
+use crate::intersect::PlaneError;
 use crate::math::{DVec3, orthonormal_basis};
 use crate::sampling::concentric_disk;
 use crate::scene::DiskLight;
@@ -23,11 +23,12 @@ impl Disk {
         let basis = orthonormal_basis(light.normal);
         // As long as the longest of the triangles that show it, and as narrow as the narrowest.
         let (s, t) = (basis.0 * light.radius, basis.1 * light.radius);
-        let facet = Facet::of(&[light.centre - s, light.centre + s, light.centre + t * 0.024]);
+        let plane_error =
+            PlaneError::of(&[light.centre - s, light.centre + s, light.centre + t * 0.024]);
         Self {
             centre: light.centre,
             radius: light.radius,
-            plane: Flat { normal: light.normal, facet },
+            plane: Flat { normal: light.normal, plane_error },
             basis,
             two_sided: light.two_sided,
         }

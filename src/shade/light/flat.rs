@@ -1,7 +1,7 @@
 //! What flat lights have in common.
 
 use super::{LightSample, ShadowTarget};
-use crate::intersect::{Facet, Target};
+use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 
 /// The plane of a flat light.
@@ -9,7 +9,7 @@ pub(super) struct Flat {
     /// Unit normal of the emitting side.
     pub normal: DVec3,
     /// What f32 may make of the triangles that show it.
-    pub facet: Facet,
+    pub plane_error: PlaneError,
 }
 
 impl Flat {
@@ -26,7 +26,7 @@ impl Flat {
     /// `point` of the light where it stands for all of it.
     #[inline(always)]
     pub fn alone(&self, point: DVec3) -> LightSample {
-        let target = Target { point, normal: self.normal, facet: self.facet };
+        let target = RayEnd { point, normal: self.normal, plane_error: self.plane_error };
         LightSample { target: ShadowTarget::Point(target), weight: 1.0 }
     }
 }

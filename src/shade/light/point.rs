@@ -1,7 +1,7 @@
 //! A point light.
 
 use super::{LightSample, ShadowTarget, is_lit};
-use crate::intersect::{Facet, Target};
+use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 use crate::scene::PointLight;
 
@@ -28,6 +28,10 @@ impl Point {
         let point = self.position;
         // No surface to stop short of: the normal along the ray costs a few ulp.
         let normal = (p - point).normalize();
-        LightSample::of_delta(ShadowTarget::Point(Target { point, normal, facet: Facet::EXACT }))
+        LightSample::of_delta(ShadowTarget::Point(RayEnd {
+            point,
+            normal,
+            plane_error: PlaneError::EXACT,
+        }))
     }
 }

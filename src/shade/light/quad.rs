@@ -2,7 +2,7 @@
 
 use super::flat::Flat;
 use super::{LightSample, irradiance};
-use crate::intersect::Facet;
+use crate::intersect::PlaneError;
 use crate::math::DVec3;
 use crate::sampling::QuadWarp;
 use crate::scene::QuadLight;
@@ -17,11 +17,11 @@ pub(super) struct Quad {
 
 impl Quad {
     pub fn new(light: &QuadLight) -> Self {
-        let facet = Facet::of_quad(&light.corners);
+        let plane_error = PlaneError::of_quad(&light.corners);
         Self {
             warp: QuadWarp::new(light.corners),
             corners: light.corners,
-            plane: Flat { normal: light.normal(), facet },
+            plane: Flat { normal: light.normal(), plane_error },
             two_sided: light.two_sided,
         }
     }

@@ -1,7 +1,7 @@
 //! A sphere light.
 
 use super::{LightSample, ShadowTarget, irradiance};
-use crate::intersect::{Facet, Target};
+use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 use crate::sampling::SphereCone;
 use crate::scene::SphereLight;
@@ -49,6 +49,6 @@ impl SphereView {
 
     fn target(&self, point: DVec3) -> ShadowTarget {
         let normal = (point - self.centre).normalize();
-        ShadowTarget::Point(Target { point, normal, facet: Facet::EXACT })
+        ShadowTarget::Point(RayEnd { point, normal, plane_error: PlaneError::EXACT })
     }
 }

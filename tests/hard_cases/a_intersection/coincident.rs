@@ -4,7 +4,6 @@ use crate::common::{self, Job};
 use crate::shapes;
 use crate::suite::{self, Outcome, Size};
 use rand::Rng;
-use tweenray::effects::EffectPlan;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, PrimRef, Ray};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{HitRules, Light, Material, PointLight, Scene, SphereLight, World};
@@ -103,10 +102,9 @@ fn same_image(outcome: &mut Outcome, size: Size) {
 fn image(job: &Job, scene: &Scene, threads: usize) -> Vec<Rgb> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let intersector = tweenray::intersect::build(scene, &job.settings, threads).unwrap();
-    let (settings, plan) = (&job.settings, EffectPlan::of(scene, &job.settings));
-    let renderer = Renderer { scene, settings, plan, intersector: &*intersector };
+    let renderer = Renderer::new(scene, &job.settings, &*intersector);
     let never = std::sync::atomic::AtomicBool::new(false);
-    pool.install(|| renderer.render(&job.camera, 1, false, &never, &common::Silent)).unwrap().0.rgb
+    pool.install(|| renderer.render(&job.camera, 1, false, &never, &())).unwrap().0.rgb
 }
 
 /// A ray in a face's plane hits nothing but what lies behind: the convention of both tracers.

@@ -90,7 +90,7 @@ pub fn degenerate(size: Size) -> Outcome {
     }
     // Past the importer: what f32 makes of geometry that was sound in f64.
     let refused = shapes::world_of(strip(1e-3)).into_scene(true).err().map(|e| e.to_string());
-    let named = refused.as_ref().is_some_and(|said| said.contains("98 of the 98 triangles of"));
+    let named = refused.as_ref().is_some_and(|said| said.contains("98 triangles"));
     outcome.check(named, || format!("a strip below f32's grain: {refused:?}"));
     for (name, mesh) in collapsed() {
         outcome.merge(traced(name, shapes::world_of(mesh), rays));

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 use tweenray::intersect::{EmbreeIntersector, Oracle};
 use tweenray::math::DVec3;
-use tweenray::scene::{CameraPath, Easing, HitRules, Pose, Scene, Settings, Shot, WorldMesh};
+use tweenray::scene::{CameraPath, HitRules, Pose, Scene, Settings, Shot, WorldMesh};
 use tweenray::verify::{Check, Class, Kind, OPEN_VERTEX_LIMIT, Tally};
 
 /// Makes a mesh.
@@ -74,7 +74,7 @@ fn scene_of(mesh: WorldMesh) -> Scene {
 fn tally(scene: &Scene, rules: HitRules, rays: u64) -> Tally {
     let (eye, target, up) = (DVec3::new(0.3, -2.0, 2.5), DVec3::ZERO, DVec3::Z);
     let path = CameraPath::Still(Pose { eye, target, up, roll_degrees: 0.0 });
-    let shot = Shot { path, easing: Easing::Linear, frames: 1, vfov_degrees: 50.0 };
+    let shot = Shot::new(path, 1, 50.0);
     let settings = Settings { rules, ..Settings::default() };
     let product = EmbreeIntersector::new(scene, rules, None, 2).unwrap();
     let oracle = Oracle::new(scene);

@@ -78,7 +78,7 @@ pub fn longest_edge([a, b, c]: &[DVec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn sees_what_f64_cannot() {
+    fn double_double_tells_weights_that_f64_rounds_away() {
         use super::{DVec3, Ray, meet};
         // A weight of 2^-60: 1 + 2^-60 rounds to 1 in f64.
         let tiny = 1.0 / (1u64 << 60) as f64;
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_are_those_of_the_nearest_part() {
+    fn distances_to_a_triangle_are_to_its_nearest_corner_edge_or_face() {
         use super::{DVec3, Ray, line_to_triangle, point_to_triangle};
         let corners = [DVec3::ZERO, DVec3::new(2.0, 0.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
         for (point, distance) in [

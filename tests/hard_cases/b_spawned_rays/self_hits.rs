@@ -6,7 +6,8 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
 use tweenray::intersect::{
-    EmbreeIntersector, Facet, Hit, Intersector, Oracle, PrimRef, Ray, SurfaceInteraction, Target,
+    EmbreeIntersector, Hit, Intersector, Oracle, PlaneError, PrimRef, Ray, RayEnd,
+    SurfaceInteraction,
 };
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{HitRules, Material, Recheck, Scene, World};
@@ -97,7 +98,7 @@ fn pair(i: u64, rays: u64) -> Tally {
     let scene = recentred.unwrap_or_else(|| world.into_scene(false).unwrap());
     let embree = EmbreeIntersector::new(&scene, HitRules::default(), None, 1).unwrap();
     let mut rng = suite::rng(27, i);
-    let facet = Facet::of(&scene.meshes[1].corners(0));
+    let plane_error = PlaneError::of(&scene.meshes[1].corners(0));
     let (mut spawned, mut sent) = (Vec::new(), Vec::new());
     let (mut bare, mut naive) = (Vec::new(), Vec::new());
     for _ in 0..rays {
@@ -106,7 +107,7 @@ fn pair(i: u64, rays: u64) -> Tally {
         let dir = shapes::direction(&mut rng);
         spawned.push(from.spawn(dir, true));
         bare.push(from.spawn(dir, false));
-        let target = Target { point: to.p, normal: to.ng, facet };
+        let target = RayEnd { point: to.p, normal: to.ng, plane_error };
         sent.push(from.spawn_to(&target, true));
         naive.push(from.spawn_to(&target, false));
     }

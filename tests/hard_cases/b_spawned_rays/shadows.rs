@@ -6,8 +6,8 @@ use crate::suite::{self, Outcome, Size};
 use rand::Rng;
 use rayon::prelude::*;
 use tweenray::intersect::{
-    EmbreeIntersector, Facet, Hit, Intersector, PrimRef, Ray, SpawnPoint, SurfaceInteraction,
-    Target, lift_to_smooth,
+    EmbreeIntersector, Hit, Intersector, PlaneError, PrimRef, Ray, RayEnd, SpawnPoint,
+    SurfaceInteraction, lift_to_smooth,
 };
 use tweenray::math::{DQuat, DVec3, Rgb};
 use tweenray::scene::{
@@ -155,7 +155,11 @@ fn lit(
             let si = SurfaceInteraction::new(scene, &ANY_RAY, &hit);
             let target = shapes::direction(&mut rng) * radius;
             if (target - si.p).dot(-si.ns) > 0.0 {
-                let end = Target { point: target, normal: target.normalize(), facet: Facet::EXACT };
+                let end = RayEnd {
+                    point: target,
+                    normal: target.normalize(),
+                    plane_error: PlaneError::EXACT,
+                };
                 shadow.push(start(scene, &hit, &si, target - si.p).to(&end));
             }
         }

@@ -170,14 +170,11 @@ fn cost(outcome: &mut Outcome) {
     let mut times = [Vec::new(), Vec::new()];
     for _ in 0..15 {
         for (i, job) in jobs.iter().enumerate() {
-            let plan = tweenray::effects::EffectPlan::of(&scenes[i], &job.settings);
             let intersector = tweenray::intersect::build(&scenes[i], &job.settings, 2).unwrap();
-            let (scene, settings) = (&scenes[i], &job.settings);
-            let renderer =
-                tweenray::shade::Renderer { scene, settings, plan, intersector: &*intersector };
+            let renderer = tweenray::shade::Renderer::new(&scenes[i], &job.settings, &*intersector);
             let never = std::sync::atomic::AtomicBool::new(false);
             let start = Instant::now();
-            renderer.render(&job.camera, 1, false, &never, &common::Silent).unwrap();
+            renderer.render(&job.camera, 1, false, &never, &()).unwrap();
             times[i].push(start.elapsed().as_secs_f64());
         }
     }

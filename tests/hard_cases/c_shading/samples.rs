@@ -4,7 +4,6 @@ use crate::common::{self, Job};
 use crate::suite::{Outcome, Size};
 use std::path::Path;
 use std::process::Command;
-use tweenray::effects::EffectPlan;
 use tweenray::error::Error;
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, Vec2};
@@ -211,7 +210,7 @@ fn judge_light(outcome: &mut Outcome, what: &str, job: &Job, clean: &Film, value
     outcome.check(ok, || format!("{what}: {bad}; {magenta} flagged, {silent} silent"));
     // The kernel that leaves nothing out counts the same.
     let scene = job.world.clone().into_scene(true).unwrap();
-    let (all, _) = common::render_scene(&scene, job, EffectPlan::EVERYTHING);
+    let (all, _) = common::render_with_every_effect(&scene, job);
     outcome.check(all.bad == bad, || format!("{what}: {bad}, with everything on {}", all.bad));
     silent
 }

@@ -6,8 +6,7 @@ use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, Policy, QuadLight, ReuseSettings, Settings, Shot, World,
-    WorldMesh,
+    CameraPath, Light, Material, Policy, QuadLight, ReuseSettings, Settings, Shot, World, WorldMesh,
 };
 
 /// Traces of a frame that tell how far its pixels scatter.
@@ -61,7 +60,7 @@ fn fence(rows: u32, lamp: f64) -> Set {
         up: DVec3::Y,
         roll_degrees: 0.0,
     };
-    Set::of(world, Shot { path, easing: Easing::Linear, frames: 9, vfov_degrees: 40.0 })
+    Set::of(world, Shot::new(path, 9, 40.0))
 }
 
 /// The box between two corners, faces outwards.
@@ -124,24 +123,26 @@ fn in_one_segment(settings: Settings) -> Settings {
 
 /// Width of a lamp in whose light the fence's shadows melt together: only a ratio of another
 /// surface would be wrong.
-const WIDE: f64 = 4.0;
+pub const WIDE: f64 = 4.0;
 /// Width, in pickets, of one in whose light they are nearly as fine as the pickets: penumbras of two
 /// pixels.
 const NARROW: f64 = 8.0;
 
 /// No pixel behind a picket shows what another frame had there.
 pub fn disocclusion(size: Size) -> Outcome {
-    let mut outcome = behind_pickets(size, WIDE);
+    let mut outcome = behind_pickets(size, WIDE, |_| ());
     if size == Size::Full {
-        outcome.merge(behind_pickets(size, NARROW * pixel(192)));
+        outcome.merge(behind_pickets(size, NARROW * pixel(192), |_| ()));
     }
     outcome
 }
 
-fn behind_pickets(size: Size, lamp: f64) -> Outcome {
+/// The same in the light of one lamp, after a `change`.
+pub fn behind_pickets(size: Size, lamp: f64, change: impl FnOnce(&mut Set)) -> Outcome {
     let mut outcome = Outcome::default();
     let (width, height) = size.of((64, 48), (256, 192));
-    let set = fence(height, lamp);
+    let mut set = fence(height, lamp);
+    change(&mut set);
     let stage = set.stage(common::threads());
     // As many rays as make it worth a look: by the narrow lamp all but what is above the shadows is traced.
     let settings = in_one_segment(set.settings((width, height), 1, 64));
@@ -164,7 +165,7 @@ fn behind_pickets(size: Size, lamp: f64) -> Outcome {
         outcome.count(u64::from(width * height), bad[0].len() as u64);
         for i in &bad[0] {
             let (x, y) = (*i as u32 % width, *i as u32 / width);
-            let source = made.film.sources.as_ref().unwrap()[*i];
+            let source = made.film.provenance.as_ref().unwrap()[*i];
             outcome.example(format!("lamp {lamp:.2}, frame {frame}, pixel {x},{y}: {source:?}"));
         }
         (control, stale) = (control + traced, stale + bad[1].len());

@@ -54,7 +54,7 @@ fn is_same(a: &Made, b: &Made) -> bool {
     // What the audit did not draw is NaN in its map.
     let map = |film: &Film| film.audit.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
     a.film.rgb == b.film.rgb
-        && a.film.sources == b.film.sources
+        && a.film.provenance == b.film.provenance
         && a.reuse == b.reuse
         && a.audit == b.audit
         && map(&a.film) == map(&b.film)

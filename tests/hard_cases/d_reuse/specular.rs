@@ -6,8 +6,7 @@ use crate::suite::{Outcome, Size};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    CameraPath, Easing, Light, Material, QuadLight, ReuseSettings, Settings, Shot, World,
-    WorldSphere,
+    CameraPath, Light, Material, QuadLight, ReuseSettings, Settings, Shot, World, WorldSphere,
 };
 
 const FRAMES: u32 = 9;
@@ -37,7 +36,7 @@ fn scene() -> Set {
     let (from, to) = (p(-5.0, 2.0, 4.0), p(5.0, 2.0, 4.0));
     let (target, up, roll_degrees) = (p(0.0, 1.0, 0.0), DVec3::Y, 0.0);
     let path = CameraPath::Pan { from, to, target, up, roll_degrees };
-    Set::of(world, Shot { path, easing: Easing::Linear, frames: FRAMES, vfov_degrees: 30.0 })
+    Set::of(world, Shot::new(path, FRAMES, 30.0))
 }
 
 /// Mean place of the pixels that show the lamp in the ball, and how many they are.

@@ -8,11 +8,17 @@ use tweenray::scene::{CameraPath, ReuseSettings, Settings};
 
 /// Ten frames of a camera that stands still: the same bytes in each.
 pub fn identity_path(size: Size) -> Outcome {
+    standing(size, |_| ())
+}
+
+/// The same after a `change`.
+pub fn standing(size: Size, change: impl FnOnce(&mut Set)) -> Outcome {
     let mut outcome = Outcome::default();
     let mut set = Set::load("cornell", |_| ());
     let pose = set.shot.pose(1).unwrap();
     set.shot = set.shot(10);
     set.shot.path = CameraPath::Still(pose);
+    change(&mut set);
     let stage = set.stage(common::threads());
     let settings = set.settings(size.of((48, 48), (480, 480)), 1, 16);
     let made = stage.frames(&settings, &set.shot, &(1..=10).collect::<Vec<_>>());

@@ -8,11 +8,9 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Oracle, Ray};
 use tweenray::math::DVec3;
-use tweenray::scene::{
-    CameraPath, Easing, HitRules, Pose, Recheck, Scene, Settings, Shot, WorldMesh,
-};
+use tweenray::scene::{CameraPath, HitRules, Pose, Recheck, Scene, Settings, Shot, WorldMesh};
 use tweenray::stats::RayCounts;
-use tweenray::verify::{Answers, Check, Class, Difference, PAST_VERTEX_LIMIT, Trial};
+use tweenray::verify::{Answers, Check, Class, Difference, PAST_VERTEX_LIMIT, TracedRay};
 
 /// Rays a scene.
 const RAYS: u64 = 1024;
@@ -96,7 +94,7 @@ fn ray(scene: &Scene, rng: &mut Pcg64Mcg) -> Ray {
 /// The camera of a check, which none of the rays needs.
 fn shot() -> Shot {
     let pose = Pose { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
-    Shot { path: CameraPath::Still(pose), easing: Easing::Linear, frames: 1, vfov_degrees: 60.0 }
+    Shot::new(CameraPath::Still(pose), 1, 60.0)
 }
 
 /// Differences by class.
@@ -127,7 +125,7 @@ impl Tally {
 fn judged(check: &Check, ray: &Ray, oracle: Option<Hit>) -> (Answers, Option<Difference>) {
     let product = check.product.intersect(ray, &mut RayCounts::default());
     let answers = Answers::Hits { product, oracle };
-    (answers, check.judge(&Trial { ray: *ray, answers }))
+    (answers, check.judge(&TracedRay { ray: *ray, answers }))
 }
 
 /// Calls `then` with a check of `scene`.

@@ -54,13 +54,13 @@ fn render(which: &str, edge: u32, times: u32) {
     let world = if which == "unused" { with_unused(plain()) } else { plain() };
     let job = job(world, edge);
     let scene = job.world.clone().into_scene(true).unwrap();
-    let plan = match which {
-        "everything" => EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING },
-        _ => EffectPlan::of(&scene, &job.settings),
+    let render = match which {
+        "everything" => common::render_with_every_effect,
+        _ => common::render_scene,
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for _ in 0..times {
-        pool.install(|| common::render_scene(&scene, &job, plan));
+        pool.install(|| render(&scene, &job));
     }
 }
 
@@ -109,18 +109,17 @@ pub fn effects_cost_nothing(size: Size) -> Outcome {
     let off =
         !(plan.mirror || plan.glass || plan.nested_glass || plan.area_lights || plan.sky_light);
     outcome.check(off, || format!("{plan:?}"));
-    let (film, counts) = common::render_scene(&scene, &job, plan);
+    let (film, counts) = common::render_scene(&scene, &job);
     let none = counts[RayKind::Mirror]
         + counts[RayKind::Glass]
         + counts[RayKind::ShadowArea]
         + counts[RayKind::ShadowSky];
     outcome.check(none == 0 && counts[RayKind::ShadowDelta] > 0, || format!("{counts:?}"));
-    let everything = EffectPlan { sky_light: false, ..EffectPlan::EVERYTHING };
-    let (all, all_counts) = common::render_scene(&scene, &job, everything);
+    let (all, all_counts) = common::render_with_every_effect(&scene, &job);
     outcome.check(film == all, || "other bytes with everything on".into());
     outcome.check(counts == all_counts, || format!("{counts:?} and {all_counts:?}"));
     let unused = with_unused(plain()).into_scene(true).unwrap();
-    let (same, _) = common::render_scene(&unused, &job, EffectPlan::of(&unused, &job.settings));
+    let (same, _) = common::render_scene(&unused, &job);
     outcome.check(film == same, || "other bytes with unused materials".into());
     count_instructions(&mut outcome, size);
     outcome

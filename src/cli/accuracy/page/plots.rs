@@ -1,7 +1,7 @@
 //! Error against time.
 
 use super::name_of;
-use crate::accuracy::{Errors, Group, Knob, Row};
+use crate::accuracy::{CandidateRow, Errors, Group, Knob};
 use crate::cli::accuracy::Outcome;
 use crate::page::words::{seconds, short};
 use crate::page::{Point, Scatter};
@@ -56,7 +56,7 @@ fn colour_of(knob: Knob) -> (&'static str, &'static str) {
 /// Error by `metric` against time; `None` where no setting has it.
 pub fn scatter(outcome: &Outcome, metric: &Metric) -> Option<Scatter> {
     let rows = &outcome.measured.rows;
-    let point = |(id, row): (usize, &Row)| {
+    let point = |(id, row): (usize, &CandidateRow)| {
         let interval = row.seconds.median.interval;
         let y = (metric.of)(&row.errors)?;
         Some(Point {

@@ -29,11 +29,13 @@ impl Camera {
         let span = self.only_path(source)?;
         let path = self.path(source, world, aspect)?;
         let moves = !matches!(path, CameraPath::Still(_));
+        let lens = self.lens(&path, source)?;
         let shot = Shot {
             frames: self.frames.map_or(if moves { 48 } else { 1 }, Int::u32),
             path,
             easing: self.easing,
             vfov_degrees: self.fov.0,
+            lens,
         };
         shot.validate().map_err(|error| match error {
             Error::Usage(what) => source.fault(&span, what).into(),

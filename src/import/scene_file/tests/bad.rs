@@ -40,6 +40,13 @@ const NAMES: &[Case] = &[
         "unknown material `red`",
         "[material.red]",
     ),
+    ("[camera]\nlens = { radius = 1, focus = ¦'far' }\n", "\"far\"", ""),
+    ("[camera]\nlens = { radius = 1, focus = ¦0 }\n", "found 0", ""),
+    ("[camera]\nlens = { radius = ¦-1 }\n", "found -1", ""),
+    ("[camera]\nlens = ¦{ focus = 2 }\n", "no aperture", "`f_number`"),
+    ("[camera]\nlens = { radius = 1, f_number = ¦2 }\n", "`radius`", "not both"),
+    ("[camera]\nlens = { radius = 1, sensor_height = ¦2 }\n", "no effect", ""),
+    ("[camera]\nlens = { radius = 1, blades = ¦2 }\n", "found 2", ""),
     ("¦[[sphere]]\nradius = 1\n", "the key `centre` is missing", ""),
     ("[camera]\npan = ¦{ from = [0, 0, 1], to = [0, 0, 2] }\n", "the key `target` is missing", ""),
 ];

@@ -4,8 +4,8 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    BuildQuality, CameraPath, DirectionalLight, Interval, Light as SceneLight, PointLight, Policy,
-    ReuseSettings, Settings as SceneSettings, SphereLight,
+    BuildQuality, CameraPath, DirectionalLight, Focus, Lens, Light as SceneLight, PointLight,
+    Policy, ReuseSettings, Settings as SceneSettings, ShotLens, SphereLight,
 };
 use std::time::Duration;
 
@@ -14,7 +14,10 @@ fn an_empty_file_is_an_empty_scene_with_all_defaults() {
     let loaded = good("");
     assert_eq!(loaded.settings, SceneSettings::default());
     assert_eq!((loaded.shot.frames, loaded.shot.vfov_degrees), (48, 40.0));
-    assert_eq!((loaded.fps, loaded.frames, loaded.output), (24.0, None, None));
+    assert_eq!(
+        (loaded.options.fps, loaded.options.frames, loaded.options.output),
+        (24.0, None, None)
+    );
     assert_eq!(loaded.files.len(), 1);
     assert!(loaded.warnings[0].message.contains("nothing lights the scene"));
     let scene = loaded.world.into_scene(true).expect("an empty scene");
@@ -49,14 +52,14 @@ fn every_setting_reaches_its_place() {
     assert!(r.spawn_offset != rd.spawn_offset && r.recentre != rd.recentre);
     let crop = s.crop.expect("a crop");
     assert_eq!((crop.x0, crop.y0, crop.x1, crop.y1), (1, 2, 30, 40));
-    let frames = loaded.frames.expect("frames");
-    assert_eq!((frames.first, frames.last, loaded.fps), (2, 3, 30.0));
-    assert_eq!(loaded.output.map(|o| o.pattern).as_deref(), Some("out/f_####.exr"));
-    assert_eq!((loaded.threads, loaded.stats), (Some(2), Some("s.json".into())));
-    assert!(loaded.overwrite && !loaded.video);
-    assert_eq!(loaded.time_limit, Some(Duration::from_secs(5400)));
-    assert_eq!(loaded.checkpoint, Some(Interval(None)));
-    assert_eq!(loaded.exchange, Some(5000));
+    let options = loaded.options;
+    let frames = options.frames.expect("frames");
+    assert_eq!((frames.first, frames.last, options.fps), (2, 3, 30.0));
+    assert_eq!(options.output.as_deref(), Some("out/f_####.exr"));
+    assert_eq!((options.threads, options.stats), (Some(2), Some("s.json".into())));
+    assert!(options.overwrite && !options.video);
+    assert_eq!(options.time_limit, Some(Duration::from_secs(5400)));
+    assert_eq!((options.checkpoint, options.exchange), (None, 5000));
 }
 
 #[test]
@@ -261,4 +264,49 @@ fn the_command_line_size_reaches_framing_and_settings() {
     let (wide, size) = at(Some((200, 100)));
     assert_eq!(size, (200, 100));
     assert!(at(Some((100, 200))).0 > 1.5 * wide);
+}
+
+#[test]
+fn a_lens_has_a_radius_or_an_f_number_and_a_focus() {
+    let lens = |camera: &str| good(&format!("[camera]\n{camera}")).shot.lens;
+    let thin = |camera: &str| match lens(camera) {
+        ShotLens::Thin(path) => path,
+        ShotLens::Pinhole => panic!("{camera}: a pinhole"),
+    };
+    assert_eq!(lens("fov = 30"), ShotLens::Pinhole);
+    let plain = thin("lens = { radius = 0.25 }");
+    assert_eq!((plain.keys.len(), plain.blades), (1, 0));
+    assert_eq!((plain.keys[0].radius, plain.keys[0].focus), (0.25, Focus::Target));
+    let shaped = thin("lens = { radius = 1, focus = 3, blades = 6, blade_rotation = 15 }");
+    assert_eq!((shaped.blades, shaped.blade_rotation_degrees), (6, 15.0));
+    assert_eq!(shaped.keys[0].focus, Focus::Distance(3.0));
+    // A 50 mm lens on 24 mm of film at f/2 opens by 12.5 mm to either side.
+    let fov = 2.0 * (12.0f64 / 50.0).atan().to_degrees();
+    let photo = thin(&format!("fov = {fov}\nlens = {{ f_number = 2, focus = 'target' }}"));
+    assert!((photo.keys[0].radius - 0.0125).abs() < 1e-12);
+    let film = thin(&format!("fov = {fov}\nlens = {{ f_number = 2, sensor_height = 0.048 }}"));
+    assert!((film.keys[0].radius - 0.025).abs() < 1e-12);
+}
+
+#[test]
+fn keys_change_the_lens_and_keep_what_they_leave_out() {
+    let key = |lens: &str| format!("[[camera.keys]]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n{lens}");
+    let text = format!(
+        "[camera]\nframes = 3\nlens = {{ radius = 0.5, focus = 2 }}\n{}\n{}\n{}\n",
+        key(""),
+        key("lens = { focus = 'target' }"),
+        key("lens = { radius = 0 }"),
+    );
+    let shot = good(&text).shot;
+    let lens = |frame| shot.camera(frame, 8, 8).expect("a camera").lens;
+    let of = |frame| match lens(frame) {
+        Lens::Thin(lens) => (lens.radius, lens.focus),
+        Lens::Pinhole => panic!("frame {frame}"),
+    };
+    assert_eq!((of(1), of(2), lens(3)), ((0.5, 2.0), (0.5, 5.0), Lens::Pinhole));
+    // A pull of focus by a camera that stands makes frames of its own.
+    assert_ne!(
+        shot.camera(1, 8, 8).expect("one").encode(),
+        shot.camera(2, 8, 8).expect("two").encode()
+    );
 }

@@ -4,6 +4,8 @@
 
 use super::*;
 use crate::math::DVec3;
+use crate::math::Rgb;
+use crate::scene::World;
 use crate::scene::{Light, WorldMesh};
 use std::collections::HashMap;
 

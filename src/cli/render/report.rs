@@ -1,0 +1,203 @@
+//! What is said of a job that renders no more frames, and the exit code that follows.
+
+use super::round::{RenderJob, Round};
+use super::site::Site;
+use super::videos;
+use crate::cli::choose::Judgement;
+use crate::cli::exit::Exit;
+use crate::cli::progress::{duration, percent};
+use crate::cli::{say, stats};
+use crate::error::{Error, Result};
+use crate::output::manifest::AuditRow;
+use crate::scene::Policy;
+use crate::stats::ReuseCounts;
+
+/// Says that the job was stopped before its first frame.
+pub(super) fn stopped_while_choosing(site: &Site) -> Exit {
+    if site.comm.is_root() {
+        site.interrupt.say_stopped();
+    }
+    Exit::Stopped
+}
+
+/// Says what came of a target: last, where it is seen.
+pub(super) fn say_verdict(judged: Option<Judgement>, quiet: bool) -> Result<()> {
+    let verdict = match judged {
+        Some(Judgement::Done(choice)) => choice.verdict(),
+        _ => None,
+    };
+    verdict.filter(|_| !quiet).map_or(Ok(()), say::result)
+}
+
+/// Tells what there is to tell of a job that renders no more frames; `was_checking`: it was stopped
+/// while these were held against what was wanted.
+pub(super) fn conclude(job: &RenderJob, round: &Round, was_checking: bool) -> Result<Exit> {
+    let is_stopped = was_checking || round.unfinished > 0;
+    if !job.site.comm.is_root() {
+        return Ok(if is_stopped { Exit::Stopped } else { Exit::Done });
+    }
+    if let Some(path) = &job.request.options.stats {
+        let seconds = job.site.clock.start.elapsed().as_secs_f64();
+        let Round { plan, outcome, ranks, .. } = round;
+        stats::write(path, &job.target.header, plan, outcome, ranks, seconds)?;
+    }
+    let done = if is_stopped { Err(Error::Stopped) } else { finish(job, round) };
+    match done {
+        Err(Error::Stopped) => {
+            say_stopped(job, round);
+            Ok(Exit::Stopped)
+        }
+        done => {
+            let samples = judge_samples(job, round);
+            let reuse = judge_reuse(job, round);
+            Ok(samples.or(reuse).unwrap_or(done?))
+        }
+    }
+}
+
+/// Says how to go on.
+fn say_stopped(job: &RenderJob, round: &Round) {
+    // A reason that came after the frames is only known here.
+    let reason = round.reasons.iter().find(|reason| !reason.is_empty()).cloned();
+    let reason = reason.unwrap_or_else(|| job.site.interrupt.reason());
+    let finished = round.total() - round.outcome.unfinished;
+    say::aside(format_args!(
+        "stopped{reason}: {finished} of {} frames are finished in {}{}",
+        round.total(),
+        job.target.pattern,
+        job.goes_on()
+    ));
+}
+
+/// Says what there is now, and makes the videos of it: all frames asked for are there.
+fn finish(job: &RenderJob, round: &Round) -> Result<Exit> {
+    let result = |line: String| if job.site.quiet { Ok(()) } else { say::result(line) };
+    let Round { plan, outcome, .. } = round;
+    let frames = if round.total() == 1 { "frame" } else { "frames" };
+    result(format!(
+        "{} {frames} in {} ({} rendered, {} kept) in {}",
+        round.total(),
+        job.target.pattern,
+        plan.render.len(),
+        plan.kept.len(),
+        duration(job.site.clock.start.elapsed().as_secs_f64())
+    ))?;
+    let policy = job.setup.settings.reuse.policy;
+    reused(policy, &stats::reuse_of(outcome)).map_or(Ok(()), result)?;
+    let audit = stats::audit_of(plan, outcome);
+    if let Some(line) = audit.and_then(|audit| audit_line(&audit)) {
+        result(line)?;
+    }
+    if job.request.options.video {
+        videos::make(job, round)?.into_iter().try_for_each(result)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// How much of the job was reused, where anything could be.
+fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
+    let all = percent(counts.share()?, 1);
+    let mirrored = counts.specular_share().map_or(String::new(), |share| {
+        format!("; of those in mirrors and glass {}", percent(share, 1))
+    });
+    let what = match policy {
+        // It takes over pixels, whatever they show.
+        Policy::Colour => "pixels",
+        Policy::Surface | Policy::Off => "lit surface points",
+    };
+    Some(format!("{all} of the {what} were reused{mirrored}"))
+}
+
+/// Says so, with what to do, where the audit is sure that inferred frames are less true than traced ones, by
+/// more than `tolerance` display steps.
+fn worse_than_traced(audit: &AuditRow, tolerance: f32) -> Option<String> {
+    let ([rmse, low, _], [traced, _, high]) = (audit.rmse?, audit.rmse_traced?);
+    (low > high.max(tolerance.into())).then(|| {
+        format!(
+            "inferred frames are less true than traced ones (RMSE {}/255 against {}/255): trace them \
+             with --policy off, or raise --probes",
+            steps(rmse),
+            steps(traced)
+        )
+    })
+}
+
+/// How good the inferred frames are, in words.
+fn audit_line(audit: &AuditRow) -> Option<String> {
+    let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
+    Some(format!(
+        "inferred frames: RMSE {}/255 ({}–{}); tracing each frame: {}/255",
+        steps(rmse),
+        steps(low),
+        steps(high),
+        steps(traced)
+    ))
+}
+
+/// Display steps in two digits or so.
+fn steps(x: f64) -> String {
+    match x {
+        ..0.0095 => format!("{x:.3}"),
+        ..0.095 => format!("{x:.2}"),
+        _ => format!("{x:.1}"),
+    }
+}
+
+/// Says where inferred frames are less true than traced ones; an exit code where that is a failure.
+fn judge_reuse(job: &RenderJob, round: &Round) -> Option<Exit> {
+    let audit = stats::audit_of(&round.plan, &round.outcome)?;
+    complain(job, worse_than_traced(&audit, job.setup.settings.reuse.tolerance)?)
+}
+
+/// Says what is wrong with finished frames; an exit code where that is a failure.
+fn complain(job: &RenderJob, message: String) -> Option<Exit> {
+    if job.request.options.strict {
+        say::error(&Error::Failed(message));
+        return Some(Exit::Failed);
+    }
+    say::unless(job.site.quiet, &[message], |m| say::warning(m));
+    None
+}
+
+/// Says how many samples are invalid; an exit code where that is a failure.
+fn judge_samples(job: &RenderJob, round: &Round) -> Option<Exit> {
+    let Round { plan, outcome, .. } = round;
+    let bad = stats::bad_of(plan, outcome);
+    if bad.is_none() {
+        return None;
+    }
+    let rendered = outcome.frames.iter().map(|(_, report)| (report.frame, report.bad));
+    let all = plan.kept_bad.iter().copied().chain(rendered);
+    let first = all.filter(|(_, bad)| !bad.is_none()).min_by_key(|(frame, _)| *frame);
+    let place = first.and_then(|(frame, bad)| Some((frame, bad.first?)));
+    let place = place.map_or(String::new(), |(frame, [x, y])| {
+        format!("; the first at pixel {x},{y} of frame {frame}")
+    });
+    let samples = if bad.total() == 1 { "invalid camera sample" } else { "invalid camera samples" };
+    let message = format!(
+        "{} {samples} ({bad}){place}\n  \
+         help: --flag-bad on shows such pixels in magenta",
+        bad.total()
+    );
+    complain(job, message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::AuditSums;
+
+    #[test]
+    fn inferred_frames_are_called_worse_only_where_that_is_sure_and_seen() {
+        let audit = |rmse, traced| AuditRow {
+            rmse: Some(rmse),
+            rmse_inferred_pixels: None,
+            rmse_traced: Some(traced),
+            sums: AuditSums::default(),
+        };
+        let is_worse = |rmse, traced| worse_than_traced(&audit(rmse, traced), 0.25).is_some();
+        assert!(is_worse([5.7, 5.0, 6.4], [2.7, 2.5, 2.9]));
+        assert!(!is_worse([2.9, 2.6, 3.2], [2.7, 2.5, 2.9]), "chance");
+        assert!(!is_worse([0.2, 0.15, 0.24], [0.05, 0.04, 0.06]), "nobody sees it");
+    }
+}

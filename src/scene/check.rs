@@ -1,0 +1,70 @@
+//! What a world that is built in code may get wrong, and tracing would not survive: refused by name.
+
+use super::{World, WorldMesh};
+use crate::error::{Error, Result};
+
+impl World {
+    /// Refuses indices of materials and vertices that there are not, and lights and spheres whose place
+    /// is no number: no bounds would hold them. (The numbers of meshes are finite by invariant.)
+    pub(super) fn check(&self) -> Result<()> {
+        let meshes = self.meshes.iter().map(|m| (&m.name, m.material));
+        let spheres = self.spheres.iter().map(|s| (&s.name, s.material));
+        let count = self.materials.len();
+        let stray = meshes.chain(spheres).find(|(_, material)| *material as usize >= count);
+        if let Some((name, material)) = stray {
+            let message = format!("`{name}` is of material {material}, counted from 0, of {count}");
+            return Err(Error::Usage(message));
+        }
+        self.meshes.iter().try_for_each(check_vertices)?;
+        self.check_finite()
+    }
+
+    fn check_finite(&self) -> Result<()> {
+        let what = |what: &str| {
+            Err(Error::Usage(format!("the place or size of {what} is not a finite number")))
+        };
+        if let Some(index) = self.lights.iter().position(|l| !l.is_finite()) {
+            return what(&format!("light {}", index + 1));
+        }
+        match self.spheres.iter().find(|s| !(s.centre.is_finite() && s.radius.is_finite())) {
+            Some(sphere) => what(&format!("`{}`", sphere.name)),
+            None => Ok(()),
+        }
+    }
+}
+
+fn check_vertices(mesh: &WorldMesh) -> Result<()> {
+    let count = mesh.positions.len();
+    let most = mesh.triangles.iter().flatten().copied().max();
+    match most.filter(|most| *most as usize >= count) {
+        Some(most) => Err(Error::Usage(format!(
+            "a triangle of `{}` has vertex {most}, counted from 0, of {count}",
+            mesh.name
+        ))),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DVec3, Rgb};
+    use crate::scene::{Material, WorldSphere};
+
+    #[test]
+    fn indices_of_nothing_are_refused_by_name() {
+        let refusal = |world: World| world.into_scene(true).expect_err("no scene").to_string();
+        let floor = |last, material| {
+            let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Z];
+            WorldMesh::new("floor", corners, vec![[0, 1, last]], material)
+        };
+        let world = |meshes| World { meshes, ..World::default() };
+        assert!(refusal(world(vec![floor(2, 0)])).contains("`floor` is of material 0"));
+        let mut bad = world(vec![floor(3, 0)]);
+        bad.add_material(Material::diffuse("white", Rgb::ONE));
+        assert!(refusal(bad.clone()).contains("`floor` has vertex 3"));
+        bad.meshes = vec![floor(2, 0)];
+        bad.spheres = vec![WorldSphere::new("ball", DVec3::ZERO, 1.0, 1)];
+        assert!(refusal(bad).contains("`ball` is of material 1"));
+    }
+}
