@@ -138,9 +138,9 @@ impl Place {
         let mut rivals = Vec::new();
         for lights in var("LIGHTS", "1 2 4 16".to_string()).split_whitespace() {
             for policy in ["off", "surface"] {
-                let mut foretold = 0.0;
+                let mut predicted = 0.0;
                 for spp in [1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192, 256] {
-                    if foretold * f64::from(spp) > 1.2 * most {
+                    if predicted * f64::from(spp) > 1.2 * most {
                         break;
                     }
                     let options = format!(
@@ -148,7 +148,7 @@ impl Place {
                          --policy {policy}"
                     );
                     let swept = self.swept(&mut known, &options);
-                    foretold = swept.0 / f64::from(spp);
+                    predicted = swept.0 / f64::from(spp);
                     let text = serde_json::to_vec(&known).expect("JSON");
                     std::fs::write(&file, text).expect("a file");
                     if reached(&swept.2, wanted) as f64 >= 0.95 * swept.2.len() as f64 {
@@ -247,7 +247,7 @@ fn row(scene: &str, place: &Place, target: &str) -> Vec<String> {
     let fastest = seconds[1..].iter().copied().fold(f64::INFINITY, f64::min);
     println!(
         "{}\n{}\n{}",
-        line(&said, "foretold:"),
+        line(&said, "predicted:"),
         line(&said, "came out"),
         line(&said, "probe t")
     );
@@ -278,7 +278,7 @@ fn budget(scene: &str, place: &Place) {
         off(taken, half),
         off(cpu, default_cpu * half / default)
     );
-    for what in ["foretold:", "came out", "probe t"] {
+    for what in ["predicted:", "came out", "probe t"] {
         println!("{}", line(&said, what));
     }
 }

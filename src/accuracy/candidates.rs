@@ -5,10 +5,10 @@ use super::knobs::{Candidate, Group, Knob};
 use crate::effects::EffectPlan;
 use crate::scene::{BuildQuality, HitRules, IntersectorKind, Policy, Recheck, Settings};
 
-/// The default first, then each knob of `groups` alone, then combinations. What `plan` says has no
-/// part in the scene is left out, and so is what equals something before it, and what makes no
-/// difference in a move of `frames` frames. `looks_up` says whether under some settings any light is
-/// worth a lookup in other frames.
+/// The default first, then each knob of `groups` alone, then combinations. Left out are knobs that by
+/// `plan` have no part in the scene, settings that equal an earlier one, and those that make no
+/// difference in a move of `frames` frames. `looks_up` says whether any light is worth a lookup in other
+/// frames under given settings.
 pub fn candidates(
     base: &Settings,
     plan: &EffectPlan,
@@ -56,7 +56,7 @@ impl List<'_> {
         }
     }
 
-    /// Whether anything is taken over from other frames by lookups under `settings`.
+    /// Whether frames look up light in other frames under `settings`.
     fn reuses(&self, settings: &Settings) -> bool {
         self.frames > 1 && (self.looks_up)(settings)
     }
@@ -198,12 +198,12 @@ impl List<'_> {
     }
 }
 
-/// `x` times `factor` as people multiply: of 0.001 ten times is 0.01, not 0.010000001.
+/// `x` times `factor` in decimal digits: ten times 0.001 is 0.01, not 0.010000001.
 fn times(factor: f64, x: f32) -> f32 {
     (factor * x.to_string().parse::<f64>().unwrap_or(f64::from(x))) as f32
 }
 
-/// A quarter and four times as many, at least one.
+/// A quarter of `n` samples, at least one, and four times `n`.
 fn around(n: u32) -> [u32; 2] {
     [(n / 4).max(1), n.saturating_mul(4).clamp(1, crate::scene::limits::MAX_SAMPLES)]
 }

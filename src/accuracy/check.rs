@@ -1,74 +1,73 @@
-//! What came out: some pixels of finished frames against many samples.
+//! How good finished frames came out: some of their pixels compared with a reference of many samples.
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::SampleCounts;
-use super::figures::{doubts, figure, squares};
-use super::foretell::{Prediction, Predictor};
+use super::figures::{figure, squared_errors};
+use super::predictor::{Prediction, Predictor};
 use super::probe::{SettingsProbe, reference, samples_of_reference};
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
 use serde::{Deserialize, Serialize};
 
-/// What was found in one frame.
+/// The error that was found in one finished frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckedFrame {
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
-    /// Its mean squared error, the reference's own left aside, display steps.
+    /// Mean squared error in squares of a display step, without that of the reference.
     pub squared_error: f64,
-    /// By how much that may be off, a share.
+    /// Standard error of `squared_error`, as a share of it.
     pub doubt: f64,
 }
 
-/// What was found in all that were looked at.
+/// The errors that were found in all frames looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckOutcome {
-    /// Frame by frame.
+    /// One for each frame looked at.
     pub frames: Vec<CheckedFrame>,
-    /// The goal's figure of the worst of them: SSIM less than 1 by how much, FLIP, share.
+    /// The goal's figure of the worst frame, as [`Goal::largest`] has it.
     pub figure: f64,
 }
 
-/// What a check says of a goal.
+/// Whether a goal was reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
-    /// Every frame looked at came to it.
+    /// Every frame looked at reached it.
     Reached,
-    /// Some did not, but by no more than what so few pixels leave open.
+    /// Some frame missed it, by less than so few pixels can tell.
     Open,
-    /// Some surely did not.
+    /// Some frame missed it by more than that.
     Missed,
 }
 
 impl CheckOutcome {
-    /// Looks at some finished frames, rendered as `foretold`, at other pixels than the probe did, as
-    /// many as `effort` says; `image` gives a frame as displayed.
+    /// Compares some finished frames, rendered with the settings of `prediction`, with a reference, at
+    /// other pixels than the probe's and as many as `effort` says; `image` gives a frame as displayed.
     ///
     /// # Errors
-    /// As [`Stage::trace`](super::stage::Stage::trace), and any that `image` gives.
+    /// As [`TrialContext::trace`](super::context::TrialContext::trace), and any that `image` gives.
     pub fn of(
         probe: &SettingsProbe,
-        foretelling: &Predictor,
-        foretold: &Prediction,
+        predictor: &Predictor,
+        prediction: &Prediction,
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<Self> {
         let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
-        let samples = samples_of_reference(foretold.samples);
-        let mut reference = reference(probe.stage.base, samples);
-        reference.bounces = reference.bounces.max(foretold.bounces);
-        let truth = patches.trace(probe.stage, &reference)?;
-        let own = foretelling.own_part(foretold.samples, samples);
+        let samples = samples_of_reference(prediction.samples);
+        let mut reference = reference(probe.context.base, samples);
+        reference.bounces = reference.bounces.max(prediction.bounces);
+        let truth = patches.trace(probe.context, &reference)?;
+        let own = predictor.model.own_part(prediction.samples, samples);
         // Rounding is all the frame's; of the rest a part is the reference's.
         let of_frame = |error: f64| {
-            let rounding = error.min(foretelling.rounding);
+            let rounding = error.min(predictor.rounding);
             rounding + own * (error - rounding)
         };
-        let found = squares(&patches, &truth, &seen).into_iter().map(of_frame);
-        let found = found.zip(doubts(&patches, &truth, &seen));
+        let (errors, doubts) = squared_errors(&patches, &truth, &seen);
+        let found = errors.into_iter().map(of_frame).zip(doubts);
         let checked = |(frame, (squared_error, doubt)): (u32, (f64, f64))| CheckedFrame {
             frame,
             squared_error,
@@ -80,51 +79,42 @@ impl CheckOutcome {
         })
     }
 
-    /// Wall seconds that a whole check of frames of `samples` is foretold to take.
-    pub fn seconds(foretelling: &Predictor, samples: SampleCounts) -> f64 {
-        let whole = Effort::WHOLE;
-        let pixels = f64::from(whole.frames) * f64::from(whole.checked_pixels());
-        pixels * foretelling.patch_seconds(samples_of_reference(samples))
-    }
-
     /// The mean of the frames' squared errors.
     pub fn mean(&self) -> f64 {
         let sum: f64 = self.frames.iter().map(|f| f.squared_error).sum();
         sum / self.frames.len().max(1) as f64
     }
 
-    /// The worst frame.
+    /// The frame with the largest squared error.
     pub fn worst(&self) -> Option<CheckedFrame> {
         self.frames.iter().copied().max_by(|a, b| a.squared_error.total_cmp(&b.squared_error))
     }
 
-    /// What came of `goal`, of which `allowed` is the squared error.
-    pub fn verdict(&self, goal: Goal, allowed: f64) -> Verdict {
+    /// Whether `goal` was reached.
+    pub fn verdict(&self, goal: Goal) -> Verdict {
         let is_reached = match goal {
-            Goal::Psnr(_) => self.worst().is_none_or(|worst| worst.squared_error <= allowed),
-            _ => self.excess(goal, allowed) <= 1.0,
+            Goal::Psnr(_) => self.worst().is_none_or(|w| w.squared_error <= goal.largest()),
+            _ => self.excess(goal) <= 1.0,
         };
         match () {
             () if is_reached => Verdict::Reached,
-            () if self.excess(goal, allowed) <= 1.0 => Verdict::Open,
+            () if self.excess(goal) <= 1.0 => Verdict::Open,
             () => Verdict::Missed,
         }
     }
 
-    /// By which factor squared errors are surely too large for `goal`, of which `allowed` is the squared
-    /// error; 1 and less where it is not surely missed. Half of what so few pixels leave open is to the
-    /// good of a frame.
-    pub fn excess(&self, goal: Goal, allowed: f64) -> f64 {
+    /// The factor by which the figure is surely too large for `goal`; at most 1 where the goal is not surely
+    /// missed. Half of a frame's standard error is to its good.
+    pub fn excess(&self, goal: Goal) -> f64 {
         let sure = |f: &CheckedFrame| f.squared_error / (1.0 + 0.5 * f.doubt);
-        match goal {
-            Goal::Psnr(_) => self.frames.iter().map(sure).fold(0.0, f64::max) / allowed,
-            // The figure itself decides; it rises no faster than the squared error.
-            Goal::Ssim(least) => self.figure / (1.0 - least),
-            Goal::Flip(most) | Goal::MaxShare(most) => self.figure / most,
-        }
+        let figure = match goal {
+            Goal::Psnr(_) => self.frames.iter().map(sure).fold(0.0, f64::max),
+            _ => self.figure,
+        };
+        figure / goal.largest()
     }
 
-    /// PSNR of the mean and of the worst frame, dB.
+    /// PSNR of the mean squared error and of the worst frame, dB.
     pub fn psnr(&self) -> [f64; 2] {
         let of = |squared_error: f64| psnr(squared_error / (255.0 * 255.0));
         [of(self.mean()), of(self.worst().map_or(0.0, |worst| worst.squared_error))]
@@ -144,17 +134,17 @@ mod tests {
                 .collect(),
             figure: 0.03,
         };
-        let goal = Goal::Psnr(45.0);
-        let verdict = |errors: &[f64]| check(errors).verdict(goal, 2.0);
-        assert_eq!(verdict(&[1.9, 2.0, 2.0]), Verdict::Reached);
+        let goal = Goal::Psnr(psnr(2.0 / (255.0 * 255.0)));
+        let verdict = |errors: &[f64]| check(errors).verdict(goal);
+        assert_eq!(verdict(&[1.9, 1.99, 1.99]), Verdict::Reached);
         // Only where more than the figure that is printed is too large.
         assert_eq!(verdict(&[1.9, 2.0, 2.1]), Verdict::Open);
         assert_eq!(verdict(&[1.9, 2.0, 2.3]), Verdict::Missed);
-        assert!(check(&[1.9, 2.0, 2.1]).excess(goal, 2.0) <= 1.0);
-        assert!(check(&[1.9, 2.0, 2.3]).excess(goal, 2.0) > 1.0);
-        assert_eq!(check(&[9.0]).verdict(Goal::Flip(0.03), 2.0), Verdict::Reached);
-        assert_eq!(check(&[1.0]).verdict(Goal::Flip(0.02), 2.0), Verdict::Missed);
-        assert!((check(&[9.0]).excess(Goal::Flip(0.02), 2.0) - 1.5).abs() < 1e-9);
-        assert!((check(&[1.0]).excess(Goal::Ssim(0.97), 2.0) - 1.0).abs() < 1e-9);
+        assert!(check(&[1.9, 2.0, 2.1]).excess(goal) <= 1.0);
+        assert!(check(&[1.9, 2.0, 2.3]).excess(goal) > 1.0);
+        assert_eq!(check(&[9.0]).verdict(Goal::Flip(0.03)), Verdict::Reached);
+        assert_eq!(check(&[1.0]).verdict(Goal::Flip(0.02)), Verdict::Missed);
+        assert!((check(&[9.0]).excess(Goal::Flip(0.02)) - 1.5).abs() < 1e-9);
+        assert!((check(&[1.0]).excess(Goal::Ssim(0.97)) - 1.0).abs() < 1e-9);
     }
 }

@@ -1,12 +1,13 @@
-//! The measured table asked the other way round: which setting for this error, for this time.
+//! Which setting of a measured sweep to recommend for an error or for a time.
 
-use super::errors::{Errors, ROUNDING};
+use super::errors::Errors;
+use super::errors::ROUNDING;
 use super::knobs::Knob;
 use super::row::CandidateRow;
 use super::table::Measured;
 use crate::measure::psnr;
 
-/// An error that is to be reached.
+/// An error that frames must not exceed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Goal {
     /// At least this PSNR, dB.
@@ -32,8 +33,17 @@ impl std::fmt::Display for Goal {
 }
 
 impl Goal {
-    /// Its figure in words: `figure` rises with the error, so it is what SSIM is less than 1. `None` for
-    /// PSNR, which is reported for every setting.
+    /// The largest figure that reaches it. Figures rise with the error: the squared error in squares of a
+    /// display step for PSNR, 1 - SSIM, FLIP, the share of pixels.
+    pub fn largest(self) -> f64 {
+        match self {
+            Self::Psnr(least) => 255.0 * 255.0 * 10f64.powf(-least / 10.0),
+            Self::Ssim(least) => 1.0 - least,
+            Self::Flip(most) | Self::MaxShare(most) => most,
+        }
+    }
+
+    /// A figure as [`Self::largest`] has it in words; `None` for PSNR, which is reported for every setting.
     pub fn in_words(self, figure: f64) -> Option<String> {
         match self {
             Self::Psnr(_) => None,
@@ -43,7 +53,7 @@ impl Goal {
         }
     }
 
-    /// Whether rounding to 8 bits alone is more than it allows.
+    /// Whether rounding to 8 bits alone is a larger error than the goal allows.
     pub fn is_beyond_8_bits(self) -> bool {
         matches!(self, Self::Psnr(least) if least > Self::most_of_8_bits())
     }
@@ -53,7 +63,7 @@ impl Goal {
         psnr(ROUNDING / (255.0 * 255.0))
     }
 
-    /// Whether `errors` reach it.
+    /// Whether `errors` reach the goal.
     pub fn is_met(self, errors: &Errors) -> bool {
         match self {
             Self::Psnr(least) => errors.psnr >= least,
@@ -64,9 +74,9 @@ impl Goal {
     }
 }
 
-/// The setting to recommend for `goal` among those that reached it and may be recommended: the fastest.
-/// Where the default does, only what is surely faster takes its place, beyond the spread of the turns: not
-/// what chance made so, and nothing where too few turns tell.
+/// The setting to recommend for `goal`: the fastest that reached it, among those that may be recommended.
+/// Where the default reached it, another setting is recommended only if it is surely faster, beyond the
+/// spread of the turns; none is where there were too few turns.
 pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&CandidateRow> {
     let default_reaches = goal.is_met(&measured.default_row().errors);
     let is_surely_faster = |row: &CandidateRow| {
@@ -78,9 +88,9 @@ pub fn fastest_reaching(measured: &Measured, goal: Goal) -> Option<&CandidateRow
     reach.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
 }
 
-/// A setting that may be faster than `found`, the one to recommend for `goal`, but was timed in too few
-/// turns to tell: by the estimates the fastest of them.
-pub fn untold<'m>(
+/// Of the settings that may be faster than `found`, the one recommended for `goal`, but were timed in too
+/// few turns to be sure, the one with the shortest time estimated.
+pub fn perhaps_faster<'m>(
     measured: &'m Measured,
     goal: Goal,
     found: &CandidateRow,
@@ -90,7 +100,7 @@ pub fn untold<'m>(
     faster.min_by(|a, b| seconds(a).total_cmp(&seconds(b)))
 }
 
-/// Whether `row` was timed in too few turns for any difference from the default's time to be sure.
+/// Whether `row` was timed in too few turns to be sure of any difference from the default's time.
 fn is_by_few_turns(row: &CandidateRow) -> bool {
     row.knob != Knob::Default && row.time_ratio.is_none_or(|ratio| !ratio.is_sure())
 }
@@ -149,7 +159,7 @@ mod tests {
         let goal = Goal::Psnr(20.0);
         let told = |m: &Measured, goal| {
             let row = fastest_reaching(m, goal).expect("some reach");
-            (row.options.clone(), untold(m, goal, row).map(|row| row.options.clone()))
+            (row.options.clone(), perhaps_faster(m, goal, row).map(|row| row.options.clone()))
         };
         assert_eq!(told(&measured, goal), ("--cutoff 0.01".into(), None));
         // All faster in each of three turns, which still may be chance.

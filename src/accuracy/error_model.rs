@@ -1,76 +1,69 @@
-//! What adds up to a frame's squared error, and by which powers of the samples it falls.
+//! How a traced frame's squared error falls with its samples.
 //!
-//! Squared errors of independent causes add. So a traced frame's is foretold, in squares of a display
-//! step, by
+//! Squared errors of independent sources add. With n camera samples, s shadow and k sky samples of each, a
+//! frame's squared error is taken to be, in squares of a display step,
 //!
 //! ```text
-//! camera · n^-a  +  n^-p · (shadow · s^-q + sky · k^-q)  +  bias · s^-2
+//! camera · n^-1.3  +  n^-1.1 · (shadow · s^-1.4 + sky · k^-1.4)  +  bias · s^-2
 //! ```
 //!
-//! with n camera samples, s shadow and k sky samples each; the bias is that of a ratio of two averages.
-//! So it is for powers of two. Samples are points of a Sobol sequence, whose merit is in whole blocks of so
-//! many (Owen, 1997): another number is blocks, each with an error of its own.
+//! The amplitudes are fitted to measurements; the last is that of the bias of a ratio of two averages. The
+//! powers are typical of points of a Sobol sequence: another scene's differ somewhat, so a setting is traced
+//! before it is chosen. They hold for powers of two, since Sobol points are even in whole blocks of so many
+//! (Owen, 1997): other numbers of samples are several blocks, each with an error of its own.
 
 use super::fit::fit;
 use serde::{Deserialize, Serialize};
 
-/// Samples a pixel.
+/// Powers of the camera samples: of the error at edges, and of that of light.
+const CAMERA: (f64, f64) = (1.3, 1.1);
+/// Power of the shadow or sky samples.
+const LIGHT: f64 = 1.4;
+
+/// Samples of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleCounts {
     /// Camera samples.
     pub spp: u32,
-    /// Shadow samples of each, per light.
+    /// Shadow samples of each camera sample, per light.
     pub shadow: u32,
-    /// Sky samples of each.
+    /// Sky samples of each camera sample.
     pub sky: u32,
 }
 
-/// The powers that all frames of a move share.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Powers {
-    camera: f64,
-    /// Of the light's part, with the camera samples.
-    light: f64,
-    /// Of the light's part, with the samples of each.
-    samples: f64,
-}
-
-/// A frame's amplitudes, of camera, shadow, sky and bias: squared error at one sample of everything,
-/// display steps.
+/// Amplitudes of camera, shadow, sky and bias: squared errors with one sample of everything, in squares of
+/// a display step.
 type Amplitudes = [f64; 4];
 
-/// Which causes there are at all.
+/// Which sources of noise a scene has beside its edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Causes {
+pub struct NoiseSources {
     /// Area lights.
     pub shadow: bool,
-    /// A sky that lights.
+    /// Light of the sky.
     pub sky: bool,
 }
 
-/// The model of a move's traced frames.
+/// The error model of some traced frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorModel {
-    causes: Causes,
-    powers: Powers,
+    sources: NoiseSources,
     frames: Vec<Amplitudes>,
-    /// Root mean square of what the model misses the measurements by, as a share of them.
-    pub misfit: f64,
 }
 
-/// What some samples came to.
+/// Errors that were measured with some number of samples.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ErrorSample {
+pub struct SampleErrors {
     /// The samples.
     pub samples: SampleCounts,
-    /// Samples of the reference that they were compared with.
+    /// Samples of the reference that the frames were compared with.
     pub reference: SampleCounts,
-    /// For each frame the mean squared difference from it.
+    /// The mean squared difference of each frame from the reference, in squares of a display step.
     pub errors: Vec<f64>,
 }
 
-/// What is left of a squared error with `count` samples, where it falls by `power` from one power of two
-/// to the next. The mean over 6 samples is that of a block of 4 and of one of 2.
+/// The share of a squared error that is left with `count` samples, where it falls by `power` from one power
+/// of two to the next. The mean over 6 samples is that of a block of 4 and a block of 2.
 fn falls(count: u32, power: f64) -> f64 {
     let count = count.max(1);
     let blocks = (0..u32::BITS).map(|bit| count & (1 << bit)).filter(|block| *block > 0);
@@ -79,95 +72,47 @@ fn falls(count: u32, power: f64) -> f64 {
     sum / (f64::from(count) * f64::from(count))
 }
 
-impl Powers {
-    fn regressors(&self, causes: Causes, s: SampleCounts) -> Amplitudes {
-        let light = falls(s.spp, self.light);
-        let each = |is_there: bool, count: u32| match is_there {
-            true => light * falls(count, self.samples),
-            false => 0.0,
-        };
-        let bias = f64::from(u8::from(causes.shadow)) / f64::from(s.shadow.max(1)).powi(2);
-        [falls(s.spp, self.camera), each(causes.shadow, s.shadow), each(causes.sky, s.sky), bias]
-    }
+/// What each amplitude is multiplied with.
+fn regressors(sources: NoiseSources, s: SampleCounts) -> Amplitudes {
+    let light = |is_there: bool, count: u32| match is_there {
+        true => falls(s.spp, CAMERA.1) * falls(count, LIGHT),
+        false => 0.0,
+    };
+    let bias = f64::from(u8::from(sources.shadow)) / f64::from(s.shadow.max(1)).powi(2);
+    [falls(s.spp, CAMERA.0), light(sources.shadow, s.shadow), light(sources.sky, s.sky), bias]
 }
 
 impl ErrorModel {
-    /// The model that comes nearest to `points`, as shares of them. `references` are the samples of what
-    /// each was held against, whose own error is part of the difference.
-    pub fn of(causes: Causes, points: &[&ErrorSample]) -> Self {
-        let frames = points.first().map_or(0, |point| point.errors.len());
-        let mut best = Self {
-            causes,
-            powers: Powers { camera: 1.0, light: 1.0, samples: 1.0 },
-            frames: vec![[0.0; 4]; frames],
-            misfit: f64::INFINITY,
-        };
-        let lit = causes.shadow || causes.sky;
-        for camera in grid(0.9, 1.7) {
-            // Without soft light its powers mean nothing.
-            for light in grid(1.0, if lit { 1.6 } else { 1.0 }) {
-                for samples in grid(0.8, if lit { 1.8 } else { 0.8 }) {
-                    let powers = Powers { camera, light, samples };
-                    let model = Self::with(causes, powers, points);
-                    if model.misfit < best.misfit {
-                        best = model;
-                    }
-                }
-            }
-        }
-        best
-    }
-
-    fn with(causes: Causes, powers: Powers, points: &[&ErrorSample]) -> Self {
-        let rows = points.iter().map(|point| {
-            let mut row = powers.regressors(causes, point.samples);
-            let [camera, shadow, sky, _] = powers.regressors(causes, point.reference);
-            // Both are biased the same way.
+    /// The model nearest to `points`, by the differences as shares of what was measured.
+    pub fn of(sources: NoiseSources, points: &[SampleErrors]) -> Self {
+        let row = |point: &SampleErrors| {
+            let mut row = regressors(sources, point.samples);
+            let [camera, shadow, sky, _] = regressors(sources, point.reference);
+            // The reference has an error of its own, and the same bias.
             row.iter_mut().zip([camera, shadow, sky]).for_each(|(x, own)| *x += own);
             row
-        });
-        let rows: Vec<Amplitudes> = rows.collect();
-        let count = points.first().map_or(0, |point| point.errors.len());
-        let (mut frames, mut squares) = (Vec::new(), 0.0);
-        for frame in 0..count {
+        };
+        let rows: Vec<Amplitudes> = points.iter().map(row).collect();
+        let frame = |frame: usize| {
             let measured: Vec<f64> = points.iter().map(|point| point.errors[frame]).collect();
-            let (amplitudes, misfit) = fit(&rows, &measured);
-            frames.push(amplitudes);
-            squares += misfit * misfit;
-        }
-        let misfit = (squares / count.max(1) as f64).sqrt();
-        Self { causes, powers, frames, misfit }
+            fit(&rows, &measured)
+        };
+        let count = points.first().map_or(0, |point| point.errors.len());
+        Self { sources, frames: (0..count).map(frame).collect() }
     }
 
-    /// The squared error of each frame looked at.
+    /// The squared error of each frame with `samples`, in squares of a display step.
     pub fn errors(&self, samples: SampleCounts) -> impl Iterator<Item = f64> + '_ {
-        let row = self.powers.regressors(self.causes, samples);
+        let row = regressors(self.sources, samples);
         self.frames.iter().map(move |frame| frame.iter().zip(row).map(|(a, x)| a * x).sum())
     }
 
-    /// The model under which `point` comes to what it did, frame by frame.
-    pub fn through(&self, point: &ErrorSample) -> Self {
-        let own: Vec<f64> = self.errors(point.reference).collect();
-        let mut model = self.clone();
-        let told = self.errors(point.samples).zip(own).zip(&point.errors);
-        for (frame, ((foretold, own), measured)) in model.frames.iter_mut().zip(told) {
-            let factor = measured / f64::max(foretold + own, 1e-12);
-            frame.iter_mut().for_each(|amplitude| *amplitude *= factor);
-        }
-        model
+    /// Which share of the squared difference between frames of `samples` and of `reference` is the error of
+    /// the former.
+    pub fn own_part(&self, samples: SampleCounts, reference: SampleCounts) -> f64 {
+        let [own, of_reference] = [samples, reference].map(|s| self.errors(s).sum::<f64>());
+        if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
-
-    /// The model of frames whose errors are all `factor` times as large.
-    pub fn times(&self, factor: f64) -> Self {
-        let mut model = self.clone();
-        model.frames.iter_mut().flatten().for_each(|amplitude| *amplitude *= factor);
-        model
-    }
-}
-
-fn grid(from: f64, to: f64) -> impl Iterator<Item = f64> {
-    let steps = ((to - from) / 0.1_f64).round() as u32;
-    (0..=steps).map(move |k| from + 0.1 * f64::from(k))
 }
 
 #[cfg(test)]
@@ -175,38 +120,37 @@ mod tests {
     use super::*;
 
     const REFERENCE: SampleCounts = SampleCounts { spp: 128, shadow: 16, sky: 16 };
-    const LIT: Causes = Causes { shadow: true, sky: true };
+    const LIT: NoiseSources = NoiseSources { shadow: true, sky: true };
 
     fn truth(s: SampleCounts, scale: f64) -> f64 {
         let (n, m, k) = (f64::from(s.spp), f64::from(s.shadow), f64::from(s.sky));
-        let light = n.powf(-1.1) * (7.0 * m.powf(-1.4) + 3.0 * k.powf(-1.4));
-        scale * (20.0 * n.powf(-1.3) + light)
+        let light = n.powf(-1.0) * (7.0 * m.powf(-1.5) + 3.0 * k.powf(-1.3));
+        scale * (20.0 * n.powf(-1.4) + light)
     }
 
-    /// From errors of up to 16 samples, each off by up to 5 %, those of up to 64 are foretold.
+    /// From errors of up to 16 samples, each off by up to 5 %, those of up to 64 are predicted, although the
+    /// powers are others.
     #[test]
-    fn a_short_sweep_foretells_settings_that_were_not_in_it() {
+    fn a_short_sweep_predicts_settings_that_were_not_in_it() {
         let point = |(i, (spp, shadow, sky)): (usize, (u32, u32, u32))| {
             let s = SampleCounts { spp, shadow, sky };
             let off = 1.0 + 0.05 * [1.0, -1.0, 0.3, -0.6][i % 4];
             let error = |scale: f64| (truth(s, scale) + truth(REFERENCE, scale)) * off;
-            ErrorSample { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
+            SampleErrors { samples: s, reference: REFERENCE, errors: vec![error(1.0), error(2.0)] }
         };
         let design =
             [(1, 1, 1), (4, 1, 1), (16, 1, 1), (4, 16, 1), (4, 1, 16), (4, 4, 4), (16, 16, 16)];
-        let points: Vec<ErrorSample> = design.into_iter().enumerate().map(point).collect();
-        let model = ErrorModel::of(LIT, &points.iter().collect::<Vec<_>>());
-        assert!(model.misfit < 0.05, "{model:?}");
+        let points: Vec<SampleErrors> = design.into_iter().enumerate().map(point).collect();
+        let model = ErrorModel::of(LIT, &points);
         for (spp, shadow, sky) in [(2, 2, 8), (8, 32, 4), (32, 4, 4), (64, 64, 64)] {
             let s = SampleCounts { spp, shadow, sky };
             for (error, scale) in model.errors(s).zip([1.0, 2.0]) {
                 let ratio = error / truth(s, scale);
-                assert!((0.75..1.33).contains(&ratio), "{s:?}: {ratio}");
+                assert!((0.6..1.6).contains(&ratio), "{s:?}: {ratio}");
             }
         }
-        let twice: Vec<f64> = model.times(2.0).errors(REFERENCE).collect();
-        let once: Vec<f64> = model.errors(REFERENCE).collect();
-        assert!((twice[0] / once[0] - 2.0).abs() < 1e-12);
+        let part = model.own_part(SampleCounts { spp: 16, ..REFERENCE }, REFERENCE);
+        assert!((0.85..0.98).contains(&part), "{part}");
     }
 
     /// As `reflective_spheres` came out: with 5 samples as with 4, with 12 by 1.5 dB nearer than with 8.
@@ -224,32 +168,18 @@ mod tests {
     }
 
     #[test]
-    fn an_effect_that_is_not_there_has_no_part() {
+    fn a_source_that_is_not_there_has_no_part() {
         let point = |spp: u32| {
             let s = SampleCounts { spp, shadow: 16, sky: 16 };
-            let errors = vec![9.0 / f64::from(spp) + 9.0 / 128.0];
-            ErrorSample { samples: s, reference: REFERENCE, errors }
+            let falls = |spp: u32| f64::from(spp).powf(-1.3);
+            let errors = vec![9.0 * (falls(spp) + falls(128))];
+            SampleErrors { samples: s, reference: REFERENCE, errors }
         };
-        let points = [point(1), point(4), point(16)];
-        let model = ErrorModel::of(Causes { shadow: false, sky: false }, &points.each_ref());
+        let dark = NoiseSources { shadow: false, sky: false };
+        let model = ErrorModel::of(dark, &[point(1), point(4), point(16)]);
         let error =
             |shadow| model.errors(SampleCounts { spp: 8, shadow, sky: 1 }).next().expect("a frame");
-        assert!((error(1) - 9.0 / 8.0).abs() < 0.02, "{model:?}");
+        assert!((error(1) - 9.0 * 8f64.powf(-1.3)).abs() < 0.02, "{model:?}");
         assert_eq!(error(1), error(64));
-    }
-
-    #[test]
-    fn a_law_is_put_through_what_was_measured() {
-        let s = SampleCounts { spp: 8, shadow: 2, sky: 1 };
-        let points = [1, 4, 16].map(|spp| {
-            let s = SampleCounts { spp, ..s };
-            let errors = vec![truth(s, 1.0), truth(s, 2.0)];
-            ErrorSample { samples: s, reference: REFERENCE, errors }
-        });
-        let point = ErrorSample { samples: s, reference: REFERENCE, errors: vec![3.0, 7.0] };
-        let model = ErrorModel::of(LIT, &points.each_ref()).through(&point);
-        let [own, _] = [0, 1].map(|i| model.errors(REFERENCE).nth(i).expect("a frame"));
-        let now: Vec<f64> = model.errors(s).collect();
-        assert!((now[0] + own - 3.0).abs() < 1e-9 && now[1] > 6.0, "{now:?}");
     }
 }

@@ -1,12 +1,12 @@
-//! Which frames are looked at, and how the frames of the move weigh.
+//! Which frames of a move are rendered in a trial, and how key frames and in-between frames weigh.
 
 use crate::scene::{Policy, Settings};
 use crate::sequence::Pyramid;
 use std::collections::BTreeSet;
 
-/// Frames of a move of `count` that stand for all: pairs that follow one another, so that flicker shows,
-/// at its start, its middle and its end. The first and the last are always traced whole. All frames
-/// of a short move.
+/// The frames of a move of `count` frames that a sweep renders: pairs of neighbours, so that flicker
+/// shows, at the start, the middle and the end; all frames of a short move. The first and the last frame
+/// of a move are always traced whole.
 pub fn chosen_frames(count: u32) -> Vec<u32> {
     if count <= 6 {
         return (1..=count).collect();
@@ -15,7 +15,7 @@ pub fn chosen_frames(count: u32) -> Vec<u32> {
     vec![1, 2, middle, middle + 1, count - 1, count]
 }
 
-/// Fewer frames, where only times are wanted and soon: the first, and two neighbours.
+/// The frames that are rendered where only times are wanted: the first, and two neighbours.
 pub(super) fn timed_frames(count: u32) -> Vec<u32> {
     if count <= 4 {
         return (1..=count).collect();
@@ -24,12 +24,13 @@ pub(super) fn timed_frames(count: u32) -> Vec<u32> {
     vec![1, third, third + 1]
 }
 
-/// How a setting cuts the move: into key frames and frames between.
+/// How a setting divides a move into key frames, which are traced whole, and in-between frames.
 #[derive(Debug, Clone, Copy)]
 pub struct Cut(Option<Pyramid>, u32);
 
 impl Cut {
-    /// As `settings` cut a move of `frames` frames. `looks_up` says whether any light is looked up.
+    /// The division of a move of `frames` frames under `settings`. `looks_up` says whether frames look up
+    /// any light in others.
     pub fn of(settings: &Settings, frames: u32, looks_up: bool) -> Self {
         let segment = match settings.reuse.policy {
             Policy::Off => None,
@@ -39,17 +40,17 @@ impl Cut {
         Self(segment.map(|segment| Pyramid { segment, frames }), frames)
     }
 
-    /// Frames of the move that are traced whole.
+    /// Number of key frames of the move.
     pub fn keys(&self) -> u32 {
         self.0.map_or(self.1, |pyramid| pyramid.keys())
     }
 
-    /// Whether `frame` is traced whole.
+    /// Whether `frame` is a key frame.
     pub fn is_key(&self, frame: u32) -> bool {
         self.0.is_none_or(|pyramid| pyramid.is_key(frame))
     }
 
-    /// `frames` with all that they are inferred from.
+    /// `frames` with all frames that they are inferred from.
     pub fn with_ancestors(&self, frames: &[u32]) -> Vec<u32> {
         let ancestors = |f: &u32| self.0.map_or(Vec::new(), |pyramid| pyramid.ancestors(*f));
         let mut all: BTreeSet<u32> = frames.iter().flat_map(ancestors).collect();
@@ -57,8 +58,8 @@ impl Cut {
         all.into_iter().collect()
     }
 
-    /// The mean over the move of what was measured on some frames: the mean of each kind of frame,
-    /// weighed by how many of it the move has. A kind that was not measured is left out.
+    /// The mean over the move of values measured on some frames, by number: the means over key frames and
+    /// over in-between frames, weighed by how many the move has. A kind without a value is left out.
     pub fn mean(&self, measured: impl Iterator<Item = (u32, f64)>) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
         for (frame, value) in measured {

@@ -1,4 +1,4 @@
-//! What can be turned, and what belongs together.
+//! The knobs that a sweep turns, and their groups.
 
 use crate::scene::Settings;
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Group {
-    /// What frames take over from one another.
+    /// Reuse of light between frames.
     Reuse,
     /// Camera, shadow and sky samples.
     Samples,
     /// Bounces and cut-off.
     Specular,
-    /// The rules that make hits trustworthy.
+    /// Rules of intersection.
     Intersection,
     /// How Embree builds its tree.
     Tree,
@@ -26,7 +26,7 @@ pub enum Group {
 }
 
 impl Group {
-    /// All of them.
+    /// All groups.
     pub const ALL: [Self; 8] = [
         Self::Reuse,
         Self::Samples,
@@ -39,19 +39,19 @@ impl Group {
     ];
 }
 
-/// What a candidate turns.
+/// A setting that a candidate changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Knob {
-    /// Nothing: what the others are compared with.
+    /// No knob: the setting that the others are compared with.
     Default,
-    /// What frames take over.
+    /// Reuse policy.
     Policy,
-    /// What error is not seen.
+    /// Tolerance of reuse.
     Tolerance,
     /// Frames from key frame to key frame.
     Segment,
-    /// Share of the pixels that is probed.
+    /// Share of an in-between frame's pixels that are probes.
     Probes,
     /// Camera samples.
     CameraSamples,
@@ -63,28 +63,28 @@ pub enum Knob {
     Bounces,
     /// Cut-off of dim branches.
     CutOff,
-    /// Which hits are computed again in f64.
+    /// Which hits are computed again in f64 (the recheck).
     Recheck,
-    /// Second tries.
+    /// Second tries of rays that miss near a triangle.
     Retry,
     /// Embree's robust mode.
     Robust,
-    /// Where new rays start.
+    /// Offset of new rays from the surface that they leave.
     SpawnOffset,
-    /// The scene about its own centre.
+    /// Recentring of the scene.
     Recentre,
-    /// All rules about single rays at once.
+    /// All rules of intersection about single rays at once.
     AllRules,
     /// Work put into Embree's tree.
     BuildQuality,
     /// A smaller tree.
     Compact,
-    /// Several at once.
+    /// Several knobs at once.
     Combination,
 }
 
 impl Knob {
-    /// Its group; `None` of the default.
+    /// The knob's group; `None` for the default.
     pub fn group(self) -> Option<Group> {
         Some(match self {
             Self::Default => return None,
@@ -102,7 +102,7 @@ impl Knob {
         })
     }
 
-    /// Its name at the head of a sentence.
+    /// The knob's name at the head of a sentence.
     pub fn name(self) -> &'static str {
         match self {
             Self::Default => "Default",
@@ -127,9 +127,9 @@ impl Knob {
         }
     }
 
-    /// Whether it trades error for time, so that its settings may be recommended. Rules of
-    /// intersection guard against rare wrong pixels, which no mean error shows, and another tree changes
-    /// next to none.
+    /// Whether the knob trades error for time, so that its settings may be recommended. Rules of
+    /// intersection guard against rare wrong pixels, which no mean error shows; another tree changes next
+    /// to no pixel.
     pub fn is_ranked(self) -> bool {
         !matches!(self.group(), Some(Group::Intersection | Group::Tree))
     }
@@ -138,9 +138,9 @@ impl Knob {
 /// A setting that is measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// What it turns.
+    /// The knob that it turns.
     pub knob: Knob,
-    /// The options that turn it, as the command line has them; empty for the default.
+    /// Command-line options of the setting; empty for the default.
     pub options: String,
     /// All settings.
     pub settings: Settings,

@@ -4,17 +4,16 @@
 //! gives [`Measured`]: errors against times, from which the program can also be asked for the fastest
 //! setting that reaches an error, or the best one within a time.
 //!
-//! Errors are those of display values: what is seen on a screen, in steps of 1/255. Times are seconds
-//! per frame of the whole move: key frames cost more than the frames between, so each kind is timed
-//! and weighed by how many of it the move has.
+//! Errors are those of display values, as a screen shows them, in display steps of 1/255. Times are
+//! seconds per frame of the whole move: key frames cost more than in-between frames, so each kind is
+//! timed and weighed by how many of it the move has.
 //!
-//! [`SettingsProbe`] takes a quick look instead, from which the error and the time of any setting are foretold
-//! ([`Predictor`]), and the program chooses one; [`CheckOutcome`] says afterwards what came out.
+//! [`SettingsProbe`] traces a few pixels and small frames instead. A [`Predictor`] made from these predicts the
+//! error and the time of any setting, and the program chooses one; [`CheckOutcome`] measures afterwards how good
+//! the frames came out. That choice is the only thing in the program that depends on measured times.
 //!
-//! Only that choice is decided by measured times; the sweep only tells them.
-//!
-//! A [`Ledger`] keeps what was measured on disk, trial by trial, so that a sweep that was stopped or
-//! killed goes on.
+//! A [`Ledger`] keeps the measurements of a sweep on disk, trial by trial, so that a sweep that was
+//! stopped or killed goes on.
 //!
 //! Not done: knobs that the program does not have (adaptive sampling, texture filters).
 
@@ -22,13 +21,13 @@ mod candidates;
 mod change;
 mod check;
 mod choice;
+mod context;
 mod draw;
 mod effort;
 mod error_model;
 mod errors;
 mod figures;
 mod fit;
-mod foretell;
 mod frames;
 mod front;
 mod knobs;
@@ -36,12 +35,12 @@ mod ledger;
 mod modes;
 mod oracle;
 mod patches;
+mod predictor;
 mod probe;
 mod reference;
 mod row;
 mod search;
 mod sentences;
-mod stage;
 mod sweep;
 mod table;
 mod timing;
@@ -51,21 +50,21 @@ mod writing;
 
 pub use candidates::candidates;
 pub use check::{CheckOutcome, CheckedFrame, Verdict};
-pub use choice::{Goal, best_within, fastest_reaching, untold};
+pub use choice::{Goal, best_within, fastest_reaching, perhaps_faster};
+pub use context::TrialContext;
 pub use effort::Effort;
 pub use error_model::SampleCounts;
 pub use errors::{Errors, displayed_rgb};
-pub use foretell::{Prediction, Predictor, Range};
 pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};
 pub use ledger::{Ledger, TrialRecord};
 pub use oracle::{OracleCrop, on_a_crop};
+pub use predictor::{Prediction, Predictor, SampleRange};
 pub use probe::{FixedSettings, SettingsProbe};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
 pub use row::{CandidateRow, Spread};
 pub use sentences::{about_knob, about_oracle, about_writing};
-pub use stage::Stage;
-pub use sweep::{CandidatePicture, Heard, Sweep};
+pub use sweep::{CandidatePicture, Sweep, SweepProgress};
 pub use table::Measured;
 pub use timing::{Timer, Timing};
 pub use writing::{Writing, on_disk};

@@ -1,8 +1,8 @@
 //! Embree against the oracle on a small crop: what trusting Embree is worth.
 
 use super::change::Change;
+use super::context::TrialContext;
 use super::errors::Frames;
-use super::stage::Stage;
 use crate::error::Result;
 use crate::intersect::{Intersector, Oracle};
 use crate::scene::{Policy, Rect, Settings};
@@ -41,26 +41,26 @@ pub struct OracleCrop {
 /// would take the oracle minutes, or where the default is the oracle.
 ///
 /// # Errors
-/// As [`Stage::trace`].
-pub fn on_a_crop(stage: &Stage, frame: u32) -> Result<Option<OracleCrop>> {
-    let triangles = stage.scene.triangle_count();
-    let threads = stage.pool.current_num_threads() as f64;
+/// As [`TrialContext::trace`].
+pub fn on_a_crop(context: &TrialContext, frame: u32) -> Result<Option<OracleCrop>> {
+    let triangles = context.scene.triangle_count();
+    let threads = context.pool.current_num_threads() as f64;
     let pixels = SECONDS * threads / (PER_TRIANGLE * RAYS * triangles.max(1) as f64);
-    let is_oracle = stage.base.intersector == crate::scene::IntersectorKind::Oracle;
+    let is_oracle = context.base.intersector == crate::scene::IntersectorKind::Oracle;
     if pixels.sqrt() < EDGE.0 || is_oracle {
         return Ok(None);
     }
     let edge = pixels.sqrt().min(EDGE.1) as u32;
-    let (width, height) = (stage.base.width.min(edge), stage.base.height.min(edge));
-    let (x0, y0) = ((stage.base.width - width) / 2, (stage.base.height - height) / 2);
+    let (width, height) = (context.base.width.min(edge), context.base.height.min(edge));
+    let (x0, y0) = ((context.base.width - width) / 2, (context.base.height - height) / 2);
     let crop = Rect { x0, y0, x1: x0 + width, y1: y0 + height };
-    let mut settings = stage.base.clone();
+    let mut settings = context.base.clone();
     (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
     settings.crop = Some(crop);
     settings.reuse.policy = Policy::Off;
-    let oracle = Oracle::new(stage.scene);
-    let (embree, rays, embree_seconds) = timed(stage, &settings, stage.intersector, frame)?;
-    let (truth, _, oracle_seconds) = timed(stage, &settings, &oracle, frame)?;
+    let oracle = Oracle::new(context.scene);
+    let (embree, rays, embree_seconds) = timed(context, &settings, context.intersector, frame)?;
+    let (truth, _, oracle_seconds) = timed(context, &settings, &oracle, frame)?;
     let change =
         Change { pixels: u64::from(width) * u64::from(height), ..Change::between(&truth, &embree) };
     let size = [width, height];
@@ -69,12 +69,12 @@ pub fn on_a_crop(stage: &Stage, frame: u32) -> Result<Option<OracleCrop>> {
 
 /// The frame by `intersector`; rays, and wall seconds.
 fn timed(
-    stage: &Stage,
+    context: &TrialContext,
     settings: &Settings,
     intersector: &dyn Intersector,
     frame: u32,
 ) -> Result<(Frames, u64, f64)> {
     let start = Instant::now();
-    let (image, rays) = stage.trace(settings, intersector, frame)?;
+    let (image, rays) = context.trace(settings, intersector, frame)?;
     Ok((Frames::from([(frame, image)]), rays.total(), start.elapsed().as_secs_f64()))
 }

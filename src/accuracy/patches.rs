@@ -1,11 +1,11 @@
-//! Patches of frames at their full size, traced alone: what a whole frame's error is estimated from.
+//! Patches of frames at their full size, from which the errors of whole frames are estimated.
 //!
-//! A small picture will not do in their place: the smaller, the more of it is edges.
+//! A smaller picture of a frame would not do: a larger part of it is edges.
 
+use super::context::TrialContext;
 use super::draw::{DrawSeed, draw};
 use super::effort::Effort;
 use super::errors::displayed_rgb;
-use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
 use crate::math::Rgb;
@@ -14,29 +14,29 @@ use crate::scene::{Policy, Settings};
 use crate::shade::Renderer;
 use rayon::prelude::*;
 
-/// How many times as wide and high the pictures are at most that contrast is measured on, or the frame.
+/// Largest ratio of the edges of a frame and of the picture that its contrast is measured on.
 const SCALE: f64 = 4.0;
 
-/// Square patches of some frames, with what each counts for.
+/// Square patches of some frames, with their weights.
 #[derive(Debug, Clone)]
 pub struct Patches {
     edge: u32,
-    frames: Vec<Drawn>,
+    frames: Vec<FramePatches>,
 }
 
 /// A frame's patches.
 #[derive(Debug, Clone, Default)]
-struct Drawn {
+struct FramePatches {
     frame: u32,
     corners: Vec<(u32, u32)>,
-    /// What a patch counts for in the frame's mean.
+    /// Weight of each patch in the frame's mean.
     weights: Vec<f64>,
-    /// The chance with which it might not have been drawn.
+    /// Probability of each patch not to be drawn.
     unsure: Vec<f64>,
 }
 
-/// For each pixel of a picture how much it and its neighbours differ: the square of the largest
-/// difference of a channel.
+/// Contrast of a picture: for each pixel the square of the largest difference of any channel from any of its
+/// eight neighbours.
 #[derive(Debug, Clone, PartialEq)]
 struct Contrast {
     width: u32,
@@ -44,19 +44,11 @@ struct Contrast {
     each: Vec<f32>,
 }
 
-/// The patches of each frame, as displayed: one image a patch.
-pub type Seen = Vec<Vec<Image>>;
+/// For each frame the images of its patches, as displayed.
+pub type PatchImages = Vec<Vec<Image>>;
 
-/// The settings of a look: one sample of everything, and every frame traced.
-pub(super) fn one_sample(base: &Settings) -> Settings {
-    let mut settings = base.clone();
-    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
-    settings.reuse.policy = Policy::Off;
-    settings
-}
-
-/// The patches in steps of 8 bits.
-pub fn rounded(seen: &Seen) -> Seen {
+/// `seen` rounded to 8 bits.
+pub fn rounded(seen: &PatchImages) -> PatchImages {
     let mut seen = seen.clone();
     for rgb in seen.iter_mut().flatten().flat_map(|image| &mut image.rgb) {
         *rgb = (*rgb * 255.0).round() / 255.0;
@@ -65,28 +57,33 @@ pub fn rounded(seen: &Seen) -> Seen {
 }
 
 impl Patches {
-    /// Patches of `edge` pixels of each of `frames`, one in each cell of a grid, about `pixels` pixels
-    /// of a frame, at places that `lot` draws.
-    pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, lot: u64) -> Self {
+    /// Patches of `edge` x `edge` pixels of each of `frames`, with about `pixels` pixels of a frame in all:
+    /// one at a random place in each cell of a grid.
+    pub fn grid(settings: &Settings, frames: &[u32], edge: u32, pixels: u32, seed: u64) -> Self {
         let edge = edge.min(settings.width).min(settings.height);
         let draw = |frame: &u32| {
-            let corners = places(settings, edge, pixels, mix(lot ^ u64::from(*frame)));
+            let corners = places(settings, edge, pixels, mix(seed ^ u64::from(*frame)));
             let weights = vec![1.0 / corners.len() as f64; corners.len()];
             let unsure = vec![1.0; corners.len()];
-            Drawn { frame: *frame, corners, weights, unsure }
+            FramePatches { frame: *frame, corners, weights, unsure }
         };
         Self { edge, frames: frames.iter().map(draw).collect() }
     }
 
-    /// Single pixels, as many as `effort` says, of each of `frames`. Most of a frame's error lies in a
-    /// few pixels at the edges of what is bright, so pixels are drawn by their contrast in a picture of
-    /// one sample a pixel: a small one of a large frame, and a large one of a small frame, lest specks
-    /// fall between its samples.
+    /// Single pixels of each of `frames`, as many as `effort` says. Most of a frame's error lies in a few
+    /// pixels at edges of bright things, so pixels are drawn by their contrast in a picture of one sample
+    /// a pixel. The picture is smaller than a large frame, and larger than a small one, in which specks
+    /// would fall between the samples.
     ///
     /// # Errors
-    /// As [`Stage::trace`].
-    pub fn by_contrast(stage: &Stage, frames: &[u32], effort: Effort, lot: u64) -> Result<Self> {
-        let mut settings = one_sample(stage.base);
+    /// As [`TrialContext::trace`].
+    pub fn by_contrast(
+        context: &TrialContext,
+        frames: &[u32],
+        effort: Effort,
+        seed: u64,
+    ) -> Result<Self> {
+        let mut settings = one_sample(context.base);
         let scale = effort.picture / (f64::from(settings.width) * f64::from(settings.height));
         let (shrink, enlarge) = match scale < 1.0 {
             true => ((1.0 / scale).sqrt().floor().min(SCALE) as u32, 1),
@@ -95,13 +92,13 @@ impl Patches {
         let edge = |length: u32| (length / shrink).max(1) * enlarge;
         (settings.width, settings.height) = (edge(settings.width), edge(settings.height));
         let picture = |frame| {
-            let image = stage.trace(&settings, stage.intersector, frame)?.0;
+            let image = context.trace(&settings, context.intersector, frame)?.0;
             Ok(Contrast::of(&image).reduced(enlarge))
         };
-        Self::drawn(stage.base, frames, &picture, effort.pixels, lot)
+        Self::drawn(context.base, frames, &picture, effort.pixels, seed)
     }
 
-    /// The same by the contrast of the frames themselves, which `image` gives.
+    /// `count` single pixels of each of `frames`, drawn by the contrast of the frame that `image` gives.
     ///
     /// # Errors
     /// Any that `image` gives.
@@ -110,10 +107,10 @@ impl Patches {
         frames: &[u32],
         image: &dyn Fn(u32) -> Result<Image>,
         count: u32,
-        lot: u64,
+        seed: u64,
     ) -> Result<Self> {
         let contrast = |frame| Ok(Contrast::of(&image(frame)?));
-        Self::drawn(settings, frames, &contrast, count, lot)
+        Self::drawn(settings, frames, &contrast, count, seed)
     }
 
     fn drawn(
@@ -121,17 +118,17 @@ impl Patches {
         frames: &[u32],
         contrast: &dyn Fn(u32) -> Result<Contrast>,
         count: u32,
-        lot: u64,
+        seed: u64,
     ) -> Result<Self> {
         let (width, height) = (settings.width, settings.height);
         let draw = |frame: &u32| {
             let contrast = contrast(*frame)?;
-            let lot = DrawSeed { seed: lot, frame: *frame, number: 0 };
+            let seed = DrawSeed { seed, frame: *frame, number: 0 };
             let among = 0..contrast.each.len() as u32;
-            let mut drawn = Drawn { frame: *frame, ..Drawn::default() };
-            for d in draw(&contrast.each, among, f64::from(count), lot) {
+            let mut drawn = FramePatches { frame: *frame, ..FramePatches::default() };
+            for d in draw(&contrast.each, among, f64::from(count), seed) {
                 // One pixel of those that a pixel of the small picture stands for.
-                let random = mix(mix(lot.seed ^ u64::from(*frame)) ^ u64::from(d.index));
+                let random = mix(mix(seed.seed ^ u64::from(*frame)) ^ u64::from(d.index));
                 let within = |k: u32, of: u32, length: u32, random: u64| {
                     let at = |k: u32| (u64::from(length) * u64::from(k) / u64::from(of)) as u32;
                     let (from, to) = (at(k), at(k + 1).max(at(k) + 1));
@@ -150,10 +147,10 @@ impl Patches {
         Ok(Self { edge: 1, frames: frames.iter().map(draw).collect::<Result<_>>()? })
     }
 
-    /// The mean over each frame of a figure of its patches, and how far it may be off: its standard
-    /// error. A pixel that was sure to be drawn leaves nothing open (Horvitz and Thompson, 1952).
+    /// For each frame the weighted mean of a figure of its patches, and its standard error. A patch that
+    /// was sure to be drawn adds nothing to that (Horvitz and Thompson, 1952).
     pub fn means(&self, seen: &[Vec<f64>]) -> Vec<(f64, f64)> {
-        let of = |(drawn, figures): (&Drawn, &Vec<f64>)| {
+        let of = |(drawn, figures): (&FramePatches, &Vec<f64>)| {
             let parts: Vec<f64> = drawn.weights.iter().zip(figures).map(|(w, x)| w * x).collect();
             let sum: f64 = parts.iter().sum();
             let open = || parts.iter().zip(&drawn.unsure);
@@ -168,37 +165,31 @@ impl Patches {
     /// Traces the patches under `settings`.
     ///
     /// # Errors
-    /// [`Error::Stopped`]; those of cameras.
-    pub fn trace(&self, stage: &Stage, settings: &Settings) -> Result<Seen> {
-        let renderer = Renderer::new(stage.scene, settings, stage.intersector);
-        let one = |Drawn { frame, corners, .. }: &Drawn| {
-            let camera = stage.shot.camera(*frame, settings.width, settings.height)?;
+    /// [`Error::Stopped`]; errors of the camera's move.
+    pub fn trace(&self, context: &TrialContext, settings: &Settings) -> Result<PatchImages> {
+        let renderer = Renderer::new(context.scene, settings, context.intersector);
+        let one = |FramePatches { frame, corners, .. }: &FramePatches| {
+            let camera = context.shot.camera(*frame, settings.width, settings.height)?;
             let places: Vec<(u32, u32)> = corners.iter().flat_map(|c| self.pixels(*c)).collect();
-            let trace = || renderer.render_scattered(&camera, *frame, &places, stage.stop);
-            let (rgb, _) = stage.pool.install(trace).ok_or(Error::Stopped)?;
+            let trace = || renderer.render_scattered(&camera, *frame, &places, context.stop);
+            let (rgb, _) = context.pool.install(trace).ok_or(Error::Stopped)?;
             Ok(self.cut(&displayed_rgb(&rgb, settings)))
         };
         self.frames.iter().map(one).collect()
     }
 
-    /// The patches of whole images of the frames, which `image` gives as displayed.
+    /// The patches, cut from the whole frames that `image` gives as displayed.
     ///
     /// # Errors
     /// Any that `image` gives.
-    pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<Seen> {
-        let one = |Drawn { frame, corners, .. }: &Drawn| {
+    pub fn of_images(&self, image: &dyn Fn(u32) -> Result<Image>) -> Result<PatchImages> {
+        let one = |FramePatches { frame, corners, .. }: &FramePatches| {
             let image = image(*frame)?;
             let at = |(x, y): (u32, u32)| image.rgb[(y * image.width + x) as usize];
             let rgb: Vec<Rgb> = corners.iter().flat_map(|c| self.pixels(*c)).map(at).collect();
             Ok(self.cut(&rgb))
         };
         self.frames.iter().map(one).collect()
-    }
-
-    /// Pixels of all patches.
-    pub fn pixels_in_all(&self) -> usize {
-        let patches: usize = self.frames.iter().map(|drawn| drawn.corners.len()).sum();
-        patches * (self.edge * self.edge) as usize
     }
 
     fn pixels(&self, (x, y): (u32, u32)) -> impl Iterator<Item = (u32, u32)> + use<> {
@@ -229,7 +220,7 @@ impl Contrast {
         Self { width: image.width, height: image.height, each }
     }
 
-    /// The means of squares of `edge` pixels, which divides width and height.
+    /// The means over squares of `edge` x `edge` pixels; `edge` divides width and height.
     fn reduced(&self, edge: u32) -> Self {
         if edge == 1 {
             return self.clone();
@@ -247,7 +238,7 @@ impl Contrast {
     }
 }
 
-fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u32)> {
+fn places(settings: &Settings, edge: u32, pixels: u32, seed: u64) -> Vec<(u32, u32)> {
     let (width, height) = (settings.width, settings.height);
     let wanted = f64::from(pixels) / f64::from(edge * edge);
     let columns = (wanted * f64::from(width) / f64::from(height)).sqrt().round() as u32;
@@ -258,11 +249,19 @@ fn places(settings: &Settings, edge: u32, pixels: u32, lot: u64) -> Vec<(u32, u3
         from + (random % u64::from(to - from - edge + 1)) as u32
     };
     let cells = (0..rows * columns).map(|cell| {
-        let random = mix(lot ^ u64::from(cell));
+        let random = mix(seed ^ u64::from(cell));
         let x = place(cell % columns, columns, width, random);
         (x, place(cell / columns, rows, height, random >> 32))
     });
     cells.collect()
+}
+
+/// `base` with one sample of everything, and every frame traced.
+pub(super) fn one_sample(base: &Settings) -> Settings {
+    let mut settings = base.clone();
+    (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+    settings.reuse.policy = Policy::Off;
+    settings
 }
 
 #[cfg(test)]
@@ -294,7 +293,7 @@ mod tests {
         {
             let settings = Settings { width, height, ..Settings::default() };
             let patches = Patches::grid(&settings, &[1, 9], edge, pixels, 3);
-            let Drawn { corners, weights, .. } = &patches.frames[0];
+            let FramePatches { corners, weights, .. } = &patches.frames[0];
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
             let all = || corners.iter().flat_map(|c| patches.pixels(*c));
             assert!(all().all(|(x, y)| x < width && y < height), "{width}x{height}");

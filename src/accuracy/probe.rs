@@ -1,16 +1,15 @@
-//! A quick look at a scene: what there has to be known to choose its settings.
+//! A probe: the few measurements of a scene that its settings are chosen by.
 //!
-//! Errors are estimated from some pixels of some frames at the full size, traced at a short sweep of samples
-//! and held against more of them; what the sweep leads to is traced there as well before it is chosen.
-//! Times come from whole frames of a small size.
+//! Errors are estimated from some pixels of some frames at the full size, traced with a short sweep of
+//! samples and compared with a reference of more samples. Times come from whole frames of a small size.
 
 use super::choice::Goal;
+use super::context::TrialContext;
 use super::effort::Effort;
-use super::error_model::{Causes, SampleCounts};
-use super::foretell::Range;
+use super::error_model::{NoiseSources, SampleCounts};
 use super::patches::{Patches, one_sample};
+use super::predictor::SampleRange;
 use super::reference::truth_settings;
-use super::stage::Stage;
 use crate::effects::EffectPlan;
 use crate::error::Result;
 use crate::film::Image;
@@ -19,16 +18,17 @@ use crate::scene::{FrameRange, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Frames, edge and pixels of patches in which neighbours count (SSIM, FLIP).
+/// Number of frames, edge of a patch and pixels of a frame for figures that need neighbouring pixels (SSIM,
+/// FLIP).
 const WIDE: (u32, u32, u32) = (4, 48, 9_300);
-/// Pixels of the picture that tells how fast tracing is.
+/// Pixels of the picture that is traced to measure how fast tracing is.
 const PILOT: f64 = 12_000.0;
-/// Draws the patches: of the probe, and of the check.
+/// Seed of the places of the probe's patches.
 pub const DRAW_OF_PROBE: u64 = 1;
-/// See [`DRAW_OF_PROBE`].
+/// Seed of the places of the check's patches.
 pub const DRAW_OF_CHECK: u64 = 2;
 
-/// What the user set already, which is not chosen.
+/// Which settings the user gave: these are not chosen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FixedSettings {
     /// Camera samples.
@@ -43,42 +43,44 @@ pub struct FixedSettings {
     pub policy: bool,
 }
 
-/// The scene and what is wanted of it.
+/// A scene and what is wanted of it.
 pub struct SettingsProbe<'a> {
-    /// What all trials share.
-    pub stage: &'a Stage<'a>,
+    /// The scene and everything needed to render it.
+    pub context: &'a TrialContext<'a>,
     /// The frames of the job.
     pub frames: FrameRange,
-    /// What is to be reached; `None` where a time is to be kept.
+    /// The error to be reached; `None` for a budget of time.
     pub goal: Option<Goal>,
-    /// What is not chosen.
+    /// The settings that are not chosen.
     pub given: FixedSettings,
     /// Whether frames are rounded to 8 bits.
     pub rounds: bool,
-    /// Seconds that the look may take; `None` where it may take as long as need be.
+    /// Seconds that the probe may take; `None` where that goes by the size of the job.
     pub seconds: Option<f64>,
     /// How many ranks share the job.
     pub ranks: u32,
 }
 
 impl SettingsProbe<'_> {
-    /// As much as there is time for.
+    /// How much to look at: for a budget by the time that there is, for a target by the size of the job.
     pub(super) fn effort(&self) -> Result<Effort> {
-        let Some(seconds) = self.seconds else { return Ok(Effort::WHOLE) };
-        let mut settings = one_sample(self.stage.base);
+        let FrameRange { first, last } = self.frames;
+        let Settings { width, height, .. } = *self.context.base;
+        let Some(seconds) = self.seconds else {
+            return Ok(Effort::of_job(last - first + 1, u64::from(width) * u64::from(height)));
+        };
+        let mut settings = one_sample(self.context.base);
         (settings.width, settings.height) = self.small_size(PILOT);
-        let middle = u32::midpoint(self.frames.first, self.frames.last);
         let begun = Instant::now();
-        self.stage.trace(&settings, self.stage.intersector, middle)?;
+        self.context.trace(&settings, self.context.intersector, u32::midpoint(first, last))?;
         let samples = f64::from(settings.width) * f64::from(settings.height);
         let spent = begun.elapsed().as_secs_f64();
-        let FrameRange { first, last } = self.frames;
         Ok(Effort::within(seconds - spent, spent / samples).of_frames(last - first + 1))
     }
 
-    /// What may be chosen.
-    pub fn range(&self) -> Range {
-        let (base, plan) = (self.stage.base, self.plan());
+    /// The numbers of samples to choose from.
+    pub fn range(&self) -> SampleRange {
+        let (base, plan) = (self.context.base, self.plan());
         // Sobol points are laid out best in powers of two; half way between them is tried where a
         // step is expensive.
         let numbers = [1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192, 256, 512, 1024];
@@ -87,7 +89,7 @@ impl SettingsProbe<'_> {
             false => vec![given],
         };
         let spp = among(!self.given.spp, 1024, base.spp);
-        Range {
+        SampleRange {
             // A time is to be used, not kept by half of it.
             spp: if self.goal.is_none() && spp.len() > 1 { between(&spp) } else { spp },
             shadow: among(plan.area_lights && !self.given.shadow, 64, base.shadow_samples),
@@ -95,7 +97,7 @@ impl SettingsProbe<'_> {
         }
     }
 
-    /// Patches of the job's frames in which the goal's figure can be taken.
+    /// Patches of the job's frames from which the goal's figure can be estimated.
     ///
     /// # Errors
     /// As [`Patches::by_contrast`].
@@ -104,16 +106,17 @@ impl SettingsProbe<'_> {
             true => {
                 let (frames, edge, pixels) = WIDE;
                 let frames = spread(self.frames, frames, 0.5);
-                Ok(Patches::grid(self.stage.base, &frames, edge, pixels, DRAW_OF_PROBE))
+                Ok(Patches::grid(self.context.base, &frames, edge, pixels, DRAW_OF_PROBE))
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.5);
-                Patches::by_contrast(self.stage, &frames, effort, DRAW_OF_PROBE)
+                Patches::by_contrast(self.context, &frames, effort, DRAW_OF_PROBE)
             }
         }
     }
 
-    /// Patches of finished frames that a check looks at, whose pictures `image` gives; and which frames.
+    /// The numbers of the finished frames that a check looks at, and patches of these; `image` gives a frame as
+    /// displayed.
     ///
     /// # Errors
     /// Any that `image` gives.
@@ -122,7 +125,7 @@ impl SettingsProbe<'_> {
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<(Vec<u32>, Patches)> {
-        let base = self.stage.base;
+        let base = self.context.base;
         Ok(match self.is_wide() {
             true => {
                 let (frames, edge, pixels) = WIDE;
@@ -132,7 +135,7 @@ impl SettingsProbe<'_> {
             }
             false => {
                 let frames = spread(self.frames, effort.frames, 0.1);
-                let count = effort.checked_pixels();
+                let count = checked_pixels(effort);
                 let patches = Patches::by_contrast_of(base, &frames, image, count, DRAW_OF_CHECK)?;
                 (frames, patches)
             }
@@ -144,23 +147,23 @@ impl SettingsProbe<'_> {
     }
 
     pub(super) fn plan(&self) -> EffectPlan {
-        EffectPlan::of(self.stage.scene, self.stage.base)
+        EffectPlan::of(self.context.scene, self.context.base)
     }
 
-    pub(super) fn causes(&self) -> Causes {
+    pub(super) fn sources(&self) -> NoiseSources {
         let plan = self.plan();
-        Causes { shadow: plan.area_lights, sky: plan.sky_light }
+        NoiseSources { shadow: plan.area_lights, sky: plan.sky_light }
     }
 
     pub(super) fn small_size(&self, pixels: f64) -> (u32, u32) {
-        let Settings { width, height, .. } = *self.stage.base;
+        let Settings { width, height, .. } = *self.context.base;
         let scale = (pixels / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
         let edge = |length: u32| ((f64::from(length) * scale).round() as u32).max(1);
         (edge(width), edge(height))
     }
 }
 
-/// `numbers` and about three between each and the next, where there are as many.
+/// `numbers` and up to three numbers between each and the next.
 fn between(numbers: &[u32]) -> Vec<u32> {
     let steps = |pair: &[u32]| {
         let (from, to) = (pair[0], pair[1]);
@@ -170,6 +173,12 @@ fn between(numbers: &[u32]) -> Vec<u32> {
     let mut all: Vec<u32> = numbers.windows(2).flat_map(steps).collect();
     all.extend(numbers.last());
     all
+}
+
+/// Pixels that a check of `effort` looks at in each frame: more than a probe, which traces each several
+/// times.
+pub(super) fn checked_pixels(effort: Effort) -> u32 {
+    effort.pixels + effort.pixels / 2
 }
 
 /// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.
@@ -184,7 +193,7 @@ pub fn spread(frames: FrameRange, count: u32, offset: f64) -> Vec<u32> {
     all
 }
 
-/// Samples enough to hold `samples` against.
+/// Samples of a reference that frames of `samples` are compared with.
 pub fn samples_of_reference(samples: SampleCounts) -> SampleCounts {
     SampleCounts {
         spp: (4 * samples.spp).clamp(32, MAX_SAMPLES),
@@ -193,7 +202,7 @@ pub fn samples_of_reference(samples: SampleCounts) -> SampleCounts {
     }
 }
 
-/// Settings of a reference of so many samples: its seed is none of a job's or of a sweep's.
+/// Settings of a reference with `samples`: its seed is neither the job's nor one of a sweep.
 pub fn reference(base: &Settings, samples: SampleCounts) -> Settings {
     let mut settings = truth_settings(base, &[]);
     (settings.spp, settings.shadow_samples) = (samples.spp, samples.shadow);

@@ -1,31 +1,31 @@
-//! The truth that candidates are held against: traced frames, with twice the samples until they no
+//! The reference that candidates are compared with: traced frames, with twice the samples until they no
 //! longer change.
 
+use super::context::TrialContext;
 use super::errors::{Frames, rms_between};
-use super::stage::Stage;
 use crate::error::Result;
 use crate::scene::limits::MAX_SEED;
 use crate::scene::{Policy, Settings};
 
-/// The converged frames.
+/// The reference's frames.
 pub struct Truth {
-    /// As displayed.
+    /// The frames as displayed.
     pub frames: Frames,
-    /// By how much the last doubling of the samples changed them: root mean square, display steps.
-    /// More than the error that is left.
+    /// Root mean square by which the last doubling of the samples changed the frames, in display steps. The
+    /// error that is left is less.
     pub change: f64,
-    /// What the change was to fall below, display steps.
+    /// The value that `change` was to fall below, in display steps.
     pub wanted: f64,
     /// The settings of the last doubling.
     pub settings: Settings,
 }
 
-/// Camera samples to begin with.
+/// Camera samples of the first, coarsest reference, at least.
 const FIRST: u32 = 32;
 
-/// The settings of the truth but for its camera samples: everything traced. More bounces and a lower
-/// cut-off than any candidate has; as many shadow samples as the candidate with the most, since the
-/// bias of their ratio falls with these alone (`docs/accuracy.md`).
+/// The settings of the first, coarsest reference: every frame traced, with at least as many bounces and as
+/// low a cut-off as any candidate, and as many shadow samples as the candidate with the most, since the bias
+/// of their ratio falls with these alone (`docs/accuracy.md`).
 pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     let most = |of: fn(&Settings) -> u32, least: u32| {
         candidates.iter().map(|s| of(s)).max().unwrap_or(0).max(of(base)).max(least)
@@ -41,81 +41,81 @@ pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     settings
 }
 
-/// The seed of a doubling: half of all seeds away from the candidates', which are the base's and the
-/// next few.
+/// The seed of a doubling: half of all seeds away from those of candidates, which are the base's and the next
+/// few.
 fn seed_of_doubling(base: u64, doubling: u32) -> u64 {
     (base + MAX_SEED / 2 + 1 + u64::from(doubling)) % (MAX_SEED + 1)
 }
 
-/// The seed of a turn of any candidate.
+/// The seed of all candidates in a turn.
 pub fn seed_of_turn(base: u64, turn: u32) -> u64 {
     (base + u64::from(turn)) % (MAX_SEED + 1)
 }
 
-/// The reference so far.
+/// The reference after some doublings of its samples.
 #[derive(Debug, Clone)]
 pub struct Doubling {
-    /// How often the samples were doubled.
+    /// Number of doublings.
     pub number: u32,
     /// Camera samples.
     pub spp: u32,
-    /// By how much the last doubling changed the frames, display steps.
+    /// Root mean square by which the last doubling changed the frames, in display steps; `None` before any.
     pub change: Option<f64>,
-    /// As displayed.
+    /// The frames as displayed.
     pub frames: Frames,
 }
 
-/// What is heard of a reference in the making.
+/// A step in the making of a reference.
 pub enum Step<'a> {
-    /// A frame of so many camera samples is about to be rendered: number `k` of `of`.
+    /// A frame is about to be rendered.
     Frame {
         /// Camera samples.
         spp: u32,
-        /// Which frame, from 0.
+        /// Position of the frame among the reference's, from 0.
         k: usize,
-        /// How many.
+        /// Number of frames of the reference.
         of: usize,
     },
-    /// All frames have twice the samples.
+    /// All frames of a doubling are rendered.
     Doubled(&'a Doubling),
 }
 
-/// How the reference is made: its frames with twice as many camera samples each time, until a doubling
-/// changes them by less than `wanted` display steps, or more than `most` samples would be needed.
+/// How a reference is made: its frames are rendered with twice as many camera samples each time, until a
+/// doubling changes them by less than `wanted`, or the next would take more than `most` samples.
 pub struct Convergence<'a> {
-    /// The scene.
-    pub stage: &'a Stage<'a>,
+    /// The scene and everything needed to render it.
+    pub context: &'a TrialContext<'a>,
     /// Settings of the first, coarsest reference ([`truth_settings`]).
     pub settings: Settings,
-    /// Which frames.
+    /// Numbers of the frames.
     pub frames: &'a [u32],
-    /// Display steps.
+    /// Largest root mean square change, in display steps.
     pub wanted: f64,
-    /// Camera samples.
+    /// Most camera samples.
     pub most: u32,
 }
 
 impl Convergence<'_> {
-    /// Goes on from `last`, if there is one. Each time all samples are new: a doubling that only added
-    /// to the ones before would seem to change less. Their mean is no better: many samples that were
-    /// laid out together are worth more than as many that were not.
+    /// Makes the reference, from the doubling `last` on if there is one; `report` is called before each frame
+    /// and after each doubling. Each doubling has new samples: one that kept the old ones would seem to change
+    /// less. Nor are doublings averaged: samples of one sequence are worth more than as many of several.
     ///
     /// # Errors
-    /// As [`Stage::trace`], and any that `hear` gives.
+    /// As [`TrialContext::trace`], and any that `report` gives.
     pub fn run(
         &self,
         mut last: Option<Doubling>,
-        hear: &mut dyn FnMut(Step) -> Result<()>,
+        report: &mut dyn FnMut(Step) -> Result<()>,
     ) -> Result<Truth> {
         loop {
             match last {
                 Some(last) if self.is_done(&last) => return Ok(self.truth(last)),
-                _ => last = Some(self.double(last, hear)?),
+                _ => last = Some(self.double(last, report)?),
             }
         }
     }
 
-    /// Whether no doubling comes after this one.
+    /// Whether `last` is the last doubling.
     pub fn is_done(&self, last: &Doubling) -> bool {
         let is_near = last.change.is_some_and(|change| change <= self.wanted);
         is_near || last.spp.saturating_mul(2) > self.most
@@ -123,27 +123,27 @@ impl Convergence<'_> {
 
     fn settings_of(&self, number: u32) -> Settings {
         let spp = self.settings.spp << number;
-        let seed = seed_of_doubling(self.stage.base.seed, number);
+        let seed = seed_of_doubling(self.context.base.seed, number);
         Settings { spp, seed, ..self.settings.clone() }
     }
 
     fn double(
         &self,
         last: Option<Doubling>,
-        hear: &mut dyn FnMut(Step) -> Result<()>,
+        report: &mut dyn FnMut(Step) -> Result<()>,
     ) -> Result<Doubling> {
         let number = last.as_ref().map_or(0, |last| last.number + 1);
         let settings = self.settings_of(number);
         let (spp, of) = (settings.spp, self.frames.len());
         let mut frames = Frames::new();
         for (k, frame) in self.frames.iter().enumerate() {
-            hear(Step::Frame { spp, k, of })?;
-            let (image, _) = self.stage.trace(&settings, self.stage.intersector, *frame)?;
+            report(Step::Frame { spp, k, of })?;
+            let (image, _) = self.context.trace(&settings, self.context.intersector, *frame)?;
             frames.insert(*frame, image);
         }
         let change = last.map(|last| rms_between(&frames, &last.frames));
         let doubling = Doubling { number, spp, change, frames };
-        hear(Step::Doubled(&doubling))?;
+        report(Step::Doubled(&doubling))?;
         Ok(doubling)
     }
 

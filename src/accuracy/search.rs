@@ -1,271 +1,311 @@
-//! The probe's errors: a sweep, a model of it, and what the model leads to, tried.
+//! The probe's errors: a short sweep, a model of it, and settings that the model leads to, traced before one
+//! is chosen.
 
 use super::choice::Goal;
 use super::effort::Effort;
-use super::error_model::{ErrorModel, ErrorSample, SampleCounts};
+use super::error_model::{ErrorModel, SampleCounts, SampleErrors};
 use super::errors::ROUNDING;
-use super::figures::{doubts, figure, squares};
-use super::foretell::{Figure, MeasuredSamples, Pace, PowerLaw, Predictor};
-use super::patches::{Patches, Seen, rounded};
+use super::figures::{figure, squared_errors};
+use super::patches::{PatchImages, Patches, rounded};
+use super::predictor::{Prediction, Predictor, ReuseMode};
 use super::probe::{SettingsProbe, reference, samples_of_reference};
-use super::timing::likely as likely_of;
+use super::worst::worst;
 use crate::error::Result;
-use std::time::Instant;
+use crate::scene::Settings;
 
-/// Share of what the goal allows that bounces and cut-off may take.
+/// Share of the squared error in reach that bounces and cut-off may leave out.
 const BIAS: f64 = 0.1;
-/// What samples may come to, of the least error that the sweep did, where no goal says.
-const BEYOND: f64 = 0.25;
-/// Numbers of bounces that are thought of.
+/// The squared error in reach as a share of the least in the sweep, where no PSNR is asked for.
+const IN_REACH: f64 = 0.25;
+/// Numbers of bounces to choose from.
 const BOUNCES: [u32; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
-/// How often the likely choices are tried.
-const ROUNDS: u32 = 4;
-/// The same where the goal's figure only goes somehow with the squared error.
-const ROUNDS_BY_FIGURE: u32 = 10;
+/// How many settings of each reuse policy are tried at most.
+const TRIALS: u32 = 8;
+/// The squared error aimed at changes by this factor at most from one trial to the next.
+const STEP: f64 = 4.0;
+/// Between squared errors less than this factor apart nothing is tried.
+const CLOSE: f64 = 1.2;
 
-/// What samples that were traced came to.
-struct Found {
-    point: ErrorSample,
-    /// How far each frame's error may be off, a share.
-    doubts: Vec<f64>,
-    /// The goal's figure, unless that is the squared error.
-    figure: Option<Figure>,
+/// What a setting was measured to come to.
+#[derive(Debug, Clone, Copy)]
+struct Measured {
+    samples: SampleCounts,
+    /// Of the worst frame, in squares of a display step.
+    squared_error: f64,
+    /// The goal's.
+    figure: f64,
 }
 
-/// What is known so far.
+/// A probe that goes on.
 pub(super) struct Search<'a> {
     probe: &'a SettingsProbe<'a>,
     patches: Patches,
-    truth: Seen,
+    truth: PatchImages,
+    /// Samples of `truth`.
     reference: SampleCounts,
-    found: Vec<Found>,
-    /// What it comes to.
-    pub foretelling: Predictor,
+    measured: Vec<Measured>,
+    /// What was found so far.
+    pub predictor: Predictor,
 }
 
 impl SettingsProbe<'_> {
-    /// Looks at the scene. `heard` hears what is being done.
+    /// Measures the scene. Where there is a goal, it also gives, for each reuse policy, the fastest setting
+    /// found whose figure was measured to be at most `aim` times the largest that the goal allows, or the
+    /// largest itself where there is no such setting. `progress` is called with what is being done.
     ///
     /// # Errors
-    /// [`crate::error::Error::Stopped`]; those of rendering.
-    pub fn look(&self, heard: &dyn Fn(&str)) -> Result<Predictor> {
+    /// [`crate::error::Error::Stopped`]; errors of rendering.
+    pub fn look(&self, aim: f64, progress: &dyn Fn(&str)) -> Result<(Predictor, Vec<Prediction>)> {
         let effort = self.effort()?;
-        heard("errors of a short sweep");
+        progress("errors of a short sweep");
         let mut search = Search::begin(self, effort)?;
-        heard("times");
-        search.foretelling.modes = self.modes(search.foretelling.bounces, effort.small)?;
+        progress("times");
+        search.predictor.modes = self.modes(search.predictor.bounces, effort.small)?;
+        let mut found = Vec::new();
         if let Some(goal) = self.goal {
-            heard("errors of what may be chosen");
-            search.try_likely(goal)?;
+            progress("errors of what may be chosen");
+            found = search.fastest(goal, aim * goal.largest())?;
+            if found.is_empty() {
+                found = search.fastest(goal, goal.largest())?;
+            }
         }
-        Ok(search.foretelling)
+        Ok((search.predictor, found))
     }
 }
 
 impl<'a> Search<'a> {
-    /// Runs the sweep.
+    /// Traces the sweep, fits the model to it, and chooses the bounces.
+    ///
+    /// # Errors
+    /// As [`Patches::trace`].
     pub fn begin(probe: &'a SettingsProbe<'a>, effort: Effort) -> Result<Self> {
-        let patches = probe.patches(effort)?;
+        let (context, patches) = (probe.context, probe.patches(effort)?);
         let reference = samples_of_reference(SampleCounts { spp: 8, shadow: 2, sky: 2 });
-        let begun = Instant::now();
-        let truth =
-            patches.trace(probe.stage, &super::probe::reference(probe.stage.base, reference))?;
-        let seconds = begun.elapsed().as_secs_f64() / patches.pixels_in_all().max(1) as f64;
-        let causes = probe.causes();
-        let foretelling = Predictor {
-            model: ErrorModel::of(causes, &[]),
-            measured: Vec::new(),
-            bias: Vec::new(),
+        let truth = patches.trace(context, &converged(context.base, reference))?;
+        let (mut points, mut doubts) = (Vec::new(), Vec::new());
+        for samples in design(probe) {
+            let seen = patches.trace(context, &sampled(context.base, samples))?;
+            let (errors, doubt) = squared_errors(&patches, &truth, &seen);
+            points.push(SampleErrors { samples, reference, errors });
+            doubts = doubt;
+        }
+        let predictor = Predictor {
+            model: ErrorModel::of(probe.sources(), &points),
+            doubts,
+            bias: 0.0,
             rounding: if probe.rounds { ROUNDING } else { 0.0 },
-            bounces: probe.stage.base.bounces,
+            bounces: context.base.bounces,
             modes: Vec::new(),
-            line: None,
-            most: probe.goal.and_then(Goal::most),
-            doubts: Vec::new(),
-            pace: Some(Pace { samples: reference, seconds }),
             excess: 1.0,
         };
-        let mut search = Self { probe, patches, truth, reference, found: Vec::new(), foretelling };
-        for samples in search.design() {
-            search.measure(samples)?;
-        }
-        search.learn();
-        let (bounces, bias) = search.bounces(BIAS * search.in_reach())?;
-        (search.foretelling.bounces, search.foretelling.bias) = (bounces, bias);
+        let largest = |p: &SampleErrors| p.errors.iter().copied().fold(0.0, f64::max);
+        let in_reach = match probe.goal {
+            Some(goal @ Goal::Psnr(_)) => goal.largest(),
+            _ => IN_REACH * points.iter().map(largest).fold(f64::INFINITY, f64::min),
+        };
+        let mut search = Self { probe, patches, truth, reference, measured: Vec::new(), predictor };
+        let (bounces, bias) = search.bounces(BIAS * in_reach)?;
+        (search.predictor.bounces, search.predictor.bias) = (bounces, bias);
         Ok(search)
     }
 
-    /// Tries what would be chosen, until it has been tried.
-    pub fn try_likely(&mut self, goal: Goal) -> Result<()> {
-        let is_squared = self.foretelling.most.is_none();
-        for _ in 0..if is_squared { ROUNDS } else { ROUNDS_BY_FIGURE } {
-            let mut new = self.untried(self.foretelling.to_try(goal));
-            if new.is_empty() {
-                let between = self.foretelling.between();
-                new = between.map_or(Vec::new(), |allowed| self.untried(allowed));
-            }
-            if new.is_empty() {
-                break;
-            }
-            for samples in new {
-                self.sharpen(samples)?;
-                self.measure(samples)?;
-            }
-            self.learn();
+    /// For each reuse policy the fastest setting found whose figure was measured to be at most `allowed`;
+    /// the predictor's errors then go through the fastest of these.
+    ///
+    /// # Errors
+    /// As [`Patches::trace`].
+    pub fn fastest(&mut self, goal: Goal, allowed: f64) -> Result<Vec<Prediction>> {
+        let mut found = Vec::new();
+        for mode in self.predictor.modes.clone() {
+            found.extend(self.fastest_of(&mode, goal, allowed)?);
         }
-        Ok(())
+        Ok(found)
     }
 
-    /// The samples that would be chosen if squared errors up to `allowed` were, but for those that were
-    /// tried.
-    fn untried(&self, allowed: f64) -> Vec<SampleCounts> {
-        let mut new: Vec<SampleCounts> = Vec::new();
-        for found in likely_of(self.foretelling.fastest(&self.probe.range(), allowed)) {
-            // Modes may agree on samples, not only neighbours among them.
-            if self.foretelling.tried(found.samples).is_none() && !new.contains(&found.samples) {
-                new.push(found.samples);
+    fn fastest_of(
+        &mut self,
+        mode: &ReuseMode,
+        goal: Goal,
+        allowed: f64,
+    ) -> Result<Option<Prediction>> {
+        let (range, is_psnr) = (self.probe.range(), matches!(goal, Goal::Psnr(_)));
+        let start = match is_psnr {
+            true => allowed,
+            false => {
+                self.predictor.of(mode, SampleCounts { spp: 4, shadow: 4, sky: 4 }).squared_error
+            }
+        };
+        let (mut bracket, mut aim, mut best) = (Bracket::default(), Some(start), None);
+        for _ in 0..TRIALS {
+            let guess = aim.and_then(|aim| self.predictor.fastest(mode, &range, aim));
+            let (Some(guess), Some(tried)) = (guess, aim) else { break };
+            let Measured { squared_error, figure, .. } = self.measure(goal, guess.samples)?;
+            let ratio = figure / allowed;
+            // Other figures rise about as the root of the squared error.
+            let wanted = guess.squared_error * ratio.powf(if is_psnr { -1.0 } else { -1.5 });
+            aim = bracket.next(tried, wanted, ratio <= 1.0);
+            if ratio <= 1.0 {
+                let figure = (!is_psnr).then_some(figure);
+                best = Some(Prediction { squared_error, figure, ..guess });
             }
         }
-        new
+        Ok(best)
     }
 
-    /// Traces the reference again where it is too coarse to hold `samples` against.
-    fn sharpen(&mut self, samples: SampleCounts) -> Result<()> {
+    /// What `samples` come to at the patches, with the bounces chosen; nothing is traced twice.
+    fn measure(&mut self, goal: Goal, samples: SampleCounts) -> Result<Measured> {
+        if let Some(known) = self.measured.iter().find(|known| known.samples == samples) {
+            return Ok(*known);
+        }
+        let context = self.probe.context;
         if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
-            let stage = self.probe.stage;
             self.reference = samples_of_reference(samples);
-            self.truth = self.patches.trace(stage, &reference(stage.base, self.reference))?;
+            self.truth = self.patches.trace(context, &converged(context.base, self.reference))?;
         }
-        Ok(())
-    }
-
-    fn measure(&mut self, samples: SampleCounts) -> Result<()> {
-        let seen = self.traced(samples)?;
-        let errors = squares(&self.patches, &self.truth, &seen);
-        let of = |goal| -> Result<Figure> {
-            let worst = errors.iter().copied().fold(0.0, f64::max);
+        let (bounces, cutoff) = (self.predictor.bounces, context.base.cutoff);
+        let settings = Settings { bounces, cutoff, ..sampled(context.base, samples) };
+        let seen = self.patches.trace(context, &settings)?;
+        let (mut errors, doubts) = squared_errors(&self.patches, &self.truth, &seen);
+        let own = self.predictor.model.own_part(samples, self.reference);
+        errors.iter_mut().for_each(|error| *error *= own);
+        let squared_error = worst(&errors, &doubts) + self.predictor.rounding;
+        let figure = match goal {
+            Goal::Psnr(_) => squared_error,
             // As the file will have it: FLIP sees steps of 8 bits all over the picture.
-            let filed = if self.probe.rounds { rounded(&seen) } else { seen.clone() };
-            let figure = figure(goal, &self.patches, &self.truth, &filed)?;
-            Ok(Figure { figure, squared_error: worst + self.foretelling.rounding })
+            _ if self.probe.rounds => figure(goal, &self.patches, &self.truth, &rounded(&seen))?,
+            _ => figure(goal, &self.patches, &self.truth, &seen)?,
         };
-        let goal = self.probe.goal.filter(|goal| goal.most().is_some());
-        let figure = goal.map(of).transpose()?;
-        let doubts = doubts(&self.patches, &self.truth, &seen);
-        let point = ErrorSample { samples, reference: self.reference, errors };
-        self.found.push(Found { point, doubts, figure });
-        Ok(())
+        let measured = Measured { samples, squared_error, figure };
+        self.measured.push(measured);
+        Ok(measured)
     }
 
-    /// Fits the model to all that was measured, and puts it through the last.
-    fn learn(&mut self) {
-        let points: Vec<&ErrorSample> = self.found.iter().map(|found| &found.point).collect();
-        let model = ErrorModel::of(self.probe.causes(), &points);
-        let measured = |Found { point, doubts, figure }: &Found| {
-            // The model tells the reference's part of the difference.
-            let own = model.errors(point.samples).zip(model.errors(point.reference));
-            let parts = own.map(|(s, r)| s / (s + r).max(1e-12));
-            let errors = point.errors.iter().zip(parts).map(|(error, part)| error * part).collect();
-            MeasuredSamples {
-                samples: point.samples,
-                errors,
-                doubts: doubts.clone(),
-                figure: *figure,
-            }
-        };
-        self.foretelling.measured = self.found.iter().map(measured).collect();
-        let last = self.found.last();
-        self.foretelling.doubts = last.map_or(Vec::new(), |last| last.doubts.clone());
-        self.foretelling.model = last.map_or(model.clone(), |last| model.through(&last.point));
-        self.foretelling.line = self.foretelling.most.and_then(|most| self.line(most));
-    }
-
-    /// The line by what came nearest to the figure `most`, through the nearest of it: a share of pixels,
-    /// say, cannot go on rising.
-    fn line(&self, most: f64) -> Option<PowerLaw> {
-        let all =
-            self.found.iter().filter_map(|found| found.figure).filter(|found| found.figure > 0.0);
-        let mut nearest: Vec<(f64, f64)> =
-            all.map(|found| (found.squared_error, found.figure)).collect();
-        let off = |found: &(f64, f64)| (found.1 / most).ln().abs();
-        nearest.sort_by(|a, b| off(a).total_cmp(&off(b)));
-        nearest.truncate(4);
-        let line = PowerLaw::through(&nearest)?;
-        nearest.first().map(|found| line.shifted_to(*found))
-    }
-
-    fn design(&self) -> Vec<SampleCounts> {
-        let (base, causes) = (self.probe.stage.base, self.probe.causes());
-        let all = [(1, 1, 1), (4, 1, 1), (4, 8, 1), (4, 1, 8), (2, 4, 4), (16, 1, 1), (8, 2, 2)];
-        let mut design = Vec::new();
-        for (spp, shadow, sky) in all {
-            let shadow = if causes.shadow { shadow } else { base.shadow_samples };
-            let sky = if causes.sky { sky } else { base.sky_samples };
-            let samples = SampleCounts { spp, shadow, sky };
-            if !design.contains(&samples) {
-                design.push(samples);
-            }
+    /// The fewest bounces that leave out at most `allowed` more of the squared error than the most bounces
+    /// do, and what they leave out in the worst frame. All are traced with the same random numbers.
+    fn bounces(&self, allowed: f64) -> Result<(u32, f64)> {
+        let (probe, base, plan) = (self.probe, self.probe.context.base, self.probe.plan());
+        if !plan.mirror && !plan.glass {
+            return Ok((base.bounces, 0.0));
         }
-        design
-    }
-
-    /// The patches with the reference's bounces: what samples alone do.
-    fn traced(&self, samples: SampleCounts) -> Result<Seen> {
-        let stage = self.probe.stage;
-        let mut settings = reference(stage.base, samples);
-        settings.seed = stage.base.seed;
-        self.patches.trace(stage, &settings)
-    }
-
-    /// The squared error that the sweep leaves to hope for: what the goal allows. Where its figure alone
-    /// decides, what reached that, if anything did; else no less than a quarter of the least, which
-    /// goes for a budget too.
-    fn in_reach(&self) -> f64 {
-        let foretelling = &self.foretelling;
-        if let Some(goal @ Goal::Psnr(_)) = self.probe.goal {
-            return foretelling.allowed(goal);
-        }
-        let worst = |found: &Found| found.point.errors.iter().copied().fold(0.0, f64::max);
-        let least = BEYOND * self.found.iter().map(worst).fold(f64::INFINITY, f64::min);
-        let Some(most) = foretelling.most else { return least };
-        let reaches = |found: &&Found| found.figure.is_some_and(|f| f.figure <= most);
-        let reached = self.found.iter().filter(reaches).map(worst).fold(0.0, f64::max);
-        let line = foretelling.line.map(|line| line.squared_error(most));
-        match reached > 0.0 {
-            true => line.unwrap_or(f64::INFINITY).min(reached),
-            false => line.unwrap_or(0.0).max(least),
-        }
-    }
-
-    /// The fewest bounces that miss at most `allowed`, or no more than that beyond what the most miss; and
-    /// what they miss in each frame. The same random numbers with more bounces tell.
-    fn bounces(&self, allowed: f64) -> Result<(u32, Vec<f64>)> {
-        let (probe, base, plan) = (self.probe, self.probe.stage.base, self.probe.plan());
-        let mut tried = vec![base.bounces];
-        if !probe.given.bounces && (plan.mirror || plan.glass) {
-            tried.extend(BOUNCES);
-            tried.sort_unstable();
-            tried.dedup();
-        }
-        let mut settings = reference(base, SampleCounts { spp: 4, shadow: 1, sky: 1 });
-        settings.seed = base.seed;
-        settings.bounces = tried.iter().copied().fold(settings.bounces, u32::max);
-        let truth = self.patches.trace(probe.stage, &settings)?;
+        let numbers = if probe.given.bounces { &[base.bounces] } else { &BOUNCES[..] };
+        let most = *numbers.last().unwrap_or(&base.bounces);
+        let mut settings = sampled(base, SampleCounts { spp: 4, shadow: 1, sky: 1 });
+        let truth = self.patches.trace(probe.context, &settings)?;
         settings.cutoff = base.cutoff;
-        let mut all: Vec<(u32, Vec<f64>)> = Vec::new();
-        for bounces in tried {
+        let mut left_out = |bounces: u32| -> Result<f64> {
             settings.bounces = bounces;
-            let seen = self.patches.trace(probe.stage, &settings)?;
-            let bias = squares(&self.patches, &truth, &seen);
-            if bias.iter().all(|bias| *bias <= allowed) {
-                return Ok((bounces, bias));
+            let seen = self.patches.trace(probe.context, &settings)?;
+            let (errors, _) = squared_errors(&self.patches, &truth, &seen);
+            Ok(errors.into_iter().fold(0.0, f64::max))
+        };
+        let least = left_out(most)?;
+        for bounces in numbers {
+            let bias = left_out(*bounces)?;
+            if bias <= least + allowed {
+                return Ok((*bounces, bias));
             }
-            all.push((bounces, bias));
         }
-        // What the cut-off leaves out no number of them brings.
-        let most = all.last().map_or(Vec::new(), |(_, bias)| bias.clone());
-        let is_as_good = |bias: &[f64]| bias.iter().zip(&most).all(|(b, m)| *b <= m + allowed);
-        let found = all.into_iter().find(|(_, bias)| is_as_good(bias));
-        Ok(found.unwrap_or((base.bounces, most)))
+        Ok((most, least))
+    }
+}
+
+/// The squared errors, as the model has them, between which that lies with which a goal is just reached.
+struct Bracket {
+    /// The largest that reached the goal; 0 where none did.
+    reached: f64,
+    /// The smallest that missed it.
+    missed: f64,
+}
+
+impl Default for Bracket {
+    fn default() -> Self {
+        Self { reached: 0.0, missed: f64::INFINITY }
+    }
+}
+
+impl Bracket {
+    /// The squared error to try after `tried`, by which the goal `is_reached` or not: `wanted`, if that lies
+    /// between the bounds; else their geometric mean. `None` where the bounds are close, or where nothing much
+    /// larger than what reached the goal is wanted.
+    fn next(&mut self, tried: f64, wanted: f64, is_reached: bool) -> Option<f64> {
+        match is_reached {
+            true => self.reached = self.reached.max(tried),
+            false => self.missed = self.missed.min(tried),
+        }
+        let step = CLOSE.sqrt();
+        let is_close = is_reached && wanted < step * self.reached;
+        if is_close || self.missed < CLOSE * self.reached {
+            return None;
+        }
+        // What missed by a hair is not approached by hairs.
+        let most = if is_reached { tried * STEP } else { tried / step };
+        let wanted = wanted.clamp(tried / STEP, most);
+        let is_between = self.reached < wanted && wanted < self.missed;
+        Some(if is_between { wanted } else { (self.reached * self.missed).sqrt() })
+    }
+}
+
+/// The settings of the sweep.
+fn design(probe: &SettingsProbe) -> Vec<SampleCounts> {
+    let (base, sources) = (probe.context.base, probe.sources());
+    let all = [(1, 1, 1), (4, 1, 1), (4, 8, 1), (4, 1, 8), (2, 4, 4), (16, 1, 1), (8, 2, 2)];
+    let mut design = Vec::new();
+    for (spp, shadow, sky) in all {
+        let shadow = if sources.shadow { shadow } else { base.shadow_samples };
+        let sky = if sources.sky { sky } else { base.sky_samples };
+        let samples = SampleCounts { spp, shadow, sky };
+        if !design.contains(&samples) {
+            design.push(samples);
+        }
+    }
+    design
+}
+
+/// The settings of a reference with `samples`, and with as many bounces as may be chosen.
+fn converged(base: &Settings, samples: SampleCounts) -> Settings {
+    let settings = reference(base, samples);
+    let bounces = BOUNCES.into_iter().fold(settings.bounces, u32::max);
+    Settings { bounces, ..settings }
+}
+
+/// The same with the job's seed: frames with these settings differ from the reference for their samples
+/// alone.
+fn sampled(base: &Settings, samples: SampleCounts) -> Settings {
+    Settings { seed: base.seed, ..converged(base, samples) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Bracket;
+
+    /// The squared errors tried where the goal is reached up to `limit`, and the figure rises by `power`.
+    fn tried(start: f64, limit: f64, power: f64) -> Vec<f64> {
+        let (mut bracket, mut aim, mut all) = (Bracket::default(), Some(start), Vec::new());
+        while let Some(tried) = aim.filter(|_| all.len() < 20) {
+            all.push(tried);
+            let ratio = (tried / limit).powf(power);
+            aim = bracket.next(tried, tried * ratio.powf(-1.5), ratio <= 1.0);
+        }
+        all
+    }
+
+    #[test]
+    fn a_goal_is_found_from_either_side_whatever_the_power() {
+        for power in [0.3, 0.67, 1.0, 2.0] {
+            for start in [0.01, 0.9, 1.1, 90.0] {
+                let all = tried(start, 1.0, power);
+                let best = all.iter().copied().filter(|x| *x <= 1.0).fold(0.0, f64::max);
+                assert!(best > 0.6 && all.len() < 12, "{power} {start}: {all:?}");
+                // Hardly any trial is of a squared error far below, which is expensive.
+                assert!(all.iter().all(|x| *x >= start.min(0.2)), "{power} {start}: {all:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_more_is_tried_where_a_cheaper_setting_would_miss() {
+        let mut bracket = Bracket::default();
+        // 4 was allowed, 2.5 predicted of what was tried, and 1.2 times that came out of 4.
+        assert_eq!(bracket.next(4.0, 2.5 / 0.75, true), None);
     }
 }

@@ -6,12 +6,12 @@
 //! the same for all candidates.
 
 use super::change::Change;
+use super::context::TrialContext;
 use super::errors::Errors;
 use super::knobs::Candidate;
 use super::ledger::{Ledger, TrialRecord};
 use super::reference::{Truth, seed_of_turn};
 use super::row::Taken;
-use super::stage::Stage;
 use super::table::Measured;
 use super::trial::{self, Trial};
 use crate::error::Result;
@@ -22,7 +22,7 @@ use std::time::Instant;
 /// What there is to do.
 pub struct Sweep<'a> {
     /// What all share.
-    pub stage: &'a Stage<'a>,
+    pub context: &'a TrialContext<'a>,
     /// The default first.
     pub candidates: &'a [Candidate],
     /// The frames that are held against the truth.
@@ -33,7 +33,7 @@ pub struct Sweep<'a> {
 
 /// A candidate is about to be tried.
 #[derive(Clone, Copy)]
-pub struct Heard<'a> {
+pub struct SweepProgress<'a> {
     /// What was measured so far.
     pub ledger: &'a Ledger,
     /// Trials done so far.
@@ -67,7 +67,7 @@ impl Sweep<'_> {
     /// due to chance, below which the truth has to be known.
     ///
     /// # Errors
-    /// As [`Stage::trace`].
+    /// As [`TrialContext::trace`].
     pub fn least_noise(&self) -> Result<f64> {
         let best = self.candidates.iter().max_by_key(|c| samples(&c.settings));
         let Some(best) = best else { return Ok(0.0) };
@@ -89,7 +89,7 @@ impl Sweep<'_> {
         &self,
         truth: &Truth,
         ledger: &mut Ledger,
-        hear: &mut dyn FnMut(Heard) -> Result<()>,
+        hear: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         let mut is_warm = false;
         for turn in 0..=self.turns {
@@ -115,7 +115,7 @@ impl Sweep<'_> {
         ledger: &mut Ledger,
         turn: u32,
         open: &[usize],
-        hear: &mut dyn FnMut(Heard) -> Result<()>,
+        hear: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         // The default goes first, also where an earlier run has had its turn: the others' pixels and
         // times are compared with its.
@@ -152,11 +152,18 @@ impl Sweep<'_> {
         ledger: &Ledger,
         turn: u32,
         candidate: usize,
-        hear: &mut dyn FnMut(Heard) -> Result<()>,
+        hear: &mut dyn FnMut(SweepProgress) -> Result<()>,
     ) -> Result<()> {
         let left = self.seconds_left(ledger.entries());
         let candidate = &self.candidates[candidate];
-        hear(Heard { ledger, done: self.done(ledger), of: self.trials(), turn, candidate, left })
+        hear(SweepProgress {
+            ledger,
+            done: self.done(ledger),
+            of: self.trials(),
+            turn,
+            candidate,
+            left,
+        })
     }
 
     /// Trials that there are in all.
@@ -204,20 +211,20 @@ impl Sweep<'_> {
     }
 
     fn with_seed(&self, candidate: &Candidate, turn: u32) -> Settings {
-        let seed = seed_of_turn(self.stage.base.seed, turn);
+        let seed = seed_of_turn(self.context.base.seed, turn);
         Settings { seed, ..candidate.settings.clone() }
     }
 
     fn try_one(&self, settings: &Settings, frames: &[u32]) -> Result<Tried> {
         let start = Instant::now();
         // Other rules build another tree, one at a time: several would not fit beside a large scene.
-        let own = self.stage.own_intersector(settings)?;
+        let own = self.context.own_intersector(settings)?;
         let build_seconds = match own {
             Some(_) => start.elapsed().as_secs_f64(),
-            None => self.stage.build_seconds,
+            None => self.context.build_seconds,
         };
-        let intersector = own.as_deref().map_or(self.stage.intersector, |own| own as _);
-        let trial = trial::run(self.stage, settings, intersector, frames)?;
+        let intersector = own.as_deref().map_or(self.context.intersector, |own| own as _);
+        let trial = trial::run(self.context, settings, intersector, frames)?;
         let entry = TrialRecord {
             seconds: trial.seconds,
             cpu_seconds: trial.cpu_seconds,

@@ -1,9 +1,8 @@
-//! How long what may be chosen takes: tried on small frames, and the choice by it.
+//! How long settings take: the likely ones are tried on small frames, and the choice goes by that.
 
-use super::error_model::SampleCounts;
-use super::foretell::{Prediction, Predictor};
 use super::frames::{Cut, timed_frames};
-use super::modes::Spent;
+use super::modes::Times;
+use super::predictor::{Prediction, Predictor, ReuseMode};
 use super::probe::SettingsProbe;
 use super::{effort::Effort, trial};
 use crate::error::Result;
@@ -11,166 +10,120 @@ use crate::reuse;
 use crate::scene::{ReuseSettings, Settings};
 use serde::{Deserialize, Serialize};
 
-/// How many times as many pixels the likely choices are timed with as well: the larger a frame, the less
-/// of it is edges, where light is not known from other frames.
+/// How many times as many pixels as [`Effort::small`] the frames have at most that are tried.
 const LARGER: f64 = 3.0;
-/// Ways to take over light foretold to take so many times as long as the fastest are not tried.
+/// Settings predicted to take so many times as long as the fastest are not tried.
 const SLOWER: f64 = 2.5;
-/// Shares of what is left of a time that the trials of what may fit it take, one after the other.
-const SHARES: [f64; 3] = [0.12, 0.06, 0.04];
-/// Share of the job that each trial of what may be fastest takes.
-const TRIED: f64 = 0.04;
+/// Shares of what is left of a budget that the trials take, one after the other.
+const SHARES: [f64; 2] = [0.15, 0.07];
+/// Share of the job that each trial takes where a target is to be reached.
+const TRIED: f64 = 0.03;
 /// Frames of fewer pixels than this are too unlike larger ones to tell what these take.
-const LEAST: f64 = 600.0;
+const LEAST: f64 = 1_800.0;
 
 /// A setting that is to be timed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// The setting.
-    pub foretold: Prediction,
-    /// Pixels of the smaller frames.
-    pub small: f64,
+    pub prediction: Prediction,
+    /// Pixels of the frames that are tried.
+    pub pixels: f64,
 }
 
-/// Who times: alone, or all ranks at once, since they share caches and memory in the job as well. Gives
-/// the wall seconds that a frame takes one of them.
+/// Times a setting: alone, or on all ranks at once, since they share caches and memory in the job as well.
+/// Gives the wall seconds that a rank takes for a frame.
 pub type Timer<'a> = &'a dyn Fn(&Timing) -> Result<f64>;
 
 impl SettingsProbe<'_> {
-    /// Of the fastest setting of each mode the one that is fastest when all are tried.
+    /// Of `found` the setting that is fastest when the likely ones are tried, with the seconds that it took.
     ///
     /// # Errors
-    /// As [`Self::look`].
-    pub fn fastest(
-        &self,
-        foretelling: &Predictor,
-        allowed: f64,
-        timer: Timer,
-    ) -> Result<Option<Prediction>> {
-        let mut found = likely(foretelling.fastest(&self.range(), allowed));
-        for foretold in &mut found {
-            let time = TRIED * foretold.seconds * self.frames_each(foretold.reuse);
-            let small = self.small_within(time, foretold);
-            if small >= LEAST {
-                let timing = Timing { foretold: foretold.clone(), small };
-                foretold.seconds = timer(&timing)?;
+    /// As `timer`.
+    pub fn fastest(&self, mut found: Vec<Prediction>, timer: Timer) -> Result<Option<Prediction>> {
+        let least = found.iter().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
+        found.retain(|f| f.seconds <= SLOWER * least);
+        for prediction in &mut found {
+            let time = TRIED * prediction.seconds * self.frames_each(prediction.reuse);
+            if let Some(timing) = self.timing(time, prediction) {
+                prediction.seconds = timer(&timing)?;
             }
         }
         Ok(found.into_iter().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
     }
 
-    /// Seconds that all frames are foretold to take this rank by the fastest setting whose squared error is
-    /// `allowed`, without trying any; `None` where there is none.
-    pub fn fastest_seconds(&self, foretelling: &Predictor, allowed: f64) -> Option<f64> {
-        let found = likely(foretelling.fastest(&self.range(), allowed));
-        found.iter().map(|f| f.seconds * self.frames_each(f.reuse)).min_by(f64::total_cmp)
-    }
-
-    /// The best setting whose frames are rendered within `left` seconds, which are asked for anew each
-    /// time: trying settings on small frames takes of them. The fastest of all where none is.
+    /// The most accurate setting whose frames are rendered within `left` seconds; the fastest where none is.
+    /// `left` is asked anew after each trial, since that takes of it.
     ///
     /// # Errors
-    /// As [`Self::look`].
+    /// As `timer`.
     pub fn best_within(
         &self,
-        foretelling: &Predictor,
-        left: &dyn Fn(SampleCounts) -> f64,
+        predictor: &Predictor,
+        left: &dyn Fn() -> f64,
         timer: Timer,
     ) -> Result<Option<Prediction>> {
-        let mut foretelling = foretelling.clone();
-        let frames: Vec<(ReuseSettings, f64)> = foretelling
-            .modes
-            .iter()
-            .map(|mode| (mode.reuse, self.frames_each(mode.reuse)))
-            .collect();
+        let mut predictor = predictor.clone();
+        let of = |mode: &ReuseMode| (mode.reuse, self.frames_each(mode.reuse));
+        let frames: Vec<(ReuseSettings, f64)> = predictor.modes.iter().map(of).collect();
         let frames = |reuse| frames.iter().find(|(r, _)| *r == reuse).map_or(0.0, |(_, n)| *n);
-        let best = |foretelling: &Predictor| {
-            let fits = |f: &Prediction| f.seconds * frames(f.reuse) <= left(f.samples);
-            foretelling.best_within(&self.range(), &fits)
+        let best = |predictor: &Predictor| {
+            let fits = |f: &Prediction| f.seconds * frames(f.reuse) <= left();
+            predictor.best_within(&self.range(), &fits)
         };
-        let mut tried: Vec<Prediction> = Vec::new();
         for share in SHARES {
-            let Some(likely) = best(&foretelling) else { break };
-            let time = share * left(likely.samples);
-            let small = self.small_within(time, &likely);
-            if tried.iter().any(|tried| is_near(tried, &likely)) || small < LEAST {
-                break;
-            }
-            let timing = Timing { foretold: likely, small };
-            let taken = timer(&timing)?;
-            foretelling.correct(&timing.foretold, taken);
-            tried.push(timing.foretold);
+            let Some(likely) = best(&predictor) else { break };
+            let time = share * left();
+            let Some(timing) = self.timing(time, &likely) else { break };
+            predictor.correct_time(&likely, timer(&timing)?);
         }
-        Ok(best(&foretelling))
+        Ok(best(&predictor))
     }
 
-    /// Seconds that a frame of the full size takes this rank, from frames of two small ones: what edges
-    /// take goes with their length, all else with the area.
+    /// Seconds that a rank takes for a frame of the full size, from smaller ones.
     ///
     /// # Errors
     /// As [`Self::look`].
     pub fn timed(&self, timing: &Timing) -> Result<f64> {
-        let settings = timing.foretold.settings(self.stage.base);
-        let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let [small, large] = [timing.small, LARGER * timing.small].map(|most| most.min(pixels));
-        let by_large = self.small(&settings, large)?;
-        if large < 1.5 * small {
-            return Ok(by_large.wall / large * pixels);
-        }
-        let by_small = self.small(&settings, small)?;
-        let [of_small, of_large] = [by_small.cpu / small, by_large.cpu / large];
-        let edges = (of_small - of_large) / (small.powf(-0.5) - large.powf(-0.5));
-        let each = of_large + edges * (pixels.powf(-0.5) - large.powf(-0.5));
-        Ok(each.clamp(0.3 * of_large, of_large) * pixels * by_large.pace())
+        let settings = timing.prediction.settings(self.context.base);
+        Ok(self.small(&settings, timing.pixels)?.wall * self.enlargement(timing.pixels))
     }
 
-    /// Pixels of the smaller frames that can be tried in `seconds`.
-    fn small_within(&self, seconds: f64, foretold: &Prediction) -> f64 {
-        let base = self.stage.base;
-        let pixels = f64::from(base.width) * f64::from(base.height);
-        let frames = self.cut(foretold.reuse).with_ancestors(&timed_frames(self.stage.shot.frames));
-        let each = foretold.seconds / pixels * frames.len() as f64;
-        (seconds / ((1.0 + LARGER) * each)).min(Effort::WHOLE.small)
+    /// How to time `prediction` in about `seconds`; `None` where that is too short to tell anything.
+    fn timing(&self, seconds: f64, prediction: &Prediction) -> Option<Timing> {
+        let base = self.context.base;
+        let full = f64::from(base.width) * f64::from(base.height);
+        let frames =
+            self.cut(prediction.reuse).with_ancestors(&timed_frames(self.context.shot.frames));
+        let each = prediction.seconds / full * frames.len() as f64;
+        let pixels = (seconds / each).min(LARGER * Effort::WHOLE.small).min(full);
+        (pixels >= LEAST).then(|| Timing { prediction: prediction.clone(), pixels })
     }
 
-    /// Frames that a rank makes, those among them that others are inferred from.
+    /// Pixels of a frame over those of one of about `pixels`.
+    pub(super) fn enlargement(&self, pixels: f64) -> f64 {
+        let (width, height) = self.small_size(pixels);
+        let base = self.context.base;
+        f64::from(base.width) * f64::from(base.height) / (f64::from(width) * f64::from(height))
+    }
+
+    /// Frames that a rank makes, with those outside the job that its frames are inferred from.
     pub fn frames_each(&self, reuse: ReuseSettings) -> f64 {
         let frames: Vec<u32> = (self.frames.first..=self.frames.last).collect();
         self.cut(reuse).with_ancestors(&frames).len() as f64 / f64::from(self.ranks)
     }
 
     fn cut(&self, reuse: ReuseSettings) -> Cut {
-        let settings = Settings { reuse, ..self.stage.base.clone() };
-        let looks_up = !reuse::channels(self.stage.scene, &settings).is_empty();
-        Cut::of(&settings, self.stage.shot.frames, looks_up)
+        let settings = Settings { reuse, ..self.context.base.clone() };
+        let looks_up = !reuse::channels(self.context.scene, &settings).is_empty();
+        Cut::of(&settings, self.context.shot.frames, looks_up)
     }
 
-    /// What a frame with about `pixels` pixels takes.
-    pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Spent> {
+    /// What a frame of about `pixels` pixels takes.
+    pub(super) fn small(&self, settings: &Settings, pixels: f64) -> Result<Times> {
         let mut settings = settings.clone();
         (settings.width, settings.height) = self.small_size(pixels);
-        let frames = timed_frames(self.stage.shot.frames);
-        let trial = trial::run(self.stage, &settings, self.stage.intersector, &frames)?;
-        Ok(Spent { wall: trial.seconds, cpu: trial.cpu_seconds })
+        let frames = timed_frames(self.context.shot.frames);
+        let trial = trial::run(self.context, &settings, self.context.intersector, &frames)?;
+        Ok(Times { wall: trial.seconds, cpu: trial.cpu_seconds })
     }
-}
-
-/// The predictions that may turn out to be the fastest.
-pub(super) fn likely(mut found: Vec<Prediction>) -> Vec<Prediction> {
-    let least = found.iter().map(|f| f.seconds).fold(f64::INFINITY, f64::min);
-    found.retain(|f| f.seconds <= SLOWER * least);
-    found
-}
-
-/// Whether what one took tells what the other does.
-fn is_near(a: &Prediction, b: &Prediction) -> bool {
-    let within = |a: u32, b: u32, factor: f64| {
-        let ratio = f64::from(a) / f64::from(b);
-        (1.0 / factor..=factor).contains(&ratio)
-    };
-    let (s, t) = (a.samples, b.samples);
-    a.reuse == b.reuse
-        && within(s.spp, t.spp, 1.6)
-        && within(s.shadow, t.shadow, 1.0)
-        && within(s.sky, t.sky, 1.0)
 }

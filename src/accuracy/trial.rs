@@ -1,8 +1,8 @@
 //! One candidate, one turn: its frames, made and timed.
 
+use super::context::TrialContext;
 use super::errors::{Frames, displayed};
 use super::frames::Cut;
-use super::stage::Stage;
 use crate::error::Result;
 use crate::intersect::Intersector;
 use crate::reuse;
@@ -36,16 +36,16 @@ pub struct Trial {
 /// # Errors
 /// [`Stopped`](crate::error::Error::Stopped); those of cameras.
 pub fn run(
-    stage: &Stage,
+    context: &TrialContext,
     settings: &Settings,
     intersector: &dyn Intersector,
     chosen: &[u32],
 ) -> Result<Trial> {
-    let scene = stage.scene_of(settings);
+    let scene = context.scene_of(settings);
     let renderer = Renderer::new(scene, settings, intersector);
     let looks_up = !reuse::channels(scene, settings).is_empty();
-    let cut = Cut::of(settings, stage.shot.frames, looks_up);
-    let maker = maker(stage, renderer, settings)?;
+    let cut = Cut::of(settings, context.shot.frames, looks_up);
+    let maker = maker(context, renderer, settings)?;
     let order = maker.batches(&cut.with_ancestors(chosen)).concat();
     maker.expect(&order);
     let mut frames = Frames::new();
@@ -60,7 +60,7 @@ pub fn run(
         rays.push((frame, cast.total() as f64));
         all_rays += cast;
         if chosen.contains(&frame) {
-            let image = stage.pool.install(|| displayed(&made.film, settings));
+            let image = context.pool.install(|| displayed(&made.film, settings));
             frames.insert(frame, image);
         }
     }
@@ -82,11 +82,11 @@ fn rays_of(made: &Made) -> RayCounts {
 }
 
 fn maker<'m>(
-    stage: &Stage<'m>,
+    context: &TrialContext<'m>,
     renderer: Renderer<'m>,
     settings: &Settings,
 ) -> Result<Box<dyn FrameMaker + 'm>> {
-    let Stage { shot, pool, stop, .. } = *stage;
+    let TrialContext { shot, pool, stop, .. } = *context;
     let progress = &();
     let context = FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress };
     Ok(match settings.reuse.policy {

@@ -1,7 +1,7 @@
 //! What putting frames and checkpoints on disk takes: time alone, no pixel differs by it.
 
+use super::context::TrialContext;
 use super::frames::Cut;
-use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::measure::{Interval, median};
@@ -48,14 +48,14 @@ pub struct Writing {
 ///
 /// # Errors
 /// As rendering and writing a frame.
-pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
-    let frames = stage.shot.frames;
-    let (film, checkpoint) = match stage.base.reuse.policy {
-        Policy::Surface => with_checkpoints(stage, folder)?,
-        _ => (traced(stage)?, None),
+pub fn on_disk(context: &TrialContext, folder: &Path) -> Result<Writing> {
+    let frames = context.shot.frames;
+    let (film, checkpoint) = match context.base.reuse.policy {
+        Policy::Surface => with_checkpoints(context, folder)?,
+        _ => (traced(context)?, None),
     };
     let path = folder.join("writing_0001.png");
-    let options = WriteOptions::of(stage.base, Some(1));
+    let options = WriteOptions::of(context.base, Some(1));
     let write = || write_image(&path, &film, &options).map(drop);
     write()?;
     let bytes = fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
@@ -66,7 +66,7 @@ pub fn on_disk(stage: &Stage, folder: &Path) -> Result<Writing> {
     let sync: Vec<f64> = synced.iter().zip(&plain).map(|(synced, plain)| synced - plain).collect();
     let (frame, sync) = (interval(&written), interval(&sync));
     fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
-    let keys = Cut::of(stage.base, frames, checkpoint.is_some()).keys();
+    let keys = Cut::of(context.base, frames, checkpoint.is_some()).keys();
     Ok(Writing {
         frame_seconds: frame.estimate,
         frame_ends: [frame.low, frame.high],
@@ -97,28 +97,28 @@ fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[Vec<f64>; 3]> {
     Ok(seconds)
 }
 
-fn context<'a>(stage: &Stage<'a>) -> FrameContext<'a> {
-    let Stage { scene, base: settings, intersector, shot, pool, stop, .. } = *stage;
+fn frame_context<'a>(context: &TrialContext<'a>) -> FrameContext<'a> {
+    let TrialContext { scene, base: settings, intersector, shot, pool, stop, .. } = *context;
     let renderer = Renderer::new(scene, settings, intersector);
     FrameContext { renderer, shot, pool, with_gbuffer: false, stop, progress: &() }
 }
 
-fn traced(stage: &Stage) -> Result<Film> {
-    Ok(Tracer::new(context(stage)).make(1)?.film)
+fn traced(context: &TrialContext) -> Result<Film> {
+    Ok(Tracer::new(frame_context(context)).make(1)?.film)
 }
 
 /// The first frame, and what its reference takes: seconds, and bytes on disk.
-fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
-    let Stage { scene, shot, base, .. } = *stage;
+fn with_checkpoints(context: &TrialContext, folder: &Path) -> Result<(Film, Option<(f64, u64)>)> {
+    let TrialContext { scene, shot, base, .. } = *context;
     let channels = reuse::channels(scene, base);
     let terms = Compatibility::of("", &channels, base);
-    let target = target(stage, folder, !channels.is_empty())?;
+    let target = target(context, folder, !channels.is_empty())?;
     let checkpoints =
         Checkpoints::new(&target, Some(Duration::ZERO), &terms, scene.recentring, true);
     let pyramid = Pyramid { segment: base.reuse.segment, frames: shot.frames };
     let (mut seconds, mut bytes, mut film) = (Vec::new(), 0, None);
     for _ in 0..KEY_TIMES {
-        let mut maker = SurfaceReuse::new(context(stage), pyramid)?;
+        let mut maker = SurfaceReuse::new(frame_context(context), pyramid)?;
         maker.checkpoints = Some(&checkpoints);
         let all: Vec<u32> = (1..=shot.frames).collect();
         maker.expect(&all);
@@ -132,9 +132,9 @@ fn with_checkpoints(stage: &Stage, folder: &Path) -> Result<(Film, Option<(f64, 
     Ok((film.ok_or(Error::Stopped)?, cost.filter(|_| bytes > 0)))
 }
 
-fn target(stage: &Stage, folder: &Path, keeps_light: bool) -> Result<Target> {
+fn target(context: &TrialContext, folder: &Path, keeps_light: bool) -> Result<Target> {
     let name = folder.join("writing_####.png");
-    let pattern = FramePattern::parse(&name.to_string_lossy(), stage.shot.frames)?;
+    let pattern = FramePattern::parse(&name.to_string_lossy(), context.shot.frames)?;
     let header = Header {
         manifest: manifest::FORMAT,
         tweenray: crate::output::VERSION.into(),
@@ -142,14 +142,14 @@ fn target(stage: &Stage, folder: &Path, keeps_light: bool) -> Result<Target> {
         scene_hash: String::new(),
         scene_parts: Default::default(),
         shot_hash: String::new(),
-        shot_frames: stage.shot.frames,
+        shot_frames: context.shot.frames,
         files: manifest::file_name(&pattern),
         tracer: String::new(),
         command: Vec::new(),
         chosen: None,
-        settings: Header::settings(stage.base),
+        settings: Header::settings(context.base),
     };
-    let recipes = Recipes::new(stage.shot, stage.base, keeps_light, false)?;
-    let write = WriteOptions::of(stage.base, None);
+    let recipes = Recipes::new(context.shot, context.base, keeps_light, false)?;
+    let write = WriteOptions::of(context.base, None);
     Ok(Target { pattern, header, recipes, write, overwrite: false })
 }

@@ -11,8 +11,8 @@ use super::exit::Exit;
 use super::signals::Interrupt;
 use super::{job, machine, say, values};
 use crate::accuracy::{
-    self, Candidate, CandidatePicture, Group, Ledger, Measured, OracleCrop, Stage, Sweep, Truth,
-    Writing,
+    self, Candidate, CandidatePicture, Group, Ledger, Measured, OracleCrop, Sweep, TrialContext,
+    Truth, Writing,
 };
 use crate::cluster;
 use crate::effects::EffectPlan;
@@ -149,7 +149,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     let pool = machine::thread_pool(threads)?;
     let building = Instant::now();
     let intersector = pool.install(|| intersect::build(&scene, &base, threads))?;
-    let stage = Stage {
+    let context = TrialContext {
         scene: &scene,
         otherwise: otherwise.as_ref(),
         shot: &shot,
@@ -160,7 +160,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         stop: &interrupt.stop,
     };
     let sweep =
-        Sweep { stage: &stage, candidates: &candidates, frames: &frames, turns: args.turns };
+        Sweep { context: &context, candidates: &candidates, frames: &frames, turns: args.turns };
     let terms = terms(args, &sweep, &hash);
     let ledger = Ledger::open(&args.output.join("sweep"), &terms, args.overwrite)?;
     let oracle_was_wanted = groups.contains(&Group::Oracle);
@@ -181,20 +181,20 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
 
 /// All that the figures depend on, by name.
 fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
-    let stage = sweep.stage;
+    let context = sweep.context;
     let options: Vec<&str> = sweep.candidates.iter().map(|c| c.options.as_str()).collect();
     let mut terms = Map::new();
-    if let Value::Object(settings) = Header::settings(stage.base) {
+    if let Value::Object(settings) = Header::settings(context.base) {
         terms.extend(settings.into_iter().map(|(name, value)| (name.replace('_', "-"), value)));
     }
     let others = [
         ("frames", json!(sweep.frames)),
         ("settings to compare", json!(options)),
         ("reference-spp", json!(args.reference_spp)),
-        ("threads", json!(stage.pool.current_num_threads())),
+        ("threads", json!(context.pool.current_num_threads())),
         ("scene content", json!(hash)),
         ("tweenray version", json!(crate::output::VERSION)),
-        ("tracer", json!(stage.intersector.describe())),
+        ("tracer", json!(context.intersector.describe())),
         ("machine", json!(machine::Machine::here().cpu)),
     ];
     terms.extend(others.map(|(name, value)| (name.to_string(), value)));

@@ -5,10 +5,14 @@ mod choice;
 mod folder;
 mod judge;
 
+pub use choice::{Choice, asks_for_choice};
+
 use super::args::SettingArgs;
 use super::request::Request;
 use super::{say, spelled, values};
-use crate::accuracy::{FixedSettings, Goal, Prediction, Predictor, SettingsProbe, Stage, Timer};
+use crate::accuracy::{
+    FixedSettings, Goal, Prediction, Predictor, SettingsProbe, Timer, TrialContext,
+};
 use crate::effects::EffectPlan;
 use crate::error::{Error, Result};
 use crate::output::Format;
@@ -20,55 +24,49 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
-pub use choice::{Choice, asks_for_choice};
-
-/// Share of the job that a probe for a target takes: what it saves is to be more.
-const PROBE_SHARE: f64 = 0.1;
-/// Shares of the allowed squared error that a choice aims at after a brief and after a longer look: what some
-/// frames showed is off in others, and a miss costs the job once more.
-const BRIEFLY: f64 = 0.7;
-/// See [`BRIEFLY`].
-const LONGER: f64 = 0.85;
+/// The share of the squared error that a target allows that the choice aims at: some frames may be worse than
+/// those that the probe looked at, and a miss costs the job once more.
+const AIM: f64 = 0.85;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
 #[command(next_help_heading = "Choice")]
 pub struct ChoiceArgs {
-    /// Choose the fastest samples, bounces and reuse foretold to make every frame this good: psnr=DB,
+    /// Choose the fastest samples, bounces and reuse predicted to make every frame this good: psnr=DB,
     /// ssim=S, flip=F or max-share=P% (pixels off by more than 2/255); options that are given stay
     #[arg(long, value_name = "FIGURE=VALUE", value_parser = values::goal, conflicts_with = "budget")]
     pub target: Option<Goal>,
-    /// Choose the most accurate ones foretold to fit this time: 90s, 10m, 1h30m
+    /// Choose the most accurate ones predicted to fit this time: 90s, 10m, 1h30m
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = values::budget)]
     pub budget: Option<Duration>,
 }
 
-/// What is to be done once frames were held against what was wanted.
+/// What is to be done after a check of the finished frames.
 #[derive(Serialize, Deserialize)]
 pub enum Judgement {
-    /// All frames are rendered again, under a tighter choice.
+    /// Render all frames again with this tighter choice.
     Again(Choice),
-    /// Nothing: the choice with what came of it.
+    /// Nothing: the choice with the check's result.
     Done(Choice),
 }
 
-/// Who chooses.
+/// Everything that a choice of settings needs.
 pub struct Chooser<'a> {
-    /// What is wanted.
+    /// The target or budget.
     pub args: &'a ChoiceArgs,
-    /// What the user set already.
+    /// The options that the user gave.
     pub options: &'a SettingArgs,
-    /// The scene and all that renders it.
-    pub stage: &'a Stage<'a>,
+    /// The scene and everything needed to render it.
+    pub context: &'a TrialContext<'a>,
     /// The job.
     pub request: &'a Request,
     /// What traces, as far as frames differ by it.
     pub tracer: &'a str,
     /// When the program started: a budget counts from then.
     pub started: Instant,
-    /// How many ranks share it.
+    /// Number of ranks that share the job.
     pub ranks: u32,
-    /// Whether nothing is said.
+    /// Whether messages are suppressed.
     pub quiet: bool,
 }
 
@@ -78,7 +76,7 @@ impl ChoiceArgs {
         self.target.is_some() || self.budget.is_some()
     }
 
-    /// Refuses what cannot be foretold.
+    /// Refuses options whose effect cannot be predicted.
     pub fn check(&self, request: &Request) -> Result<()> {
         let settings = &request.settings;
         let obstacle = match () {
@@ -100,7 +98,7 @@ impl ChoiceArgs {
         }
         obstacle.map_or(Ok(()), |option| {
             Err(Error::Usage(format!(
-                "what {option} does is not foretold, so --target and --budget cannot go with it"
+                "what {option} does is not predicted, so --target and --budget cannot go with it"
             )))
         })
     }
@@ -125,13 +123,13 @@ fn decibels(psnr: f64) -> String {
 }
 
 impl Chooser<'_> {
-    /// The choice that the manifest holds, if it answers the same question; else a new one.
+    /// The manifest's choice, if it was made for the same target or budget and settings; else a new one.
     ///
     /// # Errors
-    /// Any of the probe's; a target that no setting is predicted to reach.
+    /// Errors of the probe; a target that no setting is predicted to reach.
     pub fn choose(&self, timer: Timer) -> Result<Choice> {
         if let Some(before) = self.before() {
-            let options = self.options(&before.foretold);
+            let options = self.options(&before.predicted);
             self.tell(format!("for {}, as chosen before: {options}", before.wanted));
             self.warn_if_long(&before);
             return Ok(before);
@@ -141,35 +139,25 @@ impl Chooser<'_> {
         let budget = Budget::of(self);
         let probe =
             SettingsProbe { seconds: budget.as_ref().map(Budget::probe_seconds), ..self.probe() };
-        let (foretelling, aim) = match self.args.target {
-            Some(goal) => self.look(goal).map(|(found, aim)| (found, Some(aim)))?,
-            None => (probe.look(&|what| self.tell(format!("probe: {what}")))?, None),
+        let (mut predictor, found) =
+            probe.look(AIM, &|what| self.tell(format!("probe: {what}")))?;
+        let found = match &budget {
+            None => probe.fastest(found, timer)?,
+            Some(budget) => probe.best_within(&predictor, &|| budget.left(), timer)?,
         };
-        let allowed = self.args.target.map(|goal| foretelling.allowed(goal));
-        let aimed = |aim| probe.fastest(&foretelling, aim, timer);
-        let found = match (aim, &budget) {
-            // What is just within reach leaves no room to aim at more.
-            (Some(aim), _) => match aimed(aim)? {
-                None => allowed.map_or(Ok(None), aimed)?,
-                found => found,
-            },
-            (_, Some(budget)) => {
-                let left = |samples| budget.left(&foretelling, samples);
-                probe.best_within(&foretelling, &left, timer)?
-            }
-            _ => None,
-        };
-        let foretold = found.ok_or_else(|| self.out_of_reach(&foretelling))?;
+        let predicted = found.ok_or_else(|| self.out_of_reach(&predictor))?;
+        if budget.is_none() {
+            predictor.correct_error(&predicted);
+        }
         let writing = budget.as_ref().map_or(0.0, |budget| budget.writing);
-        let all = foretold.seconds * probe.frames_each(foretold.reuse) + writing;
-        let left = budget.as_ref().map(|b| b.left(&foretelling, foretold.samples) + writing);
+        let all = predicted.seconds * probe.frames_each(predicted.reuse) + writing;
+        let left = budget.as_ref().map(|b| b.left() + writing);
         let choice = Choice {
             wanted: self.args.words(),
-            base: Header::settings(self.stage.base),
+            base: Header::settings(self.context.base),
             given: self.given(),
-            allowed,
-            foretold,
-            foretelling,
+            predicted,
+            predictor,
             seconds: all,
             tightened: 0,
             checked: None,
@@ -179,52 +167,25 @@ impl Chooser<'_> {
         self.say_choice(&choice);
         self.tell(format!("the probe took {}", seconds(start.elapsed().as_secs_f64())));
         if left.is_some_and(|left| all > left) {
-            self.warn("no setting is foretold to fit this time; the fastest is taken".into());
+            self.warn("no setting is predicted to fit this time; the fastest is taken".into());
         }
         Ok(choice)
     }
 
-    /// Looks at the scene for about as long as `PROBE_SHARE` of the job that `goal` makes: briefly at first, and
-    /// again where that leaves time for much more. With the squared error to aim at.
-    fn look(&self, goal: Goal) -> Result<(Predictor, f64)> {
-        let begun = Instant::now();
-        let told = |what: &str| self.tell(format!("probe: {what}"));
-        let brief = SettingsProbe { seconds: Some(0.0), ..self.probe() };
-        let first = brief.look(&told)?;
-        let (aim, spent) = (first.aim(goal, BRIEFLY), begun.elapsed().as_secs_f64());
-        let within = |error| brief.fastest_seconds(&first, error);
-        let job = within(aim).or_else(|| within(first.allowed(goal)));
-        let left = job.map(|job| PROBE_SHARE * job - spent);
-        if left.is_some_and(|left| left < spent) {
-            return Ok((first, aim));
-        }
-        self.tell("there is time for a longer look".into());
-        let foretelling = SettingsProbe { seconds: left, ..self.probe() }.look(&told)?;
-        let aim = foretelling.aim(goal, LONGER);
-        Ok((foretelling, aim))
-    }
-
-    /// What to say where no setting will do.
-    fn out_of_reach(&self, foretelling: &Predictor) -> Error {
-        let best = foretelling.best(&self.probe().range()).map(|best| {
+    /// The error where no setting is found that reaches the target.
+    fn out_of_reach(&self, predictor: &Predictor) -> Error {
+        let best = predictor.best_within(&self.probe().range(), &|_| true).map(|best| {
             let took = seconds(best.seconds * self.probe().frames_each(best.reuse));
             let psnr = decibels(best.psnr());
             format!("; {} would come to {psnr}, in {took}", self.options(&best))
         });
-        // A figure that goes with no error for sure: what was seen of it.
-        let seen = foretelling.nearest().map(|(tried, figure)| {
-            let in_words = |goal: Goal| goal.in_words(figure);
-            let figure = self.args.target.and_then(in_words).unwrap_or_default();
-            let tried = spelled::samples(tried.spp, tried.shadow, tried.sky, &self.plan());
-            format!("; of what was tried, {tried} came nearest, to {figure}")
-        });
-        let nearest = seen.or(best).unwrap_or_default();
+        let nearest = best.unwrap_or_default();
         let fewer = match self.given() == FixedSettings::default() {
             true => "",
             false => ", or give fewer options",
         };
         Error::Usage(format!(
-            "no setting is foretold to reach {}{nearest}\n  help: ask for less{fewer}",
+            "no setting is predicted to reach {}{nearest}\n  help: ask for less{fewer}",
             self.args.words()
         ))
     }
@@ -232,7 +193,7 @@ impl Chooser<'_> {
     fn before(&self) -> Option<Choice> {
         let before = Choice::of(&self.request.header_before(self.tracer)?)?;
         let is_same = before.wanted == self.args.words()
-            && before.base == Header::settings(self.stage.base)
+            && before.base == Header::settings(self.context.base)
             && before.given == self.given();
         is_same.then_some(before)
     }
@@ -249,18 +210,18 @@ impl Chooser<'_> {
     }
 
     fn plan(&self) -> EffectPlan {
-        EffectPlan::of(self.stage.scene, self.stage.base)
+        EffectPlan::of(self.context.scene, self.context.base)
     }
 
-    /// The options that stand for what was chosen, as far as they have a part in the scene.
-    fn options(&self, foretold: &Prediction) -> String {
-        spelled::options(&foretold.settings(self.stage.base), &self.plan())
+    /// Command-line options of `predicted` that have an effect in the scene.
+    fn options(&self, predicted: &Prediction) -> String {
+        spelled::options(&predicted.settings(self.context.base), &self.plan())
     }
 
-    /// Who looks at the scene for this job.
+    /// A probe for this job.
     pub fn probe(&self) -> SettingsProbe<'_> {
         SettingsProbe {
-            stage: self.stage,
+            context: self.context,
             frames: self.request.frames,
             goal: self.args.target,
             given: self.given(),
@@ -272,10 +233,10 @@ impl Chooser<'_> {
 
     fn say_choice(&self, choice: &Choice) {
         self.tell(format!(
-            "for {}: {}\nforetold: {}",
+            "for {}: {}\npredicted: {}",
             choice.wanted,
-            self.options(&choice.foretold),
-            choice.foretold_in_words()
+            self.options(&choice.predicted),
+            choice.prediction_in_words()
         ));
     }
 

@@ -16,12 +16,12 @@ fn header(job: &Job) -> Value {
 fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
     let job = Job::new();
     let said = job.done(&format!("{LINE} --target psnr=38")).err;
-    for words in ["for psnr=38: --spp ", "foretold: PSNR ", "came out: PSNR "] {
+    for words in ["for psnr=38: --spp ", "predicted: PSNR ", "came out: PSNR "] {
         assert!(said.contains(words), "{words}: {said}");
     }
     let (first, before) = (header(&job), job.read("o/f_02.png"));
     assert_eq!(first["chosen"]["wanted"], "psnr=38");
-    assert_eq!(first["settings"]["spp"], first["chosen"]["foretold"]["samples"]["spp"]);
+    assert_eq!(first["settings"]["spp"], first["chosen"]["predicted"]["samples"]["spp"]);
     std::fs::remove_file(job.path("o/f_02.png")).expect("removed");
     let ran = job.done(&format!("{LINE} --target psnr=38 --threads 1"));
     assert!(ran.err.contains("as chosen before") && !ran.err.contains("probe:"), "{}", ran.err);
@@ -56,7 +56,7 @@ fn a_report_spells_out_what_was_chosen() {
         let begin = format!("tweenray {line} --shadow-samples ");
         assert!(command.starts_with(&begin), "{command}");
         assert!(command.ends_with(" --spp 3 --overwrite"), "{command}");
-        for row in ["Wanted", "Chosen", "Foretold", "Came out"] {
+        for row in ["Wanted", "Chosen", "Predicted", "Came out"] {
             assert!(page.contains(&format!("<th scope=\"row\">{row}</th>")), "{row}");
         }
         let has_verdict = page.contains("<th scope=\"row\">Verdict</th>");
@@ -127,11 +127,11 @@ fn a_budget_that_more_frames_exceed_is_warned_of() {
     let manifest = String::from_utf8(job.read("o/f.manifest.jsonl")).expect("UTF-8");
     let (first, rows) = manifest.split_once('\n').expect("lines");
     let mut slow: Value = serde_json::from_str(first).expect("JSON");
-    slow["chosen"]["foretold"]["seconds"] = 100.into();
+    slow["chosen"]["predicted"]["seconds"] = 100.into();
     std::fs::write(job.path("o/f.manifest.jsonl"), format!("{slow}\n{rows}")).expect("written");
     let ran = job.done(&line);
     assert!(ran.err.contains("as chosen before"), "{}", ran.err);
-    assert!(ran.err.contains("warning: 2 frames are left and the job is foretold"), "{}", ran.err);
+    assert!(ran.err.contains("warning: 2 frames are left and the job is predicted"), "{}", ran.err);
     assert!(ran.err.contains(", not 2 s; --overwrite"), "{}", ran.err);
     assert!(ran.err.contains("; in all "), "{}", ran.err);
     let ran = job.done(&line);
@@ -162,12 +162,12 @@ fn figures_that_need_neighbours_are_targets_too() {
     for (target, figure) in targets {
         let said = job.done(&format!("{LINE} --target {target} --overwrite")).err;
         // Before and afterwards in the same unit. Of a choice that is tightened later, by what nothing was
-        // tried of, the figure may not be foretold.
+        // tried of, the figure may not be predicted.
         let line = |begin: &str| said.lines().find(|line| line.starts_with(begin)).expect("said");
-        assert!(line("foretold: ").starts_with(&format!("foretold: {figure}")), "{said}");
+        assert!(line("predicted: ").starts_with(&format!("predicted: {figure}")), "{said}");
         let came = line("came out: ");
         assert!(came.starts_with(&format!("came out: {figure}")), "{said}");
-        assert!(came.contains(&format!(" in the worst, foretold {figure}")), "{said}");
+        assert!(came.contains(&format!(" in the worst, predicted {figure}")), "{said}");
     }
 }
 
@@ -182,13 +182,13 @@ fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
     let bits = said(&format!("{LINE} --target psnr=70"), "--png-bits 16");
     assert!(!bits.contains("probe:"), "{bits}");
     let samples =
-        said(&format!("{LINE} --target psnr=50 --spp 1"), "is foretold to reach psnr=50; --spp 1");
+        said(&format!("{LINE} --target psnr=50 --spp 1"), "is predicted to reach psnr=50; --spp 1");
     assert!(!samples.contains("bits") && samples.contains("give fewer options"), "{samples}");
     assert!(!job.path("o/f_01.png").exists());
 }
 
 #[test]
-fn what_cannot_be_foretold_is_refused() {
+fn what_cannot_be_predicted_is_refused() {
     let job = Job::new();
     for target in ["psnr", "psnr=", "psnr=-1", "psnr=nan", "ssim=2", "max-share=200%", "flip=0"] {
         job.refused(&format!("{LINE} --target {target}"), "--target");

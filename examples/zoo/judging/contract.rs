@@ -40,7 +40,7 @@ pub struct Tile {
     pub traced: f64,
     /// What an independent trace hardly ever exceeds.
     pub bound: f64,
-    /// By how many of its deviations each trace exceeds what the others foretell.
+    /// By how many of its deviations each trace exceeds what the others predict.
     pub chance: [f64; TRACES],
 }
 
@@ -53,13 +53,13 @@ impl Tile {
             let all = traces.each_ref().map(Vec::as_slice);
             let chance = std::array::from_fn(|k| {
                 let others: Vec<&[f64]> = (0..TRACES).filter(|i| *i != k).map(|i| all[i]).collect();
-                Foretold::new(&pixels, &others).deviations(mean(all[k]))
+                Expected::new(&pixels, &others).deviations(mean(all[k]))
             });
             Self {
                 place,
                 inferred: mean(inferred),
                 traced: mean(all[0]),
-                bound: Foretold::new(&pixels, &all).bound(),
+                bound: Expected::new(&pixels, &all).bound(),
                 chance,
             }
         };
@@ -83,13 +83,13 @@ impl Tile {
 }
 
 /// What is to be expected of a further trace of some pixels.
-struct Foretold {
+struct Expected {
     /// MSE, the floor at least.
     mse: f64,
     deviation: f64,
 }
 
-impl Foretold {
+impl Expected {
     fn new(pixels: &[usize], traces: &[&[f64]]) -> Self {
         let k = traces.len() as f64;
         let n = pixels.len() as f64;

@@ -86,7 +86,7 @@ impl FrameFigures {
         self.tiles.iter().all(Tile::keeps)
     }
 
-    /// By how many deviations each of the traces exceeds what the others foretell, in its worst tile.
+    /// By how many deviations each of the traces exceeds what the others predict, in its worst tile.
     pub fn chance(&self) -> [f64; TRACES] {
         std::array::from_fn(|k| self.tiles.iter().map(|t| t.chance[k]).fold(0.0, f64::max))
     }

@@ -44,7 +44,7 @@ pub struct Frame {
     pub far_off: [f64; 2],
     pub keeps_strictly: bool,
     pub keeps: bool,
-    /// By how many deviations independent traces of it exceed what others foretell, in the worst tile.
+    /// By how many deviations independent traces of it exceed what others predict, in the worst tile.
     pub chance: Vec<f64>,
     /// How many of them break their bound.
     pub chance_breaks: usize,

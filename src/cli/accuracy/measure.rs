@@ -2,7 +2,9 @@
 
 use super::line::ProgressLine;
 use super::{AccuracyArgs, Outcome, files, page};
-use crate::accuracy::{self, Convergence, Heard, Ledger, OracleCrop, Step, Sweep, Truth, Writing};
+use crate::accuracy::{
+    self, Convergence, Ledger, OracleCrop, Step, Sweep, SweepProgress, Truth, Writing,
+};
 use crate::cli::exit::Exit;
 use crate::cli::progress::duration;
 use crate::cli::signals::Interrupt;
@@ -72,17 +74,17 @@ impl SweepJob<'_> {
         // First: whoever is out of patience loses no sweep.
         if self.oracle_was_wanted && ledger.note::<Option<OracleCrop>>(ORACLE).is_none() {
             self.line.tell("the oracle, on a crop", 0.0, None);
-            let crop = accuracy::on_a_crop(self.sweep.stage, self.sweep.shown_frame())?;
+            let crop = accuracy::on_a_crop(self.sweep.context, self.sweep.shown_frame())?;
             ledger.keep_note(ORACLE, &crop)?;
         }
         if self.writing_is_wanted && ledger.note::<Writing>(WRITING).is_none() {
             self.line.tell("writing frames and checkpoints", 0.0, None);
-            let writing = accuracy::on_disk(self.sweep.stage, &self.args.output.join("sweep"))?;
+            let writing = accuracy::on_disk(self.sweep.context, &self.args.output.join("sweep"))?;
             ledger.keep_note(WRITING, &writing)?;
         }
         let truth = self.truth(ledger)?;
         let last_turn = Cell::new(None);
-        let mut hear = |heard: Heard| {
+        let mut hear = |heard: SweepProgress| {
             self.heard(&heard);
             // After each turn: whoever kills the program has a page of what there was.
             if last_turn.replace(Some(heard.turn)).is_some_and(|turn| turn != heard.turn) {
@@ -93,8 +95,8 @@ impl SweepJob<'_> {
         self.sweep.run(&truth, ledger, &mut hear)
     }
 
-    fn heard(&self, heard: &Heard) {
-        let Heard { done, of, turn, candidate, left, .. } = heard;
+    fn heard(&self, heard: &SweepProgress) {
+        let SweepProgress { done, of, turn, candidate, left, .. } = heard;
         let turn = if *turn == 0 { "warm-up".into() } else { format!("turn {turn}") };
         let name = page::name_of(&candidate.options);
         let text = format!("{} of {of}  {turn}  {name}", (done + 1).min(*of));
@@ -113,8 +115,8 @@ impl SweepJob<'_> {
         };
         let settings: Vec<&Settings> = self.sweep.candidates.iter().map(|c| &c.settings).collect();
         let convergence = Convergence {
-            stage: self.sweep.stage,
-            settings: accuracy::truth_settings(self.sweep.stage.base, &settings),
+            context: self.sweep.context,
+            settings: accuracy::truth_settings(self.sweep.context.base, &settings),
             frames: self.sweep.frames,
             wanted,
             most: self.args.reference_spp,
@@ -165,16 +167,16 @@ impl SweepJob<'_> {
             writing: ledger.note(WRITING).filter(|_| self.writing_is_wanted),
             shown_frame: sweep.shown_frame(),
             frames: sweep.frames,
-            shot_frames: sweep.stage.shot.frames,
-            threads: sweep.stage.pool.current_num_threads(),
-            tracer: sweep.stage.intersector.describe(),
+            shot_frames: sweep.context.shot.frames,
+            threads: sweep.context.pool.current_num_threads(),
+            tracer: sweep.context.intersector.describe(),
             load: self.load_of(ledger),
             seconds: ledger.is_running().then(|| self.start.elapsed().as_secs_f64()),
             runs: ledger.runs(),
             trials: [sweep.done(ledger), sweep.trials()],
             settings: sweep.candidates.len(),
-            base: sweep.stage.base,
-            plan: EffectPlan::of(sweep.stage.scene, sweep.stage.base),
+            base: sweep.context.base,
+            plan: EffectPlan::of(sweep.context.scene, sweep.context.base),
             turns: sweep.turns,
         })
     }

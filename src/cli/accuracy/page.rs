@@ -7,7 +7,7 @@ use super::given::{Given, given, with_given};
 use super::{AccuracyArgs, Outcome};
 use crate::accuracy::{
     CandidateRow, Goal, Knob, about_knob, about_oracle, about_writing, best_within,
-    fastest_reaching, untold,
+    fastest_reaching, perhaps_faster,
 };
 use crate::cli::spelled;
 use crate::error::Result;
@@ -84,7 +84,7 @@ fn summary(outcome: &Outcome) -> Vec<String> {
         let share = percent(median_of(row) / time);
         lines.push(format!("{} is as near in {share} of the time.", row.options));
     }
-    if let Some(row) = untold(&outcome.measured, goal, row) {
+    if let Some(row) = perhaps_faster(&outcome.measured, goal, row) {
         lines.push(format!(
             "{} may be as near in less time, but {} turns are too few to tell that from noise: more --turns \
              are needed, 6 or so.",

@@ -1,7 +1,6 @@
-//! A time that a job is to take, and what is left of it for rendering.
+//! A budget: the time that a job is to take, and how much of it is left for rendering.
 
 use super::{Choice, Chooser};
-use crate::accuracy::{CheckOutcome, Effort, Predictor, SampleCounts};
 use crate::film::Film;
 use crate::math::Rgb;
 use crate::output::{WriteOptions, write_image};
@@ -10,22 +9,17 @@ use crate::sampling::mix;
 use crate::scene::Settings;
 use std::time::Instant;
 
-/// Shares of what is left when the probe begins: for the probe's sweep, and for the check at most.
+/// Share of the time left when the probe begins that its sweep takes.
 const PROBE_SHARE: f64 = 0.15;
-const CHECK_SHARE: f64 = 0.07;
-/// Kept back of what is left for rendering: times foretold are off by some per cent either way.
-const RESERVE: f64 = 0.05;
-/// What a video takes: to start its program, and by the pixel; measured.
+/// Share of the time left for rendering that is kept back for the check and for errors of predicted times.
+const RESERVE: f64 = 0.1;
+/// Seconds of a video: to start its program, and for each pixel; measured.
 const VIDEO: [f64; 2] = [0.2, 4e-8];
 
 /// A budget, counted from the start of the program.
 pub(super) struct Budget {
     started: Instant,
     seconds: f64,
-    /// Seconds kept back for the check at most.
-    check: f64,
-    /// Frames, and pixels of each: what there is for a check to look at.
-    there_is: (u32, u64),
     /// Seconds for the video.
     video: f64,
     /// Seconds that a rank takes to write its frames.
@@ -33,23 +27,19 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// The budget asked for, if any.
+    /// The job's budget; `None` where there is none.
     pub fn of(chooser: &Chooser) -> Option<Self> {
         let (started, seconds) = (chooser.started, chooser.args.budget?.as_secs_f64());
-        let (request, settings) = (chooser.request, chooser.stage.base);
-        let count = request.frames.last - request.frames.first + 1;
-        let there_is = (count, u64::from(settings.width) * u64::from(settings.height));
-        let (frames, pixels) = (f64::from(count), there_is.1 as f64);
+        let (request, settings) = (chooser.request, chooser.context.base);
+        let frames = f64::from(request.frames.last - request.frames.first + 1);
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
         let [start, each] = VIDEO;
         let is_video = request.options.video && frames > 1.0;
-        let check = CHECK_SHARE * (seconds - started.elapsed().as_secs_f64()).max(0.0);
         let ending = request.pattern.path(request.frames.first);
         let ending = ending.extension().and_then(|e| e.to_str()).unwrap_or("png").to_string();
         Some(Self {
             started,
             seconds,
-            check,
-            there_is,
             video: if is_video { start + each * pixels * frames } else { 0.0 },
             writing: (frames / f64::from(chooser.ranks)).ceil() * writing(settings, &ending),
         })
@@ -64,66 +54,36 @@ impl Budget {
         PROBE_SHARE * (self.seconds - self.gone()).max(0.0)
     }
 
-    /// Seconds that are left, as of now, for tracing frames of `samples`.
-    pub fn left(&self, foretelling: &Predictor, samples: SampleCounts) -> f64 {
-        let check = self.kept_back(foretelling, samples);
-        let left = self.seconds - self.gone() - check - self.video - self.writing;
+    /// Seconds that are left, as of now, for tracing frames.
+    pub fn left(&self) -> f64 {
+        let left = self.seconds - self.gone() - self.video - self.writing;
         (1.0 - RESERVE) * left.max(0.0)
-    }
-
-    /// Seconds for the check of frames of `samples`; none where their share is too little for any.
-    fn kept_back(&self, foretelling: &Predictor, samples: SampleCounts) -> f64 {
-        let all = |effort: Effort| self.check_seconds(effort, foretelling, samples);
-        self.effort_in(self.check, foretelling, samples).map_or(0.0, all)
-    }
-
-    fn check_seconds(&self, effort: Effort, foretelling: &Predictor, samples: SampleCounts) -> f64 {
-        let (frames, pixels) = self.there_is;
-        CheckOutcome::seconds(foretelling, samples) * effort.looked_at(frames, pixels)
-    }
-
-    fn effort_in(
-        &self,
-        time: f64,
-        foretelling: &Predictor,
-        samples: SampleCounts,
-    ) -> Option<Effort> {
-        let (frames, pixels) = self.there_is;
-        Effort::of_check(time, CheckOutcome::seconds(foretelling, samples), frames, pixels)
-    }
-
-    /// What there is time for now to look at; else the seconds that the least check would take.
-    pub fn effort(&self, foretelling: &Predictor, samples: SampleCounts) -> Result<Effort, f64> {
-        let left = self.seconds - self.gone() - self.video;
-        let least = || self.check_seconds(Effort::LEAST, foretelling, samples);
-        self.effort_in(left, foretelling, samples).ok_or_else(least)
     }
 }
 
 impl Chooser<'_> {
-    /// Warns where frames that are not there yet, under what was chosen for fewer frames or more time,
-    /// are foretold to take longer than there is.
+    /// Warns where the frames still to be rendered are predicted to take longer than the budget leaves: `before`
+    /// may have been chosen for fewer frames.
     pub(super) fn warn_if_long(&self, before: &Choice) {
         let Some(budget) = Budget::of(self) else { return };
         let (first, last) = (self.request.frames.first, self.request.frames.last);
         let left = (first..=last).filter(|n| !self.request.pattern.path(*n).exists()).count();
         let share = left as f64 / f64::from(last - first + 1);
-        let foretold = &before.foretold;
-        let rendering = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let predicted = &before.predicted;
+        let rendering = predicted.seconds * self.probe().frames_each(predicted.reuse);
         let all = budget.gone() + share * (rendering + budget.writing) + budget.video;
         if left > 0 && all > budget.seconds {
             let [all, asked] = [all, budget.seconds].map(seconds);
             let frames = if left == 1 { "1 frame is" } else { &format!("{left} frames are") };
             self.warn(format!(
-                "{frames} left and the job is foretold to take {all}, not {asked}; --overwrite \
+                "{frames} left and the job is predicted to take {all}, not {asked}; --overwrite \
                  chooses anew"
             ));
         }
     }
 }
 
-/// Wall seconds that writing a frame takes, in the temporary folder; 0 where it cannot be tried: the
-/// job itself will say why.
+/// Wall seconds to write a frame in the temporary folder; 0 where that fails: the job itself will say why.
 fn writing(settings: &Settings, ending: &str) -> f64 {
     let Ok(folder) = tempfile::tempdir() else { return 0.0 };
     let mut film = Film::new(settings.width, settings.height, false);

@@ -10,62 +10,62 @@ use crate::scene::{FrameRange, Settings};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// What was chosen and why; the manifest keeps it, so that a job that goes on chooses nothing anew.
+/// The settings that were chosen, and why. The manifest keeps them, so that a job that goes on does not choose
+/// again.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Choice {
-    /// What was wanted, in words.
+    /// The target or budget, as on the command line.
     pub wanted: String,
-    /// The settings before, and which of them the user gave.
+    /// The settings before the choice.
     pub(super) base: Value,
+    /// Which of them the user gave.
     pub(super) given: FixedSettings,
-    /// The squared error that the target allows, display steps.
-    pub(super) allowed: Option<f64>,
-    /// What is foretold of the choice.
-    pub foretold: Prediction,
-    /// All that the probe found out.
-    pub(super) foretelling: Predictor,
-    /// Wall seconds that rendering and writing all frames is foretold to take.
+    /// The setting that was chosen, with its predicted error and time.
+    pub predicted: Prediction,
+    /// The predictor that the probe made.
+    pub(super) predictor: Predictor,
+    /// Wall seconds that rendering and writing all frames is predicted to take.
     pub(super) seconds: f64,
-    /// How often it was tightened.
+    /// How often the choice was tightened after a miss.
     pub tightened: u32,
-    /// What was held against what came out: the shot's hash, and frames of it.
+    /// The finished frames that were checked: the shot's hash, and the range of frames.
     pub(super) checked: Option<(String, FrameRange)>,
-    /// How good these came out, in words, if they were looked at.
+    /// The check's result in words; `None` before a check.
     #[serde(default)]
     pub came_out: Option<String>,
-    /// What came of the target then.
+    /// Whether the target was reached; `None` before a check, and for a budget.
     #[serde(default)]
     pub(super) verdict: Option<Verdict>,
 }
 
 impl Choice {
-    /// The settings that were chosen over `base`.
+    /// `base` with the settings that were chosen.
     pub fn settings(&self, base: &Settings) -> Settings {
-        self.foretold.settings(base)
+        self.predicted.settings(base)
     }
 
-    /// As the manifest keeps it.
+    /// The choice as JSON, for the manifest.
     pub fn value(&self) -> Value {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Whether `frames` of the shot of this hash were held against what came out.
+    /// Whether a check was made of a range that has all of `frames`, of the shot of this hash.
     pub fn is_checked(&self, shot: &str, frames: FrameRange) -> bool {
         let holds = |seen: &FrameRange| seen.first <= frames.first && frames.last <= seen.last;
         self.checked.as_ref().is_some_and(|(hash, seen)| hash == shot && holds(seen))
     }
 
-    /// The choice whose `frames` were.
+    /// The choice with the note that `frames` of the shot of this hash were checked.
     pub fn checked(self, shot: &str, frames: FrameRange) -> Self {
         Self { checked: Some((shot.into(), frames)), ..self }
     }
 
-    /// The choice that a manifest's header holds, if this version can read it.
+    /// The choice in a manifest's header; `None` where there is none that this version can read.
     pub fn of(header: &Header) -> Option<Self> {
         serde_json::from_value(header.chosen.clone()?).ok()
     }
 
-    /// What came of the target, if there was one and it was looked at.
+    /// Whether the target was reached, in words; `None` before a check, and for a budget.
     pub fn verdict(&self) -> Option<String> {
         let came = match self.verdict? {
             Verdict::Reached => "reached",
@@ -75,13 +75,13 @@ impl Choice {
         Some(format!("{}: {came}", self.wanted))
     }
 
-    /// All options that stand for it, whether they have a part in the scene or not.
+    /// All command-line options of the choice, also those without effect in the scene.
     pub fn options(&self) -> String {
-        spelled::options(&self.foretold.settings(&Settings::default()), &EffectPlan::EVERYTHING)
+        spelled::options(&self.predicted.settings(&Settings::default()), &EffectPlan::EVERYTHING)
     }
 
-    /// The command that gives the same frames whatever the clock says: what was chosen in place of the
-    /// wish. Options that are given stay.
+    /// `command` with the chosen options in place of `--target` or `--budget`: it gives the same frames on any
+    /// machine. Options in `command` stay.
     pub fn spelled_out(&self, command: &[String]) -> Vec<String> {
         let options = self.options();
         let options: Vec<&str> = options.split(' ').collect();
@@ -102,25 +102,24 @@ impl Choice {
         words
     }
 
-    /// What is foretold of it, in words.
-    pub fn foretold_in_words(&self) -> String {
+    /// Predicted error and time, in words.
+    pub fn prediction_in_words(&self) -> String {
         format!(
             "{}PSNR {} in the worst frame, {} a frame, {} in all",
             self.figure().map_or(String::new(), |figure| format!("{figure}, ")),
-            decibels(self.foretold.psnr()),
-            seconds(self.foretold.seconds),
+            decibels(self.predicted.psnr()),
+            seconds(self.predicted.seconds),
             seconds(self.seconds)
         )
     }
 
-    /// What is foretold of it in the target's own unit, unless that is PSNR.
+    /// The target's figure of the choice as the probe measured it, in words; `None` for PSNR and for budgets.
     pub(super) fn figure(&self) -> Option<String> {
-        let figure = self.foretelling.foretold_figure(&self.foretold)?;
-        values::goal(&self.wanted).ok()?.in_words(figure)
+        values::goal(&self.wanted).ok()?.in_words(self.predicted.figure?)
     }
 }
 
-/// Whether a command leaves settings to the program.
+/// Whether a command has `--target` or `--budget`.
 pub fn asks_for_choice(command: &[String]) -> bool {
     command.iter().any(|word| is_wish(word))
 }

@@ -34,7 +34,7 @@ impl Chooser<'_> {
 
     /// Where frames would go, were nothing chosen.
     fn target(&self) -> Result<Target> {
-        let setup = self.request.setup(self.stage.base.clone())?;
+        let setup = self.request.setup(self.context.base.clone())?;
         Ok(self.request.target(&setup, self.tracer))
     }
 
@@ -47,7 +47,7 @@ impl Chooser<'_> {
             return Ok(format!("made for {}", chosen.wanted));
         }
         let base = |settings: Value, header: Header| Header { settings, ..header };
-        let now = base(Header::settings(self.stage.base), self.target()?.header);
+        let now = base(Header::settings(self.context.base), self.target()?.header);
         // Where others were given, the first difference may be of one that nobody gave.
         let is_given_alike = chosen.given == self.given();
         let d = base(chosen.base, before.clone()).first_difference(&now).filter(|_| is_given_alike);

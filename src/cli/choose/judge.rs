@@ -1,22 +1,19 @@
-//! What came of the settings that were chosen, and tighter ones where a target was missed.
+//! The check of finished frames, and a tighter choice where a target was missed.
 
-use super::budget::Budget;
 use super::{Choice, Chooser, Judgement, decibels};
-use crate::accuracy::{CheckOutcome, Effort, Prediction, Timer, Verdict, displayed_rgb};
+use crate::accuracy::{CheckOutcome, Effort, Goal, Prediction, Timer, Verdict, displayed_rgb};
 use crate::error::{Result, counted};
 use crate::film::{Encoding, Image};
 use crate::output::manifest::AuditRow;
 use crate::output::read_image;
 use crate::page::words::seconds;
 
-/// How often a target that was missed is tightened.
+/// How often a choice that missed is tightened.
 const ROUNDS: u32 = 2;
 
-/// Share of the job that a look at what came out takes, where no time is to be kept.
-const CHECK_SHARE: f64 = 0.1;
-
 impl Chooser<'_> {
-    /// Says what came out of `choice`, and makes a tighter one where the target was missed.
+    /// Checks the finished frames of `choice`, says how good they are, and makes a tighter choice where the target
+    /// was missed. `rendered` has the seconds that rendering took, if all frames were rendered now.
     ///
     /// # Errors
     /// A frame that cannot be read or traced.
@@ -27,45 +24,28 @@ impl Chooser<'_> {
         rendered: Option<f64>,
         timer: Timer,
     ) -> Result<Judgement> {
-        let samples = choice.foretold.samples;
-        let budget = Budget::of(self);
-        let effort = match budget.map(|budget| budget.effort(&choice.foretelling, samples)) {
-            None => self.effort_of_check(&choice),
-            Some(Ok(effort)) => effort,
-            Some(Err(least)) => {
-                self.tell_unchecked(&choice, least, rendered);
-                return Ok(Judgement::Done(choice));
-            }
-        };
-        let (foretelling, foretold) = (&choice.foretelling, &choice.foretold);
+        let (frames, settings) = (self.request.frames, self.context.base);
+        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let effort = Effort::of_check(frames.last - frames.first + 1, pixels);
+        let (predictor, predicted) = (&choice.predictor, &choice.predicted);
         let image = |frame| self.image(frame);
-        let check = CheckOutcome::of(&self.probe(), foretelling, foretold, effort, &image)?;
+        let check = CheckOutcome::of(&self.probe(), predictor, predicted, effort, &image)?;
         let [mean, worst] = check.psnr().map(decibels);
         let looked = counted(check.frames.len(), "frame");
         let psnr = format!(
-            "PSNR {mean}, {worst} in the worst of {looked} looked at, foretold {}",
-            decibels(foretold.psnr())
+            "PSNR {mean}, {worst} in the worst of {looked} looked at, predicted {}",
+            decibels(predicted.psnr())
         );
         let figure = self.args.target.and_then(|goal| goal.in_words(check.figure));
         let figure = figure.map_or(String::new(), |came| {
-            let foretold = choice.figure();
-            let foretold = foretold.map_or(String::new(), |words| format!(", foretold {words}"));
-            format!("{came} in the worst{foretold}; ")
+            let predicted = choice.figure();
+            let predicted = predicted.map_or(String::new(), |words| format!(", predicted {words}"));
+            format!("{came} in the worst{predicted}; ")
         });
         let time = self.time(&choice, rendered);
         self.tell(format!("came out: {figure}{psnr}{time}"));
         let came_out = Some(format!("{figure}{psnr}"));
         self.weigh(Choice { came_out, ..choice }, &check, audit, timer)
-    }
-
-    /// How much to look at where no time is to be kept: for a small share of the job.
-    fn effort_of_check(&self, choice: &Choice) -> Effort {
-        let whole = CheckOutcome::seconds(&choice.foretelling, choice.foretold.samples);
-        let (frames, settings) = (self.request.frames, self.stage.base);
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let count = frames.last - frames.first + 1;
-        let effort = Effort::of_check(CHECK_SHARE * choice.seconds, whole, count, pixels);
-        effort.unwrap_or(Effort::LEAST)
     }
 
     /// `choice` with its verdict, or a tighter one where the target was missed and one may be had.
@@ -76,12 +56,10 @@ impl Chooser<'_> {
         audit: Option<&AuditRow>,
         timer: Timer,
     ) -> Result<Judgement> {
-        let (Some(goal), Some(allowed)) = (self.args.target, choice.allowed) else {
-            return Ok(Judgement::Done(choice));
-        };
-        let excess = check.excess(goal, allowed).max(audited_excess(audit, allowed));
+        let Some(goal) = self.args.target else { return Ok(Judgement::Done(choice)) };
+        let excess = check.excess(goal).max(audited_excess(audit, goal));
         if excess <= 1.0 {
-            let verdict = Some(check.verdict(goal, allowed));
+            let verdict = Some(check.verdict(goal));
             return Ok(Judgement::Done(Choice { verdict, ..choice }));
         }
         let missed = |choice| Judgement::Done(Choice { verdict: Some(Verdict::Missed), ..choice });
@@ -89,30 +67,19 @@ impl Chooser<'_> {
             self.warn(format!("{} was missed, and is not tightened again", choice.wanted));
             return Ok(missed(choice));
         }
-        // So much more than foretold.
-        let factor = excess * allowed / choice.foretold.squared_error.max(1e-9);
-        Ok(match self.tighter(&choice, allowed, factor, timer)? {
+        Ok(match self.tighter(&choice, excess, timer)? {
             Some(tighter) => Judgement::Again(tighter),
             None => missed(choice),
         })
     }
 
-    /// Says that there is no time for a look at what came out, which would take `least` seconds.
-    fn tell_unchecked(&self, choice: &Choice, least: f64, rendered: Option<f64>) {
-        self.tell(format!(
-            "came out: not looked at, which would take {} or more{}",
-            seconds(least),
-            self.time(choice, rendered)
-        ));
-    }
-
-    /// What rendering took beside what was foretold, if it was all rendered now, and all beside the
-    /// budget.
+    /// Time of rendering beside the prediction, if `rendered` has it, and of the program beside the budget, in
+    /// words.
     fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
-        let foretold = choice.seconds;
+        let predicted = choice.seconds;
         let rendering = rendered.map_or(String::new(), |took| {
-            let [came, said] = [took, foretold].map(seconds);
-            format!("; rendering took {came}, foretold {said} ({})", beyond(took, foretold))
+            let [came, said] = [took, predicted].map(seconds);
+            format!("; rendering took {came}, predicted {said} ({})", beyond(took, predicted))
         });
         let all = self.started.elapsed().as_secs_f64();
         let budget = self.args.budget.map_or(String::new(), |budget| {
@@ -123,32 +90,30 @@ impl Chooser<'_> {
         rendering + &budget
     }
 
-    /// The choice with errors `factor` times as large as foretold.
-    fn tighter(
-        &self,
-        choice: &Choice,
-        allowed: f64,
-        factor: f64,
-        timer: Timer,
-    ) -> Result<Option<Choice>> {
-        // A tenth beyond what was seen, lest the next round misses by a hair; and never looser.
-        let mut foretelling = choice.foretelling.worse(1.1 * f64::max(1.0, factor));
+    /// A choice whose predicted squared error is smaller by the factor `excess`; `None` where there is none.
+    fn tighter(&self, choice: &Choice, excess: f64, timer: Timer) -> Result<Option<Choice>> {
+        let mut predictor = choice.predictor.clone();
         if !self.given().bounces {
-            foretelling = foretelling.with_more_bounces();
+            predictor = predictor.with_more_bounces();
         }
-        let found = self.probe().fastest(&foretelling, allowed, timer)?;
-        let set = |foretold: &Prediction| (foretold.samples, foretold.bounces);
-        let Some(foretold) = found.filter(|found| set(found) != set(&choice.foretold)) else {
+        // A tenth beyond what was seen, lest the next round misses by a hair.
+        let allowed = choice.predicted.squared_error / (1.1 * excess);
+        let range = self.probe().range();
+        let of_mode = |mode| predictor.fastest(mode, &range, allowed);
+        let found = predictor.modes.iter().filter_map(of_mode).collect();
+        let found = self.probe().fastest(found, timer)?;
+        let set = |predicted: &Prediction| (predicted.samples, predicted.bounces);
+        let Some(predicted) = found.filter(|found| set(found) != set(&choice.predicted)) else {
             self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
             return Ok(None);
         };
         let tightened = choice.tightened + 1;
-        let seconds = foretold.seconds * self.probe().frames_each(foretold.reuse);
+        let seconds = predicted.seconds * self.probe().frames_each(predicted.reuse);
         let (checked, verdict, came_out) = (None, None, None);
         let before = choice.clone();
         let tighter = Choice {
-            foretold,
-            foretelling,
+            predicted,
+            predictor,
             seconds,
             tightened,
             checked,
@@ -165,27 +130,32 @@ impl Chooser<'_> {
     fn image(&self, frame: u32) -> Result<Image> {
         let mut image = read_image(self.request.pattern.path(frame))?;
         if image.encoding == Encoding::Linear {
-            image.rgb = displayed_rgb(&image.rgb, self.stage.base);
+            image.rgb = displayed_rgb(&image.rgb, self.context.base);
             image.encoding = Encoding::Srgb;
         }
         Ok(image)
     }
 }
 
-/// By how much what came is more than what was foretold or allowed, in words: a plus is too much.
+/// By how much `came` is more than `expected`, in per cent with sign.
 fn beyond(came: f64, expected: f64) -> String {
     format!("{:+.0} %", 100.0 * (came / expected.max(1e-9) - 1.0))
 }
 
-/// By which factor the light's noise alone, by the audit's lower end, exceeds what is allowed.
-fn audited_excess(audit: Option<&AuditRow>, allowed: f64) -> f64 {
+/// The factor by which the noise of light alone, by the lower end of the audit's interval, exceeds what a PSNR
+/// allows.
+fn audited_excess(audit: Option<&AuditRow>, goal: Goal) -> f64 {
     let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
-    low * low / allowed
+    match goal {
+        Goal::Psnr(_) => low * low / goal.largest(),
+        _ => 0.0,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{audited_excess, beyond};
+    use crate::accuracy::Goal;
     use crate::output::manifest::AuditRow;
     use crate::stats::AuditSums;
 
@@ -204,8 +174,11 @@ mod tests {
             rmse_traced: None,
             sums: AuditSums::default(),
         };
-        assert_eq!(audited_excess(None, 1.0), 0.0);
-        assert!(audited_excess(Some(&audit([1.2, 0.9, 1.5])), 1.0) < 1.0);
-        assert_eq!(audited_excess(Some(&audit([3.0, 2.0, 4.0])), 2.0), 2.0);
+        // 48.13 dB allow an RMSE of one display step.
+        let goal = Goal::Psnr(48.13);
+        assert_eq!(audited_excess(None, goal), 0.0);
+        assert!(audited_excess(Some(&audit([1.2, 0.9, 1.5])), goal) < 1.0);
+        assert!((audited_excess(Some(&audit([3.0, 2.0, 4.0])), goal) - 4.0).abs() < 0.01);
+        assert_eq!(audited_excess(Some(&audit([3.0, 2.0, 4.0])), Goal::Flip(0.1)), 0.0);
     }
 }

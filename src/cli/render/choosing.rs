@@ -3,7 +3,7 @@
 use super::RenderArgs;
 use super::round::{RenderJob, Round};
 use super::site::Site;
-use crate::accuracy::{Stage, Timer, Timing};
+use crate::accuracy::{Timer, Timing, TrialContext};
 use crate::cli::choose::{Choice, Chooser, Judgement};
 use crate::cli::request::Request;
 use crate::cli::stats;
@@ -131,7 +131,7 @@ impl Choosing<'_> {
 
     fn ask<T>(&self, question: impl Fn(&Chooser) -> Result<T>) -> Result<T> {
         let (request, site) = (self.request, self.site);
-        let stage = Stage {
+        let context = TrialContext {
             scene: &request.scene,
             otherwise: None,
             shot: &request.shot,
@@ -144,7 +144,7 @@ impl Choosing<'_> {
         question(&Chooser {
             args: &self.args.choice,
             options: &self.args.settings,
-            stage: &stage,
+            context: &context,
             request,
             tracer: &site.tracer,
             started: site.clock.start,

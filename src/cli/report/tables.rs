@@ -118,7 +118,7 @@ pub fn chosen(job: &Job, choice: &Choice) -> Table {
     let mut row = |name: &str, value: String| table.rows.push(vec![name.into(), value]);
     row("Wanted", choice.wanted.clone());
     row("Chosen", choice.options());
-    row("Foretold", choice.foretold_in_words());
+    row("Predicted", choice.prediction_in_words());
     row("Came out", format!("{came_out}{time}"));
     if let Some(verdict) = choice.verdict() {
         row("Verdict", verdict);

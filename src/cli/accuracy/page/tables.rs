@@ -1,7 +1,7 @@
 //! All figures.
 
 use super::{median_of, name_of, with_changes, with_ends};
-use crate::accuracy::{Goal, fastest_reaching, untold};
+use crate::accuracy::{Goal, fastest_reaching, perhaps_faster};
 use crate::cli::accuracy::Outcome;
 use crate::measure::Median;
 use crate::page::Table;
@@ -34,9 +34,10 @@ pub fn goals(outcome: &Outcome) -> Table {
                     Goal::Flip(_) => short(e.flip),
                     Goal::MaxShare(_) => percent(e.share_over_2),
                 };
-                let perhaps = untold(&outcome.measured, goal, row).map_or(String::new(), |row| {
-                    format!("; perhaps {}, which takes more --turns to tell", row.options)
-                });
+                let perhaps = perhaps_faster(&outcome.measured, goal, row)
+                    .map_or(String::new(), |row| {
+                        format!("; perhaps {}, which takes more --turns to tell", row.options)
+                    });
                 let name = name_of(&row.options) + &perhaps;
                 [wanted, name, short(median_of(row)), reached]
             }

@@ -1,4 +1,4 @@
-//! What every trial shares: the scene, its move, the threads; and which scene and intersector a
+//! What all trials share: the scene, the camera's move, the threads; and the scene and intersector that a
 //! setting is traced with.
 
 use super::errors::displayed;
@@ -11,27 +11,27 @@ use crate::stats::RayCounts;
 use rayon::ThreadPool;
 use std::sync::atomic::AtomicBool;
 
-/// The scene and all that renders it.
-pub struct Stage<'a> {
-    /// As `rules.recentre` of the default wants it.
+/// The scene and everything needed to render it.
+pub struct TrialContext<'a> {
+    /// The scene, recentred or not as `rules.recentre` of the default says.
     pub scene: &'a Scene,
-    /// The scene with that rule the other way, where a candidate turns it.
+    /// The scene with `rules.recentre` the other way, where a candidate needs it.
     pub otherwise: Option<&'a Scene>,
     /// The camera's move.
     pub shot: &'a Shot,
     /// The default settings.
     pub base: &'a Settings,
-    /// The default's intersector.
+    /// The intersector of the default settings.
     pub intersector: &'a dyn Intersector,
-    /// Wall seconds that it took to build.
+    /// Wall seconds that `intersector` took to build.
     pub build_seconds: f64,
     /// The threads that render.
     pub pool: &'a ThreadPool,
-    /// Set when the sweep shall stop.
+    /// Set from outside to stop rendering.
     pub stop: &'a AtomicBool,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> TrialContext<'a> {
     /// The scene that `settings` are traced on.
     pub fn scene_of(&self, settings: &Settings) -> &'a Scene {
         match self.otherwise {
@@ -40,7 +40,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// An intersector for `settings`; `None` where the default's serves.
+    /// An intersector for `settings`; `None` where they need no other than [`Self::intersector`].
     ///
     /// # Errors
     /// As [`intersect::build`].
@@ -57,10 +57,10 @@ impl<'a> Stage<'a> {
         self.pool.install(|| intersect::build(scene, settings, threads)).map(Some)
     }
 
-    /// Frame `frame` traced whole on the default's scene, as displayed; and the rays cast.
+    /// Frame `frame` of [`Self::scene`], traced whole, as displayed; and the rays cast.
     ///
     /// # Errors
-    /// [`Error::Stopped`]; those of cameras.
+    /// [`Error::Stopped`]; errors of the camera's move.
     pub fn trace(
         &self,
         settings: &Settings,
