@@ -142,11 +142,11 @@ impl<'de> Deserialize<'de> for RayCounts {
 /// Surface points that a kept light could shine on, and how many of them needed no ray to one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReuseCounts {
-    /// Points seen directly.
+    /// Points seen directly and sharply.
     pub direct: u64,
     /// Those of them that were inferred.
     pub direct_inferred: u64,
-    /// Points seen in mirrors and through glass.
+    /// Points seen in mirrors, through glass or out of focus.
     pub specular: u64,
     /// Those of them that were inferred.
     pub specular_inferred: u64,
@@ -168,7 +168,7 @@ impl ReuseCounts {
         share(self.direct_inferred + self.specular_inferred, self.direct + self.specular)
     }
 
-    /// Share of the points seen in mirrors and through glass that were inferred, 0 to 1; `None` without any.
+    /// Share of the points seen in mirrors, through glass or out of focus that were inferred, 0 to 1; `None` without any.
     pub fn specular_share(&self) -> Option<f64> {
         share(self.specular_inferred, self.specular)
     }

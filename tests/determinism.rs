@@ -12,14 +12,14 @@ use tweenray::film::Film;
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    BuildQuality, DirectionalLight, Filter, Glass, Light, Material, QuadLight, Rect, Sky,
-    SphereLight, World, WorldMesh, WorldSphere,
+    BuildQuality, DirectionalLight, Filter, Glass, Lens, Light, Material, QuadLight, Rect, Sky,
+    SphereLight, ThinLens, World, WorldMesh, WorldSphere,
 };
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
 
 /// A bumpy floor of 3,200 triangles with spheres on it; `extras` adds lights and materials.
-fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
+fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
     let mut world = World::default();
     world.materials.push(Material::diffuse("floor", Rgb::new(0.6, 0.5, 0.4)));
     world.meshes.push(bumpy_floor(40));
@@ -37,7 +37,7 @@ fn busy_world(mirror: bool, glass: bool, area: bool, sky: bool) -> World {
         ball(Material { mirror: Rgb::splat(0.9), ..Material::black("mirror") }, -1.2);
     }
     if glass {
-        let glass = Glass { ior: 1.5, tint: Rgb::splat(0.98), priority: None };
+        let glass = Glass { ior: 1.5, tint: Rgb::splat(0.98), priority: ranked.then_some(1) };
         ball(Material { glass: Some(glass), ..Material::black("glass") }, 0.1);
     }
     ball(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)), 1.3);
@@ -81,13 +81,19 @@ fn bumpy_floor(n: u32) -> WorldMesh {
 }
 
 fn busy_job(width: u32, height: u32) -> Job {
-    let world = busy_world(true, true, true, true);
+    let world = busy_world([true, true, false, true, true]);
     let mut job = job(world, pose((0.5, 2.0, 5.0), (0.0, 0.5, 0.0)), width, height);
     job.settings.spp = 3;
     job.settings.filter = Filter::Gaussian;
     job.settings.shadow_samples = 5;
     job.settings.sky_samples = 3;
     job
+}
+
+/// The same job through a lens that blurs nearly everything.
+fn through_lens(job: Job) -> Job {
+    let lens = ThinLens { radius: 0.5, focus: 5.0, blades: 5, blade_rotation_degrees: 10.0 };
+    Job { camera: job.camera.with_lens(Lens::Thin(lens)), ..job }
 }
 
 fn on_threads(job: &Job, threads: usize) -> Film {
@@ -105,10 +111,11 @@ fn on_threads(job: &Job, threads: usize) -> Film {
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     // Not a multiple of the block or the tile.
-    let job = busy_job(101, 77);
-    let one = on_threads(&job, 1);
-    for threads in [2, 3, 8] {
-        assert!(one == on_threads(&job, threads), "{threads} threads differ");
+    for job in [busy_job(101, 77), through_lens(busy_job(101, 77))] {
+        let one = on_threads(&job, 1);
+        for threads in [2, 3, 8] {
+            assert!(one == on_threads(&job, threads), "{threads} threads differ");
+        }
     }
 }
 
@@ -139,9 +146,14 @@ fn other_trees_see_the_same_and_a_compact_one_is_smaller() {
 
 #[test]
 fn a_crop_has_the_bytes_of_the_whole() {
-    let whole = on_threads(&busy_job(101, 77), 2);
+    check_crops(&busy_job(101, 77));
+    check_crops(&through_lens(busy_job(101, 77)));
+}
+
+fn check_crops(job: &Job) {
+    let whole = on_threads(job, 2);
     for (x0, y0, x1, y1) in [(3, 5, 60, 41), (8, 8, 16, 16), (95, 70, 101, 77), (50, 40, 51, 41)] {
-        let mut job = busy_job(101, 77);
+        let mut job = job.clone();
         job.settings.crop = Some(Rect { x0, y0, x1, y1 });
         let part = on_threads(&job, 2);
         let (records, all) = (part.gbuffer.as_ref().unwrap(), whole.gbuffer.as_ref().unwrap());
@@ -156,30 +168,38 @@ fn a_crop_has_the_bytes_of_the_whole() {
 
 #[test]
 fn each_specialised_kernel_equals_the_one_with_everything_on() {
-    for bits in 0..16 {
+    let mut kernels = std::collections::BTreeSet::new();
+    for bits in 0..64u32 {
         let on = |bit: u32| bits >> bit & 1 == 1;
-        let world = busy_world(on(0), on(1), on(2), on(3));
+        let (mirror, glass, ranked, area, sky) = (on(0), on(1), on(1) && on(2), on(3), on(4));
+        let world = busy_world([mirror, glass, ranked, area, sky]);
         let mut job = job(world, pose((0.5, 2.0, 5.0), (0.0, 0.5, 0.0)), 40, 30);
         job.settings.spp = 2;
         let scene = job.world.clone().into_scene(true).unwrap();
         let plan = EffectPlan::of(&scene, &job.settings);
         assert_eq!(
-            [plan.mirror, plan.glass, plan.area_lights, plan.sky_light],
-            [on(0), on(1), on(2), on(3)]
+            [plan.mirror, plan.glass, plan.nested_glass, plan.area_lights, plan.sky_light],
+            [mirror, glass, ranked, area, sky]
         );
+        kernels.insert([mirror, glass, ranked]);
+        if on(5) {
+            job = through_lens(job);
+        }
         let (film, counts) = render_scene(&scene, &job);
         let (full, full_counts) = render_with_every_effect(&scene, &job);
-        assert!(film == full, "kernel {bits:04b} differs");
-        assert_eq!(counts, full_counts, "kernel {bits:04b} casts other rays");
+        assert!(film == full, "kernel {bits:06b} differs");
+        assert_eq!(counts, full_counts, "kernel {bits:06b} casts other rays");
         let absent = [
-            (on(0), counts[RayKind::Mirror]),
-            (on(1), counts[RayKind::Glass]),
-            (on(2), counts[RayKind::ShadowArea]),
+            (mirror, counts[RayKind::Mirror]),
+            (glass, counts[RayKind::Glass]),
+            (area, counts[RayKind::ShadowArea]),
+            (sky, counts[RayKind::ShadowSky]),
         ];
-        for (present, rays) in absent.into_iter().chain([(on(3), counts[RayKind::ShadowSky])]) {
-            assert_eq!(present, rays > 0, "kernel {bits:04b}: {counts:?}");
+        for (present, rays) in absent {
+            assert_eq!(present, rays > 0, "kernel {bits:06b}: {counts:?}");
         }
     }
+    assert_eq!(kernels.len(), 6, "all kernels");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use tweenray::scene::{Camera, Material, Pose, Scene, Settings, World, WorldMesh,
 use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
 
+#[derive(Clone)]
 pub struct Job {
     pub world: World,
     pub camera: Camera,

@@ -98,7 +98,7 @@ fn finish(job: &RenderJob, round: &Round) -> Result<Exit> {
 fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
     let all = percent(counts.share()?, 1);
     let mirrored = counts.specular_share().map_or(String::new(), |share| {
-        format!("; of those in mirrors and glass {}", percent(share, 1))
+        format!("; of those in mirrors, glass and out of focus {}", percent(share, 1))
     });
     let what = match policy {
         // It takes over pixels, whatever they show.

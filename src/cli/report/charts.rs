@@ -40,7 +40,9 @@ fn reuse(job: &Job) -> Option<Chart> {
     let all = series(job, "all surface points", |row| per_cent(row.reuse.share()));
     all.values.iter().flatten().next()?;
     let mut lines = vec![all];
-    let specular = series(job, "in mirrors and glass", |row| per_cent(row.reuse.specular_share()));
+    let specular = series(job, "in mirrors, glass and out of focus", |row| {
+        per_cent(row.reuse.specular_share())
+    });
     if specular.values.iter().any(Option::is_some) {
         lines.push(specular);
     }
