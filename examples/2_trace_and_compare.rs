@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
 use tweenray::error::Result;
-use tweenray::intersect::{EmbreeIntersector, Intersector, Oracle, Ray};
+use tweenray::intersect::{EmbreeIntersector, Intersector, Oracle};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Camera, Material, Pose, Settings, World, WorldMesh};
 use tweenray::stats::RayCounts;
@@ -48,7 +48,7 @@ pub fn compare(width: u32, height: u32) -> Result<Agreement> {
     let camera = Camera::new(&pose, 40.0, width, height)?.to_scene(&scene.recentring);
     let (mut found, mut counts) = (Agreement::default(), RayCounts::default());
     for (x, y) in (0..width * height).map(|k| (f64::from(k % width), f64::from(k / width))) {
-        let ray = Ray::new(camera.eye, camera.direction(x + 0.5, y + 0.5));
+        let ray = camera.generate_ray(x + 0.5, y + 0.5, [0.5; 2]);
         let [a, b] = [&embree as &dyn Intersector, &oracle].map(|i| i.intersect(&ray, &mut counts));
         let same = a.zip(b).is_some_and(|(a, b)| a.prim == b.prim && (a.t - b.t).abs() < 1e-12);
         found.hits += u32::from(b.is_some());

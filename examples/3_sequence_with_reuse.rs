@@ -1,5 +1,5 @@
-//! Renders a camera move whose in-between frames are inferred from its key frames, and reads the
-//! audit, which says how far they are from the truth: `cargo run --example 3_sequence_with_reuse`.
+//! Renders a move whose in-between frames are inferred, and reads the audit, which says how far they
+//! are from the truth: `cargo run --example 3_sequence_with_reuse`.
 
 #![allow(clippy::print_stdout, reason = "a program for people")]
 
@@ -28,17 +28,15 @@ fn main() -> Result<()> {
 
 /// Renders a pan of `frames` frames; gives how much was inferred, and what the audit says of it.
 pub fn render(frames: u32) -> Result<(ReuseCounts, Rmse)> {
-    // One segment, from the first to the last frame. A tenth of the pixels between are probes: traced
-    // twice, they decide what is inferred, and make the audit.
+    // One segment; a tenth of its pixels are probes: traced, they decide what is inferred, and audit it.
     let reuse = ReuseSettings { segment: frames - 1, probes: 0.1, ..ReuseSettings::default() };
-    let (width, height, shadow_samples) = (160, 120, 64);
-    let settings = Settings { width, height, shadow_samples, reuse, ..Settings::default() };
+    let settings =
+        Settings { width: 160, height: 120, shadow_samples: 64, reuse, ..Settings::default() };
     // Soft shadows take many rays: those are what is worth reusing.
-    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let corners = corners.map(|(x, z)| DVec3::new(x, 4.0, z));
+    let corners = [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)].map(|(x, z)| DVec3::new(x, 4.0, z));
     let lamp = QuadLight { corners, radiance: Rgb::splat(12.0), two_sided: false };
     let scene = one_frame::world_under(Light::Quad(lamp)).into_scene(true)?;
-    let (from, to) = (DVec3::new(-1.0, 2.5, 7.0), DVec3::new(1.0, 2.5, 7.0));
+    let [from, to] = [-1.0, 1.0].map(|x| DVec3::new(x, 2.5, 7.0));
     let path = CameraPath::Pan { from, to, target: DVec3::Y, up: DVec3::Y, roll_degrees: 0.0 };
     let shot = Shot::new(path, frames, 40.0);
     let intersector = intersect::build(&scene, &settings, 1)?;

@@ -12,6 +12,7 @@ use crate::error::{Result, counted};
 use crate::import::{AddedStage, Loaded};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
+use crate::page::words::short;
 use crate::scene::{Light, Mesh, Scene, Settings, Shot};
 use crate::shade::Renderer;
 use clap::Args;
@@ -73,6 +74,9 @@ struct Lights {
 struct CameraView {
     eye: [f64; 3],
     looks_along: [f64; 3],
+    /// Distance that the lens is focused at; absent for a pinhole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    focus: Option<f64>,
 }
 
 /// Bytes.
@@ -162,7 +166,8 @@ impl Lights {
 impl CameraView {
     fn at(shot: &Shot, frame: u32, settings: &Settings) -> Result<Self> {
         let camera = shot.camera(frame, settings.width, settings.height)?;
-        Ok(Self { eye: camera.eye.to_array(), looks_along: camera.forward.to_array() })
+        let (eye, looks_along) = (camera.eye.to_array(), camera.forward.to_array());
+        Ok(Self { eye, looks_along, focus: camera.lens.focus() })
     }
 }
 
@@ -225,7 +230,9 @@ impl Inspection {
         lines.push(format!("frames     {} of {width}x{height} pixels", self.frames));
         for (name, view) in [("start", &self.camera_start), ("end", &self.camera_end)] {
             let (eye, along) = (point(view.eye), point(view.looks_along));
-            lines.push(format!("camera     {name}: at {eye}, looks along {along}"));
+            let focus =
+                view.focus.map_or(String::new(), |at| format!(", focused at {}", short(at)));
+            lines.push(format!("camera     {name}: at {eye}, looks along {along}{focus}"));
         }
         lines.push(format!("tracer     {}", self.tracer));
         let m = &self.memory;

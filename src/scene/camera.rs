@@ -151,7 +151,8 @@ impl Camera {
 
     /// Whether the rays of one image point meet within a pixel at `depth` along the view axis.
     pub fn is_in_focus(&self, depth: f64) -> bool {
-        self.lens.blur(depth) <= self.pixel_size() * depth
+        let blur = self.lens.blur(depth);
+        blur == 0.0 || blur <= self.pixel_size() * depth
     }
 
     /// Image point in pixels and depth along `forward` of `p`; `None` behind the eye, and where

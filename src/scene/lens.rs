@@ -72,6 +72,14 @@ impl Lens {
         }
     }
 
+    /// Distance along the view axis at which all is sharp; `None` where all is sharp anywhere.
+    pub fn focus(&self) -> Option<f64> {
+        match self {
+            Self::Pinhole => None,
+            Self::Thin(lens) => Some(lens.focus),
+        }
+    }
+
     /// Where the ray that passes the lens at `u` in the unit square starts, seen from the eye, and its
     /// direction (not unit), if through the lens's middle it would leave along `toward`, which is 1 long
     /// along the view axis. `right` and `up` are the image's unit directions.

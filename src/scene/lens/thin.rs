@@ -116,8 +116,8 @@ impl ThinLensPath {
         let radii = self.keys.iter().map(|key| key.radius);
         let (least, most) = radii.fold((f64::INFINITY, 0.0), |(a, b), r| (r.min(a), r.max(b)));
         let radius = match least == most {
-            true => format!("radius {most}"),
-            false => format!("radius {least} to {most}"),
+            true => format!("radius {}", short(most)),
+            false => format!("radius {} to {}", short(least), short(most)),
         };
         let distances = self.keys.iter().filter_map(|key| match key.focus {
             Focus::Distance(distance) => Some(distance),
@@ -126,8 +126,8 @@ impl ThinLensPath {
         let (near, far) = distances.fold((f64::INFINITY, 0.0), |(a, b), d| (d.min(a), d.max(b)));
         let mut focus = match far {
             0.0 => String::new(),
-            _ if near == far => format!("at {far}"),
-            _ => format!("at {near} to {far}"),
+            _ if near == far => format!("at {}", short(far)),
+            _ => format!("at {} to {}", short(near), short(far)),
         };
         if self.keys.iter().any(|key| key.focus == Focus::Target) {
             focus += if focus.is_empty() { "on the target" } else { " and on the target" };
@@ -194,6 +194,12 @@ impl ThinLens {
             && blade_rotation_degrees.is_finite();
         is_sound.then_some(Self { radius, focus, blades: blades as u32, blade_rotation_degrees })
     }
+}
+
+/// `x`, 0 or more, to four digits that matter.
+fn short(x: f64) -> f64 {
+    let scale = libm::exp10(3.0 - x.max(f64::MIN_POSITIVE).log10().floor());
+    if scale.is_finite() { (x * scale).round() / scale } else { x }
 }
 
 #[cfg(test)]
@@ -304,6 +310,18 @@ mod tests {
             [0.1, 4.0, 0.0, f64::INFINITY],
         ];
         assert!(wrong.iter().all(|numbers| Lens::from_numbers(*numbers).is_none()));
+    }
+
+    #[test]
+    fn its_reason_has_numbers_that_can_be_read() {
+        let focus = Focus::Distance(2.0 / 3.0);
+        let one = path(vec![key(0.0, 0.1 + 0.2, focus)]);
+        assert_eq!(one.reason(), (true, "thin lens, radius 0.3, focus at 0.6667".into()));
+        let two = path(vec![key(0.0, 0.0, focus), key(1.0, 1e-5, Focus::Target)]);
+        let why = "thin lens, radius 0 to 0.00001, focus at 0.6667 and on the target";
+        assert_eq!(two.reason(), (true, why.into()));
+        assert_eq!([0.0, 120.0, 12345.0, 1.5].map(short), [0.0, 120.0, 12350.0, 1.5]);
+        assert!(!path(vec![key(0.0, 0.0, focus)]).reason().0);
     }
 
     #[test]
