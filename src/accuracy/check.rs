@@ -4,7 +4,8 @@ use super::choice::Goal;
 use super::effort::Effort;
 use super::figures::{figure, squared_errors};
 use super::predictor::{Prediction, Predictor};
-use super::probe::{SettingsProbe, reference, samples_of_reference};
+use super::probe::{SettingsProbe, samples_of_reference};
+use super::search::converged;
 use crate::error::Result;
 use crate::film::Image;
 use crate::measure::psnr;
@@ -57,7 +58,7 @@ impl CheckOutcome {
         let (chosen, patches) = probe.check_patches(effort, image)?;
         let seen = patches.of_images(image)?;
         let samples = samples_of_reference(prediction.samples);
-        let mut reference = reference(probe.context.base, samples);
+        let mut reference = converged(probe.context.base, samples);
         reference.bounces = reference.bounces.max(prediction.bounces);
         let truth = patches.trace(probe.context, &reference)?;
         let own = predictor.model.own_part(prediction.samples, samples);

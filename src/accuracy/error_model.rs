@@ -110,7 +110,13 @@ impl ErrorModel {
     /// Which share of the squared difference between frames of `samples` and of `reference` is the error of
     /// the former.
     pub fn own_part(&self, samples: SampleCounts, reference: SampleCounts) -> f64 {
-        let [own, of_reference] = [samples, reference].map(|s| self.errors(s).sum::<f64>());
+        let own: f64 = self.errors(samples).sum();
+        // Both have the same bias.
+        let [camera, shadow, sky, _] = regressors(self.sources, reference);
+        let noise = |frame: &Amplitudes| {
+            frame.iter().zip([camera, shadow, sky]).map(|(a, x)| a * x).sum::<f64>()
+        };
+        let of_reference: f64 = self.frames.iter().map(noise).sum();
         if own > 0.0 { own / (own + of_reference) } else { 1.0 }
     }
 }

@@ -117,6 +117,14 @@ impl Predictor {
         }
     }
 
+    /// The least squared error that is predicted of a setting of `mode`.
+    pub fn least(&self, mode: &ReuseMode, range: &SampleRange) -> f64 {
+        range
+            .all()
+            .map(|samples| self.of(mode, samples).squared_error)
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// The fastest setting of `mode` whose squared error is predicted to be at most `allowed`; of those that
     /// are hardly slower the one with the least error.
     pub fn fastest(

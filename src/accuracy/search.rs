@@ -132,7 +132,9 @@ impl<'a> Search<'a> {
         let start = match is_psnr {
             true => allowed,
             false => {
-                self.predictor.of(mode, SampleCounts { spp: 4, shadow: 4, sky: 4 }).squared_error
+                let usual = SampleCounts { spp: 4, shadow: 4, sky: 4 };
+                // Samples that are given may leave nothing as good to choose from.
+                self.predictor.of(mode, usual).squared_error.max(self.predictor.least(mode, &range))
             }
         };
         let (mut bracket, mut aim, mut best) = (Bracket::default(), Some(start), None);
@@ -158,7 +160,10 @@ impl<'a> Search<'a> {
             return Ok(*known);
         }
         let context = self.probe.context;
-        if self.reference.spp < 2 * samples.spp || self.reference.shadow < samples.shadow {
+        let is_coarse = self.reference.spp < 2 * samples.spp
+            || self.reference.shadow < samples.shadow
+            || self.reference.sky < samples.sky;
+        if is_coarse {
             self.reference = samples_of_reference(samples);
             self.truth = self.patches.trace(context, &converged(context.base, self.reference))?;
         }
@@ -262,7 +267,7 @@ fn design(probe: &SettingsProbe) -> Vec<SampleCounts> {
 }
 
 /// The settings of a reference with `samples`, and with as many bounces as may be chosen.
-fn converged(base: &Settings, samples: SampleCounts) -> Settings {
+pub(super) fn converged(base: &Settings, samples: SampleCounts) -> Settings {
     let settings = reference(base, samples);
     let bounces = BOUNCES.into_iter().fold(settings.bounces, u32::max);
     Settings { bounces, ..settings }

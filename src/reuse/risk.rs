@@ -12,7 +12,7 @@ pub const STEPS: usize = 24;
 /// Half an octave of the risk in its third power.
 const HALF_OCTAVE_CUBED: f32 = 2.828_427;
 /// How many steps there are in all. Points seen directly have two scales: one for what noise may have made, and one
-/// for detail, which noise cannot make. So have points seen in mirrors, through glass or out of focus.
+/// for detail, which noise cannot make. So have points seen in mirrors and through glass.
 pub const LEVELS: usize = 4 * STEPS;
 /// A risk above this many standard deviations of tracing's noise is detail, not noise.
 const MOST_OF_NOISE: f32 = 6.0;

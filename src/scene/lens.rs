@@ -62,13 +62,21 @@ impl ShotLens {
 
 impl Lens {
     /// Numbers of its encoding.
-    pub(super) const NUMBERS: usize = 4;
+    pub(super) const NUMBERS: usize = 5;
 
     /// Whether a ray depends on the point of the lens that it passes.
     pub fn is_sampled(&self) -> bool {
         match self {
             Self::Pinhole => false,
             Self::Thin(_) => true,
+        }
+    }
+
+    /// Whether rays through it have numbers that can be traced.
+    pub(super) fn is_in_range(&self) -> bool {
+        match self {
+            Self::Pinhole => true,
+            Self::Thin(lens) => lens.is_in_range(),
         }
     }
 
@@ -107,19 +115,24 @@ impl Lens {
         }
     }
 
-    /// All that tells it from other lenses.
+    /// All that tells it from other lenses: the number of its kind, and its own.
     pub(super) fn numbers(&self) -> [f64; Self::NUMBERS] {
         match self {
             Self::Pinhole => [0.0; Self::NUMBERS],
-            Self::Thin(lens) => lens.numbers(),
+            Self::Thin(lens) => {
+                let [a, b, c, d] = lens.numbers();
+                [1.0, a, b, c, d]
+            }
         }
     }
 
     /// The lens with these [`numbers`](Self::numbers); `None` where no lens has them.
     pub(super) fn from_numbers(numbers: [f64; Self::NUMBERS]) -> Option<Self> {
-        match numbers == [0.0; Self::NUMBERS] {
-            true => Some(Self::Pinhole),
-            false => ThinLens::from_numbers(numbers).map(Self::Thin),
+        let [kind, own @ ..] = numbers;
+        match kind {
+            0.0 => (own == [0.0; 4]).then_some(Self::Pinhole),
+            1.0 => ThinLens::from_numbers(own).map(Self::Thin),
+            _ => None,
         }
     }
 }

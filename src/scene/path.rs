@@ -182,7 +182,14 @@ impl Shot {
             other => other,
         })?;
         let target = pose.eye.distance(pose.target);
-        Ok(camera.with_lens(self.lens.at(self.progress(frame), target)))
+        let lens = self.lens.at(self.progress(frame), target);
+        if !lens.is_in_range() {
+            return Err(Error::Usage(format!(
+                "frame {frame} of {}: the lens is too wide, or its focus too near, for rays",
+                self.frames
+            )));
+        }
+        Ok(camera.with_lens(lens))
     }
 
     /// Eased progress along the path at `frame`.

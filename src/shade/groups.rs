@@ -2,7 +2,7 @@
 //! are one surface point.
 //!
 //! Points behind mirrors and glass and points out of focus stay apart, since neighbouring samples may end far from
-//! one another there. What is traced is gathered per surface point and becomes a source.
+//! one another there. Those out of focus are traced always. What is traced is gathered per surface point and becomes a source.
 
 use super::pixels::{BLOCK, BlockPixels};
 use super::point::ShadingPoint;
@@ -128,6 +128,8 @@ pub(super) struct Groups {
     lit: Vec<bool>,
     /// Surface points that must be traced; empty where the scene has none.
     forbidden: Vec<bool>,
+    /// Surface points that a camera ray out of focus ends at; empty where the lens blurs nothing.
+    blurred: Vec<bool>,
     order: Vec<(u64, u32)>,
 }
 
@@ -147,6 +149,7 @@ impl Groups {
         pixels: &BlockPixels,
     ) {
         self.gather_points(input, lit);
+        self.note_blurred(input, lit);
         self.forbid(input, scene, lit);
         self.measure_footprints(lit, pixels);
         self.gather_unshadowed(reuse.channels.len(), unshadowed);
@@ -191,7 +194,7 @@ impl Groups {
         for point in lit {
             let own = point.surface_point(input);
             let pixel = point.place.pixel;
-            // Behind mirrors nothing joins.
+            // Behind mirrors and out of focus nothing joins.
             let known = own.direct.then(|| chains.find(pixel, points, &own)).flatten();
             if let Some(at) = known {
                 before.push(points[at].samples);
@@ -208,13 +211,34 @@ impl Groups {
         }
     }
 
-    /// Means over each surface point's samples.
+    /// Notes the points out of focus. The samples of a pixel end far from one another there, and a reference has
+    /// few near any: they are traced, and not kept, since as many as there are camera samples fill memory.
+    fn note_blurred(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {
+        let Self { of_lit, asked, blurred, .. } = self;
+        blurred.clear();
+        if input.camera.lens.is_sampled() {
+            blurred.resize(asked.points.len(), false);
+            for (point, group) in lit.iter().zip(&*of_lit) {
+                let group = *group as usize;
+                blurred[group] = point.place.branch == 1 && !asked.points[group].direct;
+            }
+        }
+    }
+
+    fn is_blurred(&self, point: usize) -> bool {
+        self.blurred.get(point).copied().unwrap_or(false)
+    }
+
+    /// Means over each surface point's samples; nothing where nobody shall look.
     fn gather_unshadowed(&mut self, channels: usize, unshadowed: &[f32]) {
-        let Self { of_lit, asked: LookupBatch { points, unshadowed: out, .. }, .. } = self;
+        let Self { of_lit, asked: LookupBatch { points, unshadowed: out, .. }, blurred, .. } = self;
         out.clear();
         out.resize(points.len() * channels, 0.0);
         for (at, own) in of_lit.iter().zip(unshadowed.chunks_exact(channels.max(1))) {
             let at = *at as usize;
+            if blurred.get(at) == Some(&true) {
+                continue;
+            }
             let share = 1.0 / points[at].samples as f32;
             let sums = &mut out[at * channels..(at + 1) * channels];
             sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * share);
@@ -382,7 +406,7 @@ impl Groups {
             *inferred += u64::from(!self.traced[i]);
             let inferred = (!self.traced[i]).then_some(&self.asked.provenance[i]);
             pixels.join_provenance(self.pixels[i], inferred);
-            if self.traced[i] {
+            if self.traced[i] && !self.is_blurred(i) {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });
                 let own = i * channels..(i + 1) * channels;

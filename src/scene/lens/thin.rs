@@ -19,7 +19,8 @@ pub struct ThinLensPath {
     pub keys: Vec<LensKey>,
     /// Blades that bound the aperture, 3 or more; 0 for a round one.
     pub blades: u32,
-    /// Turn of the blades, degrees, counter-clockwise in the image; at 0 a corner points up.
+    /// Turn of the blades, degrees, counter-clockwise in the image; at 0 a corner points up in
+    /// spots behind the focus, and down in those before it.
     pub blade_rotation_degrees: f64,
 }
 
@@ -56,6 +57,10 @@ pub struct ThinLens {
     pub blade_rotation_degrees: f64,
 }
 
+/// Widest radius, world units: squares of what is further away leave the range of f32.
+const WIDEST: f64 = 1e15;
+/// Steepest slope of a ray against the view axis.
+const STEEPEST: f64 = 1e12;
 /// Most blades; a circle is hardly told from that.
 pub const MOST_BLADES: u32 = 64;
 
@@ -149,6 +154,11 @@ impl ThinLens {
         (offset, toward - offset / self.focus)
     }
 
+    /// Whether the rays through its rim start and point somewhere that can be traced.
+    pub(super) fn is_in_range(&self) -> bool {
+        self.radius <= WIDEST && self.radius / self.focus <= STEEPEST
+    }
+
     /// A point of the aperture, its corners or rim 1 from the middle; uniform for a uniform `u`, and the middle
     /// for that of the square.
     fn aperture(&self, u: [f64; 2]) -> [f64; 2] {
@@ -178,13 +188,13 @@ impl ThinLens {
         Self { radius: self.radius * scale, focus: self.focus * scale, ..self }
     }
 
-    pub(super) fn numbers(&self) -> [f64; Lens::NUMBERS] {
+    pub(super) fn numbers(&self) -> [f64; 4] {
         let Self { radius, focus, blades, blade_rotation_degrees } = *self;
         [radius, focus, f64::from(blades), blade_rotation_degrees]
     }
 
     /// `None` where no thin lens has these `numbers`.
-    pub(super) fn from_numbers(numbers: [f64; Lens::NUMBERS]) -> Option<Self> {
+    pub(super) fn from_numbers(numbers: [f64; 4]) -> Option<Self> {
         let [radius, focus, blades, blade_rotation_degrees] = numbers;
         let is_positive = |x: f64| x.is_finite() && x > 0.0;
         let is_shape = blades == 0.0 || (3..=MOST_BLADES).any(|n| f64::from(n) == blades);
@@ -299,7 +309,7 @@ mod tests {
             let lens = Lens::Thin(lens(blades));
             assert_eq!(Lens::from_numbers(lens.numbers()), Some(lens));
         }
-        assert_eq!(Lens::from_numbers([0.0; 4]), Some(Lens::Pinhole));
+        assert_eq!(Lens::from_numbers([0.0; 5]), Some(Lens::Pinhole));
         let wrong = [
             [-1.0, 4.0, 0.0, 0.0],
             [0.0, 4.0, 0.0, 0.0],
@@ -309,7 +319,8 @@ mod tests {
             [0.1, 4.0, 6.5, 0.0],
             [0.1, 4.0, 0.0, f64::INFINITY],
         ];
-        assert!(wrong.iter().all(|numbers| Lens::from_numbers(*numbers).is_none()));
+        assert!(wrong.iter().all(|numbers| ThinLens::from_numbers(*numbers).is_none()));
+        assert!(Lens::from_numbers([2.0, 1.0, 1.0, 0.0, 0.0]).is_none());
     }
 
     #[test]
@@ -322,6 +333,14 @@ mod tests {
         assert_eq!(two.reason(), (true, why.into()));
         assert_eq!([0.0, 120.0, 12345.0, 1.5].map(short), [0.0, 120.0, 12350.0, 1.5]);
         assert!(!path(vec![key(0.0, 0.0, focus)]).reason().0);
+    }
+
+    #[test]
+    fn a_lens_of_absurd_size_is_out_of_range() {
+        assert!(lens(0).is_in_range());
+        for (radius, focus) in [(1e20, 1.0), (1e-5, 0.0), (1.0, 1e-15)] {
+            assert!(!ThinLens { radius, focus, ..lens(0) }.is_in_range(), "{radius} {focus}");
+        }
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub fn lens(set: &mut Set, share: f64) {
 /// than traced ones where it moves; no stale pixels behind pickets.
 pub fn defocus(size: Size) -> Outcome {
     let mut outcome = still::standing(size, |set| lens(set, 0.02));
-    for (scene, share) in [("cornell", 0.01), ("reflective_spheres", 0.03), ("demo", 0.005)] {
+    for (scene, share) in [("cornell", 0.1), ("reflective_spheres", 0.06), ("demo", 0.05)] {
         outcome.merge(moving(size, scene, share));
     }
     outcome.merge(fence::behind_pickets(size, fence::WIDE, |set| lens(set, 0.01)));
@@ -43,6 +43,11 @@ fn moving(size: Size, scene: &str, share: f64) -> Outcome {
     let made = stage.frames(&settings, &shot, &(1..=9).collect::<Vec<_>>());
     let width = settings.width as usize;
     for frame in size.of(&[5][..], &[2, 5, 8]) {
+        let counts = &made[*frame as usize - 1].reuse;
+        // Else the lens was no trial: points in focus, of which reuse has its share, beside others.
+        outcome.check(counts.direct > 0 && counts.specular > counts.direct / 10, || {
+            format!("{scene}, frame {frame}: {counts:?}")
+        });
         let truth = stage.converged(&settings, &shot, *frame, 256);
         let traced = stage.traced(&settings, &shot, *frame, *frame);
         let errors = |film| tile_errors(&settings, film, &truth, width);

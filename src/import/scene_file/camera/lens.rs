@@ -33,8 +33,9 @@ pub(super) struct Lens {
     sensor_height: Option<At<Positive>>,
     /// Blades of the aperture, whose shape bright spots out of focus take. Absent: a round one.
     blades: Option<Int<3, 64>>,
-    /// Turn of the blades, degrees, counter-clockwise in the image; at 0 a corner points up.
-    blade_rotation: Option<Degrees>,
+    /// Turn of the blades, degrees, counter-clockwise in the image; at 0 a corner points up in spots
+    /// behind the focus, and down in those before it.
+    blade_rotation: Option<At<Degrees>>,
 }
 
 /// The lens at a key pose: what it leaves out is the camera's.
@@ -134,9 +135,10 @@ impl Camera {
         let mut spans = spans.chain(keys.iter().filter_map(|key| Some(&key.lens.as_ref()?.span)));
         let Some(first) = spans.next() else { return Ok(ShotLens::Pinhole) };
         self.check_sensor(keys, source)?;
+        self.check_own(source)?;
         let at_key = |key: &At<Key>, at: f64| {
             let lens = key.lens.as_ref();
-            let span = lens.map_or(first, |lens| &lens.span);
+            let span = lens.map_or(&key.span, |lens| &lens.span);
             self.lens_key(at, &lens.map_or(own, |lens| lens.given().or(own)), source, span)
         };
         let keys = match path {
@@ -147,7 +149,7 @@ impl Camera {
         }?;
         let own = self.lens.as_ref();
         let blades = own.and_then(|lens| lens.blades).map_or(0, Int::u32);
-        let turn = own.and_then(|lens| lens.blade_rotation).map_or(0.0, |turn| turn.0);
+        let turn = own.and_then(|lens| lens.blade_rotation.as_ref()).map_or(0.0, |turn| turn.0);
         Ok(ShotLens::Thin(ThinLensPath { keys, blades, blade_rotation_degrees: turn }))
     }
 
@@ -179,12 +181,31 @@ impl Camera {
             }
             (None, None) => {
                 return Err(source
-                    .fault(span, "the lens has no aperture")
+                    .fault(span, "the lens has no aperture here")
                     .help("give it a `radius` in world units, or an `f_number`")
                     .into());
             }
         };
         Ok(LensKey { at, radius, focus })
+    }
+
+    /// Refuses what contradicts itself or does nothing in the camera's own lens, whatever keys say.
+    fn check_own(&self, source: &Source) -> error::Result<()> {
+        let Some(Lens { radius, f_number, blades, blade_rotation, .. }) = self.lens.as_deref()
+        else {
+            return Ok(());
+        };
+        match (radius, f_number, blades, blade_rotation) {
+            (Some(_), Some(f_number), ..) => Err(source
+                .fault(&f_number.span, "the lens has a `radius` already")
+                .help("give `radius` or `f_number`, not both")
+                .into()),
+            (.., None, Some(turn)) => Err(source
+                .fault(&turn.span, "`blade_rotation` has no effect without `blades`")
+                .help("an aperture without blades is round")
+                .into()),
+            _ => Ok(()),
+        }
     }
 
     fn check_sensor(&self, keys: &[At<Key>], source: &Source) -> error::Result<()> {

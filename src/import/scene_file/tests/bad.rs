@@ -47,6 +47,19 @@ const NAMES: &[Case] = &[
     ("[camera]\nlens = { radius = 1, f_number = ¦2 }\n", "`radius`", "not both"),
     ("[camera]\nlens = { radius = 1, sensor_height = ¦2 }\n", "no effect", ""),
     ("[camera]\nlens = { radius = 1, blades = ¦2 }\n", "found 2", ""),
+    ("[camera]\nlens = { radius = 1, blade_rotation = ¦2 }\n", "no effect", "round"),
+    (
+        "[camera]\nkeys = [\n{ eye = [0, 0, 1], target = [0, 0, 0], lens = { radius = 1 } },\n\
+         ¦{ eye = [0, 0, 2], target = [0, 0, 0] }]\n",
+        "no aperture",
+        "`radius`",
+    ),
+    (
+        "[camera]\nlens = { radius = 1, f_number = ¦2 }\n\
+         keys = [{ eye = [0, 0, 1], target = [0, 0, 0], lens = { radius = 1 } }]\n",
+        "`radius`",
+        "not both",
+    ),
     ("¦[[sphere]]\nradius = 1\n", "the key `centre` is missing", ""),
     ("[camera]\npan = ¦{ from = [0, 0, 1], to = [0, 0, 2] }\n", "the key `target` is missing", ""),
 ];
