@@ -1,4 +1,4 @@
-//! Materials and textures: the parameters of a surface's scattering, no behaviour.
+//! Materials and textures: the parameters of a surface's scattering. How it scatters stands in `shade::lobe`.
 
 use crate::math::{Rgb, bulk};
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,11 @@ impl Material {
     /// A perfect mirror.
     pub fn mirror(name: impl Into<String>, reflectance: Rgb) -> Self {
         Self { mirror: reflectance, ..Self::black(name) }
+    }
+
+    /// Emitted radiance towards the outside or inside.
+    pub fn emitted(&self, outside: bool) -> Rgb {
+        if outside || self.emits_back { self.emission } else { Rgb::ZERO }
     }
 
     /// Clear glass with the index of refraction `ior`.

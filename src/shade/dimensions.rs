@@ -10,6 +10,15 @@ pub(super) const FILM: u32 = 0;
 /// Where a camera sample passes the lens.
 pub(super) const LENS: u32 = 1;
 
+/// The branch of a path that a camera ray is.
+pub(super) const ROOT: u32 = 1;
+
+/// The branch that the `child`th direction, 0 or 1, of a lobe leads to from the end of `branch`. The tree is at
+/// most 31 deep before branches share dimensions.
+pub(super) fn branch(branch: u32, child: u32) -> u32 {
+    branch.wrapping_mul(2) + child
+}
+
 /// A light as seen from the end of a branch of a path: `light` is its number among the scene's `lights`, the
 /// sky last.
 pub(super) fn of_light(branch: u32, light: u32, lights: usize) -> u32 {

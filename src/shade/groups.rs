@@ -4,6 +4,7 @@
 //! Points behind mirrors and glass and points out of focus stay apart, since neighbouring samples may end far from
 //! one another there. Those out of focus are traced always. What is traced is gathered per surface point and becomes a source.
 
+use super::dimensions::ROOT;
 use super::pixels::{BLOCK, BlockPixels};
 use super::point::ShadingPoint;
 use super::{FrameInput, Reuse};
@@ -220,7 +221,7 @@ impl Groups {
             blurred.resize(asked.points.len(), false);
             for (point, group) in lit.iter().zip(&*of_lit) {
                 let group = *group as usize;
-                blurred[group] = point.place.branch == 1 && !asked.points[group].direct;
+                blurred[group] = point.place.branch == ROOT && !asked.points[group].direct;
             }
         }
     }
@@ -250,7 +251,7 @@ impl Groups {
     fn measure_footprints(&mut self, lit: &[ShadingPoint], pixels: &BlockPixels) {
         let Self { of_lit, asked: LookupBatch { points, .. }, order, .. } = self;
         order.clear();
-        let specular = lit.iter().zip(of_lit.iter()).filter(|(l, _)| l.place.branch > 1);
+        let specular = lit.iter().zip(of_lit.iter()).filter(|(l, _)| l.place.branch != ROOT);
         order.extend(
             specular
                 .map(|(l, at)| (u64::from(l.place.branch) << 32 | u64::from(l.place.sample), *at)),
@@ -438,7 +439,7 @@ fn neighbours(cell: usize) -> impl Iterator<Item = usize> {
 impl ShadingPoint {
     /// The point as reuse sees it.
     fn surface_point(&self, input: &FrameInput) -> SurfacePoint {
-        let is_first = self.place.branch == 1;
+        let is_first = self.place.branch == ROOT;
         // Behind mirrors a first guess, as if they were flat.
         let along = match is_first {
             true => (self.si.p - input.camera.eye).dot(input.camera.forward),

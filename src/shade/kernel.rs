@@ -6,17 +6,15 @@
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
 use super::direct::ShadowScratch;
+use super::lobe::{self, Lobe, Scattered};
 use super::medium_stack::{self, MediumStack};
-use super::optics;
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
-use super::surface::{albedo, emitted};
-use super::{FrameInput, Left, Renderer};
+use super::{FrameInput, Left, Renderer, dimensions, optics};
 use crate::film::GPixel;
 use crate::inference::SAMPLES_TOGETHER;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
-use crate::scene::Material;
 use crate::stats::{RayCounts, RayKind};
 
 /// Boundaries of ranked glass that a ray passes without another medium behind them.
@@ -31,7 +29,7 @@ struct PathState {
     pixel: u32,
     /// Camera sample.
     sample: u32,
-    /// Which branch of the tree: 1 at the root, then 2b (reflected) and 2b + 1 (refracted).
+    /// Which branch of the tree ([`dimensions::branch`]).
     branch: u32,
 }
 
@@ -134,8 +132,8 @@ fn camera_rays(
             let (x, y) = pixels.sample_position(pixel, sample);
             let lens = pixels.lens_position(pixel, sample);
             scratch.rays.push(input.camera.generate_ray(x, y, lens));
-            let throughput = Rgb::ONE;
-            scratch.states.push(PathState { throughput, pixel: pixel as u32, sample, branch: 1 });
+            let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
+            scratch.states.push(PathState { throughput, pixel: pixel as u32, sample, branch });
         }
     }
 }
@@ -222,15 +220,15 @@ impl Vertex<'_, '_> {
                 return self.meet::<MIRROR, true, true>(&ray, met, state, &inside, may_bounce);
             }
             let crossing = medium_stack::cross(renderer, &ray, &si, &inside, self.counts);
-            if let Some(boundary) = &crossing.boundary {
+            if let Some(boundary) = crossing.boundary {
                 if may_bounce {
-                    let scattered = ScatteredRays {
+                    let starts = Starts {
                         reflected: (&si, &inside),
-                        refracted: (&crossing.last, &crossing.after),
+                        transmitted: (&crossing.last, &crossing.after),
                     };
                     let wo = -ray.dir.normalize();
-                    let interface = Interface { eta: boundary.eta, tint: boundary.tint };
-                    self.split::<true>(&boundary.surface, wo, &interface, &scattered, state);
+                    let lobe = Lobe::Dielectric(boundary.lobe);
+                    self.scatter::<true>(&lobe, &boundary.surface, wo, &starts, state);
                 }
                 return;
             }
@@ -255,69 +253,38 @@ impl Vertex<'_, '_> {
         let si = SurfaceInteraction::new(scene, ray, hit);
         let material = &scene.materials[si.surface.material as usize];
         let wo = -ray.dir.normalize();
-        let le = emitted(material, si.is_outside(wo));
+        let le = material.emitted(si.is_outside(wo));
         if le != Rgb::ZERO {
             self.add(state, state.throughput * le);
         }
-        if material.diffuse != Rgb::ZERO {
-            let albedo = albedo(scene, material, &si);
-            let reflectance = state.throughput * albedo;
-            self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
-        }
-        if MIRROR && may_bounce && material.mirror != Rgb::ZERO {
-            self.mirror::<NESTED>(&si, wo, material, inside, state);
-        }
-        if GLASS && may_bounce {
-            if let Some(glass) = &material.glass {
-                let eta = if si.is_outside(wo) { glass.ior } else { 1.0 / glass.ior };
-                let scattered =
-                    ScatteredRays { reflected: (&si, inside), refracted: (&si, inside) };
-                self.split::<NESTED>(
-                    &si,
-                    wo,
-                    &Interface { eta, tint: glass.tint },
-                    &scattered,
-                    state,
-                );
+        lobe::for_each::<MIRROR, GLASS>(scene, material, &si, wo, |lobe| {
+            if let Some(albedo) = lobe.albedo() {
+                let reflectance = state.throughput * albedo;
+                self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
+            } else if may_bounce {
+                let starts = Starts { reflected: (&si, inside), transmitted: (&si, inside) };
+                self.scatter::<NESTED>(lobe, &si, wo, &starts, state);
             }
-        }
+        });
     }
 
-    fn mirror<const NESTED: bool>(
+    /// Sends the rays that `lobe` scatters at the surface `si`.
+    fn scatter<const NESTED: bool>(
         &mut self,
+        lobe: &Lobe,
         si: &SurfaceInteraction,
         wo: DVec3,
-        material: &Material,
-        inside: &MediumStack,
-        state: &PathState,
-    ) {
-        let dir = optics::keep_side(optics::reflect(wo, si.ns), si.ng, si.is_outside(wo));
-        let weight = state.throughput * material.mirror;
-        if self.push::<NESTED>((si, inside), dir, state, weight, 2) {
-            self.counts[RayKind::Mirror] += 1;
-        }
-    }
-
-    /// Sends the two rays that leave a boundary with the surface `si`.
-    fn split<const NESTED: bool>(
-        &mut self,
-        si: &SurfaceInteraction,
-        wo: DVec3,
-        interface: &Interface,
-        scattered: &ScatteredRays,
+        starts: &Starts,
         state: &PathState,
     ) {
         let outside = si.is_outside(wo);
-        let split = optics::split(wo, si.ns, interface.eta);
-        let reflected = optics::keep_side(optics::reflect(wo, si.ns), si.ng, outside);
-        let weight = state.throughput * split.reflectance as f32;
-        let sent = self.push::<NESTED>(scattered.reflected, reflected, state, weight, 2);
-        self.counts[RayKind::Glass] += u64::from(sent);
-        if let Some(refracted) = split.refracted {
-            let refracted = optics::keep_side(refracted, si.ng, !outside);
-            let weight = state.throughput * (1.0 - split.reflectance) as f32 * interface.tint;
-            let sent = self.push::<NESTED>(scattered.refracted, refracted, state, weight, 3);
-            self.counts[RayKind::Glass] += u64::from(sent);
+        for (child, scattered) in (0..).zip(lobe.sample(wo, si.ns)) {
+            let Some(Scattered { wi, share, tint, transmitted }) = scattered else { continue };
+            let wi = optics::keep_side(wi, si.ng, outside != transmitted);
+            let start = if transmitted { starts.transmitted } else { starts.reflected };
+            let weight = state.throughput * share * tint;
+            let sent = self.push::<NESTED>(start, wi, state, weight, child);
+            self.counts[lobe.ray_kind()] += u64::from(sent);
         }
     }
 
@@ -343,25 +310,16 @@ impl Vertex<'_, '_> {
         if NESTED {
             self.next_interiors.push(*inside);
         }
-        // 2b and 2b + 1; the tree is at most 31 deep before branches share dimensions.
-        let branch = from.branch.wrapping_mul(2) + (child - 2);
+        let branch = dimensions::branch(from.branch, child);
         self.next_states.push(PathState { throughput, branch, ..*from });
         true
     }
 }
 
-/// What a boundary does to light.
-struct Interface {
-    /// Index of refraction behind over that before.
-    eta: f64,
-    /// Share of light that it lets through.
-    tint: Rgb,
-}
-
-/// Where the two rays of a boundary start, and the ranked glass around them.
-struct ScatteredRays<'w> {
+/// Where scattered rays start, and the ranked glass around them.
+struct Starts<'w> {
     reflected: (&'w SurfaceInteraction, &'w MediumStack),
-    refracted: (&'w SurfaceInteraction, &'w MediumStack),
+    transmitted: (&'w SurfaceInteraction, &'w MediumStack),
 }
 
 impl PathState {
@@ -395,7 +353,7 @@ fn record(
                 depth: scene.recentring.length_to_world(along) as f32,
                 position: scene.recentring.point_to_world(si.p).as_vec3(),
                 normal: normal.as_vec3(),
-                albedo: albedo(scene, material, &si),
+                albedo: lobe::albedo(scene, material, &si),
                 mesh_id: index + 1,
             }
         });

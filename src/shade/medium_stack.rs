@@ -10,6 +10,7 @@
 //! closed. Of boundaries that coincide bit for bit two are told apart, not three.
 
 use super::Renderer;
+use super::lobe::Dielectric;
 use crate::intersect::{Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Glass, MaterialId, Scene};
@@ -137,10 +138,8 @@ pub(super) struct Crossing {
 pub(super) struct Boundary {
     /// The surface of the medium of the higher priority.
     pub surface: SurfaceInteraction,
-    /// Index of refraction behind over that before.
-    pub eta: f64,
-    /// Share of light that it lets through.
-    pub tint: Rgb,
+    /// What the boundary does to light.
+    pub lobe: Dielectric,
 }
 
 /// Boundaries that touch.
@@ -241,8 +240,10 @@ fn boundary(
     let ior = |body: Option<Body>| body.as_ref().and_then(glass).map_or(1.0, |g| g.ior);
     Some(Boundary {
         surface: *own.unwrap_or(&crossed[0]),
-        eta: ior(after) / ior(before),
-        tint: glass(&higher).map_or(Rgb::ONE, |g| g.tint),
+        lobe: Dielectric {
+            eta: ior(after) / ior(before),
+            tint: glass(&higher).map_or(Rgb::ONE, |g| g.tint),
+        },
     })
 }
 

@@ -12,13 +12,14 @@ mod groups;
 mod irradiance;
 mod kernel;
 pub(crate) mod light;
+mod lobe;
 mod medium_stack;
 mod motion;
 pub mod optics;
 mod pixels;
 mod point;
 mod scattered;
-mod surface;
+mod texture;
 
 use crate::effects::EffectPlan;
 use crate::film::{Film, GPixel, Provenance};

@@ -1,24 +1,10 @@
-//! What a surface point emits and reflects: material parameters, textures looked up.
+//! Texture lookups.
 
-use crate::intersect::SurfaceInteraction;
 use crate::math::{Rgb, Vec2};
-use crate::scene::{Material, Scene, Texture};
-
-/// Emitted radiance towards the outside or inside.
-pub(super) fn emitted(material: &Material, outside: bool) -> Rgb {
-    if outside || material.emits_back { material.emission } else { Rgb::ZERO }
-}
-
-/// Diffuse reflectance at the point, textures included.
-pub(super) fn albedo(scene: &Scene, material: &Material, si: &SurfaceInteraction) -> Rgb {
-    match material.texture {
-        Some(id) => material.diffuse * bilinear(&scene.textures[id as usize], si.uv),
-        None => material.diffuse,
-    }
-}
+use crate::scene::Texture;
 
 /// Bilinear lookup, repeating; `(0, 0)` is the image's lower left corner.
-fn bilinear(texture: &Texture, uv: Vec2) -> Rgb {
+pub(super) fn bilinear(texture: &Texture, uv: Vec2) -> Rgb {
     let (x0, x1, fx) = texels(repeat(uv.x), texture.width);
     let (y0, y1, fy) = texels(repeat(1.0 - uv.y), texture.height);
     let at = |x: usize, y: usize| texture.texels[y * texture.width as usize + x];

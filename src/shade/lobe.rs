@@ -1,0 +1,91 @@
+//! How a surface scatters light, lobe by lobe.
+//!
+//! Takes a material and a point of its surface; gives the lobes, textures looked up: what share of a light
+//! each sends to the viewer, or the directions that it passes radiance on from. One file for each kind;
+//! nothing else in `shade` asks for the kind.
+
+mod dielectric;
+mod diffuse;
+mod mirror;
+
+use crate::intersect::SurfaceInteraction;
+use crate::math::{DVec3, Rgb};
+use crate::scene::{Material, Scene};
+use crate::stats::RayKind;
+pub(super) use dielectric::Dielectric;
+use diffuse::Diffuse;
+pub(super) use diffuse::albedo;
+use mirror::Mirror;
+
+/// One of the ways in which a surface scatters light, at one of its points.
+pub(super) enum Lobe {
+    Diffuse(Diffuse),
+    Mirror(Mirror),
+    Dielectric(Dielectric),
+}
+
+/// A direction that a delta lobe passes radiance on from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scattered {
+    /// Unit direction, leaving the surface.
+    pub wi: DVec3,
+    /// Share of the radiance that is passed on, of all wavelengths alike.
+    pub share: f32,
+    /// The same by wavelength.
+    pub tint: Rgb,
+    /// Whether the ray goes on behind the surface.
+    pub transmitted: bool,
+}
+
+/// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving). Lobes that the
+/// kernel leaves out, since no material of the scene has them, cost nothing.
+#[inline(always)]
+pub(super) fn for_each<const MIRROR: bool, const GLASS: bool>(
+    scene: &Scene,
+    material: &Material,
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    mut take: impl FnMut(&Lobe),
+) {
+    if let Some(diffuse) = Diffuse::of(scene, material, si) {
+        take(&Lobe::Diffuse(diffuse));
+    }
+    if let Some(mirror) = Mirror::of(material).filter(|_| MIRROR) {
+        take(&Lobe::Mirror(mirror));
+    }
+    if let Some(dielectric) = Dielectric::of(material, si.is_outside(wo)).filter(|_| GLASS) {
+        take(&Lobe::Dielectric(dielectric));
+    }
+}
+
+impl Lobe {
+    /// The share of irradiance that is sent out alike in all directions; `None` of a delta lobe, which sees
+    /// lights by the rays of [`sample`](Self::sample) alone.
+    #[inline(always)]
+    pub fn albedo(&self) -> Option<Rgb> {
+        match self {
+            Self::Diffuse(diffuse) => Some(diffuse.albedo),
+            Self::Mirror(_) | Self::Dielectric(_) => None,
+        }
+    }
+
+    /// The directions that radiance towards `wo` comes from, at a surface with the unit normal `n` on either
+    /// side: all of a delta lobe's, since a Whitted path follows each; none of a diffuse lobe's.
+    #[inline(always)]
+    pub fn sample(&self, wo: DVec3, n: DVec3) -> [Option<Scattered>; 2] {
+        match self {
+            Self::Diffuse(_) => [None, None],
+            Self::Mirror(mirror) => [Some(mirror.sample(wo, n)), None],
+            Self::Dielectric(dielectric) => dielectric.sample(wo, n),
+        }
+    }
+
+    /// The kind of ray that is traced along a sampled direction.
+    #[inline(always)]
+    pub fn ray_kind(&self) -> RayKind {
+        match self {
+            Self::Diffuse(_) | Self::Mirror(_) => RayKind::Mirror,
+            Self::Dielectric(_) => RayKind::Glass,
+        }
+    }
+}

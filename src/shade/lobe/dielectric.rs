@@ -1,0 +1,43 @@
+//! Smooth boundaries of clear media.
+
+use super::Scattered;
+use crate::math::{DVec3, Rgb};
+use crate::scene::Material;
+use crate::shade::optics;
+
+/// A smooth boundary between two clear media.
+pub(in crate::shade) struct Dielectric {
+    /// Index of refraction behind the boundary over that before it.
+    pub eta: f64,
+    /// Share of light that it lets through.
+    pub tint: Rgb,
+}
+
+impl Dielectric {
+    /// The lobe of `material`, seen from `outside` the body that it bounds or from inside; `None` where it has none.
+    #[inline(always)]
+    pub fn of(material: &Material, outside: bool) -> Option<Self> {
+        let glass = material.glass.as_ref()?;
+        let eta = if outside { glass.ior } else { 1.0 / glass.ior };
+        Some(Self { eta, tint: glass.tint })
+    }
+
+    /// What is reflected and, but for total reflection, what is refracted.
+    #[inline(always)]
+    pub fn sample(&self, wo: DVec3, n: DVec3) -> [Option<Scattered>; 2] {
+        let split = optics::split(wo, n, self.eta);
+        let reflected = Scattered {
+            wi: optics::reflect(wo, n),
+            share: split.reflectance as f32,
+            tint: Rgb::ONE,
+            transmitted: false,
+        };
+        let refracted = split.refracted.map(|wi| Scattered {
+            wi,
+            share: (1.0 - split.reflectance) as f32,
+            tint: self.tint,
+            transmitted: true,
+        });
+        [Some(reflected), refracted]
+    }
+}

@@ -1,0 +1,27 @@
+//! Perfect mirrors.
+
+use super::Scattered;
+use crate::math::{DVec3, Rgb};
+use crate::scene::Material;
+use crate::shade::optics;
+
+/// A perfect mirror, both sides.
+pub(in crate::shade) struct Mirror {
+    reflectance: Rgb,
+}
+
+impl Mirror {
+    /// The lobe of `material`; `None` where it has none.
+    #[inline(always)]
+    pub fn of(material: &Material) -> Option<Self> {
+        let reflectance = material.mirror;
+        (reflectance != Rgb::ZERO).then_some(Self { reflectance })
+    }
+
+    /// The one direction that is seen along `wo`.
+    #[inline(always)]
+    pub fn sample(&self, wo: DVec3, n: DVec3) -> Scattered {
+        let (share, tint) = (1.0, self.reflectance);
+        Scattered { wi: optics::reflect(wo, n), share, tint, transmitted: false }
+    }
+}
