@@ -5,20 +5,22 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Scene, Settings, ShotLens};
+use crate::scene::{Glass, Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EffectPlan {
-    /// Perfect mirrors exist and bounces are allowed.
+    /// Mirrors, perfect or rough, exist and bounces are allowed.
     pub mirror: bool,
     /// Glass exists and bounces are allowed.
     pub glass: bool,
     /// Some of the glass has a priority: paths carry the bodies that they are in.
     pub nested_glass: bool,
-    /// Diffuse surfaces are lit by area lights with shadow samples.
+    /// Some of the glass absorbs light along the way.
+    pub absorption: bool,
+    /// Diffuse or glossy surfaces are lit by area lights with shadow samples.
     pub area_lights: bool,
-    /// Diffuse surfaces are lit by delta lights, with hard shadows.
+    /// Diffuse or glossy surfaces are lit by delta lights, with hard shadows.
     pub delta_lights: bool,
     /// The sky lights diffuse surfaces through sky rays.
     pub sky_light: bool,
@@ -65,6 +67,7 @@ impl EffectPlan {
         mirror: true,
         glass: true,
         nested_glass: true,
+        absorption: true,
         area_lights: true,
         delta_lights: true,
         sky_light: true,
@@ -86,11 +89,17 @@ impl EffectPlan {
         };
         let diffuse = used.diffuse > 0;
         let no_diffuse = || "no diffuse surface to light".to_string();
+        let lit = diffuse || (used.glossy > 0 && bounces > 0);
+        let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
                 "mirror reflection",
                 used.mirror > 0 && bounces > 0,
                 format!("{} in use, {}", counted(used.mirror, "mirror material"), bounced),
+            ) | decide(
+                "glossy reflection",
+                used.glossy > 0 && bounces > 0,
+                format!("{} in use, {}", counted(used.glossy, "rough mirror material"), bounced),
             ),
             glass: decide(
                 "glass",
@@ -102,20 +111,25 @@ impl EffectPlan {
                 used.ranked > 0 && bounces > 0,
                 format!("{} with a priority in use", counted(used.ranked, "glass material")),
             ),
+            absorption: decide(
+                "absorption",
+                used.absorbing > 0 && bounces > 0,
+                format!("{} that absorb in use", counted(used.absorbing, "glass material")),
+            ),
             area_lights: decide(
                 "soft shadows",
-                diffuse && area > 0 && samples > 0,
-                if diffuse {
+                lit && area > 0 && samples > 0,
+                if lit {
                     let samples = counted(samples as usize, "shadow sample");
                     format!("{}, {samples}", counted(area, "area light"))
                 } else {
-                    no_diffuse()
+                    none_lit()
                 },
             ),
             delta_lights: decide(
                 "hard shadows",
-                diffuse && delta > 0,
-                if diffuse { counted(delta, "delta light") } else { no_diffuse() },
+                lit && delta > 0,
+                if lit { counted(delta, "delta light") } else { none_lit() },
             ),
             sky_light: decide(
                 "sky light",
@@ -167,8 +181,10 @@ fn bare(scene: &Scene) -> String {
 struct UsedMaterials {
     diffuse: usize,
     mirror: usize,
+    glossy: usize,
     glass: usize,
     ranked: usize,
+    absorbing: usize,
     textured: usize,
 }
 
@@ -182,10 +198,14 @@ impl UsedMaterials {
         let mut counts = Self::default();
         for (material, _) in scene.materials.iter().zip(&used).filter(|(_, used)| **used) {
             counts.diffuse += usize::from(is_something(material.diffuse));
-            counts.mirror += usize::from(is_something(material.mirror));
+            let mirror = usize::from(is_something(material.mirror));
+            *(if material.roughness == 0.0 { &mut counts.mirror } else { &mut counts.glossy }) +=
+                mirror;
             counts.glass += usize::from(material.glass.is_some());
-            let ranked = material.glass.as_ref().is_some_and(|g| g.priority.is_some());
-            counts.ranked += usize::from(ranked);
+            let glass =
+                |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));
+            counts.ranked += glass(|glass| glass.priority.is_some());
+            counts.absorbing += glass(|glass| is_something(glass.absorption));
             counts.textured += usize::from(material.texture.is_some());
         }
         counts

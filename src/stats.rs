@@ -15,6 +15,8 @@ pub enum RayKind {
     Camera,
     /// Rays reflected by mirrors.
     Mirror,
+    /// Rays reflected by rough mirrors.
+    Glossy,
     /// Rays reflected or refracted by glass.
     Glass,
     /// Shadow rays to area lights.
@@ -31,9 +33,10 @@ pub enum RayKind {
 
 impl RayKind {
     /// All kinds, in the order in which they are stored and shown.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Camera,
         Self::Mirror,
+        Self::Glossy,
         Self::Glass,
         Self::ShadowArea,
         Self::ShadowDelta,
@@ -52,6 +55,7 @@ impl RayKind {
         match self {
             Self::Camera => "camera",
             Self::Mirror => "mirror",
+            Self::Glossy => "glossy",
             Self::Glass => "glass",
             Self::ShadowArea => "shadow of area lights",
             Self::ShadowDelta => "shadow of other lights",
@@ -66,6 +70,7 @@ impl RayKind {
         match self {
             Self::Camera => "camera",
             Self::Mirror => "mirror",
+            Self::Glossy => "glossy",
             Self::Glass => "glass",
             Self::ShadowArea => "shadow_area",
             Self::ShadowDelta => "shadow_delta",

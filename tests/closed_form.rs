@@ -7,7 +7,7 @@ mod common;
 use common::{job, pose, quad, render, sphere_world};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    Camera, DiskLight, IntersectorKind, Lens, Light, Material, PointLight, QuadLight, Sky,
+    Camera, DiskLight, Glass, IntersectorKind, Lens, Light, Material, PointLight, QuadLight, Sky,
     SpotLight, ThinLens, World, WorldSphere,
 };
 use tweenray::stats::RayKind;
@@ -210,8 +210,7 @@ fn a_white_sphere_in_a_furnace_is_one() {
 /// Clear glass in a furnace hides itself: reflected and refracted shares add up.
 #[test]
 fn a_glass_sphere_in_a_furnace_vanishes() {
-    use tweenray::scene::Glass;
-    let glass = Glass { ior: 1.5, tint: Rgb::ONE, priority: None };
+    let glass = Glass::clear(1.5);
     let mut world = sphere_world(Material { glass: Some(glass), ..Material::black("g") }, false);
     world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
     let mut job = job(world, pose((0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), 48, 36);
@@ -220,6 +219,42 @@ fn a_glass_sphere_in_a_furnace_vanishes() {
     let (film, _) = render(&job);
     for (x, y, rgb) in common::pixels(&film) {
         assert!(rgb.abs_diff_eq(Rgb::ONE, 1e-4), "{x},{y}: {rgb}");
+    }
+}
+
+/// A ball of coloured glass that does not bend light, before a bright sky: what is left after a chord `x` is
+/// exp(-absorption x), in world units, whatever the scene is scaled by.
+#[test]
+fn coloured_glass_absorbs_along_the_way() {
+    let absorption = Rgb::new(0.0, 0.4, 1.7);
+    for kind in BOTH {
+        for priority in [None, Some(1)] {
+            for radius in [1.0, 50.0] {
+                let (centre, eye) =
+                    (DVec3::new(2.0, 1.0, -1.0), DVec3::new(2.0, 1.0, 3.0 * radius));
+                let mut world = World::default();
+                let absorption = absorption / radius as f32;
+                let glass = Glass { absorption, priority, ..Glass::clear(1.0) };
+                let tea = Material { glass: Some(glass), ..Material::black("tea") };
+                let tea = world.add_material(tea);
+                world.spheres.push(WorldSphere::new("ball", centre, radius, tea));
+                world.sky.radiance = Rgb::splat(2.0);
+                let mut job = job(world, pose(eye.into(), centre.into()), 24, 18);
+                job.settings.intersector = kind;
+                let (film, _) = render(&job);
+                let mut met = 0;
+                for (x, y, rgb) in common::pixels(&film) {
+                    let dir = job.camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let off = (centre - eye).cross(dir).length();
+                    let half = (radius * radius - off * off).max(0.0).sqrt();
+                    met += u32::from(half > 0.0);
+                    let left = absorption.to_array().map(|a| (-f64::from(a) * 2.0 * half).exp());
+                    let expected = Rgb::from_array(left.map(|l| 2.0 * l as f32));
+                    assert!(rgb.abs_diff_eq(expected, 1e-5), "{kind:?} {x},{y}: {rgb} {expected}");
+                }
+                assert!(met > 100, "{met} pixels of the ball");
+            }
+        }
     }
 }
 

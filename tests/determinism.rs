@@ -37,7 +37,8 @@ fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
         ball(Material { mirror: Rgb::splat(0.9), ..Material::black("mirror") }, -1.2);
     }
     if glass {
-        let glass = Glass { ior: 1.5, tint: Rgb::splat(0.98), priority: ranked.then_some(1) };
+        let glass =
+            Glass { tint: Rgb::splat(0.98), priority: ranked.then_some(1), ..Glass::clear(1.5) };
         ball(Material { glass: Some(glass), ..Material::black("glass") }, 0.1);
     }
     ball(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)), 1.3);

@@ -120,7 +120,7 @@ fn rotated(mesh: &WorldMesh) -> [Picture; 2] {
 /// Figure 16: a glass ball whose rays are refracted on leaving as if they entered.
 fn refraction() -> [Picture; 2] {
     let mut world = World::default();
-    let glass = Glass { ior: 1.5, tint: Rgb::ONE, priority: None };
+    let glass = Glass::clear(1.5);
     world.materials.push(Material { glass: Some(glass), ..Material::black("glass") });
     world.materials.push(Material::diffuse("dark", Rgb::new(0.12, 0.14, 0.2)));
     world.materials.push(Material::diffuse("light", Rgb::new(0.75, 0.72, 0.65)));

@@ -113,7 +113,8 @@ fn why(scene: &Scene, rays: u32, looked_up: bool, spp: u32) -> String {
 /// The cost of a frame that cast `rays` and looked up `lookups` surface points.
 pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     CAMERA_RAY * rays[RayKind::Camera] as f64
-        + SPECULAR_RAY * (rays[RayKind::Mirror] + rays[RayKind::Glass]) as f64
+        + SPECULAR_RAY
+            * (rays[RayKind::Mirror] + rays[RayKind::Glossy] + rays[RayKind::Glass]) as f64
         + SHADOW_RAY * rays.shadow() as f64
         + LOOKUP * lookups as f64
 }

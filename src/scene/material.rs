@@ -18,8 +18,10 @@ pub struct Material {
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureId>,
-    /// Reflectance of a perfect mirror, both sides.
+    /// Reflectance of a mirror, both sides.
     pub mirror: Rgb,
+    /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
+    pub roughness: f64,
     /// Clear glass; then `diffuse` and `mirror` are zero.
     pub glass: Option<Glass>,
     /// Emitted radiance.
@@ -36,6 +38,7 @@ impl Material {
             diffuse: Rgb::ZERO,
             texture: None,
             mirror: Rgb::ZERO,
+            roughness: 0.0,
             glass: None,
             emission: Rgb::ZERO,
             emits_back: false,
@@ -59,8 +62,7 @@ impl Material {
 
     /// Clear glass with the index of refraction `ior`.
     pub fn glass(name: impl Into<String>, ior: f64) -> Self {
-        let glass = Glass { ior, tint: Rgb::ONE, priority: None };
-        Self { glass: Some(glass), ..Self::black(name) }
+        Self { glass: Some(Glass::clear(ior)), ..Self::black(name) }
     }
 }
 
@@ -75,9 +77,19 @@ pub struct Glass {
     pub ior: f64,
     /// Share of light that each crossing transmits, linear RGB (white is clear).
     pub tint: Rgb,
+    /// Absorption coefficient of the body, per world unit, linear RGB: after a way of `x` the share
+    /// exp(-absorption x) of light is left (Beer, 1852). Takes a closed surface.
+    pub absorption: Rgb,
     /// Which of several bodies at one place is there: the highest. Those that overlap need
     /// different ones.
     pub priority: Option<u8>,
+}
+
+impl Glass {
+    /// Glass with the index of refraction `ior` that takes nothing from light and overlaps nothing.
+    pub fn clear(ior: f64) -> Self {
+        Self { ior, tint: Rgb::ONE, absorption: Rgb::ZERO, priority: None }
+    }
 }
 
 /// A decoded image, linear RGB, row 0 at the top.

@@ -19,6 +19,11 @@ pub(super) fn branch(branch: u32, child: u32) -> u32 {
     branch.wrapping_mul(2) + child
 }
 
+/// The direction that a lobe at the end of a branch is sampled in: counted from above, where no light's are.
+pub(super) fn of_lobe(branch: u32) -> u32 {
+    u32::MAX - branch
+}
+
 /// A light as seen from the end of a branch of a path: `light` is its number among the scene's `lights`, the
 /// sky last.
 pub(super) fn of_light(branch: u32, light: u32, lights: usize) -> u32 {

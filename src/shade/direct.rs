@@ -15,7 +15,7 @@ use crate::scene::{Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
 /// Shadow rays traced together.
-const BATCH: usize = 256;
+pub(super) const BATCH: usize = 256;
 
 /// Where shadow rays leave a shading point.
 #[derive(Debug, Clone, Copy)]
@@ -92,6 +92,11 @@ pub(super) struct LightSource {
 }
 
 impl LightSource {
+    /// Whether it is the sky.
+    pub fn is_sky(&self) -> bool {
+        self.rays == RayKind::ShadowSky
+    }
+
     /// Whether its samples are drawn at random: a delta light has one.
     fn is_sampled(&self) -> bool {
         self.rays != RayKind::ShadowDelta
@@ -103,6 +108,8 @@ impl LightSource {
 pub(super) struct ShadowScratch {
     rays: Vec<Ray>,
     weights: Vec<f64>,
+    /// In place of weights what a glossy point reflects along each ray, per unit of emission.
+    seen: Vec<Rgb>,
     occluded: Vec<bool>,
     spans: Vec<Span>,
     u: Vec<[f32; 2]>,
@@ -153,17 +160,38 @@ struct Span {
 }
 
 impl ShadowScratch {
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.rays.clear();
         self.weights.clear();
+        self.seen.clear();
         self.spans.clear();
     }
 
     /// Room for `n` samples of a light, to be given back.
-    fn samples(&mut self, n: usize) -> Vec<[f32; 2]> {
+    pub fn samples(&mut self, n: usize) -> Vec<[f32; 2]> {
         let mut u = std::mem::take(&mut self.u);
         u.resize(n, [0.0; 2]);
         u
+    }
+
+    /// Takes the room back.
+    pub fn give_back(&mut self, u: Vec<[f32; 2]>) {
+        self.u = u;
+    }
+
+    /// Adds a ray of a glossy point, which reflects `seen` of the light along it.
+    pub fn push_highlight(&mut self, ray: Ray, seen: Rgb) {
+        self.rays.push(ray);
+        self.seen.push(seen);
+    }
+
+    /// What each of the batch's glossy points reflects along its rays that are not occluded.
+    pub fn highlights(&self) -> impl Iterator<Item = Rgb> {
+        let mut start = 0;
+        self.spans.iter().map(move |span| {
+            let rays = std::mem::replace(&mut start, span.end)..span.end;
+            rays.filter(|k| !self.occluded[*k]).map(|k| self.seen[k]).sum()
+        })
     }
 
     /// Whether the present point has no ray yet.
@@ -172,7 +200,7 @@ impl ShadowScratch {
     }
 
     /// Ends a point's rays.
-    fn close(&mut self, unshadowed: Rgb) {
+    pub fn close(&mut self, unshadowed: Rgb) {
         self.spans.push(Span { end: self.rays.len(), unshadowed });
     }
 
@@ -312,7 +340,7 @@ impl Renderer<'_> {
             self.trace_shadow_rays(source, s, counts);
             settle(lit, group, source.channel, pixels, s);
         }
-        s.u = u;
+        s.give_back(u);
         s.wanted = wanted;
     }
 
@@ -411,7 +439,7 @@ impl Renderer<'_> {
     }
 
     /// Stratified points of one light and one place, from sample number `first` on.
-    fn fill(
+    pub(super) fn fill(
         &self,
         place: &SamplePlace,
         source: &LightSource,
@@ -424,7 +452,7 @@ impl Renderer<'_> {
     }
 
     /// Traces the batch's rays, to a light.
-    fn trace_shadow_rays(
+    pub(super) fn trace_shadow_rays(
         &self,
         source: &LightSource,
         s: &mut ShadowScratch,

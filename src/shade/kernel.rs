@@ -5,16 +5,18 @@
 //! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
-use super::direct::ShadowScratch;
+use super::direct::{ShadowScratch, ShadowStarts};
+use super::highlight::GlossyPoint;
 use super::lobe::{self, Lobe, Scattered};
-use super::medium_stack::{self, MediumStack};
+use super::medium_stack::{self, Body, MediumStack};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
-use super::{FrameInput, Left, Renderer, dimensions, optics};
+use super::{FrameInput, Left, Renderer, dimensions, medium, optics};
 use crate::film::GPixel;
 use crate::inference::SAMPLES_TOGETHER;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
+use crate::scene::MaterialId;
 use crate::stats::{RayCounts, RayKind};
 
 /// Boundaries of ranked glass that a ray passes without another medium behind them.
@@ -29,6 +31,11 @@ struct PathState {
     pixel: u32,
     /// Camera sample.
     sample: u32,
+    /// The glass without a priority that the ray is in.
+    medium: Option<MaterialId>,
+    /// Density of the ray's direction among those of the lobe that sent it, per steradian; 0 of camera
+    /// rays and of delta lobes.
+    pdf: f32,
     /// Which branch of the tree ([`dimensions::branch`]).
     branch: u32,
 }
@@ -40,6 +47,8 @@ pub(super) struct Scratch {
     states: Vec<PathState>,
     /// Bodies of ranked glass around each ray's start; empty in kernels without.
     interiors: Vec<MediumStack>,
+    /// Bodies on the way out of the glass around a ray's start.
+    met: Vec<Body>,
     hits: Vec<Option<Hit>>,
     next_rays: Vec<Ray>,
     next_states: Vec<PathState>,
@@ -47,19 +56,20 @@ pub(super) struct Scratch {
     /// Branch of each next ray, and which it is.
     order: Vec<(u32, u32)>,
     lit: Vec<ShadingPoint>,
+    glossy: Vec<GlossyPoint>,
     shadow: ShadowScratch,
 }
 
 impl Scratch {
     /// Notes the bodies of ranked glass around each camera ray's start.
-    fn start_interiors(&mut self, renderer: &Renderer, input: &FrameInput) {
-        self.interiors.clear();
-        if input.camera.lens.is_sampled() {
+    fn start_interiors(&mut self, renderer: &Renderer, input: &FrameInput, counts: &mut RayCounts) {
+        let Self { rays, interiors, met, .. } = self;
+        interiors.clear();
+        if input.camera.lens.is_sampled() && input.has_ranked_glass {
             // A boundary may lie across the lens.
-            let around = |ray: &Ray| MediumStack::at(renderer, ray.org, ray.dir);
-            self.interiors.extend(self.rays.iter().map(around));
+            interiors.extend(rays.iter().map(|ray| MediumStack::at(renderer, ray, met, counts)));
         } else {
-            self.interiors.resize(self.rays.len(), input.around_eye);
+            interiors.resize(rays.len(), input.around_eye);
         }
     }
 
@@ -105,11 +115,14 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
         camera_rays(input, pixels, first..last, scratch);
         counts[RayKind::Camera] += scratch.rays.len() as u64;
         if NESTED {
-            scratch.start_interiors(renderer, input);
+            scratch.start_interiors(renderer, input, &mut counts);
         }
         trace_paths::<MIRROR, GLASS, NESTED>(renderer, input, pixels, scratch, &mut counts);
-        let Scratch { lit, shadow, .. } = scratch;
+        let Scratch { lit, glossy, shadow, .. } = scratch;
         renderer.light_points(input, lit, pixels, shadow, &mut counts);
+        if MIRROR && !glossy.is_empty() {
+            renderer.light_highlights(input, glossy, pixels, shadow, &mut counts);
+        }
         if let Some(reuse) = &input.reuse {
             shadow.groups.finish(reuse, pixels, &mut left.sources, &mut left.reuse);
         }
@@ -133,7 +146,8 @@ fn camera_rays(
             let lens = pixels.lens_position(pixel, sample);
             scratch.rays.push(input.camera.generate_ray(x, y, lens));
             let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
-            scratch.states.push(PathState { throughput, pixel: pixel as u32, sample, branch });
+            let (pixel, medium, pdf) = (pixel as u32, None, 0.0);
+            scratch.states.push(PathState { throughput, pixel, sample, medium, pdf, branch });
         }
     }
 }
@@ -146,8 +160,9 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     counts: &mut RayCounts,
 ) {
     scratch.lit.clear();
+    scratch.glossy.clear();
     for depth in 0..=renderer.settings.bounces {
-        let Scratch { rays, states, interiors, hits, lit, .. } = scratch;
+        let Scratch { rays, states, interiors, hits, lit, glossy, .. } = scratch;
         let Scratch { next_rays, next_states, next_interiors, .. } = scratch;
         hits.clear();
         hits.resize(rays.len(), None);
@@ -155,14 +170,29 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
         if depth == 0 && pixels.wants_records() {
             record(renderer, input, pixels, rays, hits, states);
         }
-        let mut vertex =
-            Vertex { renderer, pixels, lit, next_rays, next_states, next_interiors, counts };
+        let mut vertex = Vertex {
+            renderer,
+            input,
+            pixels,
+            lit,
+            glossy,
+            next_rays,
+            next_states,
+            next_interiors,
+            counts,
+        };
         let may_bounce = depth < renderer.settings.bounces;
         for (i, ((ray, hit), state)) in rays.iter().zip(hits.iter()).zip(states.iter()).enumerate()
         {
             if NESTED {
                 vertex.pass::<MIRROR>(*ray, *hit, state, interiors[i], may_bounce);
                 continue;
+            }
+            let absorbed;
+            let mut state = state;
+            if GLASS && renderer.plan.absorption {
+                absorbed = vertex.travel(ray, hit.as_ref(), state, state.medium);
+                state = &absorbed;
             }
             match hit {
                 None => vertex.escape(ray, state),
@@ -182,8 +212,10 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
 /// Where one generation of rays ends and the next begins.
 struct Vertex<'v, 'r> {
     renderer: &'v Renderer<'r>,
+    input: &'v FrameInput<'r>,
     pixels: &'v mut BlockPixels,
     lit: &'v mut Vec<ShadingPoint>,
+    glossy: &'v mut Vec<GlossyPoint>,
     next_rays: &'v mut Vec<Ray>,
     next_states: &'v mut Vec<PathState>,
     next_interiors: &'v mut Vec<MediumStack>,
@@ -201,6 +233,23 @@ impl Vertex<'_, '_> {
         self.pixels.add(state.pixel, state.sample, radiance);
     }
 
+    /// The path where `ray` meets `hit` or nothing, after the glass `medium` has taken its share of light.
+    fn travel(
+        &self,
+        ray: &Ray,
+        hit: Option<&Hit>,
+        state: &PathState,
+        medium: Option<MaterialId>,
+    ) -> PathState {
+        let scene = self.renderer.scene;
+        let glass = medium.and_then(|id| scene.materials[id as usize].glass.as_ref());
+        let left = glass.map_or(Rgb::ONE, |glass| {
+            let way = hit.map_or(f64::INFINITY, |hit| hit.t * ray.dir.length());
+            medium::transmittance(glass, scene.recentring.length_to_world(way))
+        });
+        PathState { throughput: state.throughput * left, ..*state }
+    }
+
     /// Follows the ray through boundaries of ranked glass that lead to no other medium, then to
     /// what it meets.
     fn pass<const MIRROR: bool>(
@@ -212,12 +261,17 @@ impl Vertex<'_, '_> {
         may_bounce: bool,
     ) {
         let renderer = self.renderer;
+        let mut state = *state;
         for _ in 0..MOST_PASSED {
-            let Some(met) = &hit else { return self.escape(&ray, state) };
+            if renderer.plan.absorption {
+                let medium = inside.material().or(state.medium);
+                state = self.travel(&ray, hit.as_ref(), &state, medium);
+            }
+            let Some(met) = &hit else { return self.escape(&ray, &state) };
             let si = SurfaceInteraction::new(renderer.scene, &ray, met);
             let material = &renderer.scene.materials[si.surface.material as usize];
             if !material.glass.as_ref().is_some_and(medium_stack::is_ranked) {
-                return self.meet::<MIRROR, true, true>(&ray, met, state, &inside, may_bounce);
+                return self.meet::<MIRROR, true, true>(&ray, met, &state, &inside, may_bounce);
             }
             let crossing = medium_stack::cross(renderer, &ray, &si, &inside, self.counts);
             if let Some(boundary) = crossing.boundary {
@@ -225,10 +279,11 @@ impl Vertex<'_, '_> {
                     let starts = Starts {
                         reflected: (&si, &inside),
                         transmitted: (&crossing.last, &crossing.after),
+                        behind: state.medium,
                     };
                     let wo = -ray.dir.normalize();
                     let lobe = Lobe::Dielectric(boundary.lobe);
-                    self.scatter::<true>(&lobe, &boundary.surface, wo, &starts, state);
+                    self.scatter::<true>(&lobe, &boundary.surface, wo, &starts, &state);
                 }
                 return;
             }
@@ -238,7 +293,7 @@ impl Vertex<'_, '_> {
             hit = renderer.intersector.intersect(&ray, self.counts);
         }
         // Given up, and not silently.
-        self.add(state, Rgb::NAN);
+        self.add(&state, Rgb::NAN);
     }
 
     fn meet<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
@@ -253,8 +308,13 @@ impl Vertex<'_, '_> {
         let si = SurfaceInteraction::new(scene, ray, hit);
         let material = &scene.materials[si.surface.material as usize];
         let wo = -ray.dir.normalize();
-        let le = material.emitted(si.is_outside(wo));
+        let mut le = material.emitted(si.is_outside(wo));
         if le != Rgb::ZERO {
+            if MIRROR && state.pdf > 0.0 {
+                let ends = (ray.org, si.p);
+                let pdf = f64::from(state.pdf);
+                le *= self.renderer.share_of_lobe(self.input, si.surface.light, ends, pdf);
+            }
             self.add(state, state.throughput * le);
         }
         lobe::for_each::<MIRROR, GLASS>(scene, material, &si, wo, |lobe| {
@@ -262,10 +322,29 @@ impl Vertex<'_, '_> {
                 let reflectance = state.throughput * albedo;
                 self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
             } else if may_bounce {
-                let starts = Starts { reflected: (&si, inside), transmitted: (&si, inside) };
-                self.scatter::<NESTED>(lobe, &si, wo, &starts, state);
+                let start = (&si, inside);
+                let behind = si.is_outside(wo).then_some(si.surface.material);
+                let starts = Starts { reflected: start, transmitted: start, behind };
+                self.scatter::<NESTED>(&lobe, &si, wo, &starts, state);
+                if MIRROR && !lobe.is_delta() {
+                    self.glossy.push(self.glossy_point(lobe, (&si, ray, hit), wo, state));
+                }
             }
         });
+    }
+
+    fn glossy_point(
+        &self,
+        lobe: Lobe,
+        (si, ray, hit): (&SurfaceInteraction, &Ray, &Hit),
+        wo: DVec3,
+        state: &PathState,
+    ) -> GlossyPoint {
+        let Renderer { scene, settings, .. } = self.renderer;
+        let point = ShadingPoint::new((si, ray, hit), wo, Rgb::ONE, state.place());
+        let starts = ShadowStarts::of(scene, settings, (si, ray, hit), point.ng);
+        let (p, n, place, throughput) = (si.p, point.n, point.place, state.throughput);
+        GlossyPoint { lobe, p, n, wo, starts, throughput, place }
     }
 
     /// Sends the rays that `lobe` scatters at the surface `si`.
@@ -278,12 +357,23 @@ impl Vertex<'_, '_> {
         state: &PathState,
     ) {
         let outside = si.is_outside(wo);
-        for (child, scattered) in (0..).zip(lobe.sample(wo, si.ns)) {
-            let Some(Scattered { wi, share, tint, transmitted }) = scattered else { continue };
-            let wi = optics::keep_side(wi, si.ng, outside != transmitted);
-            let start = if transmitted { starts.transmitted } else { starts.reflected };
-            let weight = state.throughput * share * tint;
-            let sent = self.push::<NESTED>(start, wi, state, weight, child);
+        let sampler = self.pixels.sampler(state.pixel);
+        let u = || sampler.get2(state.sample, dimensions::of_lobe(state.branch));
+        for (child, scattered) in (0..).zip(lobe.sample(wo, si.ns, u)) {
+            let Some(Scattered { wi: sent, share, tint, transmitted, pdf }) = scattered else {
+                continue;
+            };
+            let wi = optics::keep_side(sent, si.ng, outside != transmitted);
+            // Light samples do not stand for directions that were mirrored.
+            let pdf = if wi == sent { pdf as f32 } else { 0.0 };
+            let (start, medium) = match transmitted {
+                true => (starts.transmitted, starts.behind),
+                false => (starts.reflected, state.medium),
+            };
+            let throughput = state.throughput * share * tint;
+            let branch = dimensions::branch(state.branch, child);
+            let next = PathState { throughput, medium, pdf, branch, ..*state };
+            let sent = self.push::<NESTED>(start, wi, next);
             self.counts[lobe.ray_kind()] += u64::from(sent);
         }
     }
@@ -293,25 +383,22 @@ impl Vertex<'_, '_> {
         &mut self,
         (si, inside): (&SurfaceInteraction, &MediumStack),
         dir: DVec3,
-        from: &PathState,
-        throughput: Rgb,
-        child: u32,
+        next: PathState,
     ) -> bool {
         let settings = self.renderer.settings;
         // Without a sign, and so that a NaN is not below: neither is dropped unseen.
-        let [r, g, b] = throughput.to_array().map(f32::abs);
+        let [r, g, b] = next.throughput.to_array().map(f32::abs);
         let least = settings.cutoff.max(f32::MIN_POSITIVE);
         if r < least && g < least && b < least {
             return false;
         }
         // Two negative weights would make light that looks right.
-        self.pixels.check(from.pixel, from.sample, throughput);
+        self.pixels.check(next.pixel, next.sample, next.throughput);
         self.next_rays.push(si.spawn(dir, settings.rules.spawn_offset));
         if NESTED {
             self.next_interiors.push(*inside);
         }
-        let branch = dimensions::branch(from.branch, child);
-        self.next_states.push(PathState { throughput, branch, ..*from });
+        self.next_states.push(next);
         true
     }
 }
@@ -320,6 +407,8 @@ impl Vertex<'_, '_> {
 struct Starts<'w> {
     reflected: (&'w SurfaceInteraction, &'w MediumStack),
     transmitted: (&'w SurfaceInteraction, &'w MediumStack),
+    /// The glass without a priority that transmitted rays are in.
+    behind: Option<MaterialId>,
 }
 
 impl PathState {

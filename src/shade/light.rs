@@ -120,6 +120,24 @@ impl LightSampler {
         }
     }
 
+    /// Radiance towards `p` per unit of emission, where it is the same all over the light.
+    pub fn radiance_at(&self, p: DVec3) -> f64 {
+        match &self.shape {
+            Shape::Spot(light) => light.radiance_at(p),
+            Shape::Quad(_) | Shape::Sphere(_) | Shape::Disk(_) | Shape::Sky(_) => 1.0,
+            // These have an intensity or an irradiance.
+            Shape::Point(_) | Shape::Directional(_) => f64::NAN,
+        }
+    }
+
+    /// Whether rays can end on the light's surface.
+    pub fn is_seen(&self) -> bool {
+        match &self.shape {
+            Shape::Quad(_) | Shape::Sphere(_) | Shape::Disk(_) => true,
+            Shape::Point(_) | Shape::Directional(_) | Shape::Spot(_) | Shape::Sky(_) => false,
+        }
+    }
+
     /// The light as seen from `p` with unit normal `n`; `None` from within.
     pub fn seen_from(&self, p: DVec3, n: DVec3) -> Option<LightView<'_>> {
         Some(LightView(match &self.shape {
@@ -146,6 +164,17 @@ impl LightView<'_> {
             View::Sphere(light) => u.for_each(|u| sink.push(light.sample_li(p, n, u))),
             View::Disk(light) => u.for_each(|u| sink.push(light.sample_li(p, n, u))),
             View::Sky(sky) => u.for_each(|u| sink.push(sky.sample_li(n, u))),
+        }
+    }
+
+    /// Density of [`sample_li`](Self::sample_li) at `point` of the light, per steradian seen from `p`; `None` of a delta
+    /// light and of the sky.
+    pub fn pdf_li(&self, p: DVec3, point: DVec3) -> Option<f64> {
+        match &self.0 {
+            View::Quad(light) => Some(light.pdf_li(p, point)),
+            View::Sphere(light) => Some(light.pdf_li()),
+            View::Disk(light) => Some(light.pdf_li(p, point)),
+            View::Point(_) | View::Directional(_) | View::Sky(_) => None,
         }
     }
 

@@ -6,6 +6,7 @@
 
 mod dielectric;
 mod diffuse;
+mod glossy;
 mod mirror;
 
 use crate::intersect::SurfaceInteraction;
@@ -15,16 +16,19 @@ use crate::stats::RayKind;
 pub(super) use dielectric::Dielectric;
 use diffuse::Diffuse;
 pub(super) use diffuse::albedo;
+use glossy::Glossy;
 use mirror::Mirror;
+use std::f32::consts::FRAC_1_PI;
 
 /// One of the ways in which a surface scatters light, at one of its points.
 pub(super) enum Lobe {
     Diffuse(Diffuse),
     Mirror(Mirror),
+    Glossy(Glossy),
     Dielectric(Dielectric),
 }
 
-/// A direction that a delta lobe passes radiance on from.
+/// A direction that a lobe passes radiance on from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scattered {
     /// Unit direction, leaving the surface.
@@ -35,6 +39,8 @@ pub(super) struct Scattered {
     pub tint: Rgb,
     /// Whether the ray goes on behind the surface.
     pub transmitted: bool,
+    /// Density of the direction among the lobe's, per steradian; 0 of a delta lobe.
+    pub pdf: f64,
 }
 
 /// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving). Lobes that the
@@ -45,37 +51,75 @@ pub(super) fn for_each<const MIRROR: bool, const GLASS: bool>(
     material: &Material,
     si: &SurfaceInteraction,
     wo: DVec3,
-    mut take: impl FnMut(&Lobe),
+    mut take: impl FnMut(Lobe),
 ) {
     if let Some(diffuse) = Diffuse::of(scene, material, si) {
-        take(&Lobe::Diffuse(diffuse));
+        take(Lobe::Diffuse(diffuse));
     }
     if let Some(mirror) = Mirror::of(material).filter(|_| MIRROR) {
-        take(&Lobe::Mirror(mirror));
+        take(Lobe::Mirror(mirror));
+    }
+    if let Some(glossy) = MIRROR.then(|| Glossy::of(material, si, wo)).flatten() {
+        take(Lobe::Glossy(glossy));
     }
     if let Some(dielectric) = Dielectric::of(material, si.is_outside(wo)).filter(|_| GLASS) {
-        take(&Lobe::Dielectric(dielectric));
+        take(Lobe::Dielectric(dielectric));
     }
 }
 
 impl Lobe {
-    /// The share of irradiance that is sent out alike in all directions; `None` of a delta lobe, which sees
-    /// lights by the rays of [`sample`](Self::sample) alone.
+    /// The share of irradiance that is sent out alike in all directions; `None` of a lobe that depends on
+    /// the direction.
     #[inline(always)]
     pub fn albedo(&self) -> Option<Rgb> {
         match self {
             Self::Diffuse(diffuse) => Some(diffuse.albedo),
-            Self::Mirror(_) | Self::Dielectric(_) => None,
+            Self::Mirror(_) | Self::Glossy(_) | Self::Dielectric(_) => None,
         }
     }
 
-    /// The directions that radiance towards `wo` comes from, at a surface with the unit normal `n` on either
-    /// side: all of a delta lobe's, since a Whitted path follows each; none of a diffuse lobe's.
+    /// Whether the lobe passes on radiance from single directions only, so that it sees lights by the
+    /// rays of [`sample`](Self::sample) alone.
     #[inline(always)]
-    pub fn sample(&self, wo: DVec3, n: DVec3) -> [Option<Scattered>; 2] {
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Self::Diffuse(_) | Self::Glossy(_) => false,
+            Self::Mirror(_) | Self::Dielectric(_) => true,
+        }
+    }
+
+    /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving the surface), per
+    /// steradian; 0 of a delta lobe.
+    pub fn f(&self, wo: DVec3, wi: DVec3) -> Rgb {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.albedo * FRAC_1_PI,
+            Self::Glossy(glossy) => glossy.f(wo, wi),
+            Self::Mirror(_) | Self::Dielectric(_) => Rgb::ZERO,
+        }
+    }
+
+    /// The density of [`sample`](Self::sample) at `wi`, per steradian; 0 of a lobe that is not sampled at random.
+    pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
+        match self {
+            Self::Glossy(glossy) => glossy.pdf(wo, wi),
+            Self::Diffuse(_) | Self::Mirror(_) | Self::Dielectric(_) => 0.0,
+        }
+    }
+
+    /// The directions that radiance towards `wo` is passed on from, at a surface with the unit normal `n` on
+    /// either side: all of a delta lobe's, since a Whitted path follows each; none of a diffuse lobe's; else one,
+    /// at random, by the pair `u` of the unit square.
+    #[inline(always)]
+    pub fn sample(
+        &self,
+        wo: DVec3,
+        n: DVec3,
+        u: impl FnOnce() -> [f32; 2],
+    ) -> [Option<Scattered>; 2] {
         match self {
             Self::Diffuse(_) => [None, None],
             Self::Mirror(mirror) => [Some(mirror.sample(wo, n)), None],
+            Self::Glossy(glossy) => [glossy.sample(wo, u().map(f64::from)), None],
             Self::Dielectric(dielectric) => dielectric.sample(wo, n),
         }
     }
@@ -85,6 +129,7 @@ impl Lobe {
     pub fn ray_kind(&self) -> RayKind {
         match self {
             Self::Diffuse(_) | Self::Mirror(_) => RayKind::Mirror,
+            Self::Glossy(_) => RayKind::Glossy,
             Self::Dielectric(_) => RayKind::Glass,
         }
     }

@@ -12,7 +12,7 @@
 use super::Renderer;
 use super::lobe::Dielectric;
 use crate::intersect::{Ray, SurfaceInteraction};
-use crate::math::{DVec3, Rgb};
+use crate::math::Rgb;
 use crate::scene::{Glass, MaterialId, Scene};
 use crate::stats::{RayCounts, RayKind};
 
@@ -31,7 +31,7 @@ const MOST_CROSSED: usize = 1024;
 
 /// A body of glass: a mesh or a sphere.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Body {
+pub(super) struct Body {
     /// Mesh, or number of meshes plus sphere.
     index: u32,
     material: MaterialId,
@@ -85,17 +85,22 @@ impl MediumStack {
         self.bodies().iter().copied().max_by_key(Body::rank)
     }
 
-    /// The bodies at `eye`, by what a ray along `dir` leaves before it has entered it.
-    pub fn at(renderer: &Renderer, eye: DVec3, dir: DVec3) -> Self {
+    /// The glass that is there.
+    pub fn material(&self) -> Option<MaterialId> {
+        self.medium().map(|body| body.material)
+    }
+
+    /// The bodies where `ray` starts, by what it leaves before it has entered it. `met` is a buffer.
+    pub fn at(renderer: &Renderer, ray: &Ray, met: &mut Vec<Body>, counts: &mut RayCounts) -> Self {
         let mut inside = Self::default();
-        let mut met = Vec::new();
-        let mut ray = Ray::new(eye, dir);
+        met.clear();
+        let (mut ray, dir) = (*ray, ray.dir);
         for _ in 0..MOST_CROSSED {
-            let hit = renderer.intersector.intersect(&ray, &mut RayCounts::default());
-            let Some(hit) = hit else { break };
+            counts[RayKind::Glass] += 1;
+            let Some(hit) = renderer.intersector.intersect(&ray, counts) else { break };
             let si = SurfaceInteraction::new(renderer.scene, &ray, &hit);
             // A ray that starts beyond the first of several that touch would miss the others.
-            let touching = Touching::at(renderer, &ray, &si, true, &mut RayCounts::default());
+            let touching = Touching::at(renderer, &ray, &si, true, counts);
             for si in touching.surfaces() {
                 let Some(body) = body_of(renderer.scene, si).filter(|b| !met.contains(b)) else {
                     continue;

@@ -1,18 +1,20 @@
 //! Whitted radiance (Whitted, 1980) along camera rays, by kernels that [`EffectPlan`] selects.
 //!
 //! Takes a scene, an intersector and a camera; gives a film. Direct light from area, point and
-//! directional lights and the sky, perfect mirrors and clear glass by recursion to a set depth.
+//! directional lights and the sky, perfect and rough mirrors and clear glass by recursion to a set depth.
 //! Never looks at other frames.
 //!
-//! Not done: light through glass (its shadow is opaque), glossy lobes, diffuse interreflection.
+//! Not done: light through glass (its shadow is opaque), diffuse interreflection.
 
 mod dimensions;
 mod direct;
 mod groups;
+mod highlight;
 mod irradiance;
 mod kernel;
 pub(crate) mod light;
 mod lobe;
+mod medium;
 mod medium_stack;
 mod motion;
 pub mod optics;
@@ -24,10 +26,10 @@ mod texture;
 use crate::effects::EffectPlan;
 use crate::film::{Film, GPixel, Provenance};
 use crate::inference::{Channels, Inference, TracedPoints};
-use crate::intersect::Intersector;
+use crate::intersect::{Intersector, Ray};
 use crate::math::Rgb;
 use crate::sampling::PixelFilter;
-use crate::scene::{Camera, Filter, Rect, Scene, Settings};
+use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use direct::LightSource;
 pub(crate) use direct::ShadowStarts;
@@ -145,6 +147,7 @@ struct FrameInput<'a> {
     lights: Vec<LightSource>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: MediumStack,
+    has_ranked_glass: bool,
     reuse: Option<Reuse<'a>>,
     /// Whether any light must be traced in every frame.
     has_always_traced: bool,
@@ -269,8 +272,13 @@ impl Renderer<'_> {
 
     fn input<'a>(&self, camera: &Camera, stream: u32, reuse: Option<Reuse<'a>>) -> FrameInput<'a> {
         let own = camera.to_scene(&self.scene.recentring);
-        let around_eye = match self.plan.nested_glass {
-            true => MediumStack::at(self, own.eye, own.forward),
+        let is_ranked = |m: &Material| m.glass.as_ref().is_some_and(medium_stack::is_ranked);
+        let has_ranked_glass = self.scene.materials.iter().any(is_ranked);
+        let around_eye = match has_ranked_glass && self.plan.nested_glass {
+            true => {
+                let ray = Ray::new(own.eye, own.forward);
+                MediumStack::at(self, &ray, &mut Vec::new(), &mut RayCounts::default())
+            }
             false => MediumStack::default(),
         };
         FrameInput {
@@ -280,6 +288,7 @@ impl Renderer<'_> {
             filter: pixel_filter(self.settings.filter),
             lights: self.light_sources(reuse),
             around_eye,
+            has_ranked_glass,
             reuse,
             has_always_traced: self.scene.has_always_traced(),
         }

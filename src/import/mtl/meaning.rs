@@ -28,7 +28,7 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
             notes.push(format!("glass without `Ni`: the index of refraction is {DEFAULT_IOR}"));
             DEFAULT_IOR
         });
-        out.glass = Some(Glass { ior, tint, priority: None });
+        out.glass = Some(Glass { tint, ..Glass::clear(ior) });
         return (out, notes);
     }
     if matches!(mtl.illumination_model, Some(3 | 5)) {

@@ -1,7 +1,7 @@
 //! `[material.NAME]`.
 
 use super::at::At;
-use super::number::{Int, Ior};
+use super::number::{Int, Ior, Share};
 use super::report::Source;
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
@@ -19,8 +19,10 @@ pub(super) struct Material {
     pub diffuse: Option<Reflectance>,
     /// Image file, relative to the scene file, that multiplies `diffuse`.
     pub texture: Option<At<String>>,
-    /// Reflectance of a perfect mirror, linear RGB or one number for grey. Absent: 0.
+    /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
+    /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
+    roughness: Option<At<Share>>,
     /// Clear glass.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
@@ -41,6 +43,9 @@ pub(super) struct Glass {
     /// Share of light that each crossing of the surface lets through.
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
+    /// Absorption coefficient of the inside, per unit of length, linear RGB or one number for grey: a way of
+    /// length x leaves the share exp(-absorption x) of light. The surface must be closed. Absent: 0.
+    absorption: Option<Amount>,
     /// For bodies that touch, overlap or lie in one another, as tea in a glass: where several are,
     /// the one of the highest priority is. `ior` is then that of the body itself. Absent: the body
     /// overlaps nothing.
@@ -63,6 +68,7 @@ impl Material {
         let glass = self.glass.as_ref().map(|g| scene::Glass {
             ior: g.ior.0,
             tint: g.tint.rgb(),
+            absorption: g.absorption.unwrap_or_default().rgb(),
             priority: g.priority.map(|p| p.u32() as u8),
         });
         Ok(scene::Material {
@@ -70,6 +76,7 @@ impl Material {
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture,
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
+            roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
             glass,
             emission: self.emission.unwrap_or_default().rgb(),
             emits_back: self.emits_back,
@@ -88,6 +95,10 @@ impl Material {
                                `texture`, `mirror` nor `emission`";
                 return Err(source.fault(&glass.span, message).into());
             }
+        }
+        if let (Some(roughness), None) = (&self.roughness, &self.mirror) {
+            let message = "`roughness` is the mirror's: it needs `mirror`";
+            return Err(source.fault(&roughness.span, message).into());
         }
         if let (Some(diffuse), Some(mirror)) = (self.albedo(), &self.mirror) {
             let sums = [0, 1, 2].map(|c| diffuse.0[c].0 + mirror.0[c].0);

@@ -6,7 +6,7 @@ use crate::intersect::PlaneError;
 use crate::math::{DVec3, orthonormal_basis};
 use crate::sampling::concentric_disk;
 use crate::scene::DiskLight;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// A flat disk.
 pub(super) struct Disk {
@@ -64,6 +64,10 @@ impl Disk {
         let (x, y, _) = concentric_disk(u);
         let point = self.centre + (self.basis.0 * x + self.basis.1 * y) * self.radius;
         self.plane.sample_li(p, n, point)
+    }
+
+    pub fn pdf_li(&self, p: DVec3, point: DVec3) -> f64 {
+        self.plane.pdf_li(p, point, PI * self.radius * self.radius)
     }
 
     /// The middle of the part above the horizon, on the diameter that rises most.

@@ -23,6 +23,13 @@ impl Flat {
         LightSample { weight, ..self.alone(point) }
     }
 
+    /// Density per steradian at `point`, seen from `p`, of points that are uniform over `area`.
+    pub fn pdf_li(&self, p: DVec3, point: DVec3, area: f64) -> f64 {
+        let to_light = point - p;
+        let d2 = to_light.length_squared();
+        d2 * d2.sqrt() / (to_light.dot(self.normal).abs() * area)
+    }
+
     /// `point` of the light where it stands for all of it.
     #[inline(always)]
     pub fn alone(&self, point: DVec3) -> LightSample {

@@ -39,6 +39,11 @@ impl Quad {
         self.plane.sample_li(p, n, self.warp.point(u))
     }
 
+    pub fn pdf_li(&self, p: DVec3, point: DVec3) -> f64 {
+        let [a, b, c, d] = self.corners;
+        self.plane.pdf_li(p, point, 0.5 * (c - a).cross(d - b).length())
+    }
+
     pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
         let point = irradiance::middle_above(p, n, &self.warp.corners())?;
         Some(self.plane.alone(point))

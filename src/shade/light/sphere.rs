@@ -42,6 +42,10 @@ impl SphereView {
         LightSample { target: self.target(p + dir * distance), weight: dir.dot(n).max(0.0) }
     }
 
+    pub fn pdf_li(&self) -> f64 {
+        1.0 / self.cone.solid_angle()
+    }
+
     pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
         let (dir, distance) = self.cone.above(n)?;
         Some(LightSample { target: self.target(p + dir * distance), weight: 1.0 })

@@ -31,12 +31,14 @@ impl Dielectric {
             share: split.reflectance as f32,
             tint: Rgb::ONE,
             transmitted: false,
+            pdf: 0.0,
         };
         let refracted = split.refracted.map(|wi| Scattered {
             wi,
             share: (1.0 - split.reflectance) as f32,
             tint: self.tint,
             transmitted: true,
+            pdf: 0.0,
         });
         [Some(reflected), refracted]
     }

@@ -15,13 +15,13 @@ impl Mirror {
     #[inline(always)]
     pub fn of(material: &Material) -> Option<Self> {
         let reflectance = material.mirror;
-        (reflectance != Rgb::ZERO).then_some(Self { reflectance })
+        (reflectance != Rgb::ZERO && material.roughness == 0.0).then_some(Self { reflectance })
     }
 
     /// The one direction that is seen along `wo`.
     #[inline(always)]
     pub fn sample(&self, wo: DVec3, n: DVec3) -> Scattered {
-        let (share, tint) = (1.0, self.reflectance);
-        Scattered { wi: optics::reflect(wo, n), share, tint, transmitted: false }
+        let (wi, tint) = (optics::reflect(wo, n), self.reflectance);
+        Scattered { wi, share: 1.0, tint, transmitted: false, pdf: 0.0 }
     }
 }

@@ -29,7 +29,7 @@ fn studio(spp: u32) -> Job {
     world.materials.push(Material::diffuse("floor", Rgb::new(0.7, 0.7, 0.6)));
     world.materials.push(Material::diffuse("red", Rgb::new(0.7, 0.2, 0.1)));
     world.materials.push(Material { mirror: Rgb::splat(0.8), ..Material::black("mirror") });
-    let glass = Some(Glass { ior: 1.5, tint: Rgb::ONE, priority: None });
+    let glass = Some(Glass::clear(1.5));
     world.materials.push(Material { glass, ..Material::black("glass") });
     let p = DVec3::new;
     let floor = [p(-3.0, 0.0, -3.0), p(-3.0, 0.0, 3.0), p(3.0, 0.0, 3.0), p(3.0, 0.0, -3.0)];

@@ -9,7 +9,7 @@ use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{Corners, Glass, Material, Sky, Texture, World, WorldMesh, WorldSphere};
 
 fn glass(tint: f32, priority: Option<u8>) -> Material {
-    let glass = Glass { ior: 1.5, tint: Rgb::splat(tint), priority };
+    let glass = Glass { tint: Rgb::splat(tint), priority, ..Glass::clear(1.5) };
     Material { glass: Some(glass), ..Material::black("glass") }
 }
 

@@ -104,7 +104,7 @@ struct Ball {
 
 fn ball(centre: DVec3, radius: f64, mesh: Option<(u32, u32)>, ior: f64) -> Ball {
     let mut world = World::default();
-    let glass = Glass { ior, tint: Rgb::ONE, priority: None };
+    let glass = Glass::clear(ior);
     world.materials.push(Material { glass: Some(glass), ..Material::black("glass") });
     if let Some((columns, rows)) = mesh {
         world.meshes.push(shapes::smooth_sphere(centre, radius, columns, rows));
@@ -210,7 +210,7 @@ pub fn glass_ball(size: Size) -> Outcome {
 pub fn light_guide(size: Size) -> Outcome {
     let mut outcome = Outcome::default();
     let mut world = World::default();
-    let glass = Glass { ior: 1.5, tint: Rgb::ONE, priority: None };
+    let glass = Glass::clear(1.5);
     world.materials.push(Material { glass: Some(glass), ..Material::black("glass") });
     let mut slab = common::cube(DVec3::ZERO, 1.0, 0);
     // 160 long, 1 thick, 40 wide: a ray in at 60 degrees meets the sides some 113 times.

@@ -81,7 +81,7 @@ impl Shell {
 
 /// A material of glass.
 fn glass(world: &mut World, ior: f64, priority: Option<u8>) -> u32 {
-    let glass = Glass { ior, tint: Rgb::ONE, priority };
+    let glass = Glass { priority, ..Glass::clear(ior) };
     world.materials.push(Material { glass: Some(glass), ..Material::black("glass") });
     world.materials.len() as u32 - 1
 }

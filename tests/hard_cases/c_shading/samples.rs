@@ -15,7 +15,7 @@ use tweenray::scene::{
 /// Everything that has a parameter, side by side.
 fn world() -> World {
     let mut world = World::default();
-    let glass = Glass { ior: 1.5, tint: Rgb::splat(0.9), priority: None };
+    let glass = Glass { tint: Rgb::splat(0.9), ..Glass::clear(1.5) };
     let ranked = Glass { priority: Some(1), ..glass };
     world.materials = vec![
         Material::diffuse("floor", Rgb::splat(0.5)),

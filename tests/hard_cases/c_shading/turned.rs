@@ -15,7 +15,7 @@ const EYE: DVec3 = DVec3::new(1.0, 1.2, 4.0);
 /// Smooth ball, cube, glass ball of triangles and mirror quad over a floor; every kind of light.
 fn world() -> World {
     let mut world = World::default();
-    let glass = Glass { ior: 1.5, tint: Rgb::new(0.9, 1.0, 0.95), priority: None };
+    let glass = Glass { tint: Rgb::new(0.9, 1.0, 0.95), ..Glass::clear(1.5) };
     world.materials = vec![
         Material::diffuse("floor", Rgb::new(0.7, 0.6, 0.5)),
         Material::diffuse("ball", Rgb::new(0.3, 0.6, 0.9)),

@@ -32,7 +32,7 @@ fn plain() -> World {
 }
 
 fn with_unused(mut world: World) -> World {
-    let glass = Glass { ior: 1.5, tint: Rgb::ONE, priority: Some(1) };
+    let glass = Glass { priority: Some(1), ..Glass::clear(1.5) };
     world.materials.extend([
         Material { mirror: Rgb::ONE, ..Material::black("mirror") },
         Material { glass: Some(glass), ..Material::black("glass") },

@@ -1,0 +1,225 @@
+//! Rough mirrors: glossy reflection.
+
+use super::Scattered;
+use crate::intersect::SurfaceInteraction;
+use crate::math::{DVec3, Rgb, orthonormal_basis};
+use crate::sampling::to_world;
+use crate::scene::Material;
+use crate::shade::optics;
+use std::f64::consts::{PI, TAU};
+use std::sync::OnceLock;
+
+/// Nodes of the table of reflected shares along each axis.
+const NODES: usize = 33;
+/// Samples along each axis for one node.
+const SAMPLES: usize = 32;
+
+/// Microfacets that are perfect mirrors, with the distribution GGX and Smith's masking of both directions
+/// (Walter, Marschner, Li and Torrance, 2007; Heitz, 2014). What light loses to single reflection at rough
+/// surfaces is given back (Turquin, 2019), so that a white surface reflects all of a uniform light.
+pub(in crate::shade) struct Glossy {
+    /// Share of light that a microfacet reflects, with what single reflection loses.
+    tint: Rgb,
+    /// Slope of the microfacets: the square of the roughness.
+    alpha: f64,
+    /// Unit normal on the viewer's side.
+    n: DVec3,
+}
+
+impl Glossy {
+    /// The lobe of `material` at `si`, seen along `wo`; `None` where it has none.
+    pub fn of(material: &Material, si: &SurfaceInteraction, wo: DVec3) -> Option<Self> {
+        if material.mirror == Rgb::ZERO || material.roughness == 0.0 {
+            return None;
+        }
+        let side = if si.is_outside(wo) { 1.0 } else { -1.0 };
+        // Interpolated normals may face away from the viewer.
+        let n = if si.ns.dot(wo) * side > 0.0 { si.ns * side } else { si.ng * side };
+        let reflected = reflected_share(material.roughness, wo.dot(n)) as f32;
+        let lost = (1.0 - reflected) / reflected;
+        let tint = material.mirror * (Rgb::ONE + material.mirror * lost);
+        Some(Self { tint, alpha: material.roughness * material.roughness, n })
+    }
+
+    /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving), per steradian.
+    pub fn f(&self, wo: DVec3, wi: DVec3) -> Rgb {
+        let Some(cosines) = self.cosines(wo, wi) else { return Rgb::ZERO };
+        let [cos_o, cos_i, cos_m] = cosines;
+        let g2 = 1.0 / (1.0 + lambda(self.alpha, cos_o) + lambda(self.alpha, cos_i));
+        self.tint * (density(self.alpha, cos_m) * g2 / (4.0 * cos_o * cos_i)) as f32
+    }
+
+    /// The density of [`sample`](Self::sample) at `wi`, per steradian.
+    pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
+        let Some([cos_o, _, cos_m]) = self.cosines(wo, wi) else { return 0.0 };
+        let g1 = 1.0 / (1.0 + lambda(self.alpha, cos_o));
+        density(self.alpha, cos_m) * g1 / (4.0 * cos_o)
+    }
+
+    /// A direction for `u` in the unit square, by the microfacets that are seen along `wo` (Dupuy and Benyoub,
+    /// 2023); `None` where light would come from below the surface.
+    pub fn sample(&self, wo: DVec3, u: [f64; 2]) -> Option<Scattered> {
+        let (s, t) = orthonormal_basis(self.n);
+        let local = DVec3::new(wo.dot(s), wo.dot(t), wo.dot(self.n));
+        let m = visible_normal(self.alpha, local, u);
+        let wi = optics::reflect(wo, to_world(m.into(), (s, t), self.n)).normalize();
+        let [cos_o, cos_i, _] = self.cosines(wo, wi)?;
+        let share = shadowed(self.alpha, cos_o, cos_i) as f32;
+        let pdf = self.pdf(wo, wi);
+        Some(Scattered { wi, share, tint: self.tint, transmitted: false, pdf })
+    }
+
+    /// Cosines between the normal and `wo`, `wi` and the microfacet between them; `None` where one of the
+    /// directions is below the surface. NaN goes on, to be counted at its pixel.
+    fn cosines(&self, wo: DVec3, wi: DVec3) -> Option<[f64; 3]> {
+        let (cos_o, cos_i) = (wo.dot(self.n), wi.dot(self.n));
+        let cos_m = ((cos_o + cos_i) / (wo + wi).length()).min(1.0);
+        (!(cos_o <= 0.0 || cos_i <= 0.0)).then_some([cos_o, cos_i, cos_m])
+    }
+}
+
+/// Density of microfacet normals at the cosine `cos` to the surface's, per steradian.
+fn density(alpha: f64, cos: f64) -> f64 {
+    // 1 − (1 − α²) cos², which would lose its digits near the peak of a smooth surface.
+    let a2 = alpha * alpha;
+    let scaled = (1.0 - cos) * (1.0 + cos) + a2 * cos * cos;
+    a2 / (PI * scaled * scaled)
+}
+
+/// Smith's function: hidden over visible area of the microfacets along a direction of cosine `cos`.
+fn lambda(alpha: f64, cos: f64) -> f64 {
+    let slope2 = (1.0 - cos) * (1.0 + cos) / (cos * cos);
+    0.5 * ((1.0 + alpha * alpha * slope2.max(0.0)).sqrt() - 1.0)
+}
+
+/// The share of light from microfacets seen along `cos_o` that leaves along `cos_i`.
+fn shadowed(alpha: f64, cos_o: f64, cos_i: f64) -> f64 {
+    let seen = 1.0 + lambda(alpha, cos_o);
+    seen / (seen + lambda(alpha, cos_i))
+}
+
+/// The normal of a microfacet seen along `wo`, in the surface's frame.
+fn visible_normal(alpha: f64, wo: DVec3, [u, v]: [f64; 2]) -> DVec3 {
+    // As of a half sphere, stretched.
+    let stretched = DVec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize();
+    let z = (1.0 - v) * (1.0 + stretched.z) - stretched.z;
+    let radius = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
+    let angle = TAU * u;
+    let cap = DVec3::new(radius * libm::cos(angle), radius * libm::sin(angle), z);
+    let half = cap + stretched;
+    DVec3::new(alpha * half.x, alpha * half.y, half.z.max(0.0)).normalize()
+}
+
+/// The share of light from a direction of cosine `cos` that leaves a white surface after one reflection.
+fn reflected_share(roughness: f64, cos: f64) -> f64 {
+    static TABLE: OnceLock<Vec<f64>> = OnceLock::new();
+    let last = (NODES - 1) as f64;
+    let table = TABLE.get_or_init(|| {
+        let node = |i: usize| i as f64 / last;
+        (0..NODES * NODES).map(|i| integrate(node(i / NODES), node(i % NODES))).collect()
+    });
+    let place = |x: f64| {
+        let x = x.clamp(0.0, 1.0) * last;
+        let at = (x as usize).min(NODES - 2);
+        (at, x - at as f64)
+    };
+    // A smooth surface seen flat loses what depends on the ratio of the two alone.
+    let ratio = cos / (cos + roughness) * (1.0 + roughness);
+    let ((r, fr), (c, fc)) = (place(roughness), place(ratio));
+    let row = |r: usize| {
+        let at = r * NODES + c;
+        table[at] + (table[at + 1] - table[at]) * fc
+    };
+    row(r) + (row(r + 1) - row(r)) * fr
+}
+
+/// [`reflected_share`] by stratified samples; `ratio` is of the cosine to its sum with the roughness, 1 at most.
+fn integrate(roughness: f64, ratio: f64) -> f64 {
+    // The limits at both ends are taken from close by.
+    let roughness = roughness.max(1e-3);
+    let ratio = ratio.max(1e-4) / (1.0 + roughness);
+    let cos = (roughness * ratio / (1.0 - ratio)).min(1.0);
+    let alpha = roughness * roughness;
+    let wo = DVec3::new(((1.0 - cos) * (1.0 + cos)).sqrt(), 0.0, cos);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for i in 0..SAMPLES * SAMPLES / 2 {
+        // Both sides are alike, and steep microfacets, which lose most, are few.
+        let u = 0.5 * ((i / SAMPLES) as f64 + 0.5) / (SAMPLES / 2) as f64;
+        let t = ((i % SAMPLES) as f64 + 0.5) / SAMPLES as f64;
+        let weight = t * t;
+        let m = visible_normal(alpha, wo, [u, 1.0 - t * t * t]);
+        let cos_i = optics::reflect(wo, m).z;
+        sum += if cos_i > 0.0 { weight * shadowed(alpha, cos, cos_i) } else { 0.0 };
+        weights += weight;
+    }
+    sum / weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lobe(roughness: f64) -> Glossy {
+        Glossy { tint: Rgb::ONE, alpha: roughness * roughness, n: DVec3::Z }
+    }
+
+    fn direction(cos: f64, angle: f64) -> DVec3 {
+        let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
+        DVec3::new(sin * libm::cos(angle), sin * libm::sin(angle), cos)
+    }
+
+    #[test]
+    fn shares_between_the_nodes_of_the_table_are_those_of_an_integral() {
+        for i in 0..40 {
+            let (roughness, root) =
+                (0.013 + i as f64 * 0.0245, 0.05 + (i * 7 % 40) as f64 * 0.0236);
+            let cos = root * root;
+            let wo = direction(cos, 0.0);
+            let n = 256;
+            let at = |i: usize| (i as f64 + 0.5) / n as f64;
+            let sum: f64 = (0..n * n)
+                .filter_map(|i| lobe(roughness).sample(wo, [at(i / n), at(i % n)]))
+                .map(|scattered| f64::from(scattered.share))
+                .sum();
+            let exact = sum / (n * n) as f64;
+            let off = (reflected_share(roughness, cos) - exact).abs();
+            assert!(off < 0.005, "roughness {roughness}, cosine {cos}: {off} of {exact}");
+        }
+    }
+
+    #[test]
+    fn what_is_sampled_has_the_density_and_the_weight_that_f_and_pdf_say() {
+        // A sharper peak would take a finer grid.
+        for roughness in [0.3, 0.6, 1.0] {
+            for cos in [0.05, 0.4, 0.9] {
+                let (lobe, wo) = (lobe(roughness), direction(cos, 0.7));
+                // The density over the upper half, by a fine grid, and the share of samples that fall there.
+                let n = 2000;
+                let (mut density, mut light) = (0.0, 0.0);
+                for i in 0..n * n / 4 {
+                    let (row, column) = (i / (n / 2), i % (n / 2));
+                    let cos_i = (row as f64 + 0.5) / (n / 2) as f64;
+                    let wi = direction(cos_i, (column as f64 + 0.5) / (n / 2) as f64 * TAU);
+                    let solid_angle = TAU / (n * n / 4) as f64;
+                    density += lobe.pdf(wo, wi) * solid_angle;
+                    light += f64::from(lobe.f(wo, wi).x) * cos_i * solid_angle;
+                }
+                let m = 64;
+                let at = |i: usize| (i as f64 + 0.5) / m as f64;
+                let samples: Vec<Scattered> =
+                    (0..m * m).filter_map(|i| lobe.sample(wo, [at(i / m), at(i % m)])).collect();
+                let all = (m * m) as f64;
+                let above = samples.len() as f64 / all;
+                let share = samples.iter().map(|s| f64::from(s.share)).sum::<f64>() / all;
+                assert!((density - above).abs() < 0.01, "{roughness} {cos}: {density} {above}");
+                assert!((light - share).abs() < 0.01, "{roughness} {cos}: {light} {share}");
+                for s in samples.iter().step_by(97) {
+                    let f = f64::from(lobe.f(wo, s.wi).x) * s.wi.z / s.pdf;
+                    assert!((f - f64::from(s.share)).abs() < 1e-4 * f, "{f} {}", s.share);
+                    let back = f64::from(lobe.f(s.wi, wo).x / lobe.f(wo, s.wi).x);
+                    assert!((back - 1.0).abs() < 1e-5, "reciprocal: {back}");
+                }
+            }
+        }
+    }
+}
