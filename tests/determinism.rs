@@ -35,10 +35,14 @@ fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
     };
     if mirror {
         ball(Material { mirror: Rgb::splat(0.9), ..Material::black("mirror") }, -1.2);
+        let satin =
+            Material { mirror: Rgb::splat(0.3), ..Material::diffuse("satin", Rgb::splat(0.4)) };
+        ball(Material { roughness: 0.3, ..satin }, -2.6);
     }
     if glass {
-        let glass =
-            Glass { tint: Rgb::splat(0.98), priority: ranked.then_some(1), ..Glass::clear(1.5) };
+        let (tint, absorption) = (Rgb::splat(0.98), Rgb::new(0.0, 0.3, 0.1));
+        let priority = ranked.then_some(1);
+        let glass = Glass { tint, absorption, priority, ..Glass::clear(1.5) };
         ball(Material { glass: Some(glass), ..Material::black("glass") }, 0.1);
     }
     ball(Material::diffuse("red", Rgb::new(0.7, 0.1, 0.1)), 1.3);
@@ -192,6 +196,7 @@ fn each_specialised_kernel_equals_the_one_with_everything_on() {
         assert_eq!(counts, full_counts, "kernel {bits:06b} casts other rays");
         let absent = [
             (mirror, counts[RayKind::Mirror]),
+            (mirror, counts[RayKind::Glossy]),
             (glass, counts[RayKind::Glass]),
             (area, counts[RayKind::ShadowArea]),
             (sky, counts[RayKind::ShadowSky]),
@@ -249,6 +254,8 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
                 Light::Spot(_) | Light::Point(_) | Light::Directional(_) => {}
             }
         }
+        let glass = w.materials.iter_mut().filter_map(|m| m.glass.as_mut());
+        glass.for_each(|g| g.absorption /= s as f32);
         job.camera.eye *= s;
         render(&job).0.rgb
     };

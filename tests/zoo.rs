@@ -13,17 +13,25 @@ use making::{FAMILIES, Settings, Specimen};
 
 const SEED: u64 = 1;
 
-/// Families, each with the camera samples of its pixels, and whether a lens blurs.
-const SCENES: [(&str, usize, bool); 9] = [
-    ("forest", 1, false),
-    ("grating", 4, false),
-    ("contact", 4, false),
-    ("foliage", 1, false),
-    ("mirrors", 1, false),
-    ("cornell", 4, false),
-    ("forest", 4, true),
-    ("contact", 1, true),
-    ("mirrors", 4, true),
+/// What is changed of a scene.
+type Change = fn(Specimen, u64) -> Specimen;
+
+const LENS: Option<Change> = Some(Specimen::with_lens);
+const GLOSS: Option<Change> = Some(Specimen::with_gloss);
+
+/// Families, each with the camera samples of its pixels.
+const SCENES: [(&str, usize, Option<Change>); 11] = [
+    ("forest", 1, None),
+    ("grating", 4, None),
+    ("contact", 4, None),
+    ("foliage", 1, None),
+    ("mirrors", 1, None),
+    ("cornell", 4, None),
+    ("forest", 4, LENS),
+    ("contact", 1, LENS),
+    ("mirrors", 4, LENS),
+    ("contact", 4, GLOSS),
+    ("mirrors", 1, GLOSS),
 ];
 
 #[test]
@@ -32,11 +40,11 @@ fn inferred_tiles_are_no_worse_than_traced_ones() {
     let plan = Plan { size: [96, 64], judged: 4, between_only: true, timed: false };
     let folder = tempfile::tempdir().expect("a folder to work in");
     let mut broken = String::new();
-    for (family, spp, has_lens) in SCENES {
+    for (family, spp, change) in SCENES {
         let index = FAMILIES.iter().position(|f| f.name == family).expect("a family");
         let mut specimen = Specimen::new(SEED, index as u64, 4);
-        if has_lens {
-            specimen = specimen.with_lens(SEED);
+        if let Some(change) = change {
+            specimen = change(specimen, SEED);
         }
         let settings = Settings { spp, light: 16 };
         let verdict =

@@ -47,6 +47,10 @@ fn run(options: &Options) -> Result<bool, Failure> {
             true => specimen.with_lens(options.seed),
             false => specimen,
         };
+        let specimen = match options.gloss {
+            true => specimen.with_gloss(options.seed),
+            false => specimen,
+        };
         let settings = options.settings.unwrap_or(specimen.settings);
         let place = folder.join(format!("{index:04}"));
         let verdict = judge(&program, &specimen, settings, &options.plan(), &place)?;

@@ -34,6 +34,9 @@ pub struct Options {
     /// Gives every camera a random thin lens
     #[arg(long)]
     pub lens: bool,
+    /// Makes mirrors rough, and gives half of what is painted a glossy coat
+    #[arg(long)]
+    pub gloss: bool,
     /// Only the scene of this index
     #[arg(long)]
     only: Option<u64>,

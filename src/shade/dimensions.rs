@@ -3,8 +3,8 @@
 //! A pair of random numbers is a function of seed, frame, pixel, sample and dimension
 //! ([`PixelSampler`](crate::sampling::PixelSampler)). Two uses of one pixel's sampler never share a dimension.
 
-/// The place of a camera sample in its pixel. This and [`LENS`] are of the film's own sampler, which does not
-/// depend on the frame; all others are of the frame's.
+/// The place of a camera sample in its pixel. This, [`LENS`] and [`of_lobe`] are of the pixel's own sampler: paths do
+/// not depend on the frame, so that reuse compares the same surface points. Lights' are of the frame's sampler.
 pub(super) const FILM: u32 = 0;
 
 /// Where a camera sample passes the lens.

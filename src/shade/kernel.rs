@@ -357,7 +357,7 @@ impl Vertex<'_, '_> {
         state: &PathState,
     ) {
         let outside = si.is_outside(wo);
-        let sampler = self.pixels.sampler(state.pixel);
+        let sampler = self.pixels.path_sampler(state.pixel);
         let u = || sampler.get2(state.sample, dimensions::of_lobe(state.branch));
         for (child, scattered) in (0..).zip(lobe.sample(wo, si.ns, u)) {
             let Some(Scattered { wi: sent, share, tint, transmitted, pdf }) = scattered else {

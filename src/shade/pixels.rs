@@ -273,7 +273,12 @@ impl BlockPixels {
         self.bad.iter().any(|(bad, _)| *bad == pixel)
     }
 
-    /// The sampler of a pixel's shading.
+    /// The sampler of a pixel's paths, which do not depend on the frame.
+    pub fn path_sampler(&self, pixel: u32) -> &PixelSampler {
+        &self.film_samplers[pixel as usize]
+    }
+
+    /// The sampler of a pixel's light.
     pub fn sampler(&self, pixel: u32) -> &PixelSampler {
         &self.samplers[pixel as usize]
     }

@@ -23,7 +23,7 @@ pub struct Specimen {
     /// The seed of its zoo and its number there: what it is a function of.
     pub index: u64,
     /// The family's name, `forest`, with a `+` where things of other kinds were added
-    /// and a `~` where a lens blurs.
+    /// a `~` where a lens blurs, and a `^` where mirrors are rough.
     pub name: String,
     /// Which of [`FAMILIES`].
     pub family: usize,
@@ -77,6 +77,28 @@ impl Specimen {
         let blades = dice.pick(&["", ", blades = 5", ", blades = 8"]);
         self.lens = format!("lens = {{ radius = {radius:?}, focus = {focus}{blades} }}\n");
         self.name.push('~');
+        self
+    }
+
+    /// With rough mirrors for perfect ones, and a coat of one on about half of what is painted.
+    pub fn with_gloss(mut self, seed: u64) -> Self {
+        let mut dice = Dice::new(seed.rotate_left(32), self.index);
+        let mut text = String::new();
+        let mut lines = self.builder.text.lines().peekable();
+        while let Some(line) = lines.next() {
+            let _ = writeln!(text, "{line}");
+            let is_mirror = |line: &str| line.starts_with("mirror = ");
+            let has_none = lines.peek().is_none_or(|next| !is_mirror(next));
+            let coat = line.starts_with("diffuse = ") && has_none && dice.chance(0.5);
+            if coat {
+                let _ = writeln!(text, "mirror = 0.05");
+            }
+            if coat || is_mirror(line) {
+                let _ = writeln!(text, "roughness = {:?}", dice.scale(0.05, 0.8));
+            }
+        }
+        self.builder.text = text;
+        self.name.push('^');
         self
     }
 
