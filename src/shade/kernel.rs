@@ -317,18 +317,20 @@ impl Vertex<'_, '_> {
             }
             self.add(state, state.throughput * le);
         }
-        lobe::for_each::<MIRROR, GLASS>(scene, material, &si, wo, |lobe| {
-            if let Some(albedo) = lobe.albedo() {
-                let reflectance = state.throughput * albedo;
-                self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
-            } else if may_bounce {
-                let start = (&si, inside);
-                let behind = si.is_outside(wo).then_some(si.surface.material);
-                let starts = Starts { reflected: start, transmitted: start, behind };
-                self.scatter::<NESTED>(&lobe, &si, wo, &starts, state);
-                if MIRROR && !lobe.is_delta() {
-                    self.glossy.push(self.glossy_point(lobe, (&si, ray, hit), wo, state));
-                }
+        if lobe::is_diffuse(material) {
+            let reflectance = state.throughput * lobe::albedo(scene, material, &si);
+            self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
+        }
+        if !may_bounce {
+            return;
+        }
+        lobe::for_each_directional::<MIRROR, GLASS>(material, &si, wo, |lobe| {
+            let start = (&si, inside);
+            let behind = si.is_outside(wo).then_some(si.surface.material);
+            let starts = Starts { reflected: start, transmitted: start, behind };
+            self.scatter::<NESTED>(&lobe, &si, wo, &starts, state);
+            if MIRROR && !lobe.is_delta() {
+                self.glossy.push(self.glossy_point(lobe, (&si, ray, hit), wo, state));
             }
         });
     }

@@ -1,7 +1,7 @@
 //! How a surface scatters light, lobe by lobe.
 //!
 //! Takes a material and a point of its surface; gives the lobes, textures looked up: what share of a light
-//! each sends to the viewer, or the directions that it passes radiance on from. One file for each kind;
+//! each sends to the viewer, and the directions that it passes radiance on from. One file for each kind;
 //! nothing else in `shade` asks for the kind.
 
 mod dielectric;
@@ -11,18 +11,16 @@ mod mirror;
 
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb};
-use crate::scene::{Material, Scene};
+use crate::scene::Material;
 use crate::stats::RayKind;
 pub(super) use dielectric::Dielectric;
-use diffuse::Diffuse;
-pub(super) use diffuse::albedo;
+pub(super) use diffuse::{albedo, is_diffuse};
 use glossy::Glossy;
 use mirror::Mirror;
-use std::f32::consts::FRAC_1_PI;
 
-/// One of the ways in which a surface scatters light, at one of its points.
+/// One of the ways in which a surface scatters light that depend on the direction, at one of its points. Diffuse
+/// reflection does not: light is multiplied by its [`albedo`].
 pub(super) enum Lobe {
-    Diffuse(Diffuse),
     Mirror(Mirror),
     Glossy(Glossy),
     Dielectric(Dielectric),
@@ -43,47 +41,33 @@ pub(super) struct Scattered {
     pub pdf: f64,
 }
 
-/// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving). Lobes that the
-/// kernel leaves out, since no material of the scene has them, cost nothing.
+/// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving), that depends on the
+/// direction. Lobes that the kernel leaves out, since no material of the scene has them, cost nothing.
 #[inline(always)]
-pub(super) fn for_each<const MIRROR: bool, const GLASS: bool>(
-    scene: &Scene,
+pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     material: &Material,
     si: &SurfaceInteraction,
     wo: DVec3,
     mut take: impl FnMut(Lobe),
 ) {
-    if let Some(diffuse) = Diffuse::of(scene, material, si) {
-        take(Lobe::Diffuse(diffuse));
+    if MIRROR && material.mirror != Rgb::ZERO {
+        take(match material.roughness {
+            0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
+            roughness => Lobe::Glossy(Glossy::new(material.mirror, roughness, si, wo)),
+        });
     }
-    if let Some(mirror) = Mirror::of(material).filter(|_| MIRROR) {
-        take(Lobe::Mirror(mirror));
-    }
-    if let Some(glossy) = MIRROR.then(|| Glossy::of(material, si, wo)).flatten() {
-        take(Lobe::Glossy(glossy));
-    }
-    if let Some(dielectric) = Dielectric::of(material, si.is_outside(wo)).filter(|_| GLASS) {
-        take(Lobe::Dielectric(dielectric));
+    if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
+        take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))));
     }
 }
 
 impl Lobe {
-    /// The share of irradiance that is sent out alike in all directions; `None` of a lobe that depends on
-    /// the direction.
-    #[inline(always)]
-    pub fn albedo(&self) -> Option<Rgb> {
-        match self {
-            Self::Diffuse(diffuse) => Some(diffuse.albedo),
-            Self::Mirror(_) | Self::Glossy(_) | Self::Dielectric(_) => None,
-        }
-    }
-
     /// Whether the lobe passes on radiance from single directions only, so that it sees lights by the
     /// rays of [`sample`](Self::sample) alone.
     #[inline(always)]
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Diffuse(_) | Self::Glossy(_) => false,
+            Self::Glossy(_) => false,
             Self::Mirror(_) | Self::Dielectric(_) => true,
         }
     }
@@ -92,22 +76,21 @@ impl Lobe {
     /// steradian; 0 of a delta lobe.
     pub fn f(&self, wo: DVec3, wi: DVec3) -> Rgb {
         match self {
-            Self::Diffuse(diffuse) => diffuse.albedo * FRAC_1_PI,
             Self::Glossy(glossy) => glossy.f(wo, wi),
             Self::Mirror(_) | Self::Dielectric(_) => Rgb::ZERO,
         }
     }
 
-    /// The density of [`sample`](Self::sample) at `wi`, per steradian; 0 of a lobe that is not sampled at random.
+    /// The density of [`sample`](Self::sample) at `wi`, per steradian; 0 of a delta lobe.
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
         match self {
             Self::Glossy(glossy) => glossy.pdf(wo, wi),
-            Self::Diffuse(_) | Self::Mirror(_) | Self::Dielectric(_) => 0.0,
+            Self::Mirror(_) | Self::Dielectric(_) => 0.0,
         }
     }
 
     /// The directions that radiance towards `wo` is passed on from, at a surface with the unit normal `n` on
-    /// either side: all of a delta lobe's, since a Whitted path follows each; none of a diffuse lobe's; else one,
+    /// either side: all of a delta lobe's, since a Whitted path follows each; else one,
     /// at random, by the pair `u` of the unit square.
     #[inline(always)]
     pub fn sample(
@@ -117,7 +100,6 @@ impl Lobe {
         u: impl FnOnce() -> [f32; 2],
     ) -> [Option<Scattered>; 2] {
         match self {
-            Self::Diffuse(_) => [None, None],
             Self::Mirror(mirror) => [Some(mirror.sample(wo, n)), None],
             Self::Glossy(glossy) => [glossy.sample(wo, u().map(f64::from)), None],
             Self::Dielectric(dielectric) => dielectric.sample(wo, n),
@@ -128,7 +110,7 @@ impl Lobe {
     #[inline(always)]
     pub fn ray_kind(&self) -> RayKind {
         match self {
-            Self::Diffuse(_) | Self::Mirror(_) => RayKind::Mirror,
+            Self::Mirror(_) => RayKind::Mirror,
             Self::Glossy(_) => RayKind::Glossy,
             Self::Dielectric(_) => RayKind::Glass,
         }

@@ -2,7 +2,7 @@
 
 use super::Scattered;
 use crate::math::{DVec3, Rgb};
-use crate::scene::Material;
+use crate::scene::Glass;
 use crate::shade::optics;
 
 /// A smooth boundary between two clear media.
@@ -14,12 +14,10 @@ pub(in crate::shade) struct Dielectric {
 }
 
 impl Dielectric {
-    /// The lobe of `material`, seen from `outside` the body that it bounds or from inside; `None` where it has none.
+    /// The boundary of a body of `glass`, seen from `outside` it or from inside.
     #[inline(always)]
-    pub fn of(material: &Material, outside: bool) -> Option<Self> {
-        let glass = material.glass.as_ref()?;
-        let eta = if outside { glass.ior } else { 1.0 / glass.ior };
-        Some(Self { eta, tint: glass.tint })
+    pub fn new(glass: &Glass, outside: bool) -> Self {
+        Self { eta: if outside { glass.ior } else { 1.0 / glass.ior }, tint: glass.tint }
     }
 
     /// What is reflected and, but for total reflection, what is refracted.

@@ -4,7 +4,6 @@ use super::Scattered;
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::to_world;
-use crate::scene::Material;
 use crate::shade::optics;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
@@ -27,18 +26,15 @@ pub(in crate::shade) struct Glossy {
 }
 
 impl Glossy {
-    /// The lobe of `material` at `si`, seen along `wo`; `None` where it has none.
-    pub fn of(material: &Material, si: &SurfaceInteraction, wo: DVec3) -> Option<Self> {
-        if material.mirror == Rgb::ZERO || material.roughness == 0.0 {
-            return None;
-        }
+    /// The lobe of a mirror of this `reflectance` and `roughness` at `si`, seen along `wo`.
+    pub fn new(reflectance: Rgb, roughness: f64, si: &SurfaceInteraction, wo: DVec3) -> Self {
         let side = if si.is_outside(wo) { 1.0 } else { -1.0 };
         // Interpolated normals may face away from the viewer.
         let n = if si.ns.dot(wo) * side > 0.0 { si.ns * side } else { si.ng * side };
-        let reflected = reflected_share(material.roughness, wo.dot(n)) as f32;
+        let reflected = reflected_share(roughness, wo.dot(n)) as f32;
         let lost = (1.0 - reflected) / reflected;
-        let tint = material.mirror * (Rgb::ONE + material.mirror * lost);
-        Some(Self { tint, alpha: material.roughness * material.roughness, n })
+        let tint = reflectance * (Rgb::ONE + reflectance * lost);
+        Self { tint, alpha: roughness * roughness, n }
     }
 
     /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving), per steradian.
@@ -62,7 +58,7 @@ impl Glossy {
         let (s, t) = orthonormal_basis(self.n);
         let local = DVec3::new(wo.dot(s), wo.dot(t), wo.dot(self.n));
         let m = visible_normal(self.alpha, local, u);
-        let wi = optics::reflect(wo, to_world(m.into(), (s, t), self.n)).normalize();
+        let wi = optics::reflect(wo, to_world(m, (s, t), self.n)).normalize();
         let [cos_o, cos_i, _] = self.cosines(wo, wi)?;
         let share = shadowed(self.alpha, cos_o, cos_i) as f32;
         let pdf = self.pdf(wo, wi);

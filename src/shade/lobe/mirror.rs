@@ -2,7 +2,6 @@
 
 use super::Scattered;
 use crate::math::{DVec3, Rgb};
-use crate::scene::Material;
 use crate::shade::optics;
 
 /// A perfect mirror, both sides.
@@ -11,11 +10,10 @@ pub(in crate::shade) struct Mirror {
 }
 
 impl Mirror {
-    /// The lobe of `material`; `None` where it has none.
+    /// A mirror of this reflectance.
     #[inline(always)]
-    pub fn of(material: &Material) -> Option<Self> {
-        let reflectance = material.mirror;
-        (reflectance != Rgb::ZERO && material.roughness == 0.0).then_some(Self { reflectance })
+    pub fn new(reflectance: Rgb) -> Self {
+        Self { reflectance }
     }
 
     /// The one direction that is seen along `wo`.
