@@ -216,6 +216,7 @@ const TOGETHER: &[Case] = &[
         "",
     ),
     ("[material.a]\ndiffuse = 0.5\nglass = ¦{ ior = 1.5 }\n", "glass stands alone", ""),
+    ("[material.a]\ndiffuse = 0.5\nroughness = ¦0.2\n", "needs `mirror`", ""),
     (
         "[camera]\npan = { from = [0, 0, 1], to = [0, 0, 2], target = [0, 0, 0] }\norbit = ¦{}\n",
         "has a path already: `pan`",

@@ -170,16 +170,16 @@ fn paths_come_in_five_kinds() {
 #[test]
 fn materials_add_up_and_glass_stands_alone() {
     let loaded = good(
-        "[material.m]\ndiffuse = [0.1, 0.2, 0.9]\nmirror = [0.9, 0.8, 0.1]\nemission = 2\n\
+        "[material.m]\ndiffuse = [0.1, 0.2, 0.9]\nmirror = [0.9, 0.8, 0.1]\nroughness = 0.3\nemission = 2\n\
          emits_back = true\n[material.g]\nglass = { tint = [1, 0.9, 0.8], absorption = [0, 2.5, 9] }\n",
     );
     let [glass, m] = &loaded.world.materials[..] else { panic!("two") };
     assert_eq!((m.diffuse, m.mirror), (Rgb::new(0.1, 0.2, 0.9), Rgb::new(0.9, 0.8, 0.1)));
-    assert!(m.emits_back && m.emission == Rgb::splat(2.0));
+    assert!(m.roughness == 0.3 && m.emits_back && m.emission == Rgb::splat(2.0));
     assert_eq!(glass.glass.map(|g| (g.ior, g.tint)), Some((1.5, Rgb::new(1.0, 0.9, 0.8))));
     assert_eq!(glass.glass.map(|g| g.absorption), Some(Rgb::new(0.0, 2.5, 9.0)));
     let unused: Vec<_> = loaded.warnings.iter().filter(|w| w.message.contains("uses")).collect();
-    assert_eq!((unused[0].line, unused[1].line), (Some(6), Some(1)));
+    assert_eq!((unused[0].line, unused[1].line), (Some(7), Some(1)));
 }
 
 #[test]
