@@ -227,8 +227,8 @@ pub(super) fn refuse_others(target: &Target) -> Result<()> {
     let Some(first) = heads.iter().find_map(why) else { return Ok(()) };
     let count = heads.iter().filter_map(why).count();
     Err(Error::Usage(format!(
-        "{} holds {} of an earlier job that cannot serve this one: the first {first}\n  \
-         help: set it back, choose another output with -o, or let go of what was traced with --overwrite",
+        "{} holds {} of an earlier job that this job cannot use: the first {first}\n  \
+         help: restore the setting, choose another output with -o, or remove the references with --overwrite",
         folder.display(),
         counted(count, "reference"),
     )))

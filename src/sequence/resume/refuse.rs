@@ -14,7 +14,7 @@ pub(super) fn refuse_other_view(path: &Path, row: &Row, recipe: Option<&Recipe>)
         return Ok(());
     }
     Err(Error::Usage(format!(
-        "{} is of another camera move: frame {} stands elsewhere there\n  \
+        "{} is of another camera move: frame {} has another camera there\n  \
          help: choose another output with -o, or replace it with --overwrite",
         path.display(),
         row.frame
@@ -84,7 +84,7 @@ pub(super) fn refuse_others(
     }
     Err(Error::Usage(format!(
         "{} holds {} of other settings: {}\n  \
-         help: set it back, choose another output with -o, or replace the frames with --overwrite",
+         help: restore the setting, choose another output with -o, or replace the frames with --overwrite",
         target.pattern,
         counted(left, "frame"),
         d.was_and_is()
