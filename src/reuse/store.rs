@@ -30,7 +30,7 @@ const WORDS: usize = 12;
 const FINDING: usize = 3 * 4;
 /// Flag in the word of a finding's level: check rays agreed.
 const AGREED: u32 = 1 << 8;
-/// Largest squared error of a finding: from black to white, display steps.
+/// Largest squared error of a finding, from black to white: squares of a display step.
 const MOST_ERROR: f32 = 255.0 * 255.0;
 /// Most bytes of a head.
 const MOST_HEAD: usize = 1 << 20;
