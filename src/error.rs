@@ -19,7 +19,7 @@ pub enum Error {
     /// The operating system refused a file operation.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried: "read", "write", "rename".
+        /// The failed action: "read", "write", "rename".
         action: &'static str,
         /// The file or folder.
         path: PathBuf,

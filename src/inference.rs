@@ -65,58 +65,58 @@ impl SurfacePoint {
     }
 }
 
-/// What other frames suggest about one light at a point, and how risky that is.
+/// An estimate of one light at a point from other frames, and its risk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Ratio; NaN where no other frame knows it.
+    /// Ratio of shadowed to unshadowed irradiance; NaN where no other frame knows it.
     pub ratio: f32,
-    /// Level of its risk, by what the samples around the point look like.
+    /// Level of risk, from the samples around the point.
     pub level: u8,
 }
 
 impl Estimate {
-    /// Nothing is known.
+    /// No estimate.
     pub const UNKNOWN: Self = Self { ratio: f32::NAN, level: 0 };
 }
 
-/// Of the shadow rays that tracing would cast, one in so many checks an answer before it is used.
+/// One check ray is cast for this many shadow rays that tracing would cast.
 const RAYS_PER_CHECK: u32 = 16;
-/// But no fewer: two overlook a fourth of the shadows that cover half of a light.
+/// Least number of check rays: two would miss a quarter of the shadows that cover half of a light.
 const FEWEST_CHECKS: u32 = 4;
 
-/// How many rays check an answer that saves `rays` shadow rays.
+/// Number of check rays for an answer that saves `rays` shadow rays.
 pub fn check_rays(rays: u32) -> u32 {
     (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays)
 }
 
-/// What check rays found of one light at a point.
+/// The result of the check rays for one light at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Checked {
     /// Ratio of shadowed to unshadowed irradiance.
     pub ratio: f32,
-    /// How many rays found it; 0 where there was nothing to cast.
+    /// Number of check rays; 0 where none was cast.
     pub rays: u32,
 }
 
 /// Points in a batch with the answers about them.
 #[derive(Debug, Default)]
 pub struct LookupBatch {
-    /// What is asked about.
+    /// The surface points, scene space.
     pub points: Vec<SurfacePoint>,
     /// For each point the pixel that shows it: column, row.
     pub pixels: Vec<[u32; 2]>,
-    /// For each point and channel what the pixel would show of that light without shadows:
-    /// luminance, exposure applied; 0 where none can arrive.
+    /// For each point and channel the light's contribution to the pixel without shadows:
+    /// luminance, exposure applied; 0 where no light can arrive.
     pub unshadowed: Vec<f32>,
     /// For each point the ratio in each channel; NaN where it is unknown and must be traced.
     pub ratios: Vec<f32>,
-    /// For each point and channel what other frames suggest; room for whoever answers.
+    /// For each point and channel the estimate from other frames; filled by the answering side.
     pub estimates: Vec<Estimate>,
-    /// For each point where its ratios come from; the default where no other frame knows any.
+    /// For each point the provenance of its ratios; the default where no other frame knows any.
     pub provenance: Vec<Provenance>,
-    /// For each point and channel whether check rays shall be cast; empty where none is wanted.
+    /// For each point and channel whether check rays are to be cast; empty if none are.
     pub checks: Vec<bool>,
-    /// For each point and channel what they found; empty where none was wanted.
+    /// For each point and channel the result of the check rays; empty if none were cast.
     pub checked: Vec<Checked>,
 }
 
@@ -141,14 +141,14 @@ pub struct TracedPoints {
 }
 
 impl TracedPoints {
-    /// Takes in all of `other`, behind its own.
+    /// Appends all of `other`.
     pub fn append(&mut self, other: Self) {
         let Self { mut points, mut ratios } = other;
         self.points.append(&mut points);
         self.ratios.append(&mut ratios);
     }
 
-    /// The same points row by row; those of a pixel stay in their order.
+    /// The points sorted row by row; points of one pixel keep their order.
     pub fn in_rows(self) -> Self {
         let place = |t: &TracedPoint| (t.y, t.x);
         if self.points.is_sorted_by_key(place) {

@@ -35,7 +35,7 @@ pub struct Ray {
     pub exclude: PrimRef,
 }
 
-/// What an intersector returns, nothing more.
+/// The answer of an intersector, nothing more.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Ray parameter.
@@ -44,7 +44,7 @@ pub struct Hit {
     pub u: f64,
     /// Weight of vertex 2; 0 on spheres.
     pub v: f64,
-    /// What was hit.
+    /// The primitive that was hit.
     pub prim: PrimRef,
     /// Whether `t`, `u` and `v` are f32 numbers, to be computed again in f64 from the triangle
     /// once its corners are at hand. That the ray meets the triangle is certain all the same.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::ops::{AddAssign, Index, IndexMut};
 
-/// What a ray is cast for.
+/// The purpose of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RayKind {
     /// Camera rays.
@@ -204,7 +204,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// What is wrong with the linear RGB radiance `channels`, if anything.
+    /// The kind of invalid sample of the linear RGB radiance `channels`; `None` if it is valid.
     pub fn of(channels: [f32; 3]) -> Option<Self> {
         if channels.iter().any(|c| c.is_nan()) {
             Some(Self::NotANumber)

@@ -115,7 +115,7 @@ fn frames(stage: &Stage, settings: &Settings, trial: &Trial) -> Vec<Made> {
 }
 
 #[test]
-fn probes_show_what_tracing_would_and_what_they_find_decides() {
+fn probes_show_their_trace_and_their_findings_decide_what_is_inferred() {
     let set = Set::load("cornell");
     let stage = set.stage(2);
     let trial = Trial { edge: 96, share: 0.03, ..SMALL };

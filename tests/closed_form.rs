@@ -407,7 +407,7 @@ fn a_point_out_of_focus_is_a_disk_of_the_size_of_the_circle_of_confusion() {
 
 /// What is at the focus is as sharp as through a pinhole, whatever the lens.
 #[test]
-fn what_is_in_focus_is_what_a_pinhole_shows() {
+fn points_in_focus_are_as_through_a_pinhole() {
     let mut world = floor(0.6);
     world.materials[0].diffuse = Rgb::ZERO;
     world.materials[0].emission = Rgb::ONE;

@@ -231,7 +231,7 @@ fn picture(film: &Film) -> Image {
 }
 
 #[test]
-fn what_passes_between_two_samples_is_missed_and_an_uploaded_picture_shows_it() {
+fn a_surface_that_passes_between_two_samples_is_missed_unless_a_picture_is_uploaded() {
     // From far left past the ball to far right, looking ahead: only frames between see the ball.
     let mut pan = Move::pan(false, 0.0);
     pan.shot.path = CameraPath::Keys(
@@ -259,7 +259,7 @@ fn what_passes_between_two_samples_is_missed_and_an_uploaded_picture_shows_it() 
 }
 
 #[test]
-fn an_upload_says_nothing_about_distance() {
+fn an_uploaded_picture_has_no_distances() {
     // Flat light: the floor has one colour, whatever its distance.
     let mut flat = world(false);
     flat.spheres.clear();

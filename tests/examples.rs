@@ -24,7 +24,7 @@ fn seen(image: &tweenray::film::Image, settings: &Settings, p: DVec3) -> Rgb {
 /// Radiance is albedo / pi x intensity x cosine / distance^2; in the shadow and on the backdrop there is
 /// nothing of it.
 #[test]
-fn one_frame_shows_what_the_scene_calls_for() {
+fn one_frame_shows_the_effects_of_its_scene() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("one.png");
     let settings = Settings { width: 160, height: 90, ..Settings::default() };

@@ -33,7 +33,7 @@ fn cameras_stand_free(loaded: &Loaded) {
 }
 
 #[test]
-fn every_folder_has_a_scene_that_loads_and_says_what_it_shows() {
+fn every_folder_has_a_scene_that_loads_and_has_a_description() {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder()).expect("scenes").flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();

@@ -233,7 +233,7 @@ fn slipping_past_vertices_of_an_open_mesh_has_a_class_of_its_own() {
 /// Between two sheets that nearly touch is a gap narrower than the band, such as f32 leaves where a vertex
 /// lies on another triangle's edge: a ray that should meet one sheet's border may go through.
 #[test]
-fn a_ray_on_the_border_of_a_mesh_may_go_by() {
+fn a_ray_on_the_border_of_a_mesh_may_miss() {
     let mut sheet = shapes::sphere(DVec3::ZERO, 1.0, 3, 2);
     let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
     sheet.positions = corners.map(|(x, y)| DVec3::new(x, y, 0.3 * x)).to_vec();

@@ -29,7 +29,10 @@ fn main() {
         ("a tenth of the bandwidth", Change { bandwidth: 0.1, ..NONE }),
         ("twice the time for each control message", Change { message: 2.0, ..NONE }),
         ("stretches of the path 30 % heavier and lighter", Change { swing: 0.3, ..NONE }),
-        ("segments of 128, the default: half a one for each rank", Change { segment: 128, ..NONE }),
+        (
+            "segments of 128, the default: half of one for each rank",
+            Change { segment: 128, ..NONE },
+        ),
         ("a scheduler that takes no time", Change { is_scheduler_free: true, ..NONE }),
     ]
     .into_iter()

@@ -33,16 +33,16 @@ use std::time::{Duration, Instant};
 
 /// Measure what accuracy costs in time: error against seconds for every setting that matters
 ///
-/// Renders some frames of the move at a converged reference and at each setting of a sweep, several
+/// Renders some frames of the move as a converged reference and at each setting of a sweep, several
 /// times in turns, and writes a page (report.html, which opens from disk), accuracy.csv and
-/// accuracy.json. What was measured lies in the folder's sweep/, trial by trial: the same command goes
-/// on with a sweep that was stopped, and more --turns add to one that is complete.
+/// accuracy.json. Each trial is saved in the folder's sweep/: the same command resumes a sweep that was
+/// stopped, and more --turns extend one that is complete.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Times are only as good as the machine is quiet: run nothing else beside it. A difference that is
-smaller than its noise is called that. docs/accuracy.md says how to read the page.
+Run nothing else on the machine meanwhile, since other work disturbs the times. Differences within
+their noise are called noise. docs/accuracy.md explains the page.
 
-A small --size, few --turns and fewer --knobs make a quick look of it.
+A small --size, few --turns and fewer --knobs give a quick overview.
 
 Examples:
   tweenray accuracy scene.toml -o accuracy
@@ -67,7 +67,7 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", default_value_t = 1024, allow_negative_numbers = true,
         value_parser = whole(64, MAX_SAMPLES))]
     reference_spp: u32,
-    /// What is turned: reuse, samples, specular, intersection, tree, oracle, writing, combinations
+    /// Options to vary: reuse, samples, specular, intersection, tree, oracle, writing, combinations
     /// [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',',
         value_parser = values::choice::<Group>(&["reuse", "samples", "specular", "intersection", "tree", "oracle", "writing", "combinations"]))]
@@ -75,7 +75,7 @@ pub struct AccuracyArgs {
     /// Measure everything anew, whatever the folder holds
     #[arg(long)]
     overwrite: bool,
-    /// Stop after this long and exit with code 75, with the page of what there is: 25m, 1h30m, or as
+    /// Stop after this long and exit with code 75, with the page of the results so far: 25m, 1h30m, or as
     /// Slurm writes it: 30 (minutes), 00:30:00, 1-12. In a Slurm job at the latest 30 s before its end
     #[arg(long, value_name = "TIME", value_parser = values::time_limit)]
     time_limit: Option<Duration>,
@@ -83,17 +83,17 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = whole(1, MAX_THREADS))]
     threads: Option<u32>,
-    /// Say nothing but errors
+    /// Print nothing but errors
     #[arg(short, long)]
     quiet: bool,
     #[command(flatten)]
     settings: SettingArgs,
 }
 
-/// Everything that came out so far.
+/// The results of a sweep so far.
 struct Outcome<'a> {
     base: &'a Settings,
-    /// What has a part in the scene.
+    /// The effects that the scene needs.
     plan: EffectPlan,
     truth: &'a Truth,
     measured: Measured,
@@ -110,13 +110,13 @@ struct Outcome<'a> {
     tracer: String,
     /// Load of the machine over the last minute, before and after.
     load: [Option<f64>; 2],
-    /// Wall seconds of this run of the program; `None` where it only read what others had measured.
+    /// Wall seconds of this run of the program; `None` if it only read results of earlier runs.
     seconds: Option<f64>,
-    /// How many runs of the program measured it.
+    /// Number of runs of the program that measured.
     runs: u32,
-    /// Trials that are over, and all.
+    /// Number of finished trials, and of all trials.
     trials: [usize; 2],
-    /// Settings that shall be compared.
+    /// Number of settings to compare.
     settings: usize,
 }
 
@@ -131,7 +131,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
         warnings.iter().for_each(say::warning);
     }
     if base.crop.is_some() {
-        let message = "accuracy looks at whole frames: what a crop leaves black would count as right\n  \
+        let message = "accuracy compares whole frames: the black pixels outside a crop would count as exact\n  \
                        help: leave --crop out; a smaller --size is faster";
         return Err(Error::Usage(message.into()));
     }
@@ -179,7 +179,7 @@ pub fn run(args: &AccuracyArgs) -> Result<Exit> {
     job.run(ledger)
 }
 
-/// All that the figures depend on, by name.
+/// Everything that the figures depend on, by name; a sweep resumes only if it is equal.
 fn terms(args: &AccuracyArgs, sweep: &Sweep, hash: &str) -> Map<String, Value> {
     let context = sweep.context;
     let options: Vec<&str> = sweep.candidates.iter().map(|c| c.options.as_str()).collect();
@@ -213,8 +213,8 @@ fn frames(args: &AccuracyArgs, count: u32) -> Result<Vec<u32>> {
     Ok(frames)
 }
 
-/// Without the other rounding of the scene, the candidate that needs it is left out: some scenes
-/// cannot be rounded where they stand.
+/// The candidates of the sweep. Without the scene in its own coordinates (some scenes cannot be rounded there),
+/// the candidate for `--recentre off` is left out.
 fn candidates(
     scene: &Scene,
     base: &Settings,

@@ -1,4 +1,4 @@
-//! Options that stand over the scene file: what to render and how.
+//! Options that take precedence over the scene file: what to render and how.
 
 mod job;
 
@@ -28,7 +28,7 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// As import wants it; `size` is the image size that the command line asks for.
+    /// Options for the importer; `size` is the image size of the command line.
     pub fn load_options(&self, size: Option<(u32, u32)>) -> LoadOptions {
         let default = LoadOptions::default();
         LoadOptions {
@@ -39,7 +39,7 @@ impl SceneArgs {
     }
 }
 
-/// Everything that decides a frame's bytes; the scene file's value holds where an option is absent.
+/// Everything that decides a frame's bytes; without an option the scene file's value is used.
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Image")]
 pub struct SettingArgs {
@@ -49,7 +49,7 @@ pub struct SettingArgs {
     /// Render only these pixels of the image (upper left corner is 0,0; x1 and y1 are excluded)
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop)]
     pub crop: Option<Rect>,
-    /// Camera samples a pixel [default: 4]
+    /// Camera samples per pixel [default: 4]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SAMPLES))]
     pub spp: Option<u32>,
     /// Pixel filter [default: box]
@@ -59,15 +59,15 @@ pub struct SettingArgs {
     /// Factor on radiance before the tone curve [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = values::within_f32(limits::FACTOR))]
     pub exposure: Option<f32>,
-    /// Clamp each camera sample's radiance, times the exposure, to this before averaging: smooth edges
-    /// of bright lamps, but less light than is true, in exr too; "off" [default: off]
+    /// Clamp each camera sample's radiance, times the exposure, to this before averaging: smoother edges
+    /// of bright lamps, but too little light, in exr too; "off" [default: off]
     #[arg(long, value_name = "MAX", allow_negative_numbers = true, value_parser = values::clamp)]
     pub clamp: Option<Clamp>,
     /// Tone curve of png and ppm files; exr stays linear [default: srgb]
     #[arg(long, value_name = "CURVE",
         value_parser = values::choice::<ToneCurve>(&["srgb", "linear", "reinhard", "filmic"]))]
     pub tone: Option<ToneCurve>,
-    /// Bits a channel of png files: 8 or 16 [default: 8]
+    /// Bits per channel of png files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", value_parser = png_bits)]
     pub png_bits: Option<u8>,
     /// Show pixels with a sample that is NaN, infinite or negative in magenta [default: off]
@@ -101,26 +101,27 @@ pub struct SettingArgs {
     pub tracing: TracingArgs,
 }
 
-/// What frames take over from one another.
+/// What frames reuse of one another.
 #[derive(Debug, Default, Clone, Args)]
 pub struct ReuseArgs {
-    /// What frames take over from one another: shadowing at surface points, with evidence; the colours
-    /// of pixels; or nothing [default: surface]
+    /// What frames reuse of one another: shadowing at surface points, as far as measured errors allow;
+    /// the colours of pixels; or nothing [default: surface]
     #[arg(long, value_name = "POLICY", help_heading = "Reuse",
         value_parser = values::choice::<Policy>(&["surface", "colour", "off"]))]
     pub policy: Option<Policy>,
-    /// Frames from one key frame to the next; a move that may get longer wants a smaller number than
-    /// it has frames [default: 128]
+    /// Frames from one key frame to the next; choose less than the number of frames if the move may
+    /// get longer [default: 128]
     #[arg(long, value_name = "FRAMES", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SEGMENT))]
     pub segment: Option<u32>,
-    /// By how many display steps (1/255) inferred pixels may be off where traced ones are not: root mean
-    /// square over any tile of 32 x 32 pixels. Less is more exact and slower [default: 0.25]
+    /// By how many display steps (1/255) inferred pixels may be off even where traced ones are more
+    /// accurate: root mean square over any tile of 32 x 32 pixels. Less is more accurate and slower
+    /// [default: 0.25]
     #[arg(long, value_name = "STEPS", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::STEPS))]
     pub tolerance: Option<f32>,
-    /// Share of the pixels of an in-between frame that are traced though other frames may know them: what
-    /// they find decides what is inferred [default: 0.01]
+    /// Share of the pixels of an in-between frame that are estimated and also traced: the errors found
+    /// decide what is inferred [default: 0.01]
     #[arg(long, value_name = "SHARE", help_heading = "Reuse",
         allow_negative_numbers = true, value_parser = values::within_f32(limits::SHARE))]
     pub probes: Option<f32>,
@@ -134,10 +135,10 @@ pub struct ReuseArgs {
     pub distance_epsilon: Option<f32>,
 }
 
-/// What traces, and by which rules.
+/// The intersector and its rules.
 #[derive(Debug, Default, Clone, Args)]
 pub struct TracingArgs {
-    /// What traces: Embree, or the brute-force f64 oracle for small scenes [default: embree]
+    /// The intersector: Embree, or the brute-force f64 oracle for small scenes [default: embree]
     #[arg(long, value_name = "KIND", help_heading = "Tracing",
         value_parser = values::choice::<IntersectorKind>(&["embree", "oracle"]))]
     pub intersector: Option<IntersectorKind>,
@@ -145,12 +146,12 @@ pub struct TracingArgs {
     #[arg(long, value_name = "ISA", help_heading = "Tracing",
         value_parser = ["sse2", "sse4.2", "avx", "avx2", "avx512"])]
     pub isa: Option<String>,
-    /// How much work Embree puts into its tree: more takes longer to build and less to trace
-    /// [default: medium]
+    /// How much work Embree puts into its tree: a better tree takes longer to build and less time to
+    /// trace [default: medium]
     #[arg(long, value_name = "QUALITY", help_heading = "Tracing",
         value_parser = values::choice::<BuildQuality>(&["low", "medium", "high"]))]
     pub build_quality: Option<BuildQuality>,
-    /// A tree that takes less memory, and more time to trace [default: off]
+    /// A tree that takes less memory and more time to trace [default: off]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub compact: Option<bool>,
     /// Which hits are recomputed in f64 at once; "always" gives the same picture [default: risky]
@@ -160,7 +161,8 @@ pub struct TracingArgs {
     /// Watertight traversal of Embree [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub robust: Option<bool>,
-    /// A second try for rays that miss near a triangle or hit a back from outside [default: on]
+    /// Trace a ray a second time if it misses near a triangle or hits a back from outside
+    /// [default: on]
     #[arg(long, value_name = "on|off", help_heading = "Tracing", value_parser = values::switch())]
     pub retry: Option<bool>,
     /// Start secondary rays outside the rounding error of their hit [default: on]
@@ -172,7 +174,7 @@ pub struct TracingArgs {
 }
 
 impl SettingArgs {
-    /// Puts every option that was given over `settings`.
+    /// Overrides `settings` with the options that were given.
     pub fn apply(&self, settings: &mut Settings) {
         let s = settings;
         if let Some((width, height)) = self.size {
@@ -234,7 +236,7 @@ fn png_bits(text: &str) -> Result<u8, String> {
     match text {
         "8" => Ok(8),
         "16" => Ok(16),
-        _ => Err("png files have 8 or 16 bits a channel".into()),
+        _ => Err("png files have 8 or 16 bits per channel".into()),
     }
 }
 

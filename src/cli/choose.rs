@@ -24,8 +24,8 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 
-/// The share of the squared error that a target allows that the choice aims at: some frames may be worse than
-/// those that the probe looked at, and a miss costs the job once more.
+/// The choice aims at this share of the squared error that the target allows: some frames may be worse than
+/// those that the probe measured, and after a miss the job is rendered once more.
 const AIM: f64 = 0.85;
 
 /// Settings that the program chooses.
@@ -41,7 +41,7 @@ pub struct ChoiceArgs {
     pub budget: Option<Duration>,
 }
 
-/// What is to be done after a check of the finished frames.
+/// What to do after a check of the finished frames.
 #[derive(Serialize, Deserialize)]
 pub enum Judgement {
     /// Render all frames again with this tighter choice.
@@ -60,7 +60,7 @@ pub struct Chooser<'a> {
     pub context: &'a TrialContext<'a>,
     /// The job.
     pub request: &'a Request,
-    /// What traces, as far as frames differ by it.
+    /// Description of the intersector, as far as frames depend on it.
     pub tracer: &'a str,
     /// When the program started: a budget counts from then.
     pub started: Instant,
@@ -71,7 +71,7 @@ pub struct Chooser<'a> {
 }
 
 impl ChoiceArgs {
-    /// Whether anything is to be chosen.
+    /// Whether the program is to choose settings.
     pub fn is_any(&self) -> bool {
         self.target.is_some() || self.budget.is_some()
     }
@@ -92,13 +92,13 @@ impl ChoiceArgs {
         if let Some(goal) = self.target.filter(|goal| goal.is_beyond_8_bits() && rounds(request)) {
             let most = Goal::most_of_8_bits();
             return Err(Error::Usage(format!(
-                "{goal} is out of reach of frames of 8 bits, which hold {most:.1} dB at most\n  \
+                "{goal} cannot be reached by frames of 8 bits, whose rounding limits them to {most:.1} dB\n  \
                  help: ask for less, or for png files of 16 bits (--png-bits 16) or exr"
             )));
         }
         obstacle.map_or(Ok(()), |option| {
             Err(Error::Usage(format!(
-                "what {option} does is not predicted, so --target and --budget cannot go with it"
+                "the effect of {option} is not predicted, so it cannot be used with --target or --budget"
             )))
         })
     }
@@ -177,7 +177,10 @@ impl Chooser<'_> {
         let best = predictor.best_within(&self.probe().range(), &|_| true).map(|best| {
             let took = seconds(best.seconds * self.probe().frames_each(best.reuse));
             let psnr = decibels(best.psnr());
-            format!("; {} would come to {psnr}, in {took}", self.options(&best))
+            format!(
+                "; the nearest, {}, is predicted to reach {psnr} in {took}",
+                self.options(&best)
+            )
         });
         let nearest = best.unwrap_or_default();
         let fewer = match self.given() == FixedSettings::default() {

@@ -1,4 +1,4 @@
-//! `tweenray compare`: how far two images or sequences are apart.
+//! `tweenray compare`: the difference between two images or sequences.
 
 use super::exit::{Exit, as_input};
 use super::say;
@@ -26,7 +26,7 @@ pub struct CompareArgs {
     /// The reference: an image, a pattern with ####, or a folder of frames
     #[arg(value_name = "A")]
     reference: String,
-    /// What is compared with it: the same kind of thing
+    /// What to compare with it: an image, a pattern or a folder, as the reference
     #[arg(value_name = "B")]
     other: String,
     /// Print JSON
@@ -107,7 +107,7 @@ fn pair(name: String, reference: &Path, other: &Path) -> Result<Pair> {
     Ok(Pair { name, comparison })
 }
 
-/// Files by what pairs them: the frame number of a pattern, the file name in a folder.
+/// Files by the key that pairs them: the frame number for a pattern, the file name for a folder.
 type Named = BTreeMap<String, PathBuf>;
 
 enum Images {
@@ -115,7 +115,7 @@ enum Images {
     Many(Named),
 }
 
-/// What the user named: a file, a folder, or a pattern.
+/// The images of an argument: a file, a folder, or a pattern.
 fn images(name: &str) -> Result<Images> {
     let path = Path::new(name);
     if path.is_dir() {
@@ -138,7 +138,7 @@ fn images(name: &str) -> Result<Images> {
     Ok(Images::Many(found))
 }
 
-/// The number that `file` has in the place of the pattern's #s.
+/// The frame number in the file name `file`, where the pattern has its #s.
 fn frame_number(pattern: &str, file: &str) -> Option<u32> {
     let (before, rest) = pattern.split_once('#')?;
     let after = rest.trim_start_matches('#');
@@ -163,7 +163,8 @@ fn in_folder(folder: &Path) -> Result<Named> {
     Ok(named.filter(|(name, _)| !maps.contains(name)).collect())
 }
 
-/// What manifests among `files` call maps, which are no frames. One that cannot be read says nothing.
+/// Names of files that manifests among `files` list as maps, which are not frames. Unreadable manifests are
+/// ignored.
 fn maps(files: &[PathBuf]) -> BTreeSet<String> {
     let is_manifest = |path: &&PathBuf| path.to_string_lossy().ends_with(manifest::ENDING);
     let read = |path: &PathBuf| manifest::Manifest::as_of_now(path).ok().flatten();

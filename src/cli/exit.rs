@@ -1,4 +1,4 @@
-//! What the exit code says.
+//! Exit codes.
 
 use crate::error::Error;
 use std::process::ExitCode;
@@ -6,7 +6,7 @@ use std::process::ExitCode;
 /// How the program ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
-    /// Everything asked for is done.
+    /// Everything requested is done.
     Done,
     /// The job failed.
     Failed,
@@ -16,7 +16,7 @@ pub enum Exit {
     Incomplete,
     /// Stopped cleanly; the same command goes on. (`EX_TEMPFAIL` of sysexits.h.)
     Stopped,
-    /// Stopped in the same way since its launcher was killed.
+    /// Stopped because its launcher was killed; the same command goes on.
     Orphaned,
 }
 

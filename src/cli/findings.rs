@@ -1,4 +1,4 @@
-//! What `inspect` warns of, found by a few hundred rays and never by rendering.
+//! Warnings of `inspect`, from a few hundred rays, without rendering.
 
 use crate::error::Result;
 use crate::intersect::{Hit, Intersector, Ray};
@@ -6,14 +6,14 @@ use crate::math::{Bounds3, DVec3};
 use crate::scene::{Camera, Scene, Settings, Shot};
 use crate::stats::RayCounts;
 
-/// Frames that are looked at, spread over the shot, both ends among them.
+/// Number of frames that are checked, spread over the shot, both ends included.
 const FRAMES: u32 = 9;
-/// Rays about the eye; a Fibonacci lattice spreads them evenly.
+/// Number of rays in all directions from the eye; a Fibonacci lattice spreads them evenly.
 const AROUND: usize = 128;
-/// Camera rays a frame.
+/// Columns and rows of camera rays in a frame.
 const GRID: (u32, u32) = (24, 16);
-/// Share of all rays about the eye that must meet back faces first. Under an open terrain it is
-/// about a half; in the open among closed meshes it is nearly nothing.
+/// Share of the rays from the eye that hit back faces from which on a warning is given. Under an open terrain the
+/// share is about a half; outside of closed meshes it is nearly 0.
 const INSIDE: f64 = 0.4;
 
 /// Warnings about the scene as this shot shows it.

@@ -1,4 +1,4 @@
-//! `tweenray inspect`: what a scene holds and calls for, without rendering it.
+//! `tweenray inspect`: what a scene holds and what rendering it would do, without rendering it.
 
 mod reuse;
 
@@ -35,7 +35,7 @@ pub struct InspectArgs {
     settings: SettingArgs,
 }
 
-/// Everything that `inspect` tells.
+/// The output of `inspect`.
 #[derive(Serialize)]
 struct Inspection {
     scene: String,
@@ -62,7 +62,7 @@ struct Inspection {
 
 #[derive(Serialize, Default)]
 struct Lights {
-    /// How many there are of each kind.
+    /// Numbers of lights by kind.
     #[serde(flatten)]
     by_kind: BTreeMap<&'static str, usize>,
     sky: bool,
@@ -74,7 +74,7 @@ struct Lights {
 struct CameraView {
     eye: [f64; 3],
     looks_along: [f64; 3],
-    /// Distance that the lens is focused at; absent for a pinhole.
+    /// Focus distance of the lens; absent for a pinhole.
     #[serde(skip_serializing_if = "Option::is_none")]
     focus: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! A job, resolved: the scene as read, with the command line's options over it.
+//! The scene of a job, with the command line's options applied to its settings.
 
 use super::args::{SceneArgs, SettingArgs};
 use super::exit::as_input;
@@ -10,7 +10,7 @@ use crate::scene::limits::MAX_EDGE;
 use crate::scene::{Collapsed, Scene, Settings};
 use std::path::{Path, PathBuf};
 
-/// Reads the scene and puts the options over its settings.
+/// Reads the scene and applies the options to its settings.
 ///
 /// Errors: `Error::Input` and `Error::Usage`; a scene that cannot be read is bad input too.
 pub fn load(scene: &SceneArgs, options: &SettingArgs) -> Result<Loaded> {
@@ -23,7 +23,7 @@ pub fn load(scene: &SceneArgs, options: &SettingArgs) -> Result<Loaded> {
     Ok(loaded)
 }
 
-/// A folder is no scene; says which file in it may be meant.
+/// Refuses a folder, and names scene files in it.
 fn refuse_folder(path: &Path) -> Result<()> {
     if !path.is_dir() {
         return Ok(());
@@ -56,7 +56,7 @@ pub fn collapsed(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
     scene.collapsed.iter().map(warning).collect()
 }
 
-/// Whether the scene file's output can be a pattern; a fault is shown where it stands.
+/// Checks the scene file's output pattern; an error has the place in the file.
 fn check_output(loaded: &Loaded) -> Result<()> {
     let (Some(pattern), Some(place)) = (&loaded.options.output, &loaded.output_place) else {
         return Ok(());
@@ -67,7 +67,7 @@ fn check_output(loaded: &Loaded) -> Result<()> {
     }
 }
 
-/// What scene file and command line can only get wrong together.
+/// Checks settings that may be wrong only together, as from scene file and command line.
 fn check(settings: &Settings) -> Result<()> {
     let Settings { width, height, .. } = *settings;
     if width > MAX_EDGE || height > MAX_EDGE {

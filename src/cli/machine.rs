@@ -1,4 +1,4 @@
-//! The machine and this process, from `/proc`; what is not there is absent, never guessed.
+//! The machine and this process, from `/proc`; unknown figures are `None`, never guessed.
 
 use crate::error::{Error, Result};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::ffi::OsStr;
 use std::fs;
 
-/// What a job ran on.
+/// The machine of a job.
 #[derive(Debug, Clone, Serialize)]
 pub struct Machine {
     /// Processor's name.
@@ -34,7 +34,7 @@ impl Machine {
     }
 }
 
-/// A pool of so many threads of its own.
+/// A new pool of `threads` threads.
 pub fn thread_pool(threads: usize) -> Result<ThreadPool> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
@@ -46,10 +46,10 @@ pub const ISAS: [&str; 5] = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
 /// Environment variable that names the widest instruction set to use.
 const MAX_ISA: &str = "TWEENRAY_MAX_ISA";
 
-/// The instruction set to use unless told otherwise, by which the last bits of a hit differ:
+/// The default instruction set, on which the last bits of a hit depend:
 /// this machine's widest, or the narrower one that `TWEENRAY_MAX_ISA` names.
 ///
-/// Errors: `Error::Usage` where the variable names none of [`ISAS`] (empty is as good as unset).
+/// Errors: `Error::Usage` if the variable is not one of [`ISAS`] (an empty value counts as unset).
 pub fn best_isa() -> Result<&'static str> {
     let most = std::env::var_os(MAX_ISA).filter(|name| !name.is_empty());
     narrower(detected_isa(), most.as_deref())
@@ -59,7 +59,7 @@ fn narrower(own: &'static str, most: Option<&OsStr>) -> Result<&'static str> {
     let Some(name) = most else { return Ok(own) };
     let Some(most) = ISAS.iter().position(|isa| name == *isa) else {
         let (name, isas) = (name.to_string_lossy(), ISAS.join(", "));
-        let message = format!("{MAX_ISA} is '{name}', which is no instruction set; use {isas}");
+        let message = format!("{MAX_ISA} is '{name}', which is not an instruction set; use {isas}");
         return Err(Error::Usage(message));
     };
     // Another kind of processor has none of these.
@@ -101,7 +101,7 @@ pub fn memory() -> Option<u64> {
     kilobytes("/proc/meminfo", "MemTotal:")
 }
 
-/// Processes that wanted a core over the last minute, on the mean.
+/// Load average over the last minute: mean number of processes that wanted a core.
 pub fn load() -> Option<f64> {
     fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.parse().ok()
 }

@@ -1,6 +1,6 @@
-//! The command line: arguments in, words and an exit code out. One file per subcommand.
+//! The command line: parses arguments, prints, and returns an exit code. One file per subcommand.
 //!
-//! Only this room talks to people; nothing below it knows of arguments or prints. Results go to
+//! Only this room prints or parses arguments. Results go to
 //! stdout; progress, warnings and errors to stderr.
 
 mod accuracy;
@@ -122,7 +122,7 @@ fn dispatch(command: &Command) -> Exit {
 }
 
 impl Command {
-    /// The name of a command that writes files and is no work for several processes.
+    /// The name of the command, if it writes files and must run in a single process.
     fn alone(&self) -> Option<&'static str> {
         match self {
             Self::Accuracy(_) => Some("accuracy"),
@@ -133,7 +133,7 @@ impl Command {
     }
 }
 
-/// Says what is wrong with all processes that a launcher started, once.
+/// Prints an error that all processes of a launcher have, once.
 fn refused(error: &Error) -> Exit {
     if !cluster::is_nonzero_rank() {
         say::error(error);
@@ -141,7 +141,7 @@ fn refused(error: &Error) -> Exit {
     Exit::of(error)
 }
 
-/// Says what went wrong, if anything did.
+/// The exit code of `result`; prints its error.
 fn ended(result: Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
         say::error(&error);
@@ -149,7 +149,7 @@ fn ended(result: Result<Exit>) -> Exit {
     })
 }
 
-/// The words that started this process, the program by its name alone.
+/// The command line of this process, with the program's name instead of its path.
 fn words() -> Vec<String> {
     let mut words: Vec<String> =
         std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
@@ -165,7 +165,7 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn the_declarations_agree_with_themselves() {
+    fn the_declarations_of_the_command_line_are_consistent() {
         Arguments::command().debug_assert();
     }
 }

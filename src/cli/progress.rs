@@ -1,4 +1,4 @@
-//! Progress of a render on stderr: a bar on a terminal, a plain line a frame elsewhere.
+//! Progress of a render on stderr: a bar on a terminal, else a plain line per frame.
 
 use super::say;
 use crate::sequence::FrameReport;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// Bar units in a frame, so that the bar moves within a frame.
 const UNITS: f64 = 1000.0;
 
-/// Who hears of progress, and how.
+/// The display of progress.
 pub struct Watch {
     start: Instant,
     bar: Option<ProgressBar>,
@@ -22,14 +22,14 @@ pub struct Watch {
     total: u32,
     finished: AtomicU32,
     rays: AtomicU64,
-    /// Of the last frame, as it is shown.
+    /// The share reused in the last frame, as text.
     reused: Mutex<String>,
-    /// Share of the frames in flight that is done, in units.
+    /// Finished share of the frames that are being rendered, in units.
     partly: AtomicU64,
 }
 
 impl Watch {
-    /// For `total` frames, of which `kept` exist already. `quiet` says nothing at all.
+    /// A display for `total` frames, of which `kept` exist already; prints nothing if `quiet`.
     pub fn new(kept: usize, total: usize, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         Self {
@@ -64,7 +64,7 @@ impl Watch {
         self.reused.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes the bar away, so that what follows stands on clean lines.
+    /// Removes the bar, so that later output starts on a clean line.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -113,7 +113,7 @@ fn reused(share: Option<f64>) -> String {
     share.map_or(String::new(), |share| format!("  {} reused", percent(share, 0)))
 }
 
-/// A share as people say it; all of it only where it is all.
+/// A share in per cent; 100 % only if it is exactly 1.
 pub fn percent(share: f64, digits: usize) -> String {
     let unit = 10f64.powi(digits as i32);
     format!("{:.digits$} %", (share * 100.0 * unit).floor() / unit)
@@ -123,7 +123,7 @@ fn left(elapsed: Duration, finished: u32, remaining: u32) -> Duration {
     elapsed.mul_f64(f64::from(remaining) / f64::from(finished.max(1)))
 }
 
-/// Seconds as people say them: `0.41 s`, `5 s`, `3 min 20 s`, `2 h 5 min`.
+/// Seconds in words: `0.41 s`, `5 s`, `3 min 20 s`, `2 h 5 min`.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {

@@ -14,26 +14,26 @@ use std::fs;
 use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 
-/// What the user supplies.
+/// References that the user supplies.
 pub struct References {
-    /// Read when they serve; `None` for none.
+    /// The references, which are read when frames need them; `None` for none.
     pub cache: Option<ReferenceCache>,
-    /// What tells this set from others; `none` for none.
+    /// Hash of the set of references; `none` for none.
     pub hash: String,
 }
 
-/// On which terms this job's frames and others serve one another, in a world with the hash `world`.
+/// The compatibility that references must have for this job, in a world with the hash `world`.
 pub fn terms(world: &str, scene: &Scene, settings: &Settings) -> Compatibility {
     let channels = reuse::channels(scene, settings);
     Compatibility::of(world, &channels, settings)
 }
 
 impl References {
-    /// Looks through all exr files in `folders` for a job whose frames go to `pattern`: each rank
-    /// through a part of them, so that the job has looked into each once before its first frame. Then
-    /// ranks read those that serve their frames. All ranks call it.
+    /// Checks all exr files in `folders`, for a job whose frames go to `pattern`. Each rank checks a
+    /// part of them, so that each file is checked once before the first frame. Later, ranks read the
+    /// files that their frames need. All ranks call it.
     ///
-    /// Errors: a folder without such files or with the job's own; a file that cannot serve, by name.
+    /// Errors: a folder without such files or with the job's own; a file that cannot be used, by name.
     pub fn survey(
         comm: &Communicator,
         folders: &[PathBuf],
@@ -75,7 +75,7 @@ impl References {
     }
 }
 
-/// Whether `folders` hold frames that a job whose frames go to `pattern` could look into.
+/// Checks that `folders` have exr frames and are not where the job's own frames go, `pattern`.
 pub fn check(folders: &[PathBuf], pattern: &FramePattern, settings: &Settings) -> Result<()> {
     if folders.is_empty() {
         return Ok(());
@@ -91,7 +91,7 @@ fn refuse_policy(settings: &Settings) -> Result<()> {
     }
 }
 
-/// Which of `count` files this rank looks into.
+/// The range of `count` files that this rank checks.
 fn own_part(count: usize, comm: &Communicator) -> std::ops::Range<usize> {
     let edge = |rank: u32| count * rank as usize / comm.size() as usize;
     edge(comm.rank())..edge(comm.rank() + 1)

@@ -28,11 +28,12 @@ use std::time::Instant;
 Most options can also stand in the scene file; the command line wins.
 Frames that exist with the same settings are kept, so the same command goes on where it stopped.
 
-`tweenray status` says how far they are. A move that got longer keeps the frames that it shares.
+`tweenray status` shows which frames are done. When a camera move gets longer, frames that stay the
+same are kept.
 
 SIGINT, SIGTERM and SIGUSR1 stop the job; a second SIGINT or SIGTERM ends it at once.
 Exit codes: 0 done, 1 failed, 2 usage or bad input, 75 stopped and can be resumed,
-76 the same since mpirun (or srun) was killed.
+76 stopped because mpirun (or srun) was killed; can be resumed.
 
 Examples:
   tweenray render scene.toml -o 'out/frame_####.png' --frames 1..16 --size 640x360 --spp 4
@@ -64,7 +65,7 @@ pub fn parse(scene: &str, words: &[String]) -> Result<RenderArgs> {
     })
 }
 
-/// How a job goes on of which no frame was begun: one that is to replace frames has to be told so again.
+/// How to resume a job that has begun no frame: with `--overwrite` again, if it had that.
 const NOTHING_DONE: &str = " before the first frame; give the same command again";
 
 /// Runs the command.
@@ -81,7 +82,7 @@ pub fn run(args: &RenderArgs) -> Exit {
         Err(error) => return super::refused(&error),
     };
     let ended = render(&comm, &interrupt, args);
-    // Others still hear what stops rank 0's video.
+    // Other ranks still listen for signals while rank 0 makes the video.
     if comm.is_root() || !matches!(ended, Ok(Exit::Done)) {
         interrupt.over();
     }
@@ -93,7 +94,7 @@ pub fn run(args: &RenderArgs) -> Exit {
         }
         Exit::of(&error)
     });
-    // Rank 0 may make a video yet.
+    // Rank 0 may still be making the video.
     comm.final_barrier();
     interrupt.over();
     if interrupt.is_orphan() {
@@ -104,8 +105,8 @@ pub fn run(args: &RenderArgs) -> Exit {
     exit
 }
 
-/// Renders all frames that are not there; again under other settings, where the program chose them and they
-/// were not enough. All ranks call it.
+/// Renders all missing frames. If the program chose the settings and the target was missed, renders them again
+/// with other settings. All ranks call it.
 fn render(comm: &Communicator, interrupt: &Interrupt, args: &RenderArgs) -> Result<Exit> {
     let start = Instant::now();
     // Only one rank talks.
@@ -123,7 +124,7 @@ fn render(comm: &Communicator, interrupt: &Interrupt, args: &RenderArgs) -> Resu
         let job = RenderJob::new(&site, &request, choice.as_ref(), is_again)?;
         let round = job.render()?;
         match choosing.next(&job, &round, choice.take()) {
-            // All frames are there, but were not all held against what was wanted.
+            // All frames are finished, but not all were checked against the target.
             Err(Error::Stopped) => return report::conclude(&job, &round, true),
             Err(error) => return Err(error),
             Ok(Some(Judgement::Again(tighter))) => (choice, is_again) = (Some(tighter), true),
@@ -136,7 +137,7 @@ fn render(comm: &Communicator, interrupt: &Interrupt, args: &RenderArgs) -> Resu
     }
 }
 
-/// Reads what is asked for; from here on the job can be stopped.
+/// Reads the scene and the options; from here on the job can be stopped.
 fn load(
     comm: &Communicator,
     interrupt: &Interrupt,

@@ -52,7 +52,7 @@ pub struct ReportArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u32).range(1..))]
     every: Option<u32>,
-    /// Say nothing but errors
+    /// Print nothing but errors
     #[arg(short, long)]
     quiet: bool,
 }
@@ -60,10 +60,10 @@ pub struct ReportArgs {
 /// Frames in the player unless told otherwise: some 15 MB of pictures.
 const MOST_SHOWN: usize = 300;
 
-/// A job as its manifest tells.
+/// A job, as read from its manifest.
 struct Job {
     manifest: Manifest,
-    /// Its settings; where another version wrote others, the default.
+    /// Its settings; defaults for settings that another version did not write.
     settings: Settings,
     folder: PathBuf,
     standing: Standing,
@@ -164,13 +164,11 @@ impl Job {
         facts
     }
 
-    /// What stands in place of an audit.
+    /// The sentence that takes the place of an audit.
     fn why_no_audit(&self) -> &'static str {
         let ReuseSettings { policy, .. } = self.settings.reuse;
         match policy {
-            Policy::Colour => {
-                "Policy colour has no audit: nothing is known of how far its frames are off."
-            }
+            Policy::Colour => "Policy colour has no audit, so the error of its frames is unknown.",
             _ if self.rows.is_empty() => "No frame was audited yet.",
             _ if !self.reuse().is_inferred() => "No frame was audited: none is inferred.",
             _ => "No frame was audited.",
@@ -198,8 +196,8 @@ impl Job {
     }
 }
 
-/// What the command that is shown is good for; where it left settings to the program, whether these
-/// are spelled out in it.
+/// The note about the command on the page. `is_spelled_out` says whether it has the chosen settings in place of
+/// `--target` or `--budget`.
 fn command_note(header: &Header, is_spelled_out: bool) -> String {
     let same = "The same scene, settings and version give the same bytes, on any number of ranks and \
                 threads.";

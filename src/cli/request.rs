@@ -1,4 +1,4 @@
-//! What `render` was asked to do, resolved: scene, shot, settings, frames and where they go.
+//! The request to `render`: scene, shot, settings, frames and where they go.
 
 mod read;
 
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 
 pub use read::{place, uploads};
 
-/// Everything that rendering takes. One rank of each node reads it from files; the others are told.
+/// Everything that rendering needs. One rank of each node reads it from files and sends it to the others.
 #[derive(Serialize, Deserialize)]
 pub struct Request {
     /// The scene, ready to trace.
@@ -30,31 +30,31 @@ pub struct Request {
     pub settings: Settings,
     /// How the job runs.
     pub options: JobOptions,
-    /// Which frames.
+    /// The frames to render.
     pub frames: FrameRange,
-    /// Where they go.
+    /// Pattern of the frames' paths.
     pub pattern: FramePattern,
-    /// Frames of an earlier job, which each rank surveys.
+    /// Frames of an earlier job; each rank checks a part of them.
     #[serde(skip, default = "References::none")]
     pub references: References,
-    /// Pictures that are taken for frames.
+    /// Uploaded pictures, by frame.
     pub uploads: Vec<(u32, Image)>,
-    /// What import warns of, and what rounding lost. (Only rank 0, which reads by itself, tells of them.)
+    /// Warnings of import and of rounding, which rank 0 prints.
     #[serde(skip)]
     pub warnings: Vec<Diagnostic>,
     scene_name: String,
     hashes: Hashes,
 }
 
-/// Hashes of what was read, as frames differ by it.
+/// Hashes of everything read that frames depend on.
 #[derive(Serialize, Deserialize)]
 struct Hashes {
     scene: String,
-    /// Of each part of the scene, by name.
+    /// Hash of each part of the scene, by name.
     parts: BTreeMap<String, String>,
-    /// Of what light depends on.
+    /// Hash of everything that light depends on.
     light: String,
-    /// Of the scene and the camera move.
+    /// Hash of the scene and the camera move.
     shot: String,
 }
 
@@ -62,14 +62,14 @@ struct Hashes {
 pub struct Setup {
     /// The settings.
     pub settings: Settings,
-    /// On which terms frames serve as references.
+    /// The compatibility that references must have.
     pub terms: Compatibility,
-    /// What each frame of the shot is made of.
+    /// The recipe of each frame of the shot.
     pub recipes: Recipes,
 }
 
 impl Request {
-    /// Reads the scene and puts the options over it. All ranks call it.
+    /// Reads the scene and applies the options to it. All ranks call it.
     pub fn load(
         comm: &Communicator,
         scene: &SceneArgs,
@@ -88,10 +88,10 @@ impl Request {
         Ok(request)
     }
 
-    /// What traces, as far as frames differ by it: `intersector` by its own description, and the
-    /// instruction set.
+    /// Description of everything about the intersector that frames depend on: `intersector`, its own
+    /// description, and the instruction set.
     ///
-    /// Errors: [`machine::best_isa`]'s.
+    /// Errors: those of [`machine::best_isa`].
     pub fn tracer(&self, intersector: &str) -> Result<String> {
         Ok(match (self.settings.intersector, &self.settings.isa) {
             (IntersectorKind::Oracle, _) => intersector.into(),
@@ -100,7 +100,7 @@ impl Request {
         })
     }
 
-    /// What follows from rendering under `settings`.
+    /// The setup for rendering under `settings`.
     ///
     /// Errors: those of [`Recipes::new`].
     pub fn setup(&self, settings: Settings) -> Result<Setup> {
@@ -110,8 +110,8 @@ impl Request {
         Ok(Setup { settings, terms, recipes })
     }
 
-    /// The settings of `setup` with what decides frames beside them: pictures count by what they show,
-    /// not by their names.
+    /// The settings of `setup` as the header has them, with references and uploads by hashes of their content, not
+    /// by their names.
     fn header_settings(&self, setup: &Setup) -> Value {
         let mut settings = Header::settings(&setup.settings);
         let show = |(frame, image): &(u32, Image)| {
@@ -129,8 +129,7 @@ impl Request {
         settings
     }
 
-    /// The header of the frames that are there, where they are of this scene, version and `tracer`
-    /// and are to be kept.
+    /// The header of existing frames that are to be kept, if they are of this scene, version and `tracer`.
     pub fn header_before(&self, tracer: &str) -> Option<Header> {
         let header = Manifest::read(&manifest::manifest_path(&self.pattern)).ok()??.header;
         let is_same = header.scene_hash == self.hashes.scene
@@ -139,7 +138,7 @@ impl Request {
         (is_same && !self.options.overwrite).then_some(header)
     }
 
-    /// Where frames traced by `tracer` under `setup` go, and what they share.
+    /// The target of frames traced by `tracer` under `setup`.
     pub fn target(&self, setup: &Setup, tracer: &str) -> Target {
         let Hashes { scene, parts, shot, .. } = &self.hashes;
         let header = Header {
@@ -169,7 +168,7 @@ impl Request {
     }
 }
 
-/// Refuses maps of what no frame has.
+/// Refuses `--maps` with a policy that infers nothing.
 pub fn refuse_maps(options: &JobOptions, settings: &Settings) -> Result<()> {
     match settings.reuse.policy {
         Policy::Off if options.maps => Err(Error::Usage(

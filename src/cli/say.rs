@@ -1,5 +1,5 @@
-//! Words to people: results on stdout, the rest on stderr. A reader that went away is no fault; a
-//! result that is lost otherwise (a full disk) is.
+//! Printing: results on stdout, messages on stderr. A closed pipe is not an error; any other failure
+//! to write a result (a full disk) is.
 
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -23,7 +23,7 @@ pub fn json(value: &impl Serialize) -> Result<()> {
     result(text.map_err(|e| Error::Failed(format!("cannot write JSON: {e}")))?)
 }
 
-/// What came of writing to stdout.
+/// The result of writing to stdout; a closed pipe is not an error.
 pub fn told(written: std::io::Result<()>) -> Result<()> {
     match written {
         // Nobody reads on (`tweenray inspect scene.toml | head -1`).
@@ -52,7 +52,7 @@ pub fn error(error: &Error) {
     aside(format_args!("error: {error}"));
 }
 
-/// Says each of `lines`, unless nothing is to be said.
+/// Calls `say` with each of `lines`, unless `quiet`.
 pub fn unless<T>(quiet: bool, lines: &[T], say: fn(&T)) {
     if !quiet {
         lines.iter().for_each(say);

@@ -16,45 +16,44 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// clocks of two machines differ.
 const BEFORE_SLURM_ENDS: Duration = Duration::from_secs(30);
 
-/// How long a rank leaves it to rank 0 to end the job where nobody watches: a batch system signals to all of
-/// them, and one line is enough.
+/// How long other ranks wait for rank 0 to end the job while no work watches the stop flag: a batch system signals
+/// all ranks, and one message is enough.
 const AFTER_RANK_0: Duration = Duration::from_secs(3);
 
-/// How often a rank looks whether its launcher lives.
+/// How often a rank checks that its launcher is alive.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// How long a rank without launcher has to stop: as a job does on SIGTERM, with something to spare. Then it
-/// ends, wherever it is, since without its launcher MPI may wait forever.
+/// How long a rank without a launcher may take to stop: longer than a job takes on SIGTERM. Then it
+/// ends in any case, since without its launcher MPI may wait forever.
 const ORPHANS_GRACE: Duration = Duration::from_secs(15);
 
-/// How to go on, unless told otherwise.
+/// The default words about how to resume.
 const GOES_ON: &str = "; the same command goes on from here";
 
-/// What signals and limits have asked for.
+/// The requests of signals and time limits.
 #[derive(Debug, Clone)]
 pub struct Interrupt {
     /// Set by the first signal or limit.
     pub stop: Arc<AtomicBool>,
-    /// Whether somebody watches `stop`, so that work in hand can be finished cleanly. While
-    /// nobody does (loading, building), nothing is at risk and the first signal
-    /// ends the program.
+    /// Whether some work watches `stop` and can end cleanly. While none does (loading, building), nothing can be
+    /// lost, and the first signal ends the program.
     watched: Arc<AtomicBool>,
     is_root: Arc<AtomicBool>,
-    /// Whether the exit code is known. Nothing is said then, and nothing changes the code: a launcher
+    /// Whether the exit code is decided. Then signals print nothing and do not change it: a launcher
     /// sends SIGTERM to the other ranks as soon as one ends with an error. Locked while a signal
     /// ends the program, so that only one of the two happens.
     is_over: Arc<Mutex<bool>>,
-    /// How to go on, to follow the reason.
+    /// Words about how to resume, to follow the reason.
     how: Arc<Mutex<String>>,
-    /// Whether a person, or a system that waits no longer, has asked.
+    /// Whether SIGINT or SIGTERM has been received; a second one ends the program.
     asked: Arc<AtomicBool>,
     reason: Arc<OnceLock<String>>,
-    /// What started this rank.
+    /// The launcher of this rank.
     launcher: Arc<OnceLock<LauncherProcess>>,
 }
 
 impl Interrupt {
-    /// Nothing is asked for, and nobody listens yet.
+    /// No requests, and not listening yet.
     pub fn new() -> Self {
         Self {
             stop: Arc::default(),
@@ -78,8 +77,8 @@ impl Interrupt {
         Ok(())
     }
 
-    /// The exit code is known, and its reason may be told: from now on a signal or limit does nothing, but
-    /// for the second SIGINT or SIGTERM, which ends the program at once as ever.
+    /// Marks the exit code as decided: from now on signals and limits do nothing, except the
+    /// second SIGINT or SIGTERM, which still ends the program at once.
     pub fn over(&self) {
         let mut is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
         if !std::mem::replace(&mut *is_over, true) {
@@ -94,7 +93,7 @@ impl Interrupt {
         self.stop_after(limit.saturating_sub(start.elapsed()), reason);
     }
 
-    /// Stops shortly before the Slurm allocation ends that this process runs in, if it does.
+    /// Stops shortly before the end of the Slurm allocation of this process, if it has one.
     pub fn before_slurm_ends(&self) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let end = std::env::var("SLURM_JOB_END_TIME").ok();
@@ -103,8 +102,8 @@ impl Interrupt {
         }
     }
 
-    /// Stops when `launcher` ends, which started this rank: whoever killed it wants no more of the job, and
-    /// the ranks it left would keep the cores and the folder.
+    /// Stops when `launcher`, which started this rank, ends: otherwise the ranks would keep
+    /// the cores and the folder.
     pub fn end_with(&self, launcher: LauncherProcess) {
         let _ = self.launcher.set(launcher.clone());
         let theirs = self.clone();
@@ -119,8 +118,8 @@ impl Interrupt {
         });
     }
 
-    /// Whether the launcher of this rank has ended, so that MPI can no more be ended in good order. Another
-    /// rank may have seen that first, and stopped this one.
+    /// Whether the launcher of this rank has ended, so that MPI cannot be finalised any more. Another
+    /// rank may have noticed that first and stopped this one.
     pub fn is_orphan(&self) -> bool {
         self.launcher.get().is_some_and(LauncherProcess::is_gone)
     }
@@ -130,12 +129,12 @@ impl Interrupt {
         self.reason.get().cloned().unwrap_or_default()
     }
 
-    /// Whoever ends the program from now on says `how` to go on.
+    /// Sets the words about `how` to resume, which the end of the program prints from now on.
     pub fn goes_on(&self, how: String) {
         *self.how.lock().unwrap_or_else(PoisonError::into_inner) = how;
     }
 
-    /// Says that the job was stopped, outside of its frames, and how to go on.
+    /// Prints that the job was stopped while no frame was rendered, and how to resume.
     pub fn say_stopped(&self) {
         let how = self.how.lock().unwrap_or_else(PoisonError::into_inner);
         say::aside(format_args!("stopped{}{how}", self.reason()));
@@ -188,7 +187,7 @@ impl Interrupt {
         }
     }
 
-    /// Ends the program, unless it ends by itself.
+    /// Ends the program, unless its exit code is decided already.
     fn exit(&self) {
         let is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
         if !*is_over {
@@ -201,8 +200,8 @@ impl Interrupt {
     }
 }
 
-/// How long a job of an allocation that ends at `end` (seconds since 1970) runs from `now` on; `None`
-/// for an end that is past, which is none of this process's.
+/// How long a job may run from `now` on if its allocation ends at `end` (seconds since 1970); `None`
+/// if the end has passed, since then it is not this process's.
 fn until_slurm_ends(end: &str, now: Duration) -> Option<Duration> {
     let left = Duration::from_secs(end.trim().parse().ok()?).checked_sub(now)?;
     Some(left.saturating_sub(BEFORE_SLURM_ENDS))
@@ -221,7 +220,7 @@ mod tests {
         assert_eq!(left("soon", 5), None);
     }
 
-    /// (Else the test itself would end here, with code 75.)
+    /// (Otherwise the test process would exit here, with code 75.)
     #[test]
     fn nothing_is_stopped_once_the_exit_code_is_known() {
         let interrupt = Interrupt::new();
@@ -232,7 +231,7 @@ mod tests {
         interrupt.stop(" at a limit".into());
         assert!(!interrupt.stop.load(Ordering::SeqCst));
         assert_eq!(interrupt.reason(), "");
-        // What was asked before counts no more: the launcher's signal is the first.
+        // Earlier requests do not count: the launcher's signal is the first.
         let interrupt = Interrupt::new();
         interrupt.watched(|| interrupt.on(SIGTERM));
         interrupt.over();

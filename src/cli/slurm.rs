@@ -1,5 +1,5 @@
-//! `tweenray slurm`: a batch script that renders a sequence on a cluster, however many time limits that
-//! takes.
+//! `tweenray slurm`: a batch script that renders a sequence on a cluster, in as many runs as the time limit makes
+//! necessary.
 
 mod script;
 
@@ -18,17 +18,17 @@ use script::Script;
 use std::path::Path;
 use std::time::Duration;
 
-/// How long before a limit ranks are asked to stop, unless told.
+/// Default time between the signal to stop and the limit.
 const NOTICE: Duration = Duration::from_secs(60);
-/// The longest that Slurm takes.
+/// Longest such time that Slurm accepts.
 const MOST_NOTICE: Duration = Duration::from_secs(65_535);
-/// No queue allows more.
+/// Longest time limit; no queue allows more.
 const MOST_TIME: Duration = Duration::from_secs(366 * 86_400);
 
-/// Print a Slurm batch script that renders a sequence, over as many time limits as it takes
+/// Print a Slurm batch script that renders a sequence, in as many runs as its time limit makes necessary
 ///
 /// The job stops before its limit and is requeued until `tweenray status` says that the sequence is
-/// complete, or until a run gets no further. The scene is read now, so that a mistake is told before
+/// complete, or until a run makes no progress. The scene is read now, so that mistakes are reported before
 /// the job waits in a queue.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -55,11 +55,12 @@ pub struct SlurmArgs {
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
         value_parser = whole(1, 4096))]
     tasks_per_node: u32,
-    /// Cores of each process [default: whole nodes, which nobody else uses meanwhile]
+    /// Cores of each process [default: whole nodes, without other jobs]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = whole(1, 4096))]
     cpus: Option<u32>,
-    /// How long before the limit the processes are told to stop [default: 60s, or a quarter of the time]
+    /// How long before the limit the processes get the signal to stop [default: 60s, or a quarter of the
+    /// time]
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     notice: Option<Duration>,
     /// One more option of sbatch, as in partition=long or account=physics; repeatable
@@ -107,7 +108,7 @@ pub fn run(args: &SlurmArgs) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// How long before the limit Slurm shall signal.
+/// How long before the limit Slurm is to send the signal.
 fn notice(time: Duration, asked: Option<Duration>) -> Result<Duration> {
     if time < Duration::from_secs(60) {
         return Err(Error::Usage("--time: Slurm counts in minutes: at least 1m".into()));
@@ -124,7 +125,7 @@ fn notice(time: Duration, asked: Option<Duration>) -> Result<Duration> {
     Err(Error::Usage(wrong.into()))
 }
 
-/// Whether the files are there that the options name, so that the job need not wait to find it out.
+/// Checks that the files that options name exist, so that mistakes are found before the job waits in a queue.
 fn check_files(
     render: &RenderArgs,
     loaded: &Loaded,
@@ -138,7 +139,7 @@ fn check_files(
     uploads(&options.uploads, shot, settings).map(drop)
 }
 
-/// A requeued job would begin anew again and again.
+/// Refuses `--overwrite`, with which every requeued run would begin anew.
 fn refuse_overwrite(option: bool, in_scene: bool, scene: &SceneArgs) -> Result<()> {
     let place = match (option, in_scene) {
         (true, _) => "--overwrite".to_string(),

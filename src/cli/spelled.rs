@@ -1,10 +1,10 @@
-//! Settings as the options that set them.
+//! Settings as command-line options.
 
 use crate::effects::EffectPlan;
 use crate::scene::{Policy, ReuseSettings, Settings};
 
-/// The options that decide a picture's error and time, as `settings` have them; those of what `plan`
-/// says has no part in the scene are left out.
+/// The options that decide a picture's error and time, with their values in `settings`. Options without effect in the
+/// scene, by its `plan`, are left out.
 pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
     let reuse = &settings.reuse;
     let is_usual = reuse.tolerance == ReuseSettings::default().tolerance;
@@ -22,7 +22,7 @@ pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
         + &policy
 }
 
-/// The same of samples alone.
+/// Only the options of samples.
 pub fn samples(spp: u32, shadow: u32, sky: u32, plan: &EffectPlan) -> String {
     let mut options = format!("--spp {spp}");
     if plan.area_lights {
@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_has_a_part_is_spelled_out() {
+    fn only_options_with_an_effect_are_spelled_out() {
         let mut settings = Settings::default();
         let all = options(&settings, &EffectPlan::EVERYTHING);
         let every = "--spp 4 --shadow-samples 16 --sky-samples 16 --bounces 4 --policy surface";

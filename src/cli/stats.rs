@@ -1,4 +1,4 @@
-//! The file of `--stats`: what a job took, as JSON.
+//! The file of `--stats`: times, rays and memory of a job, as JSON.
 
 use super::machine::{Machine, peak_memory};
 use crate::cluster::{Outcome, RankWork};
@@ -10,7 +10,7 @@ use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What one rank tells of itself.
+/// The statistics of one rank.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RankStats {
     /// Rendering threads.
@@ -25,19 +25,19 @@ pub struct RankStats {
     pub intersector_bytes: u64,
     /// Most memory that reference frames took at a time.
     pub reference_bytes: u64,
-    /// Seconds to put references on disk.
+    /// Seconds to encode and write references to disk.
     pub checkpoint_seconds: f64,
-    /// Bytes of references put there.
+    /// Bytes of references written to disk.
     pub checkpoint_bytes: u64,
     /// The work of the process from the first frame to the last.
     #[serde(flatten)]
     pub work: RankWork,
-    /// Most memory held at once, where the system tells.
+    /// Most memory held at once; `None` if the system does not report it.
     pub peak_memory_bytes: Option<u64>,
 }
 
 impl RankStats {
-    /// This rank's, with its memory as of now.
+    /// The statistics with the peak memory of now.
     pub fn with_peak(self) -> Self {
         Self { peak_memory_bytes: peak_memory(), ..self }
     }
@@ -85,14 +85,14 @@ pub fn bad_of(plan: &Plan, outcome: &Outcome) -> BadSamples {
     sum
 }
 
-/// How much of the frames rendered now was inferred.
+/// Surface points of the frames rendered by this job, and those inferred.
 pub fn reuse_of(outcome: &Outcome) -> ReuseCounts {
     let mut sum = ReuseCounts::default();
     outcome.frames.iter().for_each(|(_, report)| sum += report.reuse);
     sum
 }
 
-/// What the audits of all frames asked for found together, rendered now or kept; `None` where none
+/// The audit of all frames asked for together, rendered now or kept; `None` if none
 /// was audited.
 pub fn audit_of(plan: &Plan, outcome: &Outcome) -> Option<AuditRow> {
     let rendered = outcome.frames.iter().filter_map(|(_, report)| Some(report.audit?.sums));

@@ -1,4 +1,4 @@
-//! `tweenray status`: how far a sequence is.
+//! `tweenray status`: which frames of a sequence are finished.
 
 use super::exit::Exit;
 use super::say;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Say which frames of a sequence are done, missing, damaged or of other settings
 ///
-/// Every file is held against its hash in the manifest. Nothing is changed, and the job may be
+/// Every file is compared with its hash in the manifest. Nothing is changed, and the job may be
 /// running.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -54,7 +54,7 @@ pub fn run(args: &StatusArgs) -> Result<Exit> {
     Ok(if complete { Exit::Done } else { Exit::Incomplete })
 }
 
-/// The manifests that are meant.
+/// The manifests that the argument names.
 fn manifests(sequence: &str) -> Result<Vec<PathBuf>> {
     let path = Path::new(sequence);
     if !path.is_dir() {

@@ -1,4 +1,4 @@
-//! Values of options as people type them: sizes, frame ranges, crops, choices, numbers in bounds.
+//! Parsers of option values: sizes, frame ranges, crops, choices, numbers in bounds.
 
 use crate::accuracy::Goal;
 use crate::scene::{FrameRange, Rect, SaveInterval, parse_time, parse_time_limit};
@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Frames as asked for; an open end is filled in by the shot.
+/// A range of frames; the shot fills in an open end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameRequest {
     first: Option<u32>,
@@ -23,7 +23,7 @@ impl FrameRequest {
     }
 }
 
-/// Whether `range` lies in a shot of `count` frames; else what is wrong.
+/// Checks that `range` lies in a shot of `count` frames; the error says what is wrong.
 pub fn in_shot(range: FrameRange, count: u32) -> Result<(), String> {
     if range.first >= 1 && range.first <= range.last && range.last <= count {
         return Ok(());
@@ -127,7 +127,7 @@ pub fn time_limit(text: &str) -> Result<Duration, String> {
     parse_time_limit(text)
 }
 
-/// A time to keep to: more than none.
+/// A budget of time, at least one second.
 pub fn budget(text: &str) -> Result<Duration, String> {
     let time = parse_time(text)?;
     if time.is_zero() {
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_is_some_time() {
+    fn a_budget_is_at_least_a_second() {
         assert_eq!(budget("1m30s"), Ok(Duration::from_secs(90)));
         let words = |text| budget(text).map(time_in_words).unwrap_or_default();
         assert_eq!((words("2m"), words("90s")), ("2 min".into(), "1 min 30 s".into()));
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_their_range() {
+    fn numbers_out_of_range_are_refused() {
         for text in ["nan", "inf", "-1", "0", "1e99"] {
             assert!(within_f32(limits::FACTOR)(text).is_err(), "{text}");
         }

@@ -1,4 +1,4 @@
-//! `tweenray verify`: both intersectors against each other on the user's own scene.
+//! `tweenray verify`: compares the intersector with the oracle on the user's own scene.
 
 mod replay;
 mod report;
@@ -24,7 +24,7 @@ use std::sync::atomic::Ordering;
 /// Most rays of each kind.
 const MOST_RAYS: u64 = 1 << 40;
 
-/// Hold the intersector to account: trace a scene with the f64 oracle too, and explain every difference
+/// Check the intersector: trace a scene with the f64 oracle too, and explain every difference
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Shoots camera, shadow, mirror and random rays and rays aimed at vertices and edges through both, and
@@ -40,11 +40,11 @@ Examples:
 pub struct VerifyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Rays of each of the six kinds [default: what some minutes allow, at least 512]
+    /// Rays of each of the six kinds [default: as many as take some minutes, at least 512]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = clap::value_parser!(u64).range(1..=MOST_RAYS))]
     rays: Option<u64>,
-    /// Trace one ray again and print all that is known of it: camera:1234, or another kind
+    /// Trace one ray again and print all details: camera:1234, or another kind
     #[arg(long, value_name = "KIND:NUMBER", value_parser = ray_id, conflicts_with = "rays")]
     ray: Option<RayId>,
     /// Print JSON
@@ -54,7 +54,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = whole(1, MAX_THREADS))]
     threads: Option<u32>,
-    /// Say nothing but the result and errors
+    /// Print nothing but the result and errors
     #[arg(short, long)]
     quiet: bool,
     /// Image size in pixels, which camera rays are shot for [default: 640x360]
@@ -69,7 +69,7 @@ pub struct VerifyArgs {
 }
 
 impl VerifyArgs {
-    /// What stands over the scene file.
+    /// The options that take precedence over the scene file.
     fn settings(&self) -> SettingArgs {
         SettingArgs {
             size: self.size,
@@ -112,11 +112,11 @@ pub fn run(args: &VerifyArgs) -> Result<Exit> {
     }
 }
 
-/// A check that could only pass would say nothing.
+/// Refuses checks that could only pass.
 fn refuse_the_pointless(scene: &Scene, settings: &Settings) -> Result<()> {
     if settings.intersector == IntersectorKind::Oracle {
-        let message = "verify holds an intersector against the oracle; the oracle against itself \
-                       says nothing\n  help: --intersector embree";
+        let message = "verify compares an intersector with the oracle; comparing the oracle with \
+                       itself shows nothing\n  help: --intersector embree";
         return Err(Error::Usage(message.into()));
     }
     if scene.triangle_count() == 0 && scene.spheres.is_empty() {
@@ -185,7 +185,7 @@ fn replay_command(id: RayId) -> String {
     words.join(" ")
 }
 
-/// As a shell wants it.
+/// A word quoted for the shell.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./:,=+@%".contains(c);
     match !word.is_empty() && word.chars().all(plain) {

@@ -33,7 +33,7 @@ impl Chunks {
     pub fn messages(
         &self,
         kind: PayloadKind,
-        original: u32,
+        representative: u32,
         strip: u32,
     ) -> impl Iterator<Item = Vec<u8>> + '_ {
         let chunks = self.count.max(1);
@@ -42,7 +42,7 @@ impl Chunks {
         };
         (0..chunks).map(move |chunk| {
             let bytes = &self.bytes[edge(chunk)..edge(chunk + 1)];
-            Payload { kind, original, strip, chunk, chunks, bytes }.encode()
+            Payload { kind, representative, strip, chunk, chunks, bytes }.encode()
         })
     }
 
@@ -52,7 +52,7 @@ impl Chunks {
     }
 }
 
-/// Chunks received so far, by kind, original and strip, then by chunk number.
+/// Chunks received so far, by kind, representative and strip, then by chunk number.
 #[derive(Default)]
 pub struct Reassembly(BTreeMap<(PayloadKind, u32, u32), BTreeMap<u32, Vec<u8>>>);
 
@@ -62,7 +62,7 @@ impl Reassembly {
         if payload.chunks == 1 {
             return Some(Chunks { bytes: payload.bytes.into(), count: 1 });
         }
-        let key = (payload.kind, payload.original, payload.strip);
+        let key = (payload.kind, payload.representative, payload.strip);
         let received = self.0.entry(key).or_default();
         received.insert(payload.chunk, payload.bytes.to_vec());
         if received.len() < payload.chunks as usize {

@@ -39,16 +39,16 @@ pub struct CommThread<'a> {
     assignments: VecDeque<Assignment>,
     /// Whether the render thread has a task.
     is_busy: bool,
-    /// Originals whose references the maker holds.
+    /// Representatives whose references the maker holds.
     imported: BTreeSet<u32>,
-    /// References that arrived and were not given to the maker, by original.
+    /// References that arrived and were not given to the maker, by representative.
     received: BTreeMap<u32, Arc<[u8]>>,
-    /// Encoded references to send on, by original, until the scheduler drops them.
+    /// Encoded references to send on, by representative, until the scheduler drops them.
     encoded: BTreeMap<u32, Chunks>,
     reassembly: Reassembly,
-    /// Originals whose references no task needs again.
+    /// Representatives whose references no task needs again.
     dropped: BTreeSet<u32>,
-    /// Rendered strips that this rank will merge: by original, then by number.
+    /// Rendered strips that this rank will merge: by representative, then by number.
     strips: BTreeMap<u32, BTreeMap<u32, Arc<[u8]>>>,
     has_sent_stop: bool,
     /// Whether all tasks of the job are done.
@@ -135,8 +135,8 @@ impl<'a> CommThread<'a> {
         for decision in decisions {
             match decision {
                 Decision::Assign(rank, assignment) => self.send(rank, Message::Do(assignment))?,
-                Decision::Send { from, to, original } => {
-                    self.send(from, Message::Send { original, to })?;
+                Decision::Send { from, to, original: representative } => {
+                    self.send(from, Message::Send { representative, to })?;
                 }
             }
         }
@@ -174,12 +174,15 @@ impl<'a> CommThread<'a> {
                 }
             }
             Message::Do(assignment) => {
-                assignment.drops.iter().for_each(|original| self.drop_reference(*original));
+                assignment
+                    .drops
+                    .iter()
+                    .for_each(|representative| self.drop_reference(*representative));
                 self.assignments.push_back(assignment);
             }
-            Message::Send { original, to } => {
-                let chunks = self.encoded.get(&original).cloned().unwrap_or_default();
-                self.comm.send_chunks(&[to], PayloadKind::Reference, original, 0, &chunks)?;
+            Message::Send { representative, to } => {
+                let chunks = self.encoded.get(&representative).cloned().unwrap_or_default();
+                self.comm.send_chunks(&[to], PayloadKind::Reference, representative, 0, &chunks)?;
             }
             Message::Stop => self.stop.store(true, Ordering::Relaxed),
             Message::End => self.is_over = true,
@@ -189,27 +192,30 @@ impl<'a> CommThread<'a> {
 
     fn handle_payload(&mut self, payload: &Payload) {
         let Some(chunks) = self.reassembly.add(payload) else { return };
-        let original = payload.original;
+        let representative = payload.representative;
         match payload.kind {
             PayloadKind::Strip => {
-                self.strips.entry(original).or_default().insert(payload.strip, chunks.bytes());
+                self.strips
+                    .entry(representative)
+                    .or_default()
+                    .insert(payload.strip, chunks.bytes());
             }
             PayloadKind::Reference | PayloadKind::Discoveries => {
                 // Discoveries may arrive after the scheduler dropped them.
-                if !self.dropped.contains(&original) {
-                    self.received.insert(original, chunks.bytes());
-                    self.encoded.insert(original, chunks);
+                if !self.dropped.contains(&representative) {
+                    self.received.insert(representative, chunks.bytes());
+                    self.encoded.insert(representative, chunks);
                 }
             }
         }
     }
 
-    fn drop_reference(&mut self, original: u32) {
-        self.encoded.remove(&original);
-        self.received.remove(&original);
-        self.dropped.insert(original);
-        if self.imported.remove(&original) {
-            self.maker.release(original);
+    fn drop_reference(&mut self, representative: u32) {
+        self.encoded.remove(&representative);
+        self.received.remove(&representative);
+        self.dropped.insert(representative);
+        if self.imported.remove(&representative) {
+            self.maker.release(representative);
         }
     }
 
@@ -277,26 +283,26 @@ impl<'a> CommThread<'a> {
         let Finished { task, report, output, seconds } = finished;
         self.is_busy = false;
         self.busy_seconds += seconds;
-        let original = task.original;
+        let representative = task.original;
         match &task.extent {
             Extent::Strip { number, leader, .. } => {
                 if *leader == self.comm.rank() {
-                    self.strips.entry(original).or_default().insert(*number, output.bytes);
+                    self.strips.entry(representative).or_default().insert(*number, output.bytes);
                 } else {
                     let strip = Chunks::whole(output.bytes);
                     let kind = PayloadKind::Strip;
-                    self.comm.send_chunks(&[*leader], kind, original, *number, &strip)?;
+                    self.comm.send_chunks(&[*leader], kind, representative, *number, &strip)?;
                 }
             }
             Extent::Whole { .. } if task.is_source => {
-                self.imported.insert(original);
+                self.imported.insert(representative);
                 let chunks = self.comm.chunks(output.bytes, output.discoveries);
                 if self.maker.sends_to_all() {
                     let others: Vec<u32> = self.others().collect();
                     let kind = PayloadKind::Discoveries;
-                    self.comm.send_chunks(&others, kind, original, 0, &chunks)?;
+                    self.comm.send_chunks(&others, kind, representative, 0, &chunks)?;
                 } else {
-                    self.encoded.insert(original, chunks);
+                    self.encoded.insert(representative, chunks);
                 }
             }
             Extent::Whole { .. } => {}

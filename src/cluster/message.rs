@@ -19,8 +19,13 @@ pub enum Message {
     },
     /// From rank 0: the receiver's next task.
     Do(Assignment),
-    /// From rank 0: send the reference of `original` to rank `to`.
-    Send { original: u32, to: u32 },
+    /// From rank 0: send the reference of `representative` to rank `to`. (Message bytes keep the key
+    /// `original`.)
+    Send {
+        #[serde(rename = "original")]
+        representative: u32,
+        to: u32,
+    },
     /// A rank was asked to stop: sent to rank 0, and from rank 0 to all ranks.
     Stop,
     /// From rank 0: all tasks are done.
@@ -42,8 +47,8 @@ pub enum PayloadKind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Payload<'a> {
     pub kind: PayloadKind,
-    /// The original that the bytes belong to.
-    pub original: u32,
+    /// The representative frame that the bytes belong to.
+    pub representative: u32,
     /// Number of the strip; 0 for other kinds.
     pub strip: u32,
     /// Number of the chunk, from 0.
@@ -61,7 +66,7 @@ impl<'a> Payload<'a> {
     /// Header and bytes.
     pub fn encode(&self) -> Vec<u8> {
         let mut all = Vec::with_capacity(HEADER + self.bytes.len());
-        for word in [self.kind as u32, self.original, self.strip, self.chunk, self.chunks] {
+        for word in [self.kind as u32, self.representative, self.strip, self.chunk, self.chunks] {
             all.extend(word.to_le_bytes());
         }
         all.extend(self.bytes);
@@ -75,8 +80,8 @@ impl<'a> Payload<'a> {
         let word = |i: usize| header[4 * i..4 * i + 4].try_into().map_or(0, u32::from_le_bytes);
         let kinds = [PayloadKind::Reference, PayloadKind::Discoveries, PayloadKind::Strip];
         let kind = *kinds.get(word(0) as usize).ok_or_else(wrong)?;
-        let (original, strip, chunk, chunks) = (word(1), word(2), word(3), word(4));
-        let payload = Self { kind, original, strip, chunk, chunks, bytes };
+        let (representative, strip, chunk, chunks) = (word(1), word(2), word(3), word(4));
+        let payload = Self { kind, representative, strip, chunk, chunks, bytes };
         if chunk < chunks { Ok(payload) } else { Err(wrong()) }
     }
 }
@@ -105,10 +110,11 @@ mod tests {
             r#""what":{"Whole":{"strips":0,"frames":[6]}}},"needs":[1],"drops":[2]}}"#
         );
         assert_eq!(json(&Message::Do(assignment)), expected);
-        let send = Message::Send { original: 1, to: 2 };
+        let send = Message::Send { representative: 1, to: 2 };
         assert_eq!(json(&send), r#"{"Send":{"original":1,"to":2}}"#);
         let kind = PayloadKind::Strip;
-        let payload = Payload { kind, original: 1, strip: 3, chunk: 4, chunks: 5, bytes: &[6] };
+        let payload =
+            Payload { kind, representative: 1, strip: 3, chunk: 4, chunks: 5, bytes: &[6] };
         let words: Vec<u8> = [2, 1, 3, 4, 5].map(u32::to_le_bytes).concat();
         assert_eq!(payload.encode(), [words, vec![6]].concat());
     }
@@ -117,7 +123,8 @@ mod tests {
     fn a_payload_is_decoded_as_it_was_encoded() {
         for kind in [PayloadKind::Reference, PayloadKind::Discoveries, PayloadKind::Strip] {
             let bytes = &[1, 2];
-            let payload = Payload { kind, original: 70_000, strip: 3, chunk: 1, chunks: 2, bytes };
+            let payload =
+                Payload { kind, representative: 70_000, strip: 3, chunk: 1, chunks: 2, bytes };
             assert_eq!(Payload::decode(&payload.encode()).expect("decoded"), payload);
             assert!(Payload::decode(&Payload { chunk: 2, ..payload }.encode()).is_err());
         }

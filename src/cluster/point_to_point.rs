@@ -26,11 +26,11 @@ impl Communicator {
         &self,
         to: &[u32],
         kind: PayloadKind,
-        original: u32,
+        representative: u32,
         strip: u32,
         chunks: &Chunks,
     ) -> Result<()> {
-        for bytes in chunks.messages(kind, original, strip) {
+        for bytes in chunks.messages(kind, representative, strip) {
             // All receivers share one copy in memory.
             let bytes: Arc<[u8]> = bytes.into();
             for rank in to {

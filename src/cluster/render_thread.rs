@@ -12,7 +12,7 @@ use std::time::Instant;
 /// A task, and its inputs from other ranks.
 pub struct TaskInput {
     pub task: Task,
-    /// References for the maker to import, by original.
+    /// References for the maker to import, by representative.
     pub references: Vec<(u32, Arc<[u8]>)>,
     /// Strips to merge, in order; empty unless the task is a merge.
     pub strips: Vec<Arc<[u8]>>,
@@ -83,7 +83,9 @@ impl RenderThread<'_> {
     fn run_task(&mut self, input: TaskInput) -> Result<Finished> {
         let start = Instant::now();
         let TaskInput { task, references, strips } = input;
-        references.iter().for_each(|(original, bytes)| self.maker.import(*original, bytes));
+        references
+            .iter()
+            .for_each(|(representative, bytes)| self.maker.import(*representative, bytes));
         let (report, output) = match &task.extent {
             Extent::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: task.is_source };
@@ -101,7 +103,7 @@ impl RenderThread<'_> {
         Ok(Finished { task, report, output, seconds })
     }
 
-    /// Makes an original and writes `frames`. The report of the last frame is returned, and an event
+    /// Makes a representative and writes `frames`. The report of the last frame is returned, and an event
     /// is sent for each of the others.
     fn whole(&mut self, task: &Task, frames: &[u32]) -> Result<(Option<FrameReport>, Exported)> {
         if task.is_source {

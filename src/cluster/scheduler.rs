@@ -1,6 +1,6 @@
 //! The scheduler on rank 0: which rank makes which frame, and which ranks hold which reference.
 //!
-//! A task is one *original*: the representative of all frames that show the same picture. A rank asks
+//! A task is one *representative*: the frame that stands for all frames with its camera. A rank asks
 //! for work by reporting a finished task, and gets tasks one by one. So no assignment is ever revoked:
 //! an unassigned task moves between ranks inside this table only. The scheduler is plain bookkeeping,
 //! without messages and clocks. Its decisions depend on the speed of the ranks; the bytes of a frame do
@@ -46,8 +46,8 @@ pub struct Scheduler {
 
 /// A task and its place in the dependency graph.
 struct TaskRecord {
-    original: u32,
-    /// Frames to write from the original; none if only its reference is needed.
+    representative: u32,
+    /// The frames to write: the representative and its copies, as far as they are asked for.
     frames: Vec<u32>,
     batch: usize,
     /// The rank whose queue holds the task while it waits.
@@ -91,7 +91,7 @@ struct RankRecord {
     queue: BTreeSet<usize>,
     /// Number of assigned tasks that are not done.
     assigned: u32,
-    /// Originals whose references the rank can free, sent with its next assignment.
+    /// Representatives whose references the rank can free, sent with its next assignment.
     drops: Vec<u32>,
     /// Seconds of rendering so far.
     busy_seconds: f64,
@@ -105,31 +105,31 @@ pub struct Assignment {
     /// What to make. (Message bytes keep the key `order`.)
     #[serde(rename = "order")]
     pub task: Task,
-    /// Originals whose references the task takes.
+    /// Representatives whose references the task takes.
     pub needs: Vec<u32>,
-    /// Originals whose references the rank can free.
+    /// Representatives whose references the rank can free.
     pub drops: Vec<u32>,
 }
 
-/// An original to make, whole or in part. (Message bytes keep the keys `task` and `what`.)
+/// A frame to make, whole or in part. (Message bytes keep the keys `task` and `what`.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// The scheduler's index of the task.
     #[serde(rename = "task")]
     pub id: usize,
-    /// The original to make.
+    /// The number of the frame to make: a representative.
     pub original: u32,
-    /// Whether other frames take the original's reference.
+    /// Whether other frames take its reference.
     pub is_source: bool,
-    /// The whole original, or one strip.
+    /// The whole frame, or one strip.
     #[serde(rename = "what")]
     pub extent: Extent,
 }
 
-/// How much of an original a task makes.
+/// How much of its frame a task makes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Extent {
-    /// The whole original: merged from `strips` strips, or rendered if 0. `frames` are written from it.
+    /// The whole frame: merged from `strips` strips, or rendered if 0. `frames` are written from it.
     Whole { strips: u32, frames: Vec<u32> },
     /// Strip `number` of `of`, which rank `leader` merges.
     Strip { number: u32, of: u32, leader: u32 },
@@ -140,7 +140,7 @@ pub enum Extent {
 pub enum Decision {
     /// The rank gets this assignment.
     Assign(u32, Assignment),
-    /// Rank `from` sends the reference of `original` to rank `to`.
+    /// Rank `from` sends the reference of the representative `original` to rank `to`.
     Send { from: u32, to: u32, original: u32 },
 }
 
@@ -227,7 +227,7 @@ impl Scheduler {
             need.unmade_users -= 1;
             if need.unmade_users == 0 {
                 for holder in std::mem::take(&mut need.holders) {
-                    self.ranks[holder as usize].drops.push(need.original);
+                    self.ranks[holder as usize].drops.push(need.representative);
                 }
             }
         }

@@ -42,7 +42,7 @@ const _: () = {
     assert!(size_of::<Query>() == 24);
 };
 
-/// What Embree says of a hit, f32.
+/// A hit as Embree returns it, f32.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PacketHit {
     /// Ray parameter.
@@ -53,11 +53,11 @@ pub struct PacketHit {
     pub v: f32,
     /// Unnormalised geometric normal; zero on spheres.
     pub ng: Vec3,
-    /// What was hit.
+    /// The primitive that was hit.
     pub prim: PrimRef,
 }
 
-/// What a query may assume and must do.
+/// Flags of a query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct QueryFlags<'p> {
     /// Neighbouring rays go similar ways.

@@ -1,4 +1,4 @@
-//! What the benches measure the rest against: a bare C loop on Embree (`ffi/bare_loop.c`).
+//! The yardstick of the benchmarks: a bare C loop on Embree (`ffi/bare_loop.c`).
 //!
 //! The renderer never uses it.
 
@@ -25,7 +25,7 @@ pub struct BareCamera {
     pub height: u32,
 }
 
-/// What the loop found, so that nobody can leave its work out.
+/// The results of the loop, so that the compiler cannot drop its work.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BareTally {

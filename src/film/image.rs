@@ -6,7 +6,7 @@ use crate::math::{Rgb, srgb_decode, srgb_encode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What the numbers of an [`Image`] mean.
+/// The encoding of an [`Image`]'s numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Encoding {
     /// Linear radiance, unbounded (exr, hdr).
@@ -25,7 +25,7 @@ pub struct Image {
     /// `width · height` pixels, row by row.
     #[serde(with = "crate::math::bulk")]
     pub rgb: Vec<Rgb>,
-    /// What the pixels' numbers mean.
+    /// Encoding of the pixels' numbers.
     pub encoding: Encoding,
 }
 

@@ -1,4 +1,4 @@
-//! Surfaces that emit become lights, where a light of that shape exists.
+//! Turning emitting surfaces into lights, if a light of that shape exists.
 //!
 //! An analytic sphere becomes a sphere light; a mesh that consists of flat convex quads (pairs of
 //! triangles, at most [`MAX_QUADS`]) becomes quad lights. [`World::into_scene`] gives lights their
@@ -8,20 +8,20 @@
 use crate::math::DVec3;
 use crate::scene::{Light, Material, QuadLight, SphereLight, World, WorldMesh};
 
-/// More quads than this would each cost shadow rays at every point.
+/// Most quads of a mesh that become lights, since each light costs shadow rays at every point.
 const MAX_QUADS: usize = 64;
 
-/// Something about an emitting surface that its user may not expect.
+/// A note about an emitting surface, for a warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Note {
-    /// The mesh of this name glows without lighting anything.
+    /// The mesh of this name is visible but lights nothing.
     CastsNoLight(String),
-    /// The light made of the surface of this name no longer reflects.
+    /// The surface of this name became a light, which reflects nothing.
     ReflectsNothing(String),
 }
 
 impl Note {
-    /// What to know.
+    /// The text of the warning.
     pub fn message(&self) -> String {
         match self {
             Self::CastsNoLight(name) => format!("`{name}` emits: it is seen, but casts no light"),
@@ -31,7 +31,7 @@ impl Note {
         }
     }
 
-    /// What to do about it.
+    /// The help line of the warning.
     pub fn help(&self) -> String {
         match self {
             Self::CastsNoLight(_) => format!(
@@ -42,8 +42,8 @@ impl Note {
     }
 }
 
-/// Turns what emits among the meshes and spheres from `first_mesh` and `first_sphere` on into
-/// lights, and says what that leaves out.
+/// Turns emitting meshes from `first_mesh` on and spheres from `first_sphere` on into
+/// lights; returns notes about them.
 pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -> Vec<Note> {
     let mut notes = Vec::new();
     let materials = &world.materials;
@@ -85,7 +85,7 @@ fn reflects(material: &Material) -> bool {
     material.diffuse.max_element() > 0.0 || material.mirror.max_element() > 0.0
 }
 
-/// The mesh as quads, if each two of its triangles in turn make one.
+/// The mesh as quads, if each pair of consecutive triangles makes one.
 fn quads(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
     let count = mesh.triangles.len();
     if count == 0 || count % 2 != 0 || count > 2 * MAX_QUADS {
@@ -95,7 +95,7 @@ fn quads(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
     mesh.triangles.chunks_exact(2).map(|t| quad(corners(&t[0]), corners(&t[1]))).collect()
 }
 
-/// Two triangles that share an edge and make a flat convex quad.
+/// The quad of two triangles that share an edge; `None` if it is not flat and convex.
 fn quad(first: [DVec3; 3], second: [DVec3; 3]) -> Option<[DVec3; 4]> {
     let (i, j) = (0..9).map(|k| (k / 3, k % 3)).find(|(i, j)| {
         // Edge i of the first runs against edge j of the second.

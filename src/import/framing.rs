@@ -7,13 +7,13 @@
 use crate::math::{Bounds3, DVec3};
 use crate::scene::World;
 
-/// How far above the level the camera looks down from, degrees.
+/// Angle by which the camera looks down, degrees.
 pub(super) const ELEVATION_DEGREES: f64 = 20.0;
 
 /// Share of the image's half width and height that the scene may fill.
 const FILL: f64 = 0.9;
 
-/// What decides how much a camera sees.
+/// The field of view of a camera.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lens {
     /// Vertical field of view, degrees.

@@ -4,14 +4,14 @@ use super::polygon;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Light, QuadLight, WorldMesh};
 
-/// A mesh that would need more lights than this stays a mesh that glows but lights nothing:
-/// every light costs shadow rays at every pixel.
+/// Most lights made of a mesh, since every light costs shadow rays at every pixel. A mesh that needs more is visible
+/// but lights nothing.
 pub(super) const MAX_LIGHTS: usize = 64;
 /// A quad's corners may leave its plane by this share of its size.
 const FLAT: f64 = 1e-6;
 
-/// Lights in place of a mesh whose faces emit `radiance` on both sides, or `None` where that
-/// takes more than [`MAX_LIGHTS`]. Neighbouring triangles make one quad where they can.
+/// Lights that replace a mesh whose faces emit `radiance` on both sides; `None` if there would be
+/// more than [`MAX_LIGHTS`]. Neighbouring triangles become one quad where possible.
 pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
     if mesh.triangles.len() > 2 * MAX_LIGHTS {
         return None;
@@ -32,7 +32,7 @@ pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
     (quads.len() <= MAX_LIGHTS).then(|| quads.into_iter().map(|q| light(q, radiance)).collect())
 }
 
-/// Lights in place of a face of three or more corners; none where it has no area.
+/// Lights that replace a face of three or more corners; none if it has no area.
 ///
 /// Errors: as [`polygon::triangulate`].
 pub(super) fn of_face(corners: &[DVec3], radiance: Rgb) -> Result<Vec<Light>, String> {

@@ -1,7 +1,7 @@
 //! Statements of a line-based text format (OBJ, MTL, the course's dialect), with line numbers.
 //!
-//! Takes bytes, since files are not always UTF-8; gives one logical line at a time: `\` at a
-//! line's end joins the next one (not in comments: they hold Windows paths), and CR before LF
+//! Reads bytes, since files are not always UTF-8, and returns one logical line at a time: `\` at a
+//! line's end joins the next line (not in comments, which may hold Windows paths), and CR before LF
 //! is dropped.
 
 use crate::error::{Diagnostic, Error, Result};
@@ -82,7 +82,7 @@ impl<'a> Words<'a> {
         Self(text)
     }
 
-    /// All that follows, trimmed; `#` means nothing in names ("Material #25").
+    /// The rest of the line, trimmed; in names `#` starts no comment ("Material #25").
     pub fn rest(&self) -> &'a [u8] {
         self.0.trim_ascii()
     }
@@ -114,7 +114,7 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// Checks that `bytes` can be text of ours, and drops a UTF-8 byte order mark.
+/// Checks that `bytes` are not UTF-16 or binary, and drops a UTF-8 byte order mark.
 pub(super) fn check_text<'a>(file: &Path, bytes: &'a [u8]) -> Result<&'a [u8]> {
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
         return Err(Error::from(

@@ -1,7 +1,7 @@
-//! Files in, a [`World`], a [`Shot`] and [`Settings`] out; every fault with its place.
+//! Reading files into a [`World`], a [`Shot`] and [`Settings`]; every error has its place in the file.
 //!
-//! [`load`] takes a scene file (TOML) or a bare mesh. Input is hostile until it was validated
-//! here: what leaves this room has indices in range and finite numbers only.
+//! [`load`] takes a scene file (TOML) or a bare mesh. All input is validated here: in the results
+//! indices are in range and numbers are finite.
 
 mod convert;
 mod course;
@@ -39,7 +39,7 @@ use std::path::{Path, PathBuf};
 /// Edges sharper than this stay sharp unless a scene file says otherwise; degrees.
 pub const DEFAULT_CREASE_DEGREES: f64 = 30.0;
 
-/// What the command line says about reading, beside the scene file itself.
+/// Options of the command line for reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadOptions {
     /// Which axis of a bare mesh is up.
@@ -73,7 +73,7 @@ pub enum UpAxis {
 /// afterwards.
 #[derive(Debug, Clone)]
 pub struct Loaded {
-    /// What is in the scene.
+    /// The scene's content.
     pub world: World,
     /// The camera move.
     pub shot: Shot,
@@ -81,27 +81,27 @@ pub struct Loaded {
     pub settings: Settings,
     /// How the job runs.
     pub options: JobOptions,
-    /// Where the file says where frames go; the message is still to be said.
+    /// Place of the output pattern in the scene file, for an error about it.
     pub output_place: Option<Diagnostic>,
-    /// What the user should know though it is no error.
+    /// Warnings for the user.
     pub warnings: Vec<Diagnostic>,
     /// Every file read, in order.
     pub files: Vec<PathBuf>,
-    /// What was added around a bare mesh.
+    /// Floor and lamp that were added to a bare mesh.
     pub stage: Option<AddedStage>,
 }
 
-/// Floor and lamp that a bare mesh gets: they are in the world, but not in the file.
+/// Indices of the floor and the lamp that are added to a bare mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AddedStage {
-    /// Which of the world's meshes is the floor.
+    /// Index of the floor among the world's meshes.
     pub floor: usize,
-    /// Which of the world's lights is the lamp.
+    /// Index of the lamp among the world's lights.
     pub lamp: usize,
 }
 
 impl Loaded {
-    /// A job that says nothing beyond what to render.
+    /// A job with default options.
     fn new(world: World, shot: Shot, settings: Settings) -> Self {
         Self {
             world,

@@ -1,4 +1,4 @@
-//! What the readers of mesh files make.
+//! The result of reading a mesh file.
 
 use crate::error::Diagnostic;
 use crate::math::{Rgb, Vec3};
@@ -10,13 +10,13 @@ pub const DEFAULT_MATERIAL: &str = "default";
 /// Diffuse reflectance of that material: a light, slightly warm grey, linear RGB.
 pub const DEFAULT_ALBEDO: Rgb = Vec3::new(0.72, 0.70, 0.66);
 
-/// What one mesh file holds, in the file's own coordinates.
+/// The content of a mesh file, in the file's own coordinates.
 #[derive(Debug, Clone, Default)]
 pub struct Model {
-    /// Meshes, spheres, materials (at least one where there is a mesh), textures and lights:
-    /// emitting faces, which are then not among the meshes. `sky` stays at its default.
+    /// Meshes, spheres, materials (at least one if there is a mesh), textures and lights. Lights are
+    /// made of emitting faces, which the meshes then lack. `sky` is the default.
     pub world: World,
-    /// What the user should know: dropped faces, ignored material keys.
+    /// Warnings about dropped faces, ignored material keys and the like.
     pub warnings: Vec<Diagnostic>,
     /// Every file read.
     pub files: Vec<PathBuf>,

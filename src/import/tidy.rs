@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn only_triangles_without_area_go() {
+    fn only_triangles_without_area_are_dropped() {
         let p = [0.0, 1.0, 2.0].map(|x| DVec3::new(x, 0.0, 0.0));
         let needle = DVec3::new(1.0, 1e-8, 0.0);
         let tiny = [DVec3::ZERO, DVec3::X * 1e-180, DVec3::Y * 1e-180];

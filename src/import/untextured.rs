@@ -12,7 +12,7 @@ pub(super) struct Untextured {
     texture: String,
 }
 
-/// Those among the meshes of `world` from number `first`.
+/// Meshes of `world` from number `first` on that lack texture coordinates for their texture.
 pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextured> + '_ {
     let bare = world.meshes[first..].iter().filter(|mesh| mesh.uvs.is_none());
     bare.filter_map(|mesh| {
@@ -27,7 +27,7 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
 }
 
 impl Untextured {
-    /// What is wrong.
+    /// The text of the warning.
     pub fn message(&self) -> String {
         let Self { mesh, material, texture } = self;
         format!(
@@ -36,7 +36,7 @@ impl Untextured {
         )
     }
 
-    /// What to do.
+    /// The help line.
     pub fn help(&self) -> &'static str {
         "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
          material without a texture"

@@ -56,7 +56,7 @@ pub struct EmbreeIntersector<'s> {
     bounds: Bounds3,
 }
 
-/// What Embree says of a ray.
+/// Embree's answer for a ray.
 #[derive(Clone, Copy)]
 struct Candidate {
     hit: PacketHit,

@@ -1,4 +1,4 @@
-//! What the hit rules know of each mesh, from one look at its triangles.
+//! Facts about each mesh that the hit rules use, computed once from its triangles.
 
 use crate::math::DVec3;
 use crate::scene::Mesh;

@@ -18,9 +18,9 @@ pub struct SurfaceInteraction {
     /// Texture coordinates: the mesh's, or an exact sphere's longitude and latitude; zero without, and
     /// on spheres without a texture.
     pub uv: Vec2,
-    /// What it is made of.
+    /// Material of the surface.
     pub surface: Surface,
-    /// What was hit.
+    /// The primitive that was hit.
     pub prim: PrimRef,
     /// How far along `ng` a ray must start so that rounding cannot put it on the wrong side.
     pub offset: f64,

@@ -61,7 +61,7 @@ pub trait Intersector: Sync {
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], counts: &mut RayCounts);
     /// [`Self::occluded`] of every ray, into `occluded` (same length).
     fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool], counts: &mut RayCounts);
-    /// What traces, for reports: "Embree 4.3.3, packets of 16" or "f64 oracle".
+    /// Description of the intersector, for reports: "Embree 4.3.3, packets of 16" or "f64 oracle".
     fn describe(&self) -> String;
     /// Memory that the acceleration structure holds, bytes.
     fn memory(&self) -> u64;

@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_not_inside() {
+    fn a_hit_that_is_not_finite_is_not_inside() {
         let nan = PlaneHit { t: f64::INFINITY, u: f64::NAN, v: f64::INFINITY };
         assert!(!nan.is_inside());
         assert!(!PlaneHit { t: f64::INFINITY, u: 0.5, v: 0.25 }.is_inside());

@@ -19,7 +19,7 @@ pub fn serialize<T: Pod, S: Serializer>(
     serializer.serialize_bytes(bytemuck::cast_slice(values))
 }
 
-/// What [`serialize`] made bytes of.
+/// Deserializes the bytes of [`serialize`].
 ///
 /// # Errors
 /// The deserializer's, and bytes that are no whole number of values.

@@ -30,7 +30,7 @@ mod tests {
     }
 
     #[test]
-    fn the_two_are_inverse() {
+    fn encoding_and_decoding_are_inverse() {
         for i in 0..=65_535 {
             let code = f64::from(i) / 65_535.0;
             // The standard's own constants leave a step of 3e-8 where the pieces meet.

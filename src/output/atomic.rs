@@ -2,7 +2,7 @@
 //! and the folder synced.
 //!
 //! The temporary name of `frame_0001.png` is `.frame_0001.png.tmp-<machine>-<pid>-<n>`. A failed write
-//! removes it; what a killed run leaves behind, [`clean_temporaries`] removes.
+//! removes it; [`clean_temporaries`] removes files that a killed run left.
 
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -13,20 +13,20 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// What was written.
+/// Size and hash of a file that was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Written {
     /// Size of the file.
     pub bytes: u64,
-    /// BLAKE3 of its bytes.
+    /// BLAKE3 of the file's bytes.
     pub hash: blake3::Hash,
 }
 
-/// Writes the file at `path`, replacing what is there, through the buffered writer that `fill`
-/// is given. When this returns, the file is whole and on disk; when it fails, `path` is as before.
+/// Writes or replaces the file at `path`; `fill` gets a buffered writer for its content. After success the file is
+/// whole and on disk; after an error `path` is unchanged.
 ///
 /// # Errors
-/// [`Error::Io`] with the path and what was tried.
+/// [`Error::Io`] with the path and the failed action.
 pub fn write(
     path: impl AsRef<Path>,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -74,9 +74,9 @@ pub fn make_room(path: impl AsRef<Path>) -> Result<()> {
 
 /// Removes temporary files of dead runs from `folder` (not below it) and returns their paths.
 ///
-/// A file of a process of this machine is removed when that is dead; one of another machine, on a folder
-/// that several share, when it did not change for `min_age`: a minute is ample. A folder that does not
-/// exist holds no such files.
+/// A file of a process of this machine is removed if that process has ended. A file of another machine, in a shared
+/// folder, is removed if it did not change for `min_age`; a minute is ample. A folder that does not
+/// exist is no error.
 ///
 /// # Errors
 /// [`Error::Io`] when the folder cannot be read or a file cannot be removed.
@@ -122,8 +122,7 @@ fn is_here(machine: &str) -> bool {
 
 const UNKNOWN: &str = "0";
 
-/// Stands for all processes that can see each other: those of one machine since it was started, and of one
-/// container.
+/// Hash of the machine, its boot and its container; equal for all processes that can see each other.
 fn this_machine() -> &'static str {
     static MACHINE: OnceLock<String> = OnceLock::new();
     MACHINE.get_or_init(|| {
@@ -138,8 +137,9 @@ fn this_machine() -> &'static str {
     })
 }
 
-/// Whether a process lives here. Without `/proc` only this one is known to. One that was killed stays in
-/// there until somebody asks for its exit code, which in a container may be nobody.
+/// Whether process `pid` of this machine runs. Without `/proc` only this process is known to run. A killed process
+/// stays in `/proc` as a zombie until its parent reads its exit code, in a container perhaps forever; it counts as
+/// ended.
 fn is_alive(pid: u32) -> bool {
     if pid == std::process::id() {
         return true;
@@ -154,8 +154,8 @@ fn is_alive(pid: u32) -> bool {
     }
 }
 
-/// The file that `target` stands for: where a link leads. A rename would replace a link by a file,
-/// and a device too, which is an error.
+/// The file behind `target`, following links, since a rename would replace a link by a file. Errors if it is not a
+/// regular file.
 fn resolve(target: &Path) -> Result<PathBuf> {
     let Ok(found) = fs::symlink_metadata(target) else { return Ok(target.to_path_buf()) };
     let real = match found.is_symlink() {
@@ -202,12 +202,12 @@ impl Temporary {
         }
     }
 
-    /// Where the temporary file lies.
+    /// Path of the temporary file.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Gives the file, already synced, its own name, and syncs the folder.
+    /// Renames the file, which is already synced, to its final name, and syncs the folder.
     pub(super) fn rename(mut self) -> Result<()> {
         fs::rename(&self.path, &self.target).map_err(|e| self.error("rename a file to", e))?;
         self.renamed = true;
@@ -222,7 +222,7 @@ impl Temporary {
         }
     }
 
-    /// An error about the file that was to be.
+    /// An error about the target file.
     pub(super) fn error(&self, action: &'static str, source: io::Error) -> Error {
         Error::io(action, &self.target, source)
     }

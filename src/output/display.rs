@@ -5,12 +5,12 @@ use crate::math::{Rgb, luminance, srgb_encode};
 use crate::scene::ToneCurve;
 use rayon::prelude::*;
 
-/// How radiance becomes what a png or ppm file holds.
+/// How radiance becomes the display values of a png or ppm file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Display {
     /// Factor on radiance.
     pub exposure: f32,
-    /// Curve after it.
+    /// Tone curve, applied after the exposure.
     pub tone: ToneCurve,
 }
 
@@ -18,8 +18,8 @@ pub struct Display {
 const BRIGHTEST: f32 = 1e9;
 
 impl Display {
-    /// Exposes `radiance` and applies the tone curve; linear display values in [0, 1]. A NaN and
-    /// what is below 0 become 0.
+    /// Exposes `radiance` and applies the tone curve; linear display values in [0, 1]. NaN and
+    /// negative values become 0.
     pub fn tone(&self, radiance: Rgb) -> Rgb {
         let clip = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, BRIGHTEST) };
         let c = Rgb::from_array((radiance * self.exposure).to_array().map(clip));

@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
-/// Type of the program's own attribute, which other programs pass by.
+/// Type of the program's own attribute, which other programs ignore.
 const OPAQUE: &str = "tweenray";
 
 /// One channel of a file.
@@ -42,7 +42,7 @@ pub struct ExrChannel {
 /// A channel's pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExrSamples {
-    /// Numbers. Half floats of other programs' files are read as these.
+    /// Numbers. Half floats in files of other programs become these.
     F32(Vec<f32>),
     /// Identifiers.
     U32(Vec<u32>),
@@ -57,13 +57,13 @@ impl ExrSamples {
         }
     }
 
-    /// True without a pixel.
+    /// Whether there are no pixels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// What a file holds.
+/// The content of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExrChannels {
     /// Columns.
@@ -114,13 +114,13 @@ pub fn push_vectors(channels: &mut Vec<ExrChannel>, names: [&str; 3], vectors: &
 /// The bytes of a file of these channels. `comment` goes to the metadata.
 ///
 /// # Errors
-/// [`Error::Usage`] when a channel has not `width · height` samples; [`Error::Failed`] when the
+/// [`Error::Usage`] if a channel does not have `width · height` samples; [`Error::Failed`] if the
 /// format cannot hold them (no channel, two of one name).
 pub fn encode(width: u32, height: u32, channels: &[ExrChannel], comment: &str) -> Result<Vec<u8>> {
     encode_with(width, height, channels, comment, None)
 }
 
-/// As [`encode()`], with one attribute of the program's own: name and bytes.
+/// Like [`encode()`], with one attribute of the program's own: name and bytes.
 ///
 /// # Errors
 /// As [`encode()`].

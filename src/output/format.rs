@@ -1,4 +1,4 @@
-//! Formats, and how a film is written.
+//! File formats of frames, and options for writing films.
 
 use super::Display;
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What can be written.
+/// A file format of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Format {
     /// Display values, 8 or 16 bits.
@@ -50,8 +50,8 @@ pub struct WriteOptions {
     /// The settings as short text for the file's metadata; nothing that differs between runs of
     /// the same frame, since the same frame is to be the same bytes.
     pub settings: String,
-    /// Whether exr frames hold the maps of reuse as channels, and other frames have them beside them:
-    /// the distance to paint as the farthest, in the unit of the film's.
+    /// Set if maps of reuse are written, as channels of exr frames or as files beside other frames: the distance
+    /// that is painted white, in the unit of the film's distances.
     pub maps: Option<f32>,
     /// An attribute of exr frames: name and bytes.
     pub attribute: Option<(&'static str, Arc<[u8]>)>,
@@ -72,7 +72,7 @@ impl Default for WriteOptions {
 }
 
 impl WriteOptions {
-    /// What the job's settings ask for, with those that shape the picture as text.
+    /// The options for the job's settings, with the settings that shape the picture as text.
     pub fn of(settings: &Settings, frame: Option<u32>) -> Self {
         let s = settings;
         let text = format!(
@@ -94,7 +94,7 @@ impl WriteOptions {
         Self { display, png_bits: s.png_bits, frame, settings: text, maps: None, attribute: None }
     }
 
-    /// One line for formats with a single comment.
+    /// The metadata as one line, for formats with a single comment.
     pub(super) fn comment(&self) -> String {
         let frame = self.frame.map(|f| format!("frame {f}"));
         let parts = frame.into_iter().chain([self.settings.clone()]);

@@ -1,14 +1,14 @@
-//! A sequence's lock: kept by every process that renders into it, freed by the system when that ends,
-//! however it ends.
+//! The lock of a sequence: held by every process that renders into it, freed by the system when the process
+//! ends, however it ends.
 //!
-//! Jobs of the same settings and the same shot share it, since they write equal bytes; any other job is
-//! refused for as long. It is a lock (`flock`) on a hidden file beside the frames, `.frame.lock` for
-//! `frame_####.png`, which says of what job it is. The last one to end removes the file; one that a killed
-//! job leaves behind locks nobody out.
+//! Jobs of the same settings and the same shot share the lock, since they write equal bytes; any other job is
+//! refused meanwhile. It is a lock (`flock`) on a hidden file beside the frames, `.frame.lock` for
+//! `frame_####.png`, whose content describes the job. The last process to end removes the file; a file that a
+//! killed job leaves has no lock and does no harm.
 //!
-//! On NFS the kernel makes it a lock of the whole file on the server, so it holds between machines; where
-//! a folder is mounted with `nolock` or `local_lock`, it holds within each machine alone. A file system
-//! without locks gives none: see [`SequenceLock::is_kept`].
+//! On NFS the kernel makes it a lock of the whole file on the server, so it holds between machines; if
+//! a folder is mounted with `nolock` or `local_lock`, it holds only within each machine. On a file system
+//! without locks there is none: see [`SequenceLock::is_kept`].
 
 use super::FramePattern;
 use super::manifest::{Header, beside};
@@ -22,15 +22,15 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// How often a job that is in the way is looked at before this one is refused: it may just be ending, and
-/// a third one that looks holds the lock for a moment too.
+/// Number of attempts to get the lock before this job is refused: the other job may just be ending, and a third
+/// job that tries also holds the lock for a moment.
 const LOOKS: usize = 10;
-/// Between two looks.
+/// Pause between two attempts.
 const NAP: Duration = Duration::from_millis(30);
-/// How long a job is waited for that has the lock for itself, and has not said yet which one it is.
+/// How long to wait for a job that holds the lock exclusively and has not yet written its description.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The lock, while it is kept.
+/// The lock; dropping it frees it.
 #[derive(Debug)]
 pub struct SequenceLock {
     path: PathBuf,
@@ -38,7 +38,7 @@ pub struct SequenceLock {
     file: Option<File>,
 }
 
-/// Of what job a lock is, as its file says.
+/// The job that holds a lock, as described in the lock file.
 #[derive(Serialize, Deserialize)]
 struct Holder {
     process: u32,
@@ -46,10 +46,10 @@ struct Holder {
     header: Header,
 }
 
-/// What came of one look at the lock.
+/// The result of one attempt to get the lock.
 enum Look {
     Kept(File),
-    /// Somebody else has it: of what job, where that is known already.
+    /// Another job holds it; its description, if it is written already.
     Taken(Option<Box<Holder>>),
     /// The file was replaced or removed meanwhile.
     Gone,
@@ -57,10 +57,10 @@ enum Look {
 }
 
 impl SequenceLock {
-    /// Takes the lock of the frames at `pattern`, in a folder that is there, for a job with `header`.
+    /// Takes the lock of the frames at `pattern`, in an existing folder, for a job with `header`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where a job of other settings, or of another shot, keeps it; [`Error::Io`].
+    /// [`Error::Usage`] if a job of other settings, or of another shot, holds it; [`Error::Io`].
     pub fn take(pattern: &FramePattern, header: &Header) -> Result<Self> {
         let path = path_of(pattern);
         let start = Instant::now();
@@ -148,7 +148,7 @@ fn lock(file: &File, operation: FlockOperation) -> std::result::Result<(), Errno
     }
 }
 
-/// Says in the file of what job it is.
+/// Writes the job's description into the lock file.
 fn sign(file: &mut File, header: &Header) -> io::Result<()> {
     let machine = rustix::system::uname().nodename().to_string_lossy().into_owned();
     let holder = Holder { process: std::process::id(), machine, header: header.clone() };
@@ -167,7 +167,7 @@ fn read(file: &mut File) -> Option<Holder> {
     serde_json::from_slice(&bytes).ok()
 }
 
-/// Whether two jobs write equal bytes wherever they meet.
+/// Whether two jobs write equal bytes for the same frame.
 fn is_same_job(one: &Header, other: &Header) -> bool {
     one.shot_hash == other.shot_hash && one.first_difference(other).is_none()
 }
@@ -229,7 +229,7 @@ mod tests {
         drop(take(1, "a").expect("free again"));
     }
 
-    /// As after a crash, of one job before it wrote a word and of another after it.
+    /// Lock files as after a crash: of one job before it wrote its description, of another after it.
     #[test]
     fn an_unlocked_lock_file_blocks_no_job() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -1,16 +1,16 @@
 //! The manifest of a sequence: which frames are whole, under which settings, at what cost.
 //!
 //! JSON Lines beside the frames: a [`Header`], then one [`Row`] a frame. Rows are only appended,
-//! each in one write that is synced, after its frame was renamed into place: a row means a whole
-//! frame. A crash can tear the last line alone, and reading drops it. A later row of a frame
-//! overrides an earlier one.
+//! each in one write that is synced, after its frame was renamed into place, so every row stands for a
+//! whole frame. Only the last line can be incomplete after a crash, and reading drops it. A later row of a
+//! frame overrides an earlier one.
 //!
-//! With several ranks, rank 0 alone writes the manifest itself and every other rank appends to a
-//! part file of its own, which rank 0 takes in at the end or at the next start: `O_APPEND` rows of
-//! many writers in one file would be enough on a local disk, but NFS does not keep them apart.
+//! With several ranks, only rank 0 writes the manifest itself. Every other rank appends to a
+//! part file of its own, which rank 0 merges at the end or at the next start: on a local disk many
+//! writers could append to one file with `O_APPEND`, but on NFS their rows could mix.
 //!
 //! Several jobs may write the same sequence at once. With equal settings they write equal bytes, and
-//! no row is lost however they meet ([`Journal`]); with others the second is refused when it starts.
+//! no row is lost ([`Journal`]); a job of other settings is refused when it starts.
 
 mod difference;
 mod journal;
@@ -40,10 +40,10 @@ use std::path::{Path, PathBuf};
 /// Version of the file format.
 pub const FORMAT: u32 = 2;
 
-/// What a manifest's name ends in.
+/// Ending of a manifest's name.
 pub const ENDING: &str = ".manifest.jsonl";
 
-/// What every frame of a sequence shares: together with its recipe, all that its bytes depend on.
+/// The data that all frames of a sequence share. A frame's bytes depend only on these and on its recipe.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// [`FORMAT`].
@@ -52,10 +52,9 @@ pub struct Header {
     pub tweenray: String,
     /// The scene as the user named it; reported, never compared.
     pub scene: String,
-    /// Hash of the resolved world, the shot left aside, hexadecimal.
+    /// Hash of the resolved world, without the shot, hexadecimal.
     pub scene_hash: String,
-    /// Hashes of the world's parts by name: they say what differs where `scene_hash` does; never compared
-    /// otherwise.
+    /// Hashes of the world's parts by name, used only to say which parts differ when `scene_hash` does.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub scene_parts: BTreeMap<String, String>,
     /// Hash of world and shot; no frame is refused by it, since every row has its own recipe.
@@ -64,12 +63,12 @@ pub struct Header {
     pub shot_frames: u32,
     /// File name pattern of the frames, without a folder.
     pub files: String,
-    /// What traces: intersector, its version and instruction set.
+    /// Intersector, its version and instruction set.
     pub tracer: String,
     /// The words of the command that started the sequence, program first; reported, never compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
-    /// How the program chose the settings, where it did; reported, never compared.
+    /// How the program chose the settings, if it did; reported, never compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen: Option<Value>,
     /// Every setting, by name. Kept as JSON, so that a manifest of another version can be read
@@ -86,7 +85,7 @@ pub struct Row {
     pub file: String,
     /// Hash of its camera, hexadecimal.
     pub view: String,
-    /// Hash of all that it was made of: its camera, and those of the frames that it is inferred from.
+    /// Hash of its number and camera, and of those of the frames that it is inferred from.
     pub recipe: String,
     /// BLAKE3 of the file, hexadecimal.
     pub blake3: String,
@@ -94,7 +93,7 @@ pub struct Row {
     pub bytes: u64,
     /// Wall seconds from the camera to the renamed file.
     pub seconds: f64,
-    /// When the file was in its place, seconds since 1970; unknown to older manifests.
+    /// Time when the file got its final name, seconds since 1970; missing in older manifests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<f64>,
     /// The rank that rendered it.
@@ -102,10 +101,10 @@ pub struct Row {
     pub rank: u32,
     /// Rays cast for it.
     pub rays: RayCounts,
-    /// How much of it was inferred.
+    /// Surface points inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
-    /// How good the inferred part of it is.
+    /// The audit of its inferred pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,
     /// Invalid camera samples.
@@ -114,12 +113,12 @@ pub struct Row {
     /// Files of its maps of reuse.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub maps: Vec<MapRow>,
-    /// Why the frame, which is left from an earlier job, is none of this sequence.
+    /// Why the frame, which is left from an earlier job, does not belong to this sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stray: Option<Foreign>,
 }
 
-/// Why a frame is none of the sequence that its manifest is of.
+/// Why a frame in a manifest does not belong to the sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Foreign {
@@ -138,24 +137,24 @@ pub struct MapRow {
     pub blake3: String,
 }
 
-/// What the audit of a frame found, with its figures: root mean squared errors in display steps of
-/// 255, each with the ends of its 95 % interval.
+/// The audit of a frame: root mean square errors in display steps of 1/255, each with the ends of its
+/// 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct AuditRow {
-    /// Of the frame as it is.
+    /// Error of the frame as it is.
     pub rmse: Option<[f64; 3]>,
-    /// Of its inferred pixels.
+    /// Error of its inferred pixels.
     pub rmse_inferred_pixels: Option<[f64; 3]>,
-    /// Of the frame, had it been traced.
+    /// Error of the frame if it had been traced.
     pub rmse_traced: Option<[f64; 3]>,
-    /// What the figures are made of; frames are pooled by adding these.
+    /// Sums from which the errors are computed; frames are pooled by adding these.
     pub sums: AuditSums,
 }
 
 /// A manifest as read: the header, and the last row of every frame.
 #[derive(Debug, Clone)]
 pub struct Manifest {
-    /// What the frames share.
+    /// The header, which the frames share.
     pub header: Header,
     /// Rows by frame.
     pub rows: BTreeMap<u32, Row>,
@@ -169,7 +168,7 @@ impl Header {
         serde_json::from_str(&text).unwrap_or(Value::Null)
     }
 
-    /// Stands for everything that is compared.
+    /// Hash of everything that is compared.
     fn key(&self) -> String {
         let mut hash = blake3::Hasher::new();
         for (name, value) in self.entries() {
@@ -178,8 +177,8 @@ impl Header {
         hash.finalize().to_hex()[..16].to_string()
     }
 
-    /// Everything that is compared, as text, the user's own settings first; before these the file
-    /// format, since some settings are set for one format only.
+    /// Everything that is compared, by name, as text. The file format comes first, since some settings apply to one
+    /// format only; then the user's settings; then the rest.
     fn entries(&self) -> Vec<(String, String)> {
         let ending = Path::new(&self.files).extension().unwrap_or_default();
         let mut entries = vec![("file format".into(), ending.to_string_lossy().to_lowercase())];
@@ -230,13 +229,13 @@ fn crop(value: &Value) -> String {
 impl Manifest {
     /// Reads the manifest at `path`; `None` where there is none.
     ///
-    /// Errors: `Error::Failed` when the header cannot be understood; rows that cannot are dropped,
+    /// Errors: `Error::Failed` if the header cannot be parsed. Rows that cannot be parsed are dropped,
     /// so that their frames are rendered again.
     pub fn read(path: &Path) -> Result<Option<Self>> {
         read_if_there(path)?.map(|bytes| Self::of(path, &bytes)).transpose()
     }
 
-    /// What `bytes`, read at `path`, say.
+    /// The manifest in `bytes`, which were read from `path`.
     fn of(path: &Path, bytes: &[u8]) -> Result<Self> {
         let first = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
         let header = header_of(first).map_err(|why| {
@@ -250,10 +249,10 @@ impl Manifest {
         Ok(Self { header, rows })
     }
 
-    /// Reads the manifest at `path` with the rows that ranks of a running job still keep to
-    /// themselves; changes no file. `None` where there is no manifest.
+    /// Reads the manifest at `path` with the rows in the part files of a running job's
+    /// ranks; changes no file. `None` where there is no manifest.
     ///
-    /// Errors: [`Self::read`]'s.
+    /// Errors: those of [`Self::read`].
     pub fn as_of_now(path: &Path) -> Result<Option<Self>> {
         // Parts first: a job that ends in between moves rows from them into the manifest.
         let mut pending = Vec::new();
@@ -268,7 +267,7 @@ impl Manifest {
         Ok(Some(manifest))
     }
 
-    /// Starts the manifest at `path` anew with `header`, in place of one of other settings and its
+    /// Starts a new manifest at `path` with `header`, replacing a manifest of other settings and its
     /// parts. `rows` are frames that stay.
     pub fn create(path: &Path, header: &Header, rows: &[Row]) -> Result<()> {
         let mut lines = line_of(path, header)?;
@@ -279,8 +278,8 @@ impl Manifest {
         Self::remove_strange_parts(path, header)
     }
 
-    /// Replaces the manifest at `path`, if there is one, by what `change` makes of it: the same settings, and
-    /// rows of the same frames. Rows that a running job appends meanwhile stay.
+    /// Replaces the header and rows of the manifest at `path`, if there is one, by those that `change` returns; they
+    /// must have the same settings and frames. Rows that a running job appends meanwhile stay.
     pub fn rewrite(path: &Path, change: impl FnOnce(Self) -> (Header, Vec<Row>)) -> Result<()> {
         let _turn = Turn::take(path)?;
         let io = |e| Error::io("read", path, e);
@@ -299,13 +298,13 @@ impl Manifest {
     }
 }
 
-/// A job's turn to decide what becomes of a manifest: held while it reads one and replaces it. Where the
-/// file system has no locks nobody waits.
+/// A lock that a job holds while it reads a manifest and replaces it. On a file system without locks no job
+/// waits.
 #[derive(Debug)]
 pub struct Turn(#[allow(dead_code, reason = "closing it ends the turn")] File);
 
 impl Turn {
-    /// Waits for the turn at the manifest at `path`, in a folder that is there.
+    /// Waits for the lock of the manifest at `path`, in an existing folder.
     pub fn take(path: &Path) -> Result<Self> {
         let folder = folder_of(path);
         let file = File::open(folder).map_err(|e| Error::io("open", folder, e))?;
@@ -321,12 +320,12 @@ pub fn file_name(pattern: &FramePattern) -> String {
     Path::new(&whole).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Where the manifest of a sequence lies: `out/frame.manifest.jsonl` for `out/frame_####.png`.
+/// Path of the manifest of a sequence: `out/frame.manifest.jsonl` for `out/frame_####.png`.
 pub fn manifest_path(pattern: &FramePattern) -> PathBuf {
     beside(pattern, ENDING)
 }
 
-/// A file beside the frames, named by what comes before their number, then `ending`.
+/// Path of a file beside the frames: the part of their names before the number, then `ending`.
 pub fn beside(pattern: &FramePattern, ending: &str) -> PathBuf {
     let name = file_name(pattern);
     let stem = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
@@ -336,7 +335,7 @@ pub fn beside(pattern: &FramePattern, ending: &str) -> PathBuf {
     pattern.folder().join(format!("{prefix}{ending}"))
 }
 
-/// The header, or why it is none.
+/// The header in `line`, or why it cannot be parsed.
 fn header_of(line: &[u8]) -> std::result::Result<Header, String> {
     let value: Value = serde_json::from_slice(line).map_err(|e| e.to_string())?;
     match value["manifest"].as_u64() {
@@ -347,14 +346,14 @@ fn header_of(line: &[u8]) -> std::result::Result<Header, String> {
     }
 }
 
-/// The header of what lies at `path`, if that is a manifest.
+/// The header of the file at `path`, if that is a manifest.
 fn header_at(path: &Path) -> Option<Header> {
     let mut line = Vec::new();
     BufReader::new(File::open(path).ok()?).read_until(b'\n', &mut line).ok()?;
     header_of(&line).ok()
 }
 
-/// How many bytes the lines take that are whole.
+/// Number of bytes in complete lines.
 fn whole_lines(bytes: &[u8]) -> usize {
     bytes.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1)
 }
@@ -365,7 +364,7 @@ fn rows_in<T: DeserializeOwned>(bytes: &[u8]) -> impl Iterator<Item = T> + '_ {
     lines.filter_map(|line| serde_json::from_slice(line).ok())
 }
 
-/// The folder that `path` lies in; `.` for the working folder.
+/// The folder of `path`; `.` for the working folder.
 pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }

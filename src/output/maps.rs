@@ -1,7 +1,7 @@
 //! Maps of reuse: where a frame's light comes from, painted over the frame.
 //!
-//! Each is a png beside its frame, `frame_0001_provenance.png`; in an exr frame they are channels of
-//! its own. Linear colours below.
+//! A map is a png file beside its frame, `frame_0001_provenance.png`, or channels of an exr frame. The colours below
+//! are linear.
 
 mod read;
 
@@ -17,19 +17,20 @@ use std::path::{Path, PathBuf};
 
 /// Traced: the source paper's pink.
 const PINK: Rgb = Rgb::new(1.0, 0.13, 0.6);
-/// Inferred from earlier frames: its red.
+/// Inferred from earlier frames: the paper's red.
 const RED: Rgb = Rgb::new(0.6, 0.0, 0.0);
 /// Inferred from later frames.
 const BLUE: Rgb = Rgb::new(0.0, 0.08, 0.7);
 /// Inferred from both.
 const BOTH: Rgb = Rgb::splat(0.3);
-/// Share of its grey that a painted pixel shows.
+/// Share of the grey picture in a painted pixel.
 const GREY: f32 = 0.25;
-/// The same of pixels with nothing to infer.
+/// Share of the grey picture in pixels with nothing to infer.
 const DARK: f32 = 0.05;
-/// Error that has the full colour, display steps of 255.
+/// Error that has the full colour, display steps of 1/255.
 const WORST: f32 = 16.0;
-/// Share of the golden ratio: hues of frames that follow one another lie far apart.
+/// Difference of the hues of consecutive frames, as a share of the circle; by the golden ratio, so that nearby frames
+/// have different hues.
 const HUE_STEP: f64 = 0.618_033_988_749_895;
 
 /// One of the maps.
@@ -37,19 +38,19 @@ const HUE_STEP: f64 = 0.618_033_988_749_895;
 pub enum Map {
     /// Traced, inferred from earlier or later frames or both, or nothing to infer.
     Provenance,
-    /// Which reference frame gave most.
+    /// The reference frame with the largest weight.
     Frame,
-    /// How far away from the pixel's own point the light was found.
+    /// Distance of the samples that were used from the pixel's own point.
     Distance,
-    /// Where the audit looked, how far the pixel is off.
+    /// Errors of the audited pixels.
     Audit,
 }
 
 impl Map {
-    /// All of them.
+    /// All maps.
     pub const ALL: [Self; 4] = [Self::Provenance, Self::Frame, Self::Distance, Self::Audit];
 
-    /// What its files' names end in, and its channel's.
+    /// Name of the map in its files' and channel's names.
     pub fn name(self) -> &'static str {
         match self {
             Self::Provenance => "provenance",
@@ -59,7 +60,7 @@ impl Map {
         }
     }
 
-    /// What it shows, in a line.
+    /// Explanation of the map, in a line.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Provenance => {
@@ -79,14 +80,14 @@ impl Map {
         }
     }
 
-    /// Where it lies for the frame at `path`: `out/f_0001_audit.png` for `out/f_0001.ppm`.
+    /// Path of the map's file for the frame at `path`: `out/f_0001_audit.png` for `out/f_0001.ppm`.
     pub fn path(self, path: &Path) -> PathBuf {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         path.with_file_name(format!("{stem}_{}.png", self.name()))
     }
 
-    /// The film in grey under this map's paint, linear display values. The distance `farthest`, in
-    /// the unit of [`Provenance::distance`], has the hottest colour.
+    /// The map painted over the film in grey, linear display values. The distance `farthest`, in
+    /// the unit of [`Provenance::distance`], is white.
     pub fn paint(self, film: &Film, display: &Display, farthest: f32) -> Film {
         let mut out = Film::new(film.width, film.height, false);
         for (i, c) in out.rgb.iter_mut().enumerate() {
@@ -105,7 +106,7 @@ impl Map {
         out
     }
 
-    /// Writes it for the frame at `path`.
+    /// Writes the map's file for the frame at `path`.
     ///
     /// # Errors
     /// [`crate::error::Error::Io`] when the file cannot be written.
@@ -124,7 +125,7 @@ impl Map {
         png::write(&path, &painted, &options).map(|written| (path, written))
     }
 
-    /// It as a channel of an exr frame, `reuse.provenance`.
+    /// The map as a channel of an exr frame, for example `reuse.provenance`.
     fn channel(self, film: &Film) -> ExrChannel {
         let n = film.rgb.len();
         let source = |i: usize| film.provenance.as_ref().map_or(Provenance::default(), |s| s[i]);
@@ -161,7 +162,7 @@ fn inferred(source: &Provenance, grey: Rgb, paint: impl FnOnce() -> Rgb) -> Rgb 
     if source.is_inferred() { painted(grey, paint()) } else { grey * DARK }
 }
 
-/// A colour for each frame; white for what is no frame of the shot.
+/// A colour for each frame; white for frames of another shot.
 fn by_frame(frame: u32) -> Rgb {
     if frame == 0 {
         return Rgb::ONE;
@@ -187,8 +188,8 @@ fn heat(share: f32) -> Rgb {
     STOPS[low].lerp(STOPS[low + 1], at - low as f32)
 }
 
-/// Audited pixels as dots of 3 x 3 pixels, since single ones would not be seen; red where the pixel
-/// is too bright, blue where too dark, white where it is right.
+/// Paints audited pixels as dots of 3 x 3 pixels, since single ones would be invisible; red if the pixel
+/// is too bright, blue if too dark, white if exact.
 fn paint_audit(film: &Film, out: &mut Film) {
     let Some(audit) = &film.audit else { return };
     let (width, height) = (film.width as usize, film.height as usize);

@@ -1,11 +1,11 @@
-//! What lies at a path, before anything is read of it.
+//! The kind of file at a path, found before anything is read from it.
 
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
-/// What lies at a path.
+/// The kind of file at a path.
 pub enum PathKind {
     /// Nothing.
     Nothing,
@@ -17,17 +17,17 @@ pub enum PathKind {
 
 /// A regular file, opened for reading.
 pub struct Regular {
-    /// Its contents.
+    /// The file's content.
     pub source: BufReader<File>,
-    /// How many bytes there are.
+    /// Size of the file, bytes.
     pub bytes: u64,
 }
 
 impl PathKind {
-    /// What lies at `path`.
+    /// The kind of file at `path`.
     ///
     /// # Errors
-    /// [`Error::Io`] where that cannot be found out, or the file not opened.
+    /// [`Error::Io`] if it cannot be determined, or if a regular file cannot be opened.
     pub fn at(path: &Path) -> Result<Self> {
         let about = match std::fs::metadata(path) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Self::Nothing),
@@ -51,7 +51,7 @@ impl Regular {
     /// The file at `path`.
     ///
     /// # Errors
-    /// [`Error::Io`] where there is none, [`Error::Input`] where something else lies there.
+    /// [`Error::Io`] if there is no file, [`Error::Input`] if it is not a regular file.
     pub fn at(path: &Path) -> Result<Self> {
         match PathKind::at(path)? {
             PathKind::File(file) => Ok(file),
@@ -60,7 +60,7 @@ impl Regular {
         }
     }
 
-    /// BLAKE3 of what is left to read, in hexadecimal. `path` is for messages.
+    /// BLAKE3 of the rest of the file, in hexadecimal. `path` is for messages.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -71,7 +71,7 @@ impl Regular {
     }
 }
 
-/// Refuses what would take more memory than `limit`, bytes.
+/// Refuses a picture that needs more memory than `limit`; both in bytes.
 ///
 /// # Errors
 /// [`Error::Input`] with both figures.

@@ -16,13 +16,13 @@ pub struct FramePattern {
     before: String,
     /// Least number of digits; 0 when the name has no frame number.
     digits: usize,
-    /// What follows the number, the ending included.
+    /// The part of the name after the number, including the ending.
     after: String,
     format: Format,
 }
 
 impl FramePattern {
-    /// Understands `text` as the pattern of a job that renders `frames` frames.
+    /// Parses `text` as the pattern of a job that renders `frames` frames.
     ///
     /// # Errors
     /// [`Error::Usage`] for two groups of `#`, a `#` in a folder's name or in the ending, no name,
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_pattern() {
+    fn invalid_patterns_are_refused() {
         let cases = [
             ("f##_##.png", "two groups"),
             ("out_##/f.png", "folder"),

@@ -1,8 +1,8 @@
-//! Linear values to sRGB levels by table: exact rounding of the function without calling it.
+//! Conversion of linear values to sRGB levels by table: the exact rounding of the function, without evaluating it.
 //!
-//! The function rises, so a level is the number of thresholds that a value has reached. They are
-//! found once, as the f32s at which the rounded function steps. A value's top bits say where to
-//! start; a step or a few forward end the search.
+//! The function is increasing, so a level is the number of thresholds that a value has reached. The thresholds are
+//! computed once: the f32s at which the rounded function steps. The upper bits of a value select where to
+//! start the search, which then takes one or a few steps.
 
 use crate::math::{srgb_decode, srgb_encode};
 use std::sync::LazyLock;
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_outside_is_clipped() {
+    fn values_outside_0_to_1_are_clipped() {
         for quantiser in [&*SRGB_8, &*SRGB_16] {
             for x in [-1.0, -0.0, 0.0, f32::NAN, f32::NEG_INFINITY, f32::MIN_POSITIVE] {
                 assert_eq!(quantiser.level(x), 0, "{x}");

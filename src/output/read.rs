@@ -192,7 +192,7 @@ mod tests {
 
     /// Another program's file: half floats.
     #[test]
-    fn a_reference_of_another_renderer() {
+    fn an_exr_file_of_another_renderer_is_read() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/peers/reference_07.exr");
         if !Path::new(path).exists() {
             eprintln!("skipped: {path} is not here");

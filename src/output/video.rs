@@ -6,8 +6,8 @@
 //!
 //! png and ppm frames hold display values, and ffmpeg reads them itself. exr frames are linear:
 //! [`make`] reads them, applies exposure, tone curve and transfer function as for a png and pipes
-//! the pixels, so the video looks the same whatever the frames' format. The command that
-//! [`command`] spells out for exr can do no more than ffmpeg: the sRGB curve, no exposure.
+//! the pixels, so the video looks the same whatever the frames' format. The command from
+//! [`command`] for exr frames uses ffmpeg's own conversion: the sRGB curve, no exposure.
 
 use super::atomic::Temporary;
 use super::{Display, Format, FramePattern, read_image};
@@ -21,28 +21,28 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Between two looks whether ffmpeg has ended, or shall.
+/// Pause between two checks whether ffmpeg has ended or is to be stopped.
 const NAP: Duration = Duration::from_millis(5);
 
 /// The frames of a video.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip<'a> {
-    /// Where the frames lie.
+    /// Pattern of the frames' paths.
     pub pattern: &'a FramePattern,
     /// Number of the first frame.
     pub first: u32,
-    /// How many, without gaps.
+    /// Number of frames, without gaps.
     pub count: u32,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// How exr frames are shown; png and ppm frames are shown as they are.
     pub display: Display,
 }
 
-/// What came of [`make`]. Frames without a video are still a finished job, so none is an error.
+/// The result of [`make`]. A job without a video is still finished, so no case is an error.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Video {
-    /// The video is there.
+    /// The video was made at this path.
     Made(PathBuf),
     /// ffmpeg is not installed; this command would make the video where it is.
     NoFfmpeg {
@@ -51,7 +51,7 @@ pub enum Video {
     },
     /// ffmpeg ran and failed.
     Failed {
-        /// The end of what it said.
+        /// The last lines of its stderr.
         stderr: String,
     },
 }
@@ -59,9 +59,9 @@ pub enum Video {
 /// Makes `out` from the clip's frames, unless `stop` is set before it is done.
 ///
 /// # Errors
-/// [`Error::Usage`] for a clip without frames or a frame rate that is none; [`Error::Io`] where a
+/// [`Error::Usage`] for a clip without frames or an invalid frame rate; [`Error::Io`] if a
 /// frame is missing; [`Error::Io`] and
-/// [`Error::Input`] when an exr frame cannot be read or the video cannot be put in its place;
+/// [`Error::Input`] if an exr frame cannot be read or the video cannot be renamed;
 /// [`Error::Stopped`].
 pub fn make(clip: &Clip, out: &Path, stop: &AtomicBool) -> Result<Video> {
     make_with(OsStr::new("ffmpeg"), clip, out, stop)
@@ -160,7 +160,7 @@ fn words(line: &str) -> Vec<String> {
     line.split(' ').map(str::to_owned).collect()
 }
 
-/// A path that ffmpeg takes neither for an option (`-a.mp4`) nor for a protocol (`a:b.mp4`).
+/// `path` in a form that ffmpeg takes neither for an option (`-a.mp4`) nor for a protocol (`a:b.mp4`).
 fn plain_file(path: &Path) -> String {
     let text = path.to_string_lossy();
     if text.starts_with('-') || text.contains(':') && path.is_relative() {
@@ -169,7 +169,7 @@ fn plain_file(path: &Path) -> String {
     text.into_owned()
 }
 
-/// What came of running ffmpeg.
+/// The result of running ffmpeg.
 struct Ran {
     is_done: bool,
     stderr: Vec<u8>,
@@ -181,8 +181,8 @@ fn start(program: &OsStr, args: Vec<String>, stdin: Stdio) -> Result<Child> {
     ffmpeg.spawn().map_err(|e| Error::io("run", program, e))
 }
 
-/// Waits for `child`, which is ended when `stop` is set. What it says is read meanwhile, or a full pipe would
-/// stop it.
+/// Waits for `child`, and kills it when `stop` is set. Reads its stderr meanwhile, since a full pipe would block
+/// it.
 fn watch(child: &mut Child, stop: &AtomicBool) -> io::Result<Ran> {
     let said = child.stderr.take();
     let reader = std::thread::spawn(move || {
@@ -233,7 +233,7 @@ fn run_piped(program: &OsStr, clip: &Clip, out: &Path, stop: &AtomicBool) -> Res
     }
 }
 
-/// Writes every frame's display values, unless it shall stop; closes the pipe on return.
+/// Writes every frame's display values to the pipe, unless `stop` is set; closes the pipe on return.
 fn feed(mut stdin: ChildStdin, clip: &Clip, first: Image, stop: &AtomicBool) -> Result<()> {
     let (width, height) = (first.width, first.height);
     let mut next = Some(first);

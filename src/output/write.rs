@@ -1,4 +1,4 @@
-//! From a film to a file of the format that its name asks for.
+//! Writing a film to a file in the format of its ending.
 
 use super::{Format, WriteOptions, Written, atomic, exr, maps, png};
 use crate::error::{Error, Result};
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_a_usage_error() {
+    fn unknown_formats_and_empty_films_are_usage_errors() {
         let options = WriteOptions::default();
         for name in ["a.gif", "a", "png", ".png", "a.png.bak"] {
             let error = write_image(name, &film(), &options).expect_err("no such format");

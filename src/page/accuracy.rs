@@ -8,7 +8,7 @@ use serde::Serialize;
 /// A picture that can be held against another.
 #[derive(Debug, Clone, Serialize)]
 pub struct Named {
-    /// What it is called.
+    /// Name.
     pub name: String,
     /// Number of its point in the plots; `None` for the reference.
     pub id: Option<usize>,
@@ -16,12 +16,12 @@ pub struct Named {
     pub picture: Picture,
 }
 
-/// What is said of a point that is chosen.
+/// The text about a selected point.
 #[derive(Debug, Clone, Serialize)]
 pub struct Detail {
     /// The point's number.
     pub id: usize,
-    /// What it is called.
+    /// Name.
     pub name: String,
     /// Figures: name and value.
     pub figures: Vec<(String, String)>,
@@ -29,7 +29,7 @@ pub struct Detail {
     pub command: String,
 }
 
-/// What turning a knob does.
+/// Sentences about the effect of a group of options.
 #[derive(Debug, Clone, Serialize)]
 pub struct KnobText {
     /// The knob.
@@ -43,11 +43,11 @@ pub struct KnobText {
 pub struct AccuracyPage {
     /// The scene.
     pub title: String,
-    /// What one wants to know first, a paragraph each.
+    /// Summary, in paragraphs.
     pub summary: Vec<String>,
     /// How it was measured: name and value.
     pub facts: Vec<(String, String)>,
-    /// What to be wary of, a paragraph each.
+    /// Warnings, a paragraph each.
     pub warnings: Vec<String>,
     /// Error against time, one for each measure of error.
     pub scatters: Vec<Scatter>,

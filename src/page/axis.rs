@@ -5,7 +5,7 @@
 pub struct Tick {
     /// Where, per cent of the axis.
     pub at: f64,
-    /// What it says.
+    /// Text of the tick.
     pub label: String,
 }
 

@@ -7,7 +7,7 @@ use std::fmt::Write;
 /// Figures of one thing, one a frame.
 #[derive(Debug, Clone, Default)]
 pub struct Series {
-    /// What it is.
+    /// Name of the series.
     pub name: String,
     /// Figures; `None` where there is none.
     pub values: Vec<Option<f64>>,
@@ -16,7 +16,7 @@ pub struct Series {
 /// A chart: frames to the right, figures upwards from 0.
 #[derive(Debug, Clone, Default)]
 pub struct Chart {
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// Unit after the figures, with its blank: ` s`.
     pub unit: String,

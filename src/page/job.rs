@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub struct PlayerFrame {
     /// Its number.
     pub number: u32,
-    /// What is said of it.
+    /// Text about the frame.
     pub text: String,
     /// The frame.
     pub picture: Picture,
@@ -24,13 +24,13 @@ pub struct PlayerFrame {
 /// Everything on the page, ready to be read.
 #[derive(Debug, Clone, Default)]
 pub struct JobPage {
-    /// What was rendered.
+    /// Title of the page: the scene.
     pub title: String,
     /// How far it is.
     pub state: String,
-    /// What is the matter with frames that are not there and whole.
+    /// Why frames are left out, a line for each reason.
     pub gaps: Vec<String>,
-    /// What one wants to know first: name and value.
+    /// The most important facts: name and value.
     pub facts: Vec<(String, String)>,
     /// Frames in the player.
     pub film: Vec<PlayerFrame>,
@@ -44,17 +44,17 @@ pub struct JobPage {
     pub effects: Table,
     /// How to read them.
     pub effects_note: String,
-    /// What the audits found.
+    /// Results of the audits.
     pub audit: Table,
     /// Why they found nothing, where there was none.
     pub no_audit: String,
     /// When each rank rendered what, where the manifest tells.
     pub timeline: Option<Timeline>,
-    /// What each rank did.
+    /// Work of each rank.
     pub ranks: Table,
     /// The command that gives the same frames; empty where unknown.
     pub command: String,
-    /// What is to be said of it.
+    /// Note about the command.
     pub command_note: String,
     /// How its settings were chosen, where the program chose them.
     pub chosen: Table,

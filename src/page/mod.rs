@@ -5,7 +5,7 @@
 //!
 //! Both are plain data to be filled in, with words and figures ready to be read; `to_html` sets them.
 //! [`Picture`]s go in as data URIs, plots are made of [`Chart`]s, [`Scatter`]s and [`Timeline`]s.
-//! What scripts do can be done by keyboard, too; without scripts the plots and tables still stand.
+//! All scripts can be used by keyboard, too; without scripts the plots and tables are still shown.
 //! A policy in each page's head forbids every request.
 //!
 //! Text in plots is HTML over the drawing, placed in per cent: it keeps its size on a narrow screen.

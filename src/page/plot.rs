@@ -8,7 +8,7 @@ use askama::Template;
 #[template(path = "plot.html")]
 pub struct Plot {
     pub(super) caption: String,
-    /// What the axes are.
+    /// Description of the axes.
     pub(super) hint: String,
     /// Class of the figure, by which scripts and styles know it.
     pub(super) kind: &'static str,

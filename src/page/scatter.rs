@@ -10,9 +10,9 @@ use std::fmt::Write;
 pub struct Point {
     /// Its number, which the page's other parts know it by.
     pub id: usize,
-    /// What it is called.
+    /// Name of the point.
     pub name: String,
-    /// What is shown beside its name.
+    /// Text beside the name.
     pub text: String,
     /// Time.
     pub x: f64,
@@ -31,9 +31,9 @@ pub struct Point {
 /// The plot.
 #[derive(Debug, Clone, Default)]
 pub struct Scatter {
-    /// What it shows.
+    /// Caption.
     pub caption: String,
-    /// What the axes are.
+    /// Description of the axes.
     pub hint: String,
     /// Units of time and error, with their blanks.
     pub units: [String; 2],

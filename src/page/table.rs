@@ -6,7 +6,7 @@ use askama::Template;
 #[derive(Debug, Clone, Default, Template)]
 #[template(path = "table.html")]
 pub struct Table {
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// Names of the columns.
     pub head: Vec<String>,

@@ -21,7 +21,7 @@ pub struct Span {
 /// A row a rank, time to the right.
 #[derive(Debug, Clone, Default)]
 pub struct Timeline {
-    /// What it shows.
+    /// Caption.
     pub caption: String,
     /// Frames, in any order.
     pub spans: Vec<Span>,

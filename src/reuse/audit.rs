@@ -1,8 +1,8 @@
-//! How far inferred pixels are from the truth, by traces of a few of them.
+//! The audit: an estimate of the error of inferred pixels, from traces of a few of them.
 //!
 //! Some pixels, the frame's probes, are traced twice, independently. With the shown value I and the
-//! traces A and B, (I - A)(I - B) is on average the squared error of what is shown, and (A - B)²/2 that of
-//! tracing, whatever the noise of A and B. Each drawn pixel counts by one over its chance.
+//! traces A and B, (I - A)(I - B) is on average the squared error of the shown value, and (A - B)²/2 that of
+//! a trace, whatever the noise of A and B. The weight of a drawn pixel is one over its probability.
 
 use crate::film::Provenance;
 use crate::math::Rgb;
@@ -11,28 +11,30 @@ use crate::output::Display;
 use crate::stats::{AuditSums, DrawnSum};
 use std::collections::BTreeMap;
 
-/// A squared error that may have gone unseen in the pixels that were not drawn: one display step where pixels are
-/// traced, whose noise shows everywhere. Where they are inferred, errors are few and large: eight steps.
+/// Squared error assumed for traced pixels that were not drawn: that of one display step, since noise is alike
+/// everywhere.
 const UNSEEN: f64 = 1.0;
+/// Squared error assumed for inferred pixels that were not drawn: that of eight display steps, since their errors
+/// are rare and large.
 const UNSEEN_INFERRED: f64 = 64.0;
-/// Display steps.
+/// Display steps from black to white.
 const STEPS: f64 = 255.0;
 
-/// The pixels of a frame that is audited.
+/// A frame that is audited.
 #[derive(Clone, Copy)]
 pub struct AuditedFrame<'a> {
     /// Radiance, row by row.
     pub rgb: &'a [Rgb],
     /// Where each pixel's light comes from.
     pub provenance: &'a [Provenance],
-    /// How radiance is shown.
+    /// How radiance becomes display values.
     pub display: Display,
 }
 
 /// A pixel that was drawn at random for the audit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AuditedPixel {
-    /// Row by row.
+    /// Index of the pixel, row by row.
     pub index: u32,
     /// One over the probability with which it was drawn.
     pub weight: f64,
@@ -47,11 +49,11 @@ impl AuditedFrame<'_> {
     }
 }
 
-/// Squared errors of a pixel as it is shown and of a trace, from two independent traces: squares of a display
-/// step, the mean of the channels.
+/// Squared errors of a shown pixel and of a trace, estimated from two independent traces: squares of a display
+/// step, means over the channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SquaredErrors {
-    /// Squared error of what is shown; may be negative.
+    /// Squared error of the shown value; may be negative.
     pub error: f64,
     /// Squared error of a trace.
     pub trace: f64,
@@ -60,15 +62,15 @@ pub struct SquaredErrors {
 impl SquaredErrors {
     /// The squared errors of the radiance `shown`, from the traces `a` and `b`.
     ///
-    /// Traces are right on average in radiance, not in display steps: the display's curve bends
-    /// them. So the squared error is not `(I - A)(I - B)` itself but `2f(M) - (f(A) + f(B))/2` with
-    /// the squared distance f to I, and M the traces' mean: the jackknife (Quenouille, 1956), which
-    /// takes the bend's first order away, and the same as the product where there is no bend. To
-    /// the trace's own error, whose bend is part of it, the bend's square is added, 4/3 of what the
-    /// two show of it, as is right for normal noise.
+    /// Traces are unbiased in radiance, but not in display steps, since the display curve is not
+    /// linear. So the squared error is not `(I - A)(I - B)` itself but `2f(M) - (f(A) + f(B))/2`, where f is
+    /// the squared distance to I and M the mean of the traces. This jackknife (Quenouille, 1956)
+    /// removes the bias to first order, and equals the product for a linear curve. The trace's own
+    /// error includes its bias, so the square of the bias is added to it: 4/3 of the square that the
+    /// two traces show, which is right for normal noise.
     ///
-    /// Higher orders stay: with noise of a third of the value, next to white, the error comes out
-    /// too small by a tenth of a trace's squared error; with half that noise nothing is left to see.
+    /// Higher orders remain: with noise of a third of the value, next to white, the error is
+    /// too small by a tenth of a trace's squared error; with half that noise the bias is negligible.
     pub fn of(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> Self {
         let [i, m, a, b] = [shown, 0.5 * (a + b), a, b].map(|c| display.code(c));
         let (mut error, mut trace) = (0.0, 0.0);
@@ -89,9 +91,9 @@ pub fn difference(display: &Display, shown: Rgb, a: Rgb, b: Rgb) -> f32 {
     ((0..3).map(|k| i[k] - m[k]).sum::<f64>() * STEPS / 3.0) as f32
 }
 
-/// The sums over the pixels `drawn` from a frame, as they are `shown` if they are inferred and in the two
-/// `traces` of the frame. Each stands for as many pixels as its weight: itself, which shows its first trace, and
-/// others, which show what it would. How many pixels the frame has is left out.
+/// The audit's sums over the pixels `drawn` from a frame: `shown` has their inferred values, `traces` their two
+/// traces. A drawn pixel represents as many pixels as its weight: itself, which shows its first trace, and others,
+/// which show inferred values like its own. The count of the frame's pixels stays 0.
 pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -> AuditSums {
     let [a, b] = traces;
     let mut sums = AuditSums { drawn: drawn.len() as u64, ..AuditSums::default() };
@@ -118,7 +120,7 @@ pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -
     sums
 }
 
-/// What a group of pixels adds to the sums.
+/// The contribution of a group of pixels to the sums.
 #[derive(Default)]
 struct Group {
     /// `None` where none of them is inferred.
@@ -130,7 +132,7 @@ struct Group {
 #[derive(Default)]
 struct Part {
     sum: f64,
-    /// What could have gone unnoticed.
+    /// Squared error assumed for the pixels that were not drawn.
     unseen: f64,
 }
 
@@ -145,18 +147,18 @@ impl Part {
     }
 }
 
-/// Root mean squares with their 95 % intervals, display steps of 255.
+/// Root mean square errors with their 95 % intervals, display steps of 1/255.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rmse {
     /// RMSE of the inferred pixels.
     pub inferred: Interval,
     /// RMSE of all pixels of the audited frames.
     pub shown: Interval,
-    /// RMSE of the same frames, had they been traced.
+    /// RMSE of the same frames if they had been traced.
     pub traced: Interval,
 }
 
-/// The figures that `sums` amount to; `None` where nothing was drawn.
+/// The root mean square errors of `sums`; `None` where no pixel was drawn.
 pub fn rmse(sums: &AuditSums) -> Option<Rmse> {
     let over = |drawn: &DrawnSum, pixels: u64| {
         let total = drawn_sum_interval(drawn.sum, drawn.squares, drawn.largest);
@@ -214,7 +216,7 @@ mod tests {
         assert!((squares.trace - 0.5 * 0.22 * 0.22 * 255.0 * 255.0).abs() < 1e-2, "{squares:?}");
     }
 
-    /// Of a light grey to a dark one, noisy by 15 %: the estimates' means are the truth.
+    /// From a light grey to a dark one, with 15 % noise, the estimates' means are the true errors.
     #[test]
     fn both_estimates_are_unbiased_through_the_curve() {
         for (truth, shown) in [(0.6f32, 0.66f32), (0.2, 0.21), (0.05, 0.04)] {

@@ -1,17 +1,17 @@
 //! Check rays: a few shadow rays that an estimate must not contradict before it is used.
 //!
-//! What is right of a level of risk on the whole may be far off at a point whose shadow no sample saw. A
-//! fraction of the rays that tracing would take tells such a point.
+//! Estimates of a level of risk may be accurate on average and still be far off at a point whose shadow no
+//! sample hit. A fraction of the rays that tracing would take finds such a point.
 
 use super::lookup::steps_per_radiance;
 use crate::inference::LookupBatch;
 
-/// An estimate is contradicted when what check rays show is off by more than so many standard deviations
-/// of what as many rays would show if the estimate were right.
+/// An estimate is contradicted when it is off from the mean of its check rays by more than so many standard
+/// deviations that this mean would have if the estimate were right.
 const MOST_DEVIATIONS: f32 = 2.0;
 
-/// Whether check rays bear out what other frames suggest about point `at`, all its lights together. An
-/// error of `tolerance` display steps is not seen.
+/// Whether the check rays of point `at` agree with its estimates, all lights together. A difference of up to
+/// `tolerance` display steps always agrees.
 pub fn agrees(batch: &LookupBatch, at: usize, channels: usize, tolerance: f32) -> bool {
     let LookupBatch { unshadowed, estimates, checked, .. } = batch;
     let own = at * channels..(at + 1) * channels;
@@ -39,7 +39,7 @@ mod tests {
     use crate::inference::{Checked, Estimate, SurfacePoint};
     use crate::math::{DVec3, Vec3};
 
-    /// Whether a light of radiance 0.5 that is estimated as `ratio` agrees with `open` of `rays`.
+    /// Whether the estimate `ratio` of a light of radiance 0.5 agrees with `open` unoccluded rays of `rays`.
     fn does_agree(ratio: f32, open: u32, rays: u32) -> bool {
         let (p, n, geom_id, footprint) = (DVec3::ZERO, Vec3::Y, 0, 1.0);
         let point = SurfacePoint { p, n, geom_id, footprint, cos: 1.0, direct: true, samples: 1 };
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_fully_lit_or_shut_is_contradicted_by_one_ray() {
+    fn full_light_and_full_shadow_are_contradicted_by_one_ray() {
         assert!(does_agree(1.0, 8, 8) && does_agree(0.0, 0, 8));
         assert!(!does_agree(1.0, 7, 8) && !does_agree(0.0, 1, 8));
     }
@@ -67,12 +67,12 @@ mod tests {
     }
 
     #[test]
-    fn what_nothing_was_cast_for_does_not_agree() {
+    fn a_point_without_check_rays_does_not_agree() {
         assert!(!does_agree(1.0, 0, 0));
     }
 
     #[test]
-    fn a_difference_that_nobody_sees_does_not_count() {
+    fn a_difference_below_the_tolerance_agrees() {
         assert!(does_agree(1.0, 4095, 4096));
     }
 }

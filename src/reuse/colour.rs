@@ -1,22 +1,22 @@
 //! The source paper's cache: colours of pixels ("Optimized Ray Tracing for Single Scene Renders",
 //! 2023). Kept as a baseline beside the lookup of surface points; never traces.
 //!
-//! What is known of a pixel is a list of entries: frame, colour, distance that the camera ray
-//! travelled. A later frame asks for the nearest entry before it and the nearest after it. Where
-//! their colours agree and their distances agree, the pixel's colour is the interpolation of the two
-//! in time; else the pixel must be traced, which makes a new entry (a *discovery*). Nothing is asked
-//! about surfaces, so what moves through a pixel between two entries unseen is missed, and what
-//! differs by less than the epsilon blurs.
+//! The cache has a list of entries for each pixel: frame, colour, and the distance that the camera ray
+//! travelled. A later frame looks up the nearest entry before it and the nearest after it. If
+//! their colours and their distances agree, the pixel's colour is interpolated between the two
+//! in time; else the pixel must be traced, which makes a new entry (a *discovery*). The cache knows
+//! nothing about surfaces. So it misses a surface that passes through a pixel between two entries, and
+//! blurs differences below the epsilon.
 //!
-//! Where the paper's text is silent, the plainest reading holds:
+//! Where the paper leaves a detail open, the simplest choice is taken:
 //! * Entries of one pixel are compared with each other, since an inferred pixel has no distance of
 //!   its own without tracing it; and only the two around the frame in time, since entries further
 //!   away say less.
 //! * Colours are compared channel by channel in linear radiance, distances by their difference as a
 //!   share of the nearer one. A ray that hits nothing travels infinitely far.
-//! * Only traced pixels and uploaded pictures make entries: what was inferred is no evidence.
+//! * Only traced pixels and uploaded pictures make entries; inferred pixels do not.
 //! * The paper hashes pixels to lists. Here the entries lie frame by frame, so that those of a frame
-//!   that is not needed any more can be dropped; what is found is the same.
+//!   that is not needed any more can be dropped; lookups have the same results.
 
 use super::columns::{self, deflated, inflated};
 use crate::film::{Provenance, ProvenanceKind};
@@ -35,10 +35,10 @@ pub struct AgreementRule {
     pub distance_epsilon: f32,
 }
 
-/// What is known of a pixel in one frame.
+/// A known pixel of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entry {
-    /// Which pixel, counted row by row.
+    /// Index of the pixel, row by row.
     pub pixel: u32,
     /// Linear radiance.
     pub rgb: Rgb,
@@ -50,7 +50,7 @@ pub struct Entry {
 /// The known colours of one frame: of all its pixels, or of those that were traced (its discoveries).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KnownColours {
-    /// Its number, from 1.
+    /// Number of the frame, from 1.
     pub frame: u32,
     /// Each pixel at most once.
     pub entries: Vec<Entry>,
@@ -61,16 +61,16 @@ pub struct KnownColours {
 pub struct InferredColour {
     /// Linear radiance.
     pub rgb: Rgb,
-    /// Frame of the entry before; the frame itself where that is known.
+    /// Frame of the entry before; the frame itself where that has an entry.
     pub before: u32,
-    /// Frame of the entry after; the frame itself where that is known.
+    /// Frame of the entry after; the frame itself where that has an entry.
     pub after: u32,
-    /// By how much their distances differ, a share of the nearer one; 0 where either is unknown.
+    /// Difference of the two entries' distances, as a share of the nearer one; 0 where either is unknown.
     pub distance: f32,
 }
 
 impl AgreementRule {
-    /// The rule that `settings` ask for.
+    /// The rule with the epsilons of `settings`.
     pub fn of(settings: &ReuseSettings) -> Self {
         let ReuseSettings { colour_epsilon, distance_epsilon, .. } = *settings;
         Self { colour_epsilon, distance_epsilon }
@@ -139,8 +139,8 @@ fn nearest<'a>(
 }
 
 impl KnownColours {
-    /// The entries as bytes: how many there are, then each in a record of the codec of references. `None`
-    /// where they would be too many.
+    /// The entries as bytes: their number, then a record of each in the codec of references. `None`
+    /// where there are too many.
     pub fn encode(&self) -> Option<Vec<u8>> {
         columns::size_of(self.entries.len(), WORDS, 0)?;
         let raw = columns::planes(self.entries.len(), WORDS, |i, column| {
@@ -150,7 +150,7 @@ impl KnownColours {
         Some([&(self.entries.len() as u32).to_le_bytes()[..], &deflated(&raw)?].concat())
     }
 
-    /// The entries that [`encode`](Self::encode) made bytes of, for frames of `pixels` pixels; `None` for other
+    /// Decodes the bytes that [`encode`](Self::encode) made, for frames of `pixels` pixels; `None` for other
     /// bytes.
     pub fn decode(frame: u32, mut bytes: &[u8], pixels: u32) -> Option<Self> {
         let count = columns::take_u32(&mut bytes)?;
@@ -171,8 +171,8 @@ impl KnownColours {
 }
 
 impl InferredColour {
-    /// Where the pixel comes from, as `frame` sees it. A pixel of a frame that was known from the
-    /// start is neither traced nor inferred.
+    /// The provenance of the pixel in `frame`. A pixel of an uploaded frame is neither traced nor
+    /// inferred.
     pub fn provenance(&self, frame: u32) -> Provenance {
         let Self { before, after, distance, .. } = *self;
         if before == frame {
@@ -194,7 +194,7 @@ mod tests {
         KnownColours { frame, entries: pixels.iter().map(entry).collect() }
     }
 
-    /// What frame 3 has at pixel 0, known in frames 1 and 5.
+    /// The value of frame 3 at pixel 0, which is known in frames 1 and 5.
     fn middle(rule: AgreementRule, a: (f32, f32), b: (f32, f32)) -> Option<f32> {
         let (a, b) = (known(1, &[(0, a.0, a.1)]), known(5, &[(0, b.0, b.1)]));
         rule.infer(&[&a, &b], 3, 1)[0].map(|i| i.rgb.x)
@@ -260,14 +260,14 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_is_known_is_itself() {
+    fn a_known_frame_keeps_its_own_colours() {
         let frames = [known(1, &[(0, 0.0, 1.0)]), known(2, &[(0, 9.0, f32::NAN)])];
         let found = RULE.infer(&[&frames[0], &frames[1]], 2, 1)[0].expect("known");
         assert_eq!((found.rgb.x, found.provenance(2)), (9.0, Provenance::default()));
     }
 
     #[test]
-    fn entries_come_back_as_they_were_and_other_bytes_are_refused() {
+    fn entries_are_decoded_as_encoded_and_other_bytes_are_refused() {
         let colours = known(3, &[(0, 0.5, 1.0), (7, -0.0, f32::INFINITY)]);
         let bytes = colours.encode().expect("few");
         assert_eq!(KnownColours::decode(3, &bytes, 8), Some(colours));

@@ -1,9 +1,9 @@
 //! The codec of references: records of 32-bit words, column by column, deflated.
 //!
-//! A column is four planes of bytes, since the bytes of equal weight of neighbouring records are alike. What is
-//! deflated is cut into parts of a fixed size, each with its length in front, so that parts are deflated side by
-//! side. Little endian throughout. Lengths are held against what is there, and memory grows with what was
-//! really read.
+//! A column is stored as four planes of bytes, the lowest bytes of all words first, since these are alike in
+//! neighbouring records. The bytes are cut into parts of a fixed size, each with its compressed length in front, so
+//! that parts are deflated in parallel. Little endian throughout. Lengths are checked against the bytes that are
+//! left, and memory is only allocated as bytes are read.
 
 use flate2::Compression;
 use flate2::read::{DeflateDecoder, DeflateEncoder};
@@ -15,13 +15,13 @@ const PART: usize = 1 << 20;
 /// Most bytes of records that are written or read.
 const MOST_BYTES: usize = 1 << 30;
 
-/// Bytes of `count` records of `columns` words and of `further` bytes; `None` where they are too many.
+/// Total size of `count` records of `columns` words and of `further` bytes; `None` where it is too large.
 pub fn size_of(count: usize, columns: usize, further: usize) -> Option<usize> {
     let planes = count.checked_mul(4 * columns)?;
     planes.checked_add(further).filter(|n| *n <= MOST_BYTES)
 }
 
-/// The planes of `count` records of `columns` words; `word` gives one by record and column.
+/// The planes of `count` records of `columns` words; `word(record, column)` gives a word.
 pub fn planes(count: usize, columns: usize, word: impl Fn(usize, usize) -> u32 + Sync) -> Vec<u8> {
     let mut raw = vec![0; 4 * columns * count];
     let each = raw.par_chunks_exact_mut((4 * count).max(1)).enumerate();
@@ -34,7 +34,7 @@ pub fn planes(count: usize, columns: usize, word: impl Fn(usize, usize) -> u32 +
     raw
 }
 
-/// The word of record `i`, of `count`, in a column of its planes.
+/// The word of record `i` of `count` in column `column`.
 pub fn word(planes: &[u8], count: usize, i: usize, column: usize) -> u32 {
     let byte = |b: usize| planes[(4 * column + b) * count + i];
     u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])

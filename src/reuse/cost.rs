@@ -1,4 +1,4 @@
-//! What is worth a lookup: decided from a fixed table of costs, never from measured times, so that
+//! Which lights are worth a lookup: decided from a fixed table of costs, never from measured times, so that
 //! every machine decides alike.
 
 use super::evidence::{Evidence, Finding};
@@ -17,13 +17,13 @@ const SHADOW_RAY: f64 = 1.2;
 const LOOKUP: f64 = 1.5;
 /// Cost of looking up one surface point in all references and of keeping the point for other frames.
 const LOOKUP_IN_ALL: f64 = 4.7;
-/// Cost of joining one camera sample to its surface point.
+/// Cost of merging one camera sample into the surface point that it shares with others of its pixel.
 const JOINING: f64 = 0.75;
-/// Cost of a check ray, in shadow rays that are traced with many others of their point.
+/// Cost of a check ray, in units of a shadow ray that is traced with many others of its point.
 const CHECK_RAY: f64 = 1.7;
 
-/// A shadow ray with its sample in `scene`: the fewer triangles, the flatter is their tree, and the more of it
-/// stays in the processor's caches. 43 ns were measured with a hundred triangles, 176 ns with a million.
+/// Cost of a shadow ray with its sample in `scene`. With fewer triangles the tree is flatter, and more of it
+/// stays in the processor's caches: 43 ns were measured with a hundred triangles, 176 ns with a million.
 fn shadow_ray(scene: &Scene) -> f64 {
     let of_depth = |depth: u32| 1.0 + (f64::from(depth) / 9.0).powi(2);
     let primitives = scene.triangle_count() + scene.spheres.len();
@@ -35,7 +35,7 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
     f64::from(rays) * shadow_ray(scene) > LOOKUP
 }
 
-/// Shadow rays of one surface point in a channel.
+/// Number of shadow rays of one camera sample in a channel.
 pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
         Channel::Area(_) => settings.shadow_samples,
@@ -61,15 +61,15 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
 /// Whether a light's shadowing is looked up in other frames, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LookupReason {
-    /// The light, as it is called in messages.
+    /// Name of the light in messages.
     pub light: String,
     /// Whether it is looked up; else it is traced in every frame.
     pub looked_up: bool,
-    /// Why.
+    /// The reason, in words.
     pub why: String,
 }
 
-/// What is looked up and what traced, and why: all lights that shine, then the sky.
+/// For each light that shines, then the sky: whether it is looked up or traced, and why.
 pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     let kept = channels(scene, settings);
     let mut reasons = Vec::new();
@@ -119,7 +119,7 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         + LOOKUP * lookups as f64
 }
 
-/// What the light of one surface point costs, of the camera samples that are shaded together.
+/// Costs of the light of one surface point, whose camera samples are shaded together.
 struct PointCost {
     /// Cost of tracing.
     traced: f64,
@@ -144,8 +144,8 @@ impl PointCost {
     }
 }
 
-/// Whether `evidence` lets enough be inferred that looking points up costs less than it saves, by what
-/// probes found: a share `probed` of the points, each of which is traced once more than it needs to be.
+/// Whether lookups save more than they cost, by the `findings` of probes, if those estimates are used that
+/// `evidence` allows. A share `probed` of the points is probed, each of which is traced once more.
 pub fn is_worth_lookups<'f>(
     evidence: &Evidence,
     findings: impl Iterator<Item = &'f Finding>,

@@ -1,30 +1,31 @@
-//! Evidence: what probes found, and which estimates may be used for it.
+//! Evidence: the findings of probes, and which estimates may be used because of them.
 //!
 //! A probe is a pixel that is estimated from other frames *and* traced twice, independently. With the
 //! estimate S and the traces A and B, (S - A)(S - B) is on average the squared error of the estimate, and
-//! (A - B)²/2 that of a trace. Estimates are sorted by their risk (`risk.rs`). Those of a level may be used
-//! where probes of that risk, in the frame itself and in those that it is inferred from, found them nearer
-//! to the truth than a trace, or off by less than can be seen.
+//! (A - B)²/2 that of a trace. Estimates are sorted by their risk (`risk.rs`). Estimates of a level may be used
+//! if probes of that risk, in the frame itself and in the frames that it is inferred from, found them more
+//! accurate than a trace, or off by less than can be seen.
 //!
 //! Every figure is a sum over findings in a fixed order.
 
 use super::risk::{LEVELS, STEPS, risk_of, shown};
 use crate::inference::Estimate;
 
-/// A level is judged by its own findings and those of so many levels on either side, errors scaled with the
-/// risk.
+/// A level is judged by its own findings and those of so many levels on either side, whose errors are scaled
+/// with the risk.
 const BESIDE: usize = 1;
 /// This share of the squared risk is added once to the errors that a level's probes found: a few probes
 /// without an error say little where errors could be large.
 const HIDDEN: f64 = 0.25;
-/// The error of estimates, times this, must be at most that of tracing: estimates that are good enough in the
-/// mean of a frame are worse in some of its tiles.
+/// The error of estimates, times this factor, must be at most the error of tracing: estimates that are accurate
+/// enough on average over a frame are worse in some of its tiles.
 const GUARD: f64 = 1.25;
-/// Share of the squared error that nobody sees in a tile that a level's mean may reach: errors are rare and
-/// large, so some tiles are above the mean.
+/// The mean squared error of a level may reach this share of the largest squared error that is invisible in a
+/// tile: errors are rare and large, so some tiles are above the mean.
 const UNSEEN_SHARE: f64 = 0.5;
 
-/// The errors of estimate and trace at a surface point of a probe, summed over the lights that other frames know.
+/// The errors of the estimate and of a trace at a surface point of a probe, summed over the lights that other
+/// frames know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
     /// Level of the estimate's risk.
@@ -33,14 +34,14 @@ pub struct Finding {
     pub agreed: bool,
     /// Squared error of the estimate, squares of a display step of the pixel; may be negative.
     pub error: f32,
-    /// Squared error of a trace, likewise.
+    /// Squared error of a trace, in the same unit.
     pub noise: f32,
 }
 
 /// Estimate and both traces of one light at a point.
 #[derive(Debug, Clone, Copy)]
 pub struct LightComparison {
-    /// What the pixel would show of the light without shadows: luminance, exposure applied.
+    /// The light's contribution to the pixel without shadows: luminance, exposure applied.
     pub unshadowed: f32,
     /// The estimate from other frames.
     pub estimate: Estimate,
@@ -49,7 +50,8 @@ pub struct LightComparison {
 }
 
 impl LightComparison {
-    /// Averages in the comparison of further camera samples, which are `share` of all. The higher risk stays.
+    /// Averages with the comparison of further camera samples, whose share of all samples is `share`. The
+    /// higher risk is kept.
     pub fn join(&mut self, other: &Self, share: f32) {
         let (own_light, light) = (self.unshadowed * (1.0 - share), other.unshadowed * share);
         self.unshadowed = own_light + light;
@@ -112,8 +114,8 @@ fn total(sums: &[Sums]) -> Sums {
     })
 }
 
-/// Marks in `taken` the steps of a scale of risk whose estimates may be used by their `sums`; a mean squared error
-/// of `unseen` is not seen.
+/// Marks in `taken` the steps of a scale of risk whose estimates may be used, by the `sums` of their findings. A
+/// mean squared error of up to `unseen` is allowed whatever tracing's error is.
 fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
     // What holds of a higher risk holds of a lower one.
     let mut most = f64::INFINITY;
@@ -134,7 +136,8 @@ fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
 }
 
 impl Evidence {
-    /// The evidence of `findings`. An error of `tolerance` display steps (root mean square over a tile) is not seen.
+    /// The evidence of `findings`. An error of up to `tolerance` display steps (root mean square over a tile) is
+    /// allowed whatever tracing's error is.
     pub fn of<'f>(findings: impl Iterator<Item = &'f Finding>, tolerance: f32) -> Self {
         let unseen = UNSEEN_SHARE * f64::from(tolerance) * f64::from(tolerance);
         let mut sums = [Sums::default(); LEVELS];
@@ -169,7 +172,7 @@ impl Evidence {
 mod tests {
     use super::*;
 
-    /// Of calm estimates, and of some beside a shadow's edge.
+    /// Level of calm estimates; the next one is of estimates beside a shadow's edge.
     const CALM: u8 = 0;
     const EDGE: u8 = 12;
 
@@ -182,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn camera_samples_that_were_estimated_apart_are_one_finding() {
+    fn camera_samples_estimated_separately_are_one_finding() {
         let light = |ratio, traced: [f32; 2], level| {
             let estimate = Estimate { ratio, level };
             LightComparison { unshadowed: 0.5, estimate, traced }
@@ -214,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_worse_than_a_trace_is_used_and_what_is_worse_is_not() {
+    fn estimates_are_used_only_if_they_are_no_worse_than_a_trace() {
         let probes = |error, noise| vec![found(EDGE, error, noise); 2000];
         assert!(may_use(&probes(1.0, 2.0), EDGE));
         assert!(!may_use(&probes(1.9, 2.0), EDGE));
@@ -226,14 +229,14 @@ mod tests {
 
     /// One estimate between its two traces has a negative error.
     #[test]
-    fn what_is_found_by_chance_does_not_speak_for_what_is_known() {
+    fn one_lucky_finding_of_a_higher_level_does_not_outweigh_many() {
         let known = vec![found(4, 3.0, 1.0); 500];
         assert!(!may_use(&known, 4));
         assert!(!may_use(&[&known[..], &[found(8, -10.0, 9.0)]].concat(), 4));
     }
 
     #[test]
-    fn an_edge_needs_more_probes_than_what_is_calm() {
+    fn an_edge_needs_more_probes_than_a_calm_surface() {
         let clean = |level, count| vec![found(level, 0.0, 0.5); count];
         assert!(may_use(&clean(CALM, 9), CALM));
         assert!(!may_use(&clean(EDGE, 100), EDGE));
@@ -241,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_tell_of_those_beside_and_below_them() {
+    fn findings_count_for_adjacent_and_lower_levels() {
         let clean = vec![found(EDGE, 0.0, 0.5); 1000];
         let may_use = |level| may_use(&clean, level);
         assert!(may_use(EDGE + 1));
@@ -262,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn what_check_rays_contradict_does_not_count() {
+    fn findings_that_check_rays_contradict_do_not_count() {
         let wrong = Finding { agreed: false, ..found(EDGE, 900.0, 0.5) };
         let mut probes = vec![found(EDGE, 0.0, 0.5); 2000];
         probes.extend([wrong; 100]);

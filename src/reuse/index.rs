@@ -1,28 +1,28 @@
-//! Samples found by place: a hash grid over cells as large as the samples are apart.
+//! Samples found by position: a hash grid whose cells are as wide as the distance between samples.
 
 use crate::inference::SurfacePoint;
 use crate::math::DVec3;
 use crate::sampling::mix;
 use std::ops::Range;
 
-/// Cells of a level that a query looks at: those whose middles surround it.
+/// Number of cells of a level that a query looks at: those whose middles surround the point.
 pub(super) const CELLS: usize = 8;
 
-/// A cell: level of size, mesh and place, hashed.
+/// A cell: hash of its level of size, mesh and position.
 type Key = u64;
 
-/// Finds samples by place: for each cell the run of its samples, which lie sorted by cell.
+/// Finds samples by position: has for each cell the range of its samples, which are stored sorted by cell.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Index {
-    /// Open addressing: cell, first sample, one past the last.
+    /// Hash table with open addressing: cell, first sample, one past the last sample.
     table: Vec<(Key, u32, u32)>,
-    /// A bit for each cell, by its key; eight for each slot of the table.
+    /// Bloom filter of the cells' keys, eight bits for each slot of the table.
     present: Vec<u64>,
 }
 
 /// The cells of one level around a point.
 pub(super) struct Cells {
-    /// Their edge, scene units.
+    /// Edge of the cells, scene units.
     pub edge: f64,
     keys: [Key; CELLS],
 }
@@ -43,8 +43,8 @@ impl Cells {
 }
 
 impl Index {
-    /// Indexes those of `points` whose numbers are `members`. Returns these sorted by cell too: so the
-    /// samples must lie, from number `first` on.
+    /// Indexes the points whose numbers are `members`. Also returns these numbers sorted by cell, the order in
+    /// which the samples must be stored, from number `first` on.
     pub fn new(points: &[SurfacePoint], members: &[u32], first: u32) -> (Self, Vec<u32>) {
         if members.is_empty() {
             return Default::default();
@@ -80,8 +80,8 @@ impl Index {
         keys.flat_map(|key| self.cell(*key))
     }
 
-    /// Whether the index may hold the cell: a Bloom filter that stays in the processor's cache, since most
-    /// cells around a point hold nothing.
+    /// Whether the index may hold the cell, by the Bloom filter. It stays in the processor's cache, which is
+    /// fast for the many cells that are empty.
     fn may_hold(&self, key: Key) -> bool {
         let bit = bit_of(key, &self.present);
         self.present.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 == 1)
@@ -110,7 +110,7 @@ fn bit_of(key: Key, present: &[u64]) -> usize {
     (key >> 32) as usize & (64 * present.len()).wrapping_sub(1)
 }
 
-/// The level whose cells are at least a footprint wide, and less than two.
+/// The level whose cells are at least one footprint wide, and less than two.
 pub(super) fn level_of(footprint: f32) -> i32 {
     // The exponent bits: what log2 would give, the same on every machine.
     let bits = footprint.max(f32::MIN_POSITIVE).to_bits();

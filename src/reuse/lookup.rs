@@ -1,9 +1,9 @@
-//! Reprojection: what other frames suggest about a surface point's ratios.
+//! Reprojection: estimates of a surface point's ratios from other frames.
 //!
-//! A point is projected into each reference. Of the four samples around it those count that lie on
+//! A point is projected into each reference. Of the four samples around it, those count that lie on
 //! the same surface: same mesh, compatible normal, within the pixel's footprint on the surface, and
 //! sampled not much more coarsely than the point itself. Their weighted mean is the estimate, in each
-//! channel on its own. Whether it may be used is not decided here but by [`Evidence`].
+//! channel on its own. [`Evidence`] decides whether it may be used.
 
 mod estimate;
 
@@ -35,7 +35,7 @@ pub struct Judged<'a> {
     pub lookup: &'a Lookup<'a>,
     /// The evidence that judges the estimates of a pixel (column, row).
     pub evidence: &'a (dyn Fn([u32; 2]) -> &'a Evidence + Sync),
-    /// An error of so many display steps is not seen.
+    /// Error that counts as invisible, display steps.
     pub tolerance: f32,
 }
 

@@ -1,11 +1,11 @@
-//! Light of frames inferred from what was traced in others. Never traces.
+//! Inference of light from points that were traced in other frames. Never traces.
 //!
 //! A [`Reference`] holds a frame's camera and the surface points that were traced for it, with their
-//! ratios. A [`Lookup`] answers from several of them, with evidence: what it cannot vouch for it
-//! leaves unknown, and that is traced. Only traced points are sources, so nothing blurs or drifts
-//! however many frames are inferred. [`store`] keeps a reference in a file.
-//! [`audit`] judges inferred pixels by traces of a few of them.
-//! All in scene space.
+//! ratios. A [`Lookup`] estimates ratios from several references. [`Judged`] answers with those
+//! estimates that the [`evidence`] allows, and leaves the others unknown, so that they are traced. Only
+//! traced points are sources, so errors do not add up however many frames are inferred. [`store`] keeps
+//! a reference in a file. [`audit`] estimates the error of inferred pixels from traces of a few of
+//! them. Coordinates are in scene space.
 
 pub mod audit;
 mod check;

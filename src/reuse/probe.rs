@@ -1,4 +1,4 @@
-//! Probes: the pixels that are estimated and traced, and what is noted about them.
+//! Probes: the pixels that are both estimated and traced, and the errors found at them.
 
 use super::Lookup;
 use super::check::agrees;
@@ -16,11 +16,11 @@ pub const PARTS: usize = 4;
 pub struct ProbeDraw {
     /// The job's seed.
     pub seed: u64,
-    /// The frame.
+    /// Number of the frame.
     pub frame: u32,
-    /// Edge of a cell, blocks of pixels.
+    /// Edge of a cell, in blocks of pixels.
     pub cell: u32,
-    /// Edge of a block of pixels that is probed as one, pixels.
+    /// Edge of a block of pixels that are probed together, in pixels.
     pub block: u32,
 }
 
@@ -31,12 +31,12 @@ impl ProbeDraw {
         Self { seed, frame, cell, block }
     }
 
-    /// How many pixels a probe stands for.
+    /// Number of pixels that a probe represents.
     pub fn weight(&self) -> f64 {
         f64::from(self.cell) * f64::from(self.cell)
     }
 
-    /// The number of the cell that a pixel lies in: its probes are drawn together.
+    /// Number of the cell that contains a pixel; a cell has one probed block.
     pub fn group(&self, x: u32, y: u32) -> u64 {
         let edge = self.cell * self.block;
         u64::from(y / edge) << 32 | u64::from(x / edge)
@@ -55,7 +55,7 @@ impl ProbeDraw {
         own == at
     }
 
-    /// Which part of the probes, of [`PARTS`], a probe belongs to: each is judged by what the others find.
+    /// The part of the probes, below [`PARTS`], that a probe belongs to.
     pub fn part(&self, x: u32, y: u32) -> usize {
         (self.words(x, y) >> 32) as usize / self.cell as usize % PARTS
     }
@@ -66,13 +66,13 @@ impl ProbeDraw {
     }
 }
 
-/// Records estimates and traces of probes; answers no question, so that all is traced.
+/// Records estimates and traces of probes. Infers nothing, so that every point is traced.
 pub struct Probe<'a> {
-    /// What estimates; `None` to note the traces alone.
+    /// The source of estimates; `None` to record only traces.
     pub lookup: Option<&'a Lookup<'a>>,
-    /// How many lights' ratios are kept.
+    /// Number of lights whose ratios are kept.
     pub channels: usize,
-    /// An error of so many display steps is not seen.
+    /// Error that counts as invisible, display steps.
     pub tolerance: f32,
     notes: Mutex<Vec<Note>>,
 }
@@ -87,26 +87,26 @@ struct Note {
 }
 
 impl<'a> Probe<'a> {
-    /// Nothing noted.
+    /// A recorder without notes.
     pub fn new(lookup: Option<&'a Lookup<'a>>, channels: usize, tolerance: f32) -> Self {
         Self { lookup, channels, tolerance, notes: Mutex::default() }
     }
 
-    /// The notes in the image's order; those of a pixel as they were made.
+    /// The notes row by row, and within a pixel in the order in which they were made.
     fn sorted(self) -> Vec<Note> {
         let mut notes = self.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
         notes.sort_by_key(|note| (note.pixel[1], note.pixel[0]));
         notes
     }
 
-    /// What `self`, which estimated, and `other`, which traced the same probes once more with other random
-    /// numbers, found: pixel by pixel, for frames of `spp` camera samples.
+    /// The findings by pixel (column, row), for frames of `spp` camera samples. `self` recorded estimates and
+    /// traces, `other` a second trace of the same probes with other random numbers.
     pub fn findings(self, other: Self, spp: u32) -> Vec<([u32; 2], Vec<Finding>)> {
         let mut all: Vec<([u32; 2], Vec<Note>)> = Vec::new();
         for (mut own, again) in self.sorted().into_iter().zip(other.sorted()) {
             let is_same = own.pixel == again.pixel && own.point.p == again.point.p;
             if !is_same {
-                // Camera samples do not depend on random numbers of the light: it cannot be.
+                // Cannot happen: camera samples do not depend on random numbers of the light.
                 debug_assert!(is_same, "{:?} {:?}", own.pixel, again.pixel);
                 continue;
             }
@@ -134,8 +134,8 @@ impl<'a> Probe<'a> {
 }
 
 impl Note {
-    /// Whether `other` is of another part of the same pixel's camera samples and of the same surface. Their
-    /// estimates are off by the same, while the noise of tracing is independent.
+    /// Whether `other`, a note of other camera samples of the same pixel, is of the same surface. The estimates of
+    /// both then have the same error, while the noise of their traces is independent.
     fn is_one_with(&self, other: &Self) -> bool {
         self.agreed == other.agreed
             && self.point.direct == other.point.direct
@@ -155,7 +155,7 @@ impl Inference for Probe<'_> {
         batch.estimates.clear();
         if let Some(lookup) = self.lookup {
             lookup.estimate(batch);
-            // Nothing of what is shown comes from there.
+            // Probes show their traces.
             batch.provenance.fill(Provenance::default());
             let is_known = |estimate: &Estimate| !estimate.ratio.is_nan();
             batch.checks.extend(batch.estimates.iter().map(is_known));

@@ -1,8 +1,8 @@
-//! A frame's traced surface points, found by image position or by place in the scene.
+//! A frame's traced surface points, found by position in the image or in the scene.
 //!
-//! Laid out for lookups, which wait for memory more than they compute: all that a scene's first light
-//! needs of a sample fills half a line of the cache; what a block of pixels sees directly lies
-//! together, and so does what lies in a cell of the index.
+//! The layout suits lookups, which mostly wait for memory: a sample with the data of the scene's first light
+//! fills half a cache line; the samples that a block of pixels sees directly are stored
+//! together, and so are the samples in a cell of the index.
 
 mod contrast;
 mod gather;
@@ -15,9 +15,9 @@ use crate::scene::Camera;
 use gather::Gathered;
 use wide::f32x4;
 
-/// In place of a sample's number: there is no sample.
+/// Sample number that means: no sample.
 pub(super) const NONE: u32 = u32::MAX;
-/// Edge of a block of pixels whose samples lie together.
+/// Edge of a block of pixels whose samples are stored together, pixels.
 const BLOCK: usize = 8;
 
 /// A traced surface point.
@@ -43,13 +43,13 @@ struct Known {
     far: Level,
 }
 
-/// A size from 0 to 1 in a byte, a sixteenth of it at most lost; 255 is NaN.
+/// A number from 0 to 1 in a byte, with a relative error of at most a sixteenth; 255 is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Level(u8);
 
 impl Level {
     const UNKNOWN: Self = Self(u8::MAX);
-    /// Exponent and the mantissa's first four bits of an f32, of the number whose byte would be 0: 2⁻¹⁶.
+    /// Upper bits (exponent and first four bits of the mantissa) of the f32 whose byte is 0: 2⁻¹⁶.
     const ZERO: u32 = (127 - 16) << 4;
 
     fn of(x: f32) -> Self {
@@ -121,7 +121,7 @@ impl Known {
     }
 }
 
-/// A camera with what projecting many points needs.
+/// A camera prepared for projecting many points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
     pub eye: DVec3,
@@ -158,13 +158,13 @@ impl View {
         (self.size[0] as usize).div_ceil(BLOCK)
     }
 
-    /// The place of a pixel in the order of pixels block by block.
+    /// Index of a pixel in the order of pixels block by block.
     fn slot(&self, x: usize, y: usize) -> usize {
         let block = y / BLOCK * self.blocks_across() + x / BLOCK;
         block * (BLOCK * BLOCK) + y % BLOCK * BLOCK + x % BLOCK
     }
 
-    /// Number of places in the order of pixels block by block, blocks at the edges filled up.
+    /// Number of pixels in the order block by block, with incomplete blocks at the edges filled up.
     fn slots(&self) -> usize {
         (self.size[1] as usize).div_ceil(BLOCK) * self.blocks_across() * BLOCK * BLOCK
     }
@@ -176,9 +176,9 @@ impl View {
 pub struct Reference {
     /// Number of the frame; [`Reference::SUPPLIED`] for a frame of another shot.
     pub frame: u32,
-    /// Scene space.
+    /// The camera, scene space.
     pub(super) view: View,
-    /// For each pixel, block by block, the sample of what is seen there directly.
+    /// For each pixel, block by block, the sample that is seen there directly.
     slots: Vec<u32>,
     /// The samples of pixels in the order of `slots`, then all others cell by cell of the index.
     pub(super) samples: Vec<Sample>,
@@ -238,22 +238,22 @@ impl Reference {
     /// Frame number of references from another shot: they count as earlier than all frames.
     pub const SUPPLIED: u32 = 0;
 
-    /// Its camera's eye, scene space.
+    /// Position of the frame's camera, scene space.
     pub fn eye(&self) -> DVec3 {
         self.view.eye
     }
 
-    /// Its camera's view direction.
+    /// View direction of the frame's camera, unit.
     pub fn forward(&self) -> DVec3 {
         self.view.forward
     }
 
-    /// How many samples it has.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.samples.len()
     }
 
-    /// Whether it has no samples.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
@@ -265,7 +265,7 @@ impl Reference {
         (samples + size_of_val(&self.slots[..]) + findings) as u64 + self.index.memory()
     }
 
-    /// The sample of what is seen directly at a pixel; [`NONE`] outside the image too.
+    /// The sample that is seen directly at a pixel; [`NONE`] where there is none, and outside the image.
     pub(super) fn seen_at(&self, x: i32, y: i32) -> u32 {
         let [width, height] = self.view.size;
         let is_inside = x >= 0 && y >= 0 && x < width && y < height;

@@ -1,7 +1,7 @@
-//! Risk of an estimate: how far it could be off, by what a lookup sees around the point.
+//! Risk of an estimate: a figure for how far it could be off, from the samples around the point.
 //!
-//! That is no claim how far it is off. It is a scale on which estimates are sorted; up to where on it they
-//! may be used is decided by what probes find ([`super::evidence`]).
+//! The risk does not predict the error. It is a scale on which estimates are sorted; the errors that probes find
+//! decide up to which risk they may be used ([`super::evidence`]).
 
 use crate::math::srgb_encode;
 
@@ -11,14 +11,14 @@ const CALM: f32 = 0.25;
 pub const STEPS: usize = 24;
 /// Half an octave of the risk in its third power.
 const HALF_OCTAVE_CUBED: f32 = 2.828_427;
-/// How many steps there are in all. Points seen directly have two scales: one for what noise may have made, and one
-/// for detail, which noise cannot make. So have points seen in mirrors and through glass.
+/// Number of steps of all scales. Points seen directly have two scales: one for differences that noise can explain,
+/// and one for detail, which noise cannot explain. Points seen in mirrors and through glass have two more.
 pub const LEVELS: usize = 4 * STEPS;
 /// A risk above this many standard deviations of tracing's noise is detail, not noise.
 const MOST_OF_NOISE: f32 = 6.0;
 
-/// The features of an estimate that its risk follows from, all lights together, display steps. NaN where too few
-/// samples are known.
+/// The features of an estimate from which its risk is computed, all lights together, in display steps. NaN where
+/// too few samples are known.
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
     /// Largest difference between a tap's ratio and the mean of two samples on opposite sides of it: a mean of taps
@@ -28,10 +28,10 @@ pub struct Features {
     pub wide: f32,
     /// Largest `wide` among the 5 x 5 samples about a tap.
     pub far: f32,
-    /// Standard deviation of a trace of the taps' ratios if its rays were independent: spread over a light as they
-    /// are, they show less.
+    /// Standard deviation of a trace with the taps' ratios if its rays were independent; the real rays are spread
+    /// over the light and have less.
     pub noise: f32,
-    /// Radiance without shadows, exposure applied; stands in for what is not known.
+    /// Radiance without shadows, exposure applied; takes the place of features that are not known.
     pub unshadowed: f32,
     /// Whether the taps surround the point.
     pub is_whole: bool,
@@ -55,8 +55,8 @@ impl Features {
         (scale * STEPS + step) as u8
     }
 
-    /// Third power of the risk: the geometric mean of bend and both contrasts; twice that where the taps lie
-    /// on one side of the point.
+    /// Third power of the risk, which is the geometric mean of bend and both contrasts, and twice that where the
+    /// taps lie on one side of the point.
     fn risk_cubed(&self) -> f32 {
         let Self { bend, wide, far, .. } = *self;
         let is_known = !(bend + wide + far).is_nan();
@@ -68,12 +68,12 @@ impl Features {
     }
 }
 
-/// Display steps that `radiance` is shown as.
+/// `radiance` in display steps.
 pub fn shown(radiance: f32) -> f32 {
     (255.0 * srgb_encode(f64::from(radiance.clamp(0.0, 1.0)))) as f32
 }
 
-/// The risk that stands for `level`, display steps: the middle of the risks in it.
+/// The middle of the risks of `level`, display steps.
 pub fn risk_of(level: usize) -> f64 {
     let step = (level % STEPS) as f64;
     f64::from(CALM) * (0.5 * (step + 0.5)).exp2()
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn what_noise_cannot_make_has_a_scale_of_its_own() {
+    fn detail_has_a_scale_of_its_own() {
         let even = |risk| Features { bend: risk, wide: risk, far: risk, noise: 1.0, ..CALMEST };
         let scale = |features: Features| usize::from(features.level()) / STEPS;
         assert_eq!([5.9, 6.1].map(|risk| scale(even(risk))), [0, 1]);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_stands_for_the_risks_that_fall_there() {
+    fn the_risk_of_a_level_lies_in_that_level() {
         for step in 0..STEPS {
             let risk = risk_of(step) as f32;
             let even = Features { bend: risk, wide: risk, far: risk, ..CALMEST };

@@ -1,13 +1,13 @@
 //! A frame's traced points as bytes, so that a later job of the same scene can take them as a
 //! [`Reference`].
 //!
-//! The bytes stand in an attribute of the frame's exr file. Not in channels: a pixel may have several
-//! points, seen in mirrors or on two surfaces, and a file that is opened in a compositor should not
-//! show twenty channels that mean nothing there. The layout: `MAGIC`, the BLAKE3 of all that
+//! The bytes are an attribute of the frame's exr file. Channels would not do: a pixel may have several
+//! points, seen in mirrors or on two surfaces, and a compositor should not show twenty channels that mean
+//! nothing to it. The layout: `MAGIC`, the BLAKE3 of all that
 //! follows, the length of a JSON `Head` and the head, the camera (world space, f64), then points and
 //! findings as `columns` encodes them. Little endian throughout.
 //!
-//! Whoever reads takes nothing on trust: every number must be one that tracing could have left.
+//! Reading checks that tracing could have produced every number.
 
 use super::Reference;
 use super::columns::{self, deflated, inflated, take, take_u32};
@@ -22,27 +22,27 @@ use std::path::Path;
 
 /// Name of the attribute of an exr file that holds the record.
 pub const ATTRIBUTE: &str = "tweenrayReference";
-/// How the bytes begin: the last letter is the layout's version.
+/// First bytes of a record; the last letter is the layout's version.
 const MAGIC: &[u8; 8] = b"twrayrf4";
-/// Words of a point beside its ratios.
+/// Words of a point without its ratios.
 const WORDS: usize = 12;
 /// Bytes of a finding.
 const FINDING: usize = 3 * 4;
-/// Flag beside a finding's level: check rays agreed.
+/// Flag in the word of a finding's level: check rays agreed.
 const AGREED: u32 = 1 << 8;
-/// Largest squared error of a finding: from black to white, display steps.
+/// Largest squared error of a finding, from black to white: squares of a display step.
 const MOST_ERROR: f32 = 255.0 * 255.0;
 /// Most bytes of a head.
 const MOST_HEAD: usize = 1 << 20;
 /// Bit that marks points seen directly, above their number of samples.
 const DIRECT: u32 = 1 << 31;
-/// Cells of a footprint's size along an edge of the scene, at most.
+/// Most cells of a footprint's size along an edge of the scene.
 const MOST_CELLS: f32 = 1e12;
 
-/// What a reference and a job must have in common.
+/// The properties that a reference and a job must have in common.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Compatibility {
-    /// Hash of the world, the shot left aside.
+    /// Hash of the world, without the shot.
     pub world: String,
     /// Whether the scene is traced about its own centre.
     pub recentre: bool,
@@ -80,7 +80,7 @@ impl Compatibility {
         }
     }
 
-    /// Why references made on the terms `other` cannot serve here.
+    /// Why references of a job with the compatibility `other` cannot be used here; `None` if they can.
     fn refusal(&self, other: &Self) -> Option<String> {
         let Self { world, recentre, lights, rays } = self;
         if *world != other.world {
@@ -110,13 +110,13 @@ impl Compatibility {
 
 /// The traced points of a frame with its camera and findings, as they go into a file.
 pub struct ReferenceRecord<'a> {
-    /// What other jobs must have in common.
+    /// The compatibility that jobs must have to use the record.
     pub terms: &'a Compatibility,
     /// Number of the frame.
     pub frame: u32,
     /// The frame's camera, world space.
     pub camera: &'a Camera,
-    /// Points outside of it are left out; `None` keeps all.
+    /// Points outside of the crop are left out; `None` keeps all points.
     pub crop: Option<Rect>,
     /// The traced points, scene space.
     pub traced: &'a TracedPoints,
@@ -127,8 +127,8 @@ pub struct ReferenceRecord<'a> {
 }
 
 impl ReferenceRecord<'_> {
-    /// The record as bytes, which do not depend on what was traced outside of the crop. `None` where they would be
-    /// too many.
+    /// The record as bytes, which do not depend on points outside of the crop. `None` where there would be too
+    /// many.
     pub fn encode(&self) -> Option<Vec<u8>> {
         // `order` takes what lies in the crop.
         let Self { terms, frame, camera, crop: _, traced: _, findings, settings } = *self;
@@ -153,7 +153,7 @@ impl ReferenceRecord<'_> {
         Some([MAGIC.as_slice(), blake3::hash(&body).as_bytes(), &body].concat())
     }
 
-    /// Points in the crop, row by row: tiles come in another order where more was traced.
+    /// Indices of the points in the crop, row by row: their order in memory depends on the tiles that were traced.
     fn order(&self) -> Vec<usize> {
         let points = &self.traced.points;
         let is_in = |p: &TracedPoint| {
@@ -187,11 +187,11 @@ impl ReferenceRecord<'_> {
     }
 }
 
-/// Reads what [`ReferenceRecord::encode`] wrote, for a job on `terms` of a scene with `recentring`: a reference
-/// and a hash that tells it apart. `path` is for messages.
+/// Decodes the bytes of [`ReferenceRecord::encode`] for a job of the compatibility `terms`, in a scene with
+/// `recentring`: the reference and the hash of its bytes. `path` is for messages.
 ///
 /// # Errors
-/// [`Error::Input`] where the bytes are damaged or no such bytes, or made on other terms.
+/// [`Error::Input`] if the bytes are damaged, are no record, or have another compatibility.
 pub fn decode(
     path: &Path,
     bytes: &[u8],
@@ -221,7 +221,7 @@ pub fn decode(
     Ok((reference.with_findings(findings), *hash))
 }
 
-/// Bytes of `points` with `channels` ratios each, and `findings`; `None` where they are too many.
+/// Size of `points` with `channels` ratios each, and of `findings`, bytes; `None` where it is too large.
 fn size_of_record(points: usize, channels: usize, findings: usize) -> Option<usize> {
     columns::size_of(points, WORDS + channels, findings.checked_mul(FINDING)?)
 }
@@ -249,7 +249,7 @@ fn finding_bytes(finding: &Finding) -> [u8; FINDING] {
     bytes
 }
 
-/// What [`finding_bytes`] made bytes of, if probes can have found it.
+/// Decodes the bytes of [`finding_bytes`]; `None` for numbers that no probe can find.
 fn finding_of(mut bytes: &[u8]) -> Option<Finding> {
     let mut words = [0; FINDING / 4];
     for word in &mut words {
@@ -295,7 +295,7 @@ fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Opti
     Some(traced)
 }
 
-/// Whether tracing can have left such a point.
+/// Whether tracing can have produced the point.
 fn is_point(point: &SurfacePoint) -> bool {
     let SurfacePoint { p, n, geom_id: _, footprint, cos, direct: _, samples } = *point;
     let p = p.as_vec3();
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_comes_back_as_it_was() {
+    fn a_reference_is_decoded_as_it_was_encoded() {
         let back = read(&encoded(&traced(), None), &terms()).expect("whole");
         let own = Reference::new(Reference::SUPPLIED, &camera(), &traced(), 2);
         let own = own.with_findings(findings());
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_do_not_depend_on_what_was_traced_beside() {
+    fn the_bytes_do_not_depend_on_points_outside_the_crop() {
         let crop = Rect { x0: 2, y0: 1, x1: 7, y1: 4 };
         let (all, mut some) = (traced(), TracedPoints::default());
         for (i, t) in all.points.iter().enumerate().rev() {
@@ -435,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn other_terms_are_refused_by_name() {
+    fn references_of_another_compatibility_are_refused_by_name() {
         let bytes = encoded(&traced(), None);
         let says = |change: fn(&mut Compatibility)| {
             let mut other = terms();

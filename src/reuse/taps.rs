@@ -1,5 +1,5 @@
-//! The samples around a point in each reference, four at a time: found by where the point is seen, or by
-//! place.
+//! The samples around a point in each reference, four at a time: found by the point's image in the reference, or by
+//! its position in the scene.
 
 mod image;
 
@@ -13,8 +13,7 @@ use wide::{CmpGe, CmpGt, CmpLe, f32x4};
 
 /// Most groups of four samples that one point's estimate is made of.
 const MOST: usize = 8;
-/// Points that are looked up together: the memory that all of them need is asked for before any of it
-/// is waited for.
+/// Number of points that are looked up together: their memory is requested for all before it is used for any.
 pub(super) const TOGETHER: usize = 16;
 /// Sum of weights (a reference that surrounds the point gives 1) from which on no further reference is looked up.
 pub(super) const ENOUGH_WEIGHT: f64 = 0.6;
@@ -24,7 +23,7 @@ const LEAST_COS: f32 = 0.8;
 /// further by this share of its distance along the plane.
 const HEIGHT: f32 = 0.7;
 const SLOPE: f32 = 0.35;
-/// Levels of the index that are asked: a point's own, the finer and the coarser one.
+/// Number of levels of the index that are searched: a point's own, the finer and the coarser one.
 const LEVELS: usize = 3;
 
 /// Three coordinates of four places.
@@ -34,13 +33,15 @@ type Vec3x4 = [f32x4; 3];
 #[derive(Clone, Copy)]
 pub(super) struct Taps4 {
     pub reference: u32,
-    /// Numbers of the samples. A lane without weight repeats the number of another, so that all can be read.
+    /// Numbers of the samples. A lane without weight repeats another lane's number, so that every lane can be
+    /// read.
     pub samples: [u32; 4],
     /// Weights; a reference that surrounds the point gives 1 in all.
     pub weight: f32x4,
-    /// Weights in means: more even than `weight`, which averages out more of tracing's noise.
+    /// Weights for means: `weight` to the power of 3/4. They are more even, which averages out more of tracing's
+    /// noise.
     pub share: f32x4,
-    /// From the point to the sample, footprints.
+    /// Distances from the point to the samples, footprints.
     pub distance: f32x4,
 }
 
@@ -53,11 +54,11 @@ pub(super) struct Taps {
     pub weight: f64,
 }
 
-/// A point to compare samples with, split so that distances, not places, are rounded to f32.
+/// A point to compare samples with, split in two so that distances, not positions, are rounded to f32.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     p: Vec3,
-    /// What the rounding of `p` left over.
+    /// The rounding error of `p`, to be added to it.
     rest: Vec3,
     n: Vec3,
     geom_id: u32,
@@ -65,10 +66,10 @@ pub(super) struct Place {
 
 /// Distances and normals of four samples relative to a point; 0 for samples that are not on its surface.
 struct Near4 {
-    /// All bits set where they are.
+    /// Mask: all bits set for samples on the surface.
     is_near: f32x4,
     distance: f32x4,
-    /// 1 with the point's own normal, 0 where they are as far apart as can be.
+    /// Likeness of the normals: 1 for equal normals, 0 at the limit.
     alike: f32x4,
 }
 
@@ -81,7 +82,7 @@ impl Taps4 {
         distance: f32x4::ZERO,
     };
 
-    /// The taps among `samples` that are `near` and have a weight; `None` where there is none.
+    /// Taps of those `samples` that are `near` and have a weight; `None` where there is none.
     fn new(reference: u32, mut samples: [u32; 4], weight: f32x4, near: &Near4) -> Option<Self> {
         let weight = weight & near.is_near & weight.cmp_gt(f32x4::ZERO);
         let some = weight.cmp_gt(f32x4::ZERO).move_mask();
@@ -116,7 +117,7 @@ impl Taps {
         (self.len, self.lanes, self.weight) = (0, 4, 0.0);
     }
 
-    /// Takes in four lanes as they are.
+    /// Appends four lanes.
     fn push(&mut self, four: &Taps4) {
         if self.len < MOST {
             self.list[self.len] = *four;
@@ -126,7 +127,7 @@ impl Taps {
         }
     }
 
-    /// Takes in those lanes that have weight, where the last four of the reference have room.
+    /// Appends the lanes that have weight, to the last group of the same reference as far as that has room.
     fn pack(&mut self, four: &Taps4) {
         let weights = four.weight.to_array();
         for (from, weight) in weights.into_iter().enumerate().filter(|(_, w)| *w > 0.0) {
@@ -158,8 +159,8 @@ impl Place {
         Self { p, rest, n: point.n, geom_id: point.geom_id }
     }
 
-    /// How `samples` lie about it, if any counts: of its mesh, with a normal like its own, within `reach`
-    /// footprints and hardly off its plane.
+    /// The distances of `samples` from the point; `None` where none counts. A sample counts if it is on the same
+    /// mesh, with a similar normal, within `reach` footprints and near the tangent plane.
     fn near(
         &self,
         reference: &Reference,
@@ -197,11 +198,11 @@ impl Place {
     }
 }
 
-/// Reference frames in the order in which they are asked.
+/// Reference frames in the order in which they are searched.
 pub(super) struct References<'a>(pub &'a [&'a Reference]);
 
 impl References<'_> {
-    /// Gathers the samples about `point` in `taps`, whose samples in the first references are `found`.
+    /// Gathers the samples about `point` in `taps`; `found` has those of the first references already.
     pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
         found.iter().flatten().for_each(|four| taps.push(four));
@@ -255,7 +256,7 @@ impl References<'_> {
     }
 }
 
-/// Products of four vectors with four others.
+/// Dot products of four vectors with four others.
 fn dot(a: Vec3x4, b: Vec3x4) -> f32x4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

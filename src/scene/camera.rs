@@ -56,7 +56,7 @@ pub struct Camera {
     pub width: u32,
     /// Image rows.
     pub height: u32,
-    /// What its rays pass.
+    /// The lens that its rays pass.
     pub lens: Lens,
 }
 

@@ -1,4 +1,4 @@
-//! What a world that is built in code may get wrong, and tracing would not survive: refused by name.
+//! Errors in a world that is built in code, which would break tracing: refused by name.
 
 use super::{World, WorldMesh};
 use crate::error::{Error, Result};
@@ -52,7 +52,7 @@ mod tests {
     use crate::scene::{Material, WorldSphere};
 
     #[test]
-    fn indices_of_nothing_are_refused_by_name() {
+    fn indices_out_of_range_are_refused_by_name() {
         let refusal = |world: World| world.into_scene(true).expect_err("no scene").to_string();
         let floor = |last, material| {
             let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Z];

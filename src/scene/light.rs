@@ -74,7 +74,7 @@ kinds! {
     Spot(SpotLight) = "spot",
 }
 
-/// What a scene needs to know of a kind of light.
+/// The interface of a kind of light to the scene.
 trait LightData {
     /// Whether the light has an extent, so that its shadows are soft and take samples. A delta light has none.
     fn is_area(&self) -> bool;

@@ -1,4 +1,4 @@
-//! What settings may be: the same in scene files and on the command line.
+//! Ranges of settings: the same in scene files and on the command line.
 
 use std::ops::RangeInclusive;
 

@@ -44,7 +44,7 @@ pub enum NormalPolicy {
     },
 }
 
-/// What the surface of a mesh or sphere is made of.
+/// The material of a mesh's or sphere's surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Surface {
     /// Its material.
@@ -111,7 +111,7 @@ pub struct Mesh {
     pub normals: Option<Corners<Vec3>>,
     /// Texture coordinates.
     pub uvs: Option<Corners<Vec2>>,
-    /// What it is made of.
+    /// Material.
     pub surface: Surface,
     /// Bounds of the f32 positions that triangles use.
     pub bounds: Bounds3,
@@ -155,6 +155,6 @@ pub struct Sphere {
     pub centre: DVec3,
     /// Radius, scene space.
     pub radius: f64,
-    /// What it is made of.
+    /// Material.
     pub surface: Surface,
 }

@@ -79,7 +79,7 @@ pub struct World {
     /// Lights. None has a surface in `meshes` or `spheres` yet.
     /// Area lights get their emitting surface from [`World::into_scene`].
     pub lights: Vec<Light>,
-    /// What a ray that hits nothing sees.
+    /// The light of rays that hit nothing.
     pub sky: Sky,
     /// Boxes in which light is traced in every frame, never reused; world space.
     pub traced_regions: Vec<Bounds3>,
@@ -100,7 +100,7 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Lights, area lights included.
     pub lights: Vec<Light>,
-    /// What a ray that hits nothing sees.
+    /// The light of rays that hit nothing.
     pub sky: Sky,
     /// Boxes in which light is traced in every frame, never reused.
     pub traced_regions: Vec<Bounds3>,

@@ -39,7 +39,7 @@ pub struct Shot {
     pub frames: u32,
     /// Vertical field of view, degrees.
     pub vfov_degrees: f64,
-    /// What is sharp.
+    /// The lens and its focus.
     pub lens: ShotLens,
 }
 

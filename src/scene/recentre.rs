@@ -30,9 +30,10 @@ impl World {
     /// emitting surface. With `recentre` false the world's own coordinates are rounded as they
     /// are: that shows what the rule is worth.
     ///
-    /// Errors: an index of a material or vertex that there is not; a scene whose longest edge lies outside `[1e-30, 1e30]` world units; a light or
-    /// sphere whose place is not finite; a mesh, sphere or area light so small beside the scene
-    /// that f32 would crush it, or a mesh of which it would crush most triangles (`recentre` only).
+    /// Errors: an index of a material or vertex that does not exist; a scene whose longest edge lies outside
+    /// `[1e-30, 1e30]` world units; a light or sphere whose place is not finite; a mesh, sphere or area light so small
+    /// beside the scene that rounding to f32 would collapse it, or a mesh of which it would collapse most triangles
+    /// (`recentre` only).
     pub fn into_scene(mut self, recentre: bool) -> Result<Scene> {
         self.check()?;
         let bounds = self.bounds();

@@ -2,18 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a frame takes over from others, and with how much care.
+/// Settings of reuse between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReuseSettings {
-    /// What is taken over.
+    /// What frames reuse of one another.
     pub policy: Policy,
     /// Frames from one key frame to the next.
     pub segment: u32,
-    /// By how much inferred pixels may be off where traced ones are not, display steps of 1/255: root
-    /// mean square over a tile of 32 x 32 pixels.
+    /// By how much inferred pixels may be off even where traced ones are more accurate, display steps of 1/255:
+    /// root mean square over a tile of 32 x 32 pixels.
     pub tolerance: f32,
-    /// Share of the pixels of an in-between frame that are traced although other frames may know them, to
-    /// measure how far off these are. More in the frames that are inferred from key frames alone.
+    /// Share of the pixels of an in-between frame that are estimated and also traced, to measure the error of
+    /// estimates. Frames that are inferred from key frames alone have more.
     pub probes: f32,
     /// Colour policy: cached colours agree within this, linear colour difference in any channel.
     pub colour_epsilon: f32,
@@ -45,7 +45,7 @@ impl ReuseSettings {
     }
 }
 
-/// What frames take over from one another.
+/// What frames reuse of one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {

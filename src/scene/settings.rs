@@ -59,7 +59,7 @@ pub struct Settings {
     pub compact: bool,
     /// The rules that make hits trustworthy.
     pub rules: HitRules,
-    /// What frames take over from one another.
+    /// What frames reuse of one another.
     pub reuse: ReuseSettings,
     /// Which part of the image is rendered; `None` for all of it.
     pub crop: Option<Rect>,

@@ -1,4 +1,4 @@
-//! What rounding to f32 would make nothing of: refused by name, or counted.
+//! Shapes that rounding to f32 would collapse: refused by name, or counted.
 
 use super::light::EmittingShape;
 use super::{Recentring, World};
@@ -113,7 +113,7 @@ mod tests {
     use crate::scene::{Material, WorldMesh};
 
     #[test]
-    fn what_rounding_would_flatten_is_refused_by_name() {
+    fn shapes_that_rounding_would_flatten_are_refused_by_name() {
         const DIRECTIONS: [DVec3; 6] =
             [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         let with = |radius: f64, at: f64| {

@@ -23,7 +23,7 @@ pub(super) fn weld_here(positions: &[DVec3]) -> Option<Vec<u32>> {
     firsts(positions.len(), &twins(positions, 0, 1))
 }
 
-/// What [`weld`] gives for `count` positions of which `twins` are pairs.
+/// The result of [`weld`] for `count` positions of which `twins` are pairs of equal ones.
 fn firsts(count: usize, twins: &[(u32, u32)]) -> Option<Vec<u32>> {
     if twins.is_empty() {
         return None;

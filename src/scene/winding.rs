@@ -169,7 +169,7 @@ mod tests {
 
     /// A worker that waits takes up other work of its pool.
     #[test]
-    fn the_volume_never_takes_up_other_work() {
+    fn computing_the_volume_starts_no_other_task_of_the_pool() {
         let positions: Vec<DVec3> = (0..3000).map(|i| DVec3::splat(f64::from(i % 7))).collect();
         let busy: Vec<AtomicBool> = (0..8).map(|_| AtomicBool::new(false)).collect();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(busy.len()).build().unwrap();

@@ -1,12 +1,12 @@
-//! References on disk, so that a job that was killed need not trace them again.
+//! References on disk, so that a job does not trace them again after it was killed.
 //!
-//! A job needs few references at a time, and those of key frames are expensive. These lie in a hidden
-//! folder beside the frames (`.frame.references` for `frame_####.png`), one file each: a line of JSON
-//! that says what job and frame it belongs to, then the bytes of [`crate::reuse::store`] (policy
+//! A job needs few references at a time, and only key frames are expensive to trace. Their references are
+//! in a hidden folder beside the frames (`.frame.references` for `frame_####.png`), one file each: a line
+//! of JSON that names the job and the frame, then the bytes of [`crate::reuse::store`] (policy
 //! `surface`) or the frame's discoveries (`colour`). A file is
 //! removed when no frame of its job needs it any more, and the folder when the job is complete. An exr
-//! frame holds its own reference, and is read where there is one. What is damaged or belongs to another
-//! job is never read: its frame is traced again.
+//! frame holds its own reference, and is read instead. A file that is damaged or belongs to another
+//! job is never used: its frame is traced again.
 
 use super::target::{LEFTOVER_AGE, Target};
 use crate::error::{Error, Result, counted};
@@ -44,7 +44,7 @@ struct Head {
     /// Hash of the bytes after this line.
     #[serde(default)]
     blake3: String,
-    /// What the job's frames share.
+    /// The header that all frames of the job share.
     header: Header,
 }
 
@@ -52,13 +52,13 @@ struct Head {
 pub struct Checkpoints<'a> {
     /// The job.
     pub target: &'a Target,
-    /// How much time of tracing may be lost; `None` to write none and read those that are there.
+    /// Most seconds of tracing that a kill may lose; `None` to write no references, only read them.
     pub every: Option<Duration>,
-    /// What a reference must have in common with the job.
+    /// Compatibility that a reference must have.
     pub terms: &'a Compatibility,
-    /// How world and scene space of the job belong together.
+    /// The transform between world and scene space of the job.
     pub recentring: Recentring,
-    /// Whether the job's frame files hold all that was traced in their frames.
+    /// Whether the job's frame files hold the whole references of their frames.
     pub frames_hold_all: bool,
     rows: OnceLock<BTreeMap<u32, Row>>,
     notes: Mutex<Vec<String>>,
@@ -87,8 +87,7 @@ impl<'a> Checkpoints<'a> {
         }
     }
 
-    /// The reference of an original frame, if it is on disk, whole and this job's.
-    /// Its bytes come with it.
+    /// The reference of a representative frame and its bytes, if it is on disk, whole and this job's.
     pub fn read(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
         let in_file = || self.decode(&self.path(frame), self.read_bytes(frame)?);
         let (mut found, bytes) = self.in_frame(frame).or_else(in_file)?;
@@ -116,13 +115,13 @@ impl<'a> Checkpoints<'a> {
         (row.stray.is_none() && row.recipe == recipe).then_some(row)
     }
 
-    /// What the manifest says. Ranks read it themselves, and only where a reference is missing.
+    /// The manifest's rows by frame. Each rank reads the manifest itself, and only if a reference is missing.
     fn rows(&self) -> &BTreeMap<u32, Row> {
         let read = || Manifest::read(&manifest_path(&self.target.pattern)).ok().flatten();
         self.rows.get_or_init(|| read().map(|manifest| manifest.rows).unwrap_or_default())
     }
 
-    /// What [`write`](Self::write) put there, if it is on disk, whole and this job's.
+    /// The bytes that [`write`](Self::write) wrote for a frame, if they are on disk, whole and this job's.
     pub fn read_bytes(&self, frame: u32) -> Option<Arc<[u8]>> {
         let path = self.path(frame);
         let mut source = Regular::at(&path).ok()?.source;
@@ -151,7 +150,7 @@ impl<'a> Checkpoints<'a> {
         }
     }
 
-    /// Puts the reference of an original frame on disk.
+    /// Writes the reference of a representative frame to disk.
     pub fn write(&self, frame: u32, bytes: &[u8]) -> Result<()> {
         let path = self.path(frame);
         let recipe = self.target.recipes.get(frame).copied().unwrap_or_default();
@@ -166,13 +165,13 @@ impl<'a> Checkpoints<'a> {
             atomic::create_folder(folder(&self.target.pattern))?;
             atomic::write(&path, |w| w.write_all(&line).and_then(|()| w.write_all(bytes))).map(drop)
         };
-        // A job of other frames of this shot may just have ended and taken the folder away.
+        // A job of other frames of this shot may just have ended and removed the folder.
         write().or_else(|_| write())
     }
 
     /// Removes the reference of a frame that no frame to come needs.
     pub fn remove(&self, frame: u32) {
-        // Whatever is left goes when the job is complete.
+        // A file that cannot be removed now is removed when the job is complete.
         let _ = fs::remove_file(self.path(frame));
     }
 
@@ -206,7 +205,7 @@ pub fn folder(pattern: &FramePattern) -> PathBuf {
     shown.with_file_name(format!(".{name}"))
 }
 
-/// Removes all references of a job that is complete, and what its killed runs left unfinished.
+/// Removes all references of a job that is complete, and temporary files of its killed runs.
 pub fn clear(target: &Target) {
     // Processes of other machines that were killed a moment before this job began leave files too young
     // for its start.
@@ -214,12 +213,12 @@ pub fn clear(target: &Target) {
     let folder = folder(&target.pattern);
     files(&folder).iter().for_each(|(_, path)| _ = fs::remove_file(path));
     let _ = atomic::clean_temporaries(&folder, Duration::ZERO);
-    // Where a reader holds it open on a network file system, it stays until the next job.
+    // On a network file system the folder stays until the next job if a reader holds a file open.
     let _ = fs::remove_dir(folder);
 }
 
-/// Refuses references of other settings, another scene or another version: they may be expensive, and a word
-/// mistyped must not cost them.
+/// Refuses references of other settings, another scene or another version: they may be expensive, and a
+/// mistyped option must not delete them.
 pub(super) fn refuse_others(target: &Target) -> Result<()> {
     let folder = folder(&target.pattern);
     let heads: Vec<FirstLine> =
@@ -228,14 +227,14 @@ pub(super) fn refuse_others(target: &Target) -> Result<()> {
     let Some(first) = heads.iter().find_map(why) else { return Ok(()) };
     let count = heads.iter().filter_map(why).count();
     Err(Error::Usage(format!(
-        "{} holds {} of an earlier job that cannot serve this one: the first {first}\n  \
-         help: set it back, choose another output with -o, or let go of what was traced with --overwrite",
+        "{} holds {} of an earlier job that this job cannot use: the first {first}\n  \
+         help: restore the setting, choose another output with -o, or remove the references with --overwrite",
         folder.display(),
         counted(count, "reference"),
     )))
 }
 
-/// Removes references that cannot serve the job at `target`; returns notes about them.
+/// Removes references that cannot be used for the job at `target`; returns notes about them.
 pub(super) fn sweep(target: &Target) -> Result<Vec<String>> {
     let folder = folder(&target.pattern);
     atomic::clean_temporaries(&folder, LEFTOVER_AGE)?;
@@ -261,7 +260,7 @@ fn files(folder: &Path) -> Vec<(u32, PathBuf)> {
     found
 }
 
-/// The first line of a file, as far as it can be understood.
+/// The first line of a file, as far as this version can read it.
 #[allow(clippy::large_enum_variant, reason = "most are the large one")]
 enum FirstLine {
     Head(Head),
@@ -287,7 +286,7 @@ fn read_head(source: &mut impl BufRead) -> Option<FirstLine> {
     }
 }
 
-/// Why a file is of a job that has nothing to do with the one at `target`.
+/// Why a file belongs to a job of other settings than the one at `target`; `None` if it does not.
 fn of_others(target: &Target, line: &FirstLine) -> Option<String> {
     let FirstLine::Head(head) = line else {
         return Some("is of another version of tweenray".into());
@@ -296,7 +295,7 @@ fn of_others(target: &Target, line: &FirstLine) -> Option<String> {
     Some(format!("is of other settings: {}", d.was_and_is()))
 }
 
-/// Why a file cannot be the reference of `frame` in the job at `target`.
+/// Why a file cannot be the reference of `frame` in the job at `target`; `None` if it can.
 fn refusal(target: &Target, line: Option<&FirstLine>, frame: u32) -> Option<String> {
     let others = line.and_then(|line| of_others(target, line));
     if others.is_some() {

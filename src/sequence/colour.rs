@@ -1,18 +1,18 @@
 //! The maker of policy `colour`, the source paper's algorithm: frames from the colours that other
 //! frames have at the same pixels ([`reuse::colour`](crate::reuse::colour)).
 //!
-//! The samples are the first and the last frame of the shot, traced, and the pictures that somebody
-//! uploads, which are taken as they are. The frames between are made in the order of the pyramid
+//! The first and the last frame of the shot are traced, and uploaded pictures are taken
+//! as they are. The frames between are made in the order of the pyramid
 //! over the whole shot: the middle one from both ends, then the quarters, and so on. The paper's
-//! ranks make their frames side by side and send each other what they discover, so that there a
-//! frame depends on who was faster. Here it depends on its own ancestors and on nothing else, and a
-//! frame that is asked for alone has these made first.
+//! ranks make their frames in parallel and send each other their discoveries, so that a
+//! frame depends on which rank was faster. Here it depends only on its ancestors; if a single
+//! frame is asked for, its ancestors are made first.
 //!
-//! Over several ranks every frame's discoveries go to all of them, as in the paper.
+//! With several ranks every frame's discoveries go to all of them, as in the paper.
 //!
-//! Not done: first hits of inferred pixels are not known: their records say that nothing is hit.
-//! What a scene names as always traced may be inferred: an inferred pixel does not know what it
-//! shows.
+//! Not done: inferred pixels have no first-hit records; theirs say that nothing is hit.
+//! Meshes and boxes that the scene says to trace always may be inferred, since an inferred pixel does
+//! not know which surface it shows.
 
 mod exchange;
 mod pixels;
@@ -38,9 +38,9 @@ use upload::known_of_upload;
 
 /// Infers frames from colours.
 pub struct ColourMaker<'a> {
-    /// Where discoveries are saved for a job that goes on after this one; `None` for nowhere. Few frames
-    /// are needed at a time, about as many as the shot's length has binary digits. A rank saves what it
-    /// made itself.
+    /// Saves discoveries for a job that resumes this one; `None` saves none. Few frames
+    /// are needed at a time, about as many as the shot's length has binary digits. Each rank saves the
+    /// frames that it made.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
     context: FrameContext<'a>,
     rule: AgreementRule,
@@ -78,8 +78,8 @@ impl<'a> ColourMaker<'a> {
         Ok(Self { checkpoints, context, rule, pyramid, schedule, uploads, known })
     }
 
-    /// Makes `frame` from what its ancestors know, which are made first where they are not at hand;
-    /// keeps its discoveries where they are due.
+    /// Makes `frame` from the discoveries of its ancestors, which are made first if they are missing.
+    /// Keeps the discoveries of `frame` if later frames need them.
     fn frame(&self, frame: u32) -> Result<Made> {
         let ancestors = self.pyramid.ancestors(frame).into_iter().map(|other| self.known(other));
         let ancestors = ancestors.collect::<Result<Vec<_>>>()?;
@@ -107,7 +107,7 @@ impl<'a> ColourMaker<'a> {
         Ok(Made { film: traced.film, rays: traced.rays, reuse, audit: None, reference: None })
     }
 
-    /// Fills in how the traced pixels moved; of the others no first hit is known.
+    /// Fills in the motion of the traced pixels; the others have no first hits.
     fn note_motion(
         &self,
         frame: u32,
@@ -120,7 +120,7 @@ impl<'a> ColourMaker<'a> {
         Ok(())
     }
 
-    /// The discoveries of `frame`, which is in use: from memory, from disk, or made.
+    /// The discoveries of `frame`, which the pool has in use: from memory, from disk, or newly made.
     fn known(&self, frame: u32) -> Result<Arc<KnownColours>> {
         let found = self.known.lock().get(frame).cloned();
         if let Some(found) = found.or_else(|| self.read_from_disk(frame)) {
@@ -146,7 +146,7 @@ impl<'a> ColourMaker<'a> {
         self.context.pool.install(|| KnownColours::decode(frame, bytes, pixels))
     }
 
-    /// Keeps discoveries in memory where they are due.
+    /// Keeps discoveries in memory if later frames need them.
     fn keep(&self, known: &Arc<KnownColours>) {
         let mut pool = self.known.lock();
         pool.keep(&self.schedule, known.frame, || Arc::clone(known));
@@ -160,19 +160,19 @@ impl<'a> ColourMaker<'a> {
 }
 
 impl FrameGraph for ColourMaker<'_> {
-    fn needs(&self, original: u32) -> Vec<u32> {
-        self.pyramid.ancestors(original)
+    fn needs(&self, representative: u32) -> Vec<u32> {
+        self.pyramid.ancestors(representative)
     }
 
-    /// First and last frame, then each between after its ancestors.
+    /// One list: the first and the last frame, then each frame between them after its ancestors.
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         let mut ordered = self.pyramid.order(frames);
         ordered.sort_by_key(|frame| !self.pyramid.is_key(*frame));
         ordered.into_iter().map(|frame| vec![frame]).collect()
     }
 
-    fn is_on_disk(&self, original: u32) -> bool {
-        self.checkpoints.is_some_and(|c| c.has(original))
+    fn is_on_disk(&self, representative: u32) -> bool {
+        self.checkpoints.is_some_and(|c| c.has(representative))
     }
 
     fn sends_to_all(&self) -> bool {

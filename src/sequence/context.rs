@@ -1,4 +1,4 @@
-//! What every maker of frames is made of, and the steps that all of them share.
+//! The parts that every maker of frames has, and the steps that all makers share.
 
 use crate::error::{Error, Result};
 use crate::film::Film;
@@ -6,7 +6,7 @@ use crate::scene::{Camera, Shot};
 use crate::shade::{FrameJob, Progress, Rendered, Renderer};
 use std::sync::atomic::AtomicBool;
 
-/// What every maker of frames is made of.
+/// The parts that every maker of frames has.
 #[derive(Clone, Copy)]
 pub struct FrameContext<'a> {
     /// Traces and shades.
@@ -17,9 +17,9 @@ pub struct FrameContext<'a> {
     pub pool: &'a rayon::ThreadPool,
     /// Whether films get first-hit records.
     pub with_gbuffer: bool,
-    /// Set when the job shall stop.
+    /// Set to true when the job is to stop.
     pub stop: &'a AtomicBool,
-    /// Told about finished tiles of frames.
+    /// Receives events about finished tiles.
     pub progress: &'a dyn Progress,
 }
 
@@ -30,7 +30,7 @@ impl FrameContext<'_> {
         self.shot.camera(frame, settings.width, settings.height)
     }
 
-    /// The job that traces all pixels of `frame` and keeps nothing for other frames.
+    /// The job that traces all pixels of `frame` and gathers no points for other frames.
     pub(super) fn job<'j>(&self, frame: u32, camera: &'j Camera) -> FrameJob<'j> {
         let with_gbuffer = self.with_gbuffer;
         let (reuse, mask, beyond_crop) = (None, None, false);
@@ -50,7 +50,7 @@ impl FrameContext<'_> {
     /// records.
     ///
     /// # Errors
-    /// The cameras'.
+    /// Errors of the two frames' cameras.
     pub(super) fn note_motion(&self, frame: u32, film: &mut Film) -> Result<()> {
         let camera = self.camera(frame)?;
         let previous = (frame > 1).then(|| self.camera(frame - 1)).transpose()?;

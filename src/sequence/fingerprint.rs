@@ -1,16 +1,16 @@
-//! What a sequence shows, as hashes: the resolved world and shot, not the files they came from.
+//! Hashes of what a sequence shows: of the resolved world and shot, not of the files that they came from.
 //!
-//! So a comment, a renamed file or a setting that moves between scene file and command line keeps
-//! the frames, while a vertex, a light or a key pose that changes does not.
+//! So frames are kept when a comment changes, a file is renamed or a setting moves between scene file and
+//! command line, but not when a vertex, a light or a key pose changes.
 
 use crate::scene::{Corners, Material, Shot, Texture, World, WorldMesh, WorldSphere};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
-/// How many parts of a kind are told apart by name; a manifest's first line stays readable.
+/// Most parts of a kind that are listed by name, so that a manifest's first line stays readable.
 const MOST_NAMED: usize = 64;
 
-/// BLAKE3 of everything in `world` and `shot` that reaches a pixel, hexadecimal.
+/// BLAKE3 of everything in `world` and `shot` that pixels depend on, hexadecimal.
 pub fn fingerprint(world: &World, shot: &Shot) -> String {
     shot_fingerprint(&WorldHash::of(world).whole(), shot)
 }
@@ -22,17 +22,17 @@ pub fn shot_fingerprint(world: &str, shot: &Shot) -> String {
     hash.hex()
 }
 
-/// A world's hash, part by part, so that what has changed can be named. A large world takes a while to
-/// hash: it is done once.
+/// A world's hash, part by part, so that changed parts can be named. A large world takes a while to
+/// hash, so this is done once.
 pub struct WorldHash {
-    /// Every part in order: its name for messages, and the hash of what of it reaches a pixel.
+    /// Every part in order: its name for messages, and the hash of everything in it that pixels depend on.
     parts: Vec<(String, blake3::Hash)>,
-    /// Hash of what is traced in every frame; `None` where nothing is.
+    /// Hash of the meshes and boxes that are traced in every frame; `None` where there are none.
     traced: Option<blake3::Hash>,
 }
 
 impl WorldHash {
-    /// Hashes everything in `world` that reaches a pixel.
+    /// Hashes everything in `world` that pixels depend on.
     pub fn of(world: &World) -> Self {
         let World { meshes, spheres, materials, textures, lights, sky, traced_regions } = world;
         let mut parts = Vec::new();
@@ -72,13 +72,13 @@ impl WorldHash {
         self.joined(self.traced.as_ref())
     }
 
-    /// The hash of everything but what is traced in every frame, hexadecimal. That choice changes no traced
-    /// light, so scenes that differ in it alone serve one another as references.
+    /// The hash of everything except which meshes and boxes are always traced, hexadecimal. That choice changes
+    /// no traced light, so scenes that differ only in it can use one another's references.
     pub fn light(&self) -> String {
         self.joined(None)
     }
 
-    /// The parts by name, each with a short hash; of very many of a kind the last ones are one.
+    /// The parts by name, each with a short hash; of very many of a kind the last ones share one hash.
     pub fn named(&self) -> BTreeMap<String, String> {
         let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
         let mut rest: BTreeMap<String, blake3::Hasher> = BTreeMap::new();
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_that_shows_changes_the_hash_and_a_name_does_not() {
+    fn every_visible_change_changes_the_hash_and_a_name_does_not() {
         let base = fingerprint(&world(), &shot());
         let mut renamed = world();
         renamed.meshes[0].name = "b".into();
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_always_traced_is_nothing_to_the_light() {
+    fn always_traced_meshes_do_not_change_the_hash_of_light() {
         let hash = |world: &World| WorldHash::of(world);
         let base = hash(&world()).light();
         assert_eq!(base, hash(&world()).whole());

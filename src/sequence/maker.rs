@@ -7,16 +7,16 @@ use crate::film::Film;
 use crate::stats::{AuditSums, RayCounts, ReuseCounts};
 use std::sync::Arc;
 
-/// Which frames are made from which. Answers without rendering; frames with one camera are one
-/// *original*.
+/// Which frames are made from which; answers without rendering. Of frames with equal cameras only one
+/// is made, their *representative*; the others are copies of it.
 pub trait FrameGraph {
-    /// The original that `frame` shows: itself unless another frame is the same picture.
-    fn original(&self, frame: u32) -> u32 {
+    /// The frame of which `frame` is a copy, or `frame` itself.
+    fn representative(&self, frame: u32) -> u32 {
         frame
     }
 
-    /// The originals whose references an original is made from.
-    fn needs(&self, _original: u32) -> Vec<u32> {
+    /// The representatives whose references a representative is inferred from.
+    fn needs(&self, _representative: u32) -> Vec<u32> {
         Vec::new()
     }
 
@@ -25,14 +25,14 @@ pub trait FrameGraph {
         frames.iter().map(|frame| vec![*frame]).collect()
     }
 
-    /// `originals` (ascending) in the best order for several ranks, cut into lists that one rank makes
+    /// `representatives` (ascending) in the best order for several ranks, cut into lists that one rank makes
     /// each.
-    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
-        self.batches(originals)
+    fn rank_batches(&self, representatives: &[u32]) -> Vec<Vec<u32>> {
+        self.batches(representatives)
     }
 
-    /// Whether an earlier job left the reference of an original on disk, so that it is read, not made.
-    fn is_on_disk(&self, _original: u32) -> bool {
+    /// Whether an earlier job left the reference of a representative on disk, so that it is read, not made.
+    fn is_on_disk(&self, _representative: u32) -> bool {
         false
     }
 
@@ -52,7 +52,7 @@ pub trait FrameMaker: FrameGraph {
     /// Makes frame `frame` (from 1).
     ///
     /// # Errors
-    /// [`Stopped`](crate::error::Error::Stopped) when the job was asked to stop; those of cameras and
+    /// [`Stopped`](crate::error::Error::Stopped) when the job was asked to stop; errors of cameras and
     /// references.
     fn make(&self, frame: u32) -> Result<Made>;
 
@@ -83,42 +83,41 @@ pub trait FrameMaker: FrameGraph {
 /// References and strips travel as bytes that only makers of the same job understand. A maker that
 /// lacks a reference makes it itself, so the frames do not depend on what arrives.
 pub trait RankMaker: FrameMaker + Sync {
-    /// Keeps the reference of `original`, once it is made, until [`release`](Self::release).
-    fn hold(&self, _original: u32) {}
+    /// Keeps the reference of `representative`, once it is made, until [`release`](Self::release).
+    fn hold(&self, _representative: u32) {}
 
-    /// Drops a reference that was held or imported, as far as no frame of this rank needs it.
-    fn release(&self, _original: u32) {}
+    /// Drops a reference that was held or imported, once no frame of this rank needs it.
+    fn release(&self, _representative: u32) {}
 
-    /// Makes the reference of `original`, and no frame.
+    /// Makes the reference of `representative`, and no frame.
     ///
     /// # Errors
     /// As for [`FrameMaker::make`].
-    fn make_reference(&self, _original: u32) -> Result<()> {
+    fn make_reference(&self, _representative: u32) -> Result<()> {
         Ok(())
     }
 
-    /// The bytes of the reference of `original`, which is held and was just made; once.
-    fn export(&self, _original: u32) -> Option<Exported> {
+    /// The bytes of the reference of `representative`, which is held and was just made. They are returned once.
+    fn export(&self, _representative: u32) -> Option<Exported> {
         None
     }
 
-    /// Takes in and holds the reference of `original` that another rank exported.
-    fn import(&self, _original: u32, _bytes: &[u8]) {}
+    /// Takes in and holds the reference of `representative` that another rank exported.
+    fn import(&self, _representative: u32, _bytes: &[u8]) {}
 
-    /// Renders one strip of an original, as bytes for [`join_strips`](Self::join_strips).
+    /// Renders one strip of a frame, as bytes for [`join_strips`](Self::join_strips).
     ///
     /// # Errors
     /// As for [`FrameMaker::make`].
-    fn render_strip(&self, _original: u32, _strip: Strip) -> Result<Vec<u8>> {
+    fn render_strip(&self, _representative: u32, _strip: Strip) -> Result<Vec<u8>> {
         Ok(Vec::new())
     }
 
-    /// Takes all strips of an original, in order, which [`FrameMaker::make`] then uses in place of
-    /// rendering.
+    /// Takes all strips of a frame, in order. [`FrameMaker::make`] then uses them instead of rendering.
     ///
     /// # Errors
-    /// They are no strips of a frame of this job.
-    fn join_strips(&self, _original: u32, _strips: &[Arc<[u8]>]) -> Result<()> {
+    /// The strips do not belong to a frame of this job.
+    fn join_strips(&self, _representative: u32, _strips: &[Arc<[u8]>]) -> Result<()> {
         Ok(())
     }
 }
@@ -126,7 +125,7 @@ pub trait RankMaker: FrameMaker + Sync {
 /// A reference as it is sent to other ranks.
 #[derive(Debug, Clone, Default)]
 pub struct Exported {
-    /// For [`RankMaker::import`].
+    /// The encoded reference, for [`RankMaker::import`].
     pub bytes: Arc<[u8]>,
     /// How many discoveries (traced points or pixels) the bytes hold.
     pub discoveries: u64,
@@ -141,7 +140,7 @@ pub struct SaveCost {
     pub bytes: u64,
 }
 
-/// A frame as it was made.
+/// A frame that was made.
 pub struct Made {
     /// The picture.
     pub film: Film,
@@ -156,7 +155,7 @@ pub struct Made {
 }
 
 impl Made {
-    /// The same frame again: no ray was cast for it, and all of it was known.
+    /// A copy of the frame, which took no rays and counts all its points as inferred.
     pub(super) fn copy(&self) -> Self {
         let reuse = ReuseCounts {
             direct_inferred: self.reuse.direct,

@@ -1,11 +1,11 @@
 //! One frame after another: camera, film, whole file, manifest row.
 //!
-//! [`prepare`] looks at what is on disk and decides which frames are kept and which rendered;
-//! [`render_frames`] renders some of these, in order. What makes a film is a parameter
+//! [`prepare`] reads the files on disk and decides which frames are kept and which are rendered;
+//! [`render_frames`] renders some of these, in order. The maker of films is a parameter
 //! ([`FrameMaker`]): [`Tracer`] traces every frame, [`SurfaceReuse`] and [`ColourMaker`] infer. All three
-//! are made of one [`FrameContext`]; the references of the two that infer lie in one kind of pool.
-//! [`checkpoint`] keeps references on disk; [`survey`] says which frames of a sequence are there. A row
-//! follows the rename of its frame, so whatever moment the job ends at, rows name whole frames only.
+//! have a [`FrameContext`]; the two that infer keep their references in a pool.
+//! [`checkpoint`] writes references to disk; [`survey`] reports the state of each frame of a sequence. A row
+//! is written after the rename of its frame, so rows always name whole frames, whenever the job ends.
 //!
 //! Not done: writing a frame does not overlap tracing the next; every frame is traced alone.
 
@@ -56,7 +56,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// What a finished frame took.
+/// The costs and counts of a finished frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameReport {
     /// Frame number, from 1.
@@ -69,10 +69,10 @@ pub struct FrameReport {
     pub bytes: u64,
     /// Rays cast.
     pub rays: RayCounts,
-    /// How much was inferred.
+    /// Surface points inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
-    /// How good the inferred part is.
+    /// The audit of the inferred pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditRow>,
     /// Invalid camera samples.
@@ -81,9 +81,9 @@ pub struct FrameReport {
 }
 
 /// Renders `frames` in order into `target` as rank `rank`; rows go to the journal at `journal`.
-/// `done` hears of each finished frame. Ends early, without an error, when `maker` was asked to stop.
+/// `done` is called with each finished frame. Ends early, without an error, when `maker` was asked to stop.
 ///
-/// Errors: whatever making or writing a frame met; the frames before it are finished.
+/// Errors: those of making or writing a frame; the frames before it are finished.
 pub fn render_frames(
     target: &Target,
     frames: &[u32],
@@ -107,10 +107,10 @@ pub fn render_frames(
     Ok(())
 }
 
-/// Renders `frame` into `target`, its row, as one of rank `rank`, into `journal`.
+/// Renders `frame` into `target` and appends its row, of rank `rank`, to `journal`.
 ///
 /// # Errors
-/// Whatever making or writing the frame met.
+/// Errors of making or writing the frame.
 pub fn render_frame(
     target: &Target,
     frame: u32,
@@ -128,7 +128,7 @@ pub fn render_frame(
     Ok(FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })
 }
 
-/// What an audit found, with the figures that it amounts to.
+/// The row of an audit: its sums, and the errors that follow from them.
 pub fn audit_row(sums: &AuditSums) -> AuditRow {
     let of = |i: crate::measure::Interval| [i.estimate, i.low, i.high];
     let rmse = rmse(sums);
@@ -140,12 +140,12 @@ pub fn audit_row(sums: &AuditSums) -> AuditRow {
     }
 }
 
-/// Writes the frame's file whole; gives its row.
+/// Writes the frame's file and maps; returns its row.
 fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Result<Row> {
     let Made { film, rays, reuse, .. } = made;
     let path = target.pattern.path(frame);
     let attribute = made.reference.as_ref().map(|bytes| (ATTRIBUTE, bytes.clone()));
-    // No frame number: a still camera is to give the same bytes in every frame.
+    // The file has no frame number, so that a still camera gives the same bytes in every frame.
     let options = WriteOptions { attribute, ..target.write.clone() };
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut maps = Vec::new();
@@ -166,7 +166,7 @@ fn write_frame(target: &Target, frame: u32, made: &Made, start: Instant) -> Resu
         blake3: written.hash.to_hex().to_string(),
         bytes: written.bytes,
         seconds: start.elapsed().as_secs_f64(),
-        // A clock before 1970 tells no time.
+        // `None` if the clock is before 1970.
         ended: SystemTime::now().duration_since(UNIX_EPOCH).ok().map(|t| t.as_secs_f64()),
         rank: 0,
         rays: *rays,

@@ -1,8 +1,8 @@
-//! The references of a running job: each in memory as long as a frame to come is inferred from it, and until
-//! then what of it waits to be written to disk or sent to other ranks.
+//! The references of a running job. Each stays in memory as long as later frames are inferred from it, with its
+//! bytes for disk and for other ranks until these are taken.
 //!
-//! References of earlier jobs (`--reference`) are not here but in [`ReferenceCache`](super::ReferenceCache):
-//! no frame of this job makes them, and room decides which of them stay.
+//! References of earlier jobs (`--references`) are in a [`ReferenceCache`](super::ReferenceCache) instead: this job
+//! does not make them, and a limit of memory decides which of them stay.
 
 use super::SaveCost;
 use super::checkpoint::Checkpoints;
@@ -11,22 +11,22 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Longest time for which a job that shall stop goes on writing references.
+/// Longest time for which a job that was asked to stop still writes references.
 const LONGEST_SAVE_AT_STOP: Duration = Duration::from_secs(5);
 
-/// References `T` by original, which reach the disk as the bytes of an `S`.
+/// References of type `T` by representative frame; an `S` holds what is written of a reference to disk.
 #[derive(Debug)]
 pub(super) struct ReferencePool<T, S = Arc<[u8]>> {
-    /// By original: how often it is still asked for as a frame.
+    /// By representative: how many frames (it and its copies) are still to be returned.
     asked: BTreeMap<u32, u32>,
-    /// By original: how many frames to come are inferred from it, or other ranks hold it.
+    /// By representative: how many later frames are inferred from it, plus one for each hold of other ranks.
     uses: BTreeMap<u32, u32>,
-    /// Originals in use whose reference is not made yet.
+    /// Representatives in use whose reference is not made yet.
     due: BTreeSet<u32>,
     held: BTreeMap<u32, Held<T, S>>,
-    /// Originals whose reference lies on disk.
+    /// Representatives whose reference is on disk.
     on_disk: BTreeSet<u32>,
-    /// When references were last written, or the job began.
+    /// Time of the last writing, or of the job's start.
     last_save: Instant,
     pub save_cost: SaveCost,
     /// The most memory that references took at a time, bytes.
@@ -37,9 +37,9 @@ pub(super) struct ReferencePool<T, S = Arc<[u8]>> {
 #[derive(Debug)]
 struct Held<T, S> {
     reference: T,
-    /// What is to be written to disk, until it is.
+    /// Data to be written to disk; `None` once it is written.
     unsaved: Option<S>,
-    /// The bytes for other ranks, until they are fetched.
+    /// The bytes for other ranks; `None` once they are taken.
     export: Option<Arc<[u8]>>,
 }
 
@@ -59,18 +59,18 @@ impl<T, S> Default for ReferencePool<T, S> {
 }
 
 impl<T, S> ReferencePool<T, S> {
-    /// Announces that `frames` will be asked for.
+    /// Announces that `frames` will be made.
     pub fn expect(&mut self, schedule: &Schedule, frames: &[u32]) {
         for frame in frames {
-            let original = schedule.original(*frame);
-            *self.asked.entry(original).or_default() += 1;
-            self.use_ancestors(schedule, original);
+            let representative = schedule.representative(*frame);
+            *self.asked.entry(representative).or_default() += 1;
+            self.use_ancestors(schedule, representative);
         }
     }
 
-    /// Announces `frame` unless that was done already.
+    /// Announces `frame`, unless it was announced already.
     pub fn expect_once(&mut self, schedule: &Schedule, frame: u32) {
-        if self.asked(schedule.original(frame)) == 0 {
+        if self.asked(schedule.representative(frame)) == 0 {
             self.expect(schedule, &[frame]);
         }
     }
@@ -88,80 +88,83 @@ impl<T, S> ReferencePool<T, S> {
         }
     }
 
-    /// Keeps the reference of `original`, which other ranks need, until [`release`](Self::release).
-    pub fn hold(&mut self, schedule: &Schedule, original: u32) {
-        *self.uses.entry(original).or_default() += 1;
-        if !self.held.contains_key(&original) && self.due.insert(original) {
-            self.use_ancestors(schedule, original);
+    /// Keeps the reference of `representative`, which other ranks need, until [`release`](Self::release).
+    pub fn hold(&mut self, schedule: &Schedule, representative: u32) {
+        *self.uses.entry(representative).or_default() += 1;
+        if !self.held.contains_key(&representative) && self.due.insert(representative) {
+            self.use_ancestors(schedule, representative);
         }
     }
 
-    /// Takes in and holds a reference that another rank made.
-    pub fn import(&mut self, original: u32, reference: T) {
-        *self.uses.entry(original).or_default() += 1;
-        self.held.entry(original).or_insert(Held { reference, unsaved: None, export: None });
+    /// Keeps a reference that another rank made, until [`release`](Self::release).
+    pub fn import(&mut self, representative: u32, reference: T) {
+        *self.uses.entry(representative).or_default() += 1;
+        self.held.entry(representative).or_insert(Held { reference, unsaved: None, export: None });
     }
 
-    /// Ends one use of `original`: the last one drops its reference.
-    pub fn release(&mut self, schedule: &Schedule, original: u32) {
-        let Some(uses) = self.uses.get_mut(&original) else { return };
+    /// Ends one use of the reference of `representative`; the end of the last use drops it.
+    pub fn release(&mut self, schedule: &Schedule, representative: u32) {
+        let Some(uses) = self.uses.get_mut(&representative) else { return };
         *uses -= 1;
         if *uses == 0 {
-            self.uses.remove(&original);
-            self.held.remove(&original);
-            if self.due.remove(&original) {
-                // All that would be made from it came from elsewhere, so it was never made.
-                self.release_ancestors(schedule, original);
+            self.uses.remove(&representative);
+            self.held.remove(&representative);
+            if self.due.remove(&representative) {
+                // It was never made: all frames that need it came from elsewhere.
+                self.release_ancestors(schedule, representative);
             }
         }
     }
 
-    fn release_ancestors(&mut self, schedule: &Schedule, original: u32) {
-        schedule.ancestors(original).into_iter().for_each(|other| self.release(schedule, other));
+    fn release_ancestors(&mut self, schedule: &Schedule, representative: u32) {
+        schedule
+            .ancestors(representative)
+            .into_iter()
+            .for_each(|other| self.release(schedule, other));
     }
 
-    /// How often an original is still asked for as a frame.
-    pub fn asked(&self, original: u32) -> u32 {
-        self.asked.get(&original).copied().unwrap_or(0)
+    /// How many frames, the representative and its copies, are still to be returned.
+    pub fn asked(&self, representative: u32) -> u32 {
+        self.asked.get(&representative).copied().unwrap_or(0)
     }
 
-    /// The reference of an original, if it is in memory.
-    pub fn get(&self, original: u32) -> Option<&T> {
-        self.held.get(&original).map(|held| &held.reference)
+    /// The reference of a representative, if it is in memory.
+    pub fn get(&self, representative: u32) -> Option<&T> {
+        self.held.get(&representative).map(|held| &held.reference)
     }
 
-    /// Whether a reference is in use that is not made yet.
-    pub fn is_due(&self, original: u32) -> bool {
-        self.due.contains(&original)
+    /// Whether the reference is in use and not made yet.
+    pub fn is_due(&self, representative: u32) -> bool {
+        self.due.contains(&representative)
     }
 
-    /// The originals whose references are in memory.
+    /// The representatives whose references are in memory.
     pub fn held(&self) -> impl Iterator<Item = u32> {
         self.held.keys().copied()
     }
 
-    /// Keeps the reference of an original that was just made or read, where it is due.
-    pub fn keep(&mut self, schedule: &Schedule, original: u32, make: impl FnOnce() -> T) {
-        if self.due.remove(&original) {
+    /// Keeps the reference of a representative that was just made or read, if it is in use.
+    pub fn keep(&mut self, schedule: &Schedule, representative: u32, make: impl FnOnce() -> T) {
+        if self.due.remove(&representative) {
             let held = Held { reference: make(), unsaved: None, export: None };
-            self.held.insert(original, held);
-            self.release_ancestors(schedule, original);
+            self.held.insert(representative, held);
+            self.release_ancestors(schedule, representative);
         }
     }
 
-    /// Notes that an original was handed out as a frame.
-    pub fn done(&mut self, schedule: &Schedule, original: u32) {
-        if let Some(asked) = self.asked.get_mut(&original) {
+    /// Notes that a frame with this representative was returned.
+    pub fn done(&mut self, schedule: &Schedule, representative: u32) {
+        if let Some(asked) = self.asked.get_mut(&representative) {
             *asked -= 1;
             if *asked == 0 {
-                self.asked.remove(&original);
+                self.asked.remove(&representative);
             }
-            self.release_ancestors(schedule, original);
+            self.release_ancestors(schedule, representative);
         }
     }
 
-    /// Updates [`most_memory`](Self::most_memory); `size` gives the bytes of a reference, and of what is to be
-    /// written of it.
+    /// Updates [`most_memory`](Self::most_memory); `size` returns the bytes of a reference and of its unsaved
+    /// data.
     pub fn note_memory(&mut self, size: impl Fn(&T, Option<&S>) -> u64) {
         let held = self.held.values();
         let memory = held.map(|held| size(&held.reference, held.unsaved.as_ref())).sum();
@@ -169,36 +172,37 @@ impl<T, S> ReferencePool<T, S> {
     }
 
     /// Keeps the bytes of a reference for other ranks.
-    pub fn set_export(&mut self, original: u32, bytes: Arc<[u8]>) {
-        self.held.entry(original).and_modify(|held| held.export = Some(bytes));
+    pub fn set_export(&mut self, representative: u32, bytes: Arc<[u8]>) {
+        self.held.entry(representative).and_modify(|held| held.export = Some(bytes));
     }
 
-    /// The bytes of a reference for other ranks, once.
-    pub fn take_export(&mut self, original: u32) -> Option<Arc<[u8]>> {
-        self.held.get_mut(&original)?.export.take()
+    /// Takes the bytes of a reference for other ranks.
+    pub fn take_export(&mut self, representative: u32) -> Option<Arc<[u8]>> {
+        self.held.get_mut(&representative)?.export.take()
     }
 
-    /// Sets what is to be written of a reference; `None` where that lies in a file already.
-    pub fn set_unsaved(&mut self, original: u32, unsaved: Option<S>) {
-        self.held.entry(original).and_modify(|held| held.unsaved = unsaved);
+    /// Sets the data to be written of a reference; `None` if a file holds it already.
+    pub fn set_unsaved(&mut self, representative: u32, unsaved: Option<S>) {
+        self.held.entry(representative).and_modify(|held| held.unsaved = unsaved);
     }
 
-    /// Notes that a reference lies on disk.
-    pub fn note_on_disk(&mut self, original: u32) {
-        self.on_disk.insert(original);
+    /// Notes that a reference is on disk.
+    pub fn note_on_disk(&mut self, representative: u32) {
+        self.on_disk.insert(representative);
     }
 
-    /// All that is to be written, if the last time is `every` ago.
+    /// Takes all unsaved data if the last writing was at least `every` ago.
     fn take_unsaved(&mut self, now: Instant, every: Duration) -> Vec<(u32, S)> {
         if now.duration_since(self.last_save) < every {
             return Vec::new();
         }
         self.last_save = now;
         let held = self.held.iter_mut();
-        held.filter_map(|(original, held)| Some((*original, held.unsaved.take()?))).collect()
+        held.filter_map(|(representative, held)| Some((*representative, held.unsaved.take()?)))
+            .collect()
     }
 
-    /// The originals whose reference lies on disk although no frame to come needs it; once.
+    /// Takes the representatives whose reference is on disk and no longer needed.
     fn take_expired(&mut self) -> Vec<u32> {
         let held = &self.held;
         let expired = self.on_disk.iter().copied().filter(|f| !held.contains_key(f));
@@ -216,7 +220,7 @@ impl Schedule {
         let ordered = self.pyramid.order(frames);
         pool.expect(self, &ordered);
         for frame in ordered {
-            let mut wanted = vec![self.original(frame)];
+            let mut wanted = vec![self.representative(frame)];
             while let Some(next) = wanted.pop() {
                 let missing = self.ancestors(next).into_iter().find(|f| pool.get(*f).is_none());
                 match missing {
@@ -227,7 +231,7 @@ impl Schedule {
                     pool.held().partition(|f| self.pyramid.is_key(*f));
                 most = (most.0.max(keys.len()), most.1.max(others.len()));
             }
-            pool.done(self, self.original(frame));
+            pool.done(self, self.representative(frame));
         }
         most
     }
@@ -247,9 +251,9 @@ impl<T, S> SharedPool<T, S> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes unsaved references, as `encode` makes bytes of them, where that is due, all of them where the
-    /// job shall stop, and removes from disk what no frame to come needs. Where one cannot be written the
-    /// job goes on without: references on disk only save time after a kill.
+    /// Writes unsaved references, encoded by `encode`, if the interval has passed or the job is to stop. Removes
+    /// references from disk that no later frame needs. If one cannot be written, the job goes on, since
+    /// references on disk only save time after a kill.
     pub fn save(
         &self,
         checkpoints: Option<&Checkpoints>,
@@ -262,21 +266,21 @@ impl<T, S> SharedPool<T, S> {
         let start = Instant::now();
         let every = if is_stopping { Duration::ZERO } else { every };
         let unsaved = self.lock().take_unsaved(start, every);
-        for (original, unsaved) in unsaved {
+        for (representative, unsaved) in unsaved {
             if is_stopping && start.elapsed() > LONGEST_SAVE_AT_STOP {
                 break;
             }
             let Some(bytes) = encode(&unsaved) else { continue };
-            if let Err(why) = checkpoints.write(original, &bytes) {
+            if let Err(why) = checkpoints.write(representative, &bytes) {
                 checkpoints.note_unwritten(&why);
                 continue;
             }
             let mut pool = self.lock();
-            pool.note_on_disk(original);
+            pool.note_on_disk(representative);
             pool.save_cost.bytes += bytes.len() as u64;
         }
         let expired = self.lock().take_expired();
-        expired.into_iter().for_each(|original| checkpoints.remove(original));
+        expired.into_iter().for_each(|representative| checkpoints.remove(representative));
         self.lock().save_cost.seconds += start.elapsed().as_secs_f64();
     }
 }
@@ -295,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn references_are_few() {
+    fn few_references_are_held_at_a_time() {
         let schedule = schedule(64, 1000);
         let all: Vec<u32> = (1..=1000).collect();
         let (keys, others) = schedule.most_held(&all);
@@ -319,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_for_others_stays_until_it_is_released() {
+    fn references_held_for_other_ranks_stay_until_released() {
         let schedule = schedule(4, 9);
         let (frame, ancestors) = (2, schedule.ancestors(2));
         let mut pool = ReferencePool::default();
@@ -335,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_for_disk_or_ranks_is_given_once_and_goes_with_its_reference() {
+    fn bytes_for_disk_and_ranks_are_taken_once_and_dropped_with_their_reference() {
         let schedule = schedule(2, 3);
         let mut pool = ReferencePool::<(), u8>::default();
         pool.set_unsaved(1, Some(1));

@@ -2,12 +2,12 @@
 //!
 //! The shot is cut into segments of a fixed number of frames, whose ends are key frames. Inside,
 //! the middle frame is inferred from both ends, then the quarters from these three, and so on. So
-//! a frame depends on its segment's ends and a handful of frames between, whoever renders it and
-//! whatever else is rendered.
+//! a frame depends on its segment's ends and a handful of frames between, whichever rank renders it and
+//! whichever other frames are rendered.
 
 use std::ops::RangeInclusive;
 
-/// The segments of a shot.
+/// The segments of a shot, and which of its frames are inferred from which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pyramid {
     /// Frames from one key frame to the next.
@@ -27,7 +27,7 @@ impl Pyramid {
         (frame - 1) % self.segment == 0 || frame == self.frames
     }
 
-    /// Number of the segment that `frame` lies in; a key frame belongs to the one that it ends, whose
+    /// Number of the segment of `frame`, from 0; a key frame belongs to the segment that it ends, whose
     /// frames need it first.
     pub fn segment_of(&self, frame: u32) -> u32 {
         frame.saturating_sub(2) / self.segment
@@ -69,8 +69,7 @@ impl Pyramid {
         ordered
     }
 
-    /// Where a frame stands among those of its segment: the frames that it comes after lie before
-    /// it in the order of places.
+    /// Sort key of a frame in its segment: frames sorted by it come after the frames that they need.
     fn place(&self, frame: u32) -> Vec<bool> {
         if self.is_key(frame) {
             return Vec::new();
@@ -103,7 +102,7 @@ impl Pyramid {
         frames
     }
 
-    /// How many key frames there are.
+    /// Number of key frames.
     pub fn keys(&self) -> u32 {
         self.frames.saturating_sub(1).div_ceil(self.segment) + self.frames.min(1)
     }
@@ -121,8 +120,8 @@ impl Pyramid {
         segments.map(<[u32]>::to_vec).collect()
     }
 
-    /// The same, but a key frame lies in the list of the segment that it starts, in front. So where
-    /// each list is made by another rank, nobody waits for what another makes last.
+    /// Like [`batches`](Self::batches), but a key frame is the first of the list of the segment that it starts. So
+    /// if each list is made by another rank, no rank waits for a frame that another makes last.
     pub fn rank_batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         let started = |frame: &u32| (frame - 1) / self.segment;
         let mut ordered = self.order(frames);
@@ -136,7 +135,7 @@ impl Pyramid {
     }
 }
 
-/// The frames between, each after its ancestors.
+/// Appends the frames between `low` and `high` to `frames`, each after its ancestors.
 fn between(low: u32, high: u32, frames: &mut Vec<u32>) {
     if high - low > 1 {
         let middle = middle(low, high);

@@ -1,9 +1,8 @@
-//! What each frame is made of: all that its bytes are a function of beside world and settings.
+//! The recipe of a frame: all that its bytes depend on besides world and settings.
 //!
-//! That is its number and camera, and the numbers and cameras of all frames that it is inferred from,
-//! and of those that these are inferred from; and which frame is in the middle of its segment, where what
-//! is allowed there is found out. A longer shot changes few of them, so that its finished frames can be
-//! told from those that must be made again.
+//! A recipe has the number and camera of the frame, and the numbers and cameras of all frames that it is
+//! inferred from, directly or through other frames. A longer shot changes few recipes, so the other
+//! finished frames can be kept.
 
 use super::schedule::Schedule;
 use crate::error::Result;
@@ -15,7 +14,7 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tag([u8; 16]);
 
-/// Hashes of all that a frame's bytes are a function of, beside world and settings.
+/// Hashes of all that a frame's bytes depend on, besides world and settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Recipe {
     /// Hash of number and camera, and of the camera before where the frame's file holds motion.
@@ -29,8 +28,8 @@ pub struct Recipe {
 pub struct Recipes(Vec<Recipe>);
 
 impl Recipes {
-    /// The recipes of all frames of `shot` under `settings`. `keeps_light` says whether frames have anything to look up in
-    /// one another, `with_motion` whether files hold the motion since the frame before.
+    /// The recipes of all frames of `shot` under `settings`. `keeps_light` says whether some light is worth a lookup,
+    /// `with_motion` whether files hold the motion since the frame before.
     ///
     /// Errors: as [`Shot::camera`].
     pub fn new(
@@ -48,7 +47,7 @@ impl Recipes {
             let before = cameras[..at].last().filter(|_| with_motion);
             let own = number_and_camera(frame, &cameras[at]);
             let view = Tag::of([own, before.map_or(Tag::default(), |c| number_and_camera(0, c))]);
-            let whole = Tag::of([view, sources[schedule.original(frame) as usize - 1]]);
+            let whole = Tag::of([view, sources[schedule.representative(frame) as usize - 1]]);
             Recipe { view, whole }
         };
         Ok(Self((1..=shot.frames).into_par_iter().map(recipe).collect()))
@@ -60,7 +59,7 @@ impl Recipes {
     }
 }
 
-/// For each original, by frame, the hash of all that its traced points are a function of.
+/// For each representative, by frame, the hash of all that its traced points depend on.
 fn sources(schedule: &Schedule, cameras: &[Camera]) -> Vec<Tag> {
     let mut tags = vec![Tag::default(); cameras.len()];
     for frame in schedule.by_need() {
@@ -105,7 +104,7 @@ mod tests {
     use crate::math::DVec3;
     use crate::scene::{CameraPath, KeyPose, Policy, Pose, ReuseSettings};
 
-    /// A key pose a frame, as a program exports them.
+    /// A move with one key pose per frame, as other programs export it.
     fn shot(frames: u32) -> Shot {
         let key = |i: u32| {
             let eye = DVec3::new(0.3 * f64::from(i), 2.0, 9.0);
@@ -160,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_counts_where_files_hold_it() {
+    fn recipes_include_motion_if_files_hold_it() {
         let with = recipes(20, Policy::Off);
         let without = Recipes::new(&shot(20), &settings(Policy::Off), true, false);
         assert_eq!(same(&with, &without.expect("good cameras"), |r| r.view), [1]);

@@ -1,4 +1,4 @@
-//! What a sequence already holds on disk, and what that leaves to render.
+//! Which frames of a sequence are finished on disk, and which are left to render.
 
 mod refuse;
 
@@ -22,30 +22,30 @@ use std::path::{Path, PathBuf};
 /// Which frames of a job are kept and which rendered.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Frames that exist whole, with the same settings, made of the same.
+    /// Frames that exist whole, of the same settings and recipe.
     pub kept: Vec<u32>,
-    /// Kept frames with invalid samples, and how many.
+    /// Kept frames with invalid samples, with their numbers of samples.
     pub kept_bad: Vec<(u32, BadSamples)>,
-    /// What the audits of the kept frames found, if any was audited.
+    /// Sums of the audits of the kept frames, if any was audited.
     pub kept_audit: Option<AuditSums>,
     /// Frames to render.
     pub render: Vec<u32>,
-    /// What the user should know: damaged frames, and others that are rendered again.
+    /// Notes for the user about frames that are rendered again, damaged ones and others.
     pub notes: Vec<String>,
 }
 
 /// Decides which of `frames` are rendered, and makes the manifest ready for their rows.
 ///
-/// A frame whose camera is the same, but not what it is inferred from, is rendered again: a longer
-/// shot goes on where a shorter one ended.
+/// A frame with the same camera that is inferred from other frames than before is rendered again, as
+/// happens when a shot gets longer.
 ///
-/// Errors: `Error::Usage` where frames or references of other settings, or frames of another camera
-/// move or of unknown origin, are in the way and `target` does not say to replace them.
+/// Errors: `Error::Usage` if there are frames or references of other settings, or frames of another
+/// camera move or without a row, and `target` does not say to replace them.
 pub fn prepare(target: &Target, frames: FrameRange) -> Result<Plan> {
     prepare_with(target, frames, None)
 }
 
-/// [`prepare`], with what [`check_files`] found where that is known.
+/// [`prepare`], with the results of [`check_files`] if they are known.
 ///
 /// # Errors
 /// As [`prepare`].
@@ -61,13 +61,13 @@ pub fn prepare_with(
     Ok(plan)
 }
 
-/// The hashes of the files of a frame and its maps, as they lie on disk.
+/// Hashes of the files of a frame and its maps on disk.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FrameFiles {
     frame: u32,
     /// Hash of the frame's file; `None` where there is none.
     hash: Option<String>,
-    /// Names of its maps, with their hashes.
+    /// Names of the frame's maps, with their hashes.
     maps: Vec<(String, String)>,
 }
 
@@ -90,7 +90,7 @@ pub fn has_frames_to_check(target: &Target) -> Result<bool> {
 pub fn check_files(target: &Target, frames: Range<u32>) -> Result<Vec<FrameFiles>> {
     let found: Vec<Result<FrameFiles>> =
         frames.into_par_iter().map(|frame| check_file(target, frame)).collect();
-    // Of several faults the first frame's is reported, whichever thread was quicker.
+    // Of several errors the first frame's is returned, whichever thread was quicker.
     found.into_iter().collect()
 }
 
@@ -160,7 +160,7 @@ fn plan(
     Ok(plan)
 }
 
-/// Says in the manifest which of its frames are not of this shot, where that is new.
+/// Marks the manifest's rows of frames that are not of this shot, if any mark has changed.
 fn mark_strays(target: &Target, before: &Header, rows: &BTreeMap<u32, Row>) -> Result<()> {
     let same_shot = before.shot_hash == target.header.shot_hash;
     if same_shot && rows.values().all(|row| marked(target, row) == *row) {
@@ -190,11 +190,11 @@ enum State {
     Whole(BadSamples, Option<AuditSums>),
     Missing,
     Damaged(Damage),
-    /// Seen by the same camera, but inferred from other frames.
+    /// Whole and of the same camera, but inferred from other frames than it would be now.
     Outdated,
 }
 
-/// Why a file that is there is rendered again.
+/// Why a frame whose file exists is rendered again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Damage {
     Unlisted,
@@ -203,8 +203,8 @@ enum Damage {
 }
 
 impl Damage {
-    /// A line about frame `first` and `more` others: of a job that was stopped while it replaced frames,
-    /// all that it did not get to are not in the manifest.
+    /// A note about frame `first` and `more` others. (If a job was stopped while it replaced frames, the frames
+    /// that it had not yet replaced are not in the manifest.)
     fn note(self, first: &Path, more: usize) -> String {
         let why = match (self, more) {
             (Self::Unlisted, 0) => "is not in the manifest",
@@ -242,13 +242,13 @@ fn state(
     })
 }
 
-/// Whether all maps of a frame are there, as they were written.
+/// Whether all maps of a frame exist and have the hashes in its row.
 fn has_maps(found: &FrameFiles, row: &Row) -> bool {
     let is_whole = |map: &MapRow| found.maps.contains(&(map.file.clone(), map.blake3.clone()));
     row.maps.len() == Map::ALL.len() && row.maps.iter().all(is_whole)
 }
 
-/// Frames of another sequence that a job over `frames` does not replace.
+/// Rows of frames of another sequence that a job over `frames` does not replace.
 fn left_over(target: &Target, manifest: &Manifest, frames: FrameRange) -> Vec<Row> {
     let folder = target.pattern.folder();
     let stays = |row: &&Row| {

@@ -1,9 +1,10 @@
-//! Which frames a job needs, what each is made of, and how long each is held for others.
+//! Which frames a job needs, and which frames each is inferred from.
 //!
-//! Frames with bit for bit the same camera are one frame, their *original*: the first of them in the
-//! order in which a job of all frames needs them. That order puts a frame after all that it is
-//! inferred from, so no frame is ever inferred from itself, however often a camera comes back; and a
-//! longer shot only adds to its end.
+//! Of frames whose cameras are equal bit for bit only one is rendered, their *representative*; the
+//! others are copies of it. The representative is the first of them in the order in which a job of
+//! all frames needs them. That order puts a frame after all that it is inferred from, so no frame is
+//! inferred from itself, even where the camera returns to an earlier pose. A longer shot only adds
+//! frames to the end of the order.
 
 use super::pyramid::Pyramid;
 use crate::error::Result;
@@ -14,12 +15,12 @@ use std::collections::{BTreeMap, HashMap};
 #[derive(Debug, Clone)]
 pub struct Schedule {
     pub(super) pyramid: Pyramid,
-    /// Frames that are copies, with their originals.
+    /// Copies, each with its representative.
     copies: BTreeMap<u32, u32>,
 }
 
 impl Schedule {
-    /// Which frames of `shot` the makers infer from which; `keeps_light`: some light is worth a lookup.
+    /// The schedule of `shot` for the maker of its policy; `keeps_light` says whether some light is worth a lookup.
     ///
     /// Errors: as [`Shot::camera`].
     pub fn of_shot(shot: &Shot, settings: &Settings, keeps_light: bool) -> Result<Self> {
@@ -40,9 +41,9 @@ impl Schedule {
         let mut first = HashMap::new();
         let mut copies = BTreeMap::new();
         for frame in pyramid.by_need() {
-            let original = *first.entry(shot.camera(frame, 1, 1)?.encode()).or_insert(frame);
-            if original != frame {
-                copies.insert(frame, original);
+            let representative = *first.entry(shot.camera(frame, 1, 1)?.encode()).or_insert(frame);
+            if representative != frame {
+                copies.insert(frame, representative);
             }
         }
         Ok(Self { pyramid, copies })
@@ -58,16 +59,16 @@ impl Schedule {
         self.pyramid.by_need()
     }
 
-    /// The original that `frame` shows: itself unless another frame has its camera.
-    pub fn original(&self, frame: u32) -> u32 {
+    /// The frame of which `frame` is a copy, or `frame` itself.
+    pub fn representative(&self, frame: u32) -> u32 {
         self.copies.get(&frame).copied().unwrap_or(frame)
     }
 
-    /// The originals that an original is inferred from: the segment's ends first.
-    pub fn ancestors(&self, original: u32) -> Vec<u32> {
+    /// The representatives that a representative is inferred from, the segment's ends first.
+    pub fn ancestors(&self, representative: u32) -> Vec<u32> {
         let mut ancestors = Vec::new();
-        for other in self.pyramid.ancestors(original) {
-            let other = self.original(other);
+        for other in self.pyramid.ancestors(representative) {
+            let other = self.representative(other);
             if !ancestors.contains(&other) {
                 ancestors.push(other);
             }
@@ -75,13 +76,13 @@ impl Schedule {
         ancestors
     }
 
-    /// How many frames are traced whole: key frames that are their own originals.
+    /// How many frames are traced whole: key frames that are no copies.
     pub fn key_frames(&self) -> u32 {
         let copies = self.copies.keys().filter(|frame| self.pyramid.is_key(**frame)).count();
         self.pyramid.keys() - copies as u32
     }
 
-    /// How many frames are not their own originals.
+    /// How many frames are copies.
     pub fn copies(&self) -> u32 {
         self.copies.len() as u32
     }
@@ -106,7 +107,7 @@ mod tests {
         Schedule::new(pyramid, shot).expect("good cameras")
     }
 
-    /// There and back again, with a rest at either end.
+    /// A move to another pose and back, with a rest at either end.
     fn returning(frames: u32) -> Shot {
         let key = |at, x| KeyPose { at, pose: pose(x) };
         let keys =
@@ -118,12 +119,12 @@ mod tests {
     fn a_still_shot_of_a_hundred_thousand_frames_is_one_frame() {
         let still = schedule(64, &shot(100_000, CameraPath::Still(pose(0.0))));
         let frames: Vec<u32> = (1..=100_000).collect();
-        assert!(frames.iter().all(|f| still.original(*f) == 1));
+        assert!(frames.iter().all(|f| still.representative(*f) == 1));
         assert_eq!(still.most_held(&frames), (0, 0));
     }
 
     #[test]
-    fn originals_are_made_of_originals_that_come_before_them() {
+    fn representatives_are_inferred_from_representatives_that_come_before_them() {
         for (segment, frames) in [(8, 9), (8, 33), (5, 40), (64, 41), (1, 7)] {
             let shot = returning(frames);
             let schedule = schedule(segment, &shot);
@@ -131,15 +132,15 @@ mod tests {
             let order = schedule.pyramid.by_need();
             let place = |f| order.iter().position(|other| *other == f);
             for frame in 1..=frames {
-                let original = schedule.original(frame);
-                assert_eq!(camera(frame), camera(original));
-                assert_eq!(schedule.original(original), original);
-                for other in schedule.ancestors(original) {
-                    assert_eq!(schedule.original(other), other);
-                    assert!(place(other) < place(original), "{segment} {frames}: {frame}");
+                let representative = schedule.representative(frame);
+                assert_eq!(camera(frame), camera(representative));
+                assert_eq!(schedule.representative(representative), representative);
+                for other in schedule.ancestors(representative) {
+                    assert_eq!(schedule.representative(other), other);
+                    assert!(place(other) < place(representative), "{segment} {frames}: {frame}");
                 }
             }
-            let copies = (1..=frames).filter(|f| schedule.original(*f) != *f).count();
+            let copies = (1..=frames).filter(|f| schedule.representative(*f) != *f).count();
             assert!(copies > 0 || frames < 8, "{segment} {frames}");
         }
     }

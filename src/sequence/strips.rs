@@ -1,8 +1,8 @@
-//! Strips of a rendered frame as bytes, and frames put together from strips.
+//! Strips of a rendered frame as bytes, and frames joined from strips.
 //!
-//! A strip is some whole rows of blocks, so its rays are the same as in a frame rendered at once. Its
-//! bytes are those of [`postcard`], deflated; no file holds them, and the two ends are the same
-//! program.
+//! A strip is some whole rows of blocks, so its rays are the same as in a frame rendered at once. It is
+//! encoded by [`postcard`] and deflated. The bytes are never stored, and the same program decodes
+//! them.
 
 use crate::error::{Error, Result};
 use crate::film::{Film, GBuffer, Provenance};
@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Edge of the blocks that frames are traced in, pixels.
 const BLOCK: u32 = 8;
 
-/// What a strip holds.
+/// The content of a strip.
 #[derive(Serialize, Deserialize)]
 struct Content {
     rgb: Vec<Rgb>,
@@ -34,7 +34,7 @@ struct Content {
     sources: TracedPoints,
 }
 
-/// One of several strips of a frame.
+/// Which strip of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Strip {
     /// Number of the strip, from the top, from 0.
@@ -53,20 +53,20 @@ impl JoinedStrips {
     /// Joins all `strips` of `frame`, in order.
     ///
     /// # Errors
-    /// They are no strips of a frame of the size in `settings`.
+    /// The strips do not make a frame of the size in `settings`.
     pub fn join(&self, frame: u32, strips: &[Arc<[u8]>], settings: &Settings) -> Result<()> {
         let rendered = join(strips, settings.width, settings.height)?;
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(frame, rendered);
         Ok(())
     }
 
-    /// The frame, once, if it was joined.
+    /// Takes the frame, if it was joined.
     pub fn take(&self, frame: u32) -> Option<Rendered> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&frame)
     }
 }
 
-/// How many strips a frame of `height` rows has at most.
+/// The most strips that a frame of `height` pixel rows can have.
 pub fn most(height: u32) -> u32 {
     height.div_ceil(BLOCK)
 }
@@ -85,7 +85,7 @@ pub fn mask(strip: Strip, settings: &Settings) -> Vec<bool> {
     (0..height).flat_map(|y| std::iter::repeat_n(rows.contains(&y), width as usize)).collect()
 }
 
-/// The bytes of what was rendered of a strip.
+/// The bytes of a rendered strip.
 pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
     let Rendered { film, rays, sources, reuse } = rendered;
     let Range { start, end } = rows(strip, film.height);
@@ -107,7 +107,7 @@ pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
 /// A whole frame from all its strips, in order.
 ///
 /// # Errors
-/// They are no strips of a frame of this size.
+/// The strips do not make a frame of this size.
 fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
     let mut film = Film::new(width, height, false);
     film.rgb.clear();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_strips_is_the_frame() {
+    fn a_frame_joined_from_strips_equals_the_frame() {
         let (width, height) = (5, 20);
         let mut film = Film::new(width, height, true);
         let mut provenance = vec![Provenance::default(); film.rgb.len()];

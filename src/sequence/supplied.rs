@@ -1,7 +1,7 @@
-//! References that somebody supplies: frames of an earlier job of the same scene.
+//! References that the user supplies: frames of an earlier job of the same scene.
 //!
-//! Each is read when a frame that is inferred from it is made, so a process reads those that serve its
-//! own frames. Which these are is known from [`ReferenceInfo`]s.
+//! A reference is read when a frame is inferred from it, so a process reads only references that its
+//! own frames need. [`ReferenceInfo`]s decide which these are.
 
 use crate::error::{Error, Result};
 use crate::math::DVec3;
@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Largest file that is read.
 const LARGEST: u64 = 2 << 30;
 
-/// How many references with many samples a frame is inferred from, and how many of the others.
+/// Number of references with many samples that a frame is inferred from; then the number of other references.
 const DENSE: usize = 2;
 const OTHERS: usize = 6;
 
@@ -28,11 +28,11 @@ pub struct ReferenceInfo {
     pub file: usize,
     /// Hash of its content.
     pub hash: [u8; 32],
-    /// Eye of its camera, scene space.
+    /// Position of its camera, scene space.
     eye: DVec3,
-    /// View direction of its camera.
+    /// View direction of its camera, unit.
     forward: DVec3,
-    /// How many samples it has.
+    /// Number of its samples.
     samples: usize,
 }
 
@@ -44,7 +44,7 @@ impl ReferenceInfo {
     }
 }
 
-/// Reads a file's reference, and the hash of its content.
+/// Function that reads a file's reference and the hash of its content.
 type Read = Box<dyn Fn(&Path) -> Result<(Reference, [u8; 32])> + Send + Sync>;
 
 /// The references that are supplied with `--references`, read when a frame needs them.
@@ -52,14 +52,14 @@ pub struct ReferenceCache {
     files: Vec<PathBuf>,
     infos: Vec<ReferenceInfo>,
     read: Read,
-    /// Most memory of references that no frame in work needs, bytes.
+    /// Most memory of references between two frames, bytes.
     budget: u64,
     held: Mutex<Held>,
 }
 
 #[derive(Default)]
 struct Held {
-    /// By file, with when it was last asked for.
+    /// References by file, each with the count of requests at its last use.
     references: BTreeMap<usize, (u64, Arc<Reference>)>,
     asked: u64,
     memory: u64,
@@ -95,7 +95,7 @@ impl ReferenceCache {
     /// Reads the `file`-th file; holds its reference if it `is_kept`.
     ///
     /// # Errors
-    /// The file cannot be read, or cannot serve.
+    /// The file cannot be read, or its reference cannot be used for this job.
     pub fn look(&self, file: usize, is_kept: bool) -> Result<ReferenceInfo> {
         let (reference, hash) = (self.read)(&self.files[file])?;
         let info = ReferenceInfo::of(file, hash, &reference);
@@ -107,7 +107,7 @@ impl ReferenceCache {
         Ok(info)
     }
 
-    /// Sets the references that serve, in an order that frames depend on; those without samples are left out.
+    /// Sets the references to choose from; frames depend on their order. References without samples are left out.
     pub fn serve(&mut self, infos: Vec<ReferenceInfo>) {
         self.infos = infos.into_iter().filter(|info| info.samples > 0).collect();
     }
@@ -174,9 +174,9 @@ impl Held {
     }
 }
 
-/// A frame's `own` references, and behind them those `supplied` for it. With
-/// any of these, references that know much come before those that do not: the first two are always
-/// asked, and key frames that were inferred themselves know little.
+/// A frame's `own` references, then those `supplied` for it. If any are supplied, references with many
+/// samples come before those with few, since the first two are always searched, and key frames that were
+/// themselves inferred have few samples.
 pub(super) fn with_supplied<'r>(
     own: Vec<&'r Reference>,
     supplied: &'r [Arc<Reference>],
@@ -191,10 +191,9 @@ pub(super) fn with_supplied<'r>(
     all
 }
 
-/// The supplied references that a frame seen by `camera` (scene space) is inferred from: a function of
-/// both alone. Frames in between know only what they discovered, so the nearest ones alone would
-/// know little: the two nearest of those with at least half as many samples as the one with most come
-/// first, then the nearest of the others.
+/// The supplied references that a frame seen by `camera` (scene space) is inferred from. In-between frames
+/// have few samples, so the nearest references alone would not do. First come the two nearest references
+/// with at least half as many samples as the one with the most, then the nearest of the others.
 fn nearest<'c>(supplied: &'c [ReferenceInfo], camera: &Camera) -> Vec<&'c ReferenceInfo> {
     let most = supplied.iter().map(|c| c.samples).max().unwrap_or(0);
     let farthest = supplied.iter().map(|c| c.eye.distance(camera.eye)).fold(0.0, f64::max);
@@ -247,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_knows_much_is_asked_first_and_nothing_changes_without_a_supply() {
+    fn references_with_many_samples_come_first_only_if_some_are_supplied() {
         let own = [reference(0.0, 3), reference(1.0, 900), reference(2.0, 4)];
         let places = |supplied: &[Arc<Reference>]| -> Vec<f64> {
             let all = with_supplied(own.iter().collect(), supplied);
@@ -259,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn two_that_know_much_come_before_the_nearest_of_the_others() {
+    fn two_references_with_many_samples_come_before_the_nearest_others() {
         let mut all: Vec<Reference> = (0..20).map(|i| reference(f64::from(i), 5)).collect();
         all.extend([0.5, 9.0, 19.5].map(|x| reference(x, 1000)));
         let all = infos(&all);
@@ -287,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn only_those_that_serve_are_read_each_once_while_there_is_room() {
+    fn only_needed_references_are_read_and_once_while_there_is_room() {
         let one = reference(0.0, 100).memory();
         let ask = |cache: &ReferenceCache, x| cache.nearest(&camera(x)).expect("readable").len();
         let (wide, reads) = cache(100 * one);

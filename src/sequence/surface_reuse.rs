@@ -28,12 +28,12 @@ use std::time::Instant;
 pub struct SurfaceReuse<'a> {
     /// References from other jobs, from which all frames, key frames too, are inferred.
     pub supplied: Option<&'a ReferenceCache>,
-    /// What later jobs must have in common to use the references in the frames' files; `None` where files
-    /// hold none.
+    /// Compatibility of the references in the frames' files, for later jobs; `None` if files hold no
+    /// references.
     pub terms: Option<Compatibility>,
-    /// Where references are saved for a job that goes on after this one; `None` for nowhere.
+    /// Saves references for a job that resumes this one; `None` saves none.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
-    /// The same for references that are sent to other ranks; `None` where there are none.
+    /// Compatibility of the references that are sent to other ranks; `None` if there are no other ranks.
     pub exchange: Option<Compatibility>,
     context: FrameContext<'a>,
     pyramid: Pyramid,
@@ -46,23 +46,23 @@ pub struct SurfaceReuse<'a> {
 
 #[derive(Default)]
 struct State {
-    /// Originals that were made for their references before they were asked for.
+    /// Representatives that were made for their references and not yet returned.
     early: BTreeMap<u32, Made>,
-    /// The last original of which a copy is still asked for.
+    /// The last representative of which a copy is still to be returned.
     again: Option<(u32, Made)>,
     /// The frame whose probes were rendered last.
     probed: Option<(u32, Arc<Probed>)>,
 }
 
 impl<'a> SurfaceReuse<'a> {
-    /// A maker of the frames of `context`, whose key frames `pyramid` names.
+    /// A maker of the frames of `context`, with the key frames of `pyramid`.
     ///
     /// # Errors
-    /// Those of the shot's cameras.
+    /// Errors of the shot's cameras.
     pub fn new(context: FrameContext<'a>, pyramid: Pyramid) -> Result<Self> {
         let renderer = &context.renderer;
         let channels = reuse::channels(renderer.scene, renderer.settings);
-        // Where nothing is worth a lookup every frame is a key frame.
+        // If no light is worth a lookup, every frame is a key frame.
         let pyramid = if channels.is_empty() { Pyramid { segment: 1, ..pyramid } } else { pyramid };
         Ok(Self {
             supplied: None,
@@ -79,8 +79,8 @@ impl<'a> SurfaceReuse<'a> {
         })
     }
 
-    /// Makes an original from the references that it needs, which are made first where they are not at
-    /// hand; keeps its own reference where one is due.
+    /// Makes a representative from the references that it needs, which are made first if they are missing. Keeps
+    /// its own reference if that is in use.
     fn frame(&self, frame: u32) -> Result<Made> {
         let camera = self.context.camera(frame)?;
         let is_due = self.references.lock().is_due(frame);
@@ -97,7 +97,7 @@ impl<'a> SurfaceReuse<'a> {
             findings = &probed.findings;
         }
         let Rendered { film, rays, reuse, sources } = rendered;
-        // In one order, however the frame was cut for tracing, and as they come back from a file.
+        // The same order however the frame was cut for tracing, and as points are read from a file.
         let sources = self.context.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources, findings);
         if is_due {
@@ -111,7 +111,7 @@ impl<'a> SurfaceReuse<'a> {
         Ok(Made { film, rays, reuse, audit, reference: kept })
     }
 
-    /// Renders the pixels of an original that `mask` names, or all, but for its probes.
+    /// Renders the pixels of `mask` of a representative, or all, except its probes.
     fn rendered(
         &self,
         frame: u32,
@@ -137,7 +137,7 @@ impl<'a> SurfaceReuse<'a> {
         })
     }
 
-    /// The probes of an original; `None` where nothing can be inferred.
+    /// The probes of a representative; `None` where nothing can be inferred.
     fn probes(
         &self,
         frame: u32,
@@ -152,8 +152,8 @@ impl<'a> SurfaceReuse<'a> {
         })
     }
 
-    /// Calls `act` with the lookup of `frame`, which `camera` (world space) sees, in `references` and in
-    /// those of other jobs; with `None` where there are no references.
+    /// Calls `act` with the lookup of `frame`, seen by `camera` (world space), in `references` and in
+    /// those of other jobs; with `None` if there are no references.
     fn with_lookup<T>(
         &self,
         (frame, camera): (u32, &Camera),
@@ -182,7 +182,7 @@ impl<'a> SurfaceReuse<'a> {
         self.context.render(&FrameJob { reuse, ..job }, progress)
     }
 
-    /// The reference that the file of `frame` holds for later jobs.
+    /// The bytes of the reference that the file of `frame` holds for later jobs; `None` if it holds none.
     fn kept(
         &self,
         frame: u32,
@@ -207,12 +207,12 @@ impl<'a> SurfaceReuse<'a> {
         self.context.pool.install(|| record.encode()).map(Into::into)
     }
 
-    /// The references of `originals`, all of them in use.
-    fn references(&self, originals: &[u32]) -> Result<Vec<Arc<Reference>>> {
-        originals.iter().map(|original| self.reference(*original)).collect()
+    /// The references of `representatives`, which are all in use.
+    fn references(&self, representatives: &[u32]) -> Result<Vec<Arc<Reference>>> {
+        representatives.iter().map(|representative| self.reference(*representative)).collect()
     }
 
-    /// The reference of an original, which is in use: from memory, from disk, or made.
+    /// The reference of a representative, which is in use: from memory, from disk, or made.
     fn reference(&self, frame: u32) -> Result<Arc<Reference>> {
         let found = self.references.lock().get(frame).cloned();
         if let Some(found) = found.or_else(|| self.read_from_disk(frame)) {
@@ -227,8 +227,8 @@ impl<'a> SurfaceReuse<'a> {
         pool.get(frame).cloned().ok_or_else(lost)
     }
 
-    /// The reference of an original that an earlier run saved. Not where the original itself is asked for:
-    /// then it is made anyway.
+    /// The reference of a representative that an earlier run saved; `None` if the representative itself is asked
+    /// for, since it is made anyway.
     fn read_from_disk(&self, frame: u32) -> Option<Arc<Reference>> {
         let checkpoints = self.checkpoints?;
         if self.references.lock().asked(frame) > 0 {
@@ -244,17 +244,17 @@ impl<'a> SurfaceReuse<'a> {
         pool.get(frame).cloned()
     }
 
-    /// Keeps a reference in memory where it is due.
+    /// Keeps a reference in memory if it is in use.
     fn keep(&self, frame: u32, reference: Reference) {
         let mut pool = self.references.lock();
         pool.keep(&self.schedule, frame, || Arc::new(reference));
         pool.note_memory(memory);
     }
 
-    /// Keeps the new reference of a frame as bytes too where they may be wanted: for other ranks, and on disk.
-    /// Only those of key frames are saved there: they are expensive, and serve long. The others would take
-    /// more time to write, one after every other frame, than the few of them that are lost take to be made
-    /// again. `kept` is the reference that the frame's file will hold.
+    /// Keeps the bytes of a frame's new reference for other ranks and for the disk, as far as needed.
+    /// Only references of key frames are written to disk: they are expensive and used for long. Writing the
+    /// others, one for every other frame, would take more time than making the few again that a kill
+    /// loses. `kept` is the reference that the frame's file will hold.
     fn save_later(
         &self,
         frame: u32,
@@ -301,44 +301,44 @@ fn memory(reference: &Arc<Reference>, unsaved: Option<&Arc<[u8]>>) -> u64 {
 }
 
 impl State {
-    /// A copy of an original that was handed out already, or the original where it was made early.
-    fn take(&mut self, original: u32) -> Option<Made> {
-        let early = self.early.remove(&original);
-        let again = self.again.as_ref().filter(|(other, _)| *other == original);
+    /// The representative if it was made early, or a copy of it if it was returned last.
+    fn take(&mut self, representative: u32) -> Option<Made> {
+        let early = self.early.remove(&representative);
+        let again = self.again.as_ref().filter(|(other, _)| *other == representative);
         again.map(|(_, made)| made.copy()).or(early)
     }
 
-    /// Notes that an original was handed out and is asked for `asked` times more: it is held while the next
-    /// copy of it may follow.
-    fn hand_out(&mut self, original: u32, made: &Made, asked: u32) {
-        let is_held = self.again.as_ref().is_some_and(|(other, _)| *other == original);
+    /// Notes that a representative was returned and that `asked` copies are still to be returned. It is kept for
+    /// the next copy.
+    fn hand_out(&mut self, representative: u32, made: &Made, asked: u32) {
+        let is_held = self.again.as_ref().is_some_and(|(other, _)| *other == representative);
         if asked == 0 && is_held {
             self.again = None;
         } else if asked > 0 && !is_held {
-            self.again = Some((original, made.copy()));
+            self.again = Some((representative, made.copy()));
         }
     }
 }
 
 impl FrameGraph for SurfaceReuse<'_> {
-    fn original(&self, frame: u32) -> u32 {
-        self.schedule.original(frame)
+    fn representative(&self, frame: u32) -> u32 {
+        self.schedule.representative(frame)
     }
 
-    fn needs(&self, original: u32) -> Vec<u32> {
-        self.schedule.ancestors(original)
+    fn needs(&self, representative: u32) -> Vec<u32> {
+        self.schedule.ancestors(representative)
     }
 
     fn batches(&self, frames: &[u32]) -> Vec<Vec<u32>> {
         self.pyramid.batches(frames)
     }
 
-    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
-        self.pyramid.rank_batches(originals)
+    fn rank_batches(&self, representatives: &[u32]) -> Vec<Vec<u32>> {
+        self.pyramid.rank_batches(representatives)
     }
 
-    fn is_on_disk(&self, original: u32) -> bool {
-        self.checkpoints.is_some_and(|c| c.has(original))
+    fn is_on_disk(&self, representative: u32) -> bool {
+        self.checkpoints.is_some_and(|c| c.has(representative))
     }
 
     fn most_strips(&self) -> u32 {
@@ -348,23 +348,23 @@ impl FrameGraph for SurfaceReuse<'_> {
 
 impl FrameMaker for SurfaceReuse<'_> {
     fn make(&self, frame: u32) -> Result<Made> {
-        let original = self.schedule.original(frame);
+        let representative = self.schedule.representative(frame);
         self.references.lock().expect_once(&self.schedule, frame);
-        let mut made = match self.with_state(|s| s.take(original)) {
+        let mut made = match self.with_state(|s| s.take(representative)) {
             Some(made) => made,
-            None => self.frame(original)?,
+            None => self.frame(representative)?,
         };
         let mut pool = self.references.lock();
-        if frame == original && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
-            // Its own file is about to hold it.
-            pool.set_unsaved(original, None);
+        if frame == representative && self.checkpoints.is_some_and(|c| c.frames_hold_all) {
+            // The frame's own file will hold the reference.
+            pool.set_unsaved(representative, None);
         }
-        pool.done(&self.schedule, original);
-        let asked = pool.asked(original);
+        pool.done(&self.schedule, representative);
+        let asked = pool.asked(representative);
         drop(pool);
-        self.with_state(|s| s.hand_out(original, &made, asked));
+        self.with_state(|s| s.hand_out(representative, &made, asked));
         self.save(false);
-        // What a frame does not share with its original.
+        // Motion differs from the representative's.
         self.context.note_motion(frame, &mut made.film)?;
         Ok(made)
     }

@@ -1,4 +1,4 @@
-//! How a sequence on disk stands, by its manifest alone: nothing is changed.
+//! The state of a sequence on disk, from its manifest and files; changes nothing.
 
 use crate::error::{Error, Result};
 use crate::output::manifest::{Foreign, Manifest, MapRow, Row, folder_of};
@@ -11,42 +11,42 @@ use std::path::Path;
 /// The frames of a sequence by their state on disk; each list ascends.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Survey {
-    /// Where its frames lie, as a pattern.
+    /// Pattern of the frames' paths.
     pub frames: String,
     /// Whether every frame that was asked about is there.
     pub complete: bool,
     /// Frames that were asked about.
     pub total: u32,
-    /// There, whole, of this sequence.
+    /// Frames that are there, whole, and of this sequence.
     pub done: Vec<u32>,
-    /// Not there.
+    /// Frames that are not there.
     pub missing: Vec<u32>,
-    /// There, but not as they were written, or not in the manifest.
+    /// Frames whose file has another hash than in the manifest, or is not in it.
     pub damaged: Vec<u32>,
-    /// Damaged frames whose picture is whole and one of whose maps is not.
+    /// Damaged frames whose picture is whole, but one of whose maps is missing or damaged.
     #[serde(skip)]
     pub without_map: Vec<u32>,
-    /// There, but of other settings.
+    /// Frames of other settings.
     pub other_settings: Vec<u32>,
-    /// There, but of another camera move, or made for a shorter or longer one.
+    /// Frames of another camera move, or of a shorter or longer one.
     pub other_move: Vec<u32>,
     /// Frames in the manifest that the camera move does not have any more.
     pub beyond: Vec<u32>,
 }
 
-/// The state of the frames in the manifest at `path`. `range` picks frames from its shot's number of
-/// frames; without it all are asked about.
+/// The state of the frames in the manifest at `path`. `range` returns the frames to look at, from the
+/// number of frames of the shot.
 ///
-/// Errors: there is no manifest, or none that can be read; `range`'s.
+/// Errors: there is no manifest, or it cannot be read; errors of `range`.
 pub fn survey(path: &Path, range: impl Fn(u32) -> Result<FrameRange>) -> Result<Survey> {
     let missing = || Error::Usage(format!("there is no manifest {}", path.display()));
     survey_of(&Manifest::as_of_now(path)?.ok_or_else(missing)?, path, range)
 }
 
-/// [`survey`] by a manifest that was read at `path`.
+/// [`survey`] for a manifest that was read from `path`.
 ///
 /// # Errors
-/// A frame that cannot be read; `range`'s.
+/// A frame cannot be read; errors of `range`.
 pub fn survey_of(
     manifest: &Manifest,
     path: &Path,
@@ -114,15 +114,15 @@ fn state_of(
     })
 }
 
-/// Whether a frame's map in `folder` is there as it was written.
+/// Whether a frame's map in `folder` exists and has the hash in its row.
 ///
 /// # Errors
-/// It is there and cannot be read.
+/// The file exists and cannot be read.
 pub fn is_whole_map(folder: &Path, map: &MapRow) -> Result<bool> {
     Ok(is_whole(&folder.join(&map.file), None, &map.blake3)? == Some(true))
 }
 
-/// Whether `path` is a file of so many `bytes` with this hash; `None` where nothing is there.
+/// Whether `path` is a file of `bytes` bytes (if given) with this hash; `None` if there is no file.
 fn is_whole(path: &Path, bytes: Option<u64>, hash: &str) -> Result<Option<bool>> {
     let file = match PathKind::at(path)? {
         PathKind::Nothing => return Ok(None),

@@ -1,4 +1,4 @@
-//! Where the frames of a job go.
+//! The target of a job: paths of its frames, and the header and recipes that decide what they hold.
 
 use super::recipe::Recipes;
 use crate::error::Result;
@@ -8,18 +8,18 @@ use crate::output::{Format, FramePattern, WriteOptions};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Temporary files of other machines' processes are cleared away once they are this old: on a shared
-/// folder a younger one may belong to one that lives.
+/// Age from which temporary files of other machines' processes are removed: in a shared folder a younger file
+/// may belong to a process that still runs.
 pub(super) const LEFTOVER_AGE: Duration = Duration::from_secs(60);
 
-/// Where the frames of a job go, and what they all share.
+/// Where the frames of a job go, and the data that they share.
 #[derive(Debug, Clone)]
 pub struct Target {
-    /// Where frame n lies.
+    /// Path of each frame.
     pub pattern: FramePattern,
-    /// What the frames share.
+    /// The manifest's header, which the frames share.
     pub header: Header,
-    /// What each frame of the shot is made of.
+    /// The recipe of each frame of the shot.
     pub recipes: Recipes,
     /// How films become files.
     pub write: WriteOptions,
@@ -33,15 +33,16 @@ impl Target {
         self.write.maps.is_some() && self.pattern.format() != Format::Exr
     }
 
-    /// Where rank `rank` appends its rows: to the manifest itself, at `path`, or its part of that.
+    /// The journal to which rank `rank` appends its rows: rank 0 to the manifest at `path`, others to their part
+    /// file.
     ///
     /// # Errors
-    /// It cannot be opened, or is of other settings.
+    /// The file cannot be opened, or is of other settings.
     pub fn journal(&self, rank: u32, path: &Path) -> Result<Journal> {
         if rank == 0 { Journal::of(path, &self.header) } else { Journal::open(path) }
     }
 
-    /// Every file that frame `frame` has.
+    /// Paths of all files of frame `frame`: the picture and its maps.
     pub(super) fn paths(&self, frame: u32) -> Vec<PathBuf> {
         let frame = self.pattern.path(frame);
         let maps = Map::ALL.iter().filter(|_| self.has_map_files());

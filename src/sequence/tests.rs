@@ -161,7 +161,7 @@ fn other_settings_are_refused_by_name_and_overwrite_replaces() {
 }
 
 #[test]
-fn frames_that_nothing_vouches_for_are_not_touched() {
+fn frames_without_a_manifest_are_not_touched() {
     let folder = Folder::new();
     fs::write(folder.path("frame_03.png"), b"somebody's").expect("written");
     let error = folder.run(&settings(), false, 0).expect_err("refused").to_string();
@@ -218,7 +218,7 @@ fn strays(target: &Target) -> Vec<u32> {
 }
 
 #[test]
-fn a_longer_shot_keeps_what_is_made_of_the_same_and_renders_the_rest_again() {
+fn a_longer_shot_keeps_frames_with_the_same_recipe_and_renders_the_others() {
     let folder = Folder::new();
     let mut settings = settings();
     settings.reuse.segment = 2;
@@ -256,7 +256,7 @@ fn another_move_is_refused_by_its_first_frame() {
 }
 
 #[test]
-fn a_survey_tells_done_missing_damaged_and_stray() {
+fn a_survey_lists_done_missing_damaged_and_stray_frames() {
     let folder = Folder::new();
     folder.run(&settings(), false, 0).expect("runs");
     let brighter = Settings { exposure: 2.0, ..settings() };

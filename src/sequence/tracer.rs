@@ -49,12 +49,12 @@ impl FrameMaker for Tracer<'_> {
 }
 
 impl RankMaker for Tracer<'_> {
-    fn render_strip(&self, original: u32, strip: Strip) -> Result<Vec<u8>> {
+    fn render_strip(&self, representative: u32, strip: Strip) -> Result<Vec<u8>> {
         let mask = strips::mask(strip, self.context.renderer.settings);
-        strips::encode(self.render(original, Some(&mask), &())?, strip)
+        strips::encode(self.render(representative, Some(&mask), &())?, strip)
     }
 
-    fn join_strips(&self, original: u32, strips: &[Arc<[u8]>]) -> Result<()> {
-        self.joined.join(original, strips, self.context.renderer.settings)
+    fn join_strips(&self, representative: u32, strips: &[Arc<[u8]>]) -> Result<()> {
+        self.joined.join(representative, strips, self.context.renderer.settings)
     }
 }

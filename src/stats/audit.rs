@@ -1,4 +1,4 @@
-//! What an audit of inferred frames adds up: enough to pool frames, whoever rendered them.
+//! The sums of an audit of inferred frames: enough to pool frames of all ranks.
 
 use super::RayCounts;
 use serde::{Deserialize, Serialize};
@@ -36,13 +36,13 @@ impl AddAssign for DrawnSum {
     }
 }
 
-/// What the audit of one or many frames found. Squared errors are in squares of a display step of
-/// 255, the mean of the channels.
+/// The audit of one or many frames. Squared errors are in squares of a display step of 1/255, means over
+/// the channels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct AuditSums {
     /// Pixels of the frames.
     pub pixels: u64,
-    /// Those of them that were inferred: as many as the drawn ones stand for.
+    /// Estimated number of inferred pixels: the drawn ones, times their weights.
     pub inferred_pixels: u64,
     /// Pixels that were drawn and traced twice.
     pub drawn: u64,
@@ -50,9 +50,9 @@ pub struct AuditSums {
     pub inferred: DrawnSum,
     /// Squared error of all pixels, some of which were traced.
     pub shown: DrawnSum,
-    /// Squared error that the same pixels would have, had all been traced.
+    /// Squared error that the same pixels would have if all had been traced.
     pub traced: DrawnSum,
-    /// Rays cast to find all this out; no ray that the picture is made of.
+    /// Rays cast for the audit alone, not for the picture.
     pub rays: RayCounts,
 }
 

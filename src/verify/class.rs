@@ -1,4 +1,4 @@
-//! What a difference between two answers is.
+//! Classes of differences between two answers.
 
 use super::Kind;
 use serde::Serialize;
@@ -14,16 +14,16 @@ pub enum Class {
     /// Another triangle at the same place: coincident, or adjacent and the ray within the band of
     /// their edge. Explained.
     Tie,
-    /// A ray no further than [`BAND_ULPS`] beside this one has the product's answer. Explained.
+    /// A ray that passes within [`BAND_ULPS`] beside this one has the intersector's answer. Explained.
     EdgeBand,
     /// The hit lies within [`BAND_ULPS`] of the ray's own start or end. Explained.
     RayEnd,
-    /// Past a vertex, within the band, onto the outside of something behind: what Embree's robust
-    /// mode leaves open and no second try can see. (An inside there would have given it away, and
-    /// nothing at all, too.) Explained, but only so many: [`super::PAST_VERTEX_LIMIT`].
+    /// The ray slipped past a vertex, within the band, onto the outside of something behind. Embree's robust
+    /// mode allows that, and the second try does not notice it. (It would notice the hit of an inside, or a
+    /// miss.) Explained, up to a limit: [`super::PAST_VERTEX_LIMIT`].
     PastVertex,
-    /// The same past a vertex of a mesh that is not closed: whoever goes through its one side need not
-    /// come upon a back behind, so nothing calls for a second try. Explained, but only so many:
+    /// The same at a vertex of a mesh that is not closed: a ray through its one side need not
+    /// meet a back behind, so there is no second try. Explained, up to a limit:
     /// [`super::OPEN_VERTEX_LIMIT`].
     PastOpenVertex,
     /// A hit that is not on its triangle.

@@ -27,20 +27,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Rays that are made and traced together. Always whole groups, since packets of rays may differ
 /// from single rays in the last bits.
 const GROUP: u64 = 64;
-/// Ray-triangle pairs of the oracle between two looks at the stop flag: about 0.1 s.
+/// Ray-triangle pairs of the oracle between two checks of the stop flag: about 0.1 s.
 const PAIRS_A_LOOK: usize = 100_000_000;
-/// Rays at least that share one of the oracle's passes over the triangles; fewer cost too much each.
+/// Least number of rays that share one of the oracle's passes over the triangles; with fewer, each costs too much.
 const LEAST_A_PASS: usize = 8;
-/// Ray-triangle pairs of all kinds together when nobody says how many rays.
+/// Default number of ray-triangle pairs, of all kinds of rays together.
 const BUDGET: u64 = 100_000_000_000;
-/// Rays of a kind at least and at most when nobody says how many.
+/// Least and most rays of a kind by default.
 const RAYS: (u64, u64) = (512, 1 << 19);
-/// What a pair costs the oracle on one thread with AVX2, seconds (`benches/oracle.rs`).
+/// Time of a pair on one thread with AVX2, seconds (`benches/oracle.rs`).
 const PAIR_SECONDS: f64 = 1.3e-9;
-/// What a ray costs beside its pairs, seconds.
+/// Time of a ray besides its pairs, seconds.
 const RAY_SECONDS: f64 = 3e-6;
 
-/// What is checked against what.
+/// A comparison of an intersector with the oracle.
 pub struct Check<'a> {
     /// The scene.
     pub scene: &'a Scene,
@@ -48,13 +48,13 @@ pub struct Check<'a> {
     pub settings: &'a Settings,
     /// The camera move.
     pub shot: &'a Shot,
-    /// The intersector on trial.
+    /// The intersector under test.
     pub product: &'a dyn Intersector,
-    /// The one that is right.
+    /// The trusted intersector.
     pub oracle: &'a Oracle<'a>,
-    /// For each mesh, once somebody asks, the sign of its volume if it is closed.
+    /// For each mesh, computed on first use, the sign of its volume if it is closed.
     volumes: Vec<OnceLock<Option<f64>>>,
-    /// For each mesh, once somebody asks, which edges of its triangles are borders.
+    /// For each mesh, computed on first use, which edges of its triangles are borders.
     borders: Vec<OnceLock<Vec<u8>>>,
 }
 
@@ -63,7 +63,7 @@ pub struct Check<'a> {
 pub struct TracedRay {
     /// The ray, scene space.
     pub ray: Ray,
-    /// What each said.
+    /// The answers of both.
     pub answers: Answers,
 }
 

@@ -19,7 +19,7 @@ const GRAZING: f64 = 0.02;
 /// Triangles among which a grazing ray picks the thinnest.
 const CANDIDATES: usize = 8;
 
-/// What a ray is shot for.
+/// The kind of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {

@@ -36,7 +36,7 @@ pub struct Worst {
     pub ulps: f64,
 }
 
-/// What was found of one class.
+/// The differences of one class.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClassRow {
     /// The class.
@@ -49,7 +49,7 @@ pub struct ClassRow {
     pub rays: u64,
     /// Share of such rays that the truth does not exceed, at 95 %.
     pub bound: f64,
-    /// The same count by kind of ray.
+    /// The count by kind of ray.
     pub by_kind: BTreeMap<Kind, u64>,
     /// The worst one.
     pub worst: Option<Worst>,
@@ -140,7 +140,7 @@ impl Tally {
     }
 }
 
-/// Of equally bad ones the first ray.
+/// The worse of two rays; of equally bad ones the first.
 fn worse(a: Option<Worst>, b: Option<Worst>) -> Option<Worst> {
     match (a, b) {
         (Some(a), Some(b)) => {

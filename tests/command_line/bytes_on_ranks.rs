@@ -100,7 +100,7 @@ fn exr_files_crops_and_other_policies_give_the_same_bytes_on_any_number_of_ranks
 
 /// However few discoveries a message carries, by word or by scene file: more of them, and the same bytes.
 #[test]
-fn what_an_exchange_carries_changes_no_byte() {
+fn the_size_of_messages_changes_no_byte() {
     let job = Job::new();
     let scene = small(&job, "reflective_spheres");
     let text = fs::read_to_string(job.path(&scene)).expect("a scene");

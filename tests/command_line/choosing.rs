@@ -44,7 +44,7 @@ fn a_job_that_goes_on_keeps_its_choice_and_its_bytes() {
 
 /// The report's command is one that gives the same frames whatever the clock says.
 #[test]
-fn a_report_spells_out_what_was_chosen() {
+fn a_report_spells_out_the_chosen_options() {
     let job = Job::new();
     for wish in ["--target psnr=34", "--target=psnr=34", "--budget 3s"] {
         let line = LINE.replace("o/f", "'o/f").replace(".png", ".png'");
@@ -172,7 +172,7 @@ fn figures_that_need_neighbours_are_targets_too() {
 }
 
 #[test]
-fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
+fn a_target_out_of_reach_is_refused_before_a_frame_is_rendered() {
     let job = Job::new();
     let said = |line: &str, words: &str| {
         job.refused(line, words);
@@ -188,7 +188,7 @@ fn what_nothing_reaches_is_refused_before_a_frame_is_rendered() {
 }
 
 #[test]
-fn what_cannot_be_predicted_is_refused() {
+fn options_that_cannot_be_predicted_are_refused() {
     let job = Job::new();
     for target in ["psnr", "psnr=", "psnr=-1", "psnr=nan", "ssim=2", "max-share=200%", "flip=0"] {
         job.refused(&format!("{LINE} --target {target}"), "--target");
@@ -205,7 +205,7 @@ fn what_cannot_be_predicted_is_refused() {
 
 /// A probe may take long: what would be refused after it is refused before.
 #[test]
-fn frames_of_something_else_are_in_the_way_before_the_probe() {
+fn frames_of_other_settings_are_refused_before_the_probe() {
     let job = Job::new();
     job.done(&format!("{LINE} --target psnr=30"));
     let manifest = job.read("o/f.manifest.jsonl");
@@ -236,7 +236,7 @@ fn a_target_ends_with_its_verdict() {
     let line = format!("{LINE} --target psnr=34");
     let last = |out: &str| out.lines().last().expect("a line").to_string();
     let verdict = last(&job.done(&line).out);
-    let known = ["reached", "not told apart from the target by so few pixels", "missed"];
+    let known = ["reached", "undecided: too close to the target for so few pixels", "missed"];
     assert!(known.iter().any(|word| verdict == format!("psnr=34: {word}")), "{verdict}");
     assert_eq!(last(&job.done(&line).out), verdict);
     // As a job leaves it that missed.

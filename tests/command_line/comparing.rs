@@ -66,7 +66,7 @@ fn compare_of_folders_leaves_maps_out() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_bad_input() {
+fn images_that_cannot_be_compared_are_bad_input() {
     let job = Job::new();
     picture(&job, "a.ppm", 0);
     picture_of(&job, "tall.ppm", 0, 13);

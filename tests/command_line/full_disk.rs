@@ -21,7 +21,7 @@ const LINE: &str = "render cube.obj --size 96x54 --spp 2 --segment 8 --frames 1.
 /// What was finished is whole and stays, what was not is not there, and once there is room the same
 /// command goes on.
 #[test]
-fn a_full_disk_ends_the_job_and_what_is_finished_stays() {
+fn a_full_disk_ends_the_job_and_finished_frames_stay() {
     for (ending, more) in [("png", ""), ("png", "--maps"), ("exr", "--spp 1 --size 48x27")] {
         let job = Job::new();
         let line = match ending {

@@ -113,7 +113,7 @@ fn kill(wanted: usize, seed: u64) -> usize {
 }
 
 #[test]
-fn a_job_killed_at_any_moment_ends_as_if_undisturbed() {
+fn a_job_killed_at_any_moment_ends_with_the_same_bytes() {
     kill(8, 0x9e37_79b9_7f4a_7c15);
 }
 

@@ -53,7 +53,7 @@ fn a_report_shows_complete_frames_and_names_missing_and_damaged_ones() {
     let page = text(&job, "o/f.report.html");
     let status = job.run("status o").out;
     let damaged = "3 damaged: 2..4";
-    let map = "1 damaged in a map alone, and shown without that map: 4";
+    let map = "1 with a damaged map, and shown without that map: 4";
     for gap in [damaged, map] {
         assert!(said.contains(gap) && page.contains(&format!("<li>{gap}</li>")), "{gap}: {said}");
     }

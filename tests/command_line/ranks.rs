@@ -113,7 +113,7 @@ mod with_mpi {
 
     /// Each rank reads a part of what is there; what is found is what one process finds.
     #[test]
-    fn ranks_find_what_is_damaged_or_missing_together() {
+    fn ranks_share_the_search_for_damaged_and_missing_frames() {
         let job = Job::new();
         let line = format!("{LINE} --maps -o o/f_##.png");
         job.done(&line);

@@ -181,7 +181,7 @@ fn references_of_a_shorter_shot_save_rays_in_a_denser_and_longer_one() {
 
 /// Mirrors by themselves: traced frames have next to no noise.
 #[test]
-fn key_frames_made_of_references_are_as_strict_as_the_frames_between() {
+fn key_frames_inferred_from_references_obey_the_same_limits() {
     let job = Job::new();
     let path = format!("{}/scenes/reflective_spheres/scene.toml", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(path).expect("a scene");
@@ -203,7 +203,7 @@ fn key_frames_made_of_references_are_as_strict_as_the_frames_between() {
 }
 
 #[test]
-fn references_that_cannot_serve_are_refused_by_name() {
+fn unusable_references_are_refused_by_name() {
     let job = Job::new();
     scene(&job, "scene.toml", &pan(3, 1.0));
     job.done("render scene.toml -o base/f_#.exr --frames 1");

@@ -127,7 +127,7 @@ fn quiet_prints_nothing_and_otherwise_each_frame_a_line() {
 }
 
 #[test]
-fn stats_are_json_and_count_what_was_cast() {
+fn stats_are_json_and_count_the_rays_cast() {
     let job = Job::new();
     job.done(&small("--frames 1..2 -o s/f_##.exr --stats stats.json --threads 2"));
     let stats: serde_json::Value =

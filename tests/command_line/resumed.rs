@@ -136,7 +136,7 @@ fn damaged_frames_are_reported_in_one_line() {
 
 /// What was changed in the scene is told by its name, and no hash.
 #[test]
-fn what_has_changed_in_the_scene_is_named() {
+fn changed_parts_of_the_scene_are_named() {
     let job = Job::new();
     let scene = "camera = { still = { eye = [0, 2, 6], target = [0, 0, 0] }, frames = 4 }\n\
         light = [{ point = { position = [3, 5, 2], intensity = 90 } }]\n\

@@ -199,7 +199,7 @@ fn named_meshes_and_regions_are_traced_in_every_frame() {
 }
 
 #[test]
-fn inspect_says_what_is_looked_up_and_what_it_takes() {
+fn inspect_reports_lookups_and_their_memory() {
     let job = Job::new();
     scene(&job, PAN, "");
     let text = fs::read_to_string(job.path("scene.toml")).expect("there")
@@ -231,7 +231,7 @@ fn inspect_says_what_is_looked_up_and_what_it_takes() {
 }
 
 #[test]
-fn inspect_knows_what_policy_colour_holds() {
+fn inspect_reports_the_memory_of_policy_colour() {
     let job = Job::new();
     scene(&job, PAN, "policy = 'colour'");
     let json = job.done("inspect scene.toml --json").out;

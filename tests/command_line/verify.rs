@@ -85,7 +85,7 @@ fn invalid_arguments_are_refused() {
 
 /// Only options that change what is compared are offered.
 #[test]
-fn help_lists_only_options_that_change_what_is_compared() {
+fn help_lists_only_options_that_change_the_comparison() {
     let help = Job::new().done("verify --help").out;
     for word in ["--size", "--seed", "--recheck", "--isa", "--retry", "--rays", "--up"] {
         assert!(help.contains(word), "{word}\n{help}");

@@ -118,7 +118,7 @@ fn player_maps_charts_and_keys() {
 }
 
 #[test]
-fn a_job_that_is_not_done_has_a_page_too() {
+fn an_unfinished_job_has_a_page_too() {
     let Some(mut browser) = browser() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     scene(folder.path());

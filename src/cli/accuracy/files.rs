@@ -25,7 +25,7 @@ struct Document<'a> {
     frames: &'a [u32],
     shot_frames: u32,
     turns: u32,
-    /// Trials that are over, and all: fewer where the sweep was stopped.
+    /// Number of finished trials, and of all trials; they differ if the sweep was stopped.
     trials: [usize; 2],
     /// Runs of the program that measured them.
     runs: u32,
@@ -34,14 +34,14 @@ struct Document<'a> {
     rows: &'a [CandidateRow],
     oracle: Option<OracleCrop>,
     writing: Option<Writing>,
-    /// What the page says of each knob.
+    /// The page's sentences about each group of options.
     knobs: Vec<KnobText>,
 }
 
 #[derive(Serialize)]
 struct Reference {
     settings: Value,
-    /// What the last doubling changed, and what it was to fall below; display steps.
+    /// Change by the last doubling, and the goal for it, display steps.
     change: f64,
     wanted: f64,
 }
@@ -78,7 +78,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
     atomic::write(folder.join("accuracy.csv"), |w| w.write_all(csv.as_bytes())).map(drop)
 }
 
-/// What the page's tables have, a column each, up to the rays of a turn by kind.
+/// Columns of the CSV, as in the page's tables, up to the rays of a turn by kind.
 const BEFORE_RAYS: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,cpu_seconds_low,\
     cpu_seconds_high,time_ratio,time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
     error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame";

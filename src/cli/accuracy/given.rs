@@ -1,4 +1,4 @@
-//! The settings that a sweep was given: they stand in every command of its page.
+//! Options that the user gave to a sweep; every command on its page includes them.
 
 use super::AccuracyArgs;
 use crate::cli::args::{SceneArgs, SettingArgs};
@@ -12,7 +12,7 @@ pub struct Given {
     value: String,
 }
 
-/// The options about the scene and its picture among `words`, which started the program.
+/// The options about the scene and its picture in the command `words`.
 pub fn given(words: &[String]) -> Vec<Given> {
     let command = AccuracyArgs::augment_args(Command::new("tweenray accuracy"));
     // The second word is the subcommand's name.
@@ -27,7 +27,7 @@ pub fn given(words: &[String]) -> Vec<Given> {
     shaping.get_arguments().filter_map(of).collect()
 }
 
-/// `options`, and before them what was given and they do not set, word by word.
+/// The words of `options`, preceded by the given options that `options` does not set.
 pub fn with_given(given: &[Given], options: &str) -> Vec<String> {
     let own: Vec<&str> = options.split_whitespace().collect();
     let others = given.iter().filter(|given| !own.contains(&given.name.as_str()));
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_given_comes_before_what_a_setting_turns() {
+    fn given_options_come_before_those_that_a_setting_varies() {
         let line = "tweenray accuracy a.obj -o out --up z --turns 3 --spp=2 --shadow-samples 4 \
                     --knobs reuse,samples --threads 2 -q --exposure 1e-3";
         let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();

@@ -9,7 +9,7 @@ use std::time::Instant;
 /// Units of a whole bar.
 const UNITS: f64 = 1000.0;
 
-/// Who hears of progress, and how.
+/// The line of progress.
 pub struct ProgressLine {
     start: Instant,
     bar: Option<ProgressBar>,
@@ -17,7 +17,7 @@ pub struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// `quiet` says nothing at all.
+    /// A line that prints nothing if `quiet`.
     pub fn new(quiet: bool) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         Self {
@@ -27,7 +27,7 @@ impl ProgressLine {
         }
     }
 
-    /// What is being done, the share that is over, and how many seconds are left, if that is known.
+    /// Shows the current work, the finished share, and the seconds left, if known.
     pub fn tell(&self, text: &str, share: f64, left: Option<f64>) {
         if let Some(bar) = &self.bar {
             bar.set_position((UNITS * share) as u64);
@@ -37,12 +37,12 @@ impl ProgressLine {
         }
     }
 
-    /// Whether it is redrawn, so that small steps may be told.
+    /// Whether the line is redrawn, so that small steps may be shown.
     pub fn is_drawn(&self) -> bool {
         self.bar.is_some()
     }
 
-    /// What stays to be read.
+    /// Prints a line that stays.
     pub fn note(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.suspend(|| say::aside(text)),
@@ -56,7 +56,7 @@ impl ProgressLine {
         self.start.elapsed().as_secs_f64()
     }
 
-    /// Takes the line away, so that what follows stands on clean lines.
+    /// Removes the line, so that later output starts on a clean line.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

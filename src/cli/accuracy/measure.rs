@@ -1,4 +1,4 @@
-//! Measuring, going on, and telling what there is.
+//! Measuring a sweep, resuming it, and writing its page.
 
 use super::line::ProgressLine;
 use super::{AccuracyArgs, Outcome, files, page};
@@ -20,7 +20,7 @@ use std::time::Instant;
 const ORACLE: &str = "oracle.json";
 /// Name of the figures of writing.
 const WRITING: &str = "writing.json";
-/// Name of the machine's load while there was measured, by the last run that did.
+/// Name of the machine's load during the last run that measured.
 const LOAD: &str = "load.json";
 
 /// A sweep to be measured and reported.
@@ -31,14 +31,14 @@ pub struct SweepJob<'a> {
     pub line: ProgressLine,
     pub oracle_was_wanted: bool,
     pub writing_is_wanted: bool,
-    /// Load of the machine over the minute before.
+    /// Load of the machine over the minute before the start.
     pub load: Option<f64>,
     /// When the program began.
     pub start: Instant,
 }
 
 impl SweepJob<'_> {
-    /// Measures what `ledger` has not, and writes the page.
+    /// Measures all trials that `ledger` lacks, and writes the page.
     pub fn run(&self, mut ledger: Ledger) -> Result<Exit> {
         self.greet(&ledger);
         let measured = self.interrupt.watched(|| self.measure(&mut ledger));
@@ -63,9 +63,12 @@ impl SweepJob<'_> {
             counted(of, "trial")
         ));
         if done == of {
-            self.line.note("all of it is measured; --overwrite measures anew, more --turns go on");
+            self.line.note(
+                "every trial is measured; --overwrite measures anew, more --turns extend the sweep",
+            );
         } else if done > 0 {
-            let text = format!("going on: {done} of {of} are measured; --overwrite measures anew");
+            let text =
+                format!("going on: {done} of {of} trials are measured; --overwrite measures anew");
             self.line.note(&text);
         }
     }
@@ -104,12 +107,12 @@ impl SweepJob<'_> {
         self.line.tell(&text, share, *left);
     }
 
-    /// The reference, as far as it is not on disk.
+    /// Renders the rest of the reference that is not on disk yet.
     fn truth(&self, ledger: &Ledger) -> Result<Truth> {
         let (last, wanted) = match ledger.reference() {
             Some((last, wanted)) => (Some(last), wanted),
             None => {
-                self.line.tell("how noisy the best-sampled setting is", 0.0, None);
+                self.line.tell("noise of the setting with the most samples", 0.0, None);
                 (None, self.sweep.least_noise()? / 4.0)
             }
         };
@@ -137,7 +140,7 @@ impl SweepJob<'_> {
                 ledger.keep_reference(doubling, wanted)?;
                 let seconds = start.get().elapsed().as_secs_f64();
                 let change = doubling.change.map_or(String::new(), |change| {
-                    format!(", {change:.3}/255 away from half as many; wanted {wanted:.3}")
+                    format!(", {change:.3}/255 from the picture of half as many; goal {wanted:.3}")
                 });
                 // Each doubling takes twice the time of the one before.
                 let more = self.args.reference_spp / doubling.spp.max(1);
@@ -154,7 +157,7 @@ impl SweepJob<'_> {
         convergence.run(last, &mut hear)
     }
 
-    /// What there is so far; `None` before the default was timed.
+    /// The results so far; `None` before the default was timed.
     fn outcome<'o>(&'o self, truth: &'o Truth, ledger: &Ledger) -> Option<Outcome<'o>> {
         let sweep = self.sweep;
         let (measured, pictures) = sweep.measured(ledger)?;
@@ -181,7 +184,7 @@ impl SweepJob<'_> {
         })
     }
 
-    /// Load of the machine before and after; of no run that only reads what others measured.
+    /// Load of the machine before and after the last run that measured.
     fn load_of(&self, ledger: &Ledger) -> [Option<f64>; 2] {
         match ledger.is_running() {
             true => [self.load, machine::load()],
@@ -189,7 +192,7 @@ impl SweepJob<'_> {
         }
     }
 
-    /// Writes page and figures of what there is; gives the page's own summary.
+    /// Writes the page and the figures of the results so far; returns the page's summary.
     fn publish(&self, truth: &Truth, ledger: &Ledger) -> Result<Option<Vec<String>>> {
         let Some(outcome) = self.outcome(truth, ledger) else { return Ok(None) };
         if ledger.is_running() {
@@ -207,7 +210,7 @@ impl SweepJob<'_> {
         self.args.output.join("report.html")
     }
 
-    /// Writes what there is and says it; whether there was anything.
+    /// Writes the page of the results so far and prints its summary; false if there are none.
     fn tell(&self, ledger: &Ledger) -> Result<bool> {
         // It converged, or was as near as it may come: nothing is rendered.
         let truth = self.truth(ledger)?;
@@ -220,7 +223,7 @@ impl SweepJob<'_> {
         Ok(true)
     }
 
-    /// The page of what there is, when the sweep was asked to stop.
+    /// Writes the page of the results so far when the sweep was asked to stop.
     fn take_leave(&self, ledger: &Ledger) -> Result<Exit> {
         let (done, of) = (self.sweep.done(ledger), self.sweep.trials());
         let is_told = done > 0 && self.tell(ledger)?;

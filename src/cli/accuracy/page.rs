@@ -69,11 +69,11 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     )];
     let half = best_within(&outcome.measured, time * 1.02).filter(|row| row.knob != Knob::Default);
     let beyond_noise = |ratio: &Option<Median>| ratio.is_some_and(|r| r.differs_from(1.0));
-    // That it takes no longer has to be told by as many turns as that it is nearer.
+    // The time ratio needs as many turns as the error ratio.
     let is_timed = |row: &&CandidateRow| row.time_ratio.is_some_and(|ratio| ratio.is_sure());
     if let Some(row) = half.filter(is_timed).filter(|row| beyond_noise(&row.error_ratio)) {
         lines.push(format!(
-            "In the same time {} comes nearer: {}/255.",
+            "{} is more accurate in the same time: {}/255.",
             row.options,
             short(row.errors.rmse_steps)
         ));
@@ -82,12 +82,12 @@ fn summary(outcome: &Outcome) -> Vec<String> {
     let Some(row) = fastest_reaching(&outcome.measured, goal) else { return lines };
     if row.knob != Knob::Default {
         let share = percent(median_of(row) / time);
-        lines.push(format!("{} is as near in {share} of the time.", row.options));
+        lines.push(format!("{} is as accurate in {share} of the time.", row.options));
     }
     if let Some(row) = perhaps_faster(&outcome.measured, goal, row) {
         lines.push(format!(
-            "{} may be as near in less time, but {} turns are too few to tell that from noise: more --turns \
-             are needed, 6 or so.",
+            "{} may be as accurate in less time, but {} turns are too few to distinguish that from noise: \
+             about 6 --turns are needed.",
             row.options,
             row.seconds.turns.len()
         ));
@@ -132,7 +132,7 @@ fn reference(outcome: &Outcome) -> String {
     }
 }
 
-/// How long it took, as far as that is known.
+/// The duration of the sweep in words, as far as it is known.
 fn whole(outcome: &Outcome) -> String {
     match (outcome.seconds.map(seconds), outcome.runs) {
         (Some(own), 1) => own,
@@ -147,7 +147,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     let [done, of] = outcome.trials;
     if done < of {
         warnings.push(format!(
-            "This is what there is of a sweep that is not complete: {} of {} trials, {} of {} settings. \
+            "The sweep is not complete: the page has {} of {} trials, {} of {} settings. \
              The same command goes on.",
             count(done as u64),
             count(of as u64),
@@ -158,16 +158,16 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     let rows = &outcome.measured.rows;
     let best = rows.iter().map(|row| row.errors.rmse_steps).fold(f64::INFINITY, f64::min);
     let change = outcome.truth.change;
-    let longer = "Errors near that are too large here. --reference-spp lets it converge longer.";
+    let longer = "Errors of about this size are overestimated here. A higher --reference-spp lets the reference converge.";
     if !change.is_finite() {
         let best = short(best);
         warnings.push(format!(
-            "Nobody knows how far the reference itself is off: it was never doubled. The best setting's \
-             error is {best}/255. {longer}"
+            "The error of the reference itself is unknown, since its samples were never doubled. The best \
+             setting's error is {best}/255. {longer}"
         ));
     } else if change > best / 4.0 {
         warnings.push(format!(
-            "The reference is not far enough ahead: its last doubling changed {}/255, more than a \
+            "The reference has not converged: its last doubling changed it by {}/255, more than a \
              quarter of the best setting's error, {}/255. {longer}",
             short(change),
             short(best)
@@ -176,7 +176,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     let before = outcome.load[0].unwrap_or(0.0);
     if before > 0.5 {
         warnings.push(format!(
-            "The machine was busy when this began (load {}): times are less sure than they could be.",
+            "The machine was busy when the sweep began (load {}), so times are less certain.",
             short(before)
         ));
     }
@@ -185,7 +185,7 @@ fn warnings(outcome: &Outcome) -> Vec<String> {
     warnings
 }
 
-/// What to be wary of where `turns` were timed, of `asked`.
+/// The warning where only `turns` of `asked` turns were timed, or too few for an interval.
 fn few_turns(turns: usize, asked: u32, confidence: f64) -> Option<String> {
     let so_far = turns < asked as usize;
     Some(match turns {
@@ -193,7 +193,7 @@ fn few_turns(turns: usize, asked: u32, confidence: f64) -> Option<String> {
         1 if so_far => "So far 1 turn is timed, which gives no interval.".into(),
         1 => "One turn is timed, which gives no interval; more --turns go on.".into(),
         _ => {
-            let hold = format!("the intervals hold the truth in {}", percent(confidence));
+            let hold = format!("the intervals contain the true value in {}", percent(confidence));
             match so_far {
                 true => format!("So far {turns} turns are timed: {hold} of cases, not in 95 %."),
                 false => format!("With --turns {turns} {hold} of cases, not in 95 %."),
@@ -210,7 +210,7 @@ fn with_ends(m: &Median, word: fn(f64) -> String) -> String {
     format!("{} ({}–{})", word(i.estimate), word(i.low), word(i.high))
 }
 
-/// How far a ratio is from 1, with its ends.
+/// A ratio's difference from 1, with the ends of its interval, in words.
 fn with_changes(ratio: &Median) -> String {
     let i = ratio.interval;
     let [is, low, high] = [i.estimate, i.low, i.high].map(change);
@@ -251,7 +251,7 @@ fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
     outcome.measured.rows.iter().enumerate().map(detail).collect()
 }
 
-/// What turning each knob does.
+/// Sentences about the effect of each group of options.
 pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
     let mut seen: Vec<Knob> = Vec::new();
     for row in &outcome.measured.rows {
@@ -268,8 +268,8 @@ pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
     if let Some(crop) = &outcome.oracle {
         all.push(KnobText { name: "Oracle".into(), sentences: vec![about_oracle(crop)] });
     } else if outcome.oracle_was_wanted {
-        let why = "Left out: it holds every ray against every triangle, and even a few pixels of this \
-                   scene would take it minutes.";
+        let why = "Left out: the oracle tests every ray against every triangle, and would take minutes for a \
+                   few pixels of this scene.";
         all.push(KnobText { name: "Oracle".into(), sentences: vec![why.into()] });
     }
     if let Some(writing) = &outcome.writing {
@@ -280,7 +280,7 @@ pub fn knobs(outcome: &Outcome) -> Vec<KnobText> {
     all
 }
 
-/// The default, the reference, then what is on the front, then the rest, as many as there is room for.
+/// Up to [`MOST_PICTURES`] pictures: the default, the reference, settings on the front, then the others.
 fn pictures(outcome: &Outcome) -> Result<Vec<Named>> {
     let rows = &outcome.measured.rows;
     let named = |candidate: usize| {
@@ -305,13 +305,14 @@ mod tests {
     use super::few_turns;
 
     #[test]
-    fn a_sweep_that_was_stopped_is_told_what_it_has_and_not_what_it_was_asked_for() {
+    fn the_warning_names_the_turns_timed_so_far_not_those_asked_for() {
         let told = |turns, asked| few_turns(turns, asked, 0.75).unwrap_or_default();
         assert!(
-            told(3, 6)
-                .starts_with("So far 3 turns are timed: the intervals hold the truth in 75 %")
+            told(3, 6).starts_with(
+                "So far 3 turns are timed: the intervals contain the true value in 75 %"
+            )
         );
-        assert!(told(3, 3).starts_with("With --turns 3 the intervals hold"));
+        assert!(told(3, 3).starts_with("With --turns 3 the intervals contain"));
         for one in [told(1, 6), told(1, 1)] {
             assert!(one.contains("gives no interval") && !one.contains('%'), "{one}");
         }

@@ -22,7 +22,7 @@ pub struct JobArgs {
     #[arg(long)]
     pub overwrite: bool,
     /// Fail (exit code 1, frames written) where a sample is NaN, infinite or negative, or where inferred
-    /// frames are less true than traced ones
+    /// frames are less accurate than traced ones
     #[arg(long)]
     pub strict: bool,
     /// Make no video of the sequence
@@ -34,12 +34,12 @@ pub struct JobArgs {
     /// Frames per second of the video [default: 24]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
     pub fps: Option<f64>,
-    /// Map where each frame's light comes from: traced or inferred, from which frame, from how far
-    /// away, how far off; as pictures beside png and ppm frames, as channels of exr frames
+    /// Write maps of where each frame's light comes from (traced or inferred, from which frame, at what
+    /// distance) and of its audited errors; as pictures beside png and ppm frames, as channels of exr frames
     #[arg(long, help_heading = "Reuse")]
     pub maps: bool,
-    /// Surface policy: infer from the exr frames in this folder too, which an earlier job of the same
-    /// scene left; repeatable
+    /// Surface policy: infer also from the exr frames in this folder, made by an earlier job of the same
+    /// scene; repeatable
     #[arg(long, value_name = "DIR", help_heading = "Reuse")]
     pub references: Vec<PathBuf>,
     /// Colour policy: take this picture (png, ppm, jpeg, exr) for frame FRAME, and infer others
@@ -50,15 +50,15 @@ pub struct JobArgs {
     /// 00:30:00, 1-12; counted from the program's start. In a Slurm job at the latest 30 s before its end
     #[arg(long, value_name = "TIME", value_parser = values::time_limit)]
     pub time_limit: Option<Duration>,
-    /// Put what frames to come need on disk every so often, so that a killed job need not trace it
-    /// again: 30s, 5m, off [default: 30s]
+    /// How often references that later frames need are written to disk, so that they need not be traced
+    /// again after a kill: 30s, 5m, off [default: 30s]
     #[arg(long, value_name = "TIME", value_parser = values::time_or_off)]
     pub checkpoint: Option<SaveInterval>,
-    /// Of several ranks of an MPI job: how many discoveries (points or pixels that one traced and others
-    /// use) a message carries at most [default: 100000]
+    /// In an MPI job: most discoveries (points or pixels that one rank traced and others use) in one
+    /// message [default: 100000]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_EXCHANGE))]
     pub exchange: Option<u32>,
-    /// Write what the job took to this file, as JSON
+    /// Write times, rays and memory of the job to this file, as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
     /// Rendering threads [default: the cores this process may use]
@@ -68,15 +68,15 @@ pub struct JobArgs {
     /// segments stay on one node [default: as the ranks share memory]
     #[arg(long, value_name = "FILE")]
     pub rank_map: Option<PathBuf>,
-    /// Say nothing but errors
+    /// Print nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
 }
 
 impl JobArgs {
-    /// Puts every option that was given over `options`, for a shot of `count` frames.
+    /// Overrides `options` with the options that were given, for a shot of `count` frames.
     ///
-    /// Errors: `Error::Usage`, frames that the shot has not.
+    /// Errors: `Error::Usage` for frames that the shot does not have.
     pub fn apply(&self, options: &mut JobOptions, count: u32) -> Result<()> {
         let o = options;
         if let Some(request) = self.frames {

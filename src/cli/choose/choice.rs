@@ -1,4 +1,4 @@
-//! What was chosen, as the manifest keeps it.
+//! The chosen settings, as the manifest keeps them.
 
 use super::decibels;
 use crate::accuracy::{FixedSettings, Prediction, Predictor, Verdict};
@@ -69,7 +69,7 @@ impl Choice {
     pub fn verdict(&self) -> Option<String> {
         let came = match self.verdict? {
             Verdict::Reached => "reached",
-            Verdict::Open => "not told apart from the target by so few pixels",
+            Verdict::Open => "undecided: too close to the target for so few pixels",
             Verdict::Missed => "missed",
         };
         Some(format!("{}: {came}", self.wanted))

@@ -1,4 +1,4 @@
-//! What is in the way of a job whose settings are yet to be chosen.
+//! Checks of the output folder before settings are chosen.
 
 use super::{Choice, Chooser};
 use crate::error::{Error, Result, counted};
@@ -8,8 +8,8 @@ use crate::sequence::{self, Target};
 use serde_json::Value;
 
 impl Chooser<'_> {
-    /// Refuses, before the probe, what rendering would only refuse after it: a folder that cannot be
-    /// written, and frames that were made for something else.
+    /// Refuses, before the probe, a folder that cannot be written, and frames that were made for another
+    /// target or settings; rendering would refuse them only after the probe.
     pub(super) fn check_folder(&self) -> Result<()> {
         let request = self.request;
         atomic::make_room(request.pattern.path(request.frames.first))?;
@@ -32,13 +32,13 @@ impl Chooser<'_> {
         )))
     }
 
-    /// Where frames would go, were nothing chosen.
+    /// The target of the job without a choice of settings.
     fn target(&self) -> Result<Target> {
         let setup = self.request.setup(self.context.base.clone())?;
         Ok(self.request.target(&setup, self.tracer))
     }
 
-    /// For what frames with the header `before` were made, and where only that is the same, what is not.
+    /// What frames with the header `before` were made for, in words; if the target is the same, also what differs.
     fn made_for(&self, before: &Header) -> Result<String> {
         let Some(chosen) = Choice::of(before) else {
             return Ok("whose settings were not chosen".into());

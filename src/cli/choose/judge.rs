@@ -8,7 +8,7 @@ use crate::output::manifest::AuditRow;
 use crate::output::read_image;
 use crate::page::words::seconds;
 
-/// How often a choice that missed is tightened.
+/// Most times that a choice is tightened after a miss.
 const ROUNDS: u32 = 2;
 
 impl Chooser<'_> {
@@ -48,7 +48,7 @@ impl Chooser<'_> {
         self.weigh(Choice { came_out, ..choice }, &check, audit, timer)
     }
 
-    /// `choice` with its verdict, or a tighter one where the target was missed and one may be had.
+    /// `choice` with its verdict, or a tighter one if the target was missed and one is found.
     fn weigh(
         &self,
         choice: Choice,
@@ -73,8 +73,8 @@ impl Chooser<'_> {
         })
     }
 
-    /// Time of rendering beside the prediction, if `rendered` has it, and of the program beside the budget, in
-    /// words.
+    /// In words: the time of rendering with its prediction, if `rendered` has it, and the time of the program with
+    /// its budget.
     fn time(&self, choice: &Choice, rendered: Option<f64>) -> String {
         let predicted = choice.seconds;
         let rendering = rendered.map_or(String::new(), |took| {
@@ -96,7 +96,7 @@ impl Chooser<'_> {
         if !self.given().bounces {
             predictor = predictor.with_more_bounces();
         }
-        // A tenth beyond what was seen, lest the next round misses by a hair.
+        // A tenth more than measured, so that the next round does not just miss.
         let allowed = choice.predicted.squared_error / (1.1 * excess);
         let range = self.probe().range();
         let of_mode = |mode| predictor.fastest(mode, &range, allowed);
@@ -104,7 +104,10 @@ impl Chooser<'_> {
         let found = self.probe().fastest(found, timer)?;
         let set = |predicted: &Prediction| (predicted.samples, predicted.bounces);
         let Some(predicted) = found.filter(|found| set(found) != set(&choice.predicted)) else {
-            self.warn(format!("{} was missed, and nothing is tighter", choice.wanted));
+            self.warn(format!(
+                "{} was missed, and no other setting is predicted to be accurate enough",
+                choice.wanted
+            ));
             return Ok(None);
         };
         let tightened = choice.tightened + 1;
@@ -137,12 +140,12 @@ impl Chooser<'_> {
     }
 }
 
-/// By how much `came` is more than `expected`, in per cent with sign.
+/// By how much `came` exceeds `expected`, in per cent with sign.
 fn beyond(came: f64, expected: f64) -> String {
     format!("{:+.0} %", 100.0 * (came / expected.max(1e-9) - 1.0))
 }
 
-/// The factor by which the noise of light alone, by the lower end of the audit's interval, exceeds what a PSNR
+/// The factor by which the lower end of the audit's interval, squared, exceeds the squared error that a PSNR
 /// allows.
 fn audited_excess(audit: Option<&AuditRow>, goal: Goal) -> f64 {
     let low = audit.and_then(|audit| audit.rmse).map_or(0.0, |[_, low, _]| low);
@@ -160,14 +163,14 @@ mod tests {
     use crate::stats::AuditSums;
 
     #[test]
-    fn what_takes_longer_is_a_plus() {
+    fn a_longer_time_has_a_plus_sign() {
         assert_eq!(beyond(0.9, 0.6), "+50 %");
         assert_eq!(beyond(1.2, 1.0), "+20 %");
         assert_eq!(beyond(0.3, 0.6), "-50 %");
     }
 
     #[test]
-    fn an_audit_misses_only_what_it_is_sure_of() {
+    fn an_audit_counts_as_a_miss_only_beyond_its_interval() {
         let audit = |rmse| AuditRow {
             rmse: Some(rmse),
             rmse_inferred_pixels: None,

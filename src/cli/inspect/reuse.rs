@@ -1,4 +1,4 @@
-//! What `inspect` tells of reuse between frames.
+//! The part of `inspect` about reuse between frames.
 
 use super::bytes;
 use crate::error::{Result, counted};
@@ -13,14 +13,14 @@ use std::sync::atomic::AtomicBool;
 /// Memory that a reference between key frames takes at most, as a share of a key frame's: 0.07 to 0.22 in
 /// the repository's scenes.
 const BETWEEN: f64 = 0.25;
-/// The same of what waits to be put on disk for a key frame: 0.17 to 0.44.
+/// Memory of a key frame's reference encoded for disk, likewise: 0.17 to 0.44.
 const WAITING: f64 = 0.5;
-/// So many of the meshes and spheres that are always traced are named.
+/// Most names of always traced meshes and spheres that are printed.
 const NAMED: usize = 8;
-/// Longer edge of the small picture that tells how much a key frame's reference takes, pixels.
+/// Longer edge of the small picture from which the memory of a key frame's reference is estimated, pixels.
 const SMALL: u32 = 96;
 
-/// How the frames of the shot come about.
+/// How the frames of the shot are made.
 #[derive(Serialize)]
 pub struct ReusePlan {
     policy: Policy,
@@ -28,7 +28,7 @@ pub struct ReusePlan {
     segment: u32,
     /// Frames that are traced whole.
     key_frames: u32,
-    /// Frames that show what another frame of the same camera shows.
+    /// Frames that are copies of another frame with the same camera.
     copies: u32,
     lights: Vec<LightPlan>,
     always_traced: AlwaysTraced,
@@ -42,7 +42,7 @@ struct LightPlan {
     why: String,
 }
 
-/// What the scene names to be traced in every frame.
+/// Meshes, spheres and boxes that the scene file says to trace in every frame.
 #[derive(Serialize)]
 struct AlwaysTraced {
     meshes: Vec<String>,
@@ -50,8 +50,7 @@ struct AlwaysTraced {
     boxes: usize,
 }
 
-/// References, or frames whose pixels are known under policy colour: how many are held at a time, and
-/// how much memory they take, at most.
+/// Most references held at a time (policy colour: most frames with known pixels), and their memory.
 #[derive(Serialize)]
 struct References {
     key_frames: usize,
@@ -59,8 +58,8 @@ struct References {
     bytes: u64,
 }
 
-/// Bytes that a key frame's reference takes: those of a small picture's at the start, the middle or
-/// the end of the shot, whichever is largest, times its pixels.
+/// Estimated bytes of a key frame's reference: the largest of three small pictures, at the start, the middle and
+/// the end of the shot, scaled to the number of pixels.
 fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u64> {
     let Settings { width, height, .. } = *renderer.settings;
     let shrink = (width.max(height) / SMALL).max(1);
@@ -93,7 +92,7 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
     Ok((most as f64 * larger) as u64)
 }
 
-/// Bytes that what is known of a frame's pixels takes at most under policy colour.
+/// Most bytes of a frame's known pixels under policy colour.
 fn pixel_bytes(settings: &Settings) -> u64 {
     let Rect { x0, y0, x1, y1 } = settings.region();
     u64::from(x1 - x0) * u64::from(y1 - y0) * size_of::<colour::Entry>() as u64
@@ -110,7 +109,7 @@ impl AlwaysTraced {
         }
     }
 
-    /// `None` where the scene names nothing, or all is traced anyway.
+    /// The line about them; `None` if there are none, or if everything is traced anyway.
     fn to_text(&self, policy: Policy) -> Option<String> {
         let ignored = match policy {
             Policy::Surface => "",

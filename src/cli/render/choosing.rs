@@ -1,4 +1,4 @@
-//! Settings that the program chooses: by rank 0, for all.
+//! Settings that the program chooses: rank 0 chooses for all ranks.
 
 use super::RenderArgs;
 use super::round::{RenderJob, Round};
@@ -14,27 +14,27 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 
-/// What rank 0 says to the others.
+/// Messages of rank 0 to the other ranks.
 #[derive(Serialize, Deserialize)]
 enum Word<T> {
-    /// That all are to time this setting, at once.
+    /// All ranks time this setting at the same time.
     Time(Timing),
-    /// What it was asked for.
+    /// The answer.
     Answer(T),
 }
 
-/// Settings that the program chooses, and chooses again where they were not enough.
+/// The choice of settings, and a tighter choice after a missed target.
 pub(super) struct Choosing<'a> {
-    /// As given.
+    /// The command's arguments.
     pub args: &'a RenderArgs,
-    /// The job, with the settings before.
+    /// The job, with its settings before the choice.
     pub request: &'a Request,
-    /// Where it looks and renders.
+    /// Ranks, threads and intersector.
     pub site: &'a Site<'a>,
 }
 
 impl Choosing<'_> {
-    /// The choice to begin with, rank 0's; `None` where nothing is to be chosen. All ranks call it.
+    /// Rank 0's first choice; `None` if there is nothing to choose. All ranks call it.
     pub fn first(&self) -> Result<Option<Choice>> {
         if !self.args.choice.is_any() {
             return Ok(None);
@@ -42,8 +42,8 @@ impl Choosing<'_> {
         self.answer(|chooser, timer| chooser.choose(timer)).map(Some)
     }
 
-    /// What came of `choice`, and a tighter one where it was not enough; `None` where nothing was chosen
-    /// or frames are missing. All ranks call it.
+    /// The judgement of `choice` after rendering, with a tighter choice if the target was missed; `None` if
+    /// nothing was chosen or frames are missing. All ranks call it.
     pub fn next(
         &self,
         job: &RenderJob,
@@ -72,8 +72,8 @@ impl Choosing<'_> {
         self.answer(judge).map(Some)
     }
 
-    /// Rank 0's answer to `question`, for all ranks, which meanwhile time what it wants timed. All ranks
-    /// call it.
+    /// Rank 0's answer to `question`, on all ranks. Meanwhile the other ranks time settings when rank 0 asks
+    /// for it. All ranks call it.
     fn answer<T: Serialize + DeserializeOwned>(
         &self,
         question: impl Fn(&Chooser, Timer) -> Result<T>,
@@ -120,7 +120,7 @@ impl Choosing<'_> {
         }
     }
 
-    /// Seconds a frame of a rank, when all try at once; the mean of how many they make in a second.
+    /// Seconds per frame of a rank when all ranks render at once: the inverse of their mean frames per second.
     fn time(&self, timing: &Timing) -> Result<f64> {
         let comm = self.site.comm;
         let own = self.ask(|chooser| chooser.probe().timed(timing));
@@ -154,7 +154,7 @@ impl Choosing<'_> {
     }
 }
 
-/// Writes into the manifest what is known of the choice now.
+/// Writes the present state of the choice into the manifest.
 fn keep(target: &Target, choice: &Choice) -> Result<()> {
     let path = manifest_path(&target.pattern);
     Manifest::merge_parts(&path, &target.header)?;

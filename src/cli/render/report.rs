@@ -1,4 +1,4 @@
-//! What is said of a job that renders no more frames, and the exit code that follows.
+//! The last lines that a job prints, and its exit code.
 
 use super::round::{RenderJob, Round};
 use super::site::Site;
@@ -12,7 +12,7 @@ use crate::output::manifest::AuditRow;
 use crate::scene::Policy;
 use crate::stats::ReuseCounts;
 
-/// Says that the job was stopped before its first frame.
+/// Prints that the job was stopped before its first frame.
 pub(super) fn stopped_while_choosing(site: &Site) -> Exit {
     if site.comm.is_root() {
         site.interrupt.say_stopped();
@@ -20,7 +20,7 @@ pub(super) fn stopped_while_choosing(site: &Site) -> Exit {
     Exit::Stopped
 }
 
-/// Says what came of a target: last, where it is seen.
+/// Prints whether the target was reached, as the last line.
 pub(super) fn say_verdict(judged: Option<Judgement>, quiet: bool) -> Result<()> {
     let verdict = match judged {
         Some(Judgement::Done(choice)) => choice.verdict(),
@@ -29,8 +29,8 @@ pub(super) fn say_verdict(judged: Option<Judgement>, quiet: bool) -> Result<()> 
     verdict.filter(|_| !quiet).map_or(Ok(()), say::result)
 }
 
-/// Tells what there is to tell of a job that renders no more frames; `was_checking`: it was stopped
-/// while these were held against what was wanted.
+/// Prints the results of a job that renders no more frames. `was_checking`: the job was stopped while
+/// its frames were checked against the target.
 pub(super) fn conclude(job: &RenderJob, round: &Round, was_checking: bool) -> Result<Exit> {
     let is_stopped = was_checking || round.unfinished > 0;
     if !job.site.comm.is_root() {
@@ -55,7 +55,7 @@ pub(super) fn conclude(job: &RenderJob, round: &Round, was_checking: bool) -> Re
     }
 }
 
-/// Says how to go on.
+/// Prints how to resume the job.
 fn say_stopped(job: &RenderJob, round: &Round) {
     // A reason that came after the frames is only known here.
     let reason = round.reasons.iter().find(|reason| !reason.is_empty()).cloned();
@@ -69,7 +69,7 @@ fn say_stopped(job: &RenderJob, round: &Round) {
     ));
 }
 
-/// Says what there is now, and makes the videos of it: all frames asked for are there.
+/// Prints the results of a job whose frames are all there, and makes its videos.
 fn finish(job: &RenderJob, round: &Round) -> Result<Exit> {
     let result = |line: String| if job.site.quiet { Ok(()) } else { say::result(line) };
     let Round { plan, outcome, .. } = round;
@@ -94,27 +94,27 @@ fn finish(job: &RenderJob, round: &Round) -> Result<Exit> {
     Ok(Exit::Done)
 }
 
-/// How much of the job was reused, where anything could be.
+/// The line about reuse; `None` if there was nothing to reuse.
 fn reused(policy: Policy, counts: &ReuseCounts) -> Option<String> {
     let all = percent(counts.share()?, 1);
     let mirrored = counts.specular_share().map_or(String::new(), |share| {
-        format!("; of those in mirrors, glass and out of focus {}", percent(share, 1))
+        format!("; of those in mirrors, in glass or out of focus {}", percent(share, 1))
     });
     let what = match policy {
-        // It takes over pixels, whatever they show.
+        // The policy reuses pixels, whatever they show.
         Policy::Colour => "pixels",
         Policy::Surface | Policy::Off => "lit surface points",
     };
     Some(format!("{all} of the {what} were reused{mirrored}"))
 }
 
-/// Says so, with what to do, where the audit is sure that inferred frames are less true than traced ones, by
-/// more than `tolerance` display steps.
+/// The warning, with what to do, if the audit's interval shows that inferred frames are less accurate than
+/// traced ones, by more than `tolerance` display steps.
 fn worse_than_traced(audit: &AuditRow, tolerance: f32) -> Option<String> {
     let ([rmse, low, _], [traced, _, high]) = (audit.rmse?, audit.rmse_traced?);
     (low > high.max(tolerance.into())).then(|| {
         format!(
-            "inferred frames are less true than traced ones (RMSE {}/255 against {}/255): trace them \
+            "inferred frames are less accurate than traced ones (RMSE {}/255 against {}/255): trace them \
              with --policy off, or raise --probes",
             steps(rmse),
             steps(traced)
@@ -122,7 +122,7 @@ fn worse_than_traced(audit: &AuditRow, tolerance: f32) -> Option<String> {
     })
 }
 
-/// How good the inferred frames are, in words.
+/// The line about the audit.
 fn audit_line(audit: &AuditRow) -> Option<String> {
     let ([rmse, low, high], [traced, ..]) = (audit.rmse?, audit.rmse_traced?);
     Some(format!(
@@ -134,7 +134,7 @@ fn audit_line(audit: &AuditRow) -> Option<String> {
     ))
 }
 
-/// Display steps in two digits or so.
+/// Display steps as text, with about two digits.
 fn steps(x: f64) -> String {
     match x {
         ..0.0095 => format!("{x:.3}"),
@@ -143,13 +143,13 @@ fn steps(x: f64) -> String {
     }
 }
 
-/// Says where inferred frames are less true than traced ones; an exit code where that is a failure.
+/// Warns if inferred frames are less accurate than traced ones; returns an exit code if that is a failure.
 fn judge_reuse(job: &RenderJob, round: &Round) -> Option<Exit> {
     let audit = stats::audit_of(&round.plan, &round.outcome)?;
     complain(job, worse_than_traced(&audit, job.setup.settings.reuse.tolerance)?)
 }
 
-/// Says what is wrong with finished frames; an exit code where that is a failure.
+/// Prints a warning about finished frames, or with `--strict` an error; then returns the exit code.
 fn complain(job: &RenderJob, message: String) -> Option<Exit> {
     if job.request.options.strict {
         say::error(&Error::Failed(message));
@@ -159,7 +159,7 @@ fn complain(job: &RenderJob, message: String) -> Option<Exit> {
     None
 }
 
-/// Says how many samples are invalid; an exit code where that is a failure.
+/// Warns of invalid samples; returns an exit code if they are a failure.
 fn judge_samples(job: &RenderJob, round: &Round) -> Option<Exit> {
     let Round { plan, outcome, .. } = round;
     let bad = stats::bad_of(plan, outcome);
@@ -188,7 +188,7 @@ mod tests {
     use crate::stats::AuditSums;
 
     #[test]
-    fn inferred_frames_are_called_worse_only_where_that_is_sure_and_seen() {
+    fn inferred_frames_are_reported_as_worse_only_beyond_interval_and_tolerance() {
         let audit = |rmse, traced| AuditRow {
             rmse: Some(rmse),
             rmse_inferred_pixels: None,

@@ -1,4 +1,4 @@
-//! One round of a job: every frame that is not there yet, by all ranks.
+//! One round of a job: all ranks render the frames that are missing.
 
 use super::site::Site;
 use crate::cli::choose::Choice;
@@ -18,21 +18,21 @@ use crate::sequence::{
 use crate::shade::Renderer;
 use std::time::Instant;
 
-/// What came of rendering all frames once.
+/// The result of one round.
 pub(super) struct Round {
     pub plan: Plan,
     pub outcome: Outcome,
-    /// Frames that no rank got to; every rank knows it.
+    /// Number of frames that were not rendered; known on every rank.
     pub unfinished: usize,
     pub seconds: f64,
-    /// What each rank took, and why it was asked to stop; known on rank 0.
+    /// Statistics of each rank; known on rank 0.
     pub ranks: Vec<RankStats>,
     pub reasons: Vec<String>,
-    /// Keeps jobs of other settings out until all that is made of the frames is made.
+    /// Keeps jobs of other settings out until the videos and the check of the frames are done.
     _lock: SequenceLock,
 }
 
-/// What rendering the frames takes.
+/// Everything that rendering the frames needs.
 pub(super) struct RenderJob<'a> {
     pub site: &'a Site<'a>,
     pub request: &'a Request,
@@ -41,7 +41,7 @@ pub(super) struct RenderJob<'a> {
 }
 
 impl Round {
-    /// All frames asked for.
+    /// Number of frames asked for.
     pub fn total(&self) -> usize {
         total(&self.plan)
     }
@@ -52,7 +52,7 @@ fn total(plan: &Plan) -> usize {
 }
 
 impl<'a> RenderJob<'a> {
-    /// The job as asked for, or as `choice` has it; one that `is_again` replaces its own frames.
+    /// The job with its own settings or those of `choice`. If it `is_again`, it replaces its own frames.
     pub fn new(
         site: &'a Site<'a>,
         request: &'a Request,
@@ -67,7 +67,7 @@ impl<'a> RenderJob<'a> {
         Ok(Self { site, request, setup, target })
     }
 
-    /// Renders the frames that are not there yet. All ranks call it.
+    /// Renders the missing frames. All ranks call it.
     pub fn render(&self) -> Result<Round> {
         let Site { comm, pool, interrupt, quiet, .. } = self.site;
         let (request, target) = (self.request, &self.target);
@@ -96,7 +96,7 @@ impl<'a> RenderJob<'a> {
         Ok(Round { plan, outcome, unfinished, seconds, ranks, reasons, _lock: lock })
     }
 
-    /// What became of the planned frames, and what they took this rank.
+    /// Renders the frames of `plan`; returns the outcome and this rank's statistics.
     fn frames(&self, plan: &Plan) -> Result<(Outcome, RankStats)> {
         let Site { comm, pool, order, interrupt, quiet, intersector, clock, .. } = self.site;
         let watch = Watch::new(plan.kept.len(), total(plan), *quiet);
@@ -129,7 +129,7 @@ impl<'a> RenderJob<'a> {
         Ok((outcome, rank))
     }
 
-    /// What makes the frames, by policy.
+    /// The maker of frames for the job's policy.
     fn maker<'m>(
         &'m self,
         watch: &'m Watch,
@@ -170,8 +170,8 @@ impl<'a> RenderJob<'a> {
         Checkpoints::new(&self.target, options.checkpoint, terms, scene.recentring, whole)
     }
 
-    /// How a job goes on that was stopped once its frames were begun: what it was to replace is its own
-    /// by then.
+    /// How to resume a job that has begun its frames: without `--overwrite`, since it has replaced older frames
+    /// already.
     pub fn goes_on(&self) -> String {
         let again = if self.request.options.overwrite { " without --overwrite" } else { "" };
         format!("; the same command{again} goes on from here")

@@ -19,10 +19,10 @@ pub(super) struct Site<'a> {
     pub pool: ThreadPool,
     /// The ranks, node by node.
     pub order: Vec<u32>,
-    /// What traces, as far as frames differ by it.
+    /// Description of the intersector, as far as frames depend on it.
     pub tracer: String,
     pub clock: Clock,
-    /// Whether nothing is said.
+    /// Whether messages are suppressed.
     pub quiet: bool,
 }
 
@@ -34,17 +34,17 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// What building the intersector took.
+    /// Seconds that building the intersector took.
     pub fn build_seconds(&self) -> f64 {
         (self.built - self.loaded).as_secs_f64()
     }
 }
 
 impl<'a> Site<'a> {
-    /// Makes all ready for `request`. All ranks call it.
+    /// Starts threads and builds the intersector for `request`. All ranks call it.
     ///
-    /// Errors: a rank map or threads that do not fit; those of building; ranks that trace with different
-    /// things.
+    /// Errors: an invalid rank map or number of threads; errors of building; ranks with different
+    /// intersectors.
     pub fn new(
         comm: &'a Communicator,
         interrupt: &'a Interrupt,
@@ -70,8 +70,8 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Holds every rank to the best instruction set that all their machines have, unless one was
-/// asked for: frames differ in their last bits by it.
+/// Sets every rank to the widest instruction set that all their machines have, unless the user chose one; the
+/// last bits of frames depend on it.
 pub(super) fn share_isa(comm: &Communicator, settings: &mut Settings, quiet: bool) -> Result<()> {
     let best: Vec<String> = comm.all_gather(machine::best_isa()?.to_string())?;
     let Some(isa) = machine::shared_isa(&best) else { return Ok(()) };
@@ -87,7 +87,7 @@ pub(super) fn share_isa(comm: &Communicator, settings: &mut Settings, quiet: boo
     Ok(())
 }
 
-/// What a launcher's binding costs, and what helps.
+/// The note about cores that the launcher leaves idle, with a remedy.
 fn in_words(binding: &Binding) -> String {
     let Binding { ranks, cores, threads, of, idle } = *binding;
     let each = if ranks == 1 { "its rank".into() } else { format!("each of its {ranks} ranks") };

@@ -1,7 +1,7 @@
 //! The videos of a job whose frames are all there.
 //!
-//! A job of some frames makes the video of these. Where they complete the shot, whoever made the others, it
-//! makes that of the whole shot too: several jobs may have shared its frames, and any may be the last.
+//! A job of some frames makes the video of these. If they complete the shot, it also makes the video of the whole
+//! shot: several jobs may have shared its frames, and any may be the last.
 
 use super::round::{RenderJob, Round};
 use crate::cli::request::Request;
@@ -11,11 +11,11 @@ use crate::output::video::{self, Clip, Video};
 use crate::scene::FrameRange;
 use crate::sequence::survey::survey_of;
 
-/// What a video of the whole shot is called, after its frames: rendering a few frames again, which gives
-/// their numbers to the name, replaces no video of all.
+/// Ending of the video of the whole shot. A video of some frames has their numbers in its name, so it does not
+/// replace this one.
 const WHOLE: &str = ".mp4";
 
-/// Makes the videos; gives the lines to print.
+/// Makes the videos; returns the lines to print.
 pub(super) fn make(job: &RenderJob, round: &Round) -> Result<Vec<String>> {
     let Request { frames, shot, pattern, .. } = job.request;
     let whole = FrameRange { first: 1, last: shot.frames };
@@ -33,7 +33,7 @@ pub(super) fn make(job: &RenderJob, round: &Round) -> Result<Vec<String>> {
     Ok(lines)
 }
 
-/// Whether every frame of the shot is there, as the manifest has it by now.
+/// Whether every frame of the shot is finished, by the manifest as it is now.
 fn is_complete(job: &RenderJob) -> Result<bool> {
     let path = manifest_path(&job.target.pattern);
     let Some(manifest) = Manifest::as_of_now(&path)? else { return Ok(false) };

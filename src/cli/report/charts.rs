@@ -1,11 +1,11 @@
-//! What changes from frame to frame, as charts.
+//! Charts of figures that change from frame to frame.
 
 use super::Job;
 use crate::output::manifest::Row;
 use crate::page::{Chart, Series, Span, Timeline};
 use crate::stats::RayKind;
 
-/// All charts that there is something to say in.
+/// All charts that have data.
 pub fn all(job: &Job) -> Vec<Chart> {
     let charts = [Some(seconds(job)), reuse(job), Some(rays(job)), audit(job)];
     charts.into_iter().flatten().filter(|_| !job.rows.is_empty()).collect()
@@ -85,7 +85,7 @@ fn audit(job: &Job) -> Option<Chart> {
     })
 }
 
-/// When each rank rendered what; `None` where the manifest does not tell.
+/// When each rank rendered which frame; `None` if the manifest has no times.
 pub fn timeline(job: &Job) -> Option<Timeline> {
     let started = |row: &Row| row.ended.map(|ended| ended - row.seconds);
     let start = job.rows.iter().filter_map(started).reduce(f64::min)?;

@@ -26,7 +26,7 @@ pub fn pictures(job: &Job, every: usize, width: u32) -> (Vec<PlayerFrame>, Vec<u
     })
 }
 
-/// The maps that say anything of the job.
+/// The maps that the job can have.
 fn offered(job: &Job) -> Vec<Map> {
     let says = |map: &Map| match map {
         Map::Audit => job.audited().is_some(),

@@ -1,10 +1,10 @@
-//! Which manifest is meant.
+//! Finding the manifest that an argument names.
 
 use crate::error::{Error, Result};
 use crate::output::manifest::ENDING;
 use std::path::{Path, PathBuf};
 
-/// The manifest that `place` is or holds.
+/// The manifest at `place`, or in the folder `place`.
 ///
 /// Errors: `Error::Input` where there is none, or more than one.
 pub fn manifest(place: &Path) -> Result<PathBuf> {

@@ -1,4 +1,4 @@
-//! How far the job is: frames that are there and whole, and what is the matter with the others.
+//! The state of the job: frames that are finished and whole, and the reasons why others are not.
 
 use super::{Job, now};
 use crate::cli::status::{not_done, runs};
@@ -7,14 +7,14 @@ use crate::output::manifest::{Manifest, Row};
 use crate::page::words;
 use crate::sequence::survey::Survey;
 
-/// How a job's frames stand.
+/// The state of a job's frames.
 pub struct Standing {
     survey: Survey,
-    /// Whether this sequence has made every frame, whatever became of it.
+    /// Whether this sequence once finished every frame, even if some were damaged or deleted since.
     is_made: bool,
-    /// Frames that lie there and are not in the manifest.
+    /// Frames that exist but are not in the manifest.
     unknown: Vec<u32>,
-    /// Whole by their hash, and yet no picture could be read from them.
+    /// Frames with the right hash from which no picture could be read.
     pub unreadable: Vec<u32>,
 }
 
@@ -30,29 +30,29 @@ impl Standing {
         Self { survey, is_made, unknown, unreadable: Vec::new() }
     }
 
-    /// Whether the frame's file is as it was written; of its maps, one may not be.
+    /// Whether the frame's file has its hash; its maps may be damaged.
     pub fn is_whole(&self, frame: u32) -> bool {
         let has = |frames: &[u32]| frames.binary_search(&frame).is_ok();
         has(&self.survey.done) || has(&self.survey.without_map)
     }
 
-    /// Whether a map of the frame, which is whole itself, is missing or damaged.
+    /// Whether a map of a whole frame is missing or damaged.
     pub fn lacks_map(&self, frame: u32) -> bool {
         self.survey.without_map.binary_search(&frame).is_ok()
     }
 
-    /// `7 of 8 frames`: of the whole move, those that are there and whole.
+    /// `7 of 8 frames`: the whole frames, of all frames of the move.
     pub fn count(&self) -> String {
         format!("{} of {}", self.survey.done.len(), counted(self.survey.total as usize, "frame"))
     }
 
-    /// What is the matter with the others, a line for each kind.
+    /// Why other frames are left out, a line for each reason.
     pub fn gaps(&self) -> Vec<String> {
         let Self { survey, unknown, unreadable, .. } = self;
         let mut gaps = not_done(survey);
         for (kind, frames) in [
             ("not in the manifest", unknown),
-            ("damaged in a map alone, and shown without that map", &survey.without_map),
+            ("with a damaged map, and shown without that map", &survey.without_map),
             ("could not be read", unreadable),
         ] {
             if !frames.is_empty() {
@@ -64,7 +64,7 @@ impl Standing {
 }
 
 impl Job {
-    /// A sentence about how far the job is.
+    /// A sentence about the state of the job.
     pub fn state(&self) -> String {
         let survey = &self.standing.survey;
         let all = counted(survey.total as usize, "frame");
@@ -80,7 +80,7 @@ impl Job {
             n => format!("{n} of the move's {all} are there"),
         };
         if self.standing.is_made {
-            return format!("{there}. The same job, run again, makes the others.");
+            return format!("{there}. The same command renders the others.");
         }
         let ended = |row: &Row| row.ended;
         let ago = match self.rows.iter().filter_map(ended).reduce(f64::max) {

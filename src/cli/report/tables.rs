@@ -1,4 +1,4 @@
-//! What the manifest holds, as tables.
+//! Tables of the manifest's content.
 
 use super::Job;
 use crate::cli::choose::Choice;
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 /// How to read the table of effects.
 pub const EFFECTS_NOTE: &str = "Cost is weighed by the fixed table that also decides what is worth a \
     lookup (a camera ray with the look at its surface is 1, a mirror or glass ray 2, a shadow ray 1.2, \
-    a lookup 1.5). It is an estimate: effects run interleaved, so their seconds cannot be told apart.";
+    a lookup 1.5). It is an estimate: effects run interleaved, so their seconds cannot be measured one by one.";
 
 /// Rays by the effect that cast them, with their shares.
 pub fn effects(job: &Job) -> Table {
@@ -86,7 +86,7 @@ fn audit_cells(name: &str, audit: &AuditRow) -> Vec<String> {
     ]
 }
 
-/// What each rank did.
+/// The work of each rank.
 pub fn ranks(job: &Job) -> Table {
     let mut table =
         Table::new("Ranks", &["", "frames", "seconds in frames", "rays", "rays a second"]);
@@ -105,7 +105,7 @@ pub fn ranks(job: &Job) -> Table {
     table
 }
 
-/// How the settings were chosen, and what came of it.
+/// How the settings were chosen, and the result.
 pub fn chosen(job: &Job, choice: &Choice) -> Table {
     let mut table = Table::new("Chosen", &["", ""]);
     let frames = job.rows.len();

@@ -1,4 +1,4 @@
-//! What the files of a job say, under the command line's options.
+//! Reading the files of a job, with the command line's options applied.
 
 use super::{Hashes, Request};
 use crate::cli::args::{JobArgs, SceneArgs, SettingArgs};
@@ -50,10 +50,10 @@ impl Request {
     }
 }
 
-/// Puts the options of `job` over those of `loaded`; which frames are asked for, and where they go: by
+/// Applies the options of `job` to those of `loaded`. Returns the frames to render and the pattern of their paths: by
 /// option, else by scene file, else a folder named after the scene.
 ///
-/// Errors: `Error::Usage`, frames that the shot has not or a pattern that is none.
+/// Errors: `Error::Usage` for frames that the shot does not have, or an invalid pattern.
 pub fn place(
     scene: &SceneArgs,
     job: &JobArgs,

@@ -1,37 +1,37 @@
-//! The text of a batch script. Pure: nothing is read or written.
+//! The text of a batch script; reads and writes no files.
 
 use crate::scene::FrameRange;
 use std::borrow::Cow;
 
-/// What a script is made of.
+/// Everything that a script contains.
 pub struct Script<'a> {
     pub program: &'a str,
     pub folder: &'a str,
-    /// The command line that asked for it.
+    /// The command line that made the script.
     pub words: &'a [String],
     pub scene: &'a str,
     /// Options of `tweenray render`.
     pub render: &'a [String],
-    /// Where frames go.
+    /// Pattern of the frames' paths.
     pub pattern: &'a str,
-    /// `None` for all.
+    /// Frames to render; `None` for all.
     pub frames: Option<FrameRange>,
     /// Folder of the references on disk.
     pub references: &'a str,
     pub nodes: u32,
     pub tasks_per_node: u32,
-    /// Of each process; `None` for whole nodes.
+    /// Cores of each process; `None` for whole nodes.
     pub cpus: Option<u32>,
     pub minutes: u64,
-    /// Seconds before the limit.
+    /// Seconds between the signal to stop and the limit.
     pub notice: u64,
     pub sbatch: &'a [String],
     pub setup: &'a [String],
 }
 
-/// What the script does, after its own words are set. A run that ends early for whatever reason, a
-/// lost process too, is followed by another as long as it got further: each leaves at least one frame or
-/// reference more, so there is an end. One that was stopped before it got further is followed by one more.
+/// The script's body, after its variables are set. A run that ends early for any reason is followed by another as
+/// long as it made progress: at least one frame or reference more, so the job ends at last. A run that was stopped
+/// before it made progress is followed by only one more.
 const BODY: &str = r#"
 # What is there of the sequence; succeeds once that is all of it.
 so_far() { "$tweenray" "${status[@]}" 2>&1; }
@@ -129,7 +129,7 @@ impl Script<'_> {
         options
     }
 
-    /// The scene's, as far as file names and Slurm's patterns take it.
+    /// The scene's name, without characters that file names or Slurm's patterns do not allow.
     fn name(&self) -> String {
         let stem = std::path::Path::new(self.scene).file_stem().unwrap_or_default();
         let fits = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
@@ -150,7 +150,7 @@ impl Script<'_> {
         words
     }
 
-    /// srun takes over neither the cores of a process nor, where these are all, that it may use them.
+    /// Options of srun: it inherits neither the number of cores per process nor `--exclusive`.
     fn srun_words(&self) -> Vec<String> {
         match self.cpus {
             Some(cpus) => vec![format!("--cpus-per-task={cpus}")],
@@ -164,7 +164,7 @@ fn array(name: &str, words: &[String]) -> String {
     format!("{name}=({})\n", words.join(" "))
 }
 
-/// A word that a shell takes as it is.
+/// A word quoted for the shell.
 fn quoted(word: &str) -> Cow<'_, str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     match !word.is_empty() && word.chars().all(plain) {
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn options_of_ones_own_come_last() {
+    fn the_users_own_options_come_last() {
         let own = ["--time=5".to_string(), "account=physics".into()];
         let text = Script { sbatch: &own, cpus: Some(8), ..script("a%b c.toml", &[]) }.text();
         let options: Vec<&str> =

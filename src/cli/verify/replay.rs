@@ -1,4 +1,4 @@
-//! One ray of `verify` again, with all that is known of it.
+//! One ray of `verify` again, with all details.
 
 use super::VerifyArgs;
 use super::report::meaning;
@@ -13,7 +13,7 @@ use serde::Serialize;
 /// Hits along the ray that are printed.
 const MOST_HITS: usize = 8;
 
-/// All of it; the text is this as lines.
+/// The JSON document about the ray; the text has the same content.
 #[derive(Serialize)]
 struct Report {
     ray: RayId,
@@ -36,11 +36,11 @@ struct Report {
 
 #[derive(Serialize, Default)]
 struct Answer {
-    /// Who says so: an intersector's name, or the court.
+    /// Source of the answer: an intersector's name, or the court.
     by: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     occluded: Option<bool>,
-    /// Where it says the ray hits, if it does.
+    /// The hit; `None` for a miss.
     hit: Option<Place>,
 }
 

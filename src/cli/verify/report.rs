@@ -1,4 +1,4 @@
-//! What `verify` found, as a table or as JSON.
+//! The results of `verify`, as a table or as JSON.
 
 use super::{VerifyArgs, replay_command};
 use crate::cli::say;
@@ -20,11 +20,11 @@ struct Report {
     seed: u64,
     band_ulps: f64,
     rays: BTreeMap<Kind, u64>,
-    /// Whether all rays were compared that were asked for.
+    /// Whether all requested rays were compared.
     complete: bool,
     passed: bool,
     unexplained: u64,
-    /// Share of the vertex rays that may be past-vertex, and how many that makes.
+    /// Share of the vertex rays that may be `past-vertex`; then the number of rays that it allows.
     past_vertex_limit: f64,
     past_vertex_allowed: u64,
     /// The same for vertices of open meshes.
@@ -40,7 +40,7 @@ struct ClassReport {
     replay: Option<String>,
 }
 
-/// Prints what was found; of a run that was stopped, until then.
+/// Prints the results, also of a run that was stopped.
 pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) -> Result<()> {
     let classes = tally
         .rows()
@@ -69,7 +69,7 @@ pub fn print(args: &VerifyArgs, check: &Check, tally: &Tally, complete: bool) ->
     say::text(&report.to_text())
 }
 
-/// What a class means, in a few words.
+/// The meaning of a class in a few words.
 pub fn meaning(class: Class) -> &'static str {
     match class {
         Class::Tie => "another triangle at the same place",
@@ -119,15 +119,15 @@ impl Report {
         let replays = self.classes.iter().filter_map(|c| c.replay.as_ref());
         let replays: Vec<String> = replays.map(|line| format!("  {line}\n")).collect();
         if !replays.is_empty() {
-            let _ = write!(text, "\nthe worst rays again:\n{}", replays.concat());
+            let _ = write!(text, "\nto trace the worst rays again:\n{}", replays.concat());
         }
         let _ = match self.unexplained {
             _ if self.passed => writeln!(text, "\npassed: every difference is explained"),
             0 if !self.complete => writeln!(text, "\nnot complete: stopped before the end"),
             0 => writeln!(
                 text,
-                "\nFAILED: more slipped past a vertex than the {} ({PAST_VERTEX_LIMIT} of the vertex rays) \
-                 that may past one of a closed mesh, or the {} ({OPEN_VERTEX_LIMIT}) past one of an open",
+                "\nFAILED: too many rays slipped past a vertex; the limits are {} for closed meshes \
+                 ({PAST_VERTEX_LIMIT} of the vertex rays) and {} for open ones ({OPEN_VERTEX_LIMIT})",
                 self.past_vertex_allowed, self.open_vertex_allowed
             ),
             n => writeln!(text, "\nFAILED: {n} unexplained"),

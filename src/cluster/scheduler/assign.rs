@@ -181,10 +181,10 @@ impl Scheduler {
         self.idle.remove(&rank);
         self.changed.insert(rank);
         let drops = std::mem::take(&mut record.drops);
-        let needs = needs.iter().map(|need| self.tasks[*need].original).collect();
+        let needs = needs.iter().map(|need| self.tasks[*need].representative).collect();
         let record = &self.tasks[t];
-        let (original, is_source) = (record.original, !record.users.is_empty());
-        let task = Task { id: t, original, is_source, extent };
+        let (representative, is_source) = (record.representative, !record.users.is_empty());
+        let task = Task { id: t, original: representative, is_source, extent };
         decisions.push(Decision::Assign(rank, Assignment { task, needs, drops }));
     }
 
@@ -198,7 +198,7 @@ impl Scheduler {
         let least = task.senders.iter_mut().min_by_key(|(_, sends)| **sends);
         if let Some((from, sends)) = least {
             *sends += 1;
-            decisions.push(Decision::Send { from: *from, to: rank, original: task.original });
+            decisions.push(Decision::Send { from: *from, to: rank, original: task.representative });
         }
     }
 }

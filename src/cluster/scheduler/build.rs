@@ -10,7 +10,7 @@ impl Scheduler {
     pub fn new(graph: &(impl FrameGraph + ?Sized), frames: &[u32], rank_order: &[u32]) -> Self {
         let mut outputs: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for frame in frames {
-            outputs.entry(graph.original(*frame)).or_default().push(*frame);
+            outputs.entry(graph.representative(*frame)).or_default().push(*frame);
         }
         let mut users: Vec<u32> = outputs.keys().copied().collect();
         let mut read = BTreeSet::new();
@@ -26,8 +26,8 @@ impl Scheduler {
                 });
             }
         }
-        let originals: Vec<u32> = outputs.keys().copied().collect();
-        let batches = graph.rank_batches(&originals);
+        let representatives: Vec<u32> = outputs.keys().copied().collect();
+        let batches = graph.rank_batches(&representatives);
         let owners = owners(&batches, rank_order);
         let mut scheduler = Self {
             tasks: Vec::new(),
@@ -39,7 +39,7 @@ impl Scheduler {
             idle: rank_order.iter().copied().collect(),
             next_thief: 0,
             changed: BTreeSet::new(),
-            remaining: originals.len(),
+            remaining: representatives.len(),
             most_strips: graph.most_strips(),
             empty_queues: rank_order.len(),
             sends_to_all: graph.sends_to_all(),
@@ -47,24 +47,32 @@ impl Scheduler {
         };
         for (batch, (list, owner)) in batches.into_iter().zip(owners).enumerate() {
             let first = scheduler.tasks.len();
-            for original in list {
-                let frames = outputs.remove(&original).unwrap_or_default();
-                scheduler.add(original, original_first(frames, original), batch, owner);
+            for representative in list {
+                let frames = outputs.remove(&representative).unwrap_or_default();
+                scheduler.add(
+                    representative,
+                    representative_first(frames, representative),
+                    batch,
+                    owner,
+                );
             }
             scheduler.batches.push(first..scheduler.tasks.len());
         }
-        let needs = |original| {
-            if read.contains(&original) { Vec::new() } else { graph.needs(original) }
+        let needs = |representative| {
+            if read.contains(&representative) { Vec::new() } else { graph.needs(representative) }
         };
         scheduler.connect(needs);
-        scheduler.tasks.iter_mut().for_each(|task| task.is_read = read.contains(&task.original));
+        scheduler
+            .tasks
+            .iter_mut()
+            .for_each(|task| task.is_read = read.contains(&task.representative));
         scheduler
     }
 
-    fn add(&mut self, original: u32, frames: Vec<u32>, batch: usize, owner: u32) {
+    fn add(&mut self, representative: u32, frames: Vec<u32>, batch: usize, owner: u32) {
         self.enqueue(owner, self.tasks.len());
         self.tasks.push(TaskRecord {
-            original,
+            representative,
             frames,
             batch,
             owner,
@@ -79,13 +87,13 @@ impl Scheduler {
         });
     }
 
-    /// Adds the edges of the dependency graph: `needs` names the originals that an original takes.
+    /// Adds the edges of the dependency graph: `needs` names the representatives that a representative takes.
     fn connect(&mut self, needs: impl Fn(u32) -> Vec<u32>) {
-        let indices = self.tasks.iter().enumerate().map(|(t, task)| (task.original, t));
+        let indices = self.tasks.iter().enumerate().map(|(t, task)| (task.representative, t));
         let indices: BTreeMap<u32, usize> = indices.collect();
         for t in 0..self.tasks.len() {
             let list: Vec<usize> =
-                needs(self.tasks[t].original).iter().map(|need| indices[need]).collect();
+                needs(self.tasks[t].representative).iter().map(|need| indices[need]).collect();
             for need in &list {
                 self.tasks[*need].users.push(t);
                 self.tasks[*need].unmade_users += 1;
@@ -99,9 +107,9 @@ impl Scheduler {
     }
 }
 
-/// `frames` in ascending order, except that `original`, if it is among them, comes first.
-fn original_first(mut frames: Vec<u32>, original: u32) -> Vec<u32> {
-    frames.sort_by_key(|frame| (*frame != original, *frame));
+/// `frames` in ascending order, except that `representative`, if it is among them, comes first.
+fn representative_first(mut frames: Vec<u32>, representative: u32) -> Vec<u32> {
+    frames.sort_by_key(|frame| (*frame != representative, *frame));
     frames
 }
 

@@ -21,20 +21,20 @@ impl FrameGraph for Frames {
         }
     }
 
-    fn needs(&self, original: u32) -> Vec<u32> {
-        if self.is_independent { Vec::new() } else { self.pyramid.ancestors(original) }
+    fn needs(&self, representative: u32) -> Vec<u32> {
+        if self.is_independent { Vec::new() } else { self.pyramid.ancestors(representative) }
     }
 
-    fn rank_batches(&self, originals: &[u32]) -> Vec<Vec<u32>> {
+    fn rank_batches(&self, representatives: &[u32]) -> Vec<Vec<u32>> {
         if self.is_independent {
-            self.batches(originals)
+            self.batches(representatives)
         } else {
-            self.pyramid.rank_batches(originals)
+            self.pyramid.rank_batches(representatives)
         }
     }
 
-    fn is_on_disk(&self, original: u32) -> bool {
-        self.on_disk.contains(&original)
+    fn is_on_disk(&self, representative: u32) -> bool {
+        self.on_disk.contains(&representative)
     }
 
     fn most_strips(&self) -> u32 {
@@ -64,14 +64,17 @@ fn simulate(frames: &Frames, wanted: &[u32], pace: &[f64]) -> Simulated {
     loop {
         for decision in scheduler.assign() {
             match decision {
-                Decision::Send { from, to, original } => {
-                    assert!(has[from as usize].contains(&original), "{from} lacks {original}");
-                    assert!(has[to as usize].insert(original), "{to} has {original}");
+                Decision::Send { from, to, original: representative } => {
+                    assert!(
+                        has[from as usize].contains(&representative),
+                        "{from} lacks {representative}"
+                    );
+                    assert!(has[to as usize].insert(representative), "{to} has {representative}");
                     run.sends += 1;
                 }
                 Decision::Assign(rank, assignment) => {
-                    for original in &assignment.drops {
-                        assert!(has[rank as usize].remove(original));
+                    for representative in &assignment.drops {
+                        assert!(has[rank as usize].remove(representative));
                     }
                     queues[rank as usize].push(assignment);
                 }
@@ -79,9 +82,12 @@ fn simulate(frames: &Frames, wanted: &[u32], pace: &[f64]) -> Simulated {
         }
         for (rank, queue) in queues.iter().enumerate() {
             if let (Some(next), None) = (queue.first(), until[rank]) {
-                let original = next.task.original;
-                assert!(next.needs.iter().all(|n| has[rank].contains(n)), "{rank} for {original}");
-                let cost = if frames.needs(original).is_empty() { 1.0 } else { 0.25 };
+                let representative = next.task.original;
+                assert!(
+                    next.needs.iter().all(|n| has[rank].contains(n)),
+                    "{rank} for {representative}"
+                );
+                let cost = if frames.needs(representative).is_empty() { 1.0 } else { 0.25 };
                 let share = match next.task.extent {
                     Extent::Strip { of, .. } => 1.0 / f64::from(of),
                     Extent::Whole { strips: 0, .. } => 1.0,

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 /// A mesh with one index per corner.
 pub(super) struct Flat<'a> {
     pub positions: Cow<'a, [DVec3]>,
-    /// As long as `positions`, where there are any.
+    /// Normals, one per position; `None` if the mesh has none.
     pub normals: Option<Cow<'a, [Vec3]>>,
     pub uvs: Option<Cow<'a, [Vec2]>>,
     pub triangles: Cow<'a, [[u32; 3]]>,
@@ -15,7 +15,7 @@ pub(super) struct Flat<'a> {
 
 const NONE: u32 = u32::MAX;
 
-/// A vertex of the result: which values it joins, and the next one of the same position.
+/// A vertex of the result: indices of its normal and texture coordinate, and the next vertex of the same position.
 struct Vertex {
     position: u32,
     normal: u32,
@@ -23,8 +23,8 @@ struct Vertex {
     next: u32,
 }
 
-/// Splits vertices that several normals or texture coordinates meet at; borrows everything
-/// where none do. Linear.
+/// Splits vertices at which several normals or texture coordinates meet; borrows all arrays
+/// if there are none. Takes linear time.
 pub(super) fn flatten(mesh: &WorldMesh) -> Flat<'_> {
     let normal_corners = mesh.normals.as_ref().and_then(|n| n.corners.as_deref());
     let uv_corners = mesh.uvs.as_ref().and_then(|uv| uv.corners.as_deref());
@@ -57,7 +57,7 @@ pub(super) fn flatten(mesh: &WorldMesh) -> Flat<'_> {
     }
 }
 
-/// The vertex that joins the given position, normal and texture coordinate, made if need be.
+/// The vertex of the given position, normal and texture coordinate; made if it does not exist.
 fn vertex(first: &mut [u32], vertices: &mut Vec<Vertex>, [position, normal, uv]: [u32; 3]) -> u32 {
     let mut at = first[position as usize];
     while at != NONE {

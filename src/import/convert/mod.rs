@@ -1,7 +1,7 @@
-//! Any mesh file to the fast format: binary little-endian PLY.
+//! Conversion of any mesh file to the fast format: binary little-endian PLY.
 //!
-//! The file is written under a temporary name, synced and renamed: where one existed, it is
-//! whole, the old one or the new.
+//! The file is written under a temporary name, synced and renamed, so an existing file is replaced by a
+//! whole one or not at all.
 
 mod flatten;
 mod write_ply;
@@ -14,12 +14,12 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// What [`convert`] did.
+/// The result of [`convert`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvertReport {
-    /// What the written file holds.
+    /// Content of the written file.
     pub written: PlyReport,
-    /// What was lost or dropped on the way.
+    /// Warnings about data that was left out.
     pub warnings: Vec<Diagnostic>,
 }
 

@@ -44,7 +44,7 @@ fn far_from_the_origin_positions_are_doubles() {
 }
 
 #[test]
-fn what_the_format_cannot_hold_is_said() {
+fn data_that_the_format_cannot_hold_gives_a_warning() {
     let (report, world) = obj_to_ply(
         "material\ndiffuse 1 0 0\nmaterial\nemitted 1 1 1\nm 0\ns 0 0 0 1\nm 1\n\
          v 0 5 0\nv 1 5 0\nv 1 5 1\nv 0 5 1\nf 1 2 3 4\n",

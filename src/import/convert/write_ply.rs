@@ -14,7 +14,7 @@ const FAR: f64 = 4.0;
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 20;
 
-/// What a written file holds.
+/// The content of a written file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlyReport {
     /// Vertices.

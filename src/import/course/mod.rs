@@ -4,8 +4,8 @@
 //! `emitted r g b`, `roughness x`); `m N` selects material N, from 0; `v x y z` with an optional
 //! `vt u v` after it; `f a b c d` (or three corners); `s x y z r` a sphere. Colours are linear.
 //!
-//! Faces that emit become area lights: flat convex quads as they are, others as several. The course's
-//! lights have no side, so neither have ours (`two_sided`); the quad of `reflective_spheres.obj`
+//! Faces that emit become area lights: a flat convex quad becomes one light, other faces several. In the course's
+//! renderer lights shine to both sides, so ours do too (`two_sided`); the quad of `reflective_spheres.obj`
 //! winds counter-clockwise seen from below and would light the scene under it in any case.
 //! Spheres that emit become sphere lights.
 
@@ -21,7 +21,7 @@ use crate::scene::{Corners, Light, Material, MaterialId, SphereLight, WorldMesh,
 use statements::{CourseMaterial, Face, File};
 use std::path::Path;
 
-/// Reads a file in the course's dialect. Normals: none.
+/// Reads a file in the course's dialect. The meshes have no normals.
 ///
 /// Errors: `Error::Input` with the line.
 pub(super) fn read(path: &Path, text: &[u8]) -> Result<Model> {

@@ -6,11 +6,11 @@ use crate::import::source::Fault;
 use crate::math::{DVec3, Rgb, Vec2};
 use crate::scene::MaterialId;
 
-/// What a file says.
+/// The statements of a file.
 #[derive(Default)]
 pub(super) struct File {
     pub positions: Vec<DVec3>,
-    /// As long as `positions`.
+    /// Texture coordinates, one per position.
     pub uvs: Vec<Option<Vec2>>,
     pub materials: Vec<CourseMaterial>,
     pub faces: Vec<Face>,
@@ -26,7 +26,7 @@ pub(super) struct CourseMaterial {
     pub diffuse: Rgb,
     pub reflective: Rgb,
     pub emitted: Rgb,
-    /// Line and file name.
+    /// Line and file name of the texture.
     pub texture: Option<(usize, String)>,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Ball {
 
 type Checked<T> = std::result::Result<T, String>;
 
-/// Reads the statements. Vertices and materials may be named before they are given.
+/// Reads the statements. Faces may use vertices and materials that are defined later.
 pub(super) fn parse(text: &[u8]) -> Result<File, Fault> {
     let mut file = File::default();
     let mut lines = Lines::new(text, 1);

@@ -102,7 +102,7 @@ fn the_first_eye_is_in_front_and_above() {
 }
 
 #[test]
-fn nothing_and_a_single_point_have_an_orbit() {
+fn an_empty_scene_and_a_single_point_have_an_orbit() {
     let lens = Lens { vfov_degrees: 30.0, aspect: 1.5 };
     let point = cloud(DVec3::ONE, DVec3::ONE);
     for world in [World::default(), World { meshes: vec![point], ..World::default() }] {

@@ -7,7 +7,7 @@ use crate::import::source::Notes;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What tobj does not tell about a material.
+/// Data of a material that tobj does not return.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Source {
     /// Name, trimmed.
@@ -18,7 +18,7 @@ pub(super) struct Source {
     pub filter: Option<[f64; 3]>,
 }
 
-/// The materials of a library, as its lines and as tobj read them.
+/// Reads the materials of a library: the data of this front, and tobj's.
 pub(super) fn read(
     file: &Path,
     bytes: &[u8],
@@ -38,8 +38,8 @@ pub(super) fn read(
 #[derive(Default)]
 struct Front {
     sources: Vec<Source>,
-    /// The text for tobj: one statement a line, names replaced by numbers (tobj trims them
-    /// otherwise than we do), only what [`super::meaning`] looks at.
+    /// The text for tobj: one statement per line, only those that [`super::meaning`] uses, with names replaced by
+    /// numbers, since tobj trims names differently.
     clean: String,
     /// Whether the current material has a `d`.
     has_dissolve: bool,
@@ -133,7 +133,7 @@ impl Front {
         self.number("d", if halo { after } else { words }, 0.0, 1.0)
     }
 
-    /// `Tr` is 1 − d. Where a material has both, `d` holds: some writers mean opaque by `Tr 1`.
+    /// `Tr` is 1 − d. If a material has both, `d` counts, since some programs write `Tr 1` for opaque.
     fn transparency(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
         let value = number_in("Tr", words, 0.0, 1.0)?;
         if !self.has_dissolve {

@@ -1,4 +1,4 @@
-//! What a material of an MTL file means to a Whitted renderer.
+//! Conversion of MTL materials to those of a Whitted renderer.
 //!
 //! | MTL | ours |
 //! |---|---|
@@ -16,7 +16,7 @@ use crate::scene::{Glass, Material};
 /// Index of refraction of glass whose file has no `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
 
-/// The material without its texture, and what the user should know about it.
+/// The material without its texture, and warnings about it.
 pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String>) {
     let mut notes = Vec::new();
     let mut out = Material::black(&source.name);
@@ -49,8 +49,8 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
     (out, notes)
 }
 
-/// The factor on the texture: `Kd` where it is a colour. Writers that leave it out or black
-/// beside a texture mean the plain texture.
+/// The factor on the texture: `Kd`, or 1 if it is missing or black, since programs that write these beside a
+/// texture mean the plain texture.
 pub(super) fn textured(mtl: &tobj::Material) -> Rgb {
     match mtl.diffuse.map(rgb) {
         Some(diffuse) if diffuse != Rgb::ZERO => diffuse.min(Rgb::ONE),

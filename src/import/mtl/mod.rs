@@ -13,7 +13,7 @@ use crate::scene::MaterialId;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// The materials that an OBJ file can name, read but not yet used.
+/// The materials of the libraries of an OBJ file, by name, before use.
 #[derive(Default)]
 pub(super) struct Libraries {
     entries: HashMap<String, Entry>,
@@ -28,10 +28,10 @@ struct Entry {
 }
 
 impl Libraries {
-    /// Reads what `mtllib NAMES` on `line` of `obj` asks for: one file, whose name may hold
-    /// blanks, or else several. A file that is missing is a warning.
+    /// Reads the files of `mtllib NAMES` on `line` of `obj`: one file, whose name may hold
+    /// blanks, or else several. A missing file gives a warning.
     ///
-    /// Errors: a library that can be read but holds nonsense, with its line.
+    /// Errors: an invalid library, with the line.
     pub fn load(&mut self, obj: &Path, line: usize, names: &str, model: &mut Model) -> Result<()> {
         let whole = source::beside(obj, names);
         let several = !whole.is_file() && names.split_whitespace().count() > 1;

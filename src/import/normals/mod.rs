@@ -1,16 +1,16 @@
-//! Shading normals as the policy asks for them.
+//! Shading normals by the policy of a mesh.
 
 mod smooth;
 
 use crate::math::{DVec3, Vec3};
 use crate::scene::{NormalPolicy, WorldMesh};
 
-/// The warning about normals that give no direction.
+/// The warning about normals that are zero or not finite.
 pub(super) const UNUSABLE: &str =
     "a normal has no length or is not a number: flat shading in its place";
 
-/// Gives `mesh` the shading normals that `policy` asks for; [`NormalPolicy::Auto`] keeps those
-/// that it has.
+/// Sets the shading normals of `mesh` by `policy`; [`NormalPolicy::Auto`] keeps those
+/// that the mesh has.
 pub fn apply(mesh: &mut WorldMesh, policy: NormalPolicy) {
     mesh.normals = match policy {
         NormalPolicy::Flat => None,

@@ -1,4 +1,4 @@
-//! From checked chunks to one mesh per material.
+//! Assembling checked chunks into one mesh per material.
 
 use super::face::{Faces, MISSING};
 use super::parse::Part;
@@ -110,7 +110,7 @@ impl Groups {
         })
     }
 
-    /// What each part's faces are made of; a material holds on across parts.
+    /// For each part the segments of faces with one material; a material stays selected across parts.
     fn segments(&mut self, parts: &[Part]) -> Vec<Vec<Segment>> {
         let mut current = None;
         let mut all = Vec::with_capacity(parts.len());
@@ -135,8 +135,8 @@ impl Groups {
     }
 }
 
-/// Joins the parts' values; where corners lack an attribute that others have, a last value
-/// stands for it: a zero normal means flat there.
+/// Joins the parts' values. If some corners lack an attribute that others have, a value is appended
+/// for them; a zero normal means flat shading there.
 fn take_values(parts: &mut [Part]) -> Values {
     let mut values = Values::default();
     for part in &mut *parts {

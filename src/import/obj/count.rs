@@ -1,4 +1,4 @@
-//! Splits a text into chunks at line ends, and counts what each holds.
+//! Splits a text into chunks at line ends, and counts the statements of each.
 
 use crate::error::{Error, Result};
 use crate::import::lines::Lines;
@@ -64,7 +64,7 @@ fn ends_in_backslash(text: &[u8]) -> bool {
     text.strip_suffix(b"\r").unwrap_or(text).last() == Some(&b'\\')
 }
 
-/// What a chunk holds.
+/// Counts the statements and lines of a chunk.
 pub(super) fn count(chunk: &[u8]) -> Counts {
     let mut lines = Lines::new(chunk, 0);
     let mut counts = Counts::default();

@@ -7,22 +7,22 @@ use crate::import::lines::{Lines, Words, number, show};
 use crate::import::source::Notes;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// What a chunk holds, in order.
+/// The content of a chunk, in order.
 #[derive(Debug, Default)]
 pub(super) struct Part {
     pub positions: Vec<DVec3>,
     pub uvs: Vec<Vec2>,
-    /// Unit, or zero where the file's is unusable.
+    /// Normals: unit, or zero where the file's is zero or not finite.
     pub normals: Vec<Vec3>,
     pub faces: Faces,
-    /// `usemtl`: the face from which a material holds, and its line and name.
+    /// `usemtl` statements: the first face with the material, line and name.
     pub materials: Vec<(usize, usize, String)>,
-    /// `mtllib`: line and name.
+    /// `mtllib` statements: line and name.
     pub libraries: Vec<(usize, String)>,
     pub notes: Notes,
 }
 
-/// Statements that mean nothing to a renderer of polygons.
+/// Statements that are ignored without a warning, since they do not affect polygons.
 const QUIET: [&[u8]; 8] = [b"o", b"g", b"s", b"mg", b"bevel", b"c_interp", b"d_interp", b"lod"];
 
 /// Reads a chunk that starts at `start` in a file that holds `total`.

@@ -1,4 +1,4 @@
-//! The usual binary layouts in bulk: vertices of fixed size, faces that are all triangles.
+//! Reading the usual binary layouts in bulk: vertices of fixed size, faces that are all triangles.
 
 use super::fields::decode;
 use super::general::index_list;
@@ -9,8 +9,8 @@ use crate::import::normals::unit_or_zero;
 use crate::math::{DVec3, Vec2};
 use rayon::prelude::*;
 
-/// Reads `element` at byte `at` and gives its size, or `None` where only the general way will
-/// do: other layouts, and faults, which that way places exactly.
+/// Reads `element` at byte `at` and returns its size. `None` for other layouts and for errors: then the general
+/// reader is used, which names the place of an error.
 pub(super) fn read(
     body: &Body<'_>,
     element: &Element,

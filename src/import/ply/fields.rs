@@ -11,9 +11,9 @@ pub(super) struct Fields<'a> {
     /// Next byte, and line.
     at: usize,
     line: usize,
-    /// Where the current record starts.
+    /// Place of the start of the current record.
     record: usize,
-    /// What is left of the current record's line (ASCII).
+    /// The rest of the current record's line (ASCII).
     words: Words<'a>,
 }
 
@@ -22,12 +22,12 @@ impl<'a> Fields<'a> {
         Self { bytes, format, at, line, record: at, words: Words::new(b"") }
     }
 
-    /// Byte and line of what comes next.
+    /// Byte and line of the next value.
     pub fn place(&self) -> (usize, usize) {
         (self.at, self.line)
     }
 
-    /// A fault in the current record.
+    /// An error in the current record.
     pub fn fault(&self, message: impl std::fmt::Display) -> Fault {
         match self.format {
             Format::Ascii => Fault::new(self.line - 1, message.to_string()),

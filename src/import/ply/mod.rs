@@ -56,7 +56,7 @@ struct Body<'a> {
     fast: bool,
 }
 
-/// What the body holds, indices checked to be in range.
+/// The content of the body, with indices checked to be in range.
 #[derive(Default)]
 struct Contents {
     vertices: Vertices,

@@ -1,4 +1,4 @@
-//! A value and where it stands in the scene file, for checks that need more than one value.
+//! A value with its place in the scene file, for checks that need more than one value.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Deserializer};

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// much again for Embree.
 pub(super) const MAX_GENERATED: u64 = 100_000_000;
 
-/// A world in the making.
+/// Builds a world from the tables.
 pub(super) struct Builder<'a> {
     source: &'a Source,
     pub world: World,
@@ -35,7 +35,7 @@ struct Named {
 }
 
 impl<'a> Builder<'a> {
-    /// A world with everything that `file` says is in it.
+    /// Builds the world of `file`.
     ///
     /// Errors: `Error::Input` at the key that is wrong, or inside the mesh file that is.
     pub fn build(source: &'a Source, file: &'a SceneFile) -> Result<Self> {
@@ -140,7 +140,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Turns what emits among the newest meshes and spheres into lights, as far as that goes.
+    /// Turns emitting meshes from number `meshes` on and spheres from `spheres` on into lights, where possible.
     fn light_up(&mut self, meshes: usize, spheres: usize, span: &Span) {
         for note in emission::adopt(&mut self.world, meshes, spheres) {
             let warning = self.source.fault(span, note.message()).help(note.help());
@@ -197,7 +197,7 @@ impl<'a> Builder<'a> {
         Ok(made)
     }
 
-    /// Refuses what would fill the memory.
+    /// Refuses more generated triangles than [`MAX_GENERATED`].
     fn allow(&mut self, triangles: u64, span: &Span) -> Result<()> {
         self.generated += triangles;
         if self.generated <= MAX_GENERATED {

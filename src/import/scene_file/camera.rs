@@ -39,7 +39,7 @@ pub(super) struct Camera {
     /// Turn about the view axis, degrees; positive tilts the camera clockwise.
     #[serde(default = "no_roll")]
     roll: Degrees,
-    /// A lens that blurs what is out of focus. Absent: all is sharp.
+    /// A thin lens, with depth of field. Absent: everything is sharp.
     lens: Option<At<Lens>>,
     /// A camera that does not move.
     still: Option<At<Still>>,
@@ -94,7 +94,7 @@ pub(super) struct Orbit {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Key {
-    /// When, as a share of the move from 0 to 1; later from key to key. Give it for every key or
+    /// Time of the key, as a share of the move from 0 to 1; increasing from key to key. Give it for every key or
     /// for none; without it the keys are evenly spread.
     at: Option<At<Share>>,
     /// Where the camera stands, world units.

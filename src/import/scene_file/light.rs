@@ -122,7 +122,7 @@ pub(super) struct SpotLight {
     /// Angle from the axis up to which the light is full, degrees.
     #[serde(default = "inner_angle")]
     inner_angle: Crease,
-    /// Radius of the sphere that shines, world units; without, shadows are hard.
+    /// Radius of the emitting sphere, world units; without it shadows are hard.
     radius: Option<Positive>,
 }
 
@@ -135,8 +135,8 @@ fn inner_angle() -> Crease {
 }
 
 impl SpotLight {
-    /// Errors: an inner angle beyond the outer one; a cone without an inside; both or neither of `direction` and `target`; a target at the
-    /// light's own place; at `span`.
+    /// Errors, at `span`: an inner angle beyond the outer one; an outer angle of 0; both or neither of `direction`
+    /// and `target`; a target at the light's own place.
     fn build(&self, source: &Source, span: &Span) -> Result<scene::SpotLight> {
         let position = self.position.vec();
         let direction = match (&self.direction, &self.target) {
@@ -167,14 +167,14 @@ impl SpotLight {
     }
 }
 
-/// What a ray that hits nothing sees: a constant sky.
+/// A constant sky: the light of rays that hit nothing.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Sky {
     /// Radiance of the sky, W/(m² sr).
     #[serde(default)]
     radiance: Amount,
-    /// Whether the sky lights diffuse surfaces, by rays that geometry can block; if not it is
+    /// Whether the sky lights diffuse surfaces, by rays that geometry can block; otherwise it is
     /// only a backdrop.
     #[serde(default = "yes")]
     lights: bool,

@@ -7,13 +7,13 @@
 use crate::math::Vec2;
 use crate::scene::Corners;
 
-/// Of a quad's corners, in order: the image once over it.
+/// Coordinates of a quad's corners, in order: the image once over it.
 pub(super) fn quad() -> Corners<Vec2> {
     let values = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
     Corners { values: values.map(|(u, v)| Vec2::new(u, v)).to_vec(), corners: None }
 }
 
-/// Of a box's faces: the image once over each. On the four sides it stands upright (+y); on top its
+/// Coordinates of a box's faces: the image once over each. On the four sides it stands upright (+y); on top its
 /// upper edge lies towards -z, below towards +z. `faces` are the corners of -x, +x, -y, +y, -z, +z, each
 /// a number whose bits 0, 1 and 2 say which end of x, y and z; each face has two triangles: its corners
 /// 0, 1, 2 and 0, 2, 3.
@@ -37,15 +37,15 @@ pub(super) fn cuboid(faces: &[[u32; 4]; 6]) -> Corners<Vec2> {
     Corners { values, corners: Some(corners.collect()) }
 }
 
-/// Of a terrain of `n · n` vertices: the image once over it, its upper edge towards -z.
+/// Coordinates of a terrain of `n · n` vertices: the image once over it, its upper edge towards -z.
 pub(super) fn terrain(n: u32) -> Corners<Vec2> {
     let share = |k: u32| (f64::from(k) / f64::from(n - 1)) as f32;
     let values = (0..n * n).map(|k| Vec2::new(share(k % n), 1.0 - share(k / n))).collect();
     Corners { values, corners: None }
 }
 
-/// Of a sphere of `nu` meridians and `nv` bands, as [`crate::import::uv_sphere`] orders its triangles: u
-/// is the longitude, v the latitude. The image's middle faces +z and its side edges meet at -z; u runs
+/// Coordinates of a sphere of `nu` meridians and `nv` bands, as [`crate::import::uv_sphere`] orders its
+/// triangles: u is the longitude, v the latitude. The image's middle faces +z and its side edges meet at -z; u runs
 /// on from there, and the image repeats. A pole has the longitude of each triangle's middle.
 pub(super) fn uv_sphere(nu: u32, nv: u32) -> Corners<Vec2> {
     let u = |i: f64| (0.75 - i / f64::from(nu)) as f32;

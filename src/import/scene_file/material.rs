@@ -9,8 +9,8 @@ use crate::scene::{self, TextureId};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What a surface is made of. `diffuse` and `mirror` add up, to at most 1 in each channel;
-/// `glass` stands alone.
+/// A material. `diffuse` and `mirror` add up, to at most 1 in each channel; `glass` excludes all other
+/// keys.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Material {
@@ -43,12 +43,12 @@ pub(super) struct Glass {
     /// Share of light that each crossing of the surface lets through.
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
-    /// Absorption coefficient of the inside, per unit of length, linear RGB or one number for grey: a way of
-    /// length x leaves the share exp(-absorption x) of light. The surface must be closed. Absent: 0.
+    /// Absorption coefficient of the inside, per unit of length, linear RGB or one number for grey: over a
+    /// length x the share exp(-absorption x) of the light remains. The surface must be closed. Absent: 0.
     absorption: Option<Amount>,
-    /// For bodies that touch, overlap or lie in one another, as tea in a glass: where several are,
-    /// the one of the highest priority is. `ior` is then that of the body itself. Absent: the body
-    /// overlaps nothing.
+    /// For bodies that touch, overlap or lie in one another, as tea in a glass: where several are at one
+    /// place, the one of the highest priority counts. `ior` is then that of the body itself. Absent: the
+    /// body overlaps nothing.
     priority: Option<Int<0, 255>>,
 }
 

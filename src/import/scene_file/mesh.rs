@@ -35,9 +35,8 @@ pub(super) struct Mesh {
     pub terrain: Option<At<Terrain>>,
     /// Name of a `[material.NAME]`. Absent: what the file says, else a light grey.
     pub material: Option<At<String>>,
-    /// Shading normals: the file's own, where it has them, else smooth ("auto"), each triangle's
-    /// plane ("flat"), or averaged at each vertex ("smooth"). Generated meshes keep their own
-    /// under "auto".
+    /// Shading normals. "auto": the file's own where it has them, else as "smooth"; generated meshes keep
+    /// their own. "flat": the normal of each triangle's plane. "smooth": averaged at each vertex.
     #[serde(default = "auto")]
     pub normals: Normals,
     /// Edges sharper than this angle stay sharp where normals are averaged, degrees.
@@ -49,7 +48,7 @@ pub(super) struct Mesh {
     /// Steps that place the mesh, applied one after the other.
     #[serde(default)]
     pub transform: Vec<At<Step>>,
-    /// Whether its light may come from other frames; if not it is traced in every frame.
+    /// Whether its light may be inferred from other frames; if not, it is traced in every frame.
     #[serde(default = "yes")]
     pub reuse: bool,
 }
@@ -78,7 +77,7 @@ pub(super) struct Sphere {
     pub radius: Positive,
     /// Name of a `[material.NAME]`. Absent: a light grey.
     pub material: Option<At<String>>,
-    /// Whether its light may come from other frames; if not it is traced in every frame.
+    /// Whether its light may be inferred from other frames; if not, it is traced in every frame.
     #[serde(default = "yes")]
     pub reuse: bool,
 }

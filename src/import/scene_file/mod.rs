@@ -1,8 +1,8 @@
 //! The scene file: TOML to a [`Loaded`] job.
 //!
 //! The tables are plain serde types whose numbers are in range by construction (`number`,
-//! `vector`), so a wrong one is refused where it stands; what takes more than one value to judge
-//! keeps its place ([`at::At`]) and is judged when the tables become scene data. The JSON schema
+//! `vector`), so an error points at the number itself. Values that are checked together with others
+//! keep their place in the file ([`at::At`]) and are checked when the tables become scene data. The JSON schema
 //! comes from the same types. `docs/scene-format.md` is the user's page.
 
 mod at;
@@ -56,7 +56,7 @@ struct SceneFile {
     camera: Option<At<Camera>>,
     /// Lights.
     light: Vec<At<Light>>,
-    /// What a ray that hits nothing sees. Absent: black.
+    /// The light of rays that hit nothing. Absent: black.
     sky: Option<Sky>,
     /// Materials by name.
     material: BTreeMap<String, At<Material>>,
@@ -66,7 +66,7 @@ struct SceneFile {
     sphere: Vec<At<Sphere>>,
     /// How to render. Absent: all defaults.
     settings: Settings,
-    /// What frames take over from one another. Absent: all defaults.
+    /// What frames reuse of one another. Absent: all defaults.
     reuse: Reuse,
 }
 

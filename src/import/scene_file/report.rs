@@ -1,11 +1,11 @@
-//! From a fault in the scene file's text to a [`Diagnostic`] with line, column and advice.
+//! Errors in the scene file's text as a [`Diagnostic`] with line, column and advice.
 
 use super::at::Span;
 use crate::error::{Diagnostic, Error, Result};
 use crate::scene::Light;
 use std::path::{Path, PathBuf};
 
-/// Larger scene files are refused: geometry belongs into mesh files.
+/// Larger scene files are refused: geometry belongs in mesh files.
 const MAX_BYTES: u64 = 16 << 20;
 
 /// The kinds of what comes in kinds.
@@ -71,7 +71,7 @@ impl Source {
         }
     }
 
-    /// What the TOML reader says, in our words.
+    /// The TOML reader's message, reworded.
     pub fn toml_fault(&self, error: &toml::de::Error) -> Diagnostic {
         let span = error.span().unwrap_or(0..0);
         let message = error.message();

@@ -11,21 +11,20 @@ use crate::scene::{Policy, ReuseSettings, limits};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What frames take over from one another. The command line's options of the same names stand over
-/// these.
+/// What frames reuse of one another. The command line's options of the same names take precedence.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, expecting = "a table")]
 pub(super) struct Reuse {
-    /// What is taken over: shadowing at surface points, with evidence ("surface"), the colours of
-    /// pixels ("colour"), or nothing, so that every frame is traced ("off").
+    /// What is reused: shadowing at surface points, as far as measured errors allow ("surface"), the colours
+    /// of pixels ("colour"), or nothing, so that every frame is traced ("off").
     policy: Policy,
     /// Frames from one key frame to the next.
     segment: Int<1, { limits::MAX_SEGMENT as i64 }>,
-    /// By how much inferred pixels may be off where traced ones are not, display steps of 1/255: root mean
-    /// square over any tile of 32 x 32 pixels. Less is more exact and slower.
+    /// By how much inferred pixels may be off even where traced ones are more accurate, display steps of 1/255:
+    /// root mean square over any tile of 32 x 32 pixels. Less is more accurate and slower.
     tolerance: Steps,
-    /// Share of the pixels of an in-between frame that are traced though other frames may know them: what
-    /// they find decides what is inferred.
+    /// Share of the pixels of an in-between frame that are estimated and also traced: the errors found decide
+    /// what is inferred.
     probes: Share,
     /// Colour policy: cached colours agree within this linear difference.
     colour_epsilon: Amount,
@@ -63,7 +62,7 @@ impl Default for Reuse {
 impl Reuse {
     /// The boxes of `traced`, world space.
     ///
-    /// Errors: corners the wrong way round.
+    /// Errors: `min` not below `max` on an axis.
     pub fn regions(&self, source: &Source) -> Result<Vec<Bounds3>> {
         let region = |region: &At<Region>| {
             let (min, max) = (region.min.vec(), region.max.vec());

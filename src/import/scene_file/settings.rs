@@ -26,13 +26,13 @@ type Corner = Int<0, { limits::MAX_EDGE as i64 }>;
 
 const MAX_SAMPLES: i64 = limits::MAX_SAMPLES as i64;
 
-/// How to render. The command line's options of the same names stand over these.
+/// How to render. The command line's options of the same names take precedence.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, expecting = "a table")]
 pub(super) struct Settings {
     /// Image width and height, pixels.
     pub size: List<Pixels, 2>,
-    /// Camera samples a pixel.
+    /// Camera samples per pixel.
     spp: Int<1, MAX_SAMPLES>,
     /// Pixel filter: "box", "tent", "gaussian" or "blackman-harris".
     filter: Filter,
@@ -52,17 +52,17 @@ pub(super) struct Settings {
     /// Factor on radiance before the tone curve.
     exposure: Positive,
     /// The most that a camera sample's radiance, times the exposure, may be in each channel before a
-    /// pixel's samples are averaged: with 1 the edges of bright lamps are smooth. It takes light away, in
-    /// exr files too. Absent: no limit.
+    /// pixel's samples are averaged: with 1 the edges of bright lamps are smooth. It removes light, also in
+    /// exr files. Absent: no limit.
     clamp: Option<Positive>,
     /// Tone curve of png and ppm files: "srgb" and "linear" clip, "reinhard" and "filmic" compress
     /// highlights. exr files stay linear.
     tone: ToneCurve,
-    /// Bits a channel of png files: 8 or 16.
+    /// Bits per channel of png files: 8 or 16.
     png_bits: PngBits,
-    /// What traces: "embree", or "oracle", the brute-force f64 path for small scenes.
+    /// Intersector: "embree", or "oracle", brute force in f64, for small scenes.
     intersector: IntersectorKind,
-    /// Embree's instruction set; frames differ in the last bits by it. Absent: the machine's best.
+    /// Embree's instruction set, on which the last bits of frames depend. Absent: the machine's best.
     isa: Option<Isa>,
     /// How much work Embree puts into its tree: "low" is built fastest and traced slowest, "high" the
     /// other way round.
@@ -76,12 +76,13 @@ pub(super) struct Settings {
     crop: Option<At<List<Corner, 4>>>,
     /// Show pixels with a sample that is NaN, infinite or negative in magenta.
     flag_bad: bool,
-    /// Whether such a sample makes the job fail, with its frames written.
+    /// Whether such a sample, or inferred frames less accurate than traced ones, make the job fail (its frames are
+    /// written).
     strict: bool,
     /// First and last frame to render, as `[first, last]`, counted from 1. Absent: all.
     frames: Option<At<List<Int<1, 1_000_000>, 2>>>,
-    /// Where frames go, relative to the current folder: `####` is the frame's number, the ending
-    /// (png, exr, ppm) the format. Absent: the command line decides.
+    /// Where frames go, relative to the current folder: `####` stands for the frame's number, the ending
+    /// (png, exr, ppm) decides the format. Absent: the command line decides.
     output: Option<At<String>>,
     /// Frames per second of the preview video.
     fps: FrameRate,
@@ -91,16 +92,16 @@ pub(super) struct Settings {
     overwrite: bool,
     /// Rendering threads. Absent: the cores this process may use.
     threads: Option<Int<1, { limits::MAX_THREADS as i64 }>>,
-    /// File for what the job took, as JSON, relative to the current folder. Absent: none.
+    /// File for times, rays and memory of the job, as JSON, relative to the current folder. Absent: none.
     stats: Option<PathBuf>,
-    /// Stop after this long, counted from the program's start, to go on later: "25m", "1h30m", "90s".
+    /// Time after which the job stops, counted from the program's start: "25m", "1h30m", "90s".
     /// Absent: only a Slurm job stops, 30 s before its end.
     time_limit: Option<Time>,
-    /// Put what frames to come need on disk every so often, so that a killed job need not trace it
-    /// again: "30s", "5m", "off". Absent: every 30 s.
+    /// How often references that later frames need are written to disk, so that they need not be traced
+    /// again after a kill: "30s", "5m", "off". Absent: every 30 s.
     checkpoint: Option<TimeOrOff>,
-    /// How many discoveries (points or pixels that one rank of an MPI job traced and others use) a
-    /// message to another rank carries at most. Absent: 100000.
+    /// Most discoveries (points or pixels that one rank of an MPI job traced and others use) in one
+    /// message to another rank. Absent: 100000.
     exchange: Option<Int<1, { limits::MAX_EXCHANGE as i64 }>>,
 }
 
@@ -150,7 +151,7 @@ pub(super) fn shortest(x: f32) -> f64 {
 }
 
 impl Settings {
-    /// As scene data, with what `[reuse]` says.
+    /// As scene data, together with the table `[reuse]`.
     ///
     /// Errors: a crop that leaves the image or is empty.
     pub fn build(&self, source: &Source, reuse: ReuseSettings) -> Result<scene::Settings> {
@@ -192,9 +193,9 @@ impl Settings {
         Err(source.fault(&crop.span, message).help(help).into())
     }
 
-    /// What does not decide a frame's bytes, in a shot of `shot_frames` frames.
+    /// The options that do not decide a frame's bytes, for a shot of `shot_frames` frames.
     ///
-    /// Errors: frames that the camera's move has not, an empty output pattern.
+    /// Errors: frames that the camera's move does not have, an empty output pattern.
     pub fn job(&self, source: &Source, shot_frames: u32) -> Result<JobOptions> {
         let frames = self.frames.as_ref();
         let frames = frames.map(|f| frame_range(f, source, shot_frames)).transpose()?;
@@ -221,7 +222,7 @@ impl Settings {
         })
     }
 
-    /// Where the output pattern stands, for what is wrong with it.
+    /// Place of the output pattern, for errors about it.
     pub fn output_place(&self, source: &Source) -> Option<Diagnostic> {
         self.output.as_ref().map(|output| source.fault(&output.span, ""))
     }

@@ -68,7 +68,7 @@ fn a_far_origin_keeps_the_line() {
 }
 
 #[test]
-fn distances_are_those_of_the_drawing() {
+fn distances_to_a_triangle_are_the_known_ones() {
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-14, "{a} {b}");
     close(down(0.25, 0.125).edge_distance(&UNIT), 0.125);
     close(down(0.25, 0.125).distance(&UNIT), 0.0);

@@ -254,7 +254,7 @@ impl EmbreeIntersector<'_> {
     }
 }
 
-/// What a lane holds before Embree found anything.
+/// The initial hit of a lane, before Embree finds one.
 const NOTHING: PacketHit =
     PacketHit { t: f32::INFINITY, u: 0.0, v: 0.0, ng: Vec3::ZERO, prim: PrimRef::NONE };
 

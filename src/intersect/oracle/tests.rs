@@ -124,7 +124,7 @@ fn the_conservative_filter_loses_no_triangle_that_the_exact_predicate_accepts() 
 }
 
 #[test]
-fn near_finds_what_lies_within_the_margin() {
+fn near_finds_triangles_within_the_margin() {
     let scene = scene(vec![bumpy(29, 17, 7)]);
     let oracle = Oracle::new(&scene);
     for (ray, margin) in rays(&scene, 60, 8).into_iter().zip([1e-6, 1e-3, 0.05].into_iter().cycle())

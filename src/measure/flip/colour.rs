@@ -52,7 +52,7 @@ pub fn colour_difference(reference: &[Plane; 3], test: &[Plane; 3], ppd: f64) ->
     reference.par_iter().zip(&test).map(map).collect()
 }
 
-/// What the eye filters out, as kernels in pixels.
+/// The filters of the eye, as kernels in pixels.
 struct Filters {
     y: Vec<f32>,
     cx: Vec<f32>,

@@ -1,23 +1,23 @@
-//! What keeps two headers apart, in words.
+//! Differences between two headers, in words.
 
 use super::Header;
 use std::collections::BTreeMap;
 
-/// What the hash of the scene is called.
+/// Name of the scene's hash in messages.
 pub(super) const SCENE: &str = "scene content";
 /// Most parts of a scene that are named.
 const MOST: usize = 3;
 
-/// A setting that keeps two headers apart.
+/// A setting in which two headers differ.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HeaderDifference {
-    /// Its name as the command line spells it, or what else differs.
+    /// Name of the setting as on the command line, or of something else that differs.
     pub name: String,
     /// Its value in the manifest.
     pub before: String,
     /// Its value now.
     pub now: String,
-    /// Which parts of the scene differ, in words, where it is the scene and they are known.
+    /// Which parts of the scene differ, in words, if the scene differs and its parts are known.
     parts: Option<String>,
 }
 
@@ -60,7 +60,7 @@ impl Header {
     }
 }
 
-/// Which parts are others, gone or new; `None` where they are not known or all the same.
+/// Which parts have changed, are gone or are new; `None` if parts are not known or all are equal.
 fn changes(before: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Option<String> {
     // What an older version wrote has none.
     if before.is_empty() || now.is_empty() {

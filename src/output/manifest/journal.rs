@@ -1,4 +1,4 @@
-//! Rows are appended one by one, whatever other jobs do to the files meanwhile.
+//! Journals: rows appended one by one, safely while other jobs replace the files.
 
 use super::{Header, Manifest, header_at, line_of, read_if_there, rows_in};
 use crate::error::{Error, Result};
@@ -11,33 +11,33 @@ use std::path::{Path, PathBuf};
 
 /// Appends rows to a manifest or to a rank's part of it.
 ///
-/// Another job may take a part into the manifest, or replace the manifest, at any moment. So who
-/// appends looks afterwards whether its file still has its name, and if not appends once more to what
-/// has that name now; and who takes a file away reads it after that. Whichever comes first, one of
-/// the two has the row, and a row that is there twice does no harm.
+/// Another job may merge a part into the manifest, or replace the manifest, at any moment. So after
+/// appending, the writer checks whether its file still has its name, and if not appends the row again to the
+/// file that has that name now. A job that removes a file reads it after removing its name. In either order one of
+/// the two has the row, and a row that occurs twice does no harm.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
     file: File,
-    /// Of a manifest: what it has to be of, also where somebody put another in its place.
+    /// Header that the manifest must have, also after another job replaced it; `None` for a part.
     header: Option<Header>,
 }
 
 impl Journal {
-    /// The lines at `path` that can be understood; none where there is no file.
+    /// The lines of the file at `path` that can be parsed; none if there is no file.
     pub fn lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>> {
         Ok(rows_in(&read_if_there(path)?.unwrap_or_default()).collect())
     }
 
-    /// Opens the manifest or part at `path` for appending; a torn last line is ended.
+    /// Opens the manifest or part at `path` for appending; ends an incomplete last line.
     pub fn open(path: &Path) -> Result<Self> {
         Ok(Self { path: path.to_path_buf(), file: open(path)?, header: None })
     }
 
-    /// The same for the manifest of a job with `header`.
+    /// Opens the manifest at `path` of a job with `header` for appending.
     ///
     /// # Errors
-    /// It is of other settings.
+    /// The manifest is of other settings.
     pub fn of(path: &Path, header: &Header) -> Result<Self> {
         let mut journal = Self { header: Some(header.clone()), ..Self::open(path)? };
         journal.check()?;
@@ -65,7 +65,8 @@ impl Journal {
         }
     }
 
-    /// Rows under the header of other settings would be wrong, and without any header useless.
+    /// Checks that the manifest's header is still the job's: rows after another header would be wrong, and without a
+    /// header useless.
     fn check(&mut self) -> Result<()> {
         let Some(header) = &self.header else { return Ok(()) };
         let Some(there) = header_at(&self.path) else {
@@ -103,8 +104,8 @@ fn is_torn(file: &mut File) -> io::Result<bool> {
     Ok(last != *b"\n")
 }
 
-/// Whether `path` still leads to `file`. (By opening it: what a network file system remembers of a name
-/// may be old.)
+/// Whether `path` still is the name of `file`. (It opens the path, since a network file system may have cached
+/// old metadata of the name.)
 fn has_name(file: &File, path: &Path) -> Result<bool> {
     let there = match File::open(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(false),

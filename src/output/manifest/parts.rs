@@ -1,4 +1,5 @@
-//! What ranks other than 0 write: a part each, which rank 0 of any job of the same settings takes in.
+//! Part files of the manifest: every rank other than 0 writes one, and rank 0 of any job of the same settings merges
+//! them.
 
 use super::{Header, Journal, Manifest, Row, folder_of, line_of, read_if_there, rows_in};
 use crate::error::{Error, Result};
@@ -8,9 +9,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Where rank `rank` (not 0) of a job with `header` appends its rows of the manifest at `path`.
+/// Path of the part file of rank `rank` (not 0) of a job with `header`, for the manifest at `path`.
 ///
-/// The name says what the rows are of, so that none gets under the header of other settings.
+/// The name has the hash of the header, so that rows are never merged under the header of other settings.
 pub fn part_path(path: &Path, header: &Header, rank: u32) -> PathBuf {
     path.with_extension(format!("rank{rank:04}-{}.jsonl", header.key()))
 }
@@ -18,23 +19,23 @@ pub fn part_path(path: &Path, header: &Header, rank: u32) -> PathBuf {
 /// A part of a manifest.
 pub(super) struct Part {
     path: PathBuf,
-    /// [`Header::key`] of what it is of.
+    /// [`Header::key`] of the job's header.
     key: String,
     rank: String,
 }
 
 impl Part {
-    /// Its rows.
+    /// The rows in the file.
     pub fn rows(&self) -> Result<Vec<Row>> {
         Ok(rows_in(&read_if_there(&self.path)?.unwrap_or_default()).collect())
     }
 
-    /// Whether it is of a job with `header`.
+    /// Whether the part is of a job with `header`.
     pub fn is_of(&self, header: &Header) -> bool {
         self.key == header.key()
     }
 
-    /// Gives it a name that nobody appends to; `None` where another process has just done that.
+    /// Renames the file so that no rank appends to it any more; `None` if another process has just done so.
     fn take(self, manifest: &Path) -> Result<Option<Self>> {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         // Processes of other machines must not come to the same name.
@@ -57,7 +58,7 @@ impl Part {
     }
 }
 
-/// All parts of the manifest at `path`, those too that somebody is taking in.
+/// All parts of the manifest at `path`, also those that a process is merging.
 pub(super) fn parts(path: &Path) -> Result<Vec<Part>> {
     let folder = folder_of(path);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned() + ".rank";
@@ -77,9 +78,9 @@ pub(super) fn parts(path: &Path) -> Result<Vec<Part>> {
 }
 
 impl Manifest {
-    /// Takes the rows of all part files of jobs with `header` into their manifest at `path`. Such a job
+    /// Merges the rows of all part files of jobs with `header` into their manifest at `path`. Such a job
     /// may be running: see [`Journal`] for why no row is lost. A crash leaves parts that the next
-    /// start takes in.
+    /// start merges.
     pub fn merge_parts(path: &Path, header: &Header) -> Result<()> {
         let mut taken = Vec::new();
         let mut lines = Vec::new();

@@ -27,7 +27,7 @@ fn names(folder: &Path) -> usize {
 }
 
 #[test]
-fn rows_that_come_after_their_part_was_taken_in_are_not_lost() {
+fn rows_appended_after_their_part_was_merged_are_not_lost() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("f.manifest.jsonl");
     Manifest::create(&path, &header(0), &[]).expect("created");
@@ -44,7 +44,7 @@ fn rows_that_come_after_their_part_was_taken_in_are_not_lost() {
 }
 
 #[test]
-fn rows_do_not_get_under_another_header() {
+fn rows_are_never_written_under_another_header() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("f.manifest.jsonl");
     Manifest::create(&path, &header(0), &[]).expect("created");
@@ -75,7 +75,7 @@ fn another_file_format_is_named_first_and_a_missing_setting_is_not_set() {
 }
 
 #[test]
-fn a_torn_line_spoils_no_other() {
+fn an_incomplete_line_affects_no_other() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("f.manifest.jsonl");
     Manifest::create(&path, &header(0), &[row(1)]).expect("created");

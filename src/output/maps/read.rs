@@ -1,4 +1,4 @@
-//! Maps back from an exr frame that holds them as channels.
+//! Reading maps from the channels of an exr frame.
 
 use super::{Display, Film, Map, Provenance, ProvenanceKind, Rgb};
 use crate::error::{Error, Result};
@@ -8,8 +8,8 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// The maps of the exr frame at `path` as they would be painted beside a png frame: linear display
-/// values. None where the frame holds none. `farthest` is [`Map::paint`]'s.
+/// The maps of the exr frame at `path`, painted as for a png frame: linear display
+/// values. Empty if the frame has none. `farthest` is as in [`Map::paint`].
 ///
 /// # Errors
 /// [`Error::Io`] and [`Error::Input`] when the file cannot be read.
@@ -20,7 +20,7 @@ pub fn of_exr(path: &Path, display: &Display, farthest: f32) -> Result<Vec<(Map,
     Ok(Map::ALL.map(|map| (map, map.paint(&film, display, farthest))).into())
 }
 
-/// What maps show of a film; `None` where a channel is missing.
+/// The film with the data of the maps' channels; `None` if a channel is missing.
 fn film_of(channels: &ExrChannels) -> Option<Film> {
     let numbers = |name: &str| {
         let found = channels.list.iter().find(|c| c.name == name)?;

@@ -107,7 +107,7 @@ fn a_failure_is_reported_in_ffmpegs_words_and_leaves_no_file() {
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 5);
 }
 
-/// What a viewer sees is what the frames hold, in number, order, size and colour.
+/// The video shows the frames, in number, order, size and colour.
 #[test]
 fn the_video_shows_the_frames() {
     if !has_ffmpeg() {

@@ -1,5 +1,5 @@
-//! What the samples about a point suggest of each light: weighted means, lane by lane, and how
-//! risky they are.
+//! Estimates of each light from the samples about a point: weighted means, lane by lane, and their
+//! risk.
 
 use super::{LEAST_WEIGHT, Lookup};
 use crate::inference::{Estimate, SurfacePoint};
@@ -19,11 +19,11 @@ struct Sums {
     far: Largest,
 }
 
-/// The largest of numbers none of which is negative; NaN once one is.
+/// The largest of non-negative numbers; NaN if any of them is NaN.
 #[derive(Clone, Copy, Default)]
 struct Largest {
     most: f32x4,
-    /// NaN once a number was.
+    /// Sum of the numbers: NaN if any of them is.
     sum: f32x4,
 }
 
@@ -39,12 +39,13 @@ impl Largest {
     }
 }
 
-/// What the taps suggest of one light.
+/// The estimate of one light from the taps.
 #[derive(Clone, Copy)]
 pub(super) struct Mean {
-    /// Weighted mean of the ratios of the taps that know it.
+    /// Weighted mean of the ratios of the taps that know the light.
     ratio: f32,
-    /// The largest of the taps' own, see [`Contrast`](crate::reuse::reference::Contrast).
+    /// The largest `bend` of the taps, see [`Contrast`](crate::reuse::reference::Contrast); likewise `wide` and
+    /// `far`.
     bend: f32,
     wide: f32,
     far: f32,
@@ -55,8 +56,8 @@ pub(super) struct Mean {
 }
 
 impl Lookup<'_> {
-    /// Estimates each light at `point`, where the pixel would show `shown` of them without shadows.
-    /// `means` is room.
+    /// Estimates each light at `point`; `shown` are the contributions of the lights to the pixel without
+    /// shadows. `means` is a buffer to reuse.
     pub(super) fn estimate_all(
         &self,
         taps: &Taps,
@@ -91,7 +92,8 @@ impl Lookup<'_> {
         }
     }
 
-    /// For a point of so many camera `samples`; `None` where too few of the taps know the light.
+    /// The mean for a point of `samples` camera samples; `None` where the taps that know the light have too little
+    /// weight.
     fn mean(&self, taps: &Taps, channel: usize, samples: u32) -> Option<Mean> {
         let rays = samples as f32 * self.rays[channel] as f32;
         let (one, per_ray) = (f32x4::splat(1.0), f32x4::splat(1.0 / (rays + 2.0)));
@@ -136,8 +138,8 @@ impl Lookup<'_> {
     }
 }
 
-/// How many display steps of 1/255 a unit of radiance makes where `radiance` is shown: the slope of
-/// the sRGB curve, as a power of 1/2.4.
+/// Display steps of 1/255 per unit of radiance at `radiance`: the slope of
+/// the sRGB curve, taken as a power of 1/2.4.
 pub(in crate::reuse) fn steps_per_radiance(radiance: f32) -> f32 {
     let shown = f64::from(radiance).clamp(0.003, 1.0);
     // Nearly x^(-7/12), by square roots, which are the same on every machine.

@@ -1,4 +1,4 @@
-//! What other surfaces tell is refused, and what is uncertain counts as that.
+//! Samples of other surfaces are not used, and uncertain estimates have a high risk.
 
 use super::Lookup;
 use crate::film::Provenance;
@@ -44,7 +44,7 @@ fn wall(ratio: impl Fn(u32) -> f32) -> Reference {
     Reference::new(1, &camera(), &traced, 1)
 }
 
-/// What `reference` suggests about `point`, which would show 1 without shadows.
+/// The estimate from `reference` for `point`, whose light has the radiance 1 without shadows.
 fn estimated(reference: &Reference, point: SurfacePoint) -> Estimate {
     let lookup = Lookup { frame: 2, references: &[reference], rays: &[16] };
     let mut asked = LookupBatch {
@@ -75,7 +75,7 @@ fn lifted(footprints: f64) -> SurfacePoint {
 }
 
 #[test]
-fn what_lies_on_the_surface_is_told_exactly() {
+fn samples_on_the_surface_give_an_exact_estimate() {
     let reference = wall(|_| 0.25);
     for point in [on_wall(30.5, 20.5), on_wall(11.13, 47.9), on_wall(0.2, 0.1), lifted(0.5)] {
         assert_eq!(told(&reference, point), 0.25);
@@ -97,7 +97,7 @@ fn a_file_may_hold_normals_a_little_longer_than_1() {
 }
 
 #[test]
-fn what_is_seen_in_mirrors_is_told_by_place_by_all_that_know() {
+fn points_seen_in_mirrors_are_estimated_by_position_from_all_references() {
     let ratio = |x: u32, y: u32| if y % 2 == 1 { f32::NAN } else { 0.25 + 0.5 * (x % 2) as f32 };
     let mut traced = TracedPoints::default();
     for (x, y) in (0..EDGE).flat_map(|y| (0..EDGE).map(move |x| (x, y))) {
@@ -117,13 +117,13 @@ fn what_is_seen_in_mirrors_is_told_by_place_by_all_that_know() {
 }
 
 #[test]
-fn another_mesh_tells_nothing() {
+fn samples_of_another_mesh_are_not_used() {
     let point = SurfacePoint { geom_id: 1, ..on_wall(30.2, 31.7) };
     assert!(told(&wall(|_| 1.0), point).is_nan());
 }
 
 #[test]
-fn a_normal_turned_away_is_refused() {
+fn samples_with_another_normal_are_not_used() {
     let turned = |degrees: f32| SurfacePoint {
         n: Vec3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos()),
         ..on_wall(30.2, 31.7)
@@ -134,7 +134,7 @@ fn a_normal_turned_away_is_refused() {
 }
 
 #[test]
-fn what_stands_off_the_surface_is_refused() {
+fn samples_off_the_surface_are_not_used() {
     let reference = wall(|_| 1.0);
     assert_eq!(told(&reference, lifted(0.5)), 1.0);
     assert!(told(&reference, lifted(1.4)).is_nan());
@@ -142,7 +142,7 @@ fn what_stands_off_the_surface_is_refused() {
 }
 
 #[test]
-fn a_coarser_sampling_is_refused() {
+fn much_coarser_references_are_not_used() {
     let finer = |by: f32| {
         let point = on_wall(30.2, 31.7);
         SurfacePoint { footprint: point.footprint / by, ..point }

@@ -1,20 +1,21 @@
-//! How ratios change from pixel to pixel of a frame, by passes over its rows: each compares all pixels of a row
-//! with those at one place beside them, so that the compiler works on several at a time.
+//! How ratios change from pixel to pixel of a frame. Each pass over a row compares all its pixels
+//! with the pixels at one fixed offset, so that the compiler can use vector instructions.
 
 use super::{Contrast, NONE};
 use crate::inference::{SAME_SURFACE, SurfacePoint};
 use rayon::prelude::*;
 
-/// How far away the pixels lie that one is compared with.
+/// Largest distance, in pixels, of the neighbours that a pixel is compared with.
 const REACH: usize = 2;
-/// Pixels in the ring of the 3 x 3 around one.
+/// Number of neighbours in the 3 x 3 pixels around one.
 const NEAR: usize = 8;
-/// And in the 5 x 5.
+/// Number of neighbours in the 5 x 5 pixels around one.
 const ALL: usize = 24;
-/// Where they lie, row by row: those of the 3 x 3 first, opposite ones as far from either end.
+/// Offsets of the neighbours, row by row, those of the 3 x 3 pixels first; opposite neighbours are as far from
+/// either end of their group.
 const AROUND: [[usize; 2]; ALL] = around();
 
-/// Columns and rows to the right of and below the one that is furthest left and up.
+/// Columns and rows from the upper left neighbour, at [0, 0], to each neighbour.
 const fn around() -> [[usize; 2]; ALL] {
     let mut places = [[0; 2]; ALL];
     let (mut near, mut wide) = (0, NEAR);
@@ -35,14 +36,14 @@ const fn around() -> [[usize; 2]; ALL] {
     places
 }
 
-/// A figure of each pixel, with a margin on which nothing is known.
+/// A figure for each pixel, with a margin of unknown figures.
 struct Image<T> {
     stride: usize,
     values: Vec<T>,
 }
 
 impl<T: Copy + Sync> Image<T> {
-    /// What `of` makes of the number of each of so many `pixels`; `none` where that is nothing.
+    /// The figure `of(i)` for pixel `i` of `pixels`; `none` where that is `None`, and in the margin.
     fn of(pixels: usize, width: usize, none: T, of: impl Fn(usize) -> Option<T>) -> Self {
         let stride = width + 2 * REACH;
         let mut values = vec![none; stride * (pixels / width + 2 * REACH)];
@@ -53,7 +54,7 @@ impl<T: Copy + Sync> Image<T> {
         Self { stride, values }
     }
 
-    /// Row `y` of the pixels that lie at `place` of [`AROUND`] from those of the image.
+    /// Row `y` of the image, shifted by an offset of [`AROUND`].
     fn row(&self, y: usize, [right, down]: [usize; 2]) -> &[T] {
         let width = self.stride - 2 * REACH;
         &self.values[(y + down) * self.stride + right..][..width]
@@ -64,8 +65,8 @@ impl<T: Copy + Sync> Image<T> {
     }
 }
 
-/// For each of `points` the contrasts in each of `channels`: [`Contrast::UNKNOWN`] but for each pixel's own,
-/// whose numbers are `slots`, in rows of `width`.
+/// For each of `points` the contrasts in each of `channels`. Only the points that pixels see directly have known
+/// ones; `slots` has their numbers, in rows of `width` pixels.
 pub(super) fn contrasts(
     points: &[SurfacePoint],
     ratios: &[f32],
@@ -97,7 +98,8 @@ pub(super) fn contrasts(
     contrasts
 }
 
-/// For each pixel which of those [`AROUND`] show the same surface, a bit each; `own` is the number of its point.
+/// For each pixel a bit for each neighbour of [`AROUND`] that shows the same surface; `own` is the number of the
+/// pixel's point.
 fn same_surface(
     points: &[SurfacePoint],
     pixels: usize,
@@ -154,7 +156,7 @@ fn near_row(known: &Image<f32>, y: usize, same: &[u32], bend: &mut [f32], wide: 
     }
 }
 
-/// The largest contrast among the pixels of row `y` and those around each; what is not known is not larger.
+/// For each pixel of row `y` the largest known contrast among itself and its neighbours.
 fn far_row(wide: &Image<f32>, y: usize, same: &[u32], far: &mut [f32]) {
     far.copy_from_slice(wide.own(y));
     for (k, place) in AROUND.into_iter().enumerate() {
@@ -196,7 +198,7 @@ mod tests {
     const MIDDLE: usize = 4 * 9 + 4;
 
     #[test]
-    fn all_places_around_are_there_once_and_opposite_ones_face() {
+    fn each_neighbour_occurs_once_and_opposite_ones_match() {
         for (k, [x, y]) in AROUND.into_iter().enumerate() {
             assert!(x <= 4 && y <= 4 && [x, y] != [2, 2]);
             assert_eq!(AROUND.iter().filter(|place| **place == [x, y]).count(), 1);
@@ -230,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_is_no_contrast() {
+    fn unknown_ratios_make_no_contrast() {
         let found = of(|x, y| if (x, y) == (5, 4) { f32::NAN } else { 0.5 }, |_, _| false);
         assert_eq!(found[MIDDLE], Contrast { bend: 0.0, wide: 0.0, far: 0.0 });
         assert!(found[MIDDLE + 1].wide.is_nan() && found[MIDDLE + 1].bend.is_nan());

@@ -1,4 +1,4 @@
-//! Traced points on their way into a reference: one sample for each pixel and surface.
+//! Traced points gathered for a reference: one sample for each pixel and surface.
 
 use super::contrast::contrasts;
 use super::{Contrast, NONE, View};
@@ -7,11 +7,11 @@ use crate::inference::{SurfacePoint, TracedPoints};
 /// A frame's points before they are put in the order of a reference.
 pub(super) struct Gathered {
     pub points: Vec<SurfacePoint>,
-    /// For each of them the ratio in each channel; NaN where unknown.
+    /// For each point the ratio in each channel; NaN where unknown.
     pub ratios: Vec<f32>,
-    /// For each pixel, row by row, the point that is seen there directly.
+    /// For each pixel, row by row, the number of the point that is seen there directly.
     pub slots: Vec<u32>,
-    /// Points that are no pixel's own: seen in mirrors, through glass, beside another surface.
+    /// Numbers of all other points: seen in mirrors, through glass, or beside another surface in a pixel.
     pub others: Vec<u32>,
     channels: usize,
     view: View,
@@ -58,14 +58,14 @@ impl Gathered {
         self.ratios.extend_from_slice(ratios);
     }
 
-    /// How the ratios change around each pixel's own point.
+    /// The contrasts of the ratios around each pixel's point.
     pub fn contrasts(&self) -> Vec<Contrast> {
         let by = (self.view.size[0] as usize, self.channels);
         contrasts(&self.points, &self.ratios, &self.slots, by)
     }
 }
 
-/// Takes in a ratio with its share of the samples; NaN where one is unknown.
+/// Averages `known` with another ratio that has this `share` of the samples; NaN where either is unknown.
 fn join(known: &mut f32, other: f32, share: f32) {
     match (known.is_nan(), other.is_nan()) {
         (true, _) => *known = other,

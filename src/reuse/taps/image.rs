@@ -1,42 +1,42 @@
-//! Where a point is seen in a reference, and the samples there.
+//! The image of a point in a reference, and the samples around it.
 
 use super::{Place, References, TOGETHER, Taps4};
 use crate::inference::SurfacePoint;
 use crate::reuse::reference::Reference;
 use wide::f32x4;
 
-/// References that are asked about every point.
+/// Number of references that are searched for every point.
 pub(in crate::reuse) const ALWAYS: usize = 2;
 
-/// By how much a sample's area on the surface may exceed the point's.
+/// Largest area of a sample on the surface, as a multiple of the point's own area.
 const COARSEST: f64 = 6.0;
-/// Samples lie within two footprints, and further where the reference looks along the surface: as far
-/// as at this cosine.
+/// Samples lie within two footprints, and further where the reference sees the surface at a grazing angle, down to
+/// this cosine.
 const GRAZING: f32 = 0.3;
 
-/// Where a point is seen in a reference.
+/// The image of a point in a reference.
 #[derive(Clone, Copy)]
 pub(super) struct Image {
-    /// Between the middles of the four pixels around it, pixels.
+    /// Position between the middles of the four pixels around the image, from 0 to 1; likewise `fy`.
     fx: f32,
     fy: f32,
-    /// A pixel's edge there, scene units.
+    /// Edge of a pixel on the surface, scene units.
     footprint: f32,
-    /// How far away samples count, footprints.
+    /// Largest distance of samples that count, footprints.
     reach: f32,
-    /// The samples of the four pixels; no sample's number where there is none.
+    /// The samples of the four pixels; `NONE` where a pixel has none.
     samples: [u32; 4],
 }
 
-/// A point's images in the references that are asked about every point.
+/// A point's images in the references that are searched for every point.
 type Images = [Option<Image>; ALWAYS];
 
 impl References<'_> {
-    /// Finds the samples about those of `points` that `is_wanted` wants, in the references that are asked
-    /// about every point.
+    /// Finds the samples about each of `points` for which `is_wanted` holds, in the references that are searched
+    /// for every point.
     ///
-    /// In two passes, each over all points: most of a lookup's time is waiting for memory, and reads
-    /// that do not depend on one another are waited for together.
+    /// Makes two passes over all points: most of a lookup's time is waiting for memory, and independent
+    /// reads are waited for together.
     pub(in crate::reuse) fn find(
         &self,
         points: &[SurfacePoint],
@@ -57,7 +57,7 @@ impl References<'_> {
         }
     }
 
-    /// Where the point is seen in the reference, if that samples finely enough there.
+    /// The image of the point in the reference, if the reference samples finely enough there.
     pub(super) fn image(&self, reference: &Reference, point: &SurfacePoint) -> Option<Image> {
         let view = &reference.view;
         let to = point.p - view.eye;

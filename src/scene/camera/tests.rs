@@ -82,7 +82,7 @@ fn extreme_sizes_and_lenses_stay_finite() {
 }
 
 #[test]
-fn what_is_no_camera_is_an_error() {
+fn invalid_cameras_are_errors() {
     let good = pose(DVec3::Z, DVec3::ZERO, DVec3::Y);
     let bad = |p: Pose| Camera::new(&p, 40.0, 4, 4).is_err();
     assert!(!bad(good));

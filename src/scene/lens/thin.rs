@@ -31,11 +31,11 @@ pub struct LensKey {
     pub at: f64,
     /// Radius of the aperture, to its corners where it has blades, world units; 0 makes a pinhole.
     pub radius: f64,
-    /// What is sharp.
+    /// The plane in focus.
     pub focus: Focus,
 }
 
-/// What is sharp.
+/// The plane in focus.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Focus {
     /// The plane at this distance along the view axis, world units.
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn its_reason_has_numbers_that_can_be_read() {
+    fn the_plans_reason_has_short_numbers() {
         let focus = Focus::Distance(2.0 / 3.0);
         let one = path(vec![key(0.0, 0.1 + 0.2, focus)]);
         assert_eq!(one.reason(), (true, "thin lens, radius 0.3, focus at 0.6667".into()));

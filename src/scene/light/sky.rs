@@ -3,7 +3,7 @@
 use crate::math::Rgb;
 use serde::{Deserialize, Serialize};
 
-/// What a ray that hits nothing sees, and how it lights surfaces.
+/// The light of rays that hit nothing, and how it lights surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sky {
     /// Constant background radiance.

@@ -1,4 +1,4 @@
-//! What makes a shot wrong, whatever the frame.
+//! Errors of a shot that do not depend on the frame.
 
 use super::level::unit;
 use super::{CameraPath, KeyPose, Shot};

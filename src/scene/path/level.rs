@@ -72,7 +72,7 @@ fn plane_normal(path: &CameraPath) -> Option<DVec3> {
     (planar && turns && tolerance < 1e-3).then_some(normal)
 }
 
-/// What a curved or straight path is made of: eyes with their targets, and the one up direction.
+/// The eyes of a curved or straight path with their targets, and its up direction.
 fn eyes_and_targets(path: &CameraPath) -> Option<(Vec<(DVec3, DVec3)>, DVec3)> {
     match path {
         CameraPath::Pan { from, to, target, up, .. } => {

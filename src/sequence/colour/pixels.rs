@@ -1,4 +1,4 @@
-//! From a film to what a frame discovered, and from what others discovered into the film.
+//! Discoveries from a film's traced pixels, and inferred pixels put into a film.
 
 use crate::film::{Film, Provenance, ProvenanceKind};
 use crate::reuse::colour::{Entry, InferredColour, KnownColours};
@@ -27,7 +27,7 @@ pub(super) fn discoveries(
     KnownColours { frame, entries }
 }
 
-/// Puts inferred pixels into the film, and says of each pixel where it comes from.
+/// Puts inferred pixels into the film, and sets the provenance of each pixel.
 pub(super) fn fill(
     film: &mut Film,
     frame: u32,
@@ -51,7 +51,7 @@ pub(super) fn fill(
     counts
 }
 
-/// The pixels that are wanted, row by row.
+/// The pixels to render, row by row.
 fn pixels_of(settings: &Settings) -> impl Iterator<Item = (u32, u32)> + use<> {
     let Rect { x0, y0, x1, y1 } = settings.region();
     (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))

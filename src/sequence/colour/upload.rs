@@ -1,4 +1,4 @@
-//! Pictures that somebody uploads for frames.
+//! Pictures that the user uploads for frames.
 
 use crate::error::{Error, Result};
 use crate::film::{Encoding, Image};
@@ -6,7 +6,7 @@ use crate::math::{Rgb, srgb_decode};
 use crate::reuse::colour::{Entry, KnownColours};
 use crate::scene::{Settings, Shot, ToneCurve};
 
-/// Whether `image` can stand for frame `frame`.
+/// Checks that `image` can be used for frame `frame`.
 ///
 /// # Errors
 /// [`Error::Usage`]: no such frame in the shot, another size than the job's, or display values of

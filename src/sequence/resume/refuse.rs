@@ -1,4 +1,4 @@
-//! What is in the way of a job, and must not be replaced unasked.
+//! Files that a job must not replace without `--overwrite`.
 
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Foreign, Manifest, Row};
@@ -8,20 +8,20 @@ use crate::sequence::target::Target;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-/// Refuses to replace a frame that shows something else than this shot's frame of that number.
+/// Refuses to replace a frame with another camera than this shot's frame of that number.
 pub(super) fn refuse_other_view(path: &Path, row: &Row, recipe: Option<&Recipe>) -> Result<()> {
     if recipe.is_some_and(|recipe| recipe.view.to_string() == row.view) {
         return Ok(());
     }
     Err(Error::Usage(format!(
-        "{} is of another camera move: frame {} stands elsewhere there\n  \
+        "{} is of another camera move: frame {} has another camera there\n  \
          help: choose another output with -o, or replace it with --overwrite",
         path.display(),
         row.frame
     )))
 }
 
-/// For each file the row that says what it holds; of several one of other settings, else the first.
+/// For each file its row; of several rows one of other settings, else the first.
 pub(super) fn by_file(rows: &BTreeMap<u32, Row>) -> HashMap<&str, &Row> {
     let mut found = HashMap::new();
     for row in rows.values() {
@@ -55,7 +55,7 @@ pub(super) fn refuse_taken(
     )))
 }
 
-/// Refuses frames that no manifest vouches for: they may be somebody's work.
+/// Refuses existing frames that no manifest lists: they may be somebody's work.
 ///
 /// Errors: `Error::Usage` with the first of them.
 pub fn refuse_unlisted(target: &Target, frames: FrameRange) -> Result<()> {
@@ -70,7 +70,7 @@ pub fn refuse_unlisted(target: &Target, frames: FrameRange) -> Result<()> {
     }
 }
 
-/// Refuses frames of other settings, as long as any is left.
+/// Refuses a manifest of other settings, as long as any of its frames exists.
 pub(super) fn refuse_others(
     target: &Target,
     manifest: &Manifest,
@@ -84,7 +84,7 @@ pub(super) fn refuse_others(
     }
     Err(Error::Usage(format!(
         "{} holds {} of other settings: {}\n  \
-         help: set it back, choose another output with -o, or replace the frames with --overwrite",
+         help: restore the setting, choose another output with -o, or replace the frames with --overwrite",
         target.pattern,
         counted(left, "frame"),
         d.was_and_is()

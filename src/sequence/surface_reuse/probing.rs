@@ -1,11 +1,11 @@
-//! Probes of a frame: rendered before the frame, so that what they find decides what is inferred in it.
+//! Probes of a frame: rendered before the frame, so that their findings decide which points are inferred.
 //!
-//! Each probe is estimated and traced twice. What that finds, and what the probes of the frames found that
-//! the frame is inferred from, is the [`Evidence`]. The probes show their first trace, and both are
-//! sources for other frames. They are the frame's audit, too: each part of them is inferred by the
-//! evidence of the other parts, with random numbers of their own, and held against their traces. An error that the
-//! evidence was blind to is seen so; were a probe judged by itself, what stays inferred would be those
-//! that were lucky.
+//! Each probe is estimated and traced twice. The findings, together with those of the frames that this one
+//! is inferred from, make the [`Evidence`]. The probes show their first trace, and both traces are
+//! sources for other frames. The probes are also the frame's audit: each part of them is inferred by the
+//! evidence of the other parts, with random numbers of its own, and compared with its traces. So the audit
+//! finds errors that the evidence missed; if probes were judged by their own findings, only those with
+//! small errors by chance would stay inferred.
 
 use super::SurfaceReuse;
 use crate::error::Result;
@@ -21,15 +21,14 @@ use crate::stats::{AuditSums, RayCounts};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Added to a frame's number (at most a million) for the random numbers of the probes' two traces, and of
-/// what is traced where they are inferred. The first, which is shown, is the one that the frame would have
-/// had if it were traced.
+/// Added to a frame's number (at most a million) to seed the light samples of the probes' two traces, and of
+/// the audit's. The first, which is shown, has the samples of a traced frame.
 const STREAMS: [u32; 3] = [0, 1 << 31, 3 << 30];
-/// How many times the usual share of the pixels is probed where no, or one, other frame has probes.
+/// Multiple of the usual share of pixels that is probed, if no, one, or more reference frames have probes.
 const FIRST: [f64; 3] = [4.0, 2.0, 1.0];
-/// Where a frame is small, as many pixels are probed as if it had this many.
+/// Frames of fewer pixels get as many probes as a frame of this many pixels.
 const LEAST: f64 = 25_000.0;
-/// Share of the usual number of probes where the findings of other frames say that lookups do not pay.
+/// Multiple of the usual share if the findings of other frames say that lookups do not pay.
 const HOPELESS: f64 = 0.25;
 /// Largest share that is probed.
 const MOST: f64 = 0.25;
@@ -40,7 +39,7 @@ pub(super) struct Probed {
     /// For each pixel whether it is a probe.
     mask: Vec<bool>,
     traces: [Rendered; 2],
-    /// Findings of the probes, which travel with the frame's reference.
+    /// Findings of the probes, which are stored with the frame's reference.
     pub findings: Vec<Finding>,
     /// The evidence for the rest of the frame.
     pub evidence: Evidence,
@@ -51,7 +50,7 @@ pub(super) struct Probed {
 }
 
 impl Probed {
-    /// The pixels of `mask`, or all, that are no probes.
+    /// Mask of the pixels of `mask` (or of all) that are not probes.
     pub fn others(&self, mask: Option<&[bool]>) -> Vec<bool> {
         let wanted = |i: usize| mask.is_none_or(|mask| mask[i]);
         self.mask.iter().enumerate().map(|(i, is_probe)| !is_probe && wanted(i)).collect()
@@ -59,7 +58,7 @@ impl Probed {
 }
 
 impl SurfaceReuse<'_> {
-    /// Renders the probes of `frame`, seen by `camera`, where `lookup` can estimate.
+    /// Renders the probes of `frame`, seen by `camera`; `lookup` gives their estimates.
     pub(super) fn probe(
         &self,
         frame: u32,
@@ -80,7 +79,7 @@ impl SurfaceReuse<'_> {
         let is_hopeless = known > 0 && !is_worth(&Evidence::of(before(), tolerance));
         let first = if is_hopeless { HOPELESS } else { FIRST[known.min(FIRST.len() - 1)] };
         let share = (first * usual).min(MOST);
-        // Behind mirrors and glass a pixel's footprint follows from the pixels beside it.
+        // In mirrors and glass the footprint of a pixel is computed from neighbouring pixels.
         let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
         let mask = draw.mask(camera.width, camera.height);
@@ -103,7 +102,7 @@ impl SurfaceReuse<'_> {
             self.context.pool.install(|| (0..PARTS).into_par_iter().map(of_others).collect());
         let findings: Vec<Finding> = found.iter().flat_map(|(_, f)| f).copied().collect();
         let evidence = Evidence::of(before().chain(&findings), tolerance);
-        // The frame's own probes are traced, whatever is done with what they say.
+        // The frame's own probes are traced in any case, so they cost nothing more.
         let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
         let traces = [first, second];
         let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_lookups };
@@ -112,7 +111,7 @@ impl SurfaceReuse<'_> {
         Ok(probed)
     }
 
-    /// The job that traces the pixels of `mask` and gathers their surface points, beyond the crop too.
+    /// The job that traces the pixels of `mask`, also outside the crop, and gathers their surface points.
     fn job<'j>(
         &self,
         camera: &'j Camera,
@@ -124,8 +123,8 @@ impl SurfaceReuse<'_> {
         FrameJob { with_gbuffer, mask, beyond_crop: true, ..job }
     }
 
-    /// Puts the probes of `frame` in `rendered`, which is the rest of it. Returns the audit of the
-    /// inferred pixels; `None` where there are none.
+    /// Puts the probes of `frame` into `rendered`, which has its other pixels. Returns the audit of the
+    /// inferred pixels; `None` if there are none.
     pub(super) fn show_probes(
         &self,
         frame: u32,
@@ -184,7 +183,7 @@ impl SurfaceReuse<'_> {
         Ok(Some(sums))
     }
 
-    /// The probes inferred by one another's evidence, and the rays that this took.
+    /// The rays cast to infer each part of the probes by the evidence of the others, and the film of them.
     fn audit(
         &self,
         frame: u32,

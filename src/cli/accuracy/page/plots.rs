@@ -6,7 +6,7 @@ use crate::cli::accuracy::Outcome;
 use crate::page::words::{seconds, short};
 use crate::page::{Point, Scatter};
 
-/// A measure of error: what it is called, its unit, its figure.
+/// A measure of error: its name, its unit, and how to get it.
 pub struct Metric {
     name: &'static str,
     hint: &'static str,
@@ -14,7 +14,7 @@ pub struct Metric {
     of: fn(&Errors) -> Option<f64>,
 }
 
-/// All of them.
+/// All measures of error.
 pub const METRICS: [Metric; 5] = [
     Metric {
         name: "RMSE",

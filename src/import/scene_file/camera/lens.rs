@@ -17,7 +17,7 @@ const FULL_FRAME: f64 = 0.024;
 /// The word that a focus may be.
 const TARGET: &str = "target";
 
-/// A thin lens: what does not lie at its focus is blurred. The aperture is given by `radius` or by `f_number`.
+/// A thin lens: surfaces out of focus are blurred. The aperture is given by `radius` or by `f_number`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 #[schemars(extend("not" = {"required": ["radius", "f_number"]}))]
@@ -26,7 +26,7 @@ pub(super) struct Lens {
     radius: Option<At<NotNegative>>,
     /// Focal length over the aperture's diameter. The focal length follows from `fov` and `sensor_height`.
     f_number: Option<At<Positive>>,
-    /// What is sharp: a distance along the view axis, world units, or "target".
+    /// Distance of the plane in focus along the view axis, world units, or "target".
     focus: Option<Sharp>,
     /// Height of the picture on the film, world units: 0.024 for a 35 mm still camera and a world in metres.
     /// Only with `f_number`.
@@ -47,11 +47,11 @@ pub(super) struct KeyLens {
     radius: Option<At<NotNegative>>,
     /// Focal length over the aperture's diameter.
     f_number: Option<At<Positive>>,
-    /// What is sharp: a distance along the view axis, world units, or "target".
+    /// Distance of the plane in focus along the view axis, world units, or "target".
     focus: Option<Sharp>,
 }
 
-/// What is sharp.
+/// Where the plane in focus is.
 #[derive(Debug, Clone, Copy)]
 enum Sharp {
     Distance(Positive),

@@ -358,7 +358,7 @@ fn columns_count_characters() {
 }
 
 #[test]
-fn a_file_that_is_no_text_says_where() {
+fn a_file_that_is_not_text_is_refused_with_the_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, b"[sky]\n# \xff\n").expect("written");

@@ -234,7 +234,7 @@ fn files_are_read_beside_the_scene_file_once_named_and_listed() {
 }
 
 #[test]
-fn what_emits_becomes_a_light_or_a_warning() {
+fn emitting_surfaces_become_lights_or_give_a_warning() {
     let loaded = good(
         "[material.glow]\nemission = 4\n\
          [[mesh]]\nquad = { centre = [0, 3, 0], normal = '-y', size = [1, 1] }\nmaterial = 'glow'\n\
