@@ -2,7 +2,7 @@
 
 use crate::costs::Costs;
 use crate::real::{Line, Ran, Stage};
-use tweenray::cluster::simulation::{CostModel, Job};
+use crate::simulation::{CostModel, Job};
 use tweenray::sequence::Pyramid;
 
 const SHOT: Pyramid = Pyramid { segment: 16, frames: 65 };

@@ -9,8 +9,8 @@ mod simulator;
 #[cfg(test)]
 mod tests;
 
-use super::traffic::Traffic;
-use crate::sequence::{FrameGraph, Pyramid};
+use tweenray::cluster::Traffic;
+use tweenray::sequence::{FrameGraph, Pyramid};
 
 /// A job: frames, the dependencies between them, and how references are sent.
 #[derive(Debug, Clone, Copy)]
