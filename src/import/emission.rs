@@ -127,8 +127,7 @@ mod tests {
     fn lamp(triangles: Vec<[u32; 3]>, raise: f64) -> WorldMesh {
         let positions =
             vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, raise), DVec3::Y, DVec3::Z];
-        let (name, normals, uvs, material) = ("lamp".into(), None, None, 0);
-        WorldMesh { name, positions, triangles, normals, uvs, material, always_traced: false }
+        WorldMesh::new("lamp", positions, triangles, 0)
     }
 
     fn world(mesh: WorldMesh) -> World {
@@ -169,14 +168,7 @@ mod tests {
         world.meshes[0].material = 1;
         let (centre, radius) = (DVec3::X, 0.5);
         for material in [0, 1] {
-            let name = format!("{material}");
-            world.spheres.push(WorldSphere {
-                name,
-                centre,
-                radius,
-                material,
-                always_traced: false,
-            });
+            world.spheres.push(WorldSphere::new("ball", centre, radius, material));
         }
         assert_eq!(adopt(&mut world, 0, 0), []);
         assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 1, 1));

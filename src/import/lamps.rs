@@ -124,15 +124,7 @@ mod tests {
 
     #[test]
     fn split_quads_are_joined_and_large_meshes_refused() {
-        let mesh = |triangles: Vec<[u32; 3]>| WorldMesh {
-            name: "lamp".into(),
-            positions: SQUARE.to_vec(),
-            triangles,
-            normals: None,
-            uvs: None,
-            material: 0,
-            always_traced: false,
-        };
+        let mesh = |triangles: Vec<[u32; 3]>| WorldMesh::new("lamp", SQUARE.to_vec(), triangles, 0);
         for [p, q] in [[[0, 1, 2], [0, 2, 3]], [[1, 2, 0], [3, 0, 2]], [[2, 0, 1], [2, 3, 0]]] {
             let lights = of_mesh(&mesh(vec![p, q]), Rgb::ONE).expect("few");
             assert_eq!((lights.len(), areas(&lights)), (1, DVec3::Z));

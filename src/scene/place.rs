@@ -149,17 +149,14 @@ mod tests {
     use crate::scene::{Light, QuadLight, WorldSphere};
 
     fn triangle() -> WorldMesh {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 1.0)];
         WorldMesh {
-            name: "t".into(),
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 1.0)],
-            triangles: vec![[0, 1, 2]],
             normals: Some(Corners {
                 values: vec![Vec3::new(0.0, -1.0, 1.0).normalize()],
                 corners: Some(vec![[0, 0, 0]]),
             }),
             uvs: Some(Corners { values: vec![], corners: Some(vec![[5, 6, 7]]) }),
-            material: 0,
-            always_traced: false,
+            ..WorldMesh::new("t", corners.into(), vec![[0, 1, 2]], 0)
         }
     }
 
@@ -199,14 +196,13 @@ mod tests {
     }
 
     fn with_sphere() -> World {
-        let (name, centre, radius) = ("ball".into(), DVec3::X, 2.0);
         let light = QuadLight {
             corners: [DVec3::ZERO, DVec3::X, DVec3::ONE, DVec3::new(0.0, 1.0, 1.0)],
             radiance: Rgb::ONE,
             two_sided: false,
         };
         World {
-            spheres: vec![WorldSphere { name, centre, radius, material: 0, always_traced: false }],
+            spheres: vec![WorldSphere::new("ball", DVec3::X, 2.0, 0)],
             materials: vec![Material { texture: Some(0), ..Material::black("m") }],
             lights: vec![Light::Quad(light)],
             ..World::default()

@@ -314,7 +314,7 @@ mod tests {
         let terms = Compatibility::of("w", &Channels::default(), &settings);
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("f.exr");
-        let mut look = |camera: &Camera| {
+        let look = |camera: &Camera| {
             let record = ReferenceRecord {
                 terms: &terms,
                 frame: 1,
