@@ -1,11 +1,11 @@
 //! Settings that are a choice: rules on or off, instruction set, bits.
 
 use crate::import::scene_file::number::Int;
+use crate::import::scene_file::schema::inline_schema;
 use crate::scene::{HitRules, Recheck};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::{JsonSchema, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::borrow::Cow;
 
 /// The rules that make hits trustworthy: each can be switched off to see what it is worth.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
@@ -73,19 +73,7 @@ impl<'de> Deserialize<'de> for PngBits {
     }
 }
 
-impl JsonSchema for PngBits {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "PngBits".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": [8, 16] })
-    }
-}
+inline_schema!(PngBits, |_| json_schema!({ "enum": [8, 16] }));
 
 impl Default for Rules {
     fn default() -> Self {
