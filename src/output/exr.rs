@@ -54,16 +54,11 @@ pub enum ExrSamples {
 
 impl ExrSamples {
     /// Number of pixels.
-    pub fn len(&self) -> usize {
+    fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
             Self::U32(v) => v.len(),
         }
-    }
-
-    /// True without a pixel.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 

@@ -104,7 +104,7 @@ impl<T> Eq for Timed<T> {}
 
 impl<'a> Simulator<'a> {
     pub fn new(job: &Job, ranks: u32, model: &'a CostModel<'a>) -> Self {
-        let frames: Vec<u32> = job.pyramid.all().collect();
+        let frames: Vec<u32> = (1..=job.pyramid.frames).collect();
         let rank_order: Vec<u32> = (0..ranks).collect();
         Self {
             model,
