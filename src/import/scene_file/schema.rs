@@ -56,6 +56,9 @@ fn drop_null_here(map: &mut Map<String, Value>) {
             map.insert("type".into(), only);
         }
     }
+    if let Some(Value::Array(values)) = map.get_mut("enum") {
+        values.retain(|value| !value.is_null());
+    }
     let Some(Value::Array(choices)) = map.get_mut("anyOf") else { return };
     choices.retain(|c| c.get("type") != Some(&Value::from("null")));
     if let [Value::Object(only)] = choices.as_mut_slice() {
