@@ -8,7 +8,7 @@ use support::camera_rays;
 
 use std::cell::Cell;
 use support::Candidate;
-use tweenray::embree::{BareCamera, BuildOptions, CommittedScene, Quality, SceneBuilder};
+use tweenray::embree::{BareCamera, CommittedScene};
 use tweenray::intersect::{EmbreeIntersector, Hit, Intersector, Ray};
 use tweenray::scene::{Camera, HitRules, Recheck, Scene};
 use tweenray::stats::RayCounts;
@@ -23,33 +23,11 @@ fn main() {
     let camera = loaded.shot.camera(FRAME, width, height).expect("a camera");
     let scene = loaded.world.into_scene(true).expect("a scene");
     let camera = camera.to_scene(&scene.recentring);
-    let committed = commit(&scene);
+    let committed = support::commit(&scene, 2);
     let rays = camera_rays::all(&camera);
     camera_rates(&scene, &committed, &camera, &rays);
     packets::report(&scene, &committed, &rays);
     println!("load average at the end {}", support::load_average());
-}
-
-/// The scene's triangles in Embree, as the intersect layer builds them.
-fn commit(scene: &Scene) -> CommittedScene<'_> {
-    let options = BuildOptions {
-        threads: 2,
-        isa: None,
-        robust: true,
-        quality: Quality::Medium,
-        compact: false,
-    };
-    let mut builder = SceneBuilder::new(&options).expect("a device");
-    for mesh in &scene.meshes {
-        let added = builder.add_triangles(
-            &mesh.positions,
-            mesh.vertex_count,
-            &mesh.triangles,
-            std::iter::empty(),
-        );
-        added.expect("valid triangles");
-    }
-    builder.commit().expect("a scene")
 }
 
 fn trace(layer: &dyn Intersector, rays: &[Ray], hits: &mut Vec<Option<Hit>>) -> u64 {

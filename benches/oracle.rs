@@ -46,15 +46,7 @@ fn terrain(side: u32) -> tweenray::scene::Scene {
         let [a, b, c, d] = [at(x, z), at(x + 1, z), at(x, z + 1), at(x + 1, z + 1)];
         [[a, c, d], [a, d, b]]
     });
-    let mesh = WorldMesh {
-        name: "terrain".into(),
-        positions,
-        triangles: triangles.collect(),
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    };
+    let mesh = WorldMesh::new("terrain", positions, triangles.collect(), 0);
     let materials = vec![Material::diffuse("white", tweenray::math::Rgb::ONE)];
     let world = World { meshes: vec![mesh], materials, ..World::default() };
     world.into_scene(true).expect("a scene")

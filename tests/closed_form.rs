@@ -348,14 +348,7 @@ fn a_point_out_of_focus_is_a_disk_of_the_size_of_the_circle_of_confusion() {
         for (focus, blades) in [(12.0, 0), (4.0, 0), (4.0, 6)] {
             let mut world = World::default();
             world.materials.push(Material { emission: Rgb::ONE, ..Material::black("ball") });
-            let (name, centre, always_traced) = ("ball".into(), DVec3::ZERO, false);
-            world.spheres.push(WorldSphere {
-                name,
-                centre,
-                radius: ball,
-                material: 0,
-                always_traced,
-            });
+            world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, ball, 0));
             let mut job = job(world, pose((0.0, 0.0, depth), (0.0, 0.0, 0.0)), size, size);
             let blade_rotation_degrees = 0.0;
             let lens = ThinLens { radius, focus, blades, blade_rotation_degrees };

@@ -25,13 +25,8 @@ fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
     world.meshes.push(bumpy_floor(40));
     let mut ball = |material: Material, x: f64| {
         world.materials.push(material);
-        world.spheres.push(WorldSphere {
-            name: "ball".into(),
-            centre: DVec3::new(x, 0.7, 0.0),
-            radius: 0.6,
-            material: world.materials.len() as u32 - 1,
-            always_traced: false,
-        });
+        let material = world.materials.len() as u32 - 1;
+        world.spheres.push(WorldSphere::new("ball", DVec3::new(x, 0.7, 0.0), 0.6, material));
     };
     if mirror {
         ball(Material { mirror: Rgb::splat(0.9), ..Material::black("mirror") }, -1.2);

@@ -104,15 +104,7 @@ fn sheet() -> Scene {
         .collect();
     let mut world = World::default();
     world.materials.push(Material::diffuse("white", Rgb::ONE));
-    world.meshes.push(WorldMesh {
-        name: "sheet".into(),
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    });
+    world.meshes.push(WorldMesh::new("sheet", positions, triangles, 0));
     world.into_scene(true).unwrap()
 }
 

@@ -3,7 +3,7 @@
 use super::moves::{self, Set};
 use super::{Choice, quartiles, support};
 use rayon::ThreadPool;
-use tweenray::embree::{BareCamera, BuildOptions, CommittedScene, Quality, SceneBuilder};
+use tweenray::embree::{BareCamera, CommittedScene};
 use tweenray::scene::{Camera, Policy, Scene, Settings};
 
 /// Frames of the move.
@@ -18,21 +18,7 @@ pub struct Bare<'s> {
 impl<'s> Bare<'s> {
     /// The scene's triangles in Embree, as the intersect layer builds them.
     pub fn new(scene: &'s Scene, threads: usize) -> Self {
-        let options = BuildOptions {
-            threads,
-            isa: None,
-            robust: true,
-            quality: Quality::Medium,
-            compact: false,
-        };
-        let mut builder = SceneBuilder::new(&options).expect("a device");
-        for mesh in &scene.meshes {
-            let none = std::iter::empty();
-            let (positions, triangles) = (&mesh.positions, &mesh.triangles);
-            let added = builder.add_triangles(positions, mesh.vertex_count, triangles, none);
-            added.expect("valid triangles");
-        }
-        Self { committed: builder.commit().expect("a scene"), scene }
+        Self { committed: support::commit(scene, threads), scene }
     }
 
     /// Seconds of the loop over all pixels of `camera` (world space), `spp` times: the image is cut

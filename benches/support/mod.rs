@@ -10,7 +10,9 @@ pub mod camera_rays;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
+use tweenray::embree::{BuildOptions, CommittedScene, Quality, SceneBuilder};
 use tweenray::import::{self, LoadOptions, Loaded};
+use tweenray::scene::Scene;
 
 /// Seconds of each turn of one candidate.
 pub struct Times(Vec<f64>);
@@ -126,4 +128,18 @@ pub fn peak_memory() -> String {
         Some(k) => format!("{:.0} MB", k * 1024e-6),
         None => "untold".into(),
     }
+}
+
+/// The scene's triangles in Embree, as the intersect layer builds them.
+pub fn commit(scene: &Scene, threads: usize) -> CommittedScene<'_> {
+    let (robust, quality) = (true, Quality::Medium);
+    let options = BuildOptions { threads, isa: None, robust, quality, compact: false };
+    let mut builder = SceneBuilder::new(&options).expect("a device");
+    for mesh in &scene.meshes {
+        let (positions, triangles) = (&mesh.positions, &mesh.triangles);
+        let none = std::iter::empty();
+        let added = builder.add_triangles(positions, mesh.vertex_count, triangles, none);
+        added.expect("valid triangles");
+    }
+    builder.commit().expect("a scene")
 }

@@ -53,7 +53,7 @@ fn still_life(mesh: &WorldMesh, scale: f64) -> Still {
     world.meshes.push(mesh);
     let far = 20.0 * scale;
     let floor = [(-far, far), (far, far), (far, -far), (-far, -far)];
-    world.meshes.push(quad(floor.map(|(x, z)| DVec3::new(x, 0.0, z)), 1));
+    world.meshes.push(WorldMesh::quad("quad", floor.map(|(x, z)| DVec3::new(x, 0.0, z)), 1));
     world.lights.push(Light::Directional(DirectionalLight {
         to_light: DVec3::new(-0.5, 0.8, 0.6).normalize(),
         irradiance: Rgb::splat(2.2),
@@ -125,22 +125,24 @@ fn refraction() -> [Picture; 2] {
     world.materials.push(Material::diffuse("dark", Rgb::new(0.12, 0.14, 0.2)));
     world.materials.push(Material::diffuse("light", Rgb::new(0.75, 0.72, 0.65)));
     let (centre, radius) = (DVec3::new(0.2, 1.0, 0.0), 0.8);
-    world.spheres.push(WorldSphere {
-        name: "ball".into(),
-        centre,
-        radius,
-        material: 0,
-        always_traced: false,
-    });
+    world.spheres.push(WorldSphere::new("ball", centre, radius, 0));
     for i in -8..8 {
         for j in 0..8 {
             let material = if (i + j) % 2 == 0 { 1 } else { 2 };
             let (x, y) = (f64::from(i) * 0.5, f64::from(j) * 0.5);
             let wall = [(x, y), (x + 0.5, y), (x + 0.5, y + 0.5), (x, y + 0.5)];
-            world.meshes.push(quad(wall.map(|(x, y)| DVec3::new(x, y, -2.0)), material));
+            world.meshes.push(WorldMesh::quad(
+                "quad",
+                wall.map(|(x, y)| DVec3::new(x, y, -2.0)),
+                material,
+            ));
             let z = f64::from(j) * 0.5 - 2.0;
             let floor = [(x, z + 0.5), (x + 0.5, z + 0.5), (x + 0.5, z), (x, z)];
-            world.meshes.push(quad(floor.map(|(x, z)| DVec3::new(x, 0.0, z)), 3 - material));
+            world.meshes.push(WorldMesh::quad(
+                "quad",
+                floor.map(|(x, z)| DVec3::new(x, 0.0, z)),
+                3 - material,
+            ));
         }
     }
     world.sky = Sky { radiance: Rgb::splat(0.6), lights: false, ambient: Rgb::splat(1.0) };
@@ -159,16 +161,4 @@ fn acne() -> [Picture; 2] {
     still.settings.rules =
         HitRules { spawn_offset: false, recentre: false, ..still.settings.rules };
     [naive::render(&still, None), ours]
-}
-
-fn quad(corners: [DVec3; 4], material: u32) -> WorldMesh {
-    WorldMesh {
-        name: "quad".into(),
-        positions: corners.to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        normals: None,
-        uvs: None,
-        material,
-        always_traced: false,
-    }
 }

@@ -53,15 +53,7 @@ pub fn rabbit() -> WorldMesh {
         }
     }
     let normals = Some(Corners { values, corners: None });
-    WorldMesh {
-        name: "rabbit".into(),
-        positions,
-        triangles,
-        normals,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    WorldMesh { normals, ..WorldMesh::new("rabbit", positions, triangles, 0) }
 }
 
 /// The first mesh of a file, put in the rabbit's place.

@@ -47,15 +47,7 @@ pub fn rabbit(mesh: WorldMesh) -> Filmed {
     world.materials.push(Material::diffuse("grass", Rgb::new(0.3, 0.45, 0.2)));
     world.meshes.push(WorldMesh { material: 0, ..mesh });
     let floor = [(-12.0, 12.0), (12.0, 12.0), (12.0, -12.0), (-12.0, -12.0)];
-    world.meshes.push(WorldMesh {
-        name: "floor".into(),
-        positions: floor.map(|(x, z)| DVec3::new(x, 0.0, z)).to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        normals: None,
-        always_traced: false,
-        uvs: None,
-        material: 1,
-    });
+    world.meshes.push(WorldMesh::quad("floor", floor.map(|(x, z)| DVec3::new(x, 0.0, z)), 1));
     let lamp = [(-3.0, 1.0), (-1.0, 1.0), (-1.0, 3.0), (-3.0, 3.0)];
     let corners = lamp.map(|(x, z)| DVec3::new(x, 5.0, z));
     let radiance = Rgb::splat(14.0);

@@ -1,7 +1,7 @@
 //! What frames and messages take, as measured.
 
 use crate::real::{Line, Ran, Stage};
-use tweenray::cluster::simulation::{CostModel, SchedulerCost};
+use crate::simulation::{CostModel, SchedulerCost};
 use tweenray::sequence::Pyramid;
 
 /// What is given, not measured: a cluster whose nodes have 64 ranks and 100 Gbit/s each.

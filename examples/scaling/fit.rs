@@ -2,7 +2,7 @@
 
 use crate::costs::Costs;
 use crate::real::{Line, Ran, Stage};
-use tweenray::cluster::simulation::{CostModel, Job};
+use crate::simulation::{CostModel, Job};
 use tweenray::sequence::Pyramid;
 
 const SHOT: Pyramid = Pyramid { segment: 16, frames: 65 };
@@ -84,9 +84,10 @@ pub fn fit(stage: &Stage) -> Fit {
 /// What two to four ranks take more than one, and do not spend on making references ready to travel, each
 /// of them adds. Least squares.
 fn fit_rank_seconds(costs: &Costs, rows: &[Row]) -> f64 {
-    let users = |f: u32| SHOT.all().any(|g| SHOT.ancestors(g).contains(&f));
+    let users = |f: u32| (1..=SHOT.frames).any(|g| SHOT.ancestors(g).contains(&f));
     let weight = |f: u32| if SHOT.is_key(f) { 1.0 } else { costs.between_share };
-    let packing = costs.pack_seconds * SHOT.all().filter(|f| users(*f)).map(weight).sum::<f64>();
+    let packing =
+        costs.pack_seconds * (1..=SHOT.frames).filter(|f| users(*f)).map(weight).sum::<f64>();
     let more = |row: &Row| row.cpu[1] - rows[0].cpu[1] - packing;
     let rise: f64 = rows[1..4].iter().map(|row| f64::from(row.ranks) * more(row)).sum();
     let run: f64 = rows[1..4].iter().map(|row| f64::from(row.ranks).powi(2)).sum();

@@ -13,6 +13,7 @@ mod paper;
 mod plot;
 mod predict;
 mod real;
+mod simulation;
 
 use predict::{Change, MOST, NONE, curve};
 

@@ -4,9 +4,9 @@ use crate::costs::{BANDWIDTH, Costs, LATENCY};
 use crate::fit::{Fit, Row, Said};
 use crate::plot;
 use crate::predict::{Curve, FRAMES, WORDS};
+use crate::simulation::SimulatedRun;
 use std::fmt::Write;
 use std::fs;
-use tweenray::cluster::simulation::SimulatedRun;
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs");
 const TEXT: &str = include_str!("page.md");

@@ -3,8 +3,8 @@
 use crate::costs::Costs;
 use crate::fit::strips;
 use crate::real::{Line, Stage};
+use crate::simulation::Job;
 use std::fmt::Write;
-use tweenray::cluster::simulation::Job;
 use tweenray::sequence::Pyramid;
 
 /// Table 1: ranks, then seconds for 32, 64 and 128 frames.

@@ -3,8 +3,8 @@
 use crate::costs::Costs;
 use crate::fit::strips;
 use crate::real::{Line, Stage};
+use crate::simulation::{CostModel, Job, SchedulerCost, SimulatedRun};
 use std::time::Instant;
-use tweenray::cluster::simulation::{CostModel, Job, SchedulerCost, SimulatedRun};
 use tweenray::sequence::Pyramid;
 
 pub const FRAMES: u32 = 262_144;

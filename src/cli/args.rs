@@ -144,7 +144,7 @@ pub struct TracingArgs {
     pub intersector: Option<IntersectorKind>,
     /// Embree's instruction set; frames differ in the last bits by it [default: this machine's best]
     #[arg(long, value_name = "ISA", help_heading = "Tracing",
-        value_parser = ["sse2", "sse4.2", "avx", "avx2", "avx512"])]
+        value_parser = limits::ISAS)]
     pub isa: Option<String>,
     /// How much work Embree puts into its tree: a better tree takes longer to build and less time to
     /// trace [default: medium]

@@ -106,8 +106,7 @@ fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
 /// encoding holds a copy.
 pub fn frame_bytes(settings: &Settings) -> u64 {
     // A cropped film has the full size, black outside.
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
-    pixels * 2 * (12 + 52)
+    settings.pixel_count() * 2 * (12 + 52)
 }
 
 #[cfg(test)]

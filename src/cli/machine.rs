@@ -1,6 +1,7 @@
 //! The machine and this process, from `/proc`; unknown figures are `None`, never guessed.
 
 use crate::error::{Error, Result};
+use crate::scene::limits::ISAS;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::ffi::OsStr;
@@ -39,9 +40,6 @@ pub fn thread_pool(threads: usize) -> Result<ThreadPool> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))
 }
-
-/// Instruction sets that Embree has kernels for, narrow to wide.
-pub const ISAS: [&str; 5] = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
 
 /// Environment variable that names the widest instruction set to use.
 const MAX_ISA: &str = "TWEENRAY_MAX_ISA";

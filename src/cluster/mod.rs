@@ -21,8 +21,7 @@ mod mpi;
 mod nodes;
 mod point_to_point;
 mod render_thread;
-mod scheduler;
-pub mod simulation;
+pub mod scheduler;
 mod traffic;
 
 pub use failure::PANIC_MESSAGE;

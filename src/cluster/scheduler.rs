@@ -129,10 +129,22 @@ pub struct Task {
 /// How much of its frame a task makes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Extent {
-    /// The whole frame: merged from `strips` strips, or rendered if 0. `frames` are written from it.
-    Whole { strips: u32, frames: Vec<u32> },
-    /// Strip `number` of `of`, which rank `leader` merges.
-    Strip { number: u32, of: u32, leader: u32 },
+    /// The whole frame.
+    Whole {
+        /// Number of strips to merge it from; 0: it is rendered.
+        strips: u32,
+        /// Frames to write from it.
+        frames: Vec<u32>,
+    },
+    /// A strip of the frame.
+    Strip {
+        /// Number of the strip, from 0.
+        number: u32,
+        /// Number of strips.
+        of: u32,
+        /// The rank that merges the strips.
+        leader: u32,
+    },
 }
 
 /// A decision of the scheduler, to be sent to a rank.
@@ -140,8 +152,15 @@ pub enum Extent {
 pub enum Decision {
     /// The rank gets this assignment.
     Assign(u32, Assignment),
-    /// Rank `from` sends the reference of the representative `original` to rank `to`.
-    Send { from: u32, to: u32, original: u32 },
+    /// A rank that holds a reference sends it to another.
+    Send {
+        /// The rank that holds it.
+        from: u32,
+        /// The rank that needs it.
+        to: u32,
+        /// The representative frame of the reference.
+        original: u32,
+    },
 }
 
 impl Scheduler {
@@ -171,6 +190,9 @@ impl Scheduler {
     }
 
     /// Records that `rank` has done `task` in `seconds`.
+    ///
+    /// # Panics
+    /// The scheduler has fewer ranks or tasks.
     pub fn complete(&mut self, rank: u32, task: &Task, seconds: f64) {
         let record = &mut self.ranks[rank as usize];
         record.assigned -= 1;

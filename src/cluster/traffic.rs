@@ -30,17 +30,17 @@ pub struct Traffic {
 
 impl Traffic {
     /// Counts a scene of `bytes` sent to one rank.
-    pub fn scene(&mut self, bytes: usize) {
+    pub(super) fn scene(&mut self, bytes: usize) {
         self.scene.count(bytes);
     }
 
     /// Counts a control message.
-    pub fn message(&mut self, bytes: usize) {
+    pub(super) fn message(&mut self, bytes: usize) {
         self.notes.count(bytes);
     }
 
     /// Counts a payload.
-    pub fn payload(&mut self, kind: PayloadKind, bytes: usize) {
+    pub(super) fn payload(&mut self, kind: PayloadKind, bytes: usize) {
         match kind {
             PayloadKind::Reference => self.references.count(bytes),
             PayloadKind::Discoveries => self.discoveries.count(bytes),
@@ -49,7 +49,7 @@ impl Traffic {
     }
 
     /// Traffic since `before`. The scene, sent earlier, is kept whole.
-    pub fn since(&self, before: &Self) -> Self {
+    pub(super) fn since(&self, before: &Self) -> Self {
         Self {
             scene: self.scene,
             notes: self.notes.since(before.notes),

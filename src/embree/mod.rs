@@ -21,9 +21,6 @@ use std::ffi::{CStr, CString, c_void};
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicI64, Ordering};
 
-/// Version of the Embree that this program was compiled with.
-pub const VERSION: &str = env!("TWEENRAY_EMBREE_VERSION");
-
 /// An analytic sphere as `ffi/shim.h` lays it out: scene space, f64.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]

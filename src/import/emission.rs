@@ -1,15 +1,13 @@
 //! Turning emitting surfaces into lights, if a light of that shape exists.
 //!
 //! An analytic sphere becomes a sphere light; a mesh that consists of flat convex quads (pairs of
-//! triangles, at most [`MAX_QUADS`]) becomes quad lights. [`World::into_scene`] gives lights their
+//! triangles, at most [`MAX_LIGHTS`]) becomes quad lights. [`World::into_scene`] gives lights their
 //! surface, so the sphere or mesh itself leaves the world. Any other mesh keeps its emission: it
 //! is seen, and casts no light.
 
+use super::lamps::{MAX_LIGHTS, joined};
 use crate::math::DVec3;
 use crate::scene::{Light, Material, QuadLight, SphereLight, World, WorldMesh};
-
-/// Most quads of a mesh that become lights, since each light costs shadow rays at every point.
-const MAX_QUADS: usize = 64;
 
 /// A note about an emitting surface, for a warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,7 +33,7 @@ impl Note {
     pub fn help(&self) -> String {
         match self {
             Self::CastsNoLight(_) => format!(
-                "a sphere, or a mesh of at most {MAX_QUADS} flat quads, lights the scene when it emits"
+                "a sphere, or a mesh of at most {MAX_LIGHTS} flat quads, lights the scene when it emits"
             ),
             Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
         }
@@ -88,34 +86,17 @@ fn reflects(material: &Material) -> bool {
 /// The mesh as quads, if each pair of consecutive triangles makes one.
 fn quads(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
     let count = mesh.triangles.len();
-    if count == 0 || count % 2 != 0 || count > 2 * MAX_QUADS {
+    if count == 0 || count % 2 != 0 || count > 2 * MAX_LIGHTS {
         return None;
     }
     let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
-    mesh.triangles.chunks_exact(2).map(|t| quad(corners(&t[0]), corners(&t[1]))).collect()
-}
-
-/// The quad of two triangles that share an edge; `None` if it is not flat and convex.
-fn quad(first: [DVec3; 3], second: [DVec3; 3]) -> Option<[DVec3; 4]> {
-    let (i, j) = (0..9).map(|k| (k / 3, k % 3)).find(|(i, j)| {
-        // Edge i of the first runs against edge j of the second.
-        first[*i] == second[(j + 1) % 3] && first[(i + 1) % 3] == second[*j]
-    })?;
-    let corners = [first[(i + 2) % 3], first[i], second[(j + 2) % 3], first[(i + 1) % 3]];
-    is_flat_and_convex(&corners).then_some(corners)
-}
-
-fn is_flat_and_convex(corners: &[DVec3; 4]) -> bool {
-    let edges = [0, 1, 2, 3].map(|k| corners[(k + 1) % 4] - corners[k]);
-    let size = edges.iter().fold(0f64, |s, e| s.max(e.abs().max_element()));
-    if !(size > 0.0 && size.is_finite()) {
-        return false;
-    }
-    let edges = edges.map(|e| e / size);
-    let normal = (edges[0] + edges[1]).cross(edges[1] + edges[2]).normalize_or_zero();
-    let turns = [0, 1, 2, 3].map(|k| edges[k].cross(edges[(k + 1) % 4]));
-    // File coordinates have six digits or so.
-    edges.iter().all(|e| e.dot(normal).abs() < 1e-5) && turns.iter().all(|t| t.dot(normal) > 0.0)
+    let quad = |t: &[[u32; 3]]| {
+        let mut quad = joined(corners(&t[0]), corners(&t[1]))?;
+        // Where its samples lie depends on the first corner.
+        quad.rotate_right(1);
+        Some(quad)
+    };
+    mesh.triangles.chunks_exact(2).map(quad).collect()
 }
 
 #[cfg(test)]
@@ -127,8 +108,7 @@ mod tests {
     fn lamp(triangles: Vec<[u32; 3]>, raise: f64) -> WorldMesh {
         let positions =
             vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, raise), DVec3::Y, DVec3::Z];
-        let (name, normals, uvs, material) = ("lamp".into(), None, None, 0);
-        WorldMesh { name, positions, triangles, normals, uvs, material, always_traced: false }
+        WorldMesh::new("lamp", positions, triangles, 0)
     }
 
     fn world(mesh: WorldMesh) -> World {
@@ -169,14 +149,7 @@ mod tests {
         world.meshes[0].material = 1;
         let (centre, radius) = (DVec3::X, 0.5);
         for material in [0, 1] {
-            let name = format!("{material}");
-            world.spheres.push(WorldSphere {
-                name,
-                centre,
-                radius,
-                material,
-                always_traced: false,
-            });
+            world.spheres.push(WorldSphere::new("ball", centre, radius, material));
         }
         assert_eq!(adopt(&mut world, 0, 0), []);
         assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 1, 1));

@@ -44,13 +44,8 @@ pub fn uv_sphere(
     let positions = directions.iter().map(|n| round6(*n * radius + centre)).collect();
     let values = directions.iter().map(|n| super::normals::unit_or_zero(round6(*n))).collect();
     Ok(WorldMesh {
-        name: name.to_owned(),
-        positions,
-        triangles: sphere_triangles(nu, nv),
         normals: Some(Corners { values, corners: None }),
-        uvs: None,
-        material,
-        always_traced: false,
+        ..WorldMesh::new(name, positions, sphere_triangles(nu, nv), material)
     })
 }
 
@@ -111,15 +106,7 @@ pub fn bench_terrain(name: &str, n: u32, half: f64, material: MaterialId) -> Res
             [[k, k + n, k + 1], [k + 1, k + n, k + n + 1]]
         })
         .collect();
-    Ok(WorldMesh {
-        name: name.to_owned(),
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material,
-        always_traced: false,
-    })
+    Ok(WorldMesh::new(name, positions, triangles, material))
 }
 
 fn usage<T>(message: String) -> Result<T> {

@@ -7,8 +7,8 @@ use crate::scene::{Light, QuadLight, WorldMesh};
 /// Most lights made of a mesh, since every light costs shadow rays at every pixel. A mesh that needs more is visible
 /// but lights nothing.
 pub(super) const MAX_LIGHTS: usize = 64;
-/// A quad's corners may leave its plane by this share of its size.
-const FLAT: f64 = 1e-6;
+/// A quad's corners may leave its plane by this share of its size: file coordinates have six digits or so.
+const FLAT: f64 = 1e-5;
 
 /// Lights that replace a mesh whose faces emit `radiance` on both sides; `None` if there would be
 /// more than [`MAX_LIGHTS`]. Neighbouring triangles become one quad where possible.
@@ -16,16 +16,16 @@ pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
     if mesh.triangles.len() > 2 * MAX_LIGHTS {
         return None;
     }
+    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
     let mut quads = Vec::new();
     let mut rest = &mesh.triangles[..];
     while let [first, after @ ..] = rest {
-        let joined = after.first().and_then(|second| joined(*first, *second));
-        let joined = joined.map(|quad| quad.map(|i| mesh.positions[i as usize]));
-        if let Some(quad) = joined.filter(is_flat_and_convex) {
+        if let Some(quad) = after.first().and_then(|second| joined(corners(first), corners(second)))
+        {
             quads.push(quad);
             rest = &after[1..];
         } else {
-            quads.extend(of_triangle(first.map(|i| mesh.positions[i as usize])));
+            quads.extend(of_triangle(corners(first)));
             rest = after;
         }
     }
@@ -62,17 +62,12 @@ fn of_triangle([a, b, c]: [DVec3; 3]) -> [[DVec3; 4]; 3] {
     [[a, ab, centre, ca], [b, bc, centre, ab], [c, ca, centre, bc]]
 }
 
-/// The quad of two triangles of one orientation that share a side.
-fn joined(p: [u32; 3], q: [u32; 3]) -> Option<[u32; 4]> {
-    for i in 0..3 {
-        for j in 0..3 {
-            let (a, b, c) = (p[i], p[(i + 1) % 3], p[(i + 2) % 3]);
-            if q[j] == b && q[(j + 1) % 3] == a {
-                return Some([a, q[(j + 2) % 3], b, c]);
-            }
-        }
-    }
-    None
+/// The flat convex quad of two triangles of one orientation that share a side.
+pub(super) fn joined(p: [DVec3; 3], q: [DVec3; 3]) -> Option<[DVec3; 4]> {
+    let mut sides = (0..9).map(|k| (k / 3, k % 3));
+    let (i, j) = sides.find(|(i, j)| p[*i] == q[(j + 1) % 3] && p[(i + 1) % 3] == q[*j])?;
+    let quad = [p[i], q[(j + 2) % 3], p[(i + 1) % 3], p[(i + 2) % 3]];
+    is_flat_and_convex(&quad).then_some(quad)
 }
 
 fn is_flat_and_convex(corners: &[DVec3; 4]) -> bool {
@@ -124,15 +119,7 @@ mod tests {
 
     #[test]
     fn split_quads_are_joined_and_large_meshes_refused() {
-        let mesh = |triangles: Vec<[u32; 3]>| WorldMesh {
-            name: "lamp".into(),
-            positions: SQUARE.to_vec(),
-            triangles,
-            normals: None,
-            uvs: None,
-            material: 0,
-            always_traced: false,
-        };
+        let mesh = |triangles: Vec<[u32; 3]>| WorldMesh::new("lamp", SQUARE.to_vec(), triangles, 0);
         for [p, q] in [[[0, 1, 2], [0, 2, 3]], [[1, 2, 0], [3, 0, 2]], [[2, 0, 1], [2, 3, 0]]] {
             let lights = of_mesh(&mesh(vec![p, q]), Rgb::ONE).expect("few");
             assert_eq!((lights.len(), areas(&lights)), (1, DVec3::Z));

@@ -120,15 +120,8 @@ impl Studio {
         let DVec3 { x, z, .. } = self.middle;
         let h = self.floor_half;
         let corner = |sx: f64, sz: f64| DVec3::new(x + sx * h, self.floor_height, z + sz * h);
-        WorldMesh {
-            name: "floor".into(),
-            positions: vec![corner(-1., 1.), corner(1., 1.), corner(1., -1.), corner(-1., -1.)],
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-            normals: None,
-            uvs: None,
-            material,
-            always_traced: false,
-        }
+        let corners = [corner(-1., 1.), corner(1., 1.), corner(1., -1.), corner(-1., -1.)];
+        WorldMesh::quad("floor", corners, material)
     }
 
     /// A square lamp that faces the middle from the upper left of the first frame's camera, which

@@ -72,18 +72,9 @@ mod tests {
 
     fn facts_of(triangles: Vec<[u32; 3]>) -> MeshFacts {
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let (name, normals) = ("tetrahedron".into(), None);
         let mut world = World::default();
         world.materials.push(Material::diffuse("white", Rgb::ONE));
-        world.meshes.push(WorldMesh {
-            name,
-            positions,
-            triangles,
-            normals,
-            uvs: None,
-            material: 0,
-            always_traced: false,
-        });
+        world.meshes.push(WorldMesh::new("tetrahedron", positions, triangles, 0));
         MeshFacts::of(&world.into_scene(false).expect("a scene").meshes[0])
     }
 

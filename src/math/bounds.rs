@@ -1,6 +1,6 @@
 //! Axis-aligned boxes in f64.
 
-use super::DVec3;
+use super::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// An axis-aligned box; empty while `min > max` on an axis.
@@ -30,6 +30,16 @@ impl Bounds3 {
     /// The smallest box that holds both.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// The smallest box that holds this one moved by `transform`; an empty one stays empty.
+    pub fn transformed(self, transform: &DAffine3) -> Self {
+        let mut moved = Self::EMPTY;
+        for corner in (0..8).filter(|_| !self.is_empty()) {
+            let edge = |axis| if corner >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+            moved.include(transform.transform_point3(DVec3::from([0, 1, 2].map(edge))));
+        }
+        moved
     }
 
     /// Middle of the box; zero for the empty box.

@@ -29,6 +29,10 @@ use std::path::Path;
 
 /// Type of the program's own attribute, which other programs ignore.
 const OPAQUE: &str = "tweenray";
+/// Most bytes that deflate makes one of.
+const MOST_DEFLATED: u64 = 1032;
+/// Bytes of a frame's pixel before it is deflated: `R G B`, AOVs left out.
+const FRAME_PIXEL: u64 = 12;
 
 /// One channel of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,16 +54,11 @@ pub enum ExrSamples {
 
 impl ExrSamples {
     /// Number of pixels.
-    pub fn len(&self) -> usize {
+    fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
             Self::U32(v) => v.len(),
         }
-    }
-
-    /// Whether there are no pixels.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
@@ -161,19 +160,30 @@ fn own_attribute((name, bytes): (&str, &[u8])) -> (Text, AttributeValue) {
     (name, AttributeValue::Custom { kind, bytes: bytes.into() })
 }
 
-/// The bytes of the attribute `name` that [`encode_with`] wrote into the file at `path`, if it has it.
+/// An attribute that [`encode_with`] wrote.
+pub struct OwnAttribute {
+    /// Its value.
+    pub bytes: Vec<u8>,
+    /// Most pixels that a frame in a file of that length can have.
+    pub most_pixels: u64,
+}
+
+/// The attribute `name` that [`encode_with`] wrote into the file at `path`, if it has it.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Input`] when it is no exr file or larger than
 /// `limit` bytes.
-pub fn read_attribute(path: &Path, name: &str, limit: u64) -> Result<Option<Vec<u8>>> {
+pub fn read_attribute(path: &Path, name: &str, limit: u64) -> Result<Option<OwnAttribute>> {
     let Regular { source, bytes } = Regular::at(path)?;
     check_memory(path, bytes, limit)?;
     let meta = MetaData::read_from_buffered(source, false);
     let meta = meta.map_err(|e| Error::input(path, format!("not a readable exr file: {e}")))?;
     let all = meta.headers.into_iter().flat_map(|header| header.own_attributes.other);
+    let most_pixels = bytes.saturating_mul(MOST_DEFLATED) / FRAME_PIXEL;
     let found = all.filter_map(|(own, value)| match value {
-        AttributeValue::Custom { bytes, .. } if own.eq(name) => Some(bytes.into_vec()),
+        AttributeValue::Custom { bytes, .. } if own.eq(name) => {
+            Some(OwnAttribute { bytes: bytes.into_vec(), most_pixels })
+        }
         _ => None,
     });
     Ok({ found }.next())

@@ -81,11 +81,6 @@ impl SequenceLock {
     pub fn is_kept(&self) -> bool {
         self.file.is_some()
     }
-
-    /// The file that is locked.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
 }
 
 impl Drop for SequenceLock {

@@ -188,15 +188,17 @@ impl ReferenceRecord<'_> {
 }
 
 /// Decodes the bytes of [`ReferenceRecord::encode`] for a job of the compatibility `terms`, in a scene with
-/// `recentring`: the reference and the hash of its bytes. `path` is for messages.
+/// `recentring`: the reference and the hash of its bytes. A reference takes memory by its camera's pixels, of
+/// which there are at most `most_pixels`. `path` is for messages.
 ///
 /// # Errors
-/// [`Error::Input`] if the bytes are damaged, are no record, or have another compatibility.
+/// [`Error::Input`] if the bytes are damaged, are no record, have another compatibility, or claim more pixels.
 pub fn decode(
     path: &Path,
     bytes: &[u8],
     terms: &Compatibility,
     recentring: &Recentring,
+    most_pixels: u64,
 ) -> Result<(Reference, [u8; 32])> {
     let refuse = |why: String| Error::input(path, format!("cannot serve as a reference: {why}"));
     let damaged = || refuse("its record of traced points is damaged".into());
@@ -214,6 +216,12 @@ pub fn decode(
         return Err(refuse(why));
     }
     let camera = take(&mut body, Camera::BYTES).and_then(Camera::decode).ok_or_else(damaged)?;
+    let Camera { width, height, .. } = camera;
+    if u64::from(width) * u64::from(height) > most_pixels {
+        return Err(refuse(format!(
+            "its record claims {width}x{height} pixels, more than it can have"
+        )));
+    }
     let (traced, findings) =
         record_of(body, &head, terms.lights.len(), &camera).ok_or_else(damaged)?;
     let camera = camera.to_scene(recentring);
@@ -348,14 +356,18 @@ mod tests {
     }
 
     fn encoded(traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
-        let (terms, camera, findings) = (terms(), camera(), findings());
-        let (terms, camera, findings, settings) = (&terms, &camera, &findings[..], "spp 1");
+        seen_by(&camera(), traced, crop)
+    }
+
+    fn seen_by(camera: &Camera, traced: &TracedPoints, crop: Option<Rect>) -> Vec<u8> {
+        let (terms, findings) = (terms(), findings());
+        let (terms, findings, settings) = (&terms, &findings[..], "spp 1");
         let kept = ReferenceRecord { terms, frame: 7, camera, crop, traced, findings, settings };
         kept.encode().expect("small enough")
     }
 
     fn read(bytes: &[u8], terms: &Compatibility) -> Result<Reference> {
-        decode(Path::new("f.exr"), bytes, terms, &Recentring::IDENTITY).map(|(r, _)| r)
+        decode(Path::new("f.exr"), bytes, terms, &Recentring::IDENTITY, 48).map(|(r, _)| r)
     }
 
     #[test]
@@ -432,6 +444,14 @@ mod tests {
             change(&mut wrong);
             assert!(read(&encoded(&wrong, None), &terms()).is_err(), "change {i}");
         }
+    }
+
+    /// It would take some 40 GB.
+    #[test]
+    fn a_claim_of_too_many_pixels_is_refused_before_memory_is_taken() {
+        let large = Camera { width: 32768, height: 32768, ..camera() };
+        let error = read(&seen_by(&large, &traced(), None), &terms()).expect_err("refused");
+        assert!(error.to_string().contains("claims 32768x32768 pixels"), "{error}");
     }
 
     #[test]

@@ -45,16 +45,6 @@ impl SphereCone {
         std::f64::consts::TAU * self.one_minus_cos
     }
 
-    /// `1 − cos` of the cone's half angle.
-    pub fn one_minus_cos(&self) -> f64 {
-        self.one_minus_cos
-    }
-
-    /// Unit vector from the point to the sphere's centre.
-    pub fn axis(&self) -> DVec3 {
-        self.axis
-    }
-
     /// A unit direction in the cone whose height above the horizon of the unit normal `n` is half
     /// of the highest one's, and the distance along it to the sphere; `None` where the cone lies
     /// below the horizon.
@@ -133,7 +123,7 @@ mod tests {
         let exact = std::f64::consts::PI * 1e-18;
         assert!((far.solid_angle() / exact - 1.0).abs() < 1e-15);
         let near = SphereCone::new(DVec3::Z, 1.0 - 1e-12, DVec3::ZERO).expect("outside");
-        let cos = ((1.0 - near.one_minus_cos()).powi(2) / 2e-12).sqrt();
+        let cos = ((1.0 - near.one_minus_cos).powi(2) / 2e-12).sqrt();
         assert!((cos - 1.0).abs() < 1e-3, "nearly a hemisphere: {cos}");
     }
 
@@ -147,7 +137,7 @@ mod tests {
             for u in pairs(n) {
                 let (d, _) = cone.direction(u);
                 // 1 − cos θ from the chord, which is exact for small angles too.
-                let share = 0.5 * (d - DVec3::X).length_squared() / cone.one_minus_cos();
+                let share = 0.5 * (d - DVec3::X).length_squared() / cone.one_minus_cos;
                 assert!(share < 1.0 + 1e-9);
                 heights[((share * 16.0) as usize).min(15)] += 1;
                 sum += d / f64::from(n);
@@ -156,7 +146,7 @@ mod tests {
                 assert!((f64::from(h) / 1024.0 - 1.0).abs() < 0.02, "{h}");
             }
             assert!(sum.y.abs() < 2e-4 * radius && sum.z.abs() < 2e-4 * radius);
-            assert!((sum.x - (1.0 - 0.5 * cone.one_minus_cos())).abs() < 1e-5);
+            assert!((sum.x - (1.0 - 0.5 * cone.one_minus_cos)).abs() < 1e-5);
         }
     }
 

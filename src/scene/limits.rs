@@ -24,5 +24,7 @@ pub const MAX_SEGMENT: u32 = 1_000_000;
 pub const STEPS: RangeInclusive<f64> = 0.0..=255.0;
 /// Differences in linear colour, and shares that may exceed the whole.
 pub const AMOUNT: RangeInclusive<f64> = 0.0..=1e30;
+/// Instruction sets that Embree has kernels for, narrow to wide.
+pub const ISAS: [&str; 5] = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
 /// Frames per second of a video.
 pub const FPS: RangeInclusive<f64> = 1.0..=1000.0;

@@ -41,18 +41,24 @@ impl World {
         self.materials.len() as MaterialId - 1
     }
 
-    /// Moves everything but the sky by `transform`: meshes, spheres and lights. The intensity
-    /// of point and spot lights and the irradiance of directional ones stay.
+    /// Moves everything but the sky by `transform`: meshes, spheres, lights and the boxes in which light is
+    /// always traced. The intensity of point and spot lights, the irradiance of directional ones and the
+    /// absorption of glass stay; a turned box becomes the upright one around it.
     ///
     /// Errors: as [`WorldMesh::apply_transform`]; spheres, disk lights and spot lights under a transform that is no
     /// similarity, since they would not stay round. The world is then half moved: drop it.
     pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
         let (_, mirrors) = normal_matrix(transform)?;
-        self.meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;
-        for sphere in &mut self.spheres {
+        // Materials stay as they are given, and the sky is the same in all directions.
+        let World { meshes, spheres, materials: _, textures: _, lights, sky: _, traced_regions } =
+            self;
+        meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;
+        for sphere in spheres {
             move_sphere(&sphere.name, &mut sphere.centre, &mut sphere.radius, transform)?;
         }
-        self.lights.iter_mut().try_for_each(|light| light.transform(transform, mirrors))
+        lights.iter_mut().try_for_each(|light| light.transform(transform, mirrors))?;
+        traced_regions.iter_mut().for_each(|region| *region = region.transformed(transform));
+        Ok(())
     }
 
     /// Adds all that `other` holds, with its indices shifted. The sky stays this world's.
@@ -139,21 +145,18 @@ pub(super) fn uniform_scale(what: &str, instead: &str, transform: &DAffine3) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DQuat, Rgb};
+    use crate::math::{Bounds3, DQuat, Rgb};
     use crate::scene::{Light, QuadLight, WorldSphere};
 
     fn triangle() -> WorldMesh {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 1.0)];
         WorldMesh {
-            name: "t".into(),
-            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 1.0)],
-            triangles: vec![[0, 1, 2]],
             normals: Some(Corners {
                 values: vec![Vec3::new(0.0, -1.0, 1.0).normalize()],
                 corners: Some(vec![[0, 0, 0]]),
             }),
             uvs: Some(Corners { values: vec![], corners: Some(vec![[5, 6, 7]]) }),
-            material: 0,
-            always_traced: false,
+            ..WorldMesh::new("t", corners.into(), vec![[0, 1, 2]], 0)
         }
     }
 
@@ -193,14 +196,13 @@ mod tests {
     }
 
     fn with_sphere() -> World {
-        let (name, centre, radius) = ("ball".into(), DVec3::X, 2.0);
         let light = QuadLight {
             corners: [DVec3::ZERO, DVec3::X, DVec3::ONE, DVec3::new(0.0, 1.0, 1.0)],
             radiance: Rgb::ONE,
             two_sided: false,
         };
         World {
-            spheres: vec![WorldSphere { name, centre, radius, material: 0, always_traced: false }],
+            spheres: vec![WorldSphere::new("ball", DVec3::X, 2.0, 0)],
             materials: vec![Material { texture: Some(0), ..Material::black("m") }],
             lights: vec![Light::Quad(light)],
             ..World::default()
@@ -220,6 +222,32 @@ mod tests {
         assert!(light.normal().dot(turn * -before) > 0.999);
         let error = with_sphere().apply_transform(&DAffine3::from_scale(DVec3::new(1.0, 1.0, 1.1)));
         assert!(error.is_err_and(|e| e.to_string().contains("`ball` is an exact sphere")));
+    }
+
+    #[test]
+    fn regions_follow_the_geometry_that_they_hold() {
+        let region = Bounds3 { min: DVec3::new(-1.0, 0.0, 2.0), max: DVec3::new(3.0, 1.0, 2.5) };
+        let moved = |region, transform: &DAffine3| {
+            let mut world = World { traced_regions: vec![region], ..World::default() };
+            world.apply_transform(transform).expect("a good transform");
+            world.traced_regions[0]
+        };
+        let mirror = DAffine3::from_scale_rotation_translation(
+            DVec3::new(-2.0, 1.0, 1.0),
+            DQuat::IDENTITY,
+            DVec3::X,
+        );
+        let expected = Bounds3 { min: DVec3::new(-5.0, 0.0, 2.0), max: DVec3::new(3.0, 1.0, 2.5) };
+        assert_eq!(moved(region, &mirror), expected);
+        // The upright box around a turned one: it holds every point of it, and is no larger.
+        let turn = DAffine3::from_rotation_z(0.7);
+        let around = moved(region, &turn);
+        let (sin, cos) = 0.7f64.sin_cos();
+        assert!(
+            (around.extent() - DVec3::new(4.0 * cos + sin, 4.0 * sin + cos, 0.5)).length() < 1e-12
+        );
+        assert!((around.centre() - turn.transform_point3(region.centre())).length() < 1e-12);
+        assert!(moved(Bounds3::EMPTY, &turn).is_empty());
     }
 
     #[test]

@@ -73,6 +73,11 @@ impl Settings {
         self.clamp.map(|most| (most / self.exposure).max(f32::MIN_POSITIVE))
     }
 
+    /// Number of the image's pixels.
+    pub fn pixel_count(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
     /// The part of the image that is rendered.
     pub fn region(&self) -> Rect {
         self.crop.unwrap_or(Rect { x0: 0, y0: 0, x1: self.width, y1: self.height })

@@ -122,15 +122,8 @@ mod tests {
             for (name, centre, radius) in [("large", 0.0, 1.0), ("tiny", at, radius)] {
                 let centre = DVec3::X * centre;
                 let corner = |dir: DVec3| centre + dir * radius;
-                world.meshes.push(WorldMesh {
-                    name: name.into(),
-                    positions: DIRECTIONS.map(corner).into(),
-                    triangles: vec![[0, 2, 4], [1, 5, 3]],
-                    normals: None,
-                    uvs: None,
-                    material: 0,
-                    always_traced: false,
-                });
+                let (corners, triangles) = (DIRECTIONS.map(corner), vec![[0, 2, 4], [1, 5, 3]]);
+                world.meshes.push(WorldMesh::new(name, corners.into(), triangles, 0));
             }
             world.into_scene(true)
         };
@@ -163,17 +156,7 @@ mod tests {
         triangles.push([next, next + 1, next + 2]);
         let corner = DVec3::X * far;
         positions.extend([corner, corner + DVec3::Y * far, corner + DVec3::Z * far]);
-        let (normals, uvs) = (None, None);
-        let name = "grid".into();
-        world.meshes.push(WorldMesh {
-            name,
-            positions,
-            triangles,
-            normals,
-            uvs,
-            material: 0,
-            always_traced: false,
-        });
+        world.meshes.push(WorldMesh::new("grid", positions, triangles, 0));
         world
     }
 

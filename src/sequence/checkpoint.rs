@@ -87,10 +87,11 @@ impl<'a> Checkpoints<'a> {
         }
     }
 
-    /// The reference of a representative frame and its bytes, if it is on disk, whole and this job's.
-    pub fn read(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
-        let in_file = || self.decode(&self.path(frame), self.read_bytes(frame)?);
-        let (mut found, bytes) = self.in_frame(frame).or_else(in_file)?;
+    /// The reference of a representative frame of so many `pixels` and its bytes, if it is on disk, whole and
+    /// this job's.
+    pub fn read(&self, frame: u32, pixels: u64) -> Option<(Reference, Arc<[u8]>)> {
+        let in_file = || self.decode(&self.path(frame), self.read_bytes(frame)?, pixels);
+        let (mut found, bytes) = self.in_frame(frame, pixels).or_else(in_file)?;
         found.frame = frame;
         Some((found, bytes))
     }
@@ -100,12 +101,12 @@ impl<'a> Checkpoints<'a> {
         self.row(frame).is_some() || self.path(frame).exists()
     }
 
-    fn in_frame(&self, frame: u32) -> Option<(Reference, Arc<[u8]>)> {
+    fn in_frame(&self, frame: u32, pixels: u64) -> Option<(Reference, Arc<[u8]>)> {
         let row = self.row(frame)?;
         let path = self.target.pattern.folder().join(&row.file);
         let is_whole = Regular::at(&path).and_then(|file| file.hash(&path)).ok()? == row.blake3;
         let bytes = is_whole.then(|| exr::read_attribute(&path, ATTRIBUTE, LARGEST_FRAME))?;
-        self.decode(&path, bytes.ok()??.into())
+        self.decode(&path, bytes.ok()??.bytes.into(), pixels)
     }
 
     /// The row of a frame whose file holds its reference.
@@ -140,8 +141,8 @@ impl<'a> Checkpoints<'a> {
         Some(bytes.into())
     }
 
-    fn decode(&self, path: &Path, bytes: Arc<[u8]>) -> Option<(Reference, Arc<[u8]>)> {
-        match decode(path, &bytes, self.terms, &self.recentring) {
+    fn decode(&self, path: &Path, bytes: Arc<[u8]>, pixels: u64) -> Option<(Reference, Arc<[u8]>)> {
+        match decode(path, &bytes, self.terms, &self.recentring, pixels) {
             Ok((reference, _)) => Some((reference, bytes)),
             Err(why) => {
                 self.note(format!("{why}; its frame is traced again"));

@@ -185,13 +185,8 @@ mod tests {
     fn world() -> World {
         World {
             meshes: vec![WorldMesh {
-                name: "a".into(),
-                positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-                triangles: vec![[0, 1, 2]],
                 normals: Some(Corners { values: vec![Vec3::Z], corners: Some(vec![[0; 3]]) }),
-                uvs: None,
-                material: 0,
-                always_traced: false,
+                ..WorldMesh::new("a", vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]], 0)
             }],
             materials: vec![Material::diffuse("m", Rgb::ONE)],
             ..World::default()

@@ -76,14 +76,14 @@ impl ReferenceCache {
         budget: u64,
     ) -> Self {
         let read = move |file: &Path| {
-            let bytes = exr::read_attribute(file, ATTRIBUTE, LARGEST)?.ok_or_else(|| {
+            let found = exr::read_attribute(file, ATTRIBUTE, LARGEST)?.ok_or_else(|| {
                 Error::input(
                     file,
                     "cannot serve as a reference: it holds no traced points\n  \
                      help: frames rendered to exr with --policy surface do",
                 )
             })?;
-            decode(file, &bytes, &terms, &recentring)
+            decode(file, &found.bytes, &terms, &recentring, found.most_pixels)
         };
         Self::reading(files, Box::new(read), budget)
     }
@@ -216,9 +216,10 @@ fn nearest<'c>(supplied: &'c [ReferenceInfo], camera: &Camera) -> Vec<&'c Refere
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inference::{SurfacePoint, TracedPoint, TracedPoints};
+    use crate::inference::{Channels, SurfacePoint, TracedPoint, TracedPoints};
     use crate::math::Vec3;
-    use crate::scene::Pose;
+    use crate::reuse::store::ReferenceRecord;
+    use crate::scene::{Pose, Settings};
 
     fn camera(x: f64) -> Camera {
         let eye = DVec3::new(x, 0.0, 0.0);
@@ -304,6 +305,37 @@ mod tests {
         assert_eq!((ask(&narrow, 4.0), ask(&narrow, 4.0)), (8, 8));
         assert!(reads.lock().expect("no panic").len() > 8);
         assert_eq!(narrow.held().references.len(), 3);
+    }
+
+    #[test]
+    fn a_small_file_cannot_claim_a_large_frame() {
+        let settings = Settings::default();
+        let terms = Compatibility::of("w", &Channels::default(), &settings);
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("f.exr");
+        let look = |camera: &Camera| {
+            let record = ReferenceRecord {
+                terms: &terms,
+                frame: 1,
+                camera,
+                crop: None,
+                traced: &TracedPoints::default(),
+                findings: &[],
+                settings: "",
+            };
+            let record = record.encode().expect("few points");
+            let mut channels = Vec::new();
+            exr::push_vectors(&mut channels, ["R", "G", "B"], &[Vec3::ZERO; 64 * 64]);
+            let own = Some((ATTRIBUTE, &record[..]));
+            let bytes = exr::encode_with(64, 64, &channels, "", own).expect("encoded");
+            std::fs::write(&path, bytes).expect("written");
+            let (files, recentring) = (vec![path.clone()], Recentring::IDENTITY);
+            ReferenceCache::new(files, terms.clone(), recentring, 0).look(0, false)
+        };
+        look(&camera(0.0)).expect("a black frame is small, and still large enough");
+        let large = Camera { width: 32768, height: 32768, ..camera(0.0) };
+        let error = look(&large).expect_err("refused").to_string();
+        assert!(error.contains("claims 32768x32768 pixels"), "{error}");
     }
 
     #[test]

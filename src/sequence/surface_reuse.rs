@@ -234,7 +234,8 @@ impl<'a> SurfaceReuse<'a> {
         if self.references.lock().asked(frame) > 0 {
             return None;
         }
-        let (reference, bytes) = self.context.pool.install(|| checkpoints.read(frame))?;
+        let pixels = self.context.renderer.settings.pixel_count();
+        let (reference, bytes) = self.context.pool.install(|| checkpoints.read(frame, pixels))?;
         self.keep(frame, reference);
         let mut pool = self.references.lock();
         pool.note_on_disk(frame);

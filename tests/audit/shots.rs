@@ -127,7 +127,7 @@ impl Stage<'_> {
         let best = Settings { shadow_samples: best, sky_samples: best, ..settings.clone() };
         let stop = AtomicBool::new(false);
         let pyramid = Pyramid { segment: 64, frames: shot.frames };
-        let frames: Vec<u32> = pyramid.all().collect();
+        let frames: Vec<u32> = (1..=pyramid.frames).collect();
         let maker =
             SurfaceReuse::new(self.context(settings, shot, &stop), pyramid).expect("cameras");
         maker.expect(&frames);

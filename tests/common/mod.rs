@@ -65,19 +65,11 @@ pub fn pixel_of(job: &Job, p: DVec3) -> (u32, u32) {
 }
 
 pub fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, material: u32) -> WorldMesh {
-    WorldMesh {
-        name: "test".into(),
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material,
-        always_traced: false,
-    }
+    WorldMesh::new("test", positions, triangles, material)
 }
 
 pub fn quad(corners: [DVec3; 4], material: u32) -> WorldMesh {
-    mesh(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], material)
+    WorldMesh::quad("test", corners, material)
 }
 
 /// A cube of half edge `half`, faces outwards.
@@ -102,14 +94,7 @@ pub fn sphere_world(material: Material, tessellated: bool) -> World {
         m.normals = Some(tweenray::scene::Corners { values, corners: None });
         world.meshes.push(m);
     } else {
-        let sphere = WorldSphere {
-            name: "sphere".into(),
-            centre: DVec3::ZERO,
-            radius: 1.0,
-            material: 0,
-            always_traced: false,
-        };
-        world.spheres.push(sphere);
+        world.spheres.push(WorldSphere::new("sphere", DVec3::ZERO, 1.0, 0));
     }
     world
 }

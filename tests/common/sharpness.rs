@@ -23,20 +23,11 @@ const LAMP: f64 = 0.03;
 /// edge; the camera slides slowly across, `pixels` of a picture of 120 rows in all.
 pub fn shadow_edge(frames: u32, pixels: f64) -> Set {
     let p = DVec3::new;
-    let quad = |name: &str, positions: [DVec3; 4], material| WorldMesh {
-        name: name.into(),
-        positions: positions.to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        normals: None,
-        uvs: None,
-        material,
-        always_traced: false,
-    };
     let mut world = World::default();
     world.materials.push(Material::diffuse("floor", Rgb::splat(0.5)));
     world.materials.push(Material::black("board"));
     let floor = [p(-6.0, 0.0, 6.0), p(6.0, 0.0, 6.0), p(6.0, 0.0, -6.0), p(-6.0, 0.0, -6.0)];
-    world.meshes.push(quad("floor", floor, 0));
+    world.meshes.push(WorldMesh::quad("floor", floor, 0));
     // Half-way from the lamp to the floor, its edge slanted by five degrees.
     let slant = 4.0 * (5.0 * PI / 180.0).tan();
     let board = [
@@ -45,7 +36,7 @@ pub fn shadow_edge(frames: u32, pixels: f64) -> Set {
         p(-5.0 + slant, 5.0, -4.0),
         p(-9.0, 5.0, -4.0),
     ];
-    world.meshes.push(quad("board", board, 1));
+    world.meshes.push(WorldMesh::quad("board", board, 1));
     let (a, lamp) = (0.5 * LAMP, p(-10.0, 10.0, 0.0));
     let corners = [(-a, -a), (a, -a), (a, a), (-a, a)].map(|(x, z)| lamp + p(x, 0.0, z));
     let radiance = Rgb::splat((400.0 / (LAMP * LAMP)) as f32);

@@ -53,15 +53,7 @@ pub fn sphere(centre: DVec3, radius: f64, columns: u32, rows: u32) -> WorldMesh 
             }
         }
     }
-    WorldMesh {
-        name: "sphere".into(),
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    WorldMesh::new("sphere", positions, triangles, 0)
 }
 
 /// [`sphere`] with the normals of a true sphere.

@@ -9,7 +9,7 @@ use super::use_tree::{Leaf, leaves};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A module path below the crate's root: `["output", "manifest"]`.
-type Path = Vec<String>;
+pub type Path = Vec<String>;
 
 /// All modules of a crate.
 #[derive(Default)]
@@ -62,6 +62,14 @@ pub struct Found {
     pub uses: Vec<FileUse>,
 }
 
+/// The name right below the crate's root through which a path leads.
+pub struct RootName {
+    /// The name; `self` for the root itself, or for all that lies below it.
+    pub name: String,
+    /// Line, from 1.
+    pub line: usize,
+}
+
 /// A path as it stands in the code of `module`.
 struct Written {
     module: Path,
@@ -69,10 +77,10 @@ struct Written {
     line: usize,
 }
 
-/// A `pub use`, which makes `name`.
+/// A `pub use`, which makes `name`, or all names of a module.
 struct Export {
     path: Written,
-    name: String,
+    name: Option<String>,
 }
 
 /// A file read into items and paths.
@@ -82,6 +90,8 @@ struct Scan {
     types: Vec<PublicType>,
     paths: Vec<Written>,
     exports: Vec<Export>,
+    /// All paths in inline modules called `tests`.
+    of_tests: Vec<Written>,
     /// Every word outside `use`.
     words: BTreeSet<String>,
 }
@@ -91,7 +101,9 @@ impl Modules {
     pub fn read_texts(files: &[(&str, &str)]) -> Found {
         let scans: Vec<(&str, Scan)> = files
             .iter()
-            .filter_map(|(file, text)| Some((*file, Scan::of(file, module_of(file)?, text))))
+            .filter_map(|(file, text)| {
+                Some((*file, Scan::of(file, module_of(file)?, &tokens(text))))
+            })
             .collect();
         let mut all = Self::default();
         let mut found = Found::default();
@@ -99,7 +111,7 @@ impl Modules {
         for (file, scan) in scans {
             all.modules.extend(scan.modules);
             found.types.extend(scan.types);
-            let is_used = |export: &Export| scan.words.contains(&export.name);
+            let is_used = |e: &Export| e.name.as_ref().is_some_and(|n| scan.words.contains(n));
             let exports = scan.exports.into_iter().filter(is_used).map(|export| export.path);
             paths.extend(scan.paths.into_iter().chain(exports).map(|path| (file, path)));
         }
@@ -115,17 +127,7 @@ impl Modules {
 
     /// The file that defines what `path`, written in module `from`, leads to; `None` outside the crate.
     fn file_of(&self, from: &Path, path: &[String], depth: usize) -> Option<String> {
-        let mut at = from.clone();
-        let mut rest = path;
-        while let Some((head, tail)) = rest.split_first() {
-            match head.as_str() {
-                "crate" => at.clear(),
-                "self" => {}
-                "super" => _ = at.pop()?,
-                _ => break,
-            }
-            rest = tail;
-        }
+        let (at, rest) = start(from, path)?;
         if rest.len() == path.len() && !self.knows(&at, &rest[0]) {
             return None;
         }
@@ -163,17 +165,47 @@ impl Modules {
     }
 }
 
+/// The module to which the first words of `path`, written in module `from`, lead, and the names behind them;
+/// `None` beyond the crate's root.
+fn start<'p>(from: &Path, path: &'p [String]) -> Option<(Path, &'p [String])> {
+    let mut at = from.clone();
+    let mut rest = path;
+    while let Some((head, tail)) = rest.split_first() {
+        match head.as_str() {
+            "crate" => at.clear(),
+            "self" => {}
+            "super" => _ = at.pop()?,
+            _ => break,
+        }
+        rest = tail;
+    }
+    Some((at, rest))
+}
+
+/// Where the paths in a file of module `module` that begin at the crate's root lead first, tests included.
+pub fn root_names(module: &Path, tokens: &[Token]) -> Vec<RootName> {
+    let Scan { paths, exports, of_tests, .. } = Scan::of("", module.clone(), tokens);
+    let exports = exports.into_iter().map(|export| export.path);
+    let name = |Written { module, path, line }: Written| {
+        let (at, rest) = start(&module, &path)?;
+        let is_rooted = at.is_empty() && rest.len() < path.len();
+        let name = rest.first().map_or("self", String::as_str).to_string();
+        is_rooted.then_some(RootName { name, line })
+    };
+    paths.into_iter().chain(exports).chain(of_tests).filter_map(name).collect()
+}
+
 /// Module path of a file of `src`; `None` for the crate's root and other files.
-fn module_of(file: &str) -> Option<Path> {
+pub fn module_of(file: &str) -> Option<Path> {
     let inside = file.strip_prefix("src/")?.strip_suffix(".rs")?;
     let inside = inside.strip_suffix("/mod").unwrap_or(inside);
     (!matches!(inside, "lib" | "main")).then(|| inside.split('/').map(String::from).collect())
 }
 
 impl Scan {
-    fn of(file: &str, module: Path, text: &str) -> Self {
+    fn of(file: &str, module: Path, tokens: &[Token]) -> Self {
         let mut scan = Self::default();
-        scan.block(&tokens(text), 0, module, file);
+        scan.block(tokens, 0, module, file);
         scan
     }
 
@@ -196,7 +228,7 @@ impl Scan {
                 "mod" if after(2) == "{" => {
                     let child = [path.as_slice(), &[after(1).to_string()]].concat();
                     i = match after(1) {
-                        "tests" => Scan::default().block(tokens, i + 3, child, file),
+                        "tests" => self.tests(tokens, i + 3, child, file),
                         _ => self.block(tokens, i + 3, child, file),
                     };
                     continue;
@@ -225,6 +257,16 @@ impl Scan {
         i + 1
     }
 
+    /// Reads the paths of a module called `tests`, as [`block`](Self::block) does.
+    fn tests(&mut self, tokens: &[Token], i: usize, path: Path, file: &str) -> usize {
+        let mut inside = Self::default();
+        let end = inside.block(tokens, i, path, file);
+        self.of_tests.extend(inside.paths);
+        self.of_tests.extend(inside.exports.into_iter().map(|export| export.path));
+        self.of_tests.extend(inside.of_tests);
+        end
+    }
+
     /// Reads the `use` at token `i` of the module `within`; returns the index past its `;`. `module` takes
     /// the names.
     fn read_use(
@@ -244,10 +286,9 @@ impl Scan {
                 (None, _) => {}
             }
             let path = Written { module: within.clone(), path, line };
-            match name {
-                Some(name) if is_export => self.exports.push(Export { path, name }),
-                None if is_export => {}
-                _ => self.paths.push(path),
+            match is_export {
+                true => self.exports.push(Export { path, name }),
+                false => self.paths.push(path),
             }
         }
         end + 1

@@ -1,6 +1,7 @@
 //! The rules themselves: from sources and floors to a list of violations.
 
 use super::lexer::{Token, tokens};
+use super::modules::{self, RootName, module_of, root_names};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -11,13 +12,9 @@ pub struct Floors(BTreeMap<String, u32>);
 pub struct Source {
     /// Path from the project's root, with `/`.
     path: String,
+    /// Module path inside the crate; `None` outside a room.
+    module: Option<modules::Path>,
     tokens: Vec<Token>,
-}
-
-/// A path in the code that leads from the crate's root to `name`.
-struct Import {
-    name: String,
-    line: usize,
 }
 
 impl Floors {
@@ -48,23 +45,13 @@ impl Floors {
 impl Source {
     /// A source of which the text is known.
     pub fn new(path: &str, text: &str) -> Self {
-        Self { path: path.to_string(), tokens: tokens(text) }
+        Self { path: path.to_string(), module: module_of(path), tokens: tokens(text) }
     }
 
     /// Reads a file.
     pub fn read(path: &Path) -> Self {
         let text = std::fs::read_to_string(path).expect("a readable source file");
         Self::new(&path.to_string_lossy(), &text)
-    }
-
-    /// Module path of the file inside the crate: `["shade", "light"]`; `None` outside a room.
-    fn module(&self) -> Option<Vec<&str>> {
-        let inside = self.path.strip_prefix("src/")?.strip_suffix(".rs")?;
-        let mut parts: Vec<&str> = inside.split('/').collect();
-        if parts.last() == Some(&"mod") {
-            parts.pop();
-        }
-        (!matches!(parts[0], "lib" | "main")).then_some(parts)
     }
 }
 
@@ -74,9 +61,9 @@ pub fn violations(floors: &Floors, sources: &[Source]) -> Vec<String> {
     let mut ground = BTreeMap::new();
     for source in sources {
         check_unsafe(source, &mut found);
-        let Some(module) = source.module() else { continue };
-        check_prints(source, &module, &mut found);
-        check_imports(floors, source, &module, &mut ground, &mut found);
+        let Some(module) = &source.module else { continue };
+        check_prints(source, module, &mut found);
+        check_imports(floors, source, module, &mut ground, &mut found);
     }
     check_circle(&ground, &mut found);
     found
@@ -95,8 +82,8 @@ fn check_unsafe(source: &Source, found: &mut Vec<String>) {
     }
 }
 
-fn check_prints(source: &Source, module: &[&str], found: &mut Vec<String>) {
-    if module[0] == "cli" || module.contains(&"tests") {
+fn check_prints(source: &Source, module: &modules::Path, found: &mut Vec<String>) {
+    if module[0] == "cli" || module.iter().any(|name| name == "tests") {
         return;
     }
     let printers = ["print", "println", "eprint", "eprintln", "dbg"];
@@ -118,16 +105,16 @@ type Ground = BTreeMap<String, BTreeMap<String, String>>;
 fn check_imports(
     floors: &Floors,
     source: &Source,
-    module: &[&str],
+    module: &modules::Path,
     ground: &mut Ground,
     found: &mut Vec<String>,
 ) {
-    let room = module[0];
+    let room = module[0].as_str();
     let Some(floor) = floors.of(room) else {
         found.push(format!("{}: room {room} stands on no floor in src/lib.rs", source.path));
         return;
     };
-    for Import { name, line } in imports(&source.tokens, module.len()) {
+    for RootName { name, line } in root_names(module, &source.tokens) {
         let place = format!("{}:{line}", source.path);
         match floors.of(&name) {
             _ if name == room => {}
@@ -184,81 +171,6 @@ fn walk(tokens: &[Token], mut visit: impl FnMut(usize, &[&str])) {
                 braces.push(module);
             }
             "}" if braces.pop() == Some(true) => _ = modules.pop(),
-            _ => {}
-        }
-    }
-}
-
-/// Everything that paths in `tokens` name right below the crate's root. `depth` is how deep the
-/// file's own module lies (1 for a room's root).
-fn imports(tokens: &[Token], depth: usize) -> Vec<Import> {
-    let mut found = Vec::new();
-    walk(tokens, |i, modules| {
-        let before = if i == 0 { "" } else { &tokens[i - 1].text };
-        let head = match tokens[i].text.as_str() {
-            // Not pub(crate).
-            "crate" if before != "(" || is_path(tokens, i) => Some(i),
-            "super" if before != "::" => climb(tokens, i, depth + modules.len()),
-            _ => None,
-        };
-        if let Some(head) = head {
-            names_below(tokens, head + 1, &mut found);
-        }
-    });
-    found
-}
-
-fn is_path(tokens: &[Token], i: usize) -> bool {
-    tokens.get(i + 1).is_some_and(|t| t.text == "::")
-}
-
-/// Index of the `super` that reaches the crate's root, if the chain at `i` gets there.
-fn climb(tokens: &[Token], mut i: usize, depth: usize) -> Option<usize> {
-    for step in 1.. {
-        if step == depth {
-            return Some(i);
-        }
-        let next = tokens.get(i + 2).filter(|t| t.text == "super");
-        if !is_path(tokens, i) || next.is_none() {
-            return None;
-        }
-        i += 2;
-    }
-    None
-}
-
-/// The first names of the path or group of paths that follows the root; `i` is at its `::`.
-fn names_below(tokens: &[Token], i: usize, found: &mut Vec<Import>) {
-    let line = tokens[i - 1].line;
-    if !is_path(tokens, i - 1) {
-        // `use crate as name`: the root itself.
-        found.push(Import { name: "self".into(), line });
-        return;
-    }
-    match tokens.get(i + 1) {
-        Some(open) if open.text == "{" => names_in_group(tokens, i + 1, found),
-        Some(name) => found.push(Import { name: name.text.clone(), line: name.line }),
-        None => {}
-    }
-}
-
-/// The first name of each path in the group that opens at `i`.
-fn names_in_group(tokens: &[Token], i: usize, found: &mut Vec<Import>) {
-    let mut depth = 0;
-    let mut fresh = false;
-    for token in &tokens[i..] {
-        match token.text.as_str() {
-            "{" => {
-                depth += 1;
-                fresh = depth == 1;
-            }
-            "}" if depth == 1 => return,
-            "}" => depth -= 1,
-            "," => fresh = depth == 1,
-            name if fresh => {
-                found.push(Import { name: name.into(), line: token.line });
-                fresh = false;
-            }
             _ => {}
         }
     }

@@ -25,8 +25,7 @@ impl Chooser<'_> {
         timer: Timer,
     ) -> Result<Judgement> {
         let (frames, settings) = (self.request.frames, self.context.base);
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
-        let effort = Effort::of_check(frames.last - frames.first + 1, pixels);
+        let effort = Effort::of_check(frames.last - frames.first + 1, settings.pixel_count());
         let (predictor, predicted) = (&choice.predictor, &choice.predicted);
         let image = |frame| self.image(frame);
         let check = CheckOutcome::of(&self.probe(), predictor, predicted, effort, &image)?;

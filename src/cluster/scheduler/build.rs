@@ -7,6 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 impl Scheduler {
     /// The schedule of `frames` by their `graph`; each rank's queue starts with a contiguous run of whole batches.
     /// `rank_order` lists the ranks so that neighbours share a node.
+    ///
+    /// # Panics
+    /// `rank_order` is no permutation of 0 to n − 1, or `graph` names needs that are in none of its batches.
     pub fn new(graph: &(impl FrameGraph + ?Sized), frames: &[u32], rank_order: &[u32]) -> Self {
         let mut outputs: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for frame in frames {

@@ -4,21 +4,21 @@ use super::{RankRecord, Scheduler, State};
 use std::collections::BTreeSet;
 
 /// Most tasks of a queue that a search looks at.
-pub const SEARCH_DEPTH: usize = 128;
+pub(super) const SEARCH_DEPTH: usize = 128;
 /// Most ranks to steal from in one pass.
 const MAX_VICTIMS: usize = 32;
 
 impl Scheduler {
     /// A ready task for `rank`, stolen from the first of `victims` that has one. The queue of `rank`
     /// also gets the second half of the victim's untouched batches, or else the task's dependents.
-    pub fn steal_for(&mut self, rank: u32, victims: &[u32]) -> Option<usize> {
+    pub(super) fn steal_for(&mut self, rank: u32, victims: &[u32]) -> Option<usize> {
         victims.iter().filter(|victim| **victim != rank).find_map(|victim| {
             self.steal_batches(*victim, rank).or_else(|| self.steal_dependents(*victim, rank))
         })
     }
 
     /// The ranks with most seconds of work in their queues, the busiest first.
-    pub fn busiest(&self) -> Vec<u32> {
+    pub(super) fn busiest(&self) -> Vec<u32> {
         let mean = self.mean_seconds();
         let ranks = (0..).zip(&self.ranks).filter(|(_, r)| !r.queue.is_empty());
         let mut left: Vec<(f64, u32)> =
@@ -87,7 +87,7 @@ impl Scheduler {
     }
 
     /// `t`, and all waiting tasks of its batch and `owner` that need it, directly or through others.
-    pub fn dependents(&self, t: usize, owner: u32) -> Vec<usize> {
+    pub(super) fn dependents(&self, t: usize, owner: u32) -> Vec<usize> {
         let mut found = BTreeSet::from([t]);
         let mut next = vec![t];
         while let Some(task) = next.pop() {

@@ -77,13 +77,7 @@ fn add_spheres(file: &File, materials: &[CourseMaterial], model: &mut Model) {
         } else {
             let material = sphere.material.unwrap_or_else(|| model.default_material());
             let name = format!("sphere {}", number + 1);
-            model.world.spheres.push(WorldSphere {
-                name,
-                centre,
-                radius,
-                material,
-                always_traced: false,
-            });
+            model.world.spheres.push(WorldSphere::new(name, centre, radius, material));
         }
     }
 }
@@ -151,13 +145,5 @@ fn mesh_of(
         let values = file.uvs.iter().map(|uv| uv.unwrap_or(Vec2::ZERO)).collect();
         Corners { values: tidy::compact_owned(values, &mut uv_triangles), corners: None }
     });
-    Ok(WorldMesh {
-        name: String::new(),
-        positions,
-        triangles,
-        normals: None,
-        uvs,
-        material,
-        always_traced: false,
-    })
+    Ok(WorldMesh { uvs, ..WorldMesh::new("", positions, triangles, material) })
 }

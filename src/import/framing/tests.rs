@@ -9,8 +9,7 @@ fn cloud(min: DVec3, max: DVec3) -> WorldMesh {
             positions.extend([min.z, max.z].map(|z| DVec3::new(x, y, z)));
         }
     }
-    let (name, triangles, normals, uvs, material) = ("cloud".into(), vec![], None, None, 0);
-    WorldMesh { name, positions, triangles, normals, uvs, material, always_traced: false }
+    WorldMesh::new("cloud", positions, vec![], 0)
 }
 
 /// How far from the image's middle the world comes in any of many frames: 1 is the edge.
@@ -44,13 +43,7 @@ fn shapes() -> Vec<World> {
         meshes: vec![cloud(min.into(), max.into())],
         ..World::default()
     };
-    let ball = |x: f64, radius: f64| WorldSphere {
-        name: "ball".into(),
-        centre: DVec3::new(x, 0.3, 0.0),
-        radius,
-        material: 0,
-        always_traced: false,
-    };
+    let ball = |x: f64, radius: f64| WorldSphere::new("ball", DVec3::new(x, 0.3, 0.0), radius, 0);
     vec![
         mesh([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]),
         mesh([-5.0, 0.0, -0.1], [5.0, 0.2, 0.1]),

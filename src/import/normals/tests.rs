@@ -8,16 +8,7 @@ fn smooth(mesh: &mut WorldMesh, crease_degrees: f64) -> Corners<Vec3> {
 }
 
 fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> WorldMesh {
-    let name = "test".to_owned();
-    WorldMesh {
-        name,
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    WorldMesh::new("test", positions, triangles, 0)
 }
 
 /// A cube of eight vertices; face normals are the axes.

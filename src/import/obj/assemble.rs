@@ -271,15 +271,6 @@ impl Builder {
                 Corners { values, corners: attribute(vn) }
             })
         });
-        let name = String::new();
-        Some(WorldMesh {
-            name,
-            positions,
-            triangles: v,
-            normals,
-            uvs,
-            material: 0,
-            always_traced: false,
-        })
+        Some(WorldMesh { normals, uvs, ..WorldMesh::new("", positions, v, 0) })
     }
 }

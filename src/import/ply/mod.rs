@@ -160,14 +160,11 @@ fn build(
         uvs.iter_mut().for_each(|uv| tidy::retain(uv, &kept));
         tidy::renumber(&mut triangles, &kept);
     }
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
     Ok(Some(WorldMesh {
-        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        positions,
-        triangles,
         normals: normals.map(|values| Corners { values, corners: None }),
         uvs: uvs.map(|values| Corners { values, corners: None }),
-        material: 0,
-        always_traced: false,
+        ..WorldMesh::new(name, positions, triangles, 0)
     }))
 }
 

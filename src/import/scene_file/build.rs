@@ -168,7 +168,7 @@ impl<'a> Builder<'a> {
     fn generate(&mut self, shape: &Shape<'_>, mesh: &Mesh, textured: bool) -> Result<WorldMesh> {
         let mut made = match shape {
             Shape::Cuboid(c) => shapes::cuboid("box".into(), c.corners(self.source)?, 0),
-            Shape::Quad(q) => shapes::quad("quad".into(), q.corners(self.source)?, 0),
+            Shape::Quad(q) => WorldMesh::quad("quad", q.corners(self.source)?, 0),
             Shape::UvSphere(s) => {
                 self.allow(s.triangles(), &s.span)?;
                 let (r, centre) = (s.radius.0, s.centre.vec());

@@ -5,11 +5,11 @@
 //! All floats are finite. Lengths and coordinates stay within 1e30, so that squares of them do
 //! not overflow and colours fit an f32.
 
+use super::schema::inline_schema;
 use crate::scene::limits;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::json_schema;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::borrow::Cow;
 use std::fmt;
 
 struct FloatVisitor {
@@ -55,19 +55,7 @@ macro_rules! number {
             }
         }
 
-        impl JsonSchema for $name {
-            fn inline_schema() -> bool {
-                true
-            }
-
-            fn schema_name() -> Cow<'static, str> {
-                stringify!($name).into()
-            }
-
-            fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                json_schema!($schema)
-            }
-        }
+        inline_schema!($name, |_| json_schema!($schema));
     };
 }
 
@@ -185,16 +173,6 @@ impl<const MIN: i64, const MAX: i64> Serialize for Int<MIN, MAX> {
     }
 }
 
-impl<const MIN: i64, const MAX: i64> JsonSchema for Int<MIN, MAX> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        format!("Int{MIN}To{MAX}").into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "integer", "minimum": MIN, "maximum": MAX })
-    }
-}
+inline_schema!(for [const MIN: i64, const MAX: i64] Int<MIN, MAX>, |_| {
+    json_schema!({ "type": "integer", "minimum": MIN, "maximum": MAX })
+});

@@ -165,9 +165,16 @@ fn help_on_names(name: &str, known: &[&str]) -> Option<String> {
     }
 }
 
+/// Keys for how bright something is, each by its quantity. One light has another than the next.
+const BRIGHTNESS: [&str; 3] = ["radiance", "irradiance", "intensity"];
+
 /// The name of `known` that `name` most likely stands for; `None` where none is near.
 pub(super) fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
     let lower = name.to_lowercase();
+    let means_same = |k: &&&str| BRIGHTNESS.contains(&lower.as_str()) && BRIGHTNESS.contains(k);
+    if let Some(same) = known.iter().find(means_same) {
+        return Some(same);
+    }
     known
         .iter()
         .map(|k| (strsim::normalized_damerau_levenshtein(&lower, &k.to_lowercase()), *k))

@@ -3,6 +3,29 @@
 use super::SceneFile;
 use serde_json::{Map, Value};
 
+/// The schema of a type that is read by hand, written out wherever the type is used.
+macro_rules! inline_schema {
+    (for [$($generic:tt)*] $type:ty, |$generator:pat_param| $schema:expr) => {
+        impl<$($generic)*> schemars::JsonSchema for $type {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                std::any::type_name::<Self>().into()
+            }
+
+            fn json_schema($generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                $schema
+            }
+        }
+    };
+    ($type:ty, |$generator:pat_param| $schema:expr) => {
+        inline_schema!(for [] $type, |$generator| $schema);
+    };
+}
+pub(super) use inline_schema;
+
 /// The scene file's JSON schema (draft 2020-12), for editors.
 pub fn schema() -> Value {
     let mut schema = schemars::schema_for!(SceneFile).to_value();
@@ -32,6 +55,9 @@ fn drop_null_here(map: &mut Map<String, Value>) {
             let only = only.clone();
             map.insert("type".into(), only);
         }
+    }
+    if let Some(Value::Array(values)) = map.get_mut("enum") {
+        values.retain(|value| !value.is_null());
     }
     let Some(Value::Array(choices)) = map.get_mut("anyOf") else { return };
     choices.retain(|c| c.get("type") != Some(&Value::from("null")));

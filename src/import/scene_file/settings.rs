@@ -172,7 +172,7 @@ impl Settings {
             tone: self.tone,
             png_bits: self.png_bits.0,
             intersector: self.intersector,
-            isa: self.isa.map(|isa| isa.name().to_owned()),
+            isa: self.isa.as_ref().map(|isa| isa.0.clone()),
             build_quality: self.build_quality,
             compact: self.compact,
             rules: HitRules { robust, retry, recheck, spawn_offset, recentre },

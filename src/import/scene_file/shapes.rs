@@ -4,10 +4,6 @@ use crate::math::DVec3;
 use crate::scene::{MaterialId, WorldMesh};
 
 /// Two triangles; `corners` run counter-clockwise seen from the front.
-pub(super) fn quad(name: String, corners: [DVec3; 4], material: MaterialId) -> WorldMesh {
-    flat(name, corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], material)
-}
-
 /// Corners of a box's faces -x, +x, -y, +y, -z, +z, counter-clockwise seen from outside: bit 0 of a
 /// number says which end of x, bit 1 of y, bit 2 of z.
 pub(super) const FACES: [[u32; 4]; 6] =
@@ -20,24 +16,7 @@ pub(super) fn cuboid(name: String, (min, max): (DVec3, DVec3), material: Materia
         |index: usize, axis: usize| if index >> axis & 1 == 0 { min[axis] } else { max[axis] };
     let positions = (0..8).map(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect();
     let triangles = FACES.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
-    flat(name, positions, triangles, material)
-}
-
-fn flat(
-    name: String,
-    positions: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
-    material: MaterialId,
-) -> WorldMesh {
-    WorldMesh {
-        name,
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material,
-        always_traced: false,
-    }
+    WorldMesh::new(name, positions, triangles, material)
 }
 
 #[cfg(test)]

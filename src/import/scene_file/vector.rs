@@ -1,12 +1,12 @@
 //! Points, directions, colours: short arrays of checked numbers.
 
 use super::number::{Amount, Coordinate, Factor, Positive, Share};
+use super::schema::inline_schema;
 use crate::math::{DVec3, Rgb};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::{JsonSchema, json_schema};
 use serde::de::value::{F64Deserializer, I64Deserializer, SeqAccessDeserializer};
 use serde::de::{Error, IntoDeserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -57,20 +57,10 @@ impl<T: Serialize, const N: usize> Serialize for List<T, N> {
     }
 }
 
-impl<T: JsonSchema, const N: usize> JsonSchema for List<T, N> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        format!("{}{N}", T::schema_name()).into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let items = generator.subschema_for::<T>();
-        json_schema!({ "type": "array", "items": items, "minItems": N, "maxItems": N })
-    }
-}
+inline_schema!(for [T: JsonSchema, const N: usize] List<T, N>, |generator| {
+    let items = generator.subschema_for::<T>();
+    json_schema!({ "type": "array", "items": items, "minItems": N, "maxItems": N })
+});
 
 /// One value for all three, or `[a, b, c]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,21 +135,11 @@ impl<T: Serialize + PartialEq> Serialize for OneOrThree<T> {
     }
 }
 
-impl<T: JsonSchema> JsonSchema for OneOrThree<T> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        format!("{}OneOrThree", T::schema_name()).into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let one = generator.subschema_for::<T>();
-        let three = generator.subschema_for::<List<T, 3>>();
-        json_schema!({ "anyOf": [one, three] })
-    }
-}
+inline_schema!(for [T: JsonSchema] OneOrThree<T>, |generator| {
+    let one = generator.subschema_for::<T>();
+    let three = generator.subschema_for::<List<T, 3>>();
+    json_schema!({ "anyOf": [one, three] })
+});
 
 /// A direction: any vector but zero, or the name of an axis; `"-y"` points down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -221,20 +201,10 @@ impl Serialize for Direction {
     }
 }
 
-impl JsonSchema for Direction {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Direction".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let vector = generator.subschema_for::<Point>();
-        json_schema!({ "anyOf": [vector, { "enum": AXIS_NAMES }] })
-    }
-}
+inline_schema!(Direction, |generator| {
+    let vector = generator.subschema_for::<Point>();
+    json_schema!({ "anyOf": [vector, { "enum": AXIS_NAMES }] })
+});
 
 /// Width and height, world units.
 pub(super) type Size2 = List<Positive, 2>;

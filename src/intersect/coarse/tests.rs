@@ -22,15 +22,8 @@ fn ball(centre: DVec3, whole: bool) -> WorldMesh {
     };
     let first = if whole { 0 } else { rings / 2 };
     let quads = (first..rings).flat_map(|ring| (0..around).map(move |k| (ring, k)));
-    WorldMesh {
-        name: "ball".into(),
-        positions: (0..(rings + 1) * around).map(position).collect(),
-        triangles: quads.flat_map(|(ring, k)| quad(ring, k)).collect(),
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    let positions = (0..(rings + 1) * around).map(position).collect();
+    WorldMesh::new("ball", positions, quads.flat_map(|(ring, k)| quad(ring, k)).collect(), 0)
 }
 
 /// Whether a ray that leaves the southern half of the first ball along `dir` may meet a triangle.

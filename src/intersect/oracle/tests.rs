@@ -30,15 +30,7 @@ fn bumpy(columns: u32, rows: u32, seed: u64) -> WorldMesh {
         let [c, d] = [at(row + 1, column), at(row + 1, column + 1)];
         triangles.extend([[a, c, d], [a, d, b]].into_iter().filter(|[a, b, c]| a != b && b != c));
     }
-    WorldMesh {
-        name: "bumpy".into(),
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    WorldMesh::new("bumpy", positions, triangles, 0)
 }
 
 fn scene(meshes: Vec<WorldMesh>) -> Scene {
@@ -156,13 +148,7 @@ fn of_coincident_triangles_the_lowest_wins_and_an_excluded_one_never() {
 #[test]
 fn batches_single_rays_and_pools_agree() {
     let mut world_sphere = scene(vec![bumpy(31, 19, 11)]);
-    let ball = WorldSphere {
-        name: "ball".into(),
-        centre: DVec3::X * 3.0,
-        radius: 1.0,
-        material: 0,
-        always_traced: false,
-    };
+    let ball = WorldSphere::new("ball", DVec3::X * 3.0, 1.0, 0);
     world_sphere.spheres = World {
         spheres: vec![ball],
         materials: vec![Material::diffuse("white", crate::math::Rgb::ONE)],

@@ -31,7 +31,8 @@ impl RankMaker for SurfaceReuse<'_> {
     fn import(&self, representative: u32, bytes: &[u8]) {
         let Some(terms) = &self.exchange else { return };
         let recentring = &self.context.renderer.scene.recentring;
-        let decode = || store::decode(Path::new("another rank"), bytes, terms, recentring);
+        let pixels = self.context.renderer.settings.pixel_count();
+        let decode = || store::decode(Path::new("another rank"), bytes, terms, recentring, pixels);
         if let Ok((mut reference, _)) = self.context.pool.install(decode) {
             reference.frame = representative;
             let mut pool = self.references.lock();

@@ -57,15 +57,7 @@ fn triangles(i: u64) -> WorldMesh {
     let positions =
         (0..3 * GROUP).map(|_| DVec3::new(coordinate(), coordinate(), coordinate())).collect();
     let triangles = (0..GROUP).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-    WorldMesh {
-        name: "many".into(),
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    WorldMesh::new("many", positions, triangles, 0)
 }
 
 /// A scene ray at an inner point of a triangle.

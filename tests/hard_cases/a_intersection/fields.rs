@@ -19,16 +19,7 @@ pub fn field(cells: u32, height: impl Fn(u32, u32) -> f64) -> WorldMesh {
         [[a, b, d], [a, d, c]]
     };
     let triangles = (0..cells * cells).flat_map(cell).collect();
-    let name = "field".into();
-    WorldMesh {
-        name,
-        positions,
-        triangles,
-        normals: None,
-        uvs: None,
-        material: 0,
-        always_traced: false,
-    }
+    WorldMesh::new("field", positions, triangles, 0)
 }
 
 /// A whole number from 0 to 7, the same for the same corner.

@@ -38,13 +38,7 @@ fn studio(spp: u32) -> Job {
     world.meshes.push(smooth(p(-1.1, 0.7, 0.1), 0.7, 1));
     world.meshes.push(smooth(p(0.3, 0.45, 1.0), 0.45, 3));
     let centre = p(0.2, 0.6, -0.6);
-    world.spheres.push(WorldSphere {
-        name: "ball".into(),
-        centre,
-        radius: 0.6,
-        material: 2,
-        always_traced: false,
-    });
+    world.spheres.push(WorldSphere::new("ball", centre, 0.6, 2));
     let lamp = [p(-0.7, 3.0, -0.7), p(0.7, 3.0, -0.7), p(0.7, 3.0, 0.7), p(-0.7, 3.0, 0.7)];
     let radiance = Rgb::splat(4.0);
     world.lights.push(Light::Quad(QuadLight { corners: lamp, radiance, two_sided: false }));

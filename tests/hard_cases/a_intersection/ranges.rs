@@ -106,13 +106,7 @@ fn side_by_side(small: Small, radius: f64, centre: DVec3, turn: f64) -> World {
     match small {
         Small::Mesh => world.meshes.push(ball(centre, radius)),
         Small::Sphere => {
-            world.spheres.push(WorldSphere {
-                name: "tiny".into(),
-                centre,
-                radius,
-                material: 0,
-                always_traced: false,
-            });
+            world.spheres.push(WorldSphere::new("tiny", centre, radius, 0));
         }
     }
     // Not only powers of ten: somewhere the small thing falls between two numbers.

@@ -95,13 +95,7 @@ fn far_sphere(radius: f64, distance: f64, sphere_moves: bool) -> (Scene, DVec3) 
     let (centre, eye) = if sphere_moves { (-away, DVec3::ZERO) } else { (DVec3::ZERO, away) };
     let mut world = World::default();
     world.materials.push(Material::diffuse("white", Rgb::ONE));
-    world.spheres.push(WorldSphere {
-        name: "sphere".into(),
-        centre,
-        radius,
-        material: 0,
-        always_traced: false,
-    });
+    world.spheres.push(WorldSphere::new("sphere", centre, radius, 0));
     let scene = world.into_scene(true).unwrap();
     let eye = scene.recentring.point_to_scene(eye);
     (scene, eye)

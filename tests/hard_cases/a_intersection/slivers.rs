@@ -42,16 +42,7 @@ impl Field {
             positions.extend([start, start + x * long, start + x * along + y * height]);
         }
         let triangles = (0..SLIVERS).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let name = "slivers".into();
-        let mesh = WorldMesh {
-            name,
-            positions,
-            triangles,
-            normals: None,
-            uvs: None,
-            material: 0,
-            always_traced: false,
-        };
+        let mesh = WorldMesh::new("slivers", positions, triangles, 0);
         Self { world: shapes::world_of(mesh), seed }
     }
 

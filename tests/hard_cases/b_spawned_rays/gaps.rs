@@ -105,14 +105,7 @@ fn concentric(gap: f64, facets: bool, rays: u64) -> Outcome {
         if facets {
             world.meshes.push(shapes::sphere(DVec3::ZERO, radius, 60, 30));
         } else {
-            let (name, centre) = (name.into(), DVec3::ZERO);
-            world.spheres.push(WorldSphere {
-                name,
-                centre,
-                radius,
-                material: 0,
-                always_traced: false,
-            });
+            world.spheres.push(WorldSphere::new(name, DVec3::ZERO, radius, 0));
         }
     }
     let scene = world.into_scene(true).unwrap();

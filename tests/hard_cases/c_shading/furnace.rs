@@ -24,14 +24,7 @@ fn unit_sphere(material: Material, exact: bool) -> World {
         texels: vec![Rgb::ONE; 4],
     });
     if exact {
-        let (name, centre) = ("ball".into(), DVec3::ZERO);
-        world.spheres.push(WorldSphere {
-            name,
-            centre,
-            radius: 1.0,
-            material: 0,
-            always_traced: false,
-        });
+        world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, 0));
     } else {
         world.meshes.push(fine_sphere());
     }
@@ -72,14 +65,7 @@ fn furnaces() -> Vec<(String, World, f32)> {
     list.push(("glass, mesh".into(), unit_sphere(glass(1.0, None), false), 1.0));
     let mut nested = unit_sphere(glass(1.0, Some(1)), true);
     nested.materials.push(glass(1.0, Some(2)));
-    let (name, centre) = ("core".into(), DVec3::new(0.3, 0.2, 0.1));
-    nested.spheres.push(WorldSphere {
-        name,
-        centre,
-        radius: 0.8,
-        material: 1,
-        always_traced: false,
-    });
+    nested.spheres.push(WorldSphere::new("core", DVec3::new(0.3, 0.2, 0.1), 0.8, 1));
     list.push(("nested glass, overlapping".into(), nested, 1.0));
     list
 }

@@ -109,13 +109,7 @@ fn ball(centre: DVec3, radius: f64, mesh: Option<(u32, u32)>, ior: f64) -> Ball 
     if let Some((columns, rows)) = mesh {
         world.meshes.push(shapes::smooth_sphere(centre, radius, columns, rows));
     } else {
-        world.spheres.push(WorldSphere {
-            name: "ball".into(),
-            centre,
-            radius,
-            material: 0,
-            always_traced: false,
-        });
+        world.spheres.push(WorldSphere::new("ball", centre, radius, 0));
     }
     Ball { scene: world.into_scene(true).unwrap(), centre, radius, ior }
 }

@@ -39,14 +39,7 @@ fn world() -> World {
     world.meshes.push(poster);
     world.meshes.push(common::quad(panel(0.2), 5));
     for (x, material) in [(-2.2, 1), (-0.1, 2), (2.0, 3)] {
-        let (name, centre) = ("ball".into(), p(x, 0.6, 0.4));
-        world.spheres.push(WorldSphere {
-            name,
-            centre,
-            radius: 0.5,
-            material,
-            always_traced: false,
-        });
+        world.spheres.push(WorldSphere::new("ball", p(x, 0.6, 0.4), 0.5, material));
     }
     let lamp = [p(-1.0, 3.0, -1.0), p(1.0, 3.0, -1.0), p(1.0, 3.0, 1.0), p(-1.0, 3.0, 1.0)];
     world.lights = vec![

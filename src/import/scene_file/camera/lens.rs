@@ -5,11 +5,11 @@ use crate::error;
 use crate::import::scene_file::at::{At, Span};
 use crate::import::scene_file::number::{Degrees, Int, NotNegative, Positive};
 use crate::import::scene_file::report::Source;
+use crate::import::scene_file::schema::inline_schema;
 use crate::scene::{CameraPath, Focus, LensKey, ShotLens, ThinLensPath};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::{JsonSchema, json_schema};
 use serde::de::{Deserializer, Error, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
-use std::borrow::Cow;
 use std::fmt;
 
 /// Height of the film of a 35 mm still camera, metres.
@@ -101,20 +101,10 @@ impl Serialize for Sharp {
     }
 }
 
-impl JsonSchema for Sharp {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Focus".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let distance = generator.subschema_for::<Positive>();
-        json_schema!({ "anyOf": [distance, { "enum": [TARGET] }] })
-    }
-}
+inline_schema!(Sharp, |generator| {
+    let distance = generator.subschema_for::<Positive>();
+    json_schema!({ "anyOf": [distance, { "enum": [TARGET] }] })
+});
 
 /// A lens as far as it is given.
 #[derive(Clone, Copy, Default)]

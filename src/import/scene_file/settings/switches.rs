@@ -1,11 +1,11 @@
 //! Settings that are a choice: rules on or off, instruction set, bits.
 
 use crate::import::scene_file::number::Int;
-use crate::scene::{HitRules, Recheck};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use crate::import::scene_file::schema::inline_schema;
+use crate::scene::{HitRules, Recheck, limits::ISAS};
+use schemars::{JsonSchema, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::borrow::Cow;
 
 /// The rules that make hits trustworthy: each can be switched off to see what it is worth.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
@@ -30,38 +30,22 @@ pub(super) struct Rules {
 #[serde(transparent)]
 pub(super) struct PngBits(pub u8);
 
-/// Instruction sets that Embree can be held to.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
-pub(super) enum Isa {
-    /// SSE2.
-    #[serde(rename = "sse2")]
-    Sse2,
-    /// SSE4.2.
-    #[serde(rename = "sse4.2")]
-    Sse42,
-    /// AVX.
-    #[serde(rename = "avx")]
-    Avx,
-    /// AVX2.
-    #[serde(rename = "avx2")]
-    Avx2,
-    /// AVX-512.
-    #[serde(rename = "avx512")]
-    Avx512,
-}
+/// An instruction set that Embree can be held to.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
+pub(super) struct Isa(pub String);
 
-impl Isa {
-    /// As Embree spells it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sse2 => "sse2",
-            Self::Sse42 => "sse4.2",
-            Self::Avx => "avx",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
+impl<'de> Deserialize<'de> for Isa {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        match ISAS.contains(&name.as_str()) {
+            true => Ok(Self(name)),
+            false => Err(D::Error::unknown_variant(&name, &ISAS)),
         }
     }
 }
+
+inline_schema!(Isa, |_| json_schema!({ "enum": ISAS }));
 
 impl<'de> Deserialize<'de> for PngBits {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
@@ -73,19 +57,7 @@ impl<'de> Deserialize<'de> for PngBits {
     }
 }
 
-impl JsonSchema for PngBits {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "PngBits".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "enum": [8, 16] })
-    }
-}
+inline_schema!(PngBits, |_| json_schema!({ "enum": [8, 16] }));
 
 impl Default for Rules {
     fn default() -> Self {

@@ -1,8 +1,8 @@
 //! Arrival times of messages.
 
-use super::super::message::PayloadKind;
 use super::simulator::{Event, Simulator, Timed};
 use std::cmp::Reverse;
+use tweenray::cluster::{Sent, Traffic};
 
 impl Simulator<'_> {
     /// Adds an event at time `at`.
@@ -16,24 +16,24 @@ impl Simulator<'_> {
         if from == to {
             return sent;
         }
-        self.run.sent.message(self.model.message_bytes as usize);
+        count(&mut self.run.sent.notes, 1, self.model.message_bytes);
         let arrives = sent + self.model.latency + self.seconds_of(self.model.message_bytes);
         self.next_poll(to, arrives)
     }
 
     /// The time at which `to` reads a payload that `from` sends now. A rank sends one payload at a time, and
-    /// receives one at a time.
+    /// receives one at a time. `kind` is where the payload counts.
     pub(super) fn send_payload(
         &mut self,
         from: u32,
         to: u32,
-        kind: PayloadKind,
+        kind: fn(&mut Traffic) -> &mut Sent,
         bytes: u64,
     ) -> f64 {
         if from == to {
             return self.now;
         }
-        self.run.sent.payload(kind, bytes as usize);
+        count(kind(&mut self.run.sent), 1, bytes);
         let seconds = self.seconds_of(bytes);
         let sender = &mut self.ranks[from as usize];
         sender.sent_until = sender.sent_until.max(self.now) + seconds;
@@ -50,8 +50,7 @@ impl Simulator<'_> {
     pub(super) fn broadcast(&mut self, original: u32) {
         let bytes = self.model.reference_bytes;
         let others = u64::from(self.rank_count() - 1);
-        self.run.sent.discoveries.messages += others;
-        self.run.sent.discoveries.bytes += others * bytes;
+        count(&mut self.run.sent.discoveries, others, bytes);
         let seconds = self.seconds_of(bytes) + self.model.latency;
         self.broadcast_until = self.broadcast_until.max(self.now) + seconds;
         let depth = f64::from(self.rank_count().next_power_of_two().ilog2());
@@ -76,4 +75,10 @@ impl Simulator<'_> {
         let first = interval * (f64::from(rank) * 0.618_033_988_749).fract();
         first + ((at - first) / interval).ceil() * interval
     }
+}
+
+/// Counts `messages` of `bytes` each.
+fn count(sent: &mut Sent, messages: u64, bytes: u64) {
+    sent.messages += messages;
+    sent.bytes += messages * bytes;
 }

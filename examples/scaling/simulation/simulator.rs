@@ -1,11 +1,10 @@
 //! The simulator: the clock, the queue of events, and the state of each rank.
 
-use super::super::message::PayloadKind;
-use super::super::scheduler::{Assignment, Decision, Extent, Scheduler, Task};
 use super::{CostModel, Job, SchedulerCost, SimulatedRun};
-use crate::sequence::Pyramid;
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
+use tweenray::cluster::scheduler::{Assignment, Decision, Extent, Scheduler, Task};
+use tweenray::sequence::Pyramid;
 
 /// A job that is being simulated. Times are in seconds since its start.
 pub struct Simulator<'a> {
@@ -105,7 +104,7 @@ impl<T> Eq for Timed<T> {}
 
 impl<'a> Simulator<'a> {
     pub fn new(job: &Job, ranks: u32, model: &'a CostModel<'a>) -> Self {
-        let frames: Vec<u32> = job.pyramid.all().collect();
+        let frames: Vec<u32> = (1..=job.pyramid.frames).collect();
         let rank_order: Vec<u32> = (0..ranks).collect();
         Self {
             model,
@@ -177,7 +176,7 @@ impl<'a> Simulator<'a> {
             Event::Assign { rank, assignment } => self.accept(rank, assignment),
             Event::Send { from, to, original } => {
                 let bytes = self.model.reference_bytes as f64 * self.weight(original);
-                let at = self.send_payload(from, to, PayloadKind::Reference, bytes as u64);
+                let at = self.send_payload(from, to, |sent| &mut sent.references, bytes as u64);
                 self.schedule(at, Event::Reference { rank: to, original });
             }
             Event::Reference { rank, original } => {
@@ -312,7 +311,7 @@ impl<'a> Simulator<'a> {
         match &task.extent {
             Extent::Strip { leader, of, .. } => {
                 let (leader, bytes) = (*leader, self.model.strips_bytes / u64::from(*of));
-                let at = self.send_payload(rank, leader, PayloadKind::Strip, bytes);
+                let at = self.send_payload(rank, leader, |sent| &mut sent.strips, bytes);
                 self.schedule(at, Event::Strip { rank: leader, original });
             }
             Extent::Whole { frames, .. } => {

@@ -9,8 +9,8 @@ mod simulator;
 #[cfg(test)]
 mod tests;
 
-use super::traffic::Traffic;
-use crate::sequence::{FrameGraph, Pyramid};
+use tweenray::cluster::Traffic;
+use tweenray::sequence::{FrameGraph, Pyramid};
 
 /// A job: frames, the dependencies between them, and how references are sent.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +94,7 @@ impl Job {
 
     /// Core seconds of all frames on one rank, which sends no messages.
     pub fn single_rank_seconds(&self, model: &CostModel) -> f64 {
-        self.pyramid.all().map(model.seconds).sum()
+        (1..=self.pyramid.frames).map(model.seconds).sum()
     }
 }
 
