@@ -8,8 +8,9 @@
 //! again. `ZOO="SEED FIRST..LAST"` takes these scenes of the zoo in place of `SCENE`, with moves of `FRAMES`
 //! frames. At the end, how many frames of all reach their target and how much time it takes.
 //!
-//! The probe of a job of seconds takes longer than the job. So its share is that of a job of a minute: the same
-//! command for frames so large that they take that long, stopped when the choice is made.
+//! The probe of a job of seconds takes longer than the job. So its share is that of a job of a minute (`LONG`
+//! seconds; with 0 it is left out): the same command for frames so large that they take that long, stopped when the
+//! choice is made.
 //!
 //! A reference of four times the samples still has some tenth of the squared error, enough for a frame
 //! at a target's edge to be counted as missed. So there are two with other seeds: the mean of the product
@@ -30,9 +31,6 @@ use tweenray::import::{self, LoadOptions};
 use tweenray::math::Rgb;
 use tweenray::measure::psnr;
 use tweenray::output::read_image;
-
-/// Seconds of a job that the probe's share is measured in.
-const LONG: f64 = 60.0;
 
 /// The program in a folder of its own.
 struct Place {
@@ -120,10 +118,14 @@ impl Place {
         self.render(name, &format!("{options} --overwrite")).0 - self.idle
     }
 
-    /// The share that the probe has of a job whose rendering takes [`LONG`], where that of this size takes
-    /// `seconds`: by the clock, of the time predicted.
-    fn share_of_probe(&self, target: &str, seconds: f64) -> f64 {
-        let size = self.times((LONG / seconds).max(1.0));
+    /// The share that the probe has of a job whose rendering takes `LONG` seconds, where that of this size takes
+    /// `seconds`: by the clock, of the time predicted. `None` where `LONG` is 0.
+    fn share_of_probe(&self, target: &str, seconds: f64) -> Option<f64> {
+        let long = var("LONG", 60.0);
+        if long <= 0.0 {
+            return None;
+        }
+        let size = self.times((long / seconds).max(1.0));
         let options = format!("--target psnr={target} --overwrite");
         let mut command = self.command("long", &size, &options);
         let mut program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
@@ -141,7 +143,7 @@ impl Place {
         // It may have ended by itself, for a target out of reach.
         let _ = program.kill();
         program.wait().expect("an end");
-        probe / rendering
+        Some(probe / rendering)
     }
 
     /// PSNR of every frame, dB.
@@ -187,20 +189,22 @@ impl Place {
     fn rivals(&self, wanted: f64, mut most: f64) -> Vec<Swept> {
         let file = self.folder.join(format!("sweep_{}.json", self.size));
         let kept = std::fs::read(&file).ok();
-        let mut known =
+        let mut known: Vec<Swept> =
             kept.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default();
         let mut rivals = Vec::new();
         for lights in var("LIGHTS", "1 2 4 16".to_string()).split_whitespace() {
             for policy in ["off", "surface"] {
                 let mut predicted = 0.0;
                 for spp in [1, 2, 4, 8, 16, 24, 32, 48, 64, 96, 128, 192, 256] {
-                    if predicted * f64::from(spp) > 1.2 * most {
-                        break;
-                    }
                     let options = format!(
                         "--spp {spp} --shadow-samples {lights} --sky-samples {lights} \
                          --policy {policy}"
                     );
+                    // What an earlier run swept is there to be compared with.
+                    let is_known = known.iter().any(|swept| swept.1 == options);
+                    if !is_known && predicted * f64::from(spp) > 1.2 * most {
+                        break;
+                    }
                     let swept = self.swept(&mut known, &options);
                     predicted = swept.0 / f64::from(spp);
                     let text = serde_json::to_vec(&known).expect("JSON");
@@ -299,8 +303,8 @@ struct Outcome {
     seconds: f64,
     /// These over those of the fastest swept, if any reached the target.
     ratio: Option<f64>,
-    /// The probe's share of a job of [`LONG`].
-    probe: f64,
+    /// The probe's share of a job of `LONG` seconds, if that was measured.
+    probe: Option<f64>,
     tightened: usize,
     chosen: String,
     swept: String,
@@ -321,9 +325,9 @@ impl Outcome {
         "swept",
     ];
 
-    /// Time over that of the fastest swept in a job of [`LONG`], the probe's included.
+    /// Time over that of the fastest swept in a job of `LONG` seconds, the probe's included.
     fn with_probe(&self) -> Option<f64> {
-        self.ratio.map(|ratio| ratio * (1.0 + self.probe))
+        Some(self.ratio? * (1.0 + self.probe?))
     }
 
     fn cells(&self, scene: &str) -> Vec<String> {
@@ -335,7 +339,7 @@ impl Outcome {
             format!("{:.1}", support::quantile(&self.frames, 0.0)),
             format!("{:.2} s", self.seconds),
             or_none(self.ratio),
-            format!("{:.0} %", 100.0 * self.probe),
+            or_none(self.probe),
             or_none(self.with_probe()),
             self.tightened.to_string(),
             self.chosen.clone(),
@@ -387,7 +391,7 @@ fn summary(all: &[Outcome]) {
     );
     let figures = [
         ("time over the fastest swept", all.iter().filter_map(|o| o.ratio).collect::<Vec<_>>()),
-        ("the probe's share of a job of a minute", all.iter().map(|o| o.probe).collect()),
+        ("the probe's share of a job of a minute", all.iter().filter_map(|o| o.probe).collect()),
         ("both", all.iter().filter_map(Outcome::with_probe).collect()),
     ];
     for (what, figures) in figures.iter().filter(|(_, figures)| !figures.is_empty()) {
