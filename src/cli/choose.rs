@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 
 /// The share of the squared error that a target allows that the choice aims at: some frames may be worse than
 /// those that the probe looked at, and a miss costs the job once more.
-const AIM: f64 = 0.85;
+const AIM: f64 = 0.9;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
