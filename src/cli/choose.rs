@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 
 /// The choice aims at this share of the squared error that the target allows: some frames may be worse than
 /// those that the probe measured, and after a miss the job is rendered once more.
-const AIM: f64 = 0.85;
+const AIM: f64 = 0.9;
 
 /// Settings that the program chooses.
 #[derive(Debug, Default, Clone, Args)]
