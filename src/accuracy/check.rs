@@ -106,7 +106,7 @@ impl CheckOutcome {
     }
 
     /// The factor by which the figure is surely too large for `goal`; at most 1 where the goal is not surely
-    /// missed. The unluckiest of the frames is not taken for the worst ([`estimates`]), and half of a frame's standard
+    /// missed. The unluckiest of the frames is not taken for the worst (`estimates`), and half of a frame's standard
     /// error is to its good.
     pub fn excess(&self, goal: Goal) -> f64 {
         let figure = match goal {
