@@ -105,9 +105,9 @@ impl CheckOutcome {
         }
     }
 
-    /// The factor by which the figure is surely too large for `goal`; at most 1 where the goal is not surely
-    /// missed. The unluckiest of the frames is not taken for the worst (`estimates`), and half of a frame's standard
-    /// error is to its good.
+    /// The figure over the largest that `goal` allows; above 1 the goal is missed. For PSNR each frame's error is first
+    /// moved towards the others' (`estimates`) and half of its standard error is taken off, so that more than 1 is
+    /// no chance; the figures of other goals have no such allowance.
     pub fn excess(&self, goal: Goal) -> f64 {
         let figure = match goal {
             Goal::Psnr(_) => {

@@ -142,6 +142,6 @@ pub struct Candidate {
     pub knob: Knob,
     /// Command-line options of the setting; empty for the default.
     pub options: String,
-    /// All settings.
+    /// The complete settings that it is rendered with: the default's, changed by `options`.
     pub settings: Settings,
 }

@@ -40,8 +40,8 @@ pub struct CandidateRow {
     pub rays: RayCounts,
     /// Intersector and references, bytes.
     pub memory_bytes: u64,
-    /// Whether no other candidate that may be recommended is both faster and nearer to the truth, and
-    /// it is not there for noise alone.
+    /// Whether the candidate is on the front by wall seconds: it may be recommended, no other that may be is both
+    /// faster and nearer to the truth, and its difference from its neighbours on the front is not noise.
     pub on_front: bool,
     /// The same by CPU seconds.
     pub on_cpu_front: bool,

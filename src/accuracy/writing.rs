@@ -22,7 +22,7 @@ const TIMES: usize = 15;
 /// How often a key frame is made for its reference.
 const KEY_TIMES: usize = 5;
 
-/// What writing takes; medians.
+/// What it takes to write a frame and a key frame's reference: median seconds, bytes, and how many of each the move has.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Writing {
     /// Wall seconds to encode, write and sync a frame as png.

@@ -33,7 +33,7 @@ pub enum Event {
 /// A task that is done.
 pub struct Finished {
     pub task: Task,
-    /// Report of the last frame written, if any was.
+    /// Report of the last frame that the task wrote, if any; those of the frames before it were sent at once.
     pub report: Option<FrameReport>,
     /// The strip, or the reference if other frames take it; otherwise empty.
     pub output: Exported,

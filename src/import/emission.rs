@@ -49,7 +49,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
         let material = &materials[mesh.material as usize];
         match quads(&mesh).filter(|_| emits(material)) {
             Some(quads) => {
-                notes.extend(reflects(material).then(|| Note::ReflectsNothing(mesh.name.clone())));
+                notes.extend(material.reflects().then(|| Note::ReflectsNothing(mesh.name.clone())));
                 let light = |corners| {
                     let (radiance, two_sided) = (material.emission, material.emits_back);
                     Light::Quad(QuadLight { corners, radiance, two_sided })
@@ -65,7 +65,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
     for sphere in world.spheres.split_off(first_sphere) {
         let material = &materials[sphere.material as usize];
         if emits(material) {
-            notes.extend(reflects(material).then_some(Note::ReflectsNothing(sphere.name)));
+            notes.extend(material.reflects().then_some(Note::ReflectsNothing(sphere.name)));
             let (centre, radius, radiance) = (sphere.centre, sphere.radius, material.emission);
             world.lights.push(Light::Sphere(SphereLight { centre, radius, radiance }));
         } else {
@@ -77,10 +77,6 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
 
 fn emits(material: &Material) -> bool {
     material.emission.max_element() > 0.0
-}
-
-fn reflects(material: &Material) -> bool {
-    material.diffuse.max_element() > 0.0 || material.mirror.max_element() > 0.0
 }
 
 /// The mesh as quads, if each pair of consecutive triangles makes one.

@@ -61,9 +61,9 @@ pub struct KnownColours {
 pub struct InferredColour {
     /// Linear radiance.
     pub rgb: Rgb,
-    /// Frame of the entry before; the frame itself where that has an entry.
+    /// Frame of the pixel's last known entry up to this frame.
     pub before: u32,
-    /// Frame of the entry after; the frame itself where that has an entry.
+    /// Frame of the pixel's first known entry from this frame on.
     pub after: u32,
     /// Difference of the two entries' distances, as a share of the nearer one; 0 where either is unknown.
     pub distance: f32,

@@ -121,11 +121,11 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
 
 /// Costs of the light of one surface point, whose camera samples are shaded together.
 struct PointCost {
-    /// Cost of tracing.
+    /// Cost of tracing, in camera rays.
     traced: f64,
-    /// Cost of check rays.
+    /// Cost of check rays, likewise.
     checked: f64,
-    /// Cost of the lookup.
+    /// Cost of looking the point up in all references and of merging its camera samples, likewise.
     lookup: f64,
 }
 

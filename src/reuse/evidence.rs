@@ -28,7 +28,7 @@ const UNSEEN_SHARE: f64 = 0.5;
 /// frames know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
-    /// Level of the estimate's risk.
+    /// Level of the estimate's risk, a step on one of four scales; below the number of levels of all.
     pub level: u8,
     /// Whether check rays agreed with the estimate.
     pub agreed: bool,

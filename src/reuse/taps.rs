@@ -96,7 +96,7 @@ impl Taps4 {
         Some(Self { reference, samples, weight, share, distance: near.distance })
     }
 
-    /// Writes lane `from` of `other` into lane `to`.
+    /// Copies lane `from` of `other`, which is of the same reference, into lane `to`.
     fn set(&mut self, to: usize, other: &Self, from: usize) {
         self.samples[to] = other.samples[from];
         let rows = |t: &Self| [t.weight, t.share, t.distance].map(f32x4::to_array);

@@ -58,7 +58,7 @@ macro_rules! kinds {
     };
 }
 
-// A new kind comes last: the order is part of a scene's hash.
+// In the order of `inspect` and of messages. The names are part of a scene's hash.
 kinds! {
     /// A point that emits alike in all directions.
     Point(PointLight) = "point",

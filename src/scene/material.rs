@@ -55,6 +55,11 @@ impl Material {
         Self { mirror: reflectance, ..Self::black(name) }
     }
 
+    /// Whether the surface reflects any light; glass does not count.
+    pub fn reflects(&self) -> bool {
+        self.diffuse.max_element() > 0.0 || self.mirror.max_element() > 0.0
+    }
+
     /// Emitted radiance towards the outside or inside.
     pub fn emitted(&self, outside: bool) -> Rgb {
         if outside || self.emits_back { self.emission } else { Rgb::ZERO }

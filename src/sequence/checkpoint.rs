@@ -206,7 +206,8 @@ pub fn folder(pattern: &FramePattern) -> PathBuf {
     shown.with_file_name(format!(".{name}"))
 }
 
-/// Removes all references of a job that is complete, and temporary files of its killed runs.
+/// Removes the references on disk of the job at `target`, which the caller knows to be complete, and temporary files of its
+/// killed runs. What cannot be removed stays.
 pub fn clear(target: &Target) {
     // Processes of other machines that were killed a moment before this job began leave files too young
     // for its start.

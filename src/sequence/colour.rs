@@ -47,7 +47,7 @@ pub struct ColourMaker<'a> {
     pyramid: Pyramid,
     schedule: Schedule,
     uploads: Vec<KnownColours>,
-    /// The discoveries of frames.
+    /// The colours that each frame traced, for as long as later frames need them.
     known: SharedPool<Arc<KnownColours>, Arc<KnownColours>>,
 }
 

@@ -152,7 +152,8 @@ impl<T, S> ReferencePool<T, S> {
         }
     }
 
-    /// Notes that a frame with this representative was returned.
+    /// Notes that a frame with this representative was returned, and ends its use of its ancestors' references: those that
+    /// no other frame needs are dropped.
     pub fn done(&mut self, schedule: &Schedule, representative: u32) {
         if let Some(asked) = self.asked.get_mut(&representative) {
             *asked -= 1;

@@ -163,7 +163,7 @@ impl Held {
         reference
     }
 
-    /// Drops the references that were used longest ago.
+    /// Drops the references that were used longest ago until the rest take at most `budget` bytes.
     fn shrink(&mut self, budget: u64) {
         while self.memory > budget {
             let oldest = self.references.iter().min_by_key(|(_, (last, _))| *last);

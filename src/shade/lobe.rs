@@ -31,7 +31,8 @@ pub(super) enum Lobe {
 pub(super) struct Scattered {
     /// Unit direction, leaving the surface.
     pub wi: DVec3,
-    /// Share of the radiance that is passed on, of all wavelengths alike.
+    /// Share of the radiance that is passed on, of all wavelengths alike: of a direction that was sampled at random, with
+    /// `tint`, `f` times the cosine over the density.
     pub share: f32,
     /// The same by wavelength.
     pub tint: Rgb,

@@ -181,8 +181,10 @@ fn a_target_out_of_reach_is_refused_before_a_frame_is_rendered() {
     // Known without a look at the scene.
     let bits = said(&format!("{LINE} --target psnr=70"), "--png-bits 16");
     assert!(!bits.contains("probe:"), "{bits}");
-    let samples =
-        said(&format!("{LINE} --target psnr=50 --spp 1"), "is predicted to reach psnr=50; --spp 1");
+    let samples = said(
+        &format!("{LINE} --target psnr=50 --spp 1"),
+        "is predicted to reach psnr=50 … --spp 1",
+    );
     assert!(!samples.contains("bits") && samples.contains("give fewer options"), "{samples}");
     assert!(!job.path("o/f_01.png").exists());
 }

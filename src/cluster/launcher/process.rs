@@ -49,7 +49,7 @@ impl LauncherProcess {
             .is_some_and(|s| s.started == self.started && s.state != "Z" && s.state != "X")
     }
 
-    /// The cores that the launcher may use, if it binds ranks to cores.
+    /// The cores that the launcher may use, if it is one that binds ranks to cores by default.
     pub(super) fn cores(&self) -> Option<BTreeSet<u32>> {
         BINDING.contains(&&*self.name).then(|| cores(&allowed_cores(self.id)))
     }

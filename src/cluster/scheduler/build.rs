@@ -5,7 +5,7 @@ use crate::sequence::FrameGraph;
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Scheduler {
-    /// The schedule of `frames` by their `graph`; each rank's queue starts with a contiguous run of whole batches.
+    /// The schedule of `frames` and of all frames that they are inferred from, by `graph`; each rank's queue starts with a contiguous run of whole batches.
     /// `rank_order` lists the ranks so that neighbours share a node.
     ///
     /// # Panics

@@ -51,7 +51,7 @@ pub(super) struct Mean {
     far: f32,
     /// Variance of a trace of as many camera samples, if its rays were independent.
     variance: f32,
-    /// Sum of the weights.
+    /// Sum of the weights of the taps that know the light.
     weight: f32,
 }
 
