@@ -18,6 +18,8 @@ pub struct EffectPlan {
     pub nested_glass: bool,
     /// Some of the glass absorbs light along the way.
     pub absorption: bool,
+    /// Some surface reflects diffusely: the light there can be kept for other frames.
+    pub diffuse: bool,
     /// Diffuse or glossy surfaces are lit by area lights with shadow samples.
     pub area_lights: bool,
     /// Diffuse or glossy surfaces are lit by delta lights, with hard shadows.
@@ -68,6 +70,7 @@ impl EffectPlan {
         glass: true,
         nested_glass: true,
         absorption: true,
+        diffuse: true,
         area_lights: true,
         delta_lights: true,
         sky_light: true,
@@ -116,6 +119,7 @@ impl EffectPlan {
                 used.absorbing > 0 && bounces > 0,
                 format!("{} that absorb in use", counted(used.absorbing, "glass material")),
             ),
+            diffuse,
             area_lights: decide(
                 "soft shadows",
                 lit && area > 0 && samples > 0,

@@ -124,7 +124,7 @@ impl AddAssign for RayCounts {
     }
 }
 
-// Named in files that people read, eight numbers in order in those that only tweenray reads.
+// Named in files that people read, a number of each kind in order in those that only tweenray reads.
 impl Serialize for RayCounts {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match serializer.is_human_readable() {

@@ -6,10 +6,10 @@ mod common;
 
 use common::{job, pose, quad, render};
 use tweenray::film::Film;
-use tweenray::math::{DVec3, Rgb};
+use tweenray::math::{DMat3, DVec3, Rgb};
 use tweenray::scene::{
-    DiskLight, IntersectorKind, Light, Material, PointLight, QuadLight, Sky, SphereLight,
-    SpotLight, World, WorldSphere,
+    Corners, DiskLight, Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky,
+    SphereLight, SpotLight, World, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -111,6 +111,120 @@ fn light_samples_and_lobe_samples_agree() {
             assert!(off < 0.01, "{} at {roughness}: {joined} and {alone}", light.name());
         }
     }
+}
+
+/// A light that shines on the whole plate of the next tests.
+fn lamp() -> Light {
+    Light::Sphere(SphereLight {
+        centre: DVec3::new(0.1, 1.2, 0.0),
+        radius: 0.3,
+        radiance: Rgb::splat(5.0),
+    })
+}
+
+/// A plate that is tilted against the axes.
+fn tilted(material: Material) -> World {
+    let mut world = plate(material);
+    let turn = DMat3::from_rotation_x(0.13) * DMat3::from_rotation_z(-0.21);
+    world.meshes[0].positions.iter_mut().for_each(|p| *p = turn * *p);
+    world
+}
+
+/// However many light samples there are, where interpolated normals send rays below coarse facets.
+#[test]
+fn light_samples_change_nothing_at_smooth_normals() {
+    let mut world = World::default();
+    world.materials.push(rough(Rgb::splat(0.9), 0.5));
+    let mut ball = common::uv_sphere(10, 6);
+    let values = ball.positions.iter().map(|p| p.as_vec3().normalize()).collect();
+    ball.normals = Some(Corners { values, corners: None });
+    world.meshes.push(ball);
+    let corners = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)];
+    let corners = corners.map(|(y, z)| DVec3::new(-2.5, y, z));
+    world.lights.push(Light::Quad(QuadLight { corners, radiance: Rgb::ONE, two_sided: true }));
+    let mut job = job(world, pose((0.0, 0.4, 3.4), (0.0, 0.0, 0.0)), 24, 18);
+    job.settings.spp = 1024;
+    let [none, few, many] = [0, 2, 8].map(|samples| {
+        job.settings.shadow_samples = samples;
+        mean(&render(&job).0)
+    });
+    assert!(
+        (few / none - 1.0).abs() < 0.01 && (many / none - 1.0).abs() < 0.01,
+        "{none} {few} {many}"
+    );
+}
+
+/// Light samples do not reach through glass, whose shadows are opaque: what rays see there counts whole.
+#[test]
+fn a_lamp_beyond_a_boundary_that_rays_pass_is_seen_whole() {
+    let mut world = World::default();
+    world.materials.push(rough(Rgb::splat(0.9), 0.4));
+    world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 0.4, 0));
+    let mut body = |priority: u8, radius: f64| {
+        let glass = Glass { priority: Some(priority), ..Glass::clear(1.2) };
+        let material = Material { glass: Some(glass), ..Material::black("glass") };
+        let material = world.add_material(material);
+        world.spheres.push(WorldSphere::new("body", DVec3::ZERO, radius, material));
+    };
+    body(2, 3.0);
+    // Within the other: no boundary is there, but its surface is met.
+    body(1, 0.55);
+    let centre = DVec3::new(-0.8, 1.2, 0.5);
+    let radiance = Rgb::splat(5.0);
+    world.lights.push(Light::Sphere(SphereLight { centre, radius: 0.4, radiance }));
+    let mut job = job(world, pose((0.0, 0.0, 6.0), (0.0, 0.0, 0.0)), 24, 18);
+    (job.settings.spp, job.settings.bounces) = (256, 8);
+    let [none, some] = [0, 4].map(|samples| {
+        job.settings.shadow_samples = samples;
+        mean(&render(&job).0)
+    });
+    assert!(none > 0.01 && (some / none - 1.0).abs() < 0.02, "{none} {some}");
+}
+
+#[test]
+fn a_lamp_seen_in_its_own_plane_makes_no_invalid_sample() {
+    let mut world = plate(rough(Rgb::splat(0.9), 0.3));
+    let turn = DMat3::from_rotation_x(0.4);
+    world.meshes[0].positions.iter_mut().for_each(|p| *p = turn * *p);
+    let corners = [(1.0, -0.5), (1.0, 0.5), (2.0, 0.5), (2.0, -0.5)];
+    let corners = corners.map(|(y, z)| DVec3::new(0.0, y, z));
+    world.lights.push(Light::Quad(QuadLight { corners, radiance: Rgb::ONE, two_sided: true }));
+    let mut job = job(world, pose((0.0, 3.0, 4.0), (0.0, 0.0, 0.0)), 65, 37);
+    job.settings.shadow_samples = 4;
+    assert_eq!(render(&job).0.bad.total(), 0);
+}
+
+#[test]
+fn the_smoothest_rough_mirrors_are_mirrors() {
+    let [perfect, rest @ ..] = [0.0, 1e-12, 1e-9, 1e-7, 1e-4, 5e-3].map(|roughness| {
+        let mut world = tilted(rough(Rgb::splat(0.9), roughness));
+        world.lights.push(lamp());
+        let mut job = job(world, pose((-0.8, 0.9, 0.9), (0.0, 0.0, 0.0)), 48, 36);
+        (job.settings.spp, job.settings.shadow_samples) = (64, 4);
+        let (film, _) = render(&job);
+        assert_eq!(film.bad.total(), 0);
+        mean(&film)
+    });
+    assert!(rest.iter().all(|m| (m / perfect - 1.0).abs() < 0.01), "{perfect} {rest:?}");
+}
+
+/// A spot light with a small radius lights like one without, at the edge of its cone, too.
+#[test]
+fn a_small_spot_light_is_a_spot_light_without_a_radius() {
+    let [small, point] = [0.01, 0.0].map(|radius| {
+        let mut world = plate(rough(Rgb::splat(0.9), 0.5));
+        let (position, direction) = (DVec3::new(0.1, 1.2, 0.0), DVec3::NEG_Y);
+        let (intensity, cos_inner, cos_outer) = (Rgb::splat(2.0), 0.97, 0.8);
+        let spot = SpotLight { position, direction, intensity, cos_inner, cos_outer, radius };
+        world.lights.push(Light::Spot(spot));
+        let mut job = job(world, pose((-0.8, 0.9, 0.9), (0.3, 0.0, -0.2)), 16, 12);
+        job.settings.spp = 64;
+        render(&job).0
+    });
+    let edge = point.rgb.iter().filter(|c| c.y == 0.0).count();
+    assert!(edge > 10 && edge < point.rgb.len() - 10, "{edge} pixels out of the cone");
+    let (small, point) = (mean(&small), mean(&point));
+    assert!((small / point - 1.0).abs() < 0.01, "{small} {point}");
 }
 
 /// On its axis a spot light with a radius lights like a sphere light of the same radius.

@@ -9,7 +9,7 @@ use crate::stats::{RayCounts, RayKind};
 
 /// Cost of a camera ray with the evaluation of its surface: the unit of cost.
 const CAMERA_RAY: f64 = 1.0;
-/// Cost of a ray from a mirror or glass, traced alone.
+/// Cost of a ray from a mirror, perfect or rough, or glass, traced alone.
 const SPECULAR_RAY: f64 = 2.0;
 /// Cost of a shadow ray with its sample, in a scene of a million triangles.
 const SHADOW_RAY: f64 = 1.2;
@@ -52,7 +52,8 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
             Channel::Sky => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
-        runs && is_worth(scene, rays_of(channel, settings).saturating_mul(settings.spp))
+        runs && plan.diffuse
+            && is_worth(scene, rays_of(channel, settings).saturating_mul(settings.spp))
     });
     let cost = PointCost::of(scene, &kept, settings);
     if cost.traced > cost.checked + cost.lookup { kept } else { Channels::of(scene, |_| false) }
@@ -72,13 +73,14 @@ pub struct LookupReason {
 /// For each light that shines, then the sky: whether it is looked up or traced, and why.
 pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     let kept = channels(scene, settings);
+    let EffectPlan { diffuse, sky_light, .. } = EffectPlan::of(scene, settings);
     let mut reasons = Vec::new();
     for (index, light) in scene.lights.iter().enumerate() {
         let channel = light.is_area().then_some(Channel::Area(index as u32));
         let looked_up = kept.of_light(index as u32).is_some();
         let why = channel.map_or_else(
             || "one hard shadow ray is not worth a lookup".into(),
-            |channel| why(scene, rays_of(channel, settings), looked_up, settings.spp),
+            |channel| why(scene, (rays_of(channel, settings), settings.spp), looked_up, diffuse),
         );
         reasons.push(LookupReason {
             light: format!("light {}, {}", index + 1, light.name()),
@@ -86,16 +88,20 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
             why,
         });
     }
-    if EffectPlan::of(scene, settings).sky_light {
+    if sky_light {
         let looked_up = kept.sky().is_some();
-        let why = why(scene, rays_of(Channel::Sky, settings), looked_up, settings.spp);
+        let rays = (rays_of(Channel::Sky, settings), settings.spp);
+        let why = why(scene, rays, looked_up, diffuse);
         reasons.push(LookupReason { light: "sky".into(), looked_up, why });
     }
     reasons
 }
 
 /// Why `rays` shadow rays of each of `spp` camera samples are `looked_up` or not.
-fn why(scene: &Scene, rays: u32, looked_up: bool, spp: u32) -> String {
+fn why(scene: &Scene, (rays, spp): (u32, u32), looked_up: bool, diffuse: bool) -> String {
+    if !diffuse {
+        return "no diffuse surface: what a rough mirror shows depends on the view".into();
+    }
     let all = rays.saturating_mul(spp);
     if all == 0 {
         return "it has no samples".into();

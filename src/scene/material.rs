@@ -22,7 +22,7 @@ pub struct Material {
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
     pub roughness: f64,
-    /// Clear glass; then `diffuse` and `mirror` are zero.
+    /// Glass; then `diffuse` and `mirror` are zero.
     pub glass: Option<Glass>,
     /// Emitted radiance.
     pub emission: Rgb,

@@ -19,8 +19,10 @@ pub(super) struct GlossyPoint {
     pub lobe: Lobe,
     /// Scene space.
     pub p: DVec3,
-    /// Shading normal on the viewer's side, unit.
+    /// The lobe's normal, unit.
     pub n: DVec3,
+    /// Unit geometric normal on the viewer's side.
+    pub ng: DVec3,
     /// Unit direction to the viewer.
     pub wo: DVec3,
     pub starts: ShadowStarts,
@@ -41,13 +43,17 @@ struct HighlightRays<'s> {
 
 impl SampleSink for HighlightRays<'_> {
     fn push(&mut self, sample: LightSample) {
-        let GlossyPoint { lobe, p, n, wo, starts, .. } = self.point;
+        let GlossyPoint { lobe, p, n, ng, wo, starts, .. } = self.point;
         let (wi, density) = match sample.target {
             ShadowTarget::Point(end) => {
                 ((end.point - *p).normalize(), self.view.pdf_li(*p, end.point))
             }
             ShadowTarget::Direction(wi) | ShadowTarget::Sky(wi) => (wi, None),
         };
+        // The lobe's rays below the facet are mirrored and count whole.
+        if wi.dot(*ng) <= 0.0 {
+            return;
+        }
         let count = f64::from(self.source.samples);
         let irradiance = density.map_or(self.exact, |density| {
             let share = self.source.share(density, lobe.pdf(*wo, wi));
@@ -68,8 +74,8 @@ impl LightSource {
         if !self.sampler.is_seen() {
             return 1.0;
         }
-        let light = light * f64::from(self.samples);
-        light / (light + lobe)
+        // In this form for a light seen in its own plane, whose density is infinite.
+        1.0 / (1.0 + lobe / (light * f64::from(self.samples)))
     }
 }
 

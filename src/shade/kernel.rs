@@ -288,6 +288,8 @@ impl Vertex<'_, '_> {
                 return;
             }
             inside = crossing.after;
+            // Light samples do not reach through glass: a lamp behind it is seen by this ray alone.
+            state.pdf = 0.0;
             ray = crossing.last.spawn(ray.dir, renderer.settings.rules.spawn_offset);
             self.counts[RayKind::Glass] += 1;
             hit = renderer.intersector.intersect(&ray, self.counts);
@@ -343,10 +345,10 @@ impl Vertex<'_, '_> {
         state: &PathState,
     ) -> GlossyPoint {
         let Renderer { scene, settings, .. } = self.renderer;
-        let point = ShadingPoint::new((si, ray, hit), wo, Rgb::ONE, state.place());
-        let starts = ShadowStarts::of(scene, settings, (si, ray, hit), point.ng);
-        let (p, n, place, throughput) = (si.p, point.n, point.place, state.throughput);
-        GlossyPoint { lobe, p, n, wo, starts, throughput, place }
+        let ng = if si.is_outside(wo) { si.ng } else { -si.ng };
+        let starts = ShadowStarts::of(scene, settings, (si, ray, hit), ng);
+        let (p, n, place) = (si.p, lobe::facing_normal(si, wo), state.place());
+        GlossyPoint { lobe, p, n, ng, wo, starts, throughput: state.throughput, place }
     }
 
     /// Sends the rays that `lobe` scatters at the surface `si`.

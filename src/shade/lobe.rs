@@ -54,12 +54,21 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     if MIRROR && material.mirror != Rgb::ZERO {
         take(match material.roughness {
             0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
-            roughness => Lobe::Glossy(Glossy::new(material.mirror, roughness, si, wo)),
+            roughness => {
+                let n = facing_normal(si, wo);
+                Lobe::Glossy(Glossy::new(material.mirror, roughness, n, wo))
+            }
         });
     }
     if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
         take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))));
     }
+}
+
+/// The shading normal at `si` on the side of `wo`, or the geometric one where the shading normal faces away from it.
+pub(super) fn facing_normal(si: &SurfaceInteraction, wo: DVec3) -> DVec3 {
+    let side = if si.is_outside(wo) { 1.0 } else { -1.0 };
+    if si.ns.dot(wo) * side > 0.0 { si.ns * side } else { si.ng * side }
 }
 
 impl Lobe {

@@ -23,7 +23,7 @@ pub(super) struct Material {
     pub mirror: Option<At<Reflectance>>,
     /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
     roughness: Option<At<Share>>,
-    /// Clear glass.
+    /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
     /// meshes of up to 64 flat quads, then light the scene; other meshes only glow.
@@ -44,7 +44,7 @@ pub(super) struct Glass {
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
     /// Absorption coefficient of the inside, per unit of length, linear RGB or one number for grey: over a
-    /// length x the share exp(-absorption x) of the light remains. The surface must be closed. Absent: 0.
+    /// length x the share exp(-absorption x) of the light remains. The surface must be closed, and a camera inside it needs a `priority`. Absent: 0.
     absorption: Option<Amount>,
     /// For bodies that touch, overlap or lie in one another, as tea in a glass: where several are at one
     /// place, the one of the highest priority counts. `ior` is then that of the body itself. Absent: the

@@ -1,13 +1,14 @@
 //! Rough mirrors: glossy reflection.
 
 use super::Scattered;
-use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::to_world;
 use crate::shade::optics;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
+/// A smoother surface counts as one of this roughness: its peak would be narrower than f64 can tell of cosines.
+const LEAST_ROUGHNESS: f64 = 3e-3;
 /// Nodes of the table of reflected shares along each axis.
 const NODES: usize = 33;
 /// Samples along each axis for one node.
@@ -26,11 +27,10 @@ pub(in crate::shade) struct Glossy {
 }
 
 impl Glossy {
-    /// The lobe of a mirror of this `reflectance` and `roughness` at `si`, seen along `wo`.
-    pub fn new(reflectance: Rgb, roughness: f64, si: &SurfaceInteraction, wo: DVec3) -> Self {
-        let side = if si.is_outside(wo) { 1.0 } else { -1.0 };
-        // Interpolated normals may face away from the viewer.
-        let n = if si.ns.dot(wo) * side > 0.0 { si.ns * side } else { si.ng * side };
+    /// The lobe of a mirror of this `reflectance` and `roughness`, seen along `wo` above the unit normal `n`.
+    pub fn new(reflectance: Rgb, roughness: f64, n: DVec3, wo: DVec3) -> Self {
+        // Not `max`, which would hide what is NaN.
+        let roughness = if roughness < LEAST_ROUGHNESS { LEAST_ROUGHNESS } else { roughness };
         let reflected = reflected_share(roughness, wo.dot(n)) as f32;
         let lost = (1.0 - reflected) / reflected;
         let tint = reflectance * (Rgb::ONE + reflectance * lost);
