@@ -25,7 +25,7 @@ pub struct Job {
 
 /// The costs of tasks and messages.
 pub struct CostModel<'a> {
-    /// Core seconds to render and write an original, by its frame number.
+    /// Core seconds to render and write a representative, by its frame number.
     pub seconds: &'a dyn Fn(u32) -> f64,
     /// Core seconds of these for writing, which strips do not share.
     pub write_seconds: f64,
@@ -103,8 +103,8 @@ impl FrameGraph for Job {
         self.pyramid.batches(frames)
     }
 
-    fn needs(&self, original: u32) -> Vec<u32> {
-        self.pyramid.ancestors(original)
+    fn needs(&self, representative: u32) -> Vec<u32> {
+        self.pyramid.ancestors(representative)
     }
 
     fn sends_to_all(&self) -> bool {

@@ -135,7 +135,7 @@ impl<'a> CommThread<'a> {
         for decision in decisions {
             match decision {
                 Decision::Assign(rank, assignment) => self.send(rank, Message::Do(assignment))?,
-                Decision::Send { from, to, original: representative } => {
+                Decision::Send { from, to, representative } => {
                     self.send(from, Message::Send { representative, to })?;
                 }
             }
@@ -239,7 +239,7 @@ impl<'a> CommThread<'a> {
         }
         let strips = match task.extent {
             Extent::Whole { strips, .. } if strips > 0 => {
-                self.strips.remove(&task.original).unwrap_or_default().into_values().collect()
+                self.strips.remove(&task.representative).unwrap_or_default().into_values().collect()
             }
             _ => Vec::new(),
         };
@@ -251,7 +251,8 @@ impl<'a> CommThread<'a> {
     fn is_ready(&self, assignment: &Assignment) -> bool {
         let has_strips = match assignment.task.extent {
             Extent::Whole { strips, .. } if strips > 0 => {
-                let received = self.strips.get(&assignment.task.original).map_or(0, BTreeMap::len);
+                let received =
+                    self.strips.get(&assignment.task.representative).map_or(0, BTreeMap::len);
                 received == strips as usize
             }
             _ => true,
@@ -283,7 +284,7 @@ impl<'a> CommThread<'a> {
         let Finished { task, report, output, seconds } = finished;
         self.is_busy = false;
         self.busy_seconds += seconds;
-        let representative = task.original;
+        let representative = task.representative;
         match &task.extent {
             Extent::Strip { number, leader, .. } => {
                 if *leader == self.comm.rank() {

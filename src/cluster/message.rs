@@ -95,7 +95,7 @@ mod tests {
     fn bytes_on_the_wire_keep_their_names() {
         let json = |message: &Message| serde_json::to_string(message).expect("JSON");
         let extent = Extent::Strip { number: 1, of: 2, leader: 3 };
-        let task = Task { id: 4, original: 5, is_source: true, extent };
+        let task = Task { id: 4, representative: 5, is_source: true, extent };
         let done = Message::Done { task, reports: Vec::new(), seconds: 0.5 };
         let expected = concat!(
             r#"{"Done":{"order":{"task":4,"original":5,"is_source":true,"#,
@@ -103,7 +103,7 @@ mod tests {
         );
         assert_eq!(json(&done), expected);
         let extent = Extent::Whole { strips: 0, frames: vec![6] };
-        let task = Task { id: 4, original: 6, is_source: false, extent };
+        let task = Task { id: 4, representative: 6, is_source: false, extent };
         let assignment = Assignment { task, needs: vec![1], drops: vec![2] };
         let expected = concat!(
             r#"{"Do":{"order":{"task":4,"original":6,"is_source":false,"#,

@@ -89,12 +89,12 @@ impl RenderThread<'_> {
         let (report, output) = match &task.extent {
             Extent::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: task.is_source };
-                let bytes = self.maker.render_strip(task.original, strip)?;
+                let bytes = self.maker.render_strip(task.representative, strip)?;
                 (None, Exported { bytes: bytes.into(), discoveries: 0 })
             }
             Extent::Whole { frames, .. } => {
                 if !strips.is_empty() {
-                    self.maker.join_strips(task.original, &strips)?;
+                    self.maker.join_strips(task.representative, &strips)?;
                 }
                 self.whole(&task, frames)?
             }
@@ -107,10 +107,10 @@ impl RenderThread<'_> {
     /// is sent for each of the others.
     fn whole(&mut self, task: &Task, frames: &[u32]) -> Result<(Option<FrameReport>, Exported)> {
         if task.is_source {
-            self.maker.hold(task.original);
+            self.maker.hold(task.representative);
         }
         if frames.is_empty() {
-            self.maker.make_reference(task.original)?;
+            self.maker.make_reference(task.representative)?;
         }
         self.maker.expect(frames);
         let mut last = None;
@@ -125,7 +125,7 @@ impl RenderThread<'_> {
                 _ = self.events.send(Event::Wrote(Box::new(before)));
             }
         }
-        let output = task.is_source.then(|| self.maker.export(task.original)).flatten();
+        let output = task.is_source.then(|| self.maker.export(task.representative)).flatten();
         Ok((last, output.unwrap_or_default()))
     }
 }

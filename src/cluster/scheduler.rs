@@ -111,14 +111,15 @@ pub struct Assignment {
     pub drops: Vec<u32>,
 }
 
-/// A frame to make, whole or in part. (Message bytes keep the keys `task` and `what`.)
+/// A frame to make, whole or in part. (Message bytes keep the keys `task`, `original` and `what`.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// The scheduler's index of the task.
     #[serde(rename = "task")]
     pub id: usize,
     /// The number of the frame to make: a representative.
-    pub original: u32,
+    #[serde(rename = "original")]
+    pub representative: u32,
     /// Whether other frames take its reference.
     pub is_source: bool,
     /// The whole frame, or one strip.
@@ -159,7 +160,7 @@ pub enum Decision {
         /// The rank that needs it.
         to: u32,
         /// The representative frame of the reference.
-        original: u32,
+        representative: u32,
     },
 }
 

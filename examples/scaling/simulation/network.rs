@@ -44,10 +44,10 @@ impl Simulator<'_> {
         self.next_poll(to, arrives)
     }
 
-    /// Sends the discoveries of `original` to all ranks, at the speed of an ideal broadcast: along a
+    /// Sends the discoveries of `representative` to all ranks, at the speed of an ideal broadcast: along a
     /// binary tree, forwarded while they are received. The limit is that each rank receives the
-    /// discoveries of all originals, one after the other.
-    pub(super) fn broadcast(&mut self, original: u32) {
+    /// discoveries of all representatives, one after the other.
+    pub(super) fn broadcast(&mut self, representative: u32) {
         let bytes = self.model.reference_bytes;
         let others = u64::from(self.rank_count() - 1);
         count(&mut self.run.sent.discoveries, others, bytes);
@@ -57,7 +57,7 @@ impl Simulator<'_> {
         let at = self.broadcast_until
             + (depth - 1.0).max(0.0) * self.model.latency
             + self.model.poll_interval;
-        self.schedule(at, Event::Known { original });
+        self.schedule(at, Event::Known { representative });
     }
 
     /// Seconds to send `bytes`, without latency.

@@ -28,9 +28,9 @@ pub struct Simulator<'a> {
     comm_idle_at: f64,
     /// If discoveries go to all ranks: the time at which the last are received.
     pub(super) broadcast_until: f64,
-    /// Originals whose discoveries all ranks have.
+    /// Representatives whose discoveries all ranks have.
     known: HashSet<u32>,
-    /// Ranks that wait for the discoveries of an original.
+    /// Ranks that wait for the discoveries of a representative.
     waiting: HashMap<u32, Vec<u32>>,
     pub(super) run: SimulatedRun,
 }
@@ -40,11 +40,11 @@ pub struct Simulator<'a> {
 pub(super) struct RankState {
     assignments: VecDeque<Assignment>,
     is_busy: bool,
-    /// Originals whose references are decoded.
+    /// Representatives whose references are decoded.
     imported: BTreeSet<u32>,
-    /// Originals whose references arrived and are not decoded.
+    /// Representatives whose references arrived and are not decoded.
     received: BTreeSet<u32>,
-    /// Number of strips that arrived, by original.
+    /// Number of strips that arrived, by representative.
     strips: HashMap<u32, u32>,
     /// Time at which the rank's last payload is sent.
     pub(super) sent_until: f64,
@@ -58,13 +58,13 @@ pub(super) enum Event {
     /// The rank receives an assignment.
     Assign { rank: u32, assignment: Assignment },
     /// Rank `from` receives the instruction to send a reference.
-    Send { from: u32, to: u32, original: u32 },
+    Send { from: u32, to: u32, representative: u32 },
     /// The rank receives a reference.
-    Reference { rank: u32, original: u32 },
+    Reference { rank: u32, representative: u32 },
     /// The rank receives a strip.
-    Strip { rank: u32, original: u32 },
-    /// All ranks have received the discoveries of an original.
-    Known { original: u32 },
+    Strip { rank: u32, representative: u32 },
+    /// All ranks have received the discoveries of a representative.
+    Known { representative: u32 },
     /// Rank 0 reads its inbox.
     Poll,
 }
@@ -174,22 +174,22 @@ impl<'a> Simulator<'a> {
             }
             Event::Poll => self.poll(),
             Event::Assign { rank, assignment } => self.accept(rank, assignment),
-            Event::Send { from, to, original } => {
-                let bytes = self.model.reference_bytes as f64 * self.weight(original);
+            Event::Send { from, to, representative } => {
+                let bytes = self.model.reference_bytes as f64 * self.weight(representative);
                 let at = self.send_payload(from, to, |sent| &mut sent.references, bytes as u64);
-                self.schedule(at, Event::Reference { rank: to, original });
+                self.schedule(at, Event::Reference { rank: to, representative });
             }
-            Event::Reference { rank, original } => {
-                self.ranks[rank as usize].received.insert(original);
+            Event::Reference { rank, representative } => {
+                self.ranks[rank as usize].received.insert(representative);
                 self.start_task(rank);
             }
-            Event::Strip { rank, original } => {
-                *self.ranks[rank as usize].strips.entry(original).or_default() += 1;
+            Event::Strip { rank, representative } => {
+                *self.ranks[rank as usize].strips.entry(representative).or_default() += 1;
                 self.start_task(rank);
             }
-            Event::Known { original } => {
-                self.known.insert(original);
-                for rank in self.waiting.remove(&original).unwrap_or_default() {
+            Event::Known { representative } => {
+                self.known.insert(representative);
+                for rank in self.waiting.remove(&representative).unwrap_or_default() {
                     self.start_task(rank);
                 }
             }
@@ -222,7 +222,9 @@ impl<'a> Simulator<'a> {
             self.comm_idle_at += self.model.message_seconds;
             let (to, event) = match decision {
                 Decision::Assign(rank, assignment) => (rank, Event::Assign { rank, assignment }),
-                Decision::Send { from, to, original } => (from, Event::Send { from, to, original }),
+                Decision::Send { from, to, representative } => {
+                    (from, Event::Send { from, to, representative })
+                }
             };
             let at = self.send_message(self.comm_idle_at, 0, to);
             self.schedule(at, event);
@@ -232,9 +234,9 @@ impl<'a> Simulator<'a> {
 
     fn accept(&mut self, rank: u32, assignment: Assignment) {
         let state = &mut self.ranks[rank as usize];
-        for original in &assignment.drops {
-            state.imported.remove(original);
-            state.received.remove(original);
+        for representative in &assignment.drops {
+            state.imported.remove(representative);
+            state.received.remove(representative);
         }
         state.assignments.push_back(assignment);
         self.start_task(rank);
@@ -253,7 +255,7 @@ impl<'a> Simulator<'a> {
         };
         let has_strips = |task: &Task| match task.extent {
             Extent::Whole { strips, .. } if strips > 0 => {
-                state.strips.get(&task.original) == Some(&strips)
+                state.strips.get(&task.representative) == Some(&strips)
             }
             _ => true,
         };
@@ -283,17 +285,17 @@ impl<'a> Simulator<'a> {
         self.running.push(Reverse(timed));
     }
 
-    /// Size of an original's reference, as a share of a key frame's.
-    fn weight(&self, original: u32) -> f64 {
-        if self.pyramid.is_key(original) { 1.0 } else { self.model.between_share }
+    /// Size of a representative's reference, as a share of a key frame's.
+    fn weight(&self, representative: u32) -> f64 {
+        if self.pyramid.is_key(representative) { 1.0 } else { self.model.between_share }
     }
 
     /// Core seconds of a task, encoding of its reference included.
     fn cost(&self, task: &Task) -> f64 {
-        let all = (self.model.seconds)(task.original);
+        let all = (self.model.seconds)(task.representative);
         let write = self.model.write_seconds.min(all);
         let is_packed = task.is_source && self.ranks.len() > 1;
-        let weight = if is_packed { self.weight(task.original) } else { 0.0 };
+        let weight = if is_packed { self.weight(task.representative) } else { 0.0 };
         let pack = weight * self.model.pack_seconds;
         match task.extent {
             Extent::Strip { of, .. } => (all - write) / f64::from(of),
@@ -305,21 +307,21 @@ impl<'a> Simulator<'a> {
     /// A task ends: its result is sent to other ranks, and its report to rank 0.
     fn finish(&mut self, ended: RunningTask) {
         let RunningTask { rank, task, start } = ended;
-        let original = task.original;
+        let representative = task.representative;
         let state = &mut self.ranks[rank as usize];
         state.is_busy = false;
         match &task.extent {
             Extent::Strip { leader, of, .. } => {
                 let (leader, bytes) = (*leader, self.model.strips_bytes / u64::from(*of));
                 let at = self.send_payload(rank, leader, |sent| &mut sent.strips, bytes);
-                self.schedule(at, Event::Strip { rank: leader, original });
+                self.schedule(at, Event::Strip { rank: leader, representative });
             }
             Extent::Whole { frames, .. } => {
                 self.run.frames += frames.len() as u64;
                 if task.is_source {
-                    state.imported.insert(original);
+                    state.imported.insert(representative);
                     if self.sends_to_all {
-                        self.broadcast(original);
+                        self.broadcast(representative);
                     }
                 }
             }

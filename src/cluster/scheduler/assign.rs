@@ -184,7 +184,7 @@ impl Scheduler {
         let needs = needs.iter().map(|need| self.tasks[*need].representative).collect();
         let record = &self.tasks[t];
         let (representative, is_source) = (record.representative, !record.users.is_empty());
-        let task = Task { id: t, original: representative, is_source, extent };
+        let task = Task { id: t, representative, is_source, extent };
         decisions.push(Decision::Assign(rank, Assignment { task, needs, drops }));
     }
 
@@ -198,7 +198,11 @@ impl Scheduler {
         let least = task.senders.iter_mut().min_by_key(|(_, sends)| **sends);
         if let Some((from, sends)) = least {
             *sends += 1;
-            decisions.push(Decision::Send { from: *from, to: rank, original: task.representative });
+            decisions.push(Decision::Send {
+                from: *from,
+                to: rank,
+                representative: task.representative,
+            });
         }
     }
 }

@@ -64,7 +64,7 @@ fn simulate(frames: &Frames, wanted: &[u32], pace: &[f64]) -> Simulated {
     loop {
         for decision in scheduler.assign() {
             match decision {
-                Decision::Send { from, to, original: representative } => {
+                Decision::Send { from, to, representative } => {
                     assert!(
                         has[from as usize].contains(&representative),
                         "{from} lacks {representative}"
@@ -82,7 +82,7 @@ fn simulate(frames: &Frames, wanted: &[u32], pace: &[f64]) -> Simulated {
         }
         for (rank, queue) in queues.iter().enumerate() {
             if let (Some(next), None) = (queue.first(), until[rank]) {
-                let representative = next.task.original;
+                let representative = next.task.representative;
                 assert!(
                     next.needs.iter().all(|n| has[rank].contains(n)),
                     "{rank} for {representative}"
@@ -107,7 +107,7 @@ fn simulate(frames: &Frames, wanted: &[u32], pace: &[f64]) -> Simulated {
             Extent::Whole { frames, .. } => {
                 run.made.extend(frames);
                 if task.is_source {
-                    has[rank].insert(task.original);
+                    has[rank].insert(task.representative);
                 }
             }
         }
