@@ -103,6 +103,9 @@ pub struct Checked {
 pub struct LookupBatch {
     /// The surface points, scene space.
     pub points: Vec<SurfacePoint>,
+    /// Camera samples that the pixels have with these, over the least number of a pixel, if more: the trace of a pixel with
+    /// more samples has less noise.
+    pub refinement: f32,
     /// For each point the pixel that shows it: column, row.
     pub pixels: Vec<[u32; 2]>,
     /// For each point and channel the light's contribution to the pixel without shadows:

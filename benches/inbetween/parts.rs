@@ -97,8 +97,7 @@ impl<'a> Stand<'a> {
         inference: Option<&'j dyn Inference>,
     ) -> FrameJob<'j> {
         let reuse = Some(Reuse { channels: &self.channels, inference });
-        let (mask, with_gbuffer, beyond_crop) = (None, false, false);
-        FrameJob { camera, stream, with_gbuffer, reuse, mask, beyond_crop }
+        FrameJob { reuse, ..FrameJob::whole(camera, stream) }
     }
 
     fn reference(&self, job: &FrameJob) -> Reference {

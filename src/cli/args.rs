@@ -4,7 +4,7 @@ mod job;
 
 pub use job::JobArgs;
 
-use super::values::{self, Clamp};
+use super::values::{self, CameraSamples, Clamp};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
     BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings,
@@ -49,9 +49,10 @@ pub struct SettingArgs {
     /// Render only these pixels of the image (upper left corner is 0,0; x1 and y1 are excluded)
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop)]
     pub crop: Option<Rect>,
-    /// Camera samples per pixel [default: 4]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1, limits::MAX_SAMPLES))]
-    pub spp: Option<u32>,
+    /// Camera samples per pixel: a number, or the least and the most, as in 4..16, where a pixel takes
+    /// more than the least as far as its samples, or its neighbours', differ [default: 4]
+    #[arg(long, value_name = "N|MIN..MAX", allow_negative_numbers = true, value_parser = values::camera_samples)]
+    pub spp: Option<CameraSamples>,
     /// Pixel filter [default: box]
     #[arg(long, value_name = "FILTER",
         value_parser = values::choice::<Filter>(&["box", "tent", "gaussian", "blackman-harris"]))]
@@ -183,7 +184,9 @@ impl SettingArgs {
         if self.crop.is_some() {
             s.crop = self.crop;
         }
-        put(&mut s.spp, self.spp);
+        if let Some(CameraSamples { spp, most_spp }) = self.spp {
+            (s.spp, s.most_spp) = (spp, most_spp);
+        }
         put(&mut s.filter, self.filter);
         put(&mut s.exposure, self.exposure);
         put(&mut s.clamp, self.clamp.map(|Clamp(most)| most));

@@ -1,7 +1,7 @@
 //! Parsers of option values: sizes, frame ranges, crops, choices, numbers in bounds.
 
 use crate::accuracy::Goal;
-use crate::scene::{FrameRange, Rect, SaveInterval, parse_time, parse_time_limit};
+use crate::scene::{FrameRange, Rect, SaveInterval, limits, parse_time, parse_time_limit};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::DeserializeOwned;
 use std::ops::RangeInclusive;
@@ -45,6 +45,35 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
     match (edge(w)?, edge(h)?) {
         (0, _) | (_, 0) => Err("an image needs at least one pixel each way".into()),
         size => Ok(size),
+    }
+}
+
+/// Camera samples of a pixel; where there is a most, the first number is the least.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CameraSamples {
+    /// All, or the least.
+    pub spp: u32,
+    /// The most, above the least.
+    pub most_spp: Option<u32>,
+}
+
+/// `4`, `4..16` (the least and the most).
+pub fn camera_samples(text: &str) -> Result<CameraSamples, String> {
+    let wrong = || {
+        let most = limits::MAX_SAMPLES;
+        format!("camera samples are written 4, or 4..16 (the least and the most), from 1 to {most}")
+    };
+    let number = |text: &str| {
+        let count = text.trim().parse().ok().filter(|n| (1..=limits::MAX_SAMPLES).contains(n));
+        count.ok_or_else(wrong)
+    };
+    let Some((least, most)) = text.split_once("..") else {
+        return Ok(CameraSamples { spp: number(text)?, most_spp: None });
+    };
+    let (spp, most) = (number(least)?, number(most)?);
+    match spp <= most {
+        true => Ok(CameraSamples { spp, most_spp: (most > spp).then_some(most) }),
+        false => Err(format!("the least camera samples, {spp}, are more than the most, {most}")),
     }
 }
 

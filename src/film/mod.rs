@@ -34,6 +34,8 @@ pub struct Film {
     pub rgb: Vec<Rgb>,
     /// First-hit records, when asked for.
     pub gbuffer: Option<GBuffer>,
+    /// How many camera samples each pixel has; `None` where all have as many.
+    pub samples: Option<Vec<u32>>,
     /// Where each pixel's light comes from; `None` where every frame is traced.
     pub provenance: Option<Vec<Provenance>>,
     /// Where the audit looked, how far each pixel is from its mean of two traces, in display steps
@@ -100,6 +102,7 @@ impl Film {
             height,
             rgb: vec![Rgb::ZERO; n],
             gbuffer: with_gbuffer.then(|| GBuffer::new(n)),
+            samples: None,
             provenance: None,
             audit: None,
             bad: BadSamples::default(),

@@ -80,7 +80,7 @@ impl WriteOptions {
              exposure {}, tone {:?}",
             s.width,
             s.height,
-            s.spp,
+            s.camera_samples(),
             s.shadow_samples,
             s.sky_samples,
             s.bounces,

@@ -159,7 +159,7 @@ pub fn is_worth_lookups<'f>(
     probed: f64,
 ) -> bool {
     let cost = PointCost::of(scene, channels, settings);
-    let saved = |finding: &Finding| match (evidence.may_use(finding.level), finding.agreed) {
+    let saved = |finding: &Finding| match (evidence.may_use(finding.level, 1.0), finding.agreed) {
         (true, true) => cost.traced - cost.checked,
         (true, false) => -cost.checked,
         (false, _) => 0.0,

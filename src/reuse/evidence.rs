@@ -93,8 +93,11 @@ pub fn finding_of(share: f32, lights: &[LightComparison], agreed: bool) -> Optio
 }
 
 /// The levels of risk whose estimates may be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Evidence([bool; LEVELS]);
+///
+/// For each level the largest number of camera samples of a pixel for which they may, as a multiple of the least
+/// number; less than 1 where they may for none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence([f64; LEVELS]);
 
 /// Sums over findings.
 #[derive(Debug, Clone, Copy, Default)]
@@ -114,9 +117,9 @@ fn total(sums: &[Sums]) -> Sums {
     })
 }
 
-/// Marks in `taken` the steps of a scale of risk whose estimates may be used, by the `sums` of their findings. A
+/// Raises `limits`, the multiples of the steps of a scale of risk, as far as the `sums` of their findings allow. A
 /// mean squared error of up to `unseen` is allowed whatever tracing's error is.
-fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
+fn raise(sums: &[Sums], unseen: f64, limits: &mut [f64]) {
     // What holds of a higher risk holds of a lower one.
     let mut most = f64::INFINITY;
     for step in (0..STEPS).rev() {
@@ -131,7 +134,9 @@ fn take(sums: &[Sums], unseen: f64, taken: &mut [bool]) {
         // Noise rises with the risk: never that of a higher one.
         let below = total(&sums[first..=step]);
         let noise = if below.count > 0.0 { below.noise / below.count } else { 0.0 };
-        taken[step] |= most <= (noise / GUARD).max(unseen);
+        // The noise of a trace falls with the number of samples, the error of an estimate does not.
+        let limit = if most <= unseen { f64::INFINITY } else { noise / GUARD / most };
+        limits[step] = limits[step].max(limit);
     }
 }
 
@@ -148,23 +153,24 @@ impl Evidence {
             sums[level].error += f64::from(finding.error) / risk_of(level);
             sums[level].noise += f64::from(finding.noise);
         }
-        let mut taken = [false; LEVELS];
-        for (sums, taken) in sums.chunks_exact(2 * STEPS).zip(taken.chunks_exact_mut(2 * STEPS)) {
+        let mut limits = [0.0; LEVELS];
+        for (sums, limits) in sums.chunks_exact(2 * STEPS).zip(limits.chunks_exact_mut(2 * STEPS)) {
             let (noisy, detailed) = sums.split_at(STEPS);
-            let (noise, detail) = taken.split_at_mut(STEPS);
-            take(detailed, unseen, detail);
-            take(noisy, unseen, noise);
+            let (noise, detail) = limits.split_at_mut(STEPS);
+            raise(detailed, unseen, detail);
+            raise(noisy, unseen, noise);
             // Detail is no less wrong than noise of the same risk: what both show holds of noise.
             let both: Vec<Sums> =
                 noisy.iter().zip(detailed).map(|(a, b)| total(&[*a, *b])).collect();
-            take(&both, unseen, noise);
+            raise(&both, unseen, noise);
         }
-        Self(taken)
+        Self(limits)
     }
 
-    /// Whether estimates of `level` may be used where check rays agree.
-    pub fn may_use(&self, level: u8) -> bool {
-        self.0.get(usize::from(level)).copied().unwrap_or_default()
+    /// Whether estimates of `level` may be used where check rays agree, in a pixel that has `refinement` times the
+    /// least number of camera samples.
+    pub fn may_use(&self, level: u8, refinement: f32) -> bool {
+        self.0.get(usize::from(level)).is_some_and(|limit| *limit >= f64::from(refinement))
     }
 }
 
@@ -181,7 +187,7 @@ mod tests {
     }
 
     fn may_use(findings: &[Finding], level: u8) -> bool {
-        Evidence::of(findings.iter(), 0.25).may_use(level)
+        Evidence::of(findings.iter(), 0.25).may_use(level, 1.0)
     }
 
     #[test]
@@ -252,7 +258,7 @@ mod tests {
         // Nothing is known of tracing's noise there.
         assert!(!may_use(EDGE - 2));
         let seen = [&clean[..], &[found(EDGE - 2, 9.0, 0.5)]].concat();
-        let may_use = |level| Evidence::of(seen.iter(), 0.25).may_use(level);
+        let may_use = |level| Evidence::of(seen.iter(), 0.25).may_use(level, 1.0);
         assert!(may_use(EDGE - 2));
         // Detail, and what is seen in mirrors, are other matters.
         let of_scale = |scale: usize| (scale * STEPS) as u8;
@@ -260,7 +266,7 @@ mod tests {
         // But what is no worse than a trace in detail is none the worse where it may be noise.
         let detail = vec![found(EDGE + of_scale(1), 0.0, 0.5); 1000];
         let evidence = Evidence::of(detail.iter(), 0.25);
-        let is_taken = |scale| evidence.may_use(EDGE + of_scale(scale));
+        let is_taken = |scale| evidence.may_use(EDGE + of_scale(scale), 1.0);
         assert_eq!([0, 1, 2, 3].map(is_taken), [true, true, false, false]);
     }
 

@@ -52,7 +52,7 @@ impl Inference for Judged<'_> {
             // One level for all lights of a point.
             let known = estimates.iter().find(|estimate| !estimate.ratio.is_nan());
             let Some(known) = known else { continue };
-            if !(self.evidence)(pixels[i]).may_use(known.level) {
+            if !(self.evidence)(pixels[i]).may_use(known.level, batch.refinement) {
                 continue;
             }
             ratios.iter_mut().zip(estimates).for_each(|(ratio, e)| *ratio = e.ratio);

@@ -99,9 +99,15 @@ impl<'a> Probe<'a> {
         notes
     }
 
-    /// The findings by pixel (column, row), for frames of `spp` camera samples. `self` recorded estimates and
-    /// traces, `other` a second trace of the same probes with other random numbers.
-    pub fn findings(self, other: Self, spp: u32) -> Vec<([u32; 2], Vec<Finding>)> {
+    /// The findings by pixel (column, row). `self` recorded estimates and traces, `other` a second trace of the same
+    /// probes with other random numbers. A pixel has `samples` camera samples; the noise of a trace is stated for
+    /// `spp` of them.
+    pub fn findings(
+        self,
+        other: Self,
+        spp: u32,
+        samples: &dyn Fn([u32; 2]) -> u32,
+    ) -> Vec<([u32; 2], Vec<Finding>)> {
         let mut all: Vec<([u32; 2], Vec<Note>)> = Vec::new();
         for (mut own, again) in self.sorted().into_iter().zip(other.sorted()) {
             let is_same = own.pixel == again.pixel && own.point.p == again.point.p;
@@ -123,8 +129,10 @@ impl<'a> Probe<'a> {
             }
         }
         let finding = |note: &Note| {
-            let share = note.point.samples as f32 / spp as f32;
-            finding_of(share, &note.lights, note.agreed)
+            let samples = samples(note.pixel) as f32;
+            let share = note.point.samples as f32 / samples;
+            let found = finding_of(share, &note.lights, note.agreed)?;
+            Some(Finding { noise: found.noise * (samples / spp as f32), ..found })
         };
         let of_pixel = |(pixel, notes): ([u32; 2], Vec<Note>)| {
             (pixel, notes.iter().filter_map(finding).collect())

@@ -20,8 +20,12 @@ pub struct Settings {
     pub width: u32,
     /// Image rows.
     pub height: u32,
-    /// Camera samples a pixel.
+    /// Camera samples a pixel; where [`most_spp`](Self::most_spp) is given, the least.
     pub spp: u32,
+    /// The most camera samples of a pixel: where samples differ, more than [`spp`](Self::spp) are taken. `None` if
+    /// every pixel takes as many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most_spp: Option<u32>,
     /// Pixel filter.
     pub filter: Filter,
     /// Shadow samples per area light and camera sample.
@@ -73,6 +77,16 @@ impl Settings {
         self.clamp.map(|most| (most / self.exposure).max(f32::MIN_POSITIVE))
     }
 
+    /// The camera samples of a pixel as text: "4", or "4..16".
+    pub fn camera_samples(&self) -> String {
+        self.most_spp.map_or_else(|| self.spp.to_string(), |most| format!("{}..{most}", self.spp))
+    }
+
+    /// The most camera samples that any pixel takes.
+    pub fn most_camera_samples(&self) -> u32 {
+        self.most_spp.map_or(self.spp, |most| most.max(self.spp))
+    }
+
     /// Number of the image's pixels.
     pub fn pixel_count(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
@@ -90,6 +104,7 @@ impl Default for Settings {
             width: 640,
             height: 360,
             spp: 4,
+            most_spp: None,
             filter: Filter::Box,
             shadow_samples: 16,
             sky_samples: 16,

@@ -30,7 +30,7 @@ use crate::error::{Error, Result};
 use crate::film::{Film, Image};
 use crate::math::Vec2;
 use crate::reuse::colour::{AgreementRule, InferredColour, KnownColours};
-use crate::shade::FrameJob;
+use crate::shade::{FrameJob, Sampling};
 use pixels::{discoveries, fill};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -92,7 +92,8 @@ impl<'a> ColourMaker<'a> {
         let mask: Vec<bool> = inferred.iter().map(Option::is_none).collect();
         // Distances come from first-hit records.
         let (with_gbuffer, mask) = (true, Some(&mask[..]));
-        let job = FrameJob { with_gbuffer, mask, ..self.context.job(frame, &camera) };
+        let sampling = Sampling::Alone;
+        let job = FrameJob { with_gbuffer, mask, sampling, ..self.context.job(frame, &camera) };
         let mut traced = self.context.render(&job, self.context.progress)?;
         let discoveries = discoveries(frame, &traced.film, &inferred, &camera, settings);
         let reuse = fill(&mut traced.film, frame, &inferred, settings);

@@ -32,9 +32,7 @@ impl FrameContext<'_> {
 
     /// The job that traces all pixels of `frame` and gathers no points for other frames.
     pub(super) fn job<'j>(&self, frame: u32, camera: &'j Camera) -> FrameJob<'j> {
-        let with_gbuffer = self.with_gbuffer;
-        let (reuse, mask, beyond_crop) = (None, None, false);
-        FrameJob { camera, stream: frame, with_gbuffer, reuse, mask, beyond_crop }
+        FrameJob { with_gbuffer: self.with_gbuffer, ..FrameJob::whole(camera, frame) }
     }
 
     /// Renders `job` on the threads of the context.

@@ -27,6 +27,7 @@ const BLOCK: u32 = 8;
 struct Content {
     rgb: Vec<Rgb>,
     gbuffer: Option<GBuffer>,
+    samples: Option<Vec<u32>>,
     provenance: Option<Vec<Provenance>>,
     bad: BadSamples,
     rays: RayCounts,
@@ -87,14 +88,15 @@ pub fn mask(strip: Strip, settings: &Settings) -> Vec<bool> {
 
 /// The bytes of a rendered strip.
 pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
-    let Rendered { film, rays, sources, reuse } = rendered;
+    let Rendered { film, rays, sources, reuse, spreads: _ } = rendered;
     let Range { start, end } = rows(strip, film.height);
     let own = film.index(0, start)..film.index(0, end);
     // The audit is made once the strips are joined.
-    let Film { width: _, height: _, rgb, gbuffer, provenance, audit: _, bad } = film;
+    let Film { width: _, height: _, rgb, gbuffer, samples, provenance, audit: _, bad } = film;
     let content = Content {
         rgb: rgb[own.clone()].to_vec(),
         gbuffer: gbuffer.map(|g| g.part(own.clone())),
+        samples: samples.map(|samples| samples[own.clone()].to_vec()),
         provenance: provenance.map(|p| p[own].to_vec()),
         bad,
         rays,
@@ -114,24 +116,27 @@ fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
     let (mut rays, mut reuse) = (RayCounts::default(), ReuseCounts::default());
     let mut sources = TracedPoints::default();
     for bytes in strips {
-        let Content { rgb, gbuffer, provenance, bad, rays: cast, reuse: counts, sources: points } =
-            unpack(bytes)?;
+        let content = unpack(bytes)?;
+        let Content { rgb, gbuffer, samples, provenance, bad, .. } = content;
         film.rgb.extend(rgb);
         if let Some(part) = gbuffer {
             film.gbuffer.get_or_insert_with(|| GBuffer::new(0)).append(part);
+        }
+        if let Some(part) = samples {
+            film.samples.get_or_insert_default().extend(part);
         }
         if let Some(part) = provenance {
             film.provenance.get_or_insert_default().extend(part);
         }
         film.bad += bad;
-        rays += cast;
-        reuse += counts;
-        sources.append(points);
+        rays += content.rays;
+        reuse += content.reuse;
+        sources.append(content.sources);
     }
     if film.rgb.len() as u64 != u64::from(width) * u64::from(height) {
         return Err(Error::Failed("strips of another rank do not make a frame".into()));
     }
-    Ok(Rendered { film, rays, sources, reuse })
+    Ok(Rendered { film, rays, sources, reuse, spreads: Vec::new() })
 }
 
 fn pack(content: &Content) -> Result<Vec<u8>> {
@@ -183,12 +188,14 @@ mod tests {
         }
         film.gbuffer.iter_mut().for_each(|g| g.depth[7] = 3.5);
         film.provenance = Some(provenance);
+        film.samples = Some((0..film.rgb.len() as u32).collect());
         let rays = RayCounts::of(RayKind::Camera, 3);
         let rendered = |film: &Film| Rendered {
             film: film.clone(),
             rays,
             sources: TracedPoints::default(),
             reuse: ReuseCounts::default(),
+            spreads: Vec::new(),
         };
         let strip = |number| Strip { number, of: 3, is_source: true };
         let bytes = |number| encode(rendered(&film), strip(number)).expect("packed").into();

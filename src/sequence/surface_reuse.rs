@@ -93,10 +93,10 @@ impl<'a> SurfaceReuse<'a> {
         let mut audit = None;
         let mut findings = &[][..];
         if let Some(probed) = &probed {
-            audit = self.show_probes(frame, &camera, &references, probed, &mut rendered)?;
+            audit = self.add_probes(frame, &camera, &references, probed, &mut rendered)?;
             findings = &probed.findings;
         }
-        let Rendered { film, rays, reuse, sources } = rendered;
+        let Rendered { film, rays, reuse, sources, .. } = rendered;
         // The same order however the frame was cut for tracing, and as points are read from a file.
         let sources = self.context.pool.install(|| sources.in_rows());
         let kept = self.kept(frame, &camera, &sources, findings);
@@ -111,7 +111,7 @@ impl<'a> SurfaceReuse<'a> {
         Ok(Made { film, rays, reuse, audit, reference: kept })
     }
 
-    /// Renders the pixels of `mask` of a representative, or all, except its probes.
+    /// Renders the pixels of `mask` of a representative, or all. Its probes show their first trace.
     fn rendered(
         &self,
         frame: u32,
@@ -122,10 +122,9 @@ impl<'a> SurfaceReuse<'a> {
         let references = self.references(&self.schedule.ancestors(frame))?;
         let camera = self.context.camera(frame)?;
         let probed = self.probes(frame, &camera, &references)?;
-        let others = probed.as_ref().map(|probed| probed.others(mask));
-        let mask = others.as_deref().or(mask);
-        let job = FrameJob { mask, beyond_crop: is_due, ..self.context.job(frame, &camera) };
-        let Some(probed) = probed.filter(|probed| probed.is_worth_lookups) else {
+        let known = probed.as_ref().map(|probed| probed.shown());
+        let job = FrameJob { mask, known, beyond_crop: is_due, ..self.context.job(frame, &camera) };
+        let Some(probed) = probed.as_ref().filter(|probed| probed.is_worth_lookups) else {
             return self.render(job, None, progress);
         };
         self.with_lookup((frame, &camera), &references, |lookup| {

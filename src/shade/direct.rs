@@ -381,7 +381,7 @@ impl Renderer<'_> {
                         // Samples that tracing does not use: had it any of these, what is traced
                         // because of them would be darker or brighter than what is.
                         let samples = source.samples.next_power_of_two();
-                        let traced = self.settings.spp.wrapping_mul(samples);
+                        let traced = self.settings.most_camera_samples().wrapping_mul(samples);
                         let first = wanted.first.wrapping_add(traced);
                         self.fill(&point.place, source, first, pixels, u);
                     });

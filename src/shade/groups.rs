@@ -149,6 +149,7 @@ impl Groups {
         unshadowed: &[f32],
         pixels: &BlockPixels,
     ) {
+        self.asked.refinement = (pixels.samples_after() as f32 / input.least as f32).max(1.0);
         self.gather_points(input, lit);
         self.note_blurred(input, lit);
         self.forbid(input, scene, lit);

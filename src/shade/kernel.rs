@@ -5,6 +5,7 @@
 //! Per block: camera rays in packets, specular rays in packets branch by branch until none is left,
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
+use super::adaptive::Until;
 use super::direct::{ShadowScratch, ShadowStarts};
 use super::highlight::GlossyPoint;
 use super::lobe::{self, Lobe, Scattered};
@@ -13,7 +14,6 @@ use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::{FrameInput, Left, Renderer, dimensions, medium, optics};
 use crate::film::GPixel;
-use crate::inference::SAMPLES_TOGETHER;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
 use crate::scene::MaterialId;
@@ -96,23 +96,22 @@ fn gather<T: Copy>(order: &[(u32, u32)], from: &[T], to: &mut Vec<T>) {
     }
 }
 
-/// Renders one block into `pixels`, which holds its radiance sums and records.
+/// Renders one block into `pixels`, which holds its radiance sums and records, `until` its pixels have their samples.
 ///
 /// `NESTED` is glass with priorities, on top of `GLASS`.
 pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     renderer: &Renderer,
     input: &FrameInput,
+    until: &Until,
     pixels: &mut BlockPixels,
     scratch: &mut Scratch,
     left: &mut Left,
 ) -> RayCounts {
     let mut counts = RayCounts::default();
     scratch.shadow.groups.start_block();
-    let mut first = 0;
-    while first < renderer.settings.spp {
-        let last = first.saturating_add(SAMPLES_TOGETHER).min(renderer.settings.spp);
-        pixels.start_samples(renderer.settings.spp, input, first..last);
-        camera_rays(input, pixels, first..last, scratch);
+    let most = renderer.settings.most_camera_samples();
+    while let Some(samples) = pixels.start_samples(input, until, most) {
+        camera_rays(input, pixels, samples, scratch);
         counts[RayKind::Camera] += scratch.rays.len() as u64;
         if NESTED {
             scratch.start_interiors(renderer, input, &mut counts);
@@ -127,7 +126,6 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
             shadow.groups.finish(reuse, pixels, &mut left.sources, &mut left.reuse);
         }
         pixels.end_samples();
-        first = last;
     }
     counts
 }
@@ -141,12 +139,12 @@ fn camera_rays(
     scratch.rays.clear();
     scratch.states.clear();
     for sample in samples {
-        for pixel in 0..pixels.len() {
-            let (x, y) = pixels.sample_position(pixel, sample);
-            let lens = pixels.lens_position(pixel, sample);
+        for pixel in pixels.active() {
+            let (x, y) = pixels.sample_position(pixel as usize, sample);
+            let lens = pixels.lens_position(pixel as usize, sample);
             scratch.rays.push(input.camera.generate_ray(x, y, lens));
             let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
-            let (pixel, medium, pdf) = (pixel as u32, None, 0.0);
+            let (medium, pdf) = (None, 0.0);
             scratch.states.push(PathState { throughput, pixel, sample, medium, pdf, branch });
         }
     }

@@ -6,6 +6,7 @@
 //!
 //! Not done: light through glass (its shadow is opaque), diffuse interreflection.
 
+mod adaptive;
 mod dimensions;
 mod direct;
 mod groups;
@@ -31,11 +32,13 @@ use crate::math::Rgb;
 use crate::sampling::PixelFilter;
 use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
+pub use adaptive::SampleSpread;
+use adaptive::Until;
 use direct::LightSource;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
-use pixels::{BLOCK, BlockPixels, FinishedPixel};
+use pixels::{BLOCK, BlockPixels, FinishedPixel, SampleLimits};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's. Larger ones leave
@@ -121,6 +124,46 @@ pub struct FrameJob<'a> {
     pub mask: Option<&'a [bool]>,
     /// Whether what lies beyond the crop is traced too, as a source for other frames.
     pub beyond_crop: bool,
+    /// Pixels that have been rendered already, and are part of the picture.
+    pub known: Option<Known<'a>>,
+    /// What pixels that may take more samples than others go by.
+    pub sampling: Sampling<'a>,
+}
+
+impl<'a> FrameJob<'a> {
+    /// All pixels of the crop, traced, without records.
+    pub fn whole(camera: &'a Camera, stream: u32) -> Self {
+        Self {
+            camera,
+            stream,
+            with_gbuffer: false,
+            reuse: None,
+            mask: None,
+            beyond_crop: false,
+            known: None,
+            sampling: Sampling::Neighbours,
+        }
+    }
+}
+
+/// Pixels of a frame that have been rendered already.
+#[derive(Clone, Copy)]
+pub struct Known<'a> {
+    /// Which, row by row.
+    pub mask: &'a [bool],
+    /// What was rendered.
+    pub rendered: &'a Rendered,
+}
+
+/// What the number of camera samples of a pixel follows, if it may be more than the least.
+#[derive(Clone, Copy)]
+pub enum Sampling<'a> {
+    /// Its own samples and those of its neighbours, which are looked at even where they are not asked for.
+    Neighbours,
+    /// Its own samples and those of the neighbours that are asked for.
+    Alone,
+    /// The numbers given for each pixel of the film.
+    As(&'a [u32]),
 }
 
 /// A rendered frame.
@@ -133,6 +176,8 @@ pub struct Rendered {
     pub sources: TracedPoints,
     /// How much was inferred.
     pub reuse: ReuseCounts,
+    /// The differences among each pixel's camera samples; empty where every pixel takes as many samples.
+    pub spreads: Vec<SampleSpread>,
 }
 
 /// What is fixed for one frame.
@@ -142,6 +187,8 @@ struct FrameInput<'a> {
     /// Edge of a pixel at distance 1 along the view axis, scene units.
     pixel_size: f64,
     stream: u32,
+    /// The least number of camera samples of a pixel.
+    least: u32,
     filter: PixelFilter,
     /// The lights that shine, the sky last.
     lights: Vec<LightSource>,
@@ -169,13 +216,19 @@ struct TileDone {
     /// Empty where none are asked for, as `provenance`.
     records: Vec<GPixel>,
     provenance: Vec<Provenance>,
+    /// Of more pixels, where they lie with what their samples say.
+    spreads: Vec<(u32, SampleSpread)>,
     rays: RayCounts,
     bad: BadSamples,
     left: Left,
 }
 
 impl TileDone {
-    fn push(&mut self, place: u32, pixel: &FinishedPixel, with_provenance: bool) {
+    fn push(&mut self, place: u32, pixel: &FinishedPixel, is_kept: bool, with_provenance: bool) {
+        self.spreads.extend(pixel.spread.map(|spread| (place, spread)));
+        if !is_kept {
+            return;
+        }
         self.places.push(place);
         self.rgb.push(pixel.rgb);
         self.records.extend(pixel.record);
@@ -184,7 +237,7 @@ impl TileDone {
 }
 
 type BlockKernel =
-    fn(&Renderer, &FrameInput, &mut BlockPixels, &mut Scratch, &mut Left) -> RayCounts;
+    fn(&Renderer, &FrameInput, &Until, &mut BlockPixels, &mut Scratch, &mut Left) -> RayCounts;
 
 impl<'a> Renderer<'a> {
     /// A renderer of `scene` under `settings`, whose rays `intersector` traces: one that was built of
@@ -230,8 +283,7 @@ impl Renderer<'_> {
         stop: &AtomicBool,
         progress: &dyn Progress,
     ) -> Option<(Film, RayCounts)> {
-        let (reuse, mask, beyond_crop) = (None, None, false);
-        let job = FrameJob { camera, stream: frame, with_gbuffer, reuse, mask, beyond_crop };
+        let job = FrameJob { with_gbuffer, ..FrameJob::whole(camera, frame) };
         self.render_job(&job, stop, progress).map(|done| (done.film, done.rays))
     }
 
@@ -246,18 +298,60 @@ impl Renderer<'_> {
         let input = self.input(camera, job.stream, job.reuse);
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
-        let traced = if job.beyond_crop { full } else { crop };
-        let samples = u64::from(traced.x1 - traced.x0)
-            * u64::from(traced.y1 - traced.y0)
+        let own = aligned(if job.beyond_crop { &full } else { &crop }, &full);
+        let with_neighbours =
+            self.settings.most_spp.is_some() && matches!(job.sampling, Sampling::Neighbours);
+        let known = job.known.map(|known| known.mask);
+        let part = Part { image: full, crop, own, mask: job.mask, known, with_neighbours };
+        let mut rendered = Rendered::new(job, self.settings.most_spp.is_some());
+        let Some(most) = self.settings.most_spp else {
+            let pass = Pass { region: own, until: Until::Count(self.settings.spp), goes_on: false };
+            self.pass((job, &input, &part, 1.0), &pass, &mut rendered, stop, progress)?;
+            rendered.take_over(job, &part);
+            return Some(rendered);
+        };
+        let region = if with_neighbours { aligned(&grown(&own), &full) } else { own };
+        let pilots = Pass { region, until: Until::Count(self.settings.spp), goes_on: false };
+        self.pass((job, &input, &part, 0.5), &pilots, &mut rendered, stop, progress)?;
+        rendered.take_over(job, &part);
+        let beside;
+        let until = match job.sampling {
+            Sampling::As(counts) => Until::Each(counts),
+            Sampling::Neighbours | Sampling::Alone => {
+                beside = adaptive::beside(&rendered.spreads, camera.width);
+                Until::Differences { beside: &beside, most }
+            }
+        };
+        let more = Pass { region: own, until, goes_on: true };
+        self.pass((job, &input, &part, 0.5), &more, &mut rendered, stop, progress)?;
+        rendered.finish_samples(&part);
+        Some(rendered)
+    }
+
+    /// Takes camera samples of the pixels of a region and puts what they show into `rendered`. `None` when `stop` was
+    /// set before the end.
+    fn pass(
+        &self,
+        (job, input, part, share): (&FrameJob, &FrameInput, &Part, f64),
+        pass: &Pass,
+        rendered: &mut Rendered,
+        stop: &AtomicBool,
+        progress: &dyn Progress,
+    ) -> Option<()> {
+        let region = &pass.region;
+        let samples = u64::from(region.x1 - region.x0)
+            * u64::from(region.y1 - region.y0)
             * u64::from(self.settings.spp);
-        let tiles = split(&aligned(&traced, &full), if samples < SMALL { BLOCK } else { TILE });
-        let share = 1.0 / tiles.len().max(1) as f64;
-        let part = Part { crop, mask: job.mask, width: camera.width };
+        let tiles = split(region, if samples < SMALL { BLOCK } else { TILE });
+        let share = share / tiles.len().max(1) as f64;
         let kernel = self.kernel();
-        let most = self.settings.most_radiance();
-        let start = || (BlockPixels::new(job.with_gbuffer, most), Scratch::default());
+        let spread = self.settings.most_spp.map(|_| self.settings.exposure);
+        let limits = SampleLimits { most: self.settings.most_radiance(), spread };
+        let with_records = job.with_gbuffer && !pass.goes_on;
+        let start = || (BlockPixels::new(with_records, limits), Scratch::default());
+        let before = pass.goes_on.then_some(&*rendered);
         let one = |state: &mut (BlockPixels, Scratch), tile: &Rect| {
-            let done = self.tile(&input, tile, &part, kernel, state, stop)?;
+            let done = self.tile((input, part, kernel), tile, (pass, before), state, stop)?;
             progress.tile_done(share, &done.rays);
             Some(done)
         };
@@ -267,7 +361,8 @@ impl Renderer<'_> {
         } else {
             take_turns(&tiles, start, one)
         };
-        Some(assemble(job, done?))
+        done?.into_iter().for_each(|tile| rendered.add(tile));
+        Some(())
     }
 
     fn input<'a>(&self, camera: &Camera, stream: u32, reuse: Option<Reuse<'a>>) -> FrameInput<'a> {
@@ -285,6 +380,7 @@ impl Renderer<'_> {
             camera: own,
             pixel_size: own.pixel_size(),
             stream,
+            least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
             lights: self.light_sources(reuse),
             around_eye,
@@ -296,29 +392,54 @@ impl Renderer<'_> {
 
     fn tile(
         &self,
-        input: &FrameInput,
+        (input, part, kernel): (&FrameInput, &Part, BlockKernel),
         tile: &Rect,
-        part: &Part,
-        kernel: BlockKernel,
+        (pass, before): (&Pass, Option<&Rendered>),
         (pixels, scratch): &mut (BlockPixels, Scratch),
         stop: &AtomicBool,
     ) -> Option<TileDone> {
         let mut out = TileDone::default();
+        let width = input.camera.width;
+        let is_adaptive = self.settings.most_spp.is_some();
         for block in split(tile, BLOCK) {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            let wanted = |x: u32, y: u32| part.is_masked_in(x, y);
+            let is_own = part.is_own(&block);
+            if !is_own && (pass.goes_on || !part.is_beside(&block)) {
+                continue;
+            }
+            let wanted = |x: u32, y: u32| {
+                let at = (y * width + x) as usize;
+                let is_asked_for = !is_own || part.is_masked_in(at);
+                is_asked_for
+                    && match before {
+                        None => !part.is_known(at),
+                        Some(before) => {
+                            let spread = &before.spreads[at];
+                            spread.count < pass.until.count(at, Some(spread))
+                        }
+                    }
+            };
             pixels.start(&block, self.settings.seed, input.stream, wanted);
             if pixels.len() == 0 {
                 continue;
             }
-            out.rays += kernel(self, input, pixels, scratch, &mut out.left);
-            let finished = pixels.finished(self.settings.spp, self.settings.flag_bad);
-            for pixel in finished.filter(|p| part.is_in_crop(p.x, p.y)) {
-                out.push(pixel.y * part.width + pixel.x, &pixel, input.reuse.is_some());
+            if let Some(before) = before {
+                pixels.resume(&before.film, &before.spreads);
             }
-            let bad = pixels.bad().filter(|(x, y, _)| part.is_in_crop(*x, *y));
+            let mut unused = Left::default();
+            let left = if is_own { &mut out.left } else { &mut unused };
+            let rays = kernel(self, input, &pass.until, pixels, scratch, left);
+            if is_own || part.mask.is_none() {
+                out.rays += rays;
+            }
+            for pixel in pixels.finished(self.settings.flag_bad) {
+                // What lies beyond the crop goes on with it, so that its batches are those of the whole frame.
+                let is_kept = is_own && (is_adaptive || part.is_in_crop(pixel.x, pixel.y));
+                out.push(pixel.y * width + pixel.x, &pixel, is_kept, input.reuse.is_some());
+            }
+            let bad = pixels.bad().filter(|(x, y, _)| is_own && part.is_in_crop(*x, *y));
             bad.for_each(|(x, y, fault)| out.bad.count(fault, x, y));
         }
         Some(out)
@@ -348,18 +469,49 @@ fn pixel_filter(filter: Filter) -> PixelFilter {
     }
 }
 
+/// Some camera samples of a frame.
+struct Pass<'p> {
+    /// The blocks that are looked at.
+    region: Rect,
+    /// How many samples each pixel has at the end.
+    until: Until<'p>,
+    /// Whether the pixels have samples already.
+    goes_on: bool,
+}
+
 /// Which part of the image is wanted.
 struct Part<'a> {
+    image: Rect,
     crop: Rect,
+    /// The blocks that are rendered: whole ones, but for the mask.
+    own: Rect,
     mask: Option<&'a [bool]>,
-    /// Of the image.
-    width: u32,
+    /// Pixels that are rendered already.
+    known: Option<&'a [bool]>,
+    /// Whether the first samples of the blocks around it are looked at too.
+    with_neighbours: bool,
 }
 
 impl Part<'_> {
-    /// Blocks are whole but for the mask.
-    fn is_masked_in(&self, x: u32, y: u32) -> bool {
-        self.mask.is_none_or(|mask| mask[y as usize * self.width as usize + x as usize])
+    fn is_masked_in(&self, at: usize) -> bool {
+        self.mask.is_none_or(|mask| mask[at])
+    }
+
+    fn is_known(&self, at: usize) -> bool {
+        self.known.is_some_and(|known| known[at])
+    }
+
+    /// Whether any pixel of `block` is wanted.
+    fn is_own(&self, block: &Rect) -> bool {
+        let Rect { x0, y0, x1, y1 } = intersection(block, &self.own);
+        let mut places = (y0..y1).flat_map(|y| (x0..x1).map(move |x| y * self.image.x1 + x));
+        places.any(|at| self.is_masked_in(at as usize))
+    }
+
+    /// Whether `block` touches one of which a pixel is wanted, and is looked at for that.
+    fn is_beside(&self, block: &Rect) -> bool {
+        let around = aligned(&grown(block), &self.image);
+        self.with_neighbours && split(&around, BLOCK).iter().any(|block| self.is_own(block))
     }
 
     fn is_in_crop(&self, x: u32, y: u32) -> bool {
@@ -392,16 +544,22 @@ fn take_turns<S, T: Send>(
     Some(done.into_iter().map(|(_, tile)| tile).collect())
 }
 
-fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
-    let mut film = Film::new(job.camera.width, job.camera.height, job.with_gbuffer);
-    film.provenance = job.reuse.map(|_| vec![Provenance::default(); film.rgb.len()]);
-    let mut rays = RayCounts::default();
-    let mut left = Left::default();
-    for tile in tiles {
-        rays += tile.rays;
+impl Rendered {
+    fn new(job: &FrameJob, is_adaptive: bool) -> Self {
+        let mut film = Film::new(job.camera.width, job.camera.height, job.with_gbuffer);
+        let pixels = film.rgb.len();
+        film.provenance = job.reuse.map(|_| vec![Provenance::default(); pixels]);
+        let spreads = vec![SampleSpread::default(); if is_adaptive { pixels } else { 0 }];
+        let (rays, reuse) = (RayCounts::default(), ReuseCounts::default());
+        Self { film, rays, sources: TracedPoints::default(), reuse, spreads }
+    }
+
+    fn add(&mut self, tile: TileDone) {
+        let film = &mut self.film;
+        self.rays += tile.rays;
         film.bad += tile.bad;
-        left.reuse += tile.left.reuse;
-        left.sources.append(tile.left.sources);
+        self.reuse += tile.left.reuse;
+        self.sources.append(tile.left.sources);
         let places = || tile.places.iter().map(|place| *place as usize);
         places().zip(&tile.rgb).for_each(|(at, rgb)| film.rgb[at] = *rgb);
         if let Some(gbuffer) = &mut film.gbuffer {
@@ -410,8 +568,52 @@ fn assemble(job: &FrameJob, tiles: Vec<TileDone>) -> Rendered {
         if let Some(provenance) = &mut film.provenance {
             places().zip(&tile.provenance).for_each(|(at, own)| provenance[at] = *own);
         }
+        tile.spreads.iter().for_each(|(at, spread)| self.spreads[*at as usize] = *spread);
     }
-    Rendered { film, rays, sources: left.sources, reuse: left.reuse }
+
+    /// Takes over the pixels that were rendered already.
+    fn take_over(&mut self, job: &FrameJob, part: &Part) {
+        let Some(Known { mask, rendered }) = job.known else { return };
+        let (film, from) = (&mut self.film, &rendered.film);
+        for at in (0..mask.len()).filter(|at| mask[*at]) {
+            if let (Some(to), Some(spread)) = (self.spreads.get_mut(at), rendered.spreads.get(at)) {
+                *to = *spread;
+            }
+            let (x, y) = (at as u32 % film.width, at as u32 / film.width);
+            let is_kept = !self.spreads.is_empty() || part.is_in_crop(x, y);
+            if !is_kept || !part.is_masked_in(at) {
+                continue;
+            }
+            film.rgb[at] = from.rgb[at];
+            if let (Some(to), Some(from)) = (&mut film.provenance, &from.provenance) {
+                to[at] = from[at];
+            }
+            if let (Some(to), Some(from)) = (&mut film.gbuffer, &from.gbuffer) {
+                to.set(at, &from.get(at));
+            }
+        }
+    }
+
+    /// Notes how many samples each pixel has, and clears those that were not asked for.
+    fn finish_samples(&mut self, part: &Part) {
+        let film = &mut self.film;
+        let mut samples: Vec<u32> = self.spreads.iter().map(|spread| spread.count).collect();
+        for (at, samples) in samples.iter_mut().enumerate() {
+            let (x, y) = (at as u32 % film.width, at as u32 / film.width);
+            if part.is_masked_in(at) && part.is_in_crop(x, y) {
+                continue;
+            }
+            *samples = 0;
+            film.rgb[at] = Rgb::ZERO;
+            if let Some(provenance) = &mut film.provenance {
+                provenance[at] = Provenance::default();
+            }
+            if let Some(gbuffer) = &mut film.gbuffer {
+                gbuffer.set(at, &GPixel::EMPTY);
+            }
+        }
+        film.samples = Some(samples);
+    }
 }
 
 fn intersection(a: &Rect, b: &Rect) -> Rect {
@@ -429,6 +631,12 @@ fn aligned(crop: &Rect, image: &Rect) -> Rect {
         x1: up(crop.x1).min(image.x1),
         y1: up(crop.y1).min(image.y1),
     }
+}
+
+/// `rect` and what touches it.
+fn grown(rect: &Rect) -> Rect {
+    let Rect { x0, y0, x1, y1 } = *rect;
+    Rect { x0: x0.saturating_sub(1), y0: y0.saturating_sub(1), x1: x1 + 1, y1: y1 + 1 }
 }
 
 /// `rect` in squares of `edge` pixels, row by row; those at the far sides may be smaller.

@@ -40,10 +40,11 @@ impl Renderer<'_> {
         let filter = pixel_filter(self.settings.filter);
         let sampler = film_sampler(self.settings.seed, x, y);
         let mut best = (f64::INFINITY, [0.0; 2], 0);
-        let spp = self.settings.spp;
+        // Samples that only some pixels take are not recorded.
+        let (spp, most) = (self.settings.spp, self.settings.most_camera_samples());
         for first in (0..spp).step_by(SAMPLES_TOGETHER as usize) {
             let chunk = first..first.saturating_add(SAMPLES_TOGETHER).min(spp);
-            for (sample, [dx, dy]) in (first..).zip(offsets_of(spp, &filter, &sampler, chunk)) {
+            for (sample, [dx, dy]) in (first..).zip(offsets_of(most, &filter, &sampler, chunk)) {
                 let distance = dx * dx + dy * dy;
                 if distance < best.0 {
                     best = (distance, [dx, dy], sample);

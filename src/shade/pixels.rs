@@ -1,7 +1,8 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
+use super::adaptive::{SampleSpread, Until};
 use super::{FrameInput, dimensions};
-use crate::film::{GPixel, Provenance, ProvenanceKind};
+use crate::film::{Film, GPixel, Provenance, ProvenanceKind};
 use crate::inference::SAMPLES_TOGETHER;
 use crate::math::Rgb;
 use crate::sampling::{PixelFilter, PixelSampler};
@@ -25,12 +26,17 @@ pub(super) struct BlockPixels {
     lens: Vec<[f64; 2]>,
     samplers: Vec<PixelSampler>,
     sums: Vec<Rgb>,
-    /// The most that each channel of a sample's radiance may be.
-    most: Option<f32>,
-    /// Where there is such a limit: sums of the present chunk's samples, pixel by pixel.
+    /// How many samples each pixel has.
+    taken: Vec<u32>,
+    limits: SampleLimits,
+    /// Where samples are looked at one by one: the present chunk's, pixel by pixel.
     samples: Vec<Rgb>,
+    /// The differences among the samples; empty where no pixel takes more because of them.
+    spreads: Vec<SampleSpread>,
     /// The present chunk's samples.
     chunk: Range<u32>,
+    /// The pixels that take them.
+    active: Vec<u32>,
     /// Invalid light of the present chunk of samples: pixel, sample, fault.
     suspects: Vec<(u32, u32, Fault)>,
     /// Pixels with such a sample, once a sample.
@@ -38,6 +44,21 @@ pub(super) struct BlockPixels {
     records: Vec<Record>,
     with_records: bool,
     provenance: Vec<Provenance>,
+}
+
+/// What is done with single camera samples.
+#[derive(Clone, Copy)]
+pub(super) struct SampleLimits {
+    /// The most that each channel of a sample's radiance may be.
+    pub most: Option<f32>,
+    /// The exposure, where differences among samples are of interest.
+    pub spread: Option<f32>,
+}
+
+impl SampleLimits {
+    fn is_any(&self) -> bool {
+        self.most.is_some() || self.spread.is_some()
+    }
 }
 
 /// A pixel as it goes to the film.
@@ -52,6 +73,8 @@ pub(super) struct FinishedPixel {
     pub record: Option<GPixel>,
     /// Where its light comes from.
     pub provenance: Provenance,
+    /// The differences among its samples, where they are of interest.
+    pub spread: Option<SampleSpread>,
 }
 
 /// The sampler of the camera samples' places in a pixel. They do not depend on the frame: frame 0 is
@@ -95,9 +118,8 @@ struct Record {
 }
 
 impl BlockPixels {
-    /// No block yet; with or without G-buffer records, and with a limit to each channel of a camera
-    /// sample's radiance or none.
-    pub fn new(with_records: bool, most: Option<f32>) -> Self {
+    /// No block yet; with or without G-buffer records.
+    pub fn new(with_records: bool, limits: SampleLimits) -> Self {
         Self {
             places: Vec::new(),
             film_samplers: Vec::new(),
@@ -105,9 +127,12 @@ impl BlockPixels {
             lens: Vec::new(),
             samplers: Vec::new(),
             sums: Vec::new(),
-            most,
+            taken: Vec::new(),
+            limits,
             samples: Vec::new(),
+            spreads: Vec::new(),
             chunk: 0..0,
+            active: Vec::new(),
             suspects: Vec::new(),
             bad: Vec::new(),
             records: Vec::new(),
@@ -146,6 +171,12 @@ impl BlockPixels {
         }
         self.sums.clear();
         self.sums.resize(self.places.len(), Rgb::ZERO);
+        self.taken.clear();
+        self.taken.resize(self.places.len(), 0);
+        self.spreads.clear();
+        if self.limits.spread.is_some() {
+            self.spreads.resize(self.places.len(), SampleSpread::default());
+        }
         self.suspects.clear();
         self.bad.clear();
         self.provenance.clear();
@@ -154,6 +185,20 @@ impl BlockPixels {
         if self.with_records {
             let empty = Record { nearest: f64::INFINITY, pixel: GPixel::EMPTY };
             self.records.resize(self.places.len(), empty);
+        }
+    }
+
+    /// Goes on where `film` and `spreads` (one for each of its pixels) left off, with further samples of the same
+    /// pixels.
+    pub fn resume(&mut self, film: &Film, spreads: &[SampleSpread]) {
+        for (i, (x, y)) in self.places.iter().enumerate() {
+            let at = film.index(*x, *y);
+            self.taken[i] = spreads[at].count;
+            self.spreads[i] = spreads[at];
+            self.sums[i] = film.rgb[at] * spreads[at].count as f32;
+            if let Some(provenance) = &film.provenance {
+                self.provenance[i] = provenance[at];
+            }
         }
     }
 
@@ -183,9 +228,9 @@ impl BlockPixels {
     /// is, and noted.
     #[inline]
     pub fn add(&mut self, pixel: u32, sample: u32, radiance: Rgb) {
-        let sum = match self.most {
-            None => &mut self.sums[pixel as usize],
-            Some(_) => {
+        let sum = match self.limits.is_any() {
+            false => &mut self.sums[pixel as usize],
+            true => {
                 let at = pixel * self.chunk_len() + sample - self.chunk.start;
                 &mut self.samples[at as usize]
             }
@@ -198,32 +243,78 @@ impl BlockPixels {
         self.chunk.end - self.chunk.start
     }
 
-    /// Starts a chunk of the `spp` camera samples of a frame.
-    pub fn start_samples(&mut self, spp: u32, input: &FrameInput, chunk: Range<u32>) {
+    /// Starts the next chunk of camera samples, for those pixels that lack any `until` they have enough; a pixel
+    /// takes at most `most`. `None` where all have enough.
+    pub fn start_samples(
+        &mut self,
+        input: &FrameInput,
+        until: &Until,
+        most: u32,
+    ) -> Option<Range<u32>> {
+        self.active.clear();
+        let mut start = u32::MAX;
+        for (i, (x, y)) in self.places.iter().enumerate() {
+            let taken = self.taken[i];
+            let at = (y * input.camera.width + x) as usize;
+            if taken <= start && taken < until.count(at, self.spreads.get(i)) {
+                if taken < start {
+                    self.active.clear();
+                }
+                start = taken;
+                self.active.push(i as u32);
+            }
+        }
+        if self.active.is_empty() {
+            return None;
+        }
+        // Later chunks start where a run of samples is evenly spread.
+        let end = (start / SAMPLES_TOGETHER + 1).saturating_mul(SAMPLES_TOGETHER);
+        let end = match until {
+            Until::Count(count) => end.min(*count),
+            Until::Each(_) | Until::Differences { .. } => end.min(most),
+        };
+        self.chunk = start..end;
         self.offsets.clear();
         self.lens.clear();
         for sampler in &self.film_samplers {
-            self.offsets.extend(offsets_of(spp, &input.filter, sampler, chunk.clone()));
+            self.offsets.extend(offsets_of(most, &input.filter, sampler, self.chunk.clone()));
             if input.camera.lens.is_sampled() {
-                self.lens.extend(lens_positions(sampler, chunk.clone()));
+                self.lens.extend(lens_positions(sampler, self.chunk.clone()));
             }
         }
-        self.chunk = chunk;
-        if self.most.is_some() {
+        if self.limits.is_any() {
             let count = self.chunk_len() as usize * self.places.len();
             self.samples.clear();
             self.samples.resize(count, Rgb::ZERO);
         }
+        Some(self.chunk.clone())
+    }
+
+    /// The pixels that take the present chunk of samples.
+    pub fn active(&self) -> impl Iterator<Item = u32> {
+        self.active.iter().copied()
+    }
+
+    /// The number of samples that each active pixel has with the present chunk.
+    pub fn samples_after(&self) -> u32 {
+        self.chunk.end
     }
 
     /// Adds the chunk's samples, whole by now, to their pixels, none of them above the limit.
-    fn add_clamped(&mut self, most: f32) {
-        let samples = self.samples.chunks(self.chunk_len().max(1) as usize);
-        for (sum, samples) in self.sums.iter_mut().zip(samples) {
-            // What is invalid stays what it is.
-            let clamped =
-                |light: &Rgb| if light.is_finite() { light.min(Rgb::splat(most)) } else { *light };
-            *sum += samples.iter().map(clamped).fold(Rgb::ZERO, |all, light| all + light);
+    fn add_samples(&mut self) {
+        let count = self.chunk_len() as usize;
+        for pixel in self.active.iter().map(|pixel| *pixel as usize) {
+            for light in &self.samples[pixel * count..][..count] {
+                let light = match self.limits.most {
+                    // What is invalid stays what it is.
+                    Some(most) if light.is_finite() => light.min(Rgb::splat(most)),
+                    _ => *light,
+                };
+                self.sums[pixel] += light;
+                if let Some(exposure) = self.limits.spread {
+                    self.spreads[pixel].add(light * exposure);
+                }
+            }
         }
     }
 
@@ -246,9 +337,11 @@ impl BlockPixels {
 
     /// Ends a chunk of camera samples: each bad one counts once, by its worst fault.
     pub fn end_samples(&mut self) {
-        if let Some(most) = self.most {
-            self.add_clamped(most);
+        if self.limits.is_any() {
+            self.add_samples();
         }
+        let count = self.chunk_len();
+        self.active.iter().for_each(|pixel| self.taken[*pixel as usize] += count);
         if self.suspects.is_empty() {
             return;
         }
@@ -327,14 +420,14 @@ impl BlockPixels {
 
     /// Each finished pixel. With `flag_bad`, pixels with a bad sample are
     /// magenta.
-    pub fn finished(&self, spp: u32, flag_bad: bool) -> impl Iterator<Item = FinishedPixel> {
-        let share = 1.0 / spp as f32;
+    pub fn finished(&self, flag_bad: bool) -> impl Iterator<Item = FinishedPixel> {
         self.places.iter().enumerate().map(move |(i, &(x, y))| {
             let sum = self.sums[i];
             let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
-            let rgb = if flagged { MAGENTA } else { sum * share };
+            let rgb = if flagged { MAGENTA } else { sum * (1.0 / self.taken[i] as f32) };
             let record = self.records.get(i).map(|r| r.pixel);
-            FinishedPixel { x, y, rgb, record, provenance: self.provenance[i] }
+            let spread = self.spreads.get(i).copied();
+            FinishedPixel { x, y, rgb, record, provenance: self.provenance[i], spread }
         })
     }
 }

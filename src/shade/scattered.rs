@@ -1,8 +1,9 @@
 //! A few pixels of a frame, wherever they lie: eight of them make a block, which fills packets and leaves
 //! enough blocks for all threads; no film is made for them.
 
+use super::adaptive::Until;
 use super::kernel::Scratch;
-use super::pixels::BlockPixels;
+use super::pixels::{BlockPixels, SampleLimits};
 use super::{Left, Renderer};
 use crate::math::Rgb;
 use crate::scene::Camera;
@@ -26,16 +27,17 @@ impl Renderer<'_> {
     ) -> Option<(Vec<Rgb>, RayCounts)> {
         let input = self.input(camera, stream, None);
         let kernel = self.kernel();
-        let most = self.settings.most_radiance();
-        let start = || (BlockPixels::new(false, most), Scratch::default());
+        let until = Until::Count(self.settings.spp);
+        let limits = SampleLimits { most: self.settings.most_radiance(), spread: None };
+        let start = || (BlockPixels::new(false, limits), Scratch::default());
         let one = |state: &mut (BlockPixels, Scratch), group: &[(u32, u32)]| {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
             let (pixels, scratch) = state;
             pixels.start_scattered(group, self.settings.seed, stream);
-            let rays = kernel(self, &input, pixels, scratch, &mut Left::default());
-            let finished = pixels.finished(self.settings.spp, self.settings.flag_bad);
+            let rays = kernel(self, &input, &until, pixels, scratch, &mut Left::default());
+            let finished = pixels.finished(self.settings.flag_bad);
             Some((finished.map(|p| p.rgb).collect::<Vec<_>>(), rays))
         };
         let done: Option<Vec<_>> = places.par_chunks(TOGETHER).map_init(start, one).collect();

@@ -149,14 +149,7 @@ impl Stage<'_> {
     }
 
     pub fn render(&self, settings: &Settings, camera: &Camera, stream: u32) -> Film {
-        let job = FrameJob {
-            camera,
-            stream,
-            with_gbuffer: false,
-            reuse: None,
-            mask: None,
-            beyond_crop: false,
-        };
+        let job = FrameJob::whole(camera, stream);
         let stop = AtomicBool::new(false);
         let render = || self.renderer(settings).render_job(&job, &stop, &());
         self.pool.install(render).expect("not stopped").film

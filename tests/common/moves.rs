@@ -126,14 +126,7 @@ impl Stage<'_> {
     /// A frame, traced with the random numbers of `stream`.
     pub fn traced(&self, settings: &Settings, shot: &Shot, frame: u32, stream: u32) -> Film {
         let camera = shot.camera(frame, settings.width, settings.height).expect("a camera");
-        let job = FrameJob {
-            camera: &camera,
-            stream,
-            with_gbuffer: false,
-            reuse: None,
-            mask: None,
-            beyond_crop: false,
-        };
+        let job = FrameJob::whole(&camera, stream);
         let render = || self.renderer(settings).render_job(&job, &self.stop, &());
         self.pool.install(render).expect("not stopped").film
     }

@@ -76,12 +76,9 @@ fn key_bytes(renderer: &Renderer, shot: &Shot, channels: &Channels) -> Result<u6
     for frame in [1, shot.frames.div_ceil(2), shot.frames] {
         let camera = shot.camera(frame, w, h)?;
         let job = FrameJob {
-            camera: &camera,
-            stream: frame,
-            with_gbuffer: false,
             reuse: Some(Reuse { channels, inference: None }),
-            mask: None,
             beyond_crop: true,
+            ..FrameJob::whole(&camera, frame)
         };
         let traced = small.render_job(&job, &AtomicBool::new(false), &());
         let sources = traced.map(|done| done.sources).unwrap_or_default();

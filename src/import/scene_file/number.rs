@@ -126,6 +126,11 @@ number!(
 pub(super) struct Int<const MIN: i64, const MAX: i64>(i64);
 
 impl<const MIN: i64, const MAX: i64> Int<MIN, MAX> {
+    /// `x`, if it is in range.
+    pub fn new<E: Error>(x: i64) -> Result<Self, E> {
+        Self(MIN).visit_i64(x)
+    }
+
     /// `x`, or the nearest end of the range.
     pub fn clamped(x: i64) -> Self {
         Self(x.clamp(MIN, MAX))

@@ -1,5 +1,6 @@
 //! `[settings]`: everything that `tweenray render` can set, under the same names.
 
+mod camera_samples;
 mod switches;
 
 use super::at::At;
@@ -12,6 +13,7 @@ use crate::scene::{
     self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, JobOptions, Rect,
     ReuseSettings, ToneCurve, limits,
 };
+use camera_samples::CameraSamples;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -32,8 +34,9 @@ const MAX_SAMPLES: i64 = limits::MAX_SAMPLES as i64;
 pub(super) struct Settings {
     /// Image width and height, pixels.
     pub size: List<Pixels, 2>,
-    /// Camera samples per pixel.
-    spp: Int<1, MAX_SAMPLES>,
+    /// Camera samples per pixel: a number, or `[least, most]`, where a pixel takes more than the least as far as its
+    /// samples, or its neighbours', differ.
+    spp: CameraSamples,
     /// Pixel filter: "box", "tent", "gaussian" or "blackman-harris".
     filter: Filter,
     /// Shadow samples per area light and camera sample; 0 leaves area lights unlit.
@@ -111,7 +114,7 @@ impl Default for Settings {
         let job = JobOptions::default();
         Self {
             size: List([s.width, s.height].map(|x| Int::clamped(x.into()))),
-            spp: Int::clamped(s.spp.into()),
+            spp: CameraSamples { least: s.spp, most: s.most_spp },
             filter: s.filter,
             shadow_samples: Int::clamped(s.shadow_samples.into()),
             sky_samples: Int::clamped(s.sky_samples.into()),
@@ -159,7 +162,8 @@ impl Settings {
         Ok(scene::Settings {
             width: self.size.0[0].u32(),
             height: self.size.0[1].u32(),
-            spp: self.spp.u32(),
+            spp: self.spp.least,
+            most_spp: self.spp.most,
             filter: self.filter,
             shadow_samples: self.shadow_samples.u32(),
             sky_samples: self.sky_samples.u32(),

@@ -16,7 +16,7 @@ use crate::reuse::audit::{self, AuditedFrame, AuditedPixel};
 use crate::reuse::evidence::{Evidence, Finding};
 use crate::reuse::{Judged, Lookup, PARTS, Probe, ProbeDraw, Reference, is_worth_lookups};
 use crate::scene::Camera;
-use crate::shade::{FrameJob, Rendered};
+use crate::shade::{FrameJob, Known, Rendered, Sampling};
 use crate::stats::{AuditSums, RayCounts};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -50,11 +50,20 @@ pub(super) struct Probed {
 }
 
 impl Probed {
-    /// Mask of the pixels of `mask` (or of all) that are not probes.
-    pub fn others(&self, mask: Option<&[bool]>) -> Vec<bool> {
-        let wanted = |i: usize| mask.is_none_or(|mask| mask[i]);
-        self.mask.iter().enumerate().map(|(i, is_probe)| !is_probe && wanted(i)).collect()
+    /// What the probes show: their first trace.
+    pub fn shown(&self) -> Known<'_> {
+        Known { mask: &self.mask, rendered: &self.traces[0] }
     }
+
+    /// The camera samples of the probes.
+    fn sampling(&self) -> Sampling<'_> {
+        sampling_of(&self.traces[0])
+    }
+}
+
+/// As many camera samples as a picture has.
+fn sampling_of(rendered: &Rendered) -> Sampling<'_> {
+    rendered.film.samples.as_deref().map_or(Sampling::Alone, Sampling::As)
 }
 
 impl SurfaceReuse<'_> {
@@ -83,16 +92,21 @@ impl SurfaceReuse<'_> {
         let block = if r.plan().mirror || r.plan().glass { 2 } else { 1 };
         let draw = ProbeDraw::of(r.settings.seed, frame, share, block);
         let mask = draw.mask(camera.width, camera.height);
-        let trace = |stream: u32, lookup| {
+        let trace = |stream: u32, lookup, sampling| {
             let probe = Probe::new(lookup, self.channels.len(), r.settings.reuse.tolerance);
             let with_gbuffer = self.context.with_gbuffer && stream == STREAMS[0];
-            let job = self.job(camera, frame | stream, with_gbuffer, Some(&mask));
+            let job = self.job(camera, frame | stream, &mask);
+            let job = FrameJob { with_gbuffer, sampling, ..job };
             let rendered = self.render(job, Some(&probe as &dyn Inference), &())?;
             Result::Ok((rendered, probe))
         };
-        let (first, own) = trace(STREAMS[0], Some(lookup))?;
-        let (second, again) = trace(STREAMS[1], None)?;
-        let found = own.findings(again, r.settings.spp);
+        let (first, own) = trace(STREAMS[0], Some(lookup), Sampling::Alone)?;
+        let (second, again) = trace(STREAMS[1], None, sampling_of(&first))?;
+        let samples = first.film.samples.as_deref();
+        let samples = |[x, y]: [u32; 2]| {
+            samples.map_or(r.settings.spp, |samples| samples[first.film.index(x, y)])
+        };
+        let found = own.findings(again, r.settings.spp, &samples);
         let of_others = |part: usize| {
             let is_in = move |pixel: &[u32; 2]| draw.part(pixel[0], pixel[1]) == part;
             let others = found.iter().filter(move |(pixel, _)| !is_in(pixel));
@@ -111,21 +125,14 @@ impl SurfaceReuse<'_> {
         Ok(probed)
     }
 
-    /// The job that traces the pixels of `mask`, also outside the crop, and gathers their surface points.
-    fn job<'j>(
-        &self,
-        camera: &'j Camera,
-        stream: u32,
-        with_gbuffer: bool,
-        mask: Option<&'j [bool]>,
-    ) -> FrameJob<'j> {
-        let job = self.context.job(stream, camera);
-        FrameJob { with_gbuffer, mask, beyond_crop: true, ..job }
+    /// The job that traces the pixels of `mask`, also outside the crop, without records.
+    fn job<'j>(&self, camera: &'j Camera, stream: u32, mask: &'j [bool]) -> FrameJob<'j> {
+        FrameJob { mask: Some(mask), beyond_crop: true, ..FrameJob::whole(camera, stream) }
     }
 
-    /// Puts the probes of `frame` into `rendered`, which has its other pixels. Returns the audit of the
-    /// inferred pixels; `None` if there are none.
-    pub(super) fn show_probes(
+    /// Adds the rays, counts and sources of the probes of `frame` to `rendered`, which shows them. Returns the audit
+    /// of the inferred pixels; `None` if there are none.
+    pub(super) fn add_probes(
         &self,
         frame: u32,
         camera: &Camera,
@@ -143,15 +150,6 @@ impl SurfaceReuse<'_> {
         let places = probed.mask.iter().enumerate().filter(|(_, is_probe)| **is_probe);
         let places: Vec<usize> =
             places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
-        for &i in &places {
-            film.rgb[i] = first.film.rgb[i];
-            if let (Some(to), Some(from)) = (&mut film.provenance, &first.film.provenance) {
-                to[i] = from[i];
-            }
-            if let (Some(to), Some(from)) = (&mut film.gbuffer, &first.film.gbuffer) {
-                to.set(i, &from.get(i));
-            }
-        }
         film.bad += first.film.bad;
         rendered.rays += first.rays;
         rendered.reuse += first.reuse;
@@ -196,7 +194,8 @@ impl SurfaceReuse<'_> {
             let evidence = |[x, y]: [u32; 2]| &probed.crossed[probed.draw.part(x, y)];
             let tolerance = self.context.renderer.settings.reuse.tolerance;
             let judged = Judged { lookup: &lookup, evidence: &evidence, tolerance };
-            let job = self.job(camera, frame | STREAMS[2], false, Some(&probed.mask));
+            let job = self.job(camera, frame | STREAMS[2], &probed.mask);
+            let job = FrameJob { sampling: probed.sampling(), ..job };
             let inferred = self.render(job, Some(&judged), &())?;
             Ok((inferred.rays, Some(inferred.film)))
         })
