@@ -6,7 +6,7 @@ use crate::cli::progress::Watch;
 use crate::cli::request::{Request, Setup};
 use crate::cli::say;
 use crate::cli::stats::RankStats;
-use crate::cluster::{self, Outcome};
+use crate::cluster::{self, Outcome, RankJob};
 use crate::error::Result;
 use crate::output::{Format, SequenceLock, atomic};
 use crate::reuse::colour::AgreementRule;
@@ -104,8 +104,17 @@ impl<'a> RenderJob<'a> {
         let maker = self.maker(&watch, &checkpoints)?;
         let (target, stop) = (&self.target, &interrupt.stop);
         let done = |report: &_| watch.frame_done(report);
-        let work = || cluster::render(comm, order, target, plan, &*maker, stop, &done);
-        let outcome = interrupt.watched(work);
+        let job = RankJob {
+            comm,
+            rank_order: order,
+            target,
+            plan,
+            maker: &*maker,
+            stop,
+            threads: pool.current_num_threads(),
+            done: &done,
+        };
+        let outcome = interrupt.watched(|| cluster::render(&job));
         watch.finish();
         let notes = outcome.as_ref().map_or_else(|_| maker.notes(), |o| o.notes.clone());
         say::unless(*quiet, &notes, |n| say::note(n));
