@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
-use tweenray::cluster::{self, Communicator};
+use tweenray::cluster::{self, Communicator, RankJob};
 use tweenray::error::{Error, Result};
 use tweenray::film::Film;
 use tweenray::output::manifest::{FORMAT, Header};
@@ -81,7 +81,17 @@ fn be_a_rank(place: &str, folder: &Path) {
     let maker = Lemon { place: place.into() };
     let stop = AtomicBool::new(false);
     let done = |_: &_| assert!(place != "main", "the main thread met a lemon");
-    match cluster::render(&comm, &order, &target, &plan, &maker, &stop, &done) {
+    let job = RankJob {
+        comm: &comm,
+        rank_order: &order,
+        target: &target,
+        plan: &plan,
+        maker: &maker,
+        stop: &stop,
+        threads: 1,
+        done: &done,
+    };
+    match cluster::render(&job) {
         Ok(outcome) => assert_eq!(outcome.unfinished, 0),
         Err(error) => comm.abort(&error),
     }

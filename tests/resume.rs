@@ -21,7 +21,7 @@ use tweenray::scene::{FrameRange, Policy, Rect, Scene, Settings, Shot};
 use tweenray::sequence::checkpoint::Checkpoints;
 use tweenray::sequence::{
     ColourMaker, FrameContext, FrameGraph, FrameMaker, Pyramid, RankMaker, Recipes, SurfaceReuse,
-    Target, prepare, render_frames,
+    Target, WriterContext, prepare, render_frames,
 };
 use tweenray::shade::{Progress, Renderer};
 use tweenray::stats::RayCounts;
@@ -59,6 +59,12 @@ struct Bed {
 struct Run {
     frames: f64,
     notes: Vec<String>,
+}
+
+fn render(target: &Target, frames: &[u32], journal: &Path, maker: &impl FrameMaker) {
+    let context = WriterContext { target, rank: 0, journal, threads: 2 };
+    render_frames(context, frames, maker, &AtomicBool::new(false), &mut |_| Ok(()))
+        .expect("renders");
 }
 
 /// What makers are made of.
@@ -106,8 +112,7 @@ impl Bed {
         self.process(|maker, target, _| {
             maker.expect(frames);
             let journal = manifest_path(&target.pattern);
-            render_frames(target, &frames[..count], (0, &journal), maker, &mut |_| Ok(()))
-                .expect("renders");
+            render(target, &frames[..count], &journal, maker);
         })
     }
 
@@ -134,7 +139,7 @@ impl Bed {
             maker.expect(frames);
             let (target, frames) = (checkpoints.target, &frames[..count]);
             let journal = manifest_path(&target.pattern);
-            render_frames(target, frames, (0, &journal), &maker, &mut |_| Ok(())).expect("renders");
+            render(target, frames, &journal, &maker);
             maker.notes()
         })
     }
@@ -301,7 +306,7 @@ fn references_that_cannot_be_written_do_not_end_the_job() {
         let frames = [1, 9, 5, 3, 2];
         maker.expect(&frames);
         let journal = manifest_path(&target.pattern);
-        render_frames(target, &frames, (0, &journal), maker, &mut |_| Ok(())).expect("renders");
+        render(target, &frames, &journal, maker);
         maker.stopped();
     });
     assert!(run.notes.len() == 1 && run.notes[0].contains(".f.references"), "{:?}", run.notes);

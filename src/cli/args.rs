@@ -7,7 +7,7 @@ pub use job::JobArgs;
 use super::values::{self, CameraSamples, Clamp};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
-    BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings,
+    Aovs, BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings,
     ToneCurve, limits,
 };
 use clap::Args;
@@ -71,6 +71,12 @@ pub struct SettingArgs {
     /// Bits per channel of png files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", value_parser = png_bits)]
     pub png_bits: Option<u8>,
+    /// What exr frames hold beside colour, with commas between: depth, position, normal, albedo, mesh-id and
+    /// motion of first hits, the maps provenance, frame, distance and audit, the reference (traced points for
+    /// --references), all, none [default: none; with --references: reference]. --maps adds the maps
+    #[arg(long, value_name = "LIST", value_delimiter = ',', hide_possible_values = true,
+        value_parser = values::choice::<Aovs>(&Aovs::NAMES))]
+    pub aovs: Vec<Aovs>,
     /// Show pixels with a sample that is NaN, infinite or negative in magenta [default: off]
     #[arg(long, value_name = "on|off", value_parser = values::switch())]
     pub flag_bad: Option<bool>,
@@ -192,6 +198,9 @@ impl SettingArgs {
         put(&mut s.clamp, self.clamp.map(|Clamp(most)| most));
         put(&mut s.tone, self.tone);
         put(&mut s.png_bits, self.png_bits);
+        if !self.aovs.is_empty() {
+            s.aovs = Some(self.aovs.iter().cloned().collect());
+        }
         put(&mut s.flag_bad, self.flag_bad);
         put(&mut s.shadow_samples, self.shadow_samples);
         put(&mut s.sky_samples, self.sky_samples);

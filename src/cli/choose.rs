@@ -208,7 +208,7 @@ impl Chooser<'_> {
             shadow: s.shadow_samples.is_some(),
             sky: s.sky_samples.is_some(),
             bounces: s.bounces.is_some(),
-            policy: s.reuse.policy.is_some() || self.request.options.maps,
+            policy: s.reuse.policy.is_some() || self.request.needs_reuse(),
         }
     }
 

@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 
 /// Bar units in a frame, so that the bar moves within a frame.
 const UNITS: f64 = 1000.0;
+/// A frame in the count of finished tiles, whose shares are far below a bar unit on large images.
+const FRAME: u64 = 1_000_000_000;
 
 /// The display of progress.
 pub struct Watch {
@@ -24,7 +26,7 @@ pub struct Watch {
     rays: AtomicU64,
     /// The share reused in the last frame, as text.
     reused: Mutex<String>,
-    /// Finished share of the frames that are being rendered, in units.
+    /// Finished share of the frames that are being rendered, [`FRAME`] for a whole one.
     partly: AtomicU64,
 }
 
@@ -48,7 +50,9 @@ impl Watch {
     /// A frame of this or another rank is finished.
     pub fn frame_done(&self, report: &FrameReport) {
         let finished = self.finished.fetch_add(1, Ordering::Relaxed) + 1;
-        self.partly.store(0, Ordering::Relaxed);
+        // The next frame may be partly or wholly traced, but none after it.
+        let beyond = |partly: u64| Some(partly.saturating_sub(FRAME).min(FRAME));
+        _ = self.partly.fetch_update(Ordering::Relaxed, Ordering::Relaxed, beyond);
         let number = self.kept + finished;
         if let Some(bar) = &self.bar {
             *self.reused() = reused(report.reuse.share());
@@ -76,11 +80,10 @@ impl Progress for Watch {
     fn tile_done(&self, share: f64, rays: &RayCounts) {
         let Some(bar) = &self.bar else { return };
         let cast = self.rays.fetch_add(rays.total(), Ordering::Relaxed) + rays.total();
-        // Tile shares are far below a unit on large images, hence the finer count.
-        let fine = (share * UNITS * 1e6) as u64;
-        let partly = (self.partly.fetch_add(fine, Ordering::Relaxed) + fine) as f64 * 1e-6;
-        let finished = f64::from(self.finished.load(Ordering::Relaxed)) * UNITS;
-        bar.set_position((finished + partly) as u64);
+        let fine = (share * FRAME as f64) as u64;
+        let partly = (self.partly.fetch_add(fine, Ordering::Relaxed) + fine) as f64 / FRAME as f64;
+        let finished = f64::from(self.finished.load(Ordering::Relaxed));
+        bar.set_position(((finished + partly) * UNITS) as u64);
         let seconds = self.start.elapsed().as_secs_f64();
         let mrays = cast as f64 * 1e-6 / seconds.max(1e-9);
         bar.set_message(format!("{mrays:.1} Mrays/s{}", self.reused()));

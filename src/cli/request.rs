@@ -11,7 +11,9 @@ use crate::film::Image;
 use crate::output::manifest::{self, Header, Manifest};
 use crate::output::{Format, FramePattern, VERSION, WriteOptions};
 use crate::reuse::store::Compatibility;
-use crate::scene::{FrameRange, IntersectorKind, JobOptions, Policy, Scene, Settings, Shot};
+use crate::scene::{
+    Aov, Aovs, FrameRange, IntersectorKind, JobOptions, Policy, Scene, Settings, Shot,
+};
 use crate::sequence::{Recipes, Target};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -80,7 +82,6 @@ impl Request {
         comm.agree(machine::best_isa())?;
         let read = comm.from_node(|| Self::read(scene, settings, job));
         let mut request = comm.agree(read)?;
-        comm.agree(refuse_maps(&request.options, &request.settings))?;
         let terms = comm.agree(request.setup(request.settings.clone()))?.terms;
         let on = (&request.scene, &request.settings, &terms);
         let folders = &request.options.references;
@@ -100,12 +101,17 @@ impl Request {
         })
     }
 
+    /// Whether the job asks for something that frames which are all traced cannot have.
+    pub fn needs_reuse(&self) -> bool {
+        self.options.maps || self.settings.aovs.as_ref().is_some_and(Aovs::need_reuse)
+    }
+
     /// The setup for rendering under `settings`.
     ///
     /// Errors: those of [`Recipes::new`].
     pub fn setup(&self, settings: Settings) -> Result<Setup> {
         let terms = references::terms(&self.hashes.light, &self.scene, &settings);
-        let with_motion = self.pattern.format() == Format::Exr;
+        let with_motion = settings.holds(Aov::Motion);
         let recipes = Recipes::new(&self.shot, &settings, !terms.lights.is_empty(), with_motion)?;
         Ok(Setup { settings, terms, recipes })
     }
@@ -118,9 +124,6 @@ impl Request {
             let hash = blake3::hash(bytemuck::cast_slice(&image.rgb)).to_hex();
             format!("{frame}={}", &hash[..16])
         };
-        if self.pattern.format() == Format::Exr {
-            settings["reuse"]["maps"] = self.options.maps.into();
-        }
         settings["reuse"]["references"] = self.references.hash.clone().into();
         if !self.uploads.is_empty() {
             let all: Vec<String> = self.uploads.iter().map(show).collect();
@@ -168,12 +171,44 @@ impl Request {
     }
 }
 
-/// Refuses `--maps` with a policy that infers nothing.
-pub fn refuse_maps(options: &JobOptions, settings: &Settings) -> Result<()> {
-    match settings.reuse.policy {
-        Policy::Off if options.maps => Err(Error::Usage(
+/// What the exr frames of a job hold beside colour: what is asked for, else the references if the job builds on those
+/// of an earlier one, and with `--maps` the maps. None if the frames of `pattern` are not exr.
+///
+/// Errors: `Error::Usage` if frames of the policy or format cannot have what is asked for.
+pub fn aovs(
+    args: &SettingArgs,
+    options: &JobOptions,
+    settings: &Settings,
+    pattern: &FramePattern,
+) -> Result<Aovs> {
+    let policy = settings.reuse.policy;
+    if options.maps && policy == Policy::Off {
+        return Err(Error::Usage(
             "--maps shows what is inferred; with --policy off every frame is traced".into(),
-        )),
-        _ => Ok(()),
+        ));
     }
+    if pattern.format() != Format::Exr {
+        return match args.aovs.iter().find(|list| **list != Aovs::default()) {
+            Some(list) => Err(Error::Usage(format!(
+                "--aovs {list}: only exr frames hold more than colour\n  \
+                 help: choose another output with -o, for example -o 'out/frame_####.exr'"
+            ))),
+            // The scene file may ask for them, and the command line for png frames this once.
+            None => Ok(Aovs::default()),
+        };
+    }
+    // References of a policy that has none are refused as such.
+    let builds_on = !options.references.is_empty() && policy == Policy::Surface;
+    let needed = || builds_on.then_some(Aov::Reference).into_iter().collect();
+    let asked = settings.aovs.clone().unwrap_or_else(needed);
+    let maps = options.maps.then(|| Aovs::from(Aov::MAPS));
+    let all: Aovs = std::iter::once(asked).chain(maps).collect();
+    all.under(policy).map_err(|aov| {
+        let policies = if aov == Aov::Reference { "surface" } else { "surface or colour" };
+        Error::Usage(format!(
+            "the frames can have no {}: that needs --policy {policies}\n  \
+             help: leave it out of --aovs (`aovs` in the scene file)",
+            aov.name()
+        ))
+    })
 }

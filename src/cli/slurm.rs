@@ -6,7 +6,7 @@ mod script;
 use super::args::{SceneArgs, whole};
 use super::exit::Exit;
 use super::render::{self, RenderArgs};
-use super::request::{place, refuse_maps, uploads};
+use super::request::{aovs, place, uploads};
 use super::{job, references, say, values};
 use crate::cluster;
 use crate::error::{Error, Result};
@@ -133,7 +133,7 @@ fn check_files(
     ranks: u32,
 ) -> Result<()> {
     let Loaded { shot, settings, options, .. } = loaded;
-    refuse_maps(options, settings)?;
+    aovs(&render.settings, options, settings, pattern)?;
     render.job.rank_map.iter().try_for_each(|map| cluster::check_rank_map(map, ranks))?;
     references::check(&options.references, pattern, settings)?;
     uploads(&options.uploads, shot, settings).map(drop)

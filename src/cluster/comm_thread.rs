@@ -16,12 +16,14 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time between polls for messages; an event of the render thread ends the wait.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 /// Time between polls while sends are pending, because MPI advances long messages only inside calls.
 const SENDING_POLL_INTERVAL: Duration = Duration::from_micros(200);
+/// Longest time that the report of a written frame waits for the end of a task, whose message takes it along.
+const REPORT_DELAY: Duration = Duration::from_secs(1);
 
 /// The state of a rank's communication thread.
 pub struct CommThread<'a> {
@@ -39,6 +41,14 @@ pub struct CommThread<'a> {
     assignments: VecDeque<Assignment>,
     /// Whether the render thread has a task.
     is_busy: bool,
+    /// Number of frames of the tasks so far that are not written.
+    unwritten: usize,
+    /// Reports of written frames that rank 0 has not got.
+    reports: Vec<FrameReport>,
+    /// When the first of these frames was written.
+    reports_since: Instant,
+    /// Since when the render thread has a task or frames are to be written.
+    working_since: Option<Instant>,
     /// Representatives whose references the maker holds.
     imported: BTreeSet<u32>,
     /// References that arrived and were not given to the maker, by representative.
@@ -55,7 +65,7 @@ pub struct CommThread<'a> {
     is_over: bool,
     /// Frames that this rank finished.
     pub finished: Vec<FrameReport>,
-    /// Seconds that the render thread had a task.
+    /// Seconds in which the render thread had a task or a frame was to be written.
     pub busy_seconds: f64,
 }
 
@@ -78,6 +88,10 @@ impl<'a> CommThread<'a> {
             tasks,
             assignments: VecDeque::new(),
             is_busy: false,
+            unwritten: 0,
+            reports: Vec::new(),
+            reports_since: Instant::now(),
+            working_since: None,
             imported: BTreeSet::new(),
             received: BTreeMap::new(),
             encoded: BTreeMap::new(),
@@ -91,14 +105,18 @@ impl<'a> CommThread<'a> {
         }
     }
 
-    /// Runs until all tasks of the job are done, or the job was asked to stop and this rank's task ended.
+    /// Runs until all tasks of the job are done, or the job was asked to stop and this rank's task ended, and
+    /// this rank's frames are written.
     pub fn run(&mut self, events: &Receiver<Event>) -> Result<()> {
         self.dispatch()?;
         loop {
             self.poll()?;
             self.propagate_stop()?;
             self.start_task()?;
-            if !self.is_busy && (self.is_over || self.stop.load(Ordering::Relaxed)) {
+            self.send_reports()?;
+            self.note_work();
+            let is_at_work = self.working_since.is_some();
+            if !is_at_work && (self.is_over || self.stop.load(Ordering::Relaxed)) {
                 return Ok(());
             }
             let is_sending = self.comm.has_pending_sends();
@@ -110,6 +128,30 @@ impl<'a> CommThread<'a> {
                     return Err(Error::Failed("the rendering thread is gone".into()));
                 }
             }
+        }
+    }
+
+    /// Sends reports that no task's end will take along soon.
+    fn send_reports(&mut self) -> Result<()> {
+        let is_due =
+            self.comm.is_root() || !self.is_busy || self.reports_since.elapsed() >= REPORT_DELAY;
+        if self.reports.is_empty() || !is_due {
+            return Ok(());
+        }
+        let reports = std::mem::take(&mut self.reports);
+        self.send(0, Message::Wrote(reports))
+    }
+
+    /// Counts the seconds of work.
+    fn note_work(&mut self) {
+        let is_at_work = self.is_busy || self.unwritten > 0;
+        match self.working_since {
+            None if is_at_work => self.working_since = Some(Instant::now()),
+            Some(since) if !is_at_work => {
+                self.busy_seconds += since.elapsed().as_secs_f64();
+                self.working_since = None;
+            }
+            _ => {}
         }
     }
 
@@ -244,6 +286,7 @@ impl<'a> CommThread<'a> {
             _ => Vec::new(),
         };
         self.is_busy = true;
+        self.unwritten += task.frames().len();
         let sent = self.tasks.send(TaskInput { task, references, strips });
         sent.map_err(|_| Error::Failed("the rendering thread is gone".into()))
     }
@@ -261,16 +304,22 @@ impl<'a> CommThread<'a> {
         has_strips && assignment.needs.iter().all(is_here)
     }
 
-    /// Handles an event of the render thread.
+    /// Handles an event of the render thread or the writing thread.
     fn handle_event(&mut self, event: Event) -> Result<()> {
         match event {
             Event::Wrote(report) => {
+                self.unwritten -= 1;
                 self.finished.push((*report).clone());
-                self.send(0, Message::Wrote(vec![*report]))
+                if self.reports.is_empty() {
+                    self.reports_since = Instant::now();
+                }
+                self.reports.push(*report);
+                Ok(())
             }
             Event::Finished(finished) => self.complete_task(*finished),
-            Event::Stopped => {
+            Event::Stopped { unmade } => {
                 self.is_busy = false;
+                self.unwritten -= unmade;
                 // A task ends early only because the job was asked to stop.
                 self.stop.store(true, Ordering::Relaxed);
                 Ok(())
@@ -281,9 +330,8 @@ impl<'a> CommThread<'a> {
 
     /// Sends the result of a task to the ranks that take it, and reports the task to rank 0.
     fn complete_task(&mut self, finished: Finished) -> Result<()> {
-        let Finished { task, report, output, seconds } = finished;
+        let Finished { task, output, seconds } = finished;
         self.is_busy = false;
-        self.busy_seconds += seconds;
         let representative = task.representative;
         match &task.extent {
             Extent::Strip { number, leader, .. } => {
@@ -308,8 +356,8 @@ impl<'a> CommThread<'a> {
             }
             Extent::Whole { .. } => {}
         }
-        self.finished.extend(report.clone());
-        self.send(0, Message::Done { task, reports: report.into_iter().collect(), seconds })?;
+        let reports = std::mem::take(&mut self.reports);
+        self.send(0, Message::Done { task, reports, seconds })?;
         self.dispatch()
     }
 

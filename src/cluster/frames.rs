@@ -1,6 +1,7 @@
 //! Rendering the frames of a sequence on all ranks of the job.
 
 use super::comm_thread::CommThread;
+use super::render_thread::Event;
 use super::scheduler::Scheduler;
 use super::traffic::Traffic;
 use super::{Communicator, render_thread};
@@ -8,7 +9,9 @@ use crate::error::Result;
 use crate::output::manifest::{Manifest, manifest_path, part_path};
 use crate::output::{SequenceLock, atomic};
 use crate::scene::FrameRange;
-use crate::sequence::{self, FrameReport, Plan, RankMaker, Target};
+use crate::sequence::{
+    self, FrameReport, FrameWriter, Plan, RankMaker, Target, WriterContext, frame_channel,
+};
 use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -32,7 +35,7 @@ pub struct Outcome {
 /// The work of one rank for a plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct RankWork {
-    /// Seconds in which the rank rendered or wrote frames or strips.
+    /// Seconds in which the rank rendered frames or strips, or wrote frames, or did both at once.
     pub busy_seconds: f64,
     /// Seconds in which the rank had no task, or waited for references.
     pub waiting_seconds: f64,
@@ -89,60 +92,61 @@ fn own_share(frames: FrameRange, rank: u32, ranks: u32) -> Range<u32> {
     edge(rank)..edge(rank + 1)
 }
 
-/// Renders the frames `plan.render` on all ranks. The scheduler on rank 0 assigns frames; each rank
-/// writes its frames and a journal of them; rank 0 merges the journals into the manifest. `rank_order`
-/// lists the ranks, node by node. `done` is called on rank 0 for every finished frame of the job. If
-/// `stop` is set on any rank, all ranks stop after the blocks in flight. All ranks call it.
+/// What the ranks of a job need to render its frames.
+pub struct RankJob<'a> {
+    /// All ranks.
+    pub comm: &'a Communicator,
+    /// The ranks, node by node.
+    pub rank_order: &'a [u32],
+    /// Where the frames go.
+    pub target: &'a Target,
+    /// Which frames are rendered.
+    pub plan: &'a Plan,
+    /// Makes the frames.
+    pub maker: &'a dyn RankMaker,
+    /// Set when the job is to stop; the maker watches it.
+    pub stop: &'a AtomicBool,
+    /// How many threads of this rank encode files, beside those that trace.
+    pub threads: usize,
+    /// Called on rank 0 for every finished frame of the job.
+    pub done: &'a (dyn Fn(&FrameReport) + Sync),
+}
+
+/// Renders the frames to render on all ranks. The scheduler on rank 0 assigns frames; each rank
+/// writes its frames, while it traces the next, and a journal of them; rank 0 merges the journals into
+/// the manifest. If `stop` is set on any rank, all ranks stop after the blocks in flight. All ranks call it.
 ///
 /// # Errors
 /// The error of this rank. Other ranks may still be rendering, and [`Communicator::abort`] ends them.
-pub fn render(
-    comm: &Communicator,
-    rank_order: &[u32],
-    target: &Target,
-    plan: &Plan,
-    maker: &dyn RankMaker,
-    stop: &AtomicBool,
-    done: &dyn Fn(&FrameReport),
-) -> Result<Outcome> {
+pub fn render(job: &RankJob) -> Result<Outcome> {
+    let RankJob { comm, target, plan, maker, .. } = *job;
     let (reports, own) = match comm.size() {
-        1 => render_single(target, plan, maker, done)?,
-        _ => render_on_ranks(comm, rank_order, target, plan, maker, stop, done)?,
+        1 => render_single(job)?,
+        _ => render_on_ranks(job)?,
     };
     merge(comm, target, plan, (reports, maker.notes()), own)
 }
 
-fn render_single(
-    target: &Target,
-    plan: &Plan,
-    maker: &dyn RankMaker,
-    done: &dyn Fn(&FrameReport),
-) -> Result<(Vec<FrameReport>, RankWork)> {
+fn render_single(job: &RankJob) -> Result<(Vec<FrameReport>, RankWork)> {
+    let RankJob { target, plan, maker, stop, threads, done, .. } = *job;
     let start = Instant::now();
     let frames = maker.batches(&plan.render).concat();
     maker.expect(&frames);
     let mut finished = Vec::new();
-    let mut after_frame = |report: &FrameReport| {
-        finished.push(report.clone());
-        done(report);
+    let mut after_frame = |report: FrameReport| {
+        done(&report);
+        finished.push(report);
         Ok(())
     };
     let journal = manifest_path(&target.pattern);
-    sequence::render_frames(target, &frames, (0, &journal), maker, &mut after_frame)?;
+    let context = WriterContext { target, rank: 0, journal: &journal, threads };
+    sequence::render_frames(context, &frames, maker, stop, &mut after_frame)?;
     let busy_seconds = start.elapsed().as_secs_f64();
     Ok((finished, RankWork { busy_seconds, ..RankWork::default() }))
 }
 
-#[allow(clippy::too_many_arguments, reason = "the parameters of `render`")]
-fn render_on_ranks(
-    comm: &Communicator,
-    rank_order: &[u32],
-    target: &Target,
-    plan: &Plan,
-    maker: &dyn RankMaker,
-    stop: &AtomicBool,
-    done: &dyn Fn(&FrameReport),
-) -> Result<(Vec<FrameReport>, RankWork)> {
+fn render_on_ranks(job: &RankJob) -> Result<(Vec<FrameReport>, RankWork)> {
+    let RankJob { comm, rank_order, target, plan, maker, stop, threads, done } = *job;
     let manifest = manifest_path(&target.pattern);
     let rank = comm.rank();
     let journal = match rank {
@@ -152,11 +156,24 @@ fn render_on_ranks(
     let start = Instant::now();
     let before = comm.sent();
     let scheduler = comm.is_root().then(|| Scheduler::new(maker, &plan.render, rank_order));
+    let writer = FrameWriter::new(WriterContext { target, rank, journal: &journal, threads })?;
+    let (to_writer, made) = frame_channel();
     let (tasks, inputs) = mpsc::channel();
     let (to_comm, events) = mpsc::channel();
+    let from_writer = to_comm.clone();
     let mut thread = CommThread::new(comm, maker, stop, done, scheduler, tasks);
     let (reports, busy_seconds, seconds) = std::thread::scope(|scope| {
-        scope.spawn(move || render_thread::run(maker, target, (rank, &journal), &inputs, &to_comm));
+        scope.spawn(move || render_thread::run(maker, &inputs, to_writer, &to_comm));
+        // The channel of events is closed only when the job ends.
+        scope.spawn(move || {
+            let mut wrote = |report| {
+                _ = from_writer.send(Event::Wrote(Box::new(report)));
+                Ok(())
+            };
+            if let Err(error) = writer.write_all(made, &mut wrote) {
+                _ = from_writer.send(Event::Failed(error));
+            }
+        });
         let ran = thread.run(&events);
         let seconds = start.elapsed().as_secs_f64();
         if ran.is_ok() && stop.load(Ordering::Relaxed) {
@@ -167,7 +184,7 @@ fn render_on_ranks(
             // The job ends, so the render thread stops tracing.
             stop.store(true, Ordering::Relaxed);
         }
-        // Dropping the rest closes the channel of tasks, which ends the render thread.
+        // Dropping the rest closes the channel of tasks, which ends the render thread, and with it the writer.
         let CommThread { finished, busy_seconds, .. } = thread;
         ran.map(|()| (finished, busy_seconds, seconds))
     })?;

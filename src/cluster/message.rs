@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 pub enum Message {
     /// To rank 0: these frames are written.
     Wrote(Vec<FrameReport>),
-    /// To rank 0: this task is done. (Message bytes keep the key `order`.)
+    /// To rank 0: this task is done, and its frames will be written; these reports are of frames that are.
+    /// (Message bytes keep the key `order`.)
     Done {
         #[serde(rename = "order")]
         task: Task,

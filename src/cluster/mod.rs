@@ -25,7 +25,7 @@ pub mod scheduler;
 mod traffic;
 
 pub use failure::PANIC_MESSAGE;
-pub use frames::{Outcome, RankWork, lock, prepare, render};
+pub use frames::{Outcome, RankJob, RankWork, lock, prepare, render};
 pub use launcher::{
     Binding, LauncherProcess, default_threads, is_nonzero_rank, launcher_process, require_single,
 };

@@ -1,12 +1,11 @@
-//! The render thread of a rank: one task after another, each with the references that it takes.
+//! The render thread of a rank: one task after another, each with the references that it takes. Its frames are
+//! written by another thread.
 
 use super::scheduler::{Extent, Task};
 use crate::error::{Error, Result};
-use crate::output::manifest::Journal;
-use crate::sequence::{self, Exported, FrameReport, RankMaker, Strip, Target};
-use std::path::Path;
+use crate::sequence::{self, Exported, FrameReport, MadeFrame, RankMaker, Strip};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender};
+use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
 /// A task, and its inputs from other ranks.
@@ -18,44 +17,43 @@ pub struct TaskInput {
     pub strips: Vec<Arc<[u8]>>,
 }
 
-/// An event on the render thread, for the communication thread.
+/// An event on the render thread or the writing thread, for the communication thread.
 pub enum Event {
-    /// A frame is written, and the task goes on.
+    /// A frame is written.
     Wrote(Box<FrameReport>),
-    /// The task is done.
+    /// The task is done, and the writing thread has its frames.
     Finished(Box<Finished>),
     /// The job was asked to stop, and the task is not done.
-    Stopped,
-    /// The task failed.
+    Stopped {
+        /// How many frames of the task the writing thread does not get.
+        unmade: usize,
+    },
+    /// The task failed, or a frame could not be written.
     Failed(Error),
 }
 
 /// A task that is done.
 pub struct Finished {
     pub task: Task,
-    /// Report of the last frame that the task wrote, if any; those of the frames before it were sent at once.
-    pub report: Option<FrameReport>,
     /// The strip, or the reference if other frames take it; otherwise empty.
     pub output: Exported,
     /// Seconds that the task took.
     pub seconds: f64,
 }
 
-/// Runs the tasks of `inputs` until that channel closes, a task fails, or the job is asked to stop.
-/// `journal` is the path of the journal of `rank`.
+/// Runs the tasks of `inputs` until that channel closes, a task fails, or the job is asked to stop. Hands frames
+/// `to_writer`.
 pub fn run(
     maker: &dyn RankMaker,
-    target: &Target,
-    (rank, journal): (u32, &Path),
     inputs: &Receiver<TaskInput>,
+    to_writer: SyncSender<MadeFrame>,
     events: &Sender<Event>,
 ) {
-    let path = journal;
-    let mut thread = RenderThread { maker, target, rank, path, journal: None, events };
+    let mut thread = RenderThread { maker, to_writer, unmade: 0 };
     for input in inputs {
         let event = match thread.run_task(input) {
             Ok(finished) => Event::Finished(Box::new(finished)),
-            Err(Error::Stopped) => Event::Stopped,
+            Err(Error::Stopped) => Event::Stopped { unmade: thread.unmade },
             Err(error) => Event::Failed(error),
         };
         let goes_on = matches!(event, Event::Finished(_));
@@ -69,13 +67,9 @@ pub fn run(
 /// The state of a rank's render thread.
 struct RenderThread<'a> {
     maker: &'a dyn RankMaker,
-    target: &'a Target,
-    rank: u32,
-    /// Path of the journal.
-    path: &'a Path,
-    /// The journal, open from this rank's first frame on.
-    journal: Option<Journal>,
-    events: &'a Sender<Event>,
+    to_writer: SyncSender<MadeFrame>,
+    /// How many frames of the task the writing thread has not got.
+    unmade: usize,
 }
 
 impl RenderThread<'_> {
@@ -83,14 +77,15 @@ impl RenderThread<'_> {
     fn run_task(&mut self, input: TaskInput) -> Result<Finished> {
         let start = Instant::now();
         let TaskInput { task, references, strips } = input;
+        self.unmade = task.frames().len();
         references
             .iter()
             .for_each(|(representative, bytes)| self.maker.import(*representative, bytes));
-        let (report, output) = match &task.extent {
+        let output = match &task.extent {
             Extent::Strip { number, of, .. } => {
                 let strip = Strip { number: *number, of: *of, is_source: task.is_source };
                 let bytes = self.maker.render_strip(task.representative, strip)?;
-                (None, Exported { bytes: bytes.into(), discoveries: 0 })
+                Exported { bytes: bytes.into(), discoveries: 0 }
             }
             Extent::Whole { frames, .. } => {
                 if !strips.is_empty() {
@@ -100,12 +95,11 @@ impl RenderThread<'_> {
             }
         };
         let seconds = start.elapsed().as_secs_f64();
-        Ok(Finished { task, report, output, seconds })
+        Ok(Finished { task, output, seconds })
     }
 
-    /// Makes a representative and writes `frames`. The report of the last frame is returned, and an event
-    /// is sent for each of the others.
-    fn whole(&mut self, task: &Task, frames: &[u32]) -> Result<(Option<FrameReport>, Exported)> {
+    /// Makes a representative and hands `frames` to the writing thread.
+    fn whole(&mut self, task: &Task, frames: &[u32]) -> Result<Exported> {
         if task.is_source {
             self.maker.hold(task.representative);
         }
@@ -113,19 +107,11 @@ impl RenderThread<'_> {
             self.maker.make_reference(task.representative)?;
         }
         self.maker.expect(frames);
-        let mut last = None;
         for frame in frames {
-            let journal = match &mut self.journal {
-                Some(journal) => journal,
-                none => none.insert(self.target.journal(self.rank, self.path)?),
-            };
-            let place = (self.rank, journal);
-            let report = sequence::render_frame(self.target, *frame, place, self.maker)?;
-            if let Some(before) = last.replace(report) {
-                _ = self.events.send(Event::Wrote(Box::new(before)));
-            }
+            sequence::make_frame(*frame, self.maker, &self.to_writer)?;
+            self.unmade -= 1;
         }
         let output = task.is_source.then(|| self.maker.export(task.representative)).flatten();
-        Ok((last, output.unwrap_or_default()))
+        Ok(output.unwrap_or_default())
     }
 }

@@ -127,6 +127,16 @@ pub struct Task {
     pub extent: Extent,
 }
 
+impl Task {
+    /// The frames that it writes.
+    pub fn frames(&self) -> &[u32] {
+        match &self.extent {
+            Extent::Whole { frames, .. } => frames,
+            Extent::Strip { .. } => &[],
+        }
+    }
+}
+
 /// How much of its frame a task makes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Extent {

@@ -1,7 +1,7 @@
 //! OpenEXR: any number of named channels of one size, in one part of scanlines, ZIP-compressed in
 //! blocks of 16 rows. (Multi-part and tiled files break viewers.)
 //!
-//! A film's channels are `R G B`; with AOVs also `Z` (distance along the view axis, infinity
+//! A film's channels are `R G B`, and of its AOVs those that are asked for: `Z` (distance along the view axis, infinity
 //! where nothing is hit), `P.X P.Y P.Z` (position), `N.X N.Y N.Z` (normal), `albedo.R albedo.G
 //! albedo.B`, `backward.u backward.v` (motion, pixels), all f32, and `mesh_id` (u32, 0 where nothing
 //! is hit). World units throughout. Where pixels take different numbers of camera samples, `samples` (u32) has
@@ -15,6 +15,7 @@ use super::path_kind::{Regular, check_memory};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::math::Vec3;
+use crate::scene::{Aov, Aovs};
 use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::image::write::layers::{LayersWriter, WritableLayers};
@@ -84,21 +85,32 @@ impl ExrChannels {
     }
 }
 
-/// The film's channels, its AOVs among them if it has them.
-pub fn channels_of(film: &Film) -> Vec<ExrChannel> {
+/// The film's colour, and what it has of the first hits and of sample counts among `aovs`.
+pub fn channels_of(film: &Film, aovs: &Aovs) -> Vec<ExrChannel> {
     let mut channels = Vec::new();
     push_vectors(&mut channels, ["R", "G", "B"], &film.rgb);
-    if let Some(samples) = &film.samples {
+    if let Some(samples) = film.samples.as_ref().filter(|_| aovs.has(Aov::Samples)) {
         let samples = ExrSamples::U32(samples.clone());
         channels.push(ExrChannel { name: "samples".into(), samples });
     }
-    if let Some(g) = &film.gbuffer {
+    let Some(g) = &film.gbuffer else { return channels };
+    if aovs.has(Aov::Depth) {
         channels.push(ExrChannel { name: "Z".into(), samples: ExrSamples::F32(g.depth.clone()) });
-        push_vectors(&mut channels, ["P.X", "P.Y", "P.Z"], &g.position);
-        push_vectors(&mut channels, ["N.X", "N.Y", "N.Z"], &g.normal);
-        push_vectors(&mut channels, ["albedo.R", "albedo.G", "albedo.B"], &g.albedo);
+    }
+    for (aov, names, vectors) in [
+        (Aov::Position, ["P.X", "P.Y", "P.Z"], &g.position),
+        (Aov::Normal, ["N.X", "N.Y", "N.Z"], &g.normal),
+        (Aov::Albedo, ["albedo.R", "albedo.G", "albedo.B"], &g.albedo),
+    ] {
+        if aovs.has(aov) {
+            push_vectors(&mut channels, names, vectors);
+        }
+    }
+    if aovs.has(Aov::MeshId) {
         let ids = ExrSamples::U32(g.mesh_id.clone());
         channels.push(ExrChannel { name: "mesh_id".into(), samples: ids });
+    }
+    if aovs.has(Aov::Motion) {
         for (i, name) in ["backward.u", "backward.v"].into_iter().enumerate() {
             let samples = ExrSamples::F32(g.motion.iter().map(|m| m[i]).collect());
             channels.push(ExrChannel { name: name.into(), samples });
@@ -291,7 +303,7 @@ mod tests {
 
     #[test]
     fn every_channel_comes_back_bit_for_bit() {
-        let channels = channels_of(&film());
+        let channels = channels_of(&film(), &Aovs::All);
         assert_eq!(channels.len(), 3 + 1 + 3 + 3 + 3 + 1 + 2);
         let bytes = encode(35, 19, &channels, "spp 4").expect("encoded");
         let back = decode(Path::new("x.exr"), Cursor::new(&bytes), LIMIT).expect("decoded");
@@ -302,8 +314,30 @@ mod tests {
     }
 
     #[test]
+    fn a_file_holds_the_channels_that_are_asked_for() {
+        let film = film();
+        let names = |list: &str| {
+            let aovs = Aovs::parse(list).expect("a list");
+            let channels = channels_of(&film, &aovs).into_iter().map(|channel| channel.name);
+            channels.collect::<Vec<_>>().join(" ")
+        };
+        for (list, more) in [
+            ("none", ""),
+            ("depth", " Z"),
+            ("position", " P.X P.Y P.Z"),
+            ("motion,normal", " N.X N.Y N.Z backward.u backward.v"),
+            ("albedo,mesh-id", " albedo.R albedo.G albedo.B mesh_id"),
+            ("reference", ""),
+        ] {
+            assert_eq!(names(list), format!("R G B{more}"), "{list}");
+        }
+        assert_eq!(channels_of(&Film::new(2, 1, false), &Aovs::All).len(), 3);
+    }
+
+    #[test]
     fn one_part_of_scanlines() {
-        let bytes = encode(35, 19, &channels_of(&film()), "a comment").expect("encoded");
+        let bytes =
+            encode(35, 19, &channels_of(&film(), &Aovs::All), "a comment").expect("encoded");
         let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(&bytes), true);
         let meta = meta.expect("pedantically valid");
         assert_eq!(meta.headers.len(), 1);
@@ -329,7 +363,7 @@ mod tests {
 
     #[test]
     fn too_large_for_the_limit() {
-        let bytes = encode(35, 19, &channels_of(&film()), "").expect("encoded");
+        let bytes = encode(35, 19, &channels_of(&film(), &Aovs::All), "").expect("encoded");
         let error = decode(Path::new("x.exr"), Cursor::new(&bytes), 35 * 19 * 16 * 4 - 1);
         assert!(matches!(error, Err(Error::Input(_))));
     }

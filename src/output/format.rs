@@ -2,7 +2,7 @@
 
 use super::Display;
 use crate::error::{Error, Result};
-use crate::scene::{Settings, ToneCurve};
+use crate::scene::{Aovs, Settings, ToneCurve};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub enum Format {
     /// Display values, 8 or 16 bits.
     Png,
-    /// Linear radiance and AOVs, f32.
+    /// Linear radiance and AOVs, f32; see [`Aovs`].
     Exr,
     /// Display values, 8 bits, binary (P6).
     Ppm,
@@ -50,8 +50,10 @@ pub struct WriteOptions {
     /// The settings as short text for the file's metadata; nothing that differs between runs of
     /// the same frame, since the same frame is to be the same bytes.
     pub settings: String,
-    /// Set if maps of reuse are written, as channels of exr frames or as files beside other frames: the distance
-    /// that is painted white, in the unit of the film's distances.
+    /// What exr frames hold beside colour, as far as the film has it.
+    pub aovs: Aovs,
+    /// Set if maps of reuse are written as files beside frames that are not exr: the distance that is
+    /// painted white, in the unit of the film's distances.
     pub maps: Option<f32>,
     /// An attribute of exr frames: name and bytes.
     pub attribute: Option<(&'static str, Arc<[u8]>)>,
@@ -65,6 +67,7 @@ impl Default for WriteOptions {
             png_bits: 8,
             frame: None,
             settings: String::new(),
+            aovs: Aovs::default(),
             maps: None,
             attribute: None,
         }
@@ -91,7 +94,9 @@ impl WriteOptions {
         let clamp = s.clamp.map_or_else(String::new, |most| format!(", clamp {most}"));
         let text = text + &clamp;
         let display = Display { exposure: s.exposure, tone: s.tone };
-        Self { display, png_bits: s.png_bits, frame, settings: text, maps: None, attribute: None }
+        let aovs = s.aovs.clone().unwrap_or_default();
+        let (png_bits, settings) = (s.png_bits, text);
+        Self { display, png_bits, frame, settings, aovs, maps: None, attribute: None }
     }
 
     /// The metadata as one line, for formats with a single comment.

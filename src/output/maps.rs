@@ -12,7 +12,7 @@ use super::{Display, WriteOptions, Written, png};
 use crate::error::Result;
 use crate::film::{Film, Provenance, ProvenanceKind};
 use crate::math::{Rgb, luminance};
-use crate::scene::ToneCurve;
+use crate::scene::{Aov, Aovs, ToneCurve};
 use std::path::{Path, PathBuf};
 
 /// Traced: the source paper's pink.
@@ -58,6 +58,21 @@ impl Map {
             Self::Distance => "distance",
             Self::Audit => "audit",
         }
+    }
+
+    /// The map as a channel of exr frames.
+    fn aov(self) -> Aov {
+        match self {
+            Self::Provenance => Aov::Provenance,
+            Self::Frame => Aov::Frame,
+            Self::Distance => Aov::Distance,
+            Self::Audit => Aov::Audit,
+        }
+    }
+
+    /// Name of the map's channel, for example `reuse.provenance`.
+    fn channel_name(self) -> String {
+        format!("reuse.{}", self.name())
     }
 
     /// Explanation of the map, in a line.
@@ -125,7 +140,7 @@ impl Map {
         png::write(&path, &painted, &options).map(|written| (path, written))
     }
 
-    /// The map as a channel of an exr frame, for example `reuse.provenance`.
+    /// The map's channel of an exr frame.
     fn channel(self, film: &Film) -> ExrChannel {
         let n = film.rgb.len();
         let source = |i: usize| film.provenance.as_ref().map_or(Provenance::default(), |s| s[i]);
@@ -135,13 +150,14 @@ impl Map {
             Self::Distance => ExrSamples::F32((0..n).map(|i| source(i).distance).collect()),
             Self::Audit => ExrSamples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
         };
-        ExrChannel { name: format!("reuse.{}", self.name()), samples }
+        ExrChannel { name: self.channel_name(), samples }
     }
 }
 
-/// All maps as channels of an exr frame.
-pub fn channels_of(film: &Film) -> Vec<ExrChannel> {
-    Map::ALL.map(|map| map.channel(film)).into()
+/// The maps among `aovs` as channels of an exr frame.
+pub fn channels_of(film: &Film, aovs: &Aovs) -> Vec<ExrChannel> {
+    let asked = Map::ALL.into_iter().filter(|map| aovs.has(map.aov()));
+    asked.map(|map| map.channel(film)).collect()
 }
 
 fn painted(grey: Rgb, paint: Rgb) -> Rgb {
@@ -279,7 +295,7 @@ mod tests {
 
     #[test]
     fn an_exr_frame_holds_them_as_channels() {
-        let channels = channels_of(&film());
+        let channels = channels_of(&film(), &Aovs::All);
         let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["reuse.provenance", "reuse.frame", "reuse.distance", "reuse.audit"]);
         let ExrSamples::U32(provenance) = &channels[0].samples else { panic!("numbers") };

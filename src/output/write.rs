@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use std::path::Path;
 
-/// Writes `film` to `path` in the format of its ending: whole or not at all. exr holds the AOVs
-/// too, when the film has them.
+/// Writes `film` to `path` in the format of its ending: whole or not at all. exr holds the AOVs of
+/// `options` too, as far as the film has them.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown ending, for `png_bits` other than 8 and 16 and for a film
@@ -21,10 +21,8 @@ pub fn write_image(path: impl AsRef<Path>, film: &Film, options: &WriteOptions) 
     match format {
         Format::Png => png::write(path, film, options),
         Format::Exr => {
-            let mut channels = exr::channels_of(film);
-            if options.maps.is_some() {
-                channels.extend(maps::channels_of(film));
-            }
+            let mut channels = exr::channels_of(film, &options.aovs);
+            channels.extend(maps::channels_of(film, &options.aovs));
             let (width, height) = (film.width, film.height);
             let attribute = options.attribute.as_ref().map(|(name, bytes)| (*name, &**bytes));
             let comment = options.comment();
@@ -47,7 +45,7 @@ mod tests {
     use super::*;
     use crate::film::Encoding;
     use crate::math::Rgb;
-    use crate::scene::{Settings, ToneCurve};
+    use crate::scene::{Aovs, Settings, ToneCurve};
 
     /// Every 8-bit level (and beyond) in every channel.
     fn film() -> Film {
@@ -99,7 +97,8 @@ mod tests {
     #[test]
     fn the_same_film_is_the_same_bytes() {
         let folder = tempfile::tempdir().expect("a folder");
-        let options = WriteOptions::of(&Settings::default(), Some(7));
+        let settings = Settings { aovs: Some(Aovs::All), ..Settings::default() };
+        let options = WriteOptions::of(&settings, Some(7));
         let mut film = film();
         film.gbuffer = Some(crate::film::GBuffer::new(film.rgb.len()));
         for name in ["a.png", "a.exr", "a.ppm"] {

@@ -8,6 +8,7 @@
 //! Not done: instances share no memory; every placed mesh is its own copy
 //! (`docs/decisions`).
 
+mod aovs;
 mod camera;
 mod check;
 mod job;
@@ -28,6 +29,7 @@ mod too_small;
 mod weld;
 mod winding;
 
+pub use aovs::{Aov, Aovs};
 pub use camera::{Camera, Pose};
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};

@@ -1,6 +1,6 @@
 //! Everything a job can set, resolved: scene file first, command line over it.
 
-use super::ReuseSettings;
+use super::{Aov, Aovs, ReuseSettings};
 use serde::{Deserialize, Serialize};
 
 /// The settings of a job. All of them reach the manifest, since a frame is a pure function of
@@ -50,6 +50,9 @@ pub struct Settings {
     pub tone: ToneCurve,
     /// Bits a channel of png files: 8 or 16.
     pub png_bits: u8,
+    /// What exr frames hold beside colour; `None` for what the job's options need.
+    #[serde(default)]
+    pub aovs: Option<Aovs>,
     /// Which intersector.
     pub intersector: IntersectorKind,
     /// Embree's instruction set ("avx2"), or `None` for the machine's best.
@@ -87,6 +90,11 @@ impl Settings {
         self.most_spp.map_or(self.spp, |most| most.max(self.spp))
     }
 
+    /// Whether exr frames hold `aov`.
+    pub fn holds(&self, aov: Aov) -> bool {
+        self.aovs.as_ref().is_some_and(|aovs| aovs.has(aov))
+    }
+
     /// Number of the image's pixels.
     pub fn pixel_count(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
@@ -116,6 +124,7 @@ impl Default for Settings {
             clamp: None,
             tone: ToneCurve::Srgb,
             png_bits: 8,
+            aovs: None,
             intersector: IntersectorKind::Embree,
             isa: None,
             build_quality: BuildQuality::default(),

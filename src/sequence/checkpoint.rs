@@ -5,7 +5,7 @@
 //! of JSON that names the job and the frame, then the bytes of [`crate::reuse::store`] (policy
 //! `surface`) or the frame's discoveries (`colour`). A file is
 //! removed when no frame of its job needs it any more, and the folder when the job is complete. An exr
-//! frame holds its own reference, and is read instead. A file that is damaged or belongs to another
+//! frame that holds its own reference is read instead. A file that is damaged or belongs to another
 //! job is never used: its frame is traced again.
 
 use super::target::{LEFTOVER_AGE, Target};
@@ -67,7 +67,8 @@ pub struct Checkpoints<'a> {
 }
 
 impl<'a> Checkpoints<'a> {
-    /// The checkpoints of the job at `target`. `whole` says whether its frames are traced without a crop.
+    /// The checkpoints of the job at `target`. `whole` says whether its frames, if they are exr, hold their whole
+    /// references.
     pub fn new(
         target: &'a Target,
         every: Option<Duration>,

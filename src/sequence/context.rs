@@ -15,7 +15,7 @@ pub struct FrameContext<'a> {
     pub shot: &'a Shot,
     /// The threads that render.
     pub pool: &'a rayon::ThreadPool,
-    /// Whether films get first-hit records.
+    /// Whether films get first-hit records, which AOVs of exr frames need.
     pub with_gbuffer: bool,
     /// Set to true when the job is to stop.
     pub stop: &'a AtomicBool,

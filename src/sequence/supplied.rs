@@ -80,7 +80,7 @@ impl ReferenceCache {
                 Error::input(
                     file,
                     "cannot serve as a reference: it holds no traced points\n  \
-                     help: frames rendered to exr with --policy surface do",
+                     help: frames rendered to exr with --policy surface and --aovs reference do",
                 )
             })?;
             decode(file, &found.bytes, &terms, &recentring, found.most_pixels)

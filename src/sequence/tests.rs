@@ -6,10 +6,10 @@ use crate::math::DVec3;
 use crate::output::manifest::{FORMAT, Foreign, Header, Manifest, manifest_path};
 use crate::output::{FramePattern, WriteOptions};
 use crate::scene::{CameraPath, FrameRange, KeyPose, Pose, Settings, Shot};
-use crate::stats::RayKind;
+use crate::stats::{RayCounts, RayKind, ReuseCounts};
 use std::cell::RefCell;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const FOUR: FrameRange = FrameRange { first: 1, last: 4 };
 
@@ -33,6 +33,17 @@ impl FrameMaker for Plain {
         let rays = RayCounts::of(RayKind::Camera, 8);
         Ok(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None })
     }
+}
+
+/// Renders `frames` as rank `rank`, with its journal at `journal`.
+fn render(
+    target: &Target,
+    frames: &[u32],
+    (rank, journal): (u32, &Path),
+    maker: &Plain,
+) -> Result<()> {
+    let context = WriterContext { target, rank, journal, threads: 1 };
+    render_frames(context, frames, maker, &AtomicBool::new(false), &mut |_| Ok(()))
 }
 
 struct Folder(tempfile::TempDir);
@@ -76,7 +87,7 @@ impl Folder {
         let made = RefCell::default();
         let maker = Plain { settings: settings.clone(), stop_before, made };
         let journal = manifest_path(&target.pattern);
-        render_frames(&target, &plan.render, (0, &journal), &maker, &mut |_| Ok(()))?;
+        render(&target, &plan.render, (0, &journal), &maker)?;
         Ok((maker.made.into_inner(), plan))
     }
 
@@ -189,9 +200,8 @@ fn parts_of_ranks_are_taken_in_at_the_next_start() {
     let maker = Plain { settings: settings(), stop_before: 0, made: RefCell::default() };
     let manifest = manifest_path(&target.pattern);
     let part = crate::output::manifest::part_path(&manifest, &target.header, 1);
-    let quiet = &mut |_: &FrameReport| Ok(());
-    render_frames(&target, &plan.render[..2], (0, &manifest), &maker, quiet).expect("runs");
-    render_frames(&target, &plan.render[2..3], (1, &part), &maker, quiet).expect("runs");
+    render(&target, &plan.render[..2], (0, &manifest), &maker).expect("runs");
+    render(&target, &plan.render[2..3], (1, &part), &maker).expect("runs");
     // Whoever looks while they run sees the rows of both, and moves none.
     let now = Manifest::as_of_now(&manifest).expect("read").expect("there");
     let ranks: Vec<(u32, u32)> = now.rows.values().map(|row| (row.frame, row.rank)).collect();
@@ -264,7 +274,7 @@ fn a_survey_lists_done_missing_damaged_and_stray_frames() {
     prepare(&target, FrameRange { first: 1, last: 3 }).expect("ready to replace three");
     let path = manifest_path(&target.pattern);
     let maker = Plain { settings: brighter, stop_before: 0, made: RefCell::default() };
-    render_frames(&target, &[1, 2], (0, &path), &maker, &mut |_| Ok(())).expect("runs");
+    render(&target, &[1, 2], (0, &path), &maker).expect("runs");
     fs::write(folder.path("frame_02.png"), b"torn").expect("written");
     fs::remove_file(folder.path("frame_03.png")).expect("removed");
     let all = |last| Ok(FrameRange { first: 1, last });
@@ -286,4 +296,118 @@ fn an_older_manifest_is_refused_with_its_version() {
     let error = folder.run(&settings(), false, 0).expect_err("refused").to_string();
     assert!(error.contains("version 1 of the format"), "{error}");
     assert_eq!(folder.run(&settings(), true, 0).expect("runs").0, [1, 2, 3, 4]);
+}
+
+/// How many frames have a row in the manifest.
+fn listed(manifest: &Path) -> usize {
+    let text = fs::read_to_string(manifest).unwrap_or_default();
+    text.lines()
+        .skip(1)
+        .filter(|line| serde_json::from_str::<serde_json::Value>(line).is_ok())
+        .count()
+}
+
+/// Makes frames while it looks at those before.
+struct Beside<'a> {
+    manifest: &'a Path,
+    /// How many rows each frame waited for, while it was made.
+    waits_for: fn(u32) -> usize,
+    /// Called with each frame, when it is made.
+    and: &'a dyn Fn(u32),
+}
+
+impl FrameGraph for Beside<'_> {}
+
+impl FrameMaker for Beside<'_> {
+    fn make(&self, frame: u32) -> Result<Made> {
+        let start = Instant::now();
+        while listed(self.manifest) < (self.waits_for)(frame) {
+            assert!(start.elapsed().as_secs() < 20, "no frame is written meanwhile");
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        (self.and)(frame);
+        let (film, rays) = (Film::new(4, 2, false), RayCounts::default());
+        Ok(Made { film, rays, reuse: ReuseCounts::default(), audit: None, reference: None })
+    }
+}
+
+fn render_beside(
+    target: &Target,
+    waits_for: fn(u32) -> usize,
+    and: &dyn Fn(u32),
+    stop: &AtomicBool,
+) -> (Result<()>, Vec<u32>) {
+    prepare(target, FOUR).expect("prepared");
+    let manifest = manifest_path(&target.pattern);
+    let maker = Beside { manifest: &manifest, waits_for, and };
+    let context = WriterContext { target, rank: 0, journal: &manifest, threads: 2 };
+    let mut done = Vec::new();
+    let mut after_frame = |report: FrameReport| {
+        assert!(report.trace_seconds > 0.0 && report.write_seconds > 0.0);
+        done.push(report.frame);
+        Ok(())
+    };
+    let ended = render_frames(context, &[1, 2, 3, 4], &maker, stop, &mut after_frame);
+    (ended, done)
+}
+
+#[test]
+fn a_frame_is_written_while_the_next_is_made() {
+    let folder = Folder::new();
+    let target = folder.target(&settings(), false);
+    let manifest = manifest_path(&target.pattern);
+    // Of two frames before this one, the first has been written: two are in memory at most.
+    let is_bounded = |frame: u32| assert!(listed(&manifest) + 2 >= frame as usize);
+    let each_waits = |frame| frame as usize - 1;
+    let (ended, done) = render_beside(&target, each_waits, &is_bounded, &AtomicBool::new(false));
+    assert_eq!((ended.expect("written"), done), ((), vec![1, 2, 3, 4]));
+    let folder = Folder::new();
+    let target = folder.target(&settings(), false);
+    let manifest = manifest_path(&target.pattern);
+    let is_bounded = |frame: u32| assert!(listed(&manifest) + 2 >= frame as usize);
+    let (ended, done) = render_beside(&target, |_| 0, &is_bounded, &AtomicBool::new(false));
+    assert_eq!((ended.expect("written"), done), ((), vec![1, 2, 3, 4]));
+}
+
+#[test]
+fn a_frame_that_cannot_be_written_stops_the_job_and_those_before_stay() {
+    let folder = Folder::new();
+    let target = folder.target(&settings(), false);
+    let stop = AtomicBool::new(false);
+    let in_the_way = |frame: u32| {
+        if frame == 2 {
+            fs::create_dir(folder.path("frame_02.png")).expect("made");
+        }
+    };
+    let (ended, done) = render_beside(&target, |_| 0, &in_the_way, &stop);
+    let error = ended.expect_err("a folder is in the way").to_string();
+    assert!(error.contains("frame_02.png"), "{error}");
+    assert_eq!(done, [1]);
+    assert!(stop.load(Ordering::Relaxed), "what is being traced is given up");
+    assert!(!folder.path("frame_03.png").exists());
+    assert_eq!(listed(&manifest_path(&target.pattern)), 1);
+}
+
+#[test]
+fn a_panic_while_frames_are_made_or_written_ends_the_job() {
+    for frame in [1, 3] {
+        let folder = Folder::new();
+        let target = folder.target(&settings(), false);
+        let panics = |at: u32| assert!(at != frame, "on purpose");
+        let run = || render_beside(&target, |_| 0, &panics, &AtomicBool::new(false));
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).expect_err("panicked");
+        assert_eq!(listed(&manifest_path(&target.pattern)), frame as usize - 1);
+    }
+    let folder = Folder::new();
+    let target = folder.target(&settings(), false);
+    prepare(&target, FOUR).expect("prepared");
+    let maker = Plain { settings: settings(), stop_before: 0, made: RefCell::default() };
+    let journal = manifest_path(&target.pattern);
+    let context = WriterContext { target: &target, rank: 0, journal: &journal, threads: 1 };
+    let mut after_frame = |_: FrameReport| panic!("on purpose");
+    let run = || {
+        let stop = AtomicBool::new(false);
+        render_frames(context, &[1, 2, 3, 4], &maker, &stop, &mut after_frame)
+    };
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).expect_err("panicked");
 }

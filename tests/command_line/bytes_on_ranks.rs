@@ -83,8 +83,8 @@ fn exr_files_crops_and_other_policies_give_the_same_bytes_on_any_number_of_ranks
     let scene = small(&job, "demo");
     let line = format!("render {scene} --size 64x48 --spp 1 --segment 8 --no-video --quiet");
     for (more, ending) in [
-        ("--frames 3..12 --maps", "exr"),
-        ("--frames 5..9 --crop 10,9,50,40", "exr"),
+        ("--frames 3..12 --aovs all", "exr"),
+        ("--frames 5..9 --crop 10,9,50,40 --aovs all", "exr"),
         ("--frames 1..9 --tolerance 0.5", "png"),
         ("--frames 1..5 --policy off", "png"),
         ("--frames 1..24 --policy colour", "png"),

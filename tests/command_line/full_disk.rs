@@ -22,7 +22,9 @@ const LINE: &str = "render cube.obj --size 96x54 --spp 2 --segment 8 --frames 1.
 /// command goes on.
 #[test]
 fn a_full_disk_ends_the_job_and_finished_frames_stay() {
-    for (ending, more) in [("png", ""), ("png", "--maps"), ("exr", "--spp 1 --size 48x27")] {
+    for (ending, more) in
+        [("png", ""), ("png", "--maps"), ("exr", "--spp 1 --size 48x27 --aovs all")]
+    {
         let job = Job::new();
         let line = match ending {
             "exr" => LINE.replace("--size 96x54 --spp 2", more),

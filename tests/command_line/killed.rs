@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 /// What the jobs are called with, each with the ending of its frames.
 const JOBS: [(&str, &str); 5] = [
     ("png", "--checkpoint 0s"),
-    ("exr", "--checkpoint 0s"),
-    ("exr", "--checkpoint 1s --crop 8,4,50,30"),
+    ("exr", "--checkpoint 0s --aovs all"),
+    ("exr", "--checkpoint 1s --crop 8,4,50,30 --aovs all"),
     ("png", "--checkpoint 0s --maps --threads 1"),
     ("png", "--checkpoint 0s --policy colour"),
 ];

@@ -1,5 +1,6 @@
 //! The program as a user meets it: words, exit codes, files.
 
+mod aovs;
 mod arguments;
 #[cfg(feature = "mpi")]
 mod bytes_on_ranks;

@@ -113,7 +113,7 @@ fn supplied_references_serve_on_any_number_of_ranks() {
     };
     scene("short.toml", 21, 1.0);
     scene("long.toml", 17, 1.2);
-    job.done("render short.toml -o base/f_##.exr");
+    job.done("render short.toml -o base/f_##.exr --aovs reference");
     let line = "render long.toml --references base";
     job.done(&format!("{line} -o solo/f_##.exr"));
     for ranks in [2, 5] {

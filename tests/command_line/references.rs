@@ -54,7 +54,7 @@ fn motion_is_zero_at_rest_also_where_frames_share_a_tracing() {
                 { at = 0.5, eye = [1, 1.5, 7], target = [0, 0, 0] }]\n";
     scene(&job, "scene.toml", keys);
     for policy in ["surface", "off", "colour"] {
-        job.done(&format!("render scene.toml -o {policy}/f_#.exr --policy {policy}"));
+        job.done(&format!("render scene.toml -o {policy}/f_#.exr --policy {policy} --aovs motion"));
         let most = |frame: u32| {
             let channels = channels(&job, &format!("{policy}/f_{frame}.exr"));
             let all = ["backward.u", "backward.v"].map(|name| f32s(&channels, name).to_vec());
@@ -70,7 +70,7 @@ fn motion_is_zero_at_rest_also_where_frames_share_a_tracing() {
 fn motion_leads_to_where_the_surface_was() {
     let job = Job::new();
     scene(&job, "scene.toml", &pan(2, -0.6).replace("frames", "fov = 40\nframes"));
-    job.done("render scene.toml -o o/f_#.exr --policy off --spp 4");
+    job.done("render scene.toml -o o/f_#.exr --policy off --spp 4 --aovs motion,position,depth");
     let camera = |x: f64| {
         let (eye, target) = (DVec3::new(x, 1.5, 7.0), DVec3::ZERO);
         let pose = Pose { eye, target, up: DVec3::Y, roll_degrees: 0.0 };
@@ -136,7 +136,9 @@ fn exr_frames_hold_their_maps() {
     assert!(f32s(&held, "reuse.distance").iter().any(|d| *d > 0.0));
     let audited = f32s(&held, "reuse.audit").iter().filter(|e| !e.is_nan()).count();
     assert!((1..64 * 36 / 2).contains(&audited), "{audited}");
-    job.refused("render scene.toml -o o/f_#.exr --frames 5", "maps … true … false");
+    let maps = "provenance,frame,distance,audit";
+    let differs = format!("aovs was {maps}, now it is none");
+    job.refused("render scene.toml -o o/f_#.exr --frames 5", &differs);
 }
 
 #[test]
@@ -145,7 +147,7 @@ fn references_of_a_shorter_shot_save_rays_in_a_denser_and_longer_one() {
     scene(&job, "short.toml", &pan(9, 1.0));
     scene(&job, "long.toml", &pan(21, 1.5));
     let samples = "--shadow-samples 64 --sky-samples 64";
-    job.done(&format!("render short.toml {samples} -o base/f_#.exr"));
+    job.done(&format!("render short.toml {samples} -o base/f_#.exr --aovs reference"));
     // In frames as small as these little can be vouched for: that is not what is tested here.
     let long = format!("render long.toml {samples} --tolerance 255 --probes 0.002");
     job.done(&format!("{long} -o cold/f_##.exr --stats cold.json"));
@@ -190,7 +192,7 @@ fn key_frames_inferred_from_references_obey_the_same_limits() {
     assert_ne!(longer, text);
     fs::write(job.path("long.toml"), longer).expect("written");
     let line = "--size 64x48 --shadow-samples 64 --quiet --no-video";
-    job.done(&format!("render short.toml -o base/f_##.exr --frames 1..3 {line}"));
+    job.done(&format!("render short.toml -o base/f_##.exr --aovs reference --frames 1..3 {line}"));
     let warm = format!("render long.toml --references base {line}");
     job.done(&format!("{warm} -o warm/f_##.exr --frames 1..2"));
     let manifest = String::from_utf8(job.read("warm/f.manifest.jsonl")).expect("UTF-8");
@@ -206,11 +208,13 @@ fn key_frames_inferred_from_references_obey_the_same_limits() {
 fn unusable_references_are_refused_by_name() {
     let job = Job::new();
     scene(&job, "scene.toml", &pan(3, 1.0));
-    job.done("render scene.toml -o base/f_#.exr --frames 1");
+    job.done("render scene.toml -o plain/f_#.exr --frames 1");
+    job.done("render scene.toml -o base/f_#.exr --frames 1 --aovs reference");
     let line = "render scene.toml -o o/f_#.exr --frames 1 --references";
     job.refused(&format!("{line} nowhere"), "--references nowhere … folder");
     fs::create_dir(job.path("empty")).expect("made");
     job.refused(&format!("{line} empty"), "empty … exr");
+    job.refused(&format!("{line} plain"), "plain/f_1.exr … --aovs reference");
     job.refused(&format!("{line} base --policy off"), "--references … --policy surface");
     job.refused(&format!("{line} base --shadow-samples 64"), "48 … light 1");
     job.refused(&format!("{line} base --sky-samples 0"), "light 1, sky");

@@ -97,8 +97,8 @@ fn assert_same(job: &Job, folder: &str, ending: &str, all: bool) {
 fn a_killed_job_goes_on_with_any_number_of_ranks() {
     for (ending, more) in [
         ("png", ""),
-        ("exr", ""),
-        ("exr", "--crop 16,8,170,100"),
+        ("exr", "--aovs all"),
+        ("exr", "--crop 16,8,170,100 --aovs all"),
         ("png", "--maps"),
         ("png", "--policy colour"),
     ] {

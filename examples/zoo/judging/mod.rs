@@ -45,8 +45,8 @@ pub struct Plan {
     /// Whether key frames, which are traced in any case, are left out: flicker then is of in-between
     /// frames alone.
     pub between_only: bool,
-    /// Whether the move is rendered twice more, to png files, to be timed: exr frames keep what later
-    /// jobs may infer from, and packing that takes longer than a small frame does.
+    /// Whether the move is rendered twice more, to png files, to be timed: packing an exr frame takes
+    /// longer.
     pub timed: bool,
 }
 

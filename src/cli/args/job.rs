@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Frames and output, for `render`.
 #[derive(Debug, Args)]
 pub struct JobArgs {
-    /// Where frames go; #### is the frame number, the ending chooses png, exr (linear, with AOVs)
+    /// Where frames go; #### is the frame number, the ending chooses png, exr (linear; see --aovs)
     /// or ppm [default: out/<scene>/frame_####.png]
     #[arg(short, long, value_name = "PATTERN")]
     pub output: Option<String>,

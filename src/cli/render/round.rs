@@ -6,11 +6,11 @@ use crate::cli::progress::Watch;
 use crate::cli::request::{Request, Setup};
 use crate::cli::say;
 use crate::cli::stats::RankStats;
-use crate::cluster::{self, Outcome};
+use crate::cluster::{self, Outcome, RankJob};
 use crate::error::Result;
-use crate::output::{Format, SequenceLock, atomic};
+use crate::output::{SequenceLock, atomic};
 use crate::reuse::colour::AgreementRule;
-use crate::scene::Policy;
+use crate::scene::{Aov, Aovs, Policy};
 use crate::sequence::checkpoint::{self, Checkpoints};
 use crate::sequence::{
     ColourMaker, FrameContext, Plan, Pyramid, RankMaker, SurfaceReuse, Target, Tracer,
@@ -104,8 +104,17 @@ impl<'a> RenderJob<'a> {
         let maker = self.maker(&watch, &checkpoints)?;
         let (target, stop) = (&self.target, &interrupt.stop);
         let done = |report: &_| watch.frame_done(report);
-        let work = || cluster::render(comm, order, target, plan, &*maker, stop, &done);
-        let outcome = interrupt.watched(work);
+        let job = RankJob {
+            comm,
+            rank_order: order,
+            target,
+            plan,
+            maker: &*maker,
+            stop,
+            threads: pool.current_num_threads(),
+            done: &done,
+        };
+        let outcome = interrupt.watched(|| cluster::render(&job));
         watch.finish();
         let notes = outcome.as_ref().map_or_else(|_| maker.notes(), |o| o.notes.clone());
         say::unless(*quiet, &notes, |n| say::note(n));
@@ -135,12 +144,12 @@ impl<'a> RenderJob<'a> {
         watch: &'m Watch,
         checkpoints: &'m Checkpoints,
     ) -> Result<Box<dyn RankMaker + 'm>> {
-        let Request { scene, shot, pattern, uploads, references, .. } = self.request;
+        let Request { scene, shot, uploads, references, .. } = self.request;
         let Setup { settings, terms, .. } = &self.setup;
         let Site { comm, intersector, pool, interrupt, .. } = self.site;
         let (stop, progress) = (&interrupt.stop, watch);
         let renderer = Renderer::new(scene, settings, &**intersector);
-        let with_gbuffer = pattern.format() == Format::Exr;
+        let with_gbuffer = settings.aovs.as_ref().is_some_and(Aovs::have_first_hits);
         let context = FrameContext { renderer, shot, pool, with_gbuffer, stop, progress };
         Ok(match settings.reuse.policy {
             Policy::Surface => {
@@ -149,7 +158,7 @@ impl<'a> RenderJob<'a> {
                 maker.supplied = references.cache.as_ref();
                 maker.checkpoints = Some(checkpoints);
                 maker.exchange = (comm.size() > 1).then(|| terms.clone());
-                maker.terms = with_gbuffer.then(|| terms.clone());
+                maker.terms = settings.holds(Aov::Reference).then(|| terms.clone());
                 Box::new(maker)
             }
             Policy::Colour => {
@@ -165,8 +174,8 @@ impl<'a> RenderJob<'a> {
     fn checkpoints(&self) -> Checkpoints<'_> {
         let Request { scene, options, .. } = self.request;
         let Setup { settings, terms, .. } = &self.setup;
-        // Frame files hold references of policy `surface` only.
-        let whole = settings.crop.is_none() && settings.reuse.policy == Policy::Surface;
+        // The file of a cropped frame holds a part of its reference.
+        let whole = settings.crop.is_none() && settings.holds(Aov::Reference);
         Checkpoints::new(&self.target, options.checkpoint, terms, scene.recentring, whole)
     }
 

@@ -17,10 +17,12 @@ impl Request {
     /// Reads all files.
     ///
     /// Errors: `Error::Input` and `Error::Usage`.
-    pub(super) fn read(scene: &SceneArgs, settings: &SettingArgs, job: &JobArgs) -> Result<Self> {
-        let mut loaded = job::load(scene, settings)?;
+    pub(super) fn read(scene: &SceneArgs, args: &SettingArgs, job: &JobArgs) -> Result<Self> {
+        let mut loaded = job::load(scene, args)?;
         let (frames, pattern) = place(scene, job, &mut loaded)?;
         let Loaded { world, shot, settings, options, mut warnings, files, .. } = loaded;
+        let aovs = super::aovs(args, &options, &settings, &pattern)?;
+        let settings = Settings { aovs: Some(aovs), ..settings };
         refuse_input(options.stats.as_deref(), &files)?;
         let uploads = uploads(&options.uploads, &shot, &settings)?;
         let hash = WorldHash::of(&world);

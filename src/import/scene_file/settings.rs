@@ -17,7 +17,7 @@ use camera_samples::CameraSamples;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
-use switches::{Isa, PngBits, Rules};
+use switches::{AovName, Isa, PngBits, Rules};
 
 /// Image columns or rows.
 pub(super) type Pixels = Int<1, { limits::MAX_EDGE as i64 }>;
@@ -63,6 +63,8 @@ pub(super) struct Settings {
     tone: ToneCurve,
     /// Bits per channel of png files: 8 or 16.
     png_bits: PngBits,
+    /// What exr frames hold beside colour. Absent: what the job's options need, which is nothing without them.
+    aovs: Option<Vec<AovName>>,
     /// Intersector: "embree", or "oracle", brute force in f64, for small scenes.
     intersector: IntersectorKind,
     /// Embree's instruction set, on which the last bits of frames depend. Absent: the machine's best.
@@ -126,6 +128,7 @@ impl Default for Settings {
             clamp: None,
             tone: s.tone,
             png_bits: PngBits(s.png_bits),
+            aovs: None,
             intersector: s.intersector,
             isa: None,
             build_quality: s.build_quality,
@@ -175,6 +178,7 @@ impl Settings {
             clamp: self.clamp.map(|most| most.0 as f32),
             tone: self.tone,
             png_bits: self.png_bits.0,
+            aovs: self.aovs.as_ref().map(|names| names.iter().map(|n| n.0.clone()).collect()),
             intersector: self.intersector,
             isa: self.isa.as_ref().map(|isa| isa.0.clone()),
             build_quality: self.build_quality,

@@ -8,8 +8,8 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// The maps of the exr frame at `path`, painted as for a png frame: linear display
-/// values. Empty if the frame has none. `farthest` is as in [`Map::paint`].
+/// The maps that the exr frame at `path` has, painted as for a png frame: linear display
+/// values. `farthest` is as in [`Map::paint`].
 ///
 /// # Errors
 /// [`Error::Io`] and [`Error::Input`] when the file cannot be read.
@@ -17,10 +17,17 @@ pub fn of_exr(path: &Path, display: &Display, farthest: f32) -> Result<Vec<(Map,
     let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
     let channels = exr::decode(path, BufReader::new(file), DEFAULT_MEMORY_LIMIT)?;
     let Some(film) = film_of(&channels) else { return Ok(Vec::new()) };
-    Ok(Map::ALL.map(|map| (map, map.paint(&film, display, farthest))).into())
+    let has = |map: Map| channels.list.iter().any(|channel| channel.name == map.channel_name());
+    // The provenance says which pixels the two others are of.
+    let is_whole = |map: &Map| match map {
+        Map::Provenance | Map::Audit => has(*map),
+        Map::Frame | Map::Distance => has(*map) && has(Map::Provenance),
+    };
+    let maps = Map::ALL.into_iter().filter(is_whole);
+    Ok(maps.map(|map| (map, map.paint(&film, display, farthest))).collect())
 }
 
-/// The film with the data of the maps' channels; `None` if a channel is missing.
+/// The film with the data of the maps' channels, as far as there are such channels; `None` without colour.
 fn film_of(channels: &ExrChannels) -> Option<Film> {
     let numbers = |name: &str| {
         let found = channels.list.iter().find(|c| c.name == name)?;
@@ -30,12 +37,15 @@ fn film_of(channels: &ExrChannels) -> Option<Film> {
         }
     };
     let [r, g, b] = [channels.f32("R")?, channels.f32("G")?, channels.f32("B")?];
-    let kind = numbers("reuse.provenance")?;
-    let (frame, distance) = (numbers("reuse.frame")?, channels.f32("reuse.distance")?);
+    let (kind, frame) = (numbers("reuse.provenance"), numbers("reuse.frame"));
+    let distance = channels.f32("reuse.distance");
     let mut film = Film::new(channels.width, channels.height, false);
     film.rgb = (0..r.len()).map(|i| Rgb::new(r[i], g[i], b[i])).collect();
-    let source =
-        |i: usize| Provenance { kind: known(kind[i]), frame: frame[i], distance: distance[i] };
+    let source = |i: usize| Provenance {
+        kind: kind.map_or(ProvenanceKind::default(), |kind| known(kind[i])),
+        frame: frame.map_or(0, |frame| frame[i]),
+        distance: distance.map_or(0.0, |distance| distance[i]),
+    };
     film.provenance = Some((0..r.len()).map(source).collect());
     film.audit = channels.f32("reuse.audit").map(<[f32]>::to_vec);
     Some(film)
@@ -50,7 +60,7 @@ fn known(number: u32) -> ProvenanceKind {
 mod tests {
     use super::*;
     use crate::output::{WriteOptions, write_image};
-    use crate::scene::ToneCurve;
+    use crate::scene::{Aovs, ToneCurve};
 
     #[test]
     fn an_exr_frame_gives_the_maps_that_a_png_frame_has_beside_it() {
@@ -60,9 +70,12 @@ mod tests {
         let source = |i: u32| Provenance { kind: known(i % 5), frame: i, distance: i as f32 / 4.0 };
         film.provenance = Some((0..6).map(source).collect());
         film.audit = Some(vec![f32::NAN, 3.0, f32::NAN, -8.0, f32::NAN, f32::NAN]);
-        let options = WriteOptions { maps: Some(2.0), ..WriteOptions::default() };
+        let with = |list| WriteOptions {
+            aovs: Aovs::parse(list).expect("a list"),
+            ..WriteOptions::default()
+        };
         let path = folder.path().join("a.exr");
-        write_image(&path, &film, &options).expect("written");
+        write_image(&path, &film, &with("all")).expect("written");
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
         let maps = of_exr(&path, &display, 2.0).expect("read");
         assert_eq!(maps.len(), Map::ALL.len());
@@ -70,7 +83,15 @@ mod tests {
             assert_eq!(painted.rgb, map.paint(&film, &display, 2.0).rgb, "{}", map.name());
         }
         let plain = folder.path().join("b.exr");
-        write_image(&plain, &film, &WriteOptions::default()).expect("written");
-        assert!(of_exr(&plain, &display, 2.0).expect("read").is_empty());
+        for (list, expected) in [
+            ("none", &[][..]),
+            ("audit", &[Map::Audit]),
+            ("frame", &[]),
+            ("provenance,distance", &[Map::Provenance, Map::Distance]),
+        ] {
+            write_image(&plain, &film, &with(list)).expect("written");
+            let found = of_exr(&plain, &display, 2.0).expect("read");
+            assert_eq!(found.iter().map(|(map, _)| *map).collect::<Vec<_>>(), expected, "{list}");
+        }
     }
 }

@@ -1,8 +1,8 @@
-//! Settings that are a choice: rules on or off, instruction set, bits.
+//! Settings that are a choice: rules on or off, instruction set, bits, AOVs.
 
 use crate::import::scene_file::number::Int;
 use crate::import::scene_file::schema::inline_schema;
-use crate::scene::{HitRules, Recheck, limits::ISAS};
+use crate::scene::{Aovs, HitRules, Recheck, limits::ISAS};
 use schemars::{JsonSchema, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -34,6 +34,13 @@ pub(super) struct PngBits(pub u8);
 #[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
 pub(super) struct Isa(pub String);
+
+/// The name of an AOV, or of all or none.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(super) struct AovName(pub Aovs);
+
+inline_schema!(AovName, |_| json_schema!({ "enum": Aovs::NAMES }));
 
 impl<'de> Deserialize<'de> for Isa {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
