@@ -96,6 +96,12 @@ fn through_lens(job: Job) -> Job {
     Job { camera: job.camera.with_lens(Lens::Thin(lens)), ..job }
 }
 
+/// The same job with more samples where they differ.
+fn adaptive(mut job: Job) -> Job {
+    job.settings.most_spp = Some(10);
+    job
+}
+
 fn on_threads(job: &Job, threads: usize) -> Film {
     let scene = job.world.clone().into_scene(true).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -111,7 +117,8 @@ fn on_threads(job: &Job, threads: usize) -> Film {
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     // Not a multiple of the block or the tile.
-    for job in [busy_job(101, 77), through_lens(busy_job(101, 77))] {
+    let busy = || busy_job(101, 77);
+    for job in [busy(), through_lens(busy()), adaptive(busy()), adaptive(through_lens(busy()))] {
         let one = on_threads(&job, 1);
         for threads in [2, 3, 8] {
             assert!(one == on_threads(&job, threads), "{threads} threads differ");
@@ -148,6 +155,7 @@ fn other_trees_see_the_same_and_a_compact_one_is_smaller() {
 fn a_crop_has_the_bytes_of_the_whole() {
     check_crops(&busy_job(101, 77));
     check_crops(&through_lens(busy_job(101, 77)));
+    check_crops(&adaptive(busy_job(101, 77)));
 }
 
 fn check_crops(job: &Job) {

@@ -95,7 +95,8 @@ impl List<'_> {
 
     fn samples(&mut self, plan: &EffectPlan) {
         for spp in around(self.base.spp) {
-            self.add(Knob::CameraSamples, format!("--spp {spp}"), |s| s.spp = spp);
+            let options = format!("--spp {spp}");
+            self.add(Knob::CameraSamples, options, |s| (s.spp, s.most_spp) = (spp, None));
         }
         if plan.area_lights {
             for n in around(self.base.shadow_samples) {
@@ -171,7 +172,7 @@ impl List<'_> {
             // Without soft light there is but one number of shadow samples: none.
             for k in if lit == 1 { 0..3 } else { 1..2 } {
                 let mut options = format!("--spp {spp}");
-                let mut settings = Settings { spp, ..base.clone() };
+                let mut settings = Settings { spp, most_spp: None, ..base.clone() };
                 // Samples of what is not there would only make twins.
                 if plan.area_lights {
                     options += &format!(" --shadow-samples {}", shadow[k]);

@@ -82,6 +82,7 @@ impl ChoiceArgs {
         let obstacle = match () {
             () if !self.is_any() => None,
             () if settings.crop.is_some() => Some("--crop"),
+            () if settings.most_spp.is_some() => Some("--spp MIN..MAX"),
             () if settings.reuse.policy == Policy::Colour => Some("--policy colour"),
             () if !request.references.is_empty() => Some("--references"),
             () if request.options.maps && settings.reuse.policy == Policy::Off => {

@@ -2,6 +2,7 @@
 
 use crate::effects::EffectPlan;
 use crate::scene::{Policy, ReuseSettings, Settings};
+use std::fmt::Display;
 
 /// The options that decide a picture's error and time, with their values in `settings`. Options without effect in the
 /// scene, by its `plan`, are left out.
@@ -14,7 +15,7 @@ pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
         Policy::Surface if is_usual => " --policy surface".into(),
         Policy::Surface => format!(" --policy surface --tolerance {}", reuse.tolerance),
     };
-    samples(settings.spp, settings.shadow_samples, settings.sky_samples, plan)
+    samples(settings.camera_samples(), settings.shadow_samples, settings.sky_samples, plan)
         + &match plan.mirror || plan.glass {
             true => format!(" --bounces {}", settings.bounces),
             false => String::new(),
@@ -23,7 +24,7 @@ pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
 }
 
 /// Only the options of samples.
-pub fn samples(spp: u32, shadow: u32, sky: u32, plan: &EffectPlan) -> String {
+pub fn samples(spp: impl Display, shadow: u32, sky: u32, plan: &EffectPlan) -> String {
     let mut options = format!("--spp {spp}");
     if plan.area_lights {
         options += &format!(" --shadow-samples {shadow}");

@@ -111,7 +111,8 @@ pub(super) fn beside(spreads: &[SampleSpread], width: u32) -> Vec<f32> {
             let found = is_inside.then(|| &spreads[y as usize * width + x as usize]);
             found.filter(|spread| spread.count > 0)
         };
-        let deviation = |spread: &SampleSpread| if spread.count > 1 { spread.deviation() } else { 0.0 };
+        let deviation =
+            |spread: &SampleSpread| if spread.count > 1 { spread.deviation() } else { 0.0 };
         let mut most = 0f32;
         for (dx, dy) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
             let pair = [at(dx, dy), at(-dx, -dy)];

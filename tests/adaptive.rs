@@ -1,0 +1,132 @@
+//! Adaptive camera samples: fewer rays for the same error, a bias that is stated, the same bytes however a frame is
+//! cut, and inferred frames that are no worse than traced ones.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shows what it measured")]
+
+mod common;
+#[path = "common/moves.rs"]
+mod moves;
+
+use moves::{Set, codes, mean_square, psnr_of};
+use tweenray::film::Film;
+use tweenray::math::Rgb;
+use tweenray::scene::{Policy, Settings};
+use tweenray::shade::{FrameJob, Sampling};
+
+const SCENES: [&str; 4] = ["cornell", "demo", "reflective_spheres", "spheres_on_terrain"];
+
+fn mean_samples(film: &Film) -> f64 {
+    let samples = film.samples.as_ref().expect("adaptive");
+    samples.iter().map(|n| f64::from(*n)).sum::<f64>() / samples.len() as f64
+}
+
+fn uniform(settings: &Settings, spp: u32, seed: u64) -> Settings {
+    Settings { spp, most_spp: None, seed, ..settings.clone() }
+}
+
+/// With as many camera rays, uniform samples are off by more in every scene of `scenes/`.
+#[test]
+fn errors_are_smaller_than_those_of_as_many_uniform_samples() {
+    for scene in SCENES {
+        let set = Set::load(scene, |_| ());
+        let (stage, shot) = (set.stage(2), set.shot(16));
+        let base = set.settings((96, 54), 4, 4);
+        let settings = Settings { most_spp: Some(32), ..base.clone() };
+        let film = stage.traced(&settings, &shot, 8, 8);
+        let spp = mean_samples(&film).ceil() as u32;
+        assert!((4..32).contains(&spp), "{scene}: {spp}");
+        let truth = stage.traced(&uniform(&base, 512, 9), &shot, 8, 8);
+        let same = stage.traced(&uniform(&base, spp, 0), &shot, 8, 8);
+        let [adaptive, uniform] = [&film, &same].map(|film| psnr_of(&settings, film, &truth));
+        println!("{scene}: {spp} samples, adaptive {adaptive:.2} dB, uniform {uniform:.2} dB");
+        assert!(adaptive > uniform + 0.5, "{scene}");
+    }
+}
+
+/// The choice by samples that are part of the mean makes pictures too flat at edges: by how much is stated in
+/// `docs/accuracy.md`.
+#[test]
+fn the_bias_is_small() {
+    for scene in ["cornell", "spheres_on_terrain"] {
+        let set = Set::load(scene, |_| ());
+        let (stage, shot) = (set.stage(2), set.shot(16));
+        let base = set.settings((64, 36), 4, 4);
+        let settings = Settings { most_spp: Some(16), ..base.clone() };
+        let seeds = 64;
+        let mean = |of: &dyn Fn(u64) -> Film| {
+            let films = (0..seeds).map(of);
+            films.fold(vec![Rgb::ZERO; 64 * 36], |mut sum, film| {
+                sum.iter_mut().zip(&film.rgb).for_each(|(sum, c)| *sum += *c / seeds as f32);
+                sum
+            })
+        };
+        let film = |rgb: Vec<Rgb>| Film { rgb, ..Film::new(64, 36, false) };
+        let adaptive =
+            mean(&|seed| stage.traced(&Settings { seed, ..settings.clone() }, &shot, 8, 8));
+        let truth = mean(&|seed| stage.traced(&uniform(&base, 64, 1000 + seed), &shot, 8, 8));
+        let same = mean(&|seed| stage.traced(&uniform(&base, 16, seed), &shot, 8, 8));
+        let truth = codes(&settings, &film(truth));
+        let rmse = |rgb| 255.0 * mean_square(&codes(&settings, &film(rgb)), &truth).sqrt();
+        let (bias, chance) = (rmse(adaptive), rmse(same));
+        println!(
+            "{scene}: mean of {seeds} pictures off by {bias:.3}/255, of uniform 16 {chance:.3}"
+        );
+        assert!(bias < chance + 0.4, "{scene}");
+    }
+}
+
+/// Some rows of blocks, as another rank would render them, have the samples of the whole frame.
+#[test]
+fn a_part_of_a_frame_has_the_bytes_of_the_whole() {
+    let set = Set::load("demo", |_| ());
+    let (stage, shot) = (set.stage(2), set.shot(16));
+    let settings = Settings { most_spp: Some(13), ..set.settings((100, 60), 3, 2) };
+    let whole = stage.traced(&settings, &shot, 5, 5);
+    let camera = shot.camera(5, 100, 60).unwrap();
+    for rows in [0..8, 16..40, 56..60] {
+        let mask: Vec<bool> = (0..60 * 100).map(|i| rows.contains(&(i / 100))).collect();
+        let job = FrameJob { mask: Some(&mask), ..FrameJob::whole(&camera, 5) };
+        let render = || stage.renderer(&settings).render_job(&job, &stage.stop, &());
+        let part = stage.pool.install(render).unwrap().film;
+        for (i, masked) in mask.iter().enumerate() {
+            let (rgb, samples) = match masked {
+                true => (whole.rgb[i], whole.samples.as_ref().unwrap()[i]),
+                false => (Rgb::ZERO, 0),
+            };
+            assert_eq!((part.rgb[i], part.samples.as_ref().unwrap()[i]), (rgb, samples), "{i}");
+        }
+        // Without its neighbours' samples a pixel at the edge may take others.
+        let job = FrameJob { sampling: Sampling::Alone, ..job };
+        let render = || stage.renderer(&settings).render_job(&job, &stage.stop, &());
+        assert!(stage.pool.install(render).is_some());
+    }
+}
+
+/// Against pictures of many camera samples, so that edges count.
+#[test]
+fn inferred_frames_are_no_worse_than_traced_ones() {
+    for scene in SCENES {
+        let set = Set::load(scene, |_| ());
+        let (stage, shot) = (set.stage(2), set.shot(33));
+        let mut settings = Settings { most_spp: Some(16), ..set.settings((128, 72), 4, 16) };
+        settings.reuse.segment = 8;
+        let made = stage.frames(&settings, &shot, &[1, 2, 3, 4, 5, 6, 7, 8, 9]);
+        let off = {
+            let mut off = settings.clone();
+            off.reuse.policy = Policy::Off;
+            off
+        };
+        let mut inferred = 0;
+        for frame in [3, 5, 6] {
+            let film = &made[frame as usize - 1].film;
+            inferred += made[frame as usize - 1].reuse.direct_inferred;
+            let truth = stage.traced(&uniform(&off, 128, 5), &shot, frame, frame);
+            let traced = stage.frames(&off, &shot, &[frame]).remove(0).film;
+            let [own, other] = [film, &traced].map(|film| psnr_of(&settings, film, &truth));
+            let samples = [film, &traced].map(mean_samples);
+            println!("{scene} {frame}: {own:.2} dB, traced {other:.2}; samples {samples:?}");
+            assert!(own > other - 0.3, "{scene} {frame}");
+        }
+        assert!(inferred > 0, "{scene}");
+    }
+}
