@@ -43,6 +43,36 @@ fn errors_are_smaller_than_those_of_as_many_uniform_samples() {
     }
 }
 
+/// The figures of `docs/accuracy.md`: camera rays for the error of uniform samples, at the samples of light of each
+/// scene file.
+#[test]
+#[ignore = "minutes"]
+fn rays_for_the_error_of_uniform_samples() {
+    const UNIFORM: [u32; 5] = [4, 8, 16, 32, 64];
+    for scene in SCENES {
+        let set = Set::load(scene, |_| ());
+        let (stage, shot) = (set.stage(2), set.shot(16));
+        let base = Settings { width: 320, height: 180, ..set.settings.clone() };
+        let truth = stage.traced(&uniform(&base, 512, 77), &shot, 8, 8);
+        let psnr = |film: &Film| psnr_of(&base, film, &truth);
+        let known = UNIFORM.map(|spp| psnr(&stage.traced(&uniform(&base, spp, 0), &shot, 8, 8)));
+        println!("{scene}: uniform {UNIFORM:?}: {known:.1?} dB");
+        for (least, most) in [(2, 32), (4, 16), (4, 32), (4, 64)] {
+            let settings = Settings { spp: least, most_spp: Some(most), ..base.clone() };
+            let film = stage.traced(&settings, &shot, 8, 8);
+            let (own, mean) = (psnr(&film), mean_samples(&film));
+            // Between two known figures the logarithm of the number of samples is interpolated.
+            let at = known.partition_point(|known| *known < own).clamp(1, UNIFORM.len() - 1);
+            let share = (own - known[at - 1]) / (known[at] - known[at - 1]);
+            let equal = f64::from(UNIFORM[at - 1]) * 2f64.powf(share);
+            let rays = 100.0 * mean / equal;
+            println!(
+                "  {least}..{most}: {mean:.2} samples, {own:.1} dB, as {equal:.0} uniform: {rays:.0} % of the rays"
+            );
+        }
+    }
+}
+
 /// The choice by samples that are part of the mean makes pictures too flat at edges: by how much is stated in
 /// `docs/accuracy.md`.
 #[test]

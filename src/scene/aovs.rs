@@ -245,7 +245,7 @@ mod tests {
     fn a_policy_has_all_that_it_can_and_refuses_by_name_what_it_cannot() {
         let under = |text: &str, policy| Aovs::parse(text).expect("a list").under(policy);
         let all = |policy| under("all", policy).map(|aovs| aovs.to_string());
-        let first_hits = "depth,position,normal,albedo,mesh-id,motion";
+        let first_hits = "depth,position,normal,albedo,mesh-id,motion,samples";
         let maps = "provenance,frame,distance,audit";
         assert_eq!(all(Policy::Off), Ok(first_hits.into()));
         assert_eq!(all(Policy::Colour), Ok(format!("{first_hits},{maps}")));

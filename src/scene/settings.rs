@@ -24,7 +24,7 @@ pub struct Settings {
     pub spp: u32,
     /// The most camera samples of a pixel: where samples differ, more than [`spp`](Self::spp) are taken. `None` if
     /// every pixel takes as many.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub most_spp: Option<u32>,
     /// Pixel filter.
     pub filter: Filter,

@@ -32,7 +32,9 @@ fn invalid_arguments_are_refused_with_what_is_valid() {
     job.refused("render cube.obj --size 0x0", "0x0 … pixel");
     job.refused("render cube.obj --size 640", "640 … 640x360");
     job.refused("render cube.obj --size 70000x1", "70000x1 … 32768");
-    job.refused("render cube.obj --spp 0", "1..=65536");
+    job.refused("render cube.obj --spp 0", "from 1 to 65536");
+    job.refused("render cube.obj --spp 4..2", "least");
+    job.refused("render cube.obj --spp 4..16 --target psnr=40", "not predicted");
     job.refused("render cube.obj --frames 9..3", "frame 9 … frame 3");
     job.refused("render cube.obj --frames 0", "--frames … from 1");
     job.refused("render cube.obj --frames 9999999", "9999999 … 1..48");
@@ -43,7 +45,7 @@ fn invalid_arguments_are_refused_with_what_is_valid() {
     job.refused("render cube.obj --scale -1", "from 1e-30 to 1e30");
     job.refused("render cube.obj --cutoff -0.5", "from 0 to 1");
     job.refused("render cube.obj --fps 0", "from 1 to 1000");
-    job.refused("render cube.obj --spp -1", "1..=65536");
+    job.refused("render cube.obj --spp -1", "from 1 to 65536");
     job.refused("render cube.obj --seed 9223372036854775808", "0..=9223372036854775807");
     job.refused("render cube.obj --threads 0", "1..=4096");
     job.refused("render cube.obj -o out/frame_####.gif", ".png, .exr or .ppm");

@@ -7,7 +7,7 @@ use crate::scene::limits;
 use schemars::json_schema;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Error, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
 type Count = Int<1, { limits::MAX_SAMPLES as i64 }>;
@@ -26,7 +26,11 @@ impl<'de> Visitor<'de> for OneOrTwo {
     type Value = CameraSamples;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a whole number, or the least and the most, as in [4, 16]")
+        write!(
+            f,
+            "a whole number from 1 to {}, or the least and the most, as in [4, 16]",
+            limits::MAX_SAMPLES
+        )
     }
 
     fn visit_i64<E: Error>(self, x: i64) -> Result<Self::Value, E> {
@@ -49,6 +53,15 @@ impl<'de> Visitor<'de> for OneOrTwo {
 impl<'de> Deserialize<'de> for CameraSamples {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(OneOrTwo)
+    }
+}
+
+impl Serialize for CameraSamples {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.most {
+            None => serializer.serialize_u32(self.least),
+            Some(most) => serializer.collect_seq([self.least, most]),
+        }
     }
 }
 

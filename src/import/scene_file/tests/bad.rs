@@ -119,7 +119,7 @@ const TYPES: &[Case] = &[
     ("[sky]\nlights = ¦1\n", "expected a boolean, found integer `1`", ""),
     (
         "[settings]\nspp = ¦4.0\n",
-        "expected a whole number from 1 to 65536, found floating point `4.0`",
+        "from 1 to 65536, or the least and the most, as in [4, 16], found floating point `4.0`",
         "",
     ),
     ("[settings]\ntime_limit = ¦'25x'\n", "a time limit is written with its units, as in 90s", ""),
@@ -195,6 +195,7 @@ const RANGES: &[Case] = &[
     ("[reuse]\nprobes = ¦1.5\n", "expected a number from 0 to 1, found 1.5", ""),
     ("[reuse]\ntolerance = ¦256\n", "expected a number from 0 to 255, found 256", ""),
     ("[reuse]\ncolour_epsilon = ¦nan\n", "expected a number from 0 to 1e30, found NaN", ""),
+    ("[settings]\nspp = ¦[8, 2]\n", "the least and the most camera samples, found [8, 2]", ""),
     ("[settings]\nspp = ¦0\n", "expected a whole number from 1 to 65536, found 0", ""),
     ("[settings]\nsize = [640, ¦0]\n", "expected a whole number from 1 to 32768, found 0", ""),
     ("[settings]\npng_bits = ¦12\n", "expected 8 or 16, found 12", ""),
