@@ -101,13 +101,17 @@ impl List<'_> {
         if plan.area_lights {
             for n in around(self.base.shadow_samples) {
                 let options = format!("--shadow-samples {n}");
-                self.add(Knob::ShadowSamples, options, |s| s.shadow_samples = n);
+                self.add(Knob::ShadowSamples, options, |s| {
+                    (s.shadow_samples, s.least_shadow_samples) = (n, None);
+                });
             }
         }
         if plan.sky_light {
             for n in around(self.base.sky_samples) {
                 let options = format!("--sky-samples {n}");
-                self.add(Knob::SkySamples, options, |s| s.sky_samples = n);
+                self.add(Knob::SkySamples, options, |s| {
+                    (s.sky_samples, s.least_sky_samples) = (n, None);
+                });
             }
         }
     }
@@ -176,11 +180,11 @@ impl List<'_> {
                 // Samples of what is not there would only make twins.
                 if plan.area_lights {
                     options += &format!(" --shadow-samples {}", shadow[k]);
-                    settings.shadow_samples = shadow[k];
+                    (settings.shadow_samples, settings.least_shadow_samples) = (shadow[k], None);
                 }
                 if plan.sky_light {
                     options += &format!(" --sky-samples {}", sky[k]);
-                    settings.sky_samples = sky[k];
+                    (settings.sky_samples, settings.least_sky_samples) = (sky[k], None);
                 }
                 // So would policies where there is nothing to take over.
                 if !self.reuses(&settings) {

@@ -33,7 +33,8 @@ pub fn truth_settings(base: &Settings, candidates: &[&Settings]) -> Settings {
     let cutoff = candidates.iter().map(|s| s.cutoff).fold(base.cutoff, f32::min);
     let mut settings = base.clone();
     settings.spp = most(Settings::most_camera_samples, FIRST);
-    settings.most_spp = None;
+    (settings.most_spp, settings.least_shadow_samples) = (None, None);
+    settings.least_sky_samples = None;
     settings.shadow_samples = most(|s| s.shadow_samples, 16);
     settings.sky_samples = most(|s| s.sky_samples, 16);
     settings.bounces = most(|s| s.bounces, 16);

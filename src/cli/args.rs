@@ -4,7 +4,7 @@ mod job;
 
 pub use job::JobArgs;
 
-use super::values::{self, CameraSamples, Clamp};
+use super::values::{self, Clamp, SampleNumber};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
     Aovs, BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings,
@@ -52,7 +52,7 @@ pub struct SettingArgs {
     /// Camera samples per pixel: a number, or the least and the most, as in 4..16, where a pixel takes
     /// more than the least as far as its samples, or its neighbours', differ [default: 4]
     #[arg(long, value_name = "N|MIN..MAX", allow_negative_numbers = true, value_parser = values::camera_samples)]
-    pub spp: Option<CameraSamples>,
+    pub spp: Option<SampleNumber>,
     /// Pixel filter [default: box]
     #[arg(long, value_name = "FILTER",
         value_parser = values::choice::<Filter>(&["box", "tent", "gaussian", "blackman-harris"]))]
@@ -81,14 +81,17 @@ pub struct SettingArgs {
     #[arg(long, value_name = "on|off", value_parser = values::switch())]
     pub flag_bad: Option<bool>,
 
-    /// Shadow samples per area light and camera sample; 0 leaves area lights unlit [default: 16]
-    #[arg(long, value_name = "N", help_heading = "Light",
-        allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
-    pub shadow_samples: Option<u32>,
-    /// Sky rays per camera sample where the sky lights the scene [default: 16]
-    #[arg(long, value_name = "N", help_heading = "Light",
-        allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
-    pub sky_samples: Option<u32>,
+    /// Shadow samples per area light and camera sample; 0 leaves area lights unlit. With the least and the most, as
+    /// in 4..16, a point takes the least where all of them find the same, there and in the pixels around, else the
+    /// most [default: 16]
+    #[arg(long, value_name = "N|MIN..MAX", help_heading = "Light",
+        allow_negative_numbers = true, value_parser = values::light_samples)]
+    pub shadow_samples: Option<SampleNumber>,
+    /// Sky rays per camera sample where the sky lights the scene: a number, or the least and the most as for shadow
+    /// samples [default: 16]
+    #[arg(long, value_name = "N|MIN..MAX", help_heading = "Light",
+        allow_negative_numbers = true, value_parser = values::light_samples)]
+    pub sky_samples: Option<SampleNumber>,
     /// Specular bounces after the camera ray [default: 4]
     #[arg(long, value_name = "N", help_heading = "Light",
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_BOUNCES))]
@@ -190,8 +193,8 @@ impl SettingArgs {
         if self.crop.is_some() {
             s.crop = self.crop;
         }
-        if let Some(CameraSamples { spp, most_spp }) = self.spp {
-            (s.spp, s.most_spp) = (spp, most_spp);
+        if let Some(SampleNumber { least, most }) = self.spp {
+            (s.spp, s.most_spp) = (least, most);
         }
         put(&mut s.filter, self.filter);
         put(&mut s.exposure, self.exposure);
@@ -202,8 +205,12 @@ impl SettingArgs {
             s.aovs = Some(self.aovs.iter().cloned().collect());
         }
         put(&mut s.flag_bad, self.flag_bad);
-        put(&mut s.shadow_samples, self.shadow_samples);
-        put(&mut s.sky_samples, self.sky_samples);
+        if let Some(samples) = self.shadow_samples {
+            (s.shadow_samples, s.least_shadow_samples) = samples.of_light();
+        }
+        if let Some(samples) = self.sky_samples {
+            (s.sky_samples, s.least_sky_samples) = samples.of_light();
+        }
         put(&mut s.bounces, self.bounces);
         put(&mut s.cutoff, self.cutoff);
         put(&mut s.seed, self.seed);

@@ -83,6 +83,8 @@ impl ChoiceArgs {
             () if !self.is_any() => None,
             () if settings.crop.is_some() => Some("--crop"),
             () if settings.most_spp.is_some() => Some("--spp MIN..MAX"),
+            () if settings.least_shadow_samples.is_some() => Some("--shadow-samples MIN..MAX"),
+            () if settings.least_sky_samples.is_some() => Some("--sky-samples MIN..MAX"),
             () if settings.reuse.policy == Policy::Colour => Some("--policy colour"),
             () if !request.references.is_empty() => Some("--references"),
             () if request.options.maps && settings.reuse.policy == Policy::Off => {

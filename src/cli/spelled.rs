@@ -15,16 +15,24 @@ pub fn options(settings: &Settings, plan: &EffectPlan) -> String {
         Policy::Surface if is_usual => " --policy surface".into(),
         Policy::Surface => format!(" --policy surface --tolerance {}", reuse.tolerance),
     };
-    samples(settings.camera_samples(), settings.shadow_samples, settings.sky_samples, plan)
-        + &match plan.mirror || plan.glass {
-            true => format!(" --bounces {}", settings.bounces),
-            false => String::new(),
-        }
-        + &policy
+    samples(
+        settings.camera_samples(),
+        settings.shadow_sample_range(),
+        settings.sky_sample_range(),
+        plan,
+    ) + &match plan.mirror || plan.glass {
+        true => format!(" --bounces {}", settings.bounces),
+        false => String::new(),
+    } + &policy
 }
 
 /// Only the options of samples.
-pub fn samples(spp: impl Display, shadow: u32, sky: u32, plan: &EffectPlan) -> String {
+pub fn samples(
+    spp: impl Display,
+    shadow: impl Display,
+    sky: impl Display,
+    plan: &EffectPlan,
+) -> String {
     let mut options = format!("--spp {spp}");
     if plan.area_lights {
         options += &format!(" --shadow-samples {shadow}");

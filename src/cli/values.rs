@@ -48,32 +48,49 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// Camera samples of a pixel; where there is a most, the first number is the least.
+/// A number of samples; where there is a most, the first number is the least.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CameraSamples {
+pub struct SampleNumber {
     /// All, or the least.
-    pub spp: u32,
+    pub least: u32,
     /// The most, above the least.
-    pub most_spp: Option<u32>,
+    pub most: Option<u32>,
+}
+
+impl SampleNumber {
+    /// All or the most, and the least of a range.
+    pub fn of_light(self) -> (u32, Option<u32>) {
+        (self.most.unwrap_or(self.least), self.most.map(|_| self.least))
+    }
 }
 
 /// `4`, `4..16` (the least and the most).
-pub fn camera_samples(text: &str) -> Result<CameraSamples, String> {
-    let wrong = || {
+pub fn camera_samples(text: &str) -> Result<SampleNumber, String> {
+    samples("camera samples", 1, text)
+}
+
+/// As [`camera_samples`], and 0.
+pub fn light_samples(text: &str) -> Result<SampleNumber, String> {
+    samples("samples", 0, text)
+}
+
+fn samples(name: &str, fewest: u32, text: &str) -> Result<SampleNumber, String> {
+    let number = |text: &str, fewest: u32| {
         let most = limits::MAX_SAMPLES;
-        format!("camera samples are written 4, or 4..16 (the least and the most), from 1 to {most}")
-    };
-    let number = |text: &str| {
-        let count = text.trim().parse().ok().filter(|n| (1..=limits::MAX_SAMPLES).contains(n));
-        count.ok_or_else(wrong)
+        let count = text.trim().parse().ok().filter(|n| (fewest..=most).contains(n));
+        count.ok_or_else(|| {
+            format!(
+                "{name} are written 4, or 4..16 (the least and the most), from {fewest} to {most}"
+            )
+        })
     };
     let Some((least, most)) = text.split_once("..") else {
-        return Ok(CameraSamples { spp: number(text)?, most_spp: None });
+        return Ok(SampleNumber { least: number(text, fewest)?, most: None });
     };
-    let (spp, most) = (number(least)?, number(most)?);
-    match spp <= most {
-        true => Ok(CameraSamples { spp, most_spp: (most > spp).then_some(most) }),
-        false => Err(format!("the least camera samples, {spp}, are more than the most, {most}")),
+    let (least, most) = (number(least, 1)?, number(most, 1)?);
+    match least <= most {
+        true => Ok(SampleNumber { least, most: (most > least).then_some(most) }),
+        false => Err(format!("the least {name}, {least}, are more than the most, {most}")),
     }
 }
 

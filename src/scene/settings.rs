@@ -28,10 +28,19 @@ pub struct Settings {
     pub most_spp: Option<u32>,
     /// Pixel filter.
     pub filter: Filter,
-    /// Shadow samples per area light and camera sample.
+    /// Shadow samples per area light and camera sample; where [`least_shadow_samples`](Self::least_shadow_samples) is
+    /// given, the most.
     pub shadow_samples: u32,
-    /// Sky rays per camera sample where the sky lights the scene.
+    /// The least shadow samples: where they all find the same, there and in the pixels around, no more are taken.
+    /// `None` if every point takes all of them.
+    #[serde(default)]
+    pub least_shadow_samples: Option<u32>,
+    /// Sky rays per camera sample where the sky lights the scene; where
+    /// [`least_sky_samples`](Self::least_sky_samples) is given, the most.
     pub sky_samples: u32,
+    /// The least sky rays, as [`least_shadow_samples`](Self::least_shadow_samples).
+    #[serde(default)]
+    pub least_sky_samples: Option<u32>,
     /// Start shadow rays of smooth meshes on the smooth surface, not on its facets.
     pub smooth_terminator: bool,
     /// Specular bounces after the camera ray.
@@ -85,6 +94,16 @@ impl Settings {
         self.most_spp.map_or_else(|| self.spp.to_string(), |most| format!("{}..{most}", self.spp))
     }
 
+    /// The shadow samples of a camera sample as text: "16", or "4..16".
+    pub fn shadow_sample_range(&self) -> String {
+        range(self.least_shadow_samples, self.shadow_samples)
+    }
+
+    /// The sky rays of a camera sample as text, likewise.
+    pub fn sky_sample_range(&self) -> String {
+        range(self.least_sky_samples, self.sky_samples)
+    }
+
     /// The most camera samples that any pixel takes.
     pub fn most_camera_samples(&self) -> u32 {
         self.most_spp.map_or(self.spp, |most| most.max(self.spp))
@@ -106,6 +125,10 @@ impl Settings {
     }
 }
 
+fn range(least: Option<u32>, most: u32) -> String {
+    least.map_or_else(|| most.to_string(), |least| format!("{least}..{most}"))
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -115,7 +138,9 @@ impl Default for Settings {
             most_spp: None,
             filter: Filter::Box,
             shadow_samples: 16,
+            least_shadow_samples: None,
             sky_samples: 16,
+            least_sky_samples: None,
             smooth_terminator: true,
             bounces: 4,
             cutoff: 1e-3,

@@ -6,6 +6,7 @@
 
 use super::groups::{CheckRays, Groups};
 use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
+use super::pilots::{Findings, Run};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
@@ -85,6 +86,8 @@ pub(super) struct LightSource {
     pub number: u32,
     /// Shadow rays of one camera sample.
     pub samples: u32,
+    /// How many of them are pilots: where these find the same all around, there are no others.
+    pub pilots: u32,
     /// What its shadow rays count as.
     pub rays: RayKind,
     /// The channel of its ratio with the number of channels, if the ratio is kept.
@@ -111,11 +114,18 @@ pub(super) struct ShadowScratch {
     /// In place of weights what a glossy point reflects along each ray, per unit of emission.
     seen: Vec<Rgb>,
     occluded: Vec<bool>,
-    spans: Vec<Span>,
+    /// Where the rays of each point of the batch end.
+    ends: Vec<usize>,
     u: Vec<[f32; 2]>,
     runs: Runs,
     /// Shading points that the present light must be traced for.
     wanted: Vec<u32>,
+    /// For each of these what its rays have found.
+    gathered: Vec<Gathered>,
+    /// Which of these cast rays now.
+    going: Vec<u32>,
+    /// What pilots found in the block, light by light.
+    findings: Vec<Findings>,
     /// Irradiance without shadows, per unit of emission, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
@@ -153,18 +163,30 @@ impl Runs {
     }
 }
 
-/// The shadow rays of one point, and the irradiance they decide on.
-struct Span {
-    end: usize,
-    unshadowed: Rgb,
+/// What the shadow rays of one point to one light have found.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gathered {
+    /// Irradiance without shadows, per unit of emission.
+    exact: f64,
+    /// Weights of the rays that reached the light, and of all.
+    open: f64,
+    all: f64,
+    rays: u32,
 }
 
 impl ShadowScratch {
+    /// Starts another block of pixels, lit by as many lights.
+    pub fn start_block(&mut self, lights: usize) {
+        self.groups.start_block();
+        self.findings.clear();
+        self.findings.resize(lights, Findings::default());
+    }
+
     pub fn clear(&mut self) {
         self.rays.clear();
         self.weights.clear();
         self.seen.clear();
-        self.spans.clear();
+        self.ends.clear();
     }
 
     /// Room for `n` samples of a light, to be given back.
@@ -188,20 +210,20 @@ impl ShadowScratch {
     /// What each of the batch's glossy points reflects along its rays that are not occluded.
     pub fn highlights(&self) -> impl Iterator<Item = Rgb> {
         let mut start = 0;
-        self.spans.iter().map(move |span| {
-            let rays = std::mem::replace(&mut start, span.end)..span.end;
+        self.ends.iter().map(move |end| {
+            let rays = std::mem::replace(&mut start, *end)..*end;
             rays.filter(|k| !self.occluded[*k]).map(|k| self.seen[k]).sum()
         })
     }
 
     /// Whether the present point has no ray yet.
     fn is_open(&self) -> bool {
-        self.rays.len() == self.spans.last().map_or(0, |span| span.end)
+        self.rays.len() == self.ends.last().copied().unwrap_or(0)
     }
 
     /// Ends a point's rays.
-    pub fn close(&mut self, unshadowed: Rgb) {
-        self.spans.push(Span { end: self.rays.len(), unshadowed });
+    pub fn close(&mut self) {
+        self.ends.push(self.rays.len());
     }
 
     fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
@@ -215,27 +237,41 @@ impl ShadowScratch {
 
 impl Renderer<'_> {
     /// The lights that shine under the plan, in the scene's order, then the sky.
-    pub(super) fn light_sources(&self, reuse: Option<Reuse>) -> Vec<LightSource> {
+    /// Without `stops_early` every point takes all samples.
+    pub(super) fn light_sources(
+        &self,
+        reuse: Option<Reuse>,
+        stops_early: bool,
+    ) -> Vec<LightSource> {
         let channels = reuse.map(|reuse| reuse.channels);
         let of = |channel: Option<usize>| Some((channel?, channels?.len()));
-        let plan = &self.plan;
+        let Self { plan, settings, .. } = self;
+        let pilots = |least: Option<u32>, all: u32| match least {
+            Some(least) if stops_early => least.min(all),
+            _ => all,
+        };
         let mut sources = Vec::new();
         for (number, light) in (0..).zip(&self.scene.lights) {
-            let (runs, rays, samples) = match light.is_area() {
-                true => (plan.area_lights, RayKind::ShadowArea, self.settings.shadow_samples),
-                false => (plan.delta_lights, RayKind::ShadowDelta, 1),
+            let (runs, rays, samples, least) = match light.is_area() {
+                true => {
+                    let (samples, least) = (settings.shadow_samples, settings.least_shadow_samples);
+                    (plan.area_lights, RayKind::ShadowArea, samples, least)
+                }
+                false => (plan.delta_lights, RayKind::ShadowDelta, 1, None),
             };
             if runs {
                 let sampler = LightSampler::new(light);
                 let channel = of(channels.and_then(|channels| channels.of_light(number)));
-                sources.push(LightSource { sampler, number, samples, rays, channel });
+                let pilots = pilots(least, samples);
+                sources.push(LightSource { sampler, number, samples, pilots, rays, channel });
             }
         }
         if plan.sky_light {
             sources.push(LightSource {
                 sampler: LightSampler::of_sky(&self.scene.sky),
                 number: self.scene.lights.len() as u32,
-                samples: self.settings.sky_samples,
+                samples: settings.sky_samples,
+                pilots: pilots(settings.least_sky_samples, settings.sky_samples),
                 rays: RayKind::ShadowSky,
                 channel: of(channels.and_then(|channels| channels.sky())),
             });
@@ -267,8 +303,8 @@ impl Renderer<'_> {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
             lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
         }
-        for source in &input.lights {
-            self.light_from(source, lit, pixels, scratch, counts);
+        for (at, source) in input.lights.iter().enumerate() {
+            self.light_from((at, source), lit, pixels, scratch, counts);
         }
     }
 
@@ -295,38 +331,89 @@ impl Renderer<'_> {
         }
     }
 
-    /// Adds the light of one source, known or traced.
+    /// Adds the light of one source, the one at `at` in the list, known or traced.
     fn light_from(
         &self,
-        source: &LightSource,
+        (at, source): (usize, &LightSource),
         lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        let n = source.samples as usize;
-        let wanted = self.use_known(source, lit, pixels, s);
+        let wanted = self.use_known((at, source), lit, pixels, s);
+        s.gathered.clear();
+        s.gathered.extend(wanted.iter().map(|i| {
+            let exact = match source.channel {
+                Some((channel, channels)) => s.exact[*i as usize * channels + channel],
+                None => source.sampler.unshadowed(lit[*i as usize].si.p, lit[*i as usize].n),
+            };
+            Gathered { exact, ..Gathered::default() }
+        }));
+        let mut going = std::mem::take(&mut s.going);
+        going.clear();
+        going.extend(0..wanted.len() as u32);
+        let (pilots, rest) = Run::of((source.pilots, source.samples), pixels.chunk());
+        self.cast((source, &pilots), (lit, &wanted, &going), pixels, s, counts);
+        if let Some(rest) = rest {
+            let pixel_of = |slot: u32| lit[wanted[slot as usize] as usize].place.pixel;
+            let ShadowScratch { gathered, findings, .. } = s;
+            let found = &mut findings[at];
+            for (slot, gathered) in (0..).zip(&*gathered).filter(|(_, g)| g.exact != 0.0) {
+                // Where all pilots lay below the horizon, nothing is known.
+                let is_unknown = gathered.rays == 0;
+                let open = is_unknown || gathered.open > 0.0;
+                let shut = is_unknown || gathered.open < gathered.all;
+                found.note(pixels.cell(pixel_of(slot)), open, shut);
+            }
+            let disputed = found.disputed();
+            going.retain(|slot| disputed.has(pixels.cell(pixel_of(*slot))));
+            self.cast((source, &rest), (lit, &wanted, &going), pixels, s, counts);
+        }
+        for (&i, gathered) in wanted.iter().zip(&s.gathered) {
+            let point = &lit[i as usize];
+            let Gathered { exact, open, all, rays } = *gathered;
+            if let (Some((channel, channels)), true) = (source.channel, rays > 0) {
+                s.groups.add(i as usize, channel, channels, open, all);
+            }
+            if open > 0.0 {
+                let unshadowed = source.sampler.emission * exact as f32;
+                let light = point.weight * unshadowed * (open / all) as f32;
+                pixels.add(point.place.pixel, point.place.sample, light);
+            }
+        }
+        (s.wanted, s.going) = (wanted, going);
+    }
+
+    /// Casts a run of shadow rays from each of those of the `wanted` points that are `going`, and gathers what they
+    /// find.
+    fn cast(
+        &self,
+        (source, run): (&LightSource, &Run),
+        (lit, wanted, going): (&[ShadingPoint], &[u32], &[u32]),
+        pixels: &BlockPixels,
+        s: &mut ShadowScratch,
+        counts: &mut RayCounts,
+    ) {
+        let n = run.count as usize;
         let mut u = s.samples(n);
-        for group in wanted.chunks((BATCH / n).max(1)) {
+        for group in going.chunks((BATCH / n.max(1)).max(1)) {
             s.clear();
-            for &i in group {
+            for &slot in group {
+                let i = wanted[slot as usize];
                 let point = &lit[i as usize];
-                let exact = match source.channel {
-                    Some((channel, channels)) => s.exact[i as usize * channels + channel],
-                    None => source.sampler.unshadowed(point.si.p, point.n),
-                };
+                let gathered = s.gathered[slot as usize];
                 // What is NaN goes on, to be counted at its pixel.
-                let seen = match exact {
+                let seen = match gathered.exact {
                     0.0 => None,
                     _ => source.sampler.seen_from(point.si.p, point.n),
                 };
                 if let Some(seen) = &seen {
                     if source.is_sampled() {
-                        let first = point.place.sample.wrapping_mul(source.samples);
+                        let first = run.first(point.place.sample);
                         self.fill(&point.place, source, first, pixels, &mut u);
                     }
                     self.rays_to(seen, (lit, i), &u, s);
-                    if s.is_open() {
+                    if run.is_last && s.is_open() && gathered.rays == 0 {
                         // All below the horizon, but some of the light is above: a point of that
                         // decides, or the horizon's own shadow would be counted twice.
                         if let Some(sample) = seen.above(point.si.p, point.n) {
@@ -335,13 +422,20 @@ impl Renderer<'_> {
                         }
                     }
                 }
-                s.close(seen.map_or(Rgb::ZERO, |_| source.sampler.emission * exact as f32));
+                s.close();
             }
             self.trace_shadow_rays(source, s, counts);
-            settle(lit, group, source.channel, pixels, s);
+            let mut start = 0;
+            for (&slot, &end) in group.iter().zip(&s.ends) {
+                let (open, all) = opened(&s.weights, &s.occluded, start..end);
+                let gathered = &mut s.gathered[slot as usize];
+                gathered.open += open;
+                gathered.all += all;
+                gathered.rays += (end - start) as u32;
+                start = end;
+            }
         }
         s.give_back(u);
-        s.wanted = wanted;
     }
 
     /// Pushes a shadow ray from shading point `i` to each of the samples `u` of a light, but for those below
@@ -389,15 +483,15 @@ impl Renderer<'_> {
                         self.rays_to(&seen, (lit, i), own, s);
                     }
                 }
-                s.close(Rgb::ZERO);
+                s.close();
             }
             s.runs = runs;
             self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
-            for (i, span) in s.spans.iter().enumerate() {
-                let (open, weight) = opened(&s.weights, &s.occluded, start..span.end);
-                let rays = span.end - start;
-                start = span.end;
+            for (i, end) in s.ends.iter().copied().enumerate() {
+                let (open, weight) = opened(&s.weights, &s.occluded, start..end);
+                let rays = end - start;
+                start = end;
                 if rays > 0 {
                     s.groups.note_checked(i, (at, channels), (open, weight), rays);
                 }
@@ -410,7 +504,7 @@ impl Renderer<'_> {
     /// them where no ratio is kept.
     fn use_known(
         &self,
-        source: &LightSource,
+        (at, source): (usize, &LightSource),
         lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
@@ -431,6 +525,7 @@ impl Renderer<'_> {
             if ratio.is_nan() {
                 wanted.push(i as u32);
             } else {
+                s.findings[at].note_ratio(pixels.cell(point.place.pixel), ratio);
                 let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
             }
@@ -462,31 +557,6 @@ impl Renderer<'_> {
         s.occluded.clear();
         s.occluded.resize(s.rays.len(), false);
         self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
-    }
-}
-
-/// Adds `weight · unshadowed · ratio` to the pixel of each point of the traced batch `group`; in a channel that is
-/// kept, the ratio also to its surface point.
-fn settle(
-    lit: &[ShadingPoint],
-    group: &[u32],
-    channel: Option<(usize, usize)>,
-    pixels: &mut BlockPixels,
-    s: &mut ShadowScratch,
-) {
-    let mut start = 0;
-    for (&i, span) in group.iter().zip(&s.spans) {
-        let point = &lit[i as usize];
-        let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
-        if let (Some((channel, channels)), true) = (channel, span.end > start) {
-            s.groups.add(i as usize, channel, channels, open, all);
-        }
-        start = span.end;
-        if open > 0.0 {
-            let ratio = (open / all) as f32;
-            let light = point.weight * span.unshadowed * ratio;
-            pixels.add(point.place.pixel, point.place.sample, light);
-        }
     }
 }
 

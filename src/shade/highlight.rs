@@ -125,7 +125,7 @@ impl Renderer<'_> {
                         let mut rays = HighlightRays { point, view, source, exact, scratch };
                         view.sample_li(point.p, point.n, &u, &mut rays);
                     }
-                    s.close(Rgb::ZERO);
+                    s.close();
                 }
                 self.trace_shadow_rays(source, s, counts);
                 for (point, seen) in group.iter().zip(s.highlights()) {

@@ -19,6 +19,7 @@ mod medium;
 mod medium_stack;
 mod motion;
 pub mod optics;
+mod pilots;
 mod pixels;
 mod point;
 mod scattered;
@@ -295,7 +296,7 @@ impl Renderer<'_> {
         progress: &dyn Progress,
     ) -> Option<Rendered> {
         let camera = job.camera;
-        let input = self.input(camera, job.stream, job.reuse);
+        let input = self.input(job);
         let full = Rect { x0: 0, y0: 0, x1: camera.width, y1: camera.height };
         let crop = self.settings.crop.map_or(full, |c| intersection(&c, &full));
         let own = aligned(if job.beyond_crop { &full } else { &crop }, &full);
@@ -365,7 +366,10 @@ impl Renderer<'_> {
         Some(())
     }
 
-    fn input<'a>(&self, camera: &Camera, stream: u32, reuse: Option<Reuse<'a>>) -> FrameInput<'a> {
+    fn input<'a>(&self, job: &FrameJob<'a>) -> FrameInput<'a> {
+        let FrameJob { camera, stream, reuse, .. } = *job;
+        // Single pixels have no neighbours that pilots could be compared with.
+        let stops_early = job.mask.is_none();
         let own = camera.to_scene(&self.scene.recentring);
         let is_ranked = |m: &Material| m.glass.as_ref().is_some_and(medium_stack::is_ranked);
         let has_ranked_glass = self.scene.materials.iter().any(is_ranked);
@@ -382,7 +386,7 @@ impl Renderer<'_> {
             stream,
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
-            lights: self.light_sources(reuse),
+            lights: self.light_sources(reuse, stops_early),
             around_eye,
             has_ranked_glass,
             reuse,

@@ -1,6 +1,6 @@
 //! `[settings]`: everything that `tweenray render` can set, under the same names.
 
-mod camera_samples;
+mod samples;
 mod switches;
 
 use super::at::At;
@@ -13,7 +13,7 @@ use crate::scene::{
     self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, JobOptions, Rect,
     ReuseSettings, ToneCurve, limits,
 };
-use camera_samples::CameraSamples;
+use samples::Samples;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -21,12 +21,8 @@ use switches::{AovName, Isa, PngBits, Rules};
 
 /// Image columns or rows.
 pub(super) type Pixels = Int<1, { limits::MAX_EDGE as i64 }>;
-/// Samples of any kind that may be none.
-type Samples = Int<0, MAX_SAMPLES>;
 /// A corner of a crop.
 type Corner = Int<0, { limits::MAX_EDGE as i64 }>;
-
-const MAX_SAMPLES: i64 = limits::MAX_SAMPLES as i64;
 
 /// How to render. The command line's options of the same names take precedence.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -36,13 +32,14 @@ pub(super) struct Settings {
     pub size: List<Pixels, 2>,
     /// Camera samples per pixel: a number, or `[least, most]`, where a pixel takes more than the least as far as its
     /// samples, or its neighbours', differ.
-    spp: CameraSamples,
+    spp: Samples<1>,
     /// Pixel filter: "box", "tent", "gaussian" or "blackman-harris".
     filter: Filter,
-    /// Shadow samples per area light and camera sample; 0 leaves area lights unlit.
-    shadow_samples: Samples,
-    /// Sky rays per camera sample where the sky lights the scene.
-    sky_samples: Samples,
+    /// Shadow samples per area light and camera sample; 0 leaves area lights unlit. With `[least, most]` a point takes
+    /// the least where all of them find the same, there and in the pixels around, else the most.
+    shadow_samples: Samples<0>,
+    /// Sky rays per camera sample where the sky lights the scene: a number, or `[least, most]` as for shadow samples.
+    sky_samples: Samples<0>,
     /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
     /// shadows end where the shading does.
     smooth_terminator: bool,
@@ -116,10 +113,10 @@ impl Default for Settings {
         let job = JobOptions::default();
         Self {
             size: List([s.width, s.height].map(|x| Int::clamped(x.into()))),
-            spp: CameraSamples { least: s.spp, most: s.most_spp },
+            spp: Samples { least: s.spp, most: s.most_spp },
             filter: s.filter,
-            shadow_samples: Int::clamped(s.shadow_samples.into()),
-            sky_samples: Int::clamped(s.sky_samples.into()),
+            shadow_samples: Samples::of_light(s.shadow_samples, s.least_shadow_samples),
+            sky_samples: Samples::of_light(s.sky_samples, s.least_sky_samples),
             smooth_terminator: s.smooth_terminator,
             bounces: Int::clamped(s.bounces.into()),
             cutoff: Share(shortest(s.cutoff)),
@@ -162,14 +159,18 @@ impl Settings {
     /// Errors: a crop that leaves the image or is empty.
     pub fn build(&self, source: &Source, reuse: ReuseSettings) -> Result<scene::Settings> {
         let Rules { robust, retry, recheck, spawn_offset, recentre } = self.rules;
+        let (shadow_samples, least_shadow_samples) = self.shadow_samples.to_light();
+        let (sky_samples, least_sky_samples) = self.sky_samples.to_light();
         Ok(scene::Settings {
             width: self.size.0[0].u32(),
             height: self.size.0[1].u32(),
             spp: self.spp.least,
             most_spp: self.spp.most,
             filter: self.filter,
-            shadow_samples: self.shadow_samples.u32(),
-            sky_samples: self.sky_samples.u32(),
+            shadow_samples,
+            least_shadow_samples,
+            sky_samples,
+            least_sky_samples,
             smooth_terminator: self.smooth_terminator,
             bounces: self.bounces.u32(),
             cutoff: self.cutoff.0 as f32,

@@ -1,0 +1,156 @@
+//! Pilot samples of a light: where all of them find the same, the others are not taken.
+//!
+//! Most points of a picture are lit fully or not at all by a light; only in a penumbra do more shadow rays make a
+//! better estimate. So each point casts a few pilot rays first. It casts the others only if the pilots of its pixel and
+//! of the pixels up to two away disagree: some reached the light, some did not. What is known from other frames counts
+//! as pilots do.
+//!
+//! The choice depends on the block alone, so it is the same for any threads, ranks and crop. A shadow that no pilot
+//! of these pixels meets is missed; `docs/accuracy.md` has a bound on that error.
+
+use super::pixels::BLOCK;
+use std::ops::Range;
+
+/// How far away pilots count, pixels, each way.
+const REACH: u32 = 2;
+/// A share of a light this small, from other frames, is rounding.
+const ROUNDING: f32 = 1e-3;
+/// The first column of a block.
+const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
+
+const _: () = assert!(BLOCK * BLOCK == u64::BITS, "a bit for each pixel of a block");
+
+/// Pixels of a block, a bit for each, row by row.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Cells(u64);
+
+impl Cells {
+    /// Whether the pixel at `cell` is among them.
+    pub fn has(self, cell: usize) -> bool {
+        self.0 >> cell & 1 == 1
+    }
+
+    fn add(&mut self, cell: usize, is_in: bool) {
+        self.0 |= u64::from(is_in) << cell;
+    }
+
+    /// These and the pixels next to them.
+    fn grown(self) -> Self {
+        let Self(own) = self;
+        let last_column = FIRST_COLUMN << (BLOCK - 1);
+        let row = own | (own << 1 & !FIRST_COLUMN) | (own >> 1 & !last_column);
+        Self(row | row << BLOCK | row >> BLOCK)
+    }
+}
+
+/// What the pilots of a block's pixels found of one light.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Findings {
+    /// Pixels in which any reached the light.
+    open: Cells,
+    /// Pixels in which any did not.
+    shut: Cells,
+}
+
+impl Findings {
+    /// Notes what the pilots of the pixel at `cell` found: whether any reached the light, and whether any did not.
+    pub fn note(&mut self, cell: usize, open: bool, shut: bool) {
+        self.open.add(cell, open);
+        self.shut.add(cell, shut);
+    }
+
+    /// Notes the ratio of a light that is known from other frames.
+    pub fn note_ratio(&mut self, cell: usize, ratio: f32) {
+        self.note(cell, ratio > ROUNDING, ratio < 1.0 - ROUNDING);
+    }
+
+    /// The pixels around which pilots disagree.
+    pub fn disputed(&self) -> Cells {
+        let near = |cells: Cells| (0..REACH).fold(cells, |cells, _| cells.grown());
+        Cells(near(self.open).0 & near(self.shut).0)
+    }
+}
+
+/// Part of a light's samples.
+pub(super) struct Run {
+    /// Number of the first sample of the chunk's first camera sample.
+    base: u32,
+    /// The chunk's first camera sample.
+    start: u32,
+    /// How many each camera sample has.
+    pub count: u32,
+    /// Whether there are no others after these.
+    pub is_last: bool,
+}
+
+impl Run {
+    /// The first `pilots` of `all` samples of a light, and the others, for a chunk of camera samples. Both are runs over
+    /// all camera samples of a pixel, one after the other, since such runs are spread over the light.
+    pub fn of((pilots, all): (u32, u32), chunk: &Range<u32>) -> (Self, Option<Self>) {
+        let (base, start) = (chunk.start.wrapping_mul(all), chunk.start);
+        if pilots >= all {
+            return (Self { base, start, count: all, is_last: true }, None);
+        }
+        let camera_samples = chunk.end - chunk.start;
+        let after = base.wrapping_add(camera_samples.wrapping_mul(pilots));
+        let rest = Self { base: after, start, count: all - pilots, is_last: true };
+        (Self { base, start, count: pilots, is_last: false }, Some(rest))
+    }
+
+    /// Number of the first sample of a camera sample.
+    pub fn first(&self, sample: u32) -> u32 {
+        self.base.wrapping_add((sample - self.start).wrapping_mul(self.count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_grow_by_one_each_way_and_not_across_the_block() {
+        let of = |cells: &[(usize, usize)]| {
+            cells.iter().fold(0u64, |all, (x, y)| all | 1 << (y * 8 + x))
+        };
+        let corner = Cells(of(&[(7, 0)])).grown();
+        assert_eq!(corner, Cells(of(&[(6, 0), (7, 0), (6, 1), (7, 1)])));
+        let edge = Cells(of(&[(0, 7)])).grown();
+        assert_eq!(edge, Cells(of(&[(0, 7), (1, 7), (0, 6), (1, 6)])));
+        assert_eq!(Cells(of(&[(3, 3)])).grown().0.count_ones(), 9);
+    }
+
+    #[test]
+    fn pixels_are_disputed_where_pilots_nearby_disagree() {
+        let mut found = Findings::default();
+        (0..64).for_each(|cell| found.note(cell, true, false));
+        assert_eq!(found.disputed(), Cells(0));
+        found.note(0, true, true);
+        assert_eq!(found.disputed().0.count_ones(), 9);
+        assert!(found.disputed().has(18) && !found.disputed().has(3));
+        let mut known = Findings::default();
+        known.note_ratio(9, 1.0);
+        known.note_ratio(10, 0.0);
+        assert!(known.disputed().has(9));
+        let mut partly = Findings::default();
+        partly.note_ratio(9, 0.5);
+        assert!(partly.disputed().has(9));
+    }
+
+    #[test]
+    fn pilots_and_the_others_are_all_samples_once() {
+        let numbers = |pilots: u32| {
+            let run = |run: &Run| {
+                let of = |sample: u32| run.first(sample)..run.first(sample) + run.count;
+                (4..8).flat_map(of).collect::<Vec<u32>>()
+            };
+            let (first, rest) = Run::of((pilots, 16), &(4..8));
+            let mut all = run(&first);
+            all.extend(rest.iter().flat_map(run));
+            all
+        };
+        let all: Vec<u32> = (64..128).collect();
+        for pilots in [0, 1, 4, 16, 99] {
+            assert_eq!(numbers(pilots), all, "{pilots}");
+        }
+    }
+}
