@@ -86,7 +86,8 @@ pub(super) struct LightSource {
     pub number: u32,
     /// Shadow rays of one camera sample.
     pub samples: u32,
-    /// How many of them are pilots: where these find the same all around, there are no others.
+    /// Shadow rays of one camera sample that are cast before: where these find the same all around, there are no
+    /// others. As many as `samples` if there are none.
     pub pilots: u32,
     /// What its shadow rays count as.
     pub rays: RayKind,
@@ -352,9 +353,8 @@ impl Renderer<'_> {
         let mut going = std::mem::take(&mut s.going);
         going.clear();
         going.extend(0..wanted.len() as u32);
-        let (pilots, rest) = Run::of((source.pilots, source.samples), pixels.chunk());
-        self.cast((source, &pilots), (lit, &wanted, &going), pixels, s, counts);
-        if let Some(rest) = rest {
+        if let Some(pilots) = Run::pilots(source, self.settings.most_camera_samples()) {
+            self.cast((source, &pilots), (lit, &wanted, &going), pixels, s, counts);
             let pixel_of = |slot: u32| lit[wanted[slot as usize] as usize].place.pixel;
             let ShadowScratch { gathered, findings, .. } = s;
             let found = &mut findings[at];
@@ -367,8 +367,12 @@ impl Renderer<'_> {
             }
             let disputed = found.disputed();
             going.retain(|slot| disputed.has(pixels.cell(pixel_of(*slot))));
-            self.cast((source, &rest), (lit, &wanted, &going), pixels, s, counts);
+            for slot in &going {
+                let gathered = &mut gathered[*slot as usize];
+                *gathered = Gathered { exact: gathered.exact, ..Gathered::default() };
+            }
         }
+        self.cast((source, &Run::whole(source)), (lit, &wanted, &going), pixels, s, counts);
         for (&i, gathered) in wanted.iter().zip(&s.gathered) {
             let point = &lit[i as usize];
             let Gathered { exact, open, all, rays } = *gathered;
@@ -413,7 +417,7 @@ impl Renderer<'_> {
                         self.fill(&point.place, source, first, pixels, &mut u);
                     }
                     self.rays_to(seen, (lit, i), &u, s);
-                    if run.is_last && s.is_open() && gathered.rays == 0 {
+                    if s.is_open() && n == source.samples as usize {
                         // All below the horizon, but some of the light is above: a point of that
                         // decides, or the horizon's own shadow would be counted twice.
                         if let Some(sample) = seen.above(point.si.p, point.n) {

@@ -1,15 +1,15 @@
-//! Pilot samples of a light: where all of them find the same, the others are not taken.
+//! Pilot rays to a light: where all of them find the same, no others are cast.
 //!
 //! Most points of a picture are lit fully or not at all by a light; only in a penumbra do more shadow rays make a
-//! better estimate. So each point casts a few pilot rays first. It casts the others only if the pilots of its pixel and
-//! of the pixels up to two away disagree: some reached the light, some did not. What is known from other frames counts
-//! as pilots do.
+//! better estimate. So each point casts a few pilot rays first. If the pilots of its pixel and of the pixels up to two
+//! away disagree (some reached the light, some did not), it is traced as if there were none. What is known from other
+//! frames counts as pilots do.
 //!
 //! The choice depends on the block alone, so it is the same for any threads, ranks and crop. A shadow that no pilot
 //! of these pixels meets is missed; `docs/accuracy.md` has a bound on that error.
 
+use super::direct::LightSource;
 use super::pixels::BLOCK;
-use std::ops::Range;
 
 /// How far away pilots count, pixels, each way.
 const REACH: u32 = 2;
@@ -71,35 +71,33 @@ impl Findings {
     }
 }
 
-/// Part of a light's samples.
+/// Samples of a light that every camera sample has as many of.
 pub(super) struct Run {
-    /// Number of the first sample of the chunk's first camera sample.
-    base: u32,
-    /// The chunk's first camera sample.
-    start: u32,
+    /// Number of the first sample of the first camera sample.
+    first: u32,
     /// How many each camera sample has.
     pub count: u32,
-    /// Whether there are no others after these.
-    pub is_last: bool,
 }
 
 impl Run {
-    /// The first `pilots` of `all` samples of a light, and the others, for a chunk of camera samples. Both are runs over
-    /// all camera samples of a pixel, one after the other, since such runs are spread over the light.
-    pub fn of((pilots, all): (u32, u32), chunk: &Range<u32>) -> (Self, Option<Self>) {
-        let (base, start) = (chunk.start.wrapping_mul(all), chunk.start);
-        if pilots >= all {
-            return (Self { base, start, count: all, is_last: true }, None);
-        }
-        let camera_samples = chunk.end - chunk.start;
-        let after = base.wrapping_add(camera_samples.wrapping_mul(pilots));
-        let rest = Self { base: after, start, count: all - pilots, is_last: true };
-        (Self { base, start, count: pilots, is_last: false }, Some(rest))
+    /// The samples that a light is traced with.
+    pub fn whole(source: &LightSource) -> Self {
+        Self { first: 0, count: source.samples }
     }
 
-    /// Number of the first sample of a camera sample.
+    /// The pilots, where not every point takes all samples; a pixel has at most `camera_samples`. They are no part of
+    /// the estimate: had a point that goes on pilots among its samples, these would be those that disagree more often
+    /// than not. Their numbers lie beyond those of traced samples and of check rays.
+    pub fn pilots(source: &LightSource, camera_samples: u32) -> Option<Self> {
+        let traced = camera_samples.wrapping_mul(source.samples.next_power_of_two());
+        let first = traced.wrapping_mul(2);
+        (source.pilots < source.samples).then_some(Self { first, count: source.pilots })
+    }
+
+    /// Number of the first sample of a camera sample. Those of a pixel follow one another, since such a run is spread
+    /// over the light.
     pub fn first(&self, sample: u32) -> u32 {
-        self.base.wrapping_add((sample - self.start).wrapping_mul(self.count))
+        self.first.wrapping_add(sample.wrapping_mul(self.count))
     }
 }
 
@@ -134,23 +132,5 @@ mod tests {
         let mut partly = Findings::default();
         partly.note_ratio(9, 0.5);
         assert!(partly.disputed().has(9));
-    }
-
-    #[test]
-    fn pilots_and_the_others_are_all_samples_once() {
-        let numbers = |pilots: u32| {
-            let run = |run: &Run| {
-                let of = |sample: u32| run.first(sample)..run.first(sample) + run.count;
-                (4..8).flat_map(of).collect::<Vec<u32>>()
-            };
-            let (first, rest) = Run::of((pilots, 16), &(4..8));
-            let mut all = run(&first);
-            all.extend(rest.iter().flat_map(run));
-            all
-        };
-        let all: Vec<u32> = (64..128).collect();
-        for pilots in [0, 1, 4, 16, 99] {
-            assert_eq!(numbers(pilots), all, "{pilots}");
-        }
     }
 }

@@ -239,11 +239,6 @@ impl BlockPixels {
         self.check(pixel, sample, radiance);
     }
 
-    /// The present chunk of camera samples.
-    pub fn chunk(&self) -> &Range<u32> {
-        &self.chunk
-    }
-
     fn chunk_len(&self) -> u32 {
         self.chunk.end - self.chunk.start
     }
