@@ -124,7 +124,10 @@ impl EffectPlan {
                 "soft shadows",
                 lit && area > 0 && samples > 0,
                 if lit {
-                    let samples = counted(samples as usize, "shadow sample");
+                    let samples = match settings.least_shadow_samples {
+                        Some(_) => format!("{} shadow samples", settings.shadow_sample_range()),
+                        None => counted(samples as usize, "shadow sample"),
+                    };
                     format!("{}, {samples}", counted(area, "area light"))
                 } else {
                     none_lit()
@@ -145,10 +148,11 @@ impl EffectPlan {
                 } else if !scene.sky.lights {
                     "the sky is only a backdrop".into()
                 } else {
-                    format!(
-                        "constant sky, {}",
-                        counted(settings.sky_samples as usize, "sky sample")
-                    )
+                    let samples = match settings.least_sky_samples {
+                        Some(_) => format!("{} sky samples", settings.sky_sample_range()),
+                        None => counted(settings.sky_samples as usize, "sky sample"),
+                    };
+                    format!("constant sky, {samples}")
                 },
             ),
             ambient: decide(

@@ -10,8 +10,8 @@ mod moves;
 use moves::{Set, codes, mean_square, psnr_of};
 use tweenray::film::Film;
 use tweenray::math::Rgb;
-use tweenray::scene::{Policy, Settings};
-use tweenray::shade::{FrameJob, Sampling};
+use tweenray::scene::{Policy, Rect, Settings};
+use tweenray::shade::{FrameJob, Known, Sampling};
 
 const SCENES: [&str; 4] = ["cornell", "demo", "reflective_spheres", "spheres_on_terrain"];
 
@@ -129,6 +129,61 @@ fn a_part_of_a_frame_has_the_bytes_of_the_whole() {
         let job = FrameJob { sampling: Sampling::Alone, ..job };
         let render = || stage.renderer(&settings).render_job(&job, &stage.stop, &());
         assert!(stage.pool.install(render).is_some());
+    }
+}
+
+/// Pixels that were rendered before, as probes are, change no other pixel, although they took samples by their own
+/// differences alone. How many they would have had is known afterwards.
+#[test]
+fn pixels_around_probes_have_the_bytes_of_the_whole() {
+    let set = Set::load("spheres_on_terrain", |_| ());
+    let (stage, shot) = (set.stage(2), set.shot(16));
+    let settings = Settings { most_spp: Some(32), ..set.settings((96, 54), 4, 4) };
+    let render = |job: &FrameJob| {
+        let render = || stage.renderer(&settings).render_job(job, &stage.stop, &());
+        stage.pool.install(render).unwrap()
+    };
+    let whole = stage.traced(&settings, &shot, 5, 5);
+    let camera = shot.camera(5, 96, 54).unwrap();
+    let mask: Vec<bool> = (0..96 * 54).map(|i| i % 7 == 3).collect();
+    let job = FrameJob::whole(&camera, 5);
+    let probes = FrameJob { mask: Some(&mask), sampling: Sampling::Alone, ..job };
+    let probes = render(&probes);
+    let known = Some(Known { mask: &mask, rendered: &probes });
+    let rest = render(&FrameJob { known, ..FrameJob::whole(&camera, 5) });
+    let samples = whole.samples.as_ref().unwrap();
+    for i in (0..mask.len()).filter(|i| !mask[*i]) {
+        let own = (rest.film.rgb[i], rest.film.samples.as_ref().unwrap()[i]);
+        assert_eq!(own, (whole.rgb[i], samples[i]), "{i}");
+    }
+    let counts = probes.sample_counts();
+    let (mut wanted, mut alone, mut traced) = (0, 0, 0);
+    for (at, count) in &rest.wanted {
+        let at = *at as usize;
+        (wanted, alone, traced) = (wanted + count, alone + counts[at], traced + samples[at]);
+    }
+    println!("{alone} samples alone, {traced} in the whole, {wanted} expected of it");
+    let share = f64::from(wanted) / f64::from(traced);
+    assert!(alone < traced && (share - 1.0).abs() < 0.05, "{share}");
+}
+
+/// In-between frames too, whose probes lie beyond the crop as well.
+#[test]
+fn a_crop_of_an_inferred_frame_has_the_bytes_of_the_whole() {
+    let set = Set::load("spheres_on_terrain", |_| ());
+    let (stage, shot) = (set.stage(2), set.shot(33));
+    let mut settings = Settings { most_spp: Some(16), ..set.settings((160, 90), 4, 32) };
+    settings.reuse.segment = 8;
+    let crop = Rect { x0: 37, y0: 21, x1: 91, y1: 60 };
+    let cropped = Settings { crop: Some(crop), ..settings.clone() };
+    let made = |settings| stage.frames(settings, &shot, &[1, 5, 7, 9]);
+    for (whole, part) in made(&settings).iter().zip(made(&cropped)).skip(1).take(2) {
+        assert!(whole.reuse.direct_inferred > 0);
+        let places = (crop.y0..crop.y1).flat_map(|y| (crop.x0..crop.x1).map(move |x| (x, y)));
+        for at in places.map(|(x, y)| whole.film.index(x, y)) {
+            let of = |film: &Film| (film.rgb[at], film.samples.as_ref().unwrap()[at]);
+            assert_eq!(of(&part.film), of(&whole.film), "{at}");
+        }
     }
 }
 

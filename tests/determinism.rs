@@ -102,6 +102,12 @@ fn adaptive(mut job: Job) -> Job {
     job
 }
 
+/// The same job with pilots.
+fn with_pilots(mut job: Job) -> Job {
+    (job.settings.least_shadow_samples, job.settings.least_sky_samples) = (Some(2), Some(1));
+    job
+}
+
 fn on_threads(job: &Job, threads: usize) -> Film {
     let scene = job.world.clone().into_scene(true).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -118,7 +124,9 @@ fn on_threads(job: &Job, threads: usize) -> Film {
 fn any_number_of_threads_gives_the_same_bytes() {
     // Not a multiple of the block or the tile.
     let busy = || busy_job(101, 77);
-    for job in [busy(), through_lens(busy()), adaptive(busy()), adaptive(through_lens(busy()))] {
+    let lens = || through_lens(busy());
+    let busier = adaptive(with_pilots(busy()));
+    for job in [busy(), lens(), adaptive(busy()), adaptive(lens()), with_pilots(busy()), busier] {
         let one = on_threads(&job, 1);
         for threads in [2, 3, 8] {
             assert!(one == on_threads(&job, threads), "{threads} threads differ");
@@ -156,6 +164,7 @@ fn a_crop_has_the_bytes_of_the_whole() {
     check_crops(&busy_job(101, 77));
     check_crops(&through_lens(busy_job(101, 77)));
     check_crops(&adaptive(busy_job(101, 77)));
+    check_crops(&adaptive(with_pilots(busy_job(101, 77))));
 }
 
 fn check_crops(job: &Job) {

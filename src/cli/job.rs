@@ -103,13 +103,15 @@ fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
 }
 
 /// Bytes that the frames in memory take at most, pixels alone: colour (12 a pixel) and, if exr frames may hold them,
-/// first-hit records (52). There are three of each: one is traced while the one before is encoded, which
-/// takes a copy.
+/// first-hit records (52). There are four of each: one is traced while the one before is encoded, which takes a copy,
+/// and its tiles hold their pixels until all are finished, with their places (4). Where pixels take different numbers
+/// of samples, what is known of these adds 52.
 pub fn frame_bytes(settings: &Settings) -> u64 {
     let has_first_hits = settings.aovs.as_ref().is_some_and(Aovs::have_first_hits)
         || settings.reuse.policy == Policy::Colour;
     // A cropped film has the full size, black outside.
-    settings.pixel_count() * 3 * (12 + if has_first_hits { 52 } else { 0 })
+    let each = 4 + 4 * (12 + if has_first_hits { 52 } else { 0 });
+    settings.pixel_count() * (each + if settings.most_spp.is_some() { 52 } else { 0 })
 }
 
 #[cfg(test)]
@@ -121,10 +123,10 @@ mod tests {
     fn sizes_and_crops_beyond_reason_are_refused_with_the_figure() {
         let large = Settings { width: 30_000, height: 30_000, ..Settings::default() };
         let error = check_memory(&large, Some(8 << 30)).expect_err("too large").to_string();
-        assert!(error.contains("32.4 GB") && error.contains("8.6 GB"), "{error}");
+        assert!(error.contains("46.8 GB") && error.contains("8.6 GB"), "{error}");
         let all = Settings { aovs: Some(Aovs::All), ..large };
         let error = check_memory(&all, Some(8 << 30)).expect_err("too large").to_string();
-        assert!(error.contains("172.8 GB"), "{error}");
+        assert!(error.contains("234.0 GB"), "{error}");
         assert!(check(&Settings { width: 70_000, ..Settings::default() }).is_err());
         let crop = |x1, y1| Settings {
             crop: Some(Rect { x0: 600, y0: 0, x1, y1 }),

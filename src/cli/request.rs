@@ -203,10 +203,14 @@ pub fn aovs(
     let asked = settings.aovs.clone().unwrap_or_else(needed);
     let maps = options.maps.then(|| Aovs::from(Aov::MAPS));
     let all: Aovs = std::iter::once(asked).chain(maps).collect();
-    all.under(policy).map_err(|aov| {
-        let policies = if aov == Aov::Reference { "surface" } else { "surface or colour" };
+    all.under(policy, settings.most_spp.is_some()).map_err(|aov| {
+        let needed = match aov {
+            Aov::Samples => "--spp MIN..MAX",
+            Aov::Reference => "--policy surface",
+            _ => "--policy surface or colour",
+        };
         Error::Usage(format!(
-            "the frames can have no {}: that needs --policy {policies}\n  \
+            "the frames can have no {}: that needs {needed}\n  \
              help: leave it out of --aovs (`aovs` in the scene file)",
             aov.name()
         ))

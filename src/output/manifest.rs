@@ -187,9 +187,13 @@ impl Header {
         entries.push(("crop".into(), crop(&s["crop"])));
         for group in [s, &s["rules"], &s["reuse"]] {
             for (key, value) in group.as_object().into_iter().flatten() {
-                if !["width", "height", "crop", "rules", "reuse"].contains(&key.as_str()) {
-                    entries.push((key.replace('_', "-"), plain(value)));
+                let own = ["width", "height", "crop", "rules", "reuse"];
+                if own.contains(&key.as_str()) || RANGES.iter().any(|range| range[1] == key) {
+                    continue;
                 }
+                let other = RANGES.iter().find(|range| range[0] == key);
+                let other = other.map_or(&Value::Null, |range| &group[range[1]]);
+                entries.push((key.replace('_', "-"), range(plain(value), other)));
             }
         }
         for (name, value) in [
@@ -201,6 +205,21 @@ impl Header {
             entries.push((name.into(), value.clone()));
         }
         entries
+    }
+}
+
+/// Settings that with another one, if that is there, are the least and the most of something.
+const RANGES: [[&str; 2]; 3] = [
+    ["spp", "most_spp"],
+    ["shadow_samples", "least_shadow_samples"],
+    ["sky_samples", "least_sky_samples"],
+];
+
+/// As on the command line: `4`, or `4..16`, whichever of the two is the least.
+fn range(one: String, other: &Value) -> String {
+    match (one.parse::<u64>(), other.as_u64()) {
+        (Ok(one), Some(other)) => format!("{}..{}", one.min(other), one.max(other)),
+        _ => one,
     }
 }
 

@@ -40,6 +40,9 @@ pub struct AuditedPixel {
     pub weight: f64,
     /// Pixels with one group number are neighbours that were drawn together; their errors are alike.
     pub group: u64,
+    /// How many times as many camera samples as the traces have a traced frame takes of it: its squared error is
+    /// smaller by that.
+    pub refinement: f64,
 }
 
 impl AuditedFrame<'_> {
@@ -98,7 +101,7 @@ pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -
     let [a, b] = traces;
     let mut sums = AuditSums { drawn: drawn.len() as u64, ..AuditSums::default() };
     let mut groups: BTreeMap<u64, Group> = BTreeMap::new();
-    for AuditedPixel { index, weight, group } in drawn {
+    for AuditedPixel { index, weight, group, refinement } in drawn {
         let group = groups.entry(*group).or_default();
         let i = *index as usize;
         let squares = SquaredErrors::of(&shown.display, shown.rgb[i], a[i], b[i]);
@@ -110,7 +113,7 @@ pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -
         let mean = (others * squares.error + squares.trace) / weight;
         let unseen = if shown.is_inferred(i) { UNSEEN_INFERRED } else { UNSEEN };
         group.shown.add(mean, *weight, unseen);
-        group.traced.add(squares.trace, *weight, UNSEEN);
+        group.traced.add(squares.trace / refinement, *weight, UNSEEN);
     }
     for Group { inferred, shown, traced } in groups.values() {
         inferred.iter().for_each(|part| part.add_to(&mut sums.inferred));
@@ -199,8 +202,9 @@ mod tests {
         let shown = AuditedFrame { rgb: &rgb, provenance: &provenance, display: LINEAR };
         let (a, b) = (vec![Rgb::splat(0.4); 4], vec![Rgb::splat(0.6); 4]);
         let of = |group: fn(u32) -> u64| {
-            let drawn: Vec<AuditedPixel> =
-                (0..4).map(|k| AuditedPixel { index: k, weight: 8.0, group: group(k) }).collect();
+            let drawn: Vec<AuditedPixel> = (0..4)
+                .map(|k| AuditedPixel { index: k, weight: 8.0, group: group(k), refinement: 1.0 })
+                .collect();
             sums(&shown, &drawn, [&a, &b]).traced
         };
         let (apart, together) = (of(u64::from), of(|_| 0));

@@ -91,15 +91,17 @@ pub struct LookupReason {
 pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     let kept = channels(scene, settings);
     let EffectPlan { diffuse, sky_light, .. } = EffectPlan::of(scene, settings);
+    let expected = |channel| {
+        let varies = settings.most_spp.is_some() || settings.least_shadow_samples.is_some();
+        (expected_rays(channel, settings), settings.spp, varies)
+    };
     let mut reasons = Vec::new();
     for (index, light) in scene.lights.iter().enumerate() {
         let channel = light.is_area().then_some(Channel::Area(index as u32));
         let looked_up = kept.of_light(index as u32).is_some();
         let why = channel.map_or_else(
             || "one hard shadow ray is not worth a lookup".into(),
-            |channel| {
-                why(scene, (expected_rays(channel, settings), settings.spp), looked_up, diffuse)
-            },
+            |channel| why(scene, expected(channel), looked_up, diffuse),
         );
         reasons.push(LookupReason {
             light: format!("light {}, {}", index + 1, light.name()),
@@ -109,15 +111,19 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
     }
     if sky_light {
         let looked_up = kept.sky().is_some();
-        let rays = (expected_rays(Channel::Sky, settings), settings.spp);
-        let why = why(scene, rays, looked_up, diffuse);
+        let why = why(scene, expected(Channel::Sky), looked_up, diffuse);
         reasons.push(LookupReason { light: "sky".into(), looked_up, why });
     }
     reasons
 }
 
-/// Why `rays` shadow rays of each of `spp` camera samples are `looked_up` or not.
-fn why(scene: &Scene, (rays, spp): (u32, u32), looked_up: bool, diffuse: bool) -> String {
+/// Why `rays` shadow rays of each of `spp` camera samples, numbers that may `vary`, are `looked_up` or not.
+fn why(
+    scene: &Scene,
+    (rays, spp, vary): (u32, u32, bool),
+    looked_up: bool,
+    diffuse: bool,
+) -> String {
     if !diffuse {
         return "no diffuse surface: what a rough mirror shows depends on the view".into();
     }
@@ -125,7 +131,11 @@ fn why(scene: &Scene, (rays, spp): (u32, u32), looked_up: bool, diffuse: bool) -
     if all == 0 {
         return "it has no samples".into();
     }
-    let rays = if all == 1 { "one shadow ray".into() } else { format!("{all} shadow rays") };
+    let rays = match all {
+        1 => "one shadow ray".into(),
+        _ if vary => format!("{all} or so shadow rays"),
+        _ => format!("{all} shadow rays"),
+    };
     match (looked_up, is_worth(scene, all)) {
         (true, _) => format!("one lookup costs less than a pixel's {rays}"),
         (false, false) => format!("a lookup costs more than a pixel's {rays}"),

@@ -64,12 +64,12 @@ impl Aov {
         self <= Self::Motion
     }
 
-    /// Whether frames of `policy` can have it.
-    fn is_of(self, policy: Policy) -> bool {
-        match policy {
-            Policy::Surface => true,
-            Policy::Colour => self != Self::Reference,
-            Policy::Off => self.is_first_hit() || self == Self::Samples,
+    /// Whether frames of `policy` can have it, where pixels take as many samples or, `adaptive`, different numbers.
+    fn is_of(self, policy: Policy, adaptive: bool) -> bool {
+        match self {
+            Self::Samples => adaptive,
+            Self::Reference => policy == Policy::Surface,
+            _ => self.is_first_hit() || policy != Policy::Off,
         }
     }
 }
@@ -140,15 +140,16 @@ impl Aovs {
 
     /// Whether frames that are all traced cannot have some of them.
     pub fn need_reuse(&self) -> bool {
-        Aov::ALL.into_iter().any(|aov| !aov.is_of(Policy::Off) && self.has(aov))
+        Aov::ALL.into_iter().any(|aov| !aov.is_of(Policy::Off, true) && self.has(aov))
     }
 
-    /// These, by name, of a job with `policy`; the first that its frames cannot have as an error. What is
-    /// not named, as with [`Aovs::All`], is left out.
-    pub fn under(self, policy: Policy) -> Result<Self, Aov> {
+    /// These, by name, of a job with `policy` whose pixels take as many samples or, `adaptive`, different numbers; the
+    /// first that its frames cannot have as an error. What is not named, as with [`Aovs::All`], is left out.
+    pub fn under(self, policy: Policy, adaptive: bool) -> Result<Self, Aov> {
+        let can_have = |aov: &Aov| aov.is_of(policy, adaptive);
         match self {
-            Self::All => Ok(Aov::ALL.into_iter().filter(|aov| aov.is_of(policy)).collect()),
-            Self::These(these) => match these.iter().find(|aov| !aov.is_of(policy)) {
+            Self::All => Ok(Aov::ALL.into_iter().filter(can_have).collect()),
+            Self::These(these) => match these.iter().find(|aov| !can_have(aov)) {
                 Some(aov) => Err(*aov),
                 None => Ok(Self::These(these)),
             },
@@ -243,9 +244,10 @@ mod tests {
 
     #[test]
     fn a_policy_has_all_that_it_can_and_refuses_by_name_what_it_cannot() {
-        let under = |text: &str, policy| Aovs::parse(text).expect("a list").under(policy);
+        let under = |text: &str, policy| Aovs::parse(text).expect("a list").under(policy, true);
         let all = |policy| under("all", policy).map(|aovs| aovs.to_string());
         let first_hits = "depth,position,normal,albedo,mesh-id,motion,samples";
+        assert_eq!(Aovs::from([Aov::Samples]).under(Policy::Off, false), Err(Aov::Samples));
         let maps = "provenance,frame,distance,audit";
         assert_eq!(all(Policy::Off), Ok(first_hits.into()));
         assert_eq!(all(Policy::Colour), Ok(format!("{first_hits},{maps}")));

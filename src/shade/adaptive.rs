@@ -26,9 +26,10 @@ const BEND: f32 = 0.5;
 pub struct SampleSpread {
     /// How many samples.
     pub count: u32,
-    /// Sum of their values. NaN once one of them was invalid.
-    sum: Vec3,
-    /// Sum of the squares of all channels.
+    /// Mean of their values. NaN once one of them was invalid.
+    mean: Vec3,
+    /// Sum of the squared distances from the mean, all channels (Welford, 1962: sums of squares themselves would round
+    /// away what little thousands of samples differ by).
     squares: f32,
 }
 
@@ -42,30 +43,29 @@ impl SampleSpread {
             // Nothing is gained by more samples.
             false => Vec3::NAN,
         };
-        self.sum += value;
-        self.squares += value.length_squared();
+        let before = value - self.mean;
+        self.mean += before / self.count as f32;
+        self.squares += before.dot(value - self.mean);
     }
 
-    fn mean(&self) -> Vec3 {
-        self.sum / self.count as f32
+    /// Notes that one of the samples was invalid.
+    pub fn spoil(&mut self) {
+        self.mean = Vec3::NAN;
     }
 
     /// Standard deviation of one sample, root mean square over the channels; 0 of a single sample, and where one
     /// was invalid.
     fn deviation(&self) -> f32 {
-        let n = self.count as f32;
-        let squares = self.squares - self.sum.length_squared() / n;
+        let others = self.count.max(2) - 1;
         // NaN is not larger.
-        (squares / (3.0 * (n - 1.0))).max(0.0).sqrt()
+        (self.squares / (3 * others) as f32).max(0.0).sqrt()
     }
 
     /// How many samples the pixel should have, at most `most`, where its neighbours suggest a standard deviation of
     /// `beside`.
     pub fn wanted(&self, beside: f32, most: u32) -> u32 {
-        let deviation = if self.count > 1 { self.deviation() } else { 0.0 };
-        let share = deviation.max(beside) / FULL;
-        // A cast of NaN is 0.
-        if self.sum.is_nan() { 0 } else { (share.min(1.0) * most as f32).ceil() as u32 }
+        let share = self.deviation().max(beside) / FULL;
+        if self.mean.is_nan() { 0 } else { (share.min(1.0) * most as f32).ceil() as u32 }
     }
 }
 
@@ -98,33 +98,33 @@ impl Until<'_> {
 /// suggest nothing.
 pub(super) fn beside(spreads: &[SampleSpread], width: u32) -> Vec<f32> {
     let width = width.max(1) as usize;
-    let height = spreads.len() / width;
-    let of = |i: usize| {
-        let own = &spreads[i];
-        if own.count == 0 {
-            return 0.0;
-        }
-        let (x, y) = ((i % width) as isize, (i / width) as isize);
-        let at = |dx: isize, dy: isize| {
-            let (x, y) = (x + dx, y + dy);
-            let is_inside = x >= 0 && y >= 0 && x < width as isize && y < height as isize;
-            let found = is_inside.then(|| &spreads[y as usize * width + x as usize]);
-            found.filter(|spread| spread.count > 0)
-        };
-        let deviation =
-            |spread: &SampleSpread| if spread.count > 1 { spread.deviation() } else { 0.0 };
-        let mut most = 0f32;
-        for (dx, dy) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
-            let pair = [at(dx, dy), at(-dx, -dy)];
-            for spread in pair.into_iter().flatten() {
-                most = most.max(BESIDE * deviation(spread));
-            }
-            if let [Some(a), Some(b)] = pair {
-                let bend = own.mean() - 0.5 * (a.mean() + b.mean());
-                most = most.max(BEND * (bend.length_squared() / 3.0).sqrt());
-            }
-        }
-        most
-    };
+    let of = |i: usize| beside_of(spreads, width, i);
     (0..spreads.len()).into_par_iter().with_min_len(1024).map(of).collect()
+}
+
+fn beside_of(spreads: &[SampleSpread], width: usize, i: usize) -> f32 {
+    let height = spreads.len() / width;
+    let own = &spreads[i];
+    if own.count == 0 {
+        return 0.0;
+    }
+    let (x, y) = ((i % width) as isize, (i / width) as isize);
+    let at = |dx: isize, dy: isize| {
+        let (x, y) = (x + dx, y + dy);
+        let is_inside = x >= 0 && y >= 0 && x < width as isize && y < height as isize;
+        let found = is_inside.then(|| &spreads[y as usize * width + x as usize]);
+        found.filter(|spread| spread.count > 0)
+    };
+    let mut most = 0f32;
+    for (dx, dy) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
+        let pair = [at(dx, dy), at(-dx, -dy)];
+        for spread in pair.into_iter().flatten() {
+            most = most.max(BESIDE * spread.deviation());
+        }
+        if let [Some(a), Some(b)] = pair {
+            let bend = own.mean - 0.5 * (a.mean + b.mean);
+            most = most.max(BEND * (bend.length_squared() / 3.0).sqrt());
+        }
+    }
+    most
 }

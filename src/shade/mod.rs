@@ -179,6 +179,18 @@ pub struct Rendered {
     pub reuse: ReuseCounts,
     /// The differences among each pixel's camera samples; empty where every pixel takes as many samples.
     pub spreads: Vec<SampleSpread>,
+    /// The same of the least number of samples, where more followed a pixel's own differences alone.
+    pub pilots: Vec<SampleSpread>,
+    /// Of pixels that had been rendered before: the index, and the number of samples that the pixel would have had
+    /// here.
+    pub wanted: Vec<(u32, u32)>,
+}
+
+impl Rendered {
+    /// How many samples each pixel has, also beyond the crop if it was rendered; empty where all have as many.
+    pub fn sample_counts(&self) -> Vec<u32> {
+        self.spreads.iter().map(|spread| spread.count).collect()
+    }
 }
 
 /// What is fixed for one frame.
@@ -314,7 +326,10 @@ impl Renderer<'_> {
         let region = if with_neighbours { aligned(&grown(&own), &full) } else { own };
         let pilots = Pass { region, until: Until::Count(self.settings.spp), goes_on: false };
         self.pass((job, &input, &part, 0.5), &pilots, &mut rendered, stop, progress)?;
-        rendered.take_over(job, &part);
+        rendered.take_over_pilots(job);
+        if matches!(job.sampling, Sampling::Alone) {
+            rendered.pilots = rendered.spreads.clone();
+        }
         let beside;
         let until = match job.sampling {
             Sampling::As(counts) => Until::Each(counts),
@@ -325,6 +340,8 @@ impl Renderer<'_> {
         };
         let more = Pass { region: own, until, goes_on: true };
         self.pass((job, &input, &part, 0.5), &more, &mut rendered, stop, progress)?;
+        rendered.take_over(job, &part);
+        rendered.note_wanted(&part, &until);
         rendered.finish_samples(&part);
         Some(rendered)
     }
@@ -369,7 +386,7 @@ impl Renderer<'_> {
     fn input<'a>(&self, job: &FrameJob<'a>) -> FrameInput<'a> {
         let FrameJob { camera, stream, reuse, .. } = *job;
         // Single pixels have no neighbours that pilots could be compared with.
-        let stops_early = job.mask.is_none();
+        let stops_early = matches!(job.sampling, Sampling::Neighbours);
         let own = camera.to_scene(&self.scene.recentring);
         let is_ranked = |m: &Material| m.glass.as_ref().is_some_and(medium_stack::is_ranked);
         let has_ranked_glass = self.scene.materials.iter().any(is_ranked);
@@ -418,7 +435,8 @@ impl Renderer<'_> {
                 let is_asked_for = !is_own || part.is_masked_in(at);
                 is_asked_for
                     && match before {
-                        None => !part.is_known(at),
+                        _ if part.is_known(at) => false,
+                        None => true,
                         Some(before) => {
                             let spread = &before.spreads[at];
                             spread.count < pass.until.count(at, Some(spread))
@@ -435,7 +453,8 @@ impl Renderer<'_> {
             let mut unused = Left::default();
             let left = if is_own { &mut out.left } else { &mut unused };
             let rays = kernel(self, input, &pass.until, pixels, scratch, left);
-            if is_own || part.mask.is_none() {
+            // What lies around a rank's rows are another rank's own.
+            if is_own {
                 out.rays += rays;
             }
             for pixel in pixels.finished(self.settings.flag_bad) {
@@ -555,7 +574,15 @@ impl Rendered {
         film.provenance = job.reuse.map(|_| vec![Provenance::default(); pixels]);
         let spreads = vec![SampleSpread::default(); if is_adaptive { pixels } else { 0 }];
         let (rays, reuse) = (RayCounts::default(), ReuseCounts::default());
-        Self { film, rays, sources: TracedPoints::default(), reuse, spreads }
+        Self {
+            film,
+            rays,
+            sources: TracedPoints::default(),
+            reuse,
+            spreads,
+            pilots: Vec::new(),
+            wanted: Vec::new(),
+        }
     }
 
     fn add(&mut self, tile: TileDone) {
@@ -573,6 +600,15 @@ impl Rendered {
             places().zip(&tile.provenance).for_each(|(at, own)| provenance[at] = *own);
         }
         tile.spreads.iter().for_each(|(at, spread)| self.spreads[*at as usize] = *spread);
+    }
+
+    /// Takes over what the least number of samples told in the pixels that were rendered already, as if they had no
+    /// more yet.
+    fn take_over_pilots(&mut self, job: &FrameJob) {
+        let Some(Known { mask, rendered }) = job.known else { return };
+        for (at, spread) in rendered.pilots.iter().enumerate().filter(|(at, _)| mask[*at]) {
+            self.spreads[at] = *spread;
+        }
     }
 
     /// Takes over the pixels that were rendered already.
@@ -598,10 +634,20 @@ impl Rendered {
         }
     }
 
+    /// Notes how many samples the pixels would have that were taken over.
+    fn note_wanted(&mut self, part: &Part, until: &Until) {
+        let known = part.known.unwrap_or_default().iter().enumerate().filter(|(_, known)| **known);
+        let wanted = known.map(|(at, _)| at).filter(|at| part.is_masked_in(*at)).map(|at| {
+            let own = &self.spreads[at];
+            (at as u32, until.count(at, Some(own)).max(own.count))
+        });
+        self.wanted = wanted.collect();
+    }
+
     /// Notes how many samples each pixel has, and clears those that were not asked for.
     fn finish_samples(&mut self, part: &Part) {
+        let mut samples = self.sample_counts();
         let film = &mut self.film;
-        let mut samples: Vec<u32> = self.spreads.iter().map(|spread| spread.count).collect();
         for (at, samples) in samples.iter_mut().enumerate() {
             let (x, y) = (at as u32 % film.width, at as u32 / film.width);
             if part.is_masked_in(at) && part.is_in_crop(x, y) {

@@ -426,7 +426,11 @@ impl BlockPixels {
             let flagged = flag_bad && (!sum.is_finite() || self.is_bad(i as u32));
             let rgb = if flagged { MAGENTA } else { sum * (1.0 / self.taken[i] as f32) };
             let record = self.records.get(i).map(|r| r.pixel);
-            let spread = self.spreads.get(i).copied();
+            let mut spread = self.spreads.get(i).copied();
+            if flagged {
+                // More samples would be added to magenta.
+                spread.iter_mut().for_each(SampleSpread::spoil);
+            }
             FinishedPixel { x, y, rgb, record, provenance: self.provenance[i], spread }
         })
     }

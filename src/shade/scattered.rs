@@ -4,7 +4,7 @@
 use super::adaptive::Until;
 use super::kernel::Scratch;
 use super::pixels::{BlockPixels, SampleLimits};
-use super::{FrameJob, Left, Renderer};
+use super::{FrameJob, Left, Renderer, Sampling};
 use crate::math::Rgb;
 use crate::scene::Camera;
 use crate::stats::RayCounts;
@@ -25,7 +25,8 @@ impl Renderer<'_> {
         places: &[(u32, u32)],
         stop: &AtomicBool,
     ) -> Option<(Vec<Rgb>, RayCounts)> {
-        let input = self.input(&FrameJob { mask: Some(&[]), ..FrameJob::whole(camera, stream) });
+        let input =
+            self.input(&FrameJob { sampling: Sampling::Alone, ..FrameJob::whole(camera, stream) });
         let kernel = self.kernel();
         let until = Until::Count(self.settings.spp);
         let limits = SampleLimits { most: self.settings.most_radiance(), spread: None };

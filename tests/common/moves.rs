@@ -134,7 +134,13 @@ impl Stage<'_> {
     /// A frame with many samples a light, of which no other frame has one. Its camera samples are
     /// those of every render of the pixel.
     pub fn converged(&self, settings: &Settings, shot: &Shot, frame: u32, samples: u32) -> Film {
-        let best = Settings { shadow_samples: samples, sky_samples: samples, ..settings.clone() };
+        let best = Settings {
+            shadow_samples: samples,
+            least_shadow_samples: None,
+            sky_samples: samples,
+            least_sky_samples: None,
+            ..settings.clone()
+        };
         self.traced(&best, shot, frame, CONVERGED | frame)
     }
 }

@@ -19,6 +19,7 @@ use crate::scene::Camera;
 use crate::shade::{FrameJob, Known, Rendered, Sampling};
 use crate::stats::{AuditSums, RayCounts};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Added to a frame's number (at most a million) to seed the light samples of the probes' two traces, and of
@@ -39,6 +40,8 @@ pub(super) struct Probed {
     /// For each pixel whether it is a probe.
     mask: Vec<bool>,
     traces: [Rendered; 2],
+    /// For each pixel its number of camera samples; empty where all have as many.
+    counts: Vec<u32>,
     /// Findings of the probes, which are stored with the frame's reference.
     pub findings: Vec<Finding>,
     /// The evidence for the rest of the frame.
@@ -57,13 +60,13 @@ impl Probed {
 
     /// The camera samples of the probes.
     fn sampling(&self) -> Sampling<'_> {
-        sampling_of(&self.traces[0])
+        sampling_of(&self.counts)
     }
 }
 
-/// As many camera samples as a picture has.
-fn sampling_of(rendered: &Rendered) -> Sampling<'_> {
-    rendered.film.samples.as_deref().map_or(Sampling::Alone, Sampling::As)
+/// As many camera samples as `counts` has, where pixels have different numbers.
+fn sampling_of(counts: &[u32]) -> Sampling<'_> {
+    if counts.is_empty() { Sampling::Alone } else { Sampling::As(counts) }
 }
 
 impl SurfaceReuse<'_> {
@@ -101,10 +104,10 @@ impl SurfaceReuse<'_> {
             Result::Ok((rendered, probe))
         };
         let (first, own) = trace(STREAMS[0], Some(lookup), Sampling::Alone)?;
-        let (second, again) = trace(STREAMS[1], None, sampling_of(&first))?;
-        let samples = first.film.samples.as_deref();
+        let counts = first.sample_counts();
+        let (second, again) = trace(STREAMS[1], None, sampling_of(&counts))?;
         let samples = |[x, y]: [u32; 2]| {
-            samples.map_or(r.settings.spp, |samples| samples[first.film.index(x, y)])
+            counts.get(first.film.index(x, y)).copied().unwrap_or(r.settings.spp)
         };
         let found = own.findings(again, r.settings.spp, &samples);
         let of_others = |part: usize| {
@@ -119,7 +122,8 @@ impl SurfaceReuse<'_> {
         // The frame's own probes are traced in any case, so they cost nothing more.
         let is_worth_lookups = is_worth_lookups(&evidence, findings.iter(), cast, 0.0);
         let traces = [first, second];
-        let probed = Probed { draw, mask, traces, findings, evidence, crossed, is_worth_lookups };
+        let probed =
+            Probed { draw, mask, traces, counts, findings, evidence, crossed, is_worth_lookups };
         let probed = Arc::new(probed);
         self.with_state(|s| s.probed = Some((frame, Arc::clone(&probed))));
         Ok(probed)
@@ -142,14 +146,23 @@ impl SurfaceReuse<'_> {
     ) -> Result<Option<AuditSums>> {
         let [first, second] = &probed.traces;
         let is_inferred = rendered.reuse.is_inferred();
+        let wanted: HashMap<u32, u32> = rendered.wanted.iter().copied().collect();
+        let drawn = |i: usize| {
+            let (index, weight) = (i as u32, probed.draw.weight());
+            let group = probed.draw.group(index % camera.width, index / camera.width);
+            let count = |wanted: &u32| f64::from(*wanted) / f64::from(probed.counts[i]);
+            let refinement = wanted.get(&index).map_or(1.0, count);
+            AuditedPixel { index, weight, group, refinement }
+        };
         let (rays, inferred) = match is_inferred {
             true => self.audit(frame, camera, references, probed)?,
             false => (RayCounts::default(), None),
         };
-        let film = &mut rendered.film;
         let places = probed.mask.iter().enumerate().filter(|(_, is_probe)| **is_probe);
         let places: Vec<usize> =
-            places.map(|(i, _)| i).filter(|i| self.is_shown(film, *i)).collect();
+            places.map(|(i, _)| i).filter(|i| self.is_shown(&rendered.film, *i)).collect();
+        let drawn: Vec<AuditedPixel> = places.iter().map(|i| drawn(*i)).collect();
+        let film = &mut rendered.film;
         film.bad += first.film.bad;
         rendered.rays += first.rays;
         rendered.reuse += first.reuse;
@@ -160,12 +173,6 @@ impl SurfaceReuse<'_> {
             rendered.rays += second.rays;
             return Ok(None);
         };
-        let drawn = |i: usize| {
-            let (index, weight) = (i as u32, probed.draw.weight());
-            let group = probed.draw.group(index % film.width, index / film.width);
-            AuditedPixel { index, weight, group }
-        };
-        let drawn: Vec<AuditedPixel> = places.iter().map(|i| drawn(*i)).collect();
         let shown = self.shown(&inferred);
         let traces = [&first.film.rgb[..], &second.film.rgb[..]];
         let mut sums = audit::sums(&shown, &drawn, traces);
