@@ -102,7 +102,7 @@ fn figures_of_pilots() {
 /// A point whose pilots all reach a light although a share x of it is hidden is off by x. With n pilots in the pixels
 /// that count this happens with a probability of at most (1 - x)^n, so the mean error is at most 1 / (e n).
 #[test]
-fn what_is_missed_is_at_most_what_the_documentation_says() {
+fn missed_shadows_stay_below_the_stated_bound() {
     // A small plate just below a light hides the same share of it from every point of a small floor far below.
     let mut world = World::default();
     let white = world.add_material(Material::diffuse("white", Rgb::splat(0.8)));

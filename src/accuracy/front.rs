@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_there_for_noise_alone_leaves() {
+    fn candidates_on_the_front_by_noise_alone_leave() {
         let mut rows = measured(&[
             (Knob::Default, "", 1.0, 2.0),
             (Knob::Tolerance, "--tolerance 2", 0.99, 2.01),

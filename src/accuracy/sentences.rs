@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_sync_takes_has_an_interval_and_is_no_more_than_all() {
+    fn time_of_a_sync_has_an_interval_and_is_at_most_the_whole() {
         let making = Interval { estimate: 0.1, low: 0.08, high: 0.2 };
         let writing = |sync_seconds, sync_ends| Writing {
             frame_seconds: 0.01,

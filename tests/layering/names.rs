@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_allowed_is_allowed_for_its_files_and_as_long_as_it_is_needed() {
+    fn allowed_names_are_allowed_for_their_files_and_while_needed() {
         let allowed = |files| [Allowed { name: "Row", files, why: "of two tables" }];
         let list = allowed(&["src/scene/a.rs", "src/film/b.rs"]);
         assert_eq!(check("pub struct Row;", &list), [""; 0]);

@@ -20,7 +20,7 @@ fn entry(turn: u32, candidate: usize) -> TrialRecord {
 }
 
 #[test]
-fn what_was_measured_is_there_again_and_a_torn_line_is_not() {
+fn measured_rows_come_back_and_a_torn_line_does_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let open = || Ledger::open(folder.path(), &terms("8x8"), false).expect("opens");
     let mut first = open();

@@ -75,6 +75,27 @@ fn another_file_format_is_named_first_and_a_missing_setting_is_not_set() {
 }
 
 #[test]
+fn ranges_of_samples_are_named_as_on_the_command_line() {
+    let of = |settings| Header { settings, ..header(0) };
+    let one = of(serde_json::json!({ "spp": 4, "shadow_samples": 16 }));
+    let range = of(serde_json::json!({ "spp": 4, "most_spp": 8, "shadow_samples": 16,
+        "least_shadow_samples": 2 }));
+    let told = |before: &Header, now: &Header| {
+        before.first_difference(now).expect("they differ").was_and_is()
+    };
+    let both = told(&one, &range);
+    let light = told(
+        &one,
+        &of(serde_json::json!({ "spp": 4, "shadow_samples": 16,
+        "least_shadow_samples": 2 })),
+    );
+    assert_eq!(light, "shadow-samples was 16, now it is 2..16");
+    assert!(["spp was 4, now it is 4..8", &light].contains(&&*both), "{both}");
+    let null = of(serde_json::json!({ "spp": 4, "most_spp": null, "shadow_samples": 16 }));
+    assert_eq!(one.first_difference(&null), None);
+}
+
+#[test]
 fn an_incomplete_line_affects_no_other() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("f.manifest.jsonl");

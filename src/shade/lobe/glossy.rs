@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_sampled_has_the_density_and_the_weight_that_f_and_pdf_say() {
+    fn samples_have_the_density_and_the_weight_of_f_and_pdf() {
         // A sharper peak would take a finer grid.
         for roughness in [0.3, 0.6, 1.0] {
             for cos in [0.05, 0.4, 0.9] {

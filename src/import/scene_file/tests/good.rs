@@ -25,6 +25,18 @@ fn an_empty_file_is_an_empty_scene_with_all_defaults() {
 }
 
 #[test]
+fn numbers_of_samples_may_be_the_least_and_the_most() {
+    let of = |text: &str| {
+        let s = good(&format!("[settings]\n{text}\n")).settings;
+        let light = (s.shadow_samples, s.least_shadow_samples, s.sky_samples, s.least_sky_samples);
+        ((s.spp, s.most_spp), light)
+    };
+    let all = of("spp = [2, 8]\nshadow_samples = [3, 9]\nsky_samples = [4, 4]");
+    assert_eq!(all, ((2, Some(8)), (9, Some(3), 4, None)));
+    assert_eq!(of("shadow_samples = 0").1, (0, None, 16, None));
+}
+
+#[test]
 fn every_setting_reaches_its_place() {
     let loaded = good(
         "[settings]\nsize = [320, 200]\nspp = 7\nfilter = 'tent'\nshadow_samples = 5\n\
