@@ -89,6 +89,10 @@ pub struct SettingArgs {
     #[arg(long, value_name = "N", help_heading = "Light",
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
     pub sky_samples: Option<u32>,
+    /// Whether every point looks at every light in scenes of more than 8, not only at those that matter there
+    /// [default: off]
+    #[arg(long, value_name = "on|off", help_heading = "Light", value_parser = values::switch())]
+    pub all_lights: Option<bool>,
     /// Specular bounces after the camera ray [default: 4]
     #[arg(long, value_name = "N", help_heading = "Light",
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_BOUNCES))]
@@ -204,6 +208,7 @@ impl SettingArgs {
         put(&mut s.flag_bad, self.flag_bad);
         put(&mut s.shadow_samples, self.shadow_samples);
         put(&mut s.sky_samples, self.sky_samples);
+        put(&mut s.all_lights, self.all_lights);
         put(&mut s.bounces, self.bounces);
         put(&mut s.cutoff, self.cutoff);
         put(&mut s.seed, self.seed);

@@ -32,6 +32,9 @@ pub struct Settings {
     pub shadow_samples: u32,
     /// Sky rays per camera sample where the sky lights the scene.
     pub sky_samples: u32,
+    /// Look at every light at every point, however little it can send there, in scenes of many lights too.
+    #[serde(default)]
+    pub all_lights: bool,
     /// Start shadow rays of smooth meshes on the smooth surface, not on its facets.
     pub smooth_terminator: bool,
     /// Specular bounces after the camera ray.
@@ -116,6 +119,7 @@ impl Default for Settings {
             filter: Filter::Box,
             shadow_samples: 16,
             sky_samples: 16,
+            all_lights: false,
             smooth_terminator: true,
             bounces: 4,
             cutoff: 1e-3,

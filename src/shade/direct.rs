@@ -8,6 +8,8 @@ use super::groups::{CheckRays, Groups};
 use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
+use super::selection::{LightUser, LightUsers, Reached};
+use super::tail::TailSamples;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance};
@@ -87,8 +89,10 @@ pub(super) struct LightSource {
     pub samples: u32,
     /// What its shadow rays count as.
     pub rays: RayKind,
-    /// The channel of its ratio with the number of channels, if the ratio is kept.
-    pub channel: Option<(usize, usize)>,
+    /// The channel of its ratio, if that is kept; where lights are selected, every point has channels of its own.
+    pub channel: Option<u16>,
+    /// Whether its ratio is kept.
+    pub is_kept: bool,
 }
 
 impl LightSource {
@@ -115,7 +119,13 @@ pub(super) struct ShadowScratch {
     u: Vec<[f32; 2]>,
     runs: Runs,
     /// Shading points that the present light must be traced for.
-    wanted: Vec<u32>,
+    wanted: Vec<LightUser>,
+    /// Channels of a shading point.
+    channels: usize,
+    /// Where each light is traced, if lights are selected.
+    pub users: LightUsers,
+    /// Samples of the tail.
+    pub tail: TailSamples,
     /// Irradiance without shadows, per unit of emission, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
@@ -185,6 +195,16 @@ impl ShadowScratch {
         self.seen.push(seen);
     }
 
+    /// Number of the batch's rays.
+    pub fn ray_count(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Multiplies what is seen along the rays from number `first` on by `light`.
+    pub fn tint_from(&mut self, first: usize, light: Rgb) {
+        self.seen[first..].iter_mut().for_each(|seen| *seen *= light);
+    }
+
     /// What each of the batch's glossy points reflects along its rays that are not occluded.
     pub fn highlights(&self) -> impl Iterator<Item = Rgb> {
         let mut start = 0;
@@ -204,7 +224,12 @@ impl ShadowScratch {
         self.spans.push(Span { end: self.rays.len(), unshadowed });
     }
 
-    fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
+    pub fn starts(
+        &mut self,
+        renderer: &Renderer,
+        lit: &[ShadingPoint],
+        i: u32,
+    ) -> ShadowStarts {
         let point = &lit[i as usize];
         *self.starts[i as usize].get_or_insert_with(|| {
             let seen = (&point.si, &point.ray, &point.hit);
@@ -217,7 +242,8 @@ impl Renderer<'_> {
     /// The lights that shine under the plan, in the scene's order, then the sky.
     pub(super) fn light_sources(&self, reuse: Option<Reuse>) -> Vec<LightSource> {
         let channels = reuse.map(|reuse| reuse.channels);
-        let of = |channel: Option<usize>| Some((channel?, channels?.len()));
+        let selects = channels.is_some_and(|channels| channels.slots() > 0);
+        let narrow = |channel: usize| channel as u16;
         let plan = &self.plan;
         let mut sources = Vec::new();
         for (number, light) in (0..).zip(&self.scene.lights) {
@@ -227,17 +253,20 @@ impl Renderer<'_> {
             };
             if runs {
                 let sampler = LightSampler::new(light);
-                let channel = of(channels.and_then(|channels| channels.of_light(number)));
-                sources.push(LightSource { sampler, number, samples, rays, channel });
+                let channel = channels.and_then(|channels| channels.of_light(number)).map(narrow);
+                let is_kept = channel.is_some() || (selects && light.is_area());
+                sources.push(LightSource { sampler, number, samples, rays, channel, is_kept });
             }
         }
         if plan.sky_light {
+            let channel = channels.and_then(|channels| channels.sky()).map(narrow);
             sources.push(LightSource {
                 sampler: LightSampler::of_sky(&self.scene.sky),
                 number: self.scene.lights.len() as u32,
                 samples: self.settings.sky_samples,
                 rays: RayKind::ShadowSky,
-                channel: of(channels.and_then(|channels| channels.sky())),
+                channel,
+                is_kept: channel.is_some(),
             });
         }
         sources
@@ -256,63 +285,86 @@ impl Renderer<'_> {
         scratch.starts.clear();
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
-            self.light_without_shadows(input, reuse.channels.len(), lit, scratch);
+            scratch.channels = reuse.channels.len();
+            scratch.groups.gather_points(input, reuse.channels, lit);
+        }
+        let mut users = std::mem::take(&mut scratch.users);
+        if let Some(selection) = &input.selection {
+            let points = lit.iter().map(|point| point.si.p);
+            let groups = &mut scratch.groups;
+            let slot = |point, source: &LightSource| {
+                source.is_kept.then(|| groups.slot(point, source.number)).flatten()
+            };
+            users.find(selection, &input.lights, points, |c| selection.of_diffuse(c), slot);
+        }
+        if let Some(reuse) = &input.reuse {
+            self.light_without_shadows(input, lit, &users, scratch);
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
             if scratch.groups.wants_checks() {
-                self.check_answers(input, reuse, lit, pixels, scratch, counts);
+                self.check_answers(input, reuse, (lit, &users), pixels, scratch, counts);
             }
         }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
             lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
         }
-        for source in &input.lights {
-            self.light_from(source, lit, pixels, scratch, counts);
+        for at in 0..input.lights.len() {
+            self.light_from(input, at, (lit, &users), pixels, scratch, counts);
         }
+        if let Some(selection) = &input.selection {
+            let lit = (lit, &users.cells[..]);
+            self.light_tails((input, selection), lit, pixels, scratch, counts);
+        }
+        scratch.users = users;
     }
 
     /// What of the kept lights would arrive if nothing were in the way.
     fn light_without_shadows(
         &self,
         input: &FrameInput,
-        channels: usize,
         lit: &[ShadingPoint],
+        users: &LightUsers,
         s: &mut ShadowScratch,
     ) {
+        let channels = s.channels;
         s.exact.clear();
         s.exact.resize(lit.len() * channels, 0.0);
         s.shown.clear();
         s.shown.resize(lit.len() * channels, 0.0);
-        for source in &input.lights {
-            let Some((channel, _)) = source.channel else { continue };
-            for (i, point) in lit.iter().enumerate() {
+        for (at, source) in input.lights.iter().enumerate().filter(|(_, source)| source.is_kept) {
+            for LightUser { point: i, slot } in input.reached(at, lit.len(), users).iter() {
+                let Some(slot) = slot else { continue };
+                let point = &lit[i as usize];
                 let exact = source.sampler.unshadowed(point.si.p, point.n);
                 let shown = luminance(point.weight * source.sampler.emission) * exact as f32;
-                s.exact[i * channels + channel] = exact;
-                s.shown[i * channels + channel] = shown * self.settings.exposure;
+                let own = i as usize * channels + usize::from(slot);
+                s.exact[own] = exact;
+                s.shown[own] = shown * self.settings.exposure;
             }
         }
     }
 
-    /// Adds the light of one source, known or traced.
+    /// Adds the light of source number `at`, known or traced.
     fn light_from(
         &self,
-        source: &LightSource,
-        lit: &[ShadingPoint],
+        input: &FrameInput,
+        at: usize,
+        (lit, users): (&[ShadingPoint], &LightUsers),
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
+        let source = &input.lights[at];
         let n = source.samples as usize;
-        let wanted = self.use_known(source, lit, pixels, s);
+        let wanted = self.use_known(source, input.reached(at, lit.len(), users), lit, pixels, s);
         let mut u = s.samples(n);
         for group in wanted.chunks((BATCH / n).max(1)) {
             s.clear();
-            for &i in group {
+            for &LightUser { point: i, slot } in group {
                 let point = &lit[i as usize];
-                let exact = match source.channel {
-                    Some((channel, channels)) => s.exact[i as usize * channels + channel],
+                let exact = match slot {
+                    Some(slot) => s.exact[i as usize * s.channels + usize::from(slot)],
                     None => source.sampler.unshadowed(point.si.p, point.n),
                 };
                 // What is NaN goes on, to be counted at its pixel.
@@ -338,7 +390,7 @@ impl Renderer<'_> {
                 s.close(seen.map_or(Rgb::ZERO, |_| source.sampler.emission * exact as f32));
             }
             self.trace_shadow_rays(source, s, counts);
-            settle(lit, group, source.channel, pixels, s);
+            settle(lit, group, pixels, s);
         }
         s.give_back(u);
         s.wanted = wanted;
@@ -363,19 +415,26 @@ impl Renderer<'_> {
         &self,
         input: &FrameInput,
         reuse: &Reuse,
-        lit: &[ShadingPoint],
+        (lit, users): (&[ShadingPoint], &LightUsers),
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        for source in &input.lights {
-            let Some((at, channels)) = source.channel else { continue };
+        let channels = s.channels;
+        for (at, source) in input.lights.iter().enumerate().filter(|(_, source)| source.is_kept) {
+            let reached = input.reached(at, lit.len(), users);
+            if reached.len() == 0 {
+                continue;
+            }
             s.clear();
             let mut runs = std::mem::take(&mut s.runs);
             runs.start(s.groups.len());
-            for (i, point) in (0..).zip(lit) {
-                let wanted = s.groups.check_rays(i as usize, at, channels, source.samples);
-                let wanted = wanted.filter(|_| s.exact[i as usize * channels + at] != 0.0);
+            for LightUser { point: i, slot } in reached.iter() {
+                let point = &lit[i as usize];
+                let wanted = slot.map(usize::from).and_then(|slot| {
+                    let wanted = s.groups.check_rays(i as usize, slot, channels, source.samples);
+                    wanted.filter(|_| s.exact[i as usize * channels + slot] != 0.0)
+                });
                 if let Some(wanted) = wanted {
                     let own = runs.own(&wanted, |u| {
                         // Samples that tracing does not use: had it any of these, what is traced
@@ -394,34 +453,43 @@ impl Renderer<'_> {
             s.runs = runs;
             self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
-            for (i, span) in s.spans.iter().enumerate() {
+            for (LightUser { point: i, slot }, span) in reached.iter().zip(&s.spans) {
                 let (open, weight) = opened(&s.weights, &s.occluded, start..span.end);
                 let rays = span.end - start;
                 start = span.end;
-                if rays > 0 {
-                    s.groups.note_checked(i, (at, channels), (open, weight), rays);
+                if let (Some(slot), true) = (slot, rays > 0) {
+                    let at = (usize::from(slot), channels);
+                    s.groups.note_checked(i as usize, at, (open, weight), rays);
                 }
             }
         }
         s.groups.conclude_checks(reuse);
     }
 
-    /// Adds the light of `source` where its ratio is known. Returns the points where it must be traced: all of
-    /// them where no ratio is kept.
+    /// Adds the light of `source` where its ratio is known. Returns those of the points that it reaches where it must
+    /// be traced: all of them where no ratio is kept.
     fn use_known(
         &self,
         source: &LightSource,
+        reached: Reached,
         lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
-    ) -> Vec<u32> {
+    ) -> Vec<LightUser> {
         let mut wanted = std::mem::take(&mut s.wanted);
         wanted.clear();
-        let Some((channel, channels)) = source.channel else {
-            wanted.extend(0..lit.len() as u32);
+        if !source.is_kept {
+            wanted.extend(reached.iter());
             return wanted;
-        };
-        for (i, point) in lit.iter().enumerate() {
+        }
+        let channels = s.channels;
+        for user in reached.iter() {
+            let Some(channel) = user.slot.map(usize::from) else {
+                wanted.push(user);
+                continue;
+            };
+            let i = user.point as usize;
+            let point = &lit[i];
             let exact = s.exact[i * channels + channel];
             if exact == 0.0 {
                 continue;
@@ -429,7 +497,7 @@ impl Renderer<'_> {
             s.groups.note_lit(i);
             let ratio = s.groups.known(i, channel, channels);
             if ratio.is_nan() {
-                wanted.push(i as u32);
+                wanted.push(user);
             } else {
                 let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
@@ -447,8 +515,17 @@ impl Renderer<'_> {
         pixels: &BlockPixels,
         u: &mut [[f32; 2]],
     ) {
-        let dimension = dimensions::of_light(place.branch, source.number, self.scene.lights.len());
+        let dimension = dimensions::of_light(place.branch, source.number, self.light_dimensions());
         pixels.sampler(place.pixel).fill2(first, dimension, u);
+    }
+
+    /// Random dimensions of a branch's lights.
+    pub(super) fn light_dimensions(&self) -> usize {
+        let lights = self.scene.lights.len();
+        match self.scene.selected_lights(self.settings) {
+            None => lights,
+            Some(_) => lights + dimensions::TAIL,
+        }
     }
 
     /// Traces the batch's rays, to a light.
@@ -459,27 +536,31 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         counts[source.rays] += s.rays.len() as u64;
+        self.trace_rays(s, counts);
+    }
+
+    /// Traces the batch's rays, which are counted already.
+    pub(super) fn trace_rays(&self, s: &mut ShadowScratch, counts: &mut RayCounts) {
         s.occluded.clear();
         s.occluded.resize(s.rays.len(), false);
         self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
     }
 }
 
-/// Adds `weight · unshadowed · ratio` to the pixel of each point of the traced batch `group`; in a channel that is
-/// kept, the ratio also to its surface point.
+/// Adds `weight · unshadowed · ratio` to the pixel of each point of the traced batch `group`; where the ratio is kept,
+/// that also to its surface point.
 fn settle(
     lit: &[ShadingPoint],
-    group: &[u32],
-    channel: Option<(usize, usize)>,
+    group: &[LightUser],
     pixels: &mut BlockPixels,
     s: &mut ShadowScratch,
 ) {
     let mut start = 0;
-    for (&i, span) in group.iter().zip(&s.spans) {
+    for (&LightUser { point: i, slot }, span) in group.iter().zip(&s.spans) {
         let point = &lit[i as usize];
         let (open, all) = opened(&s.weights, &s.occluded, start..span.end);
-        if let (Some((channel, channels)), true) = (channel, span.end > start) {
-            s.groups.add(i as usize, channel, channels, open, all);
+        if let (Some(slot), true) = (slot, span.end > start) {
+            s.groups.add(i as usize, usize::from(slot), s.channels, open, all);
         }
         start = span.end;
         if open > 0.0 {

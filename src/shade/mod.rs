@@ -22,6 +22,8 @@ pub mod optics;
 mod pixels;
 mod point;
 mod scattered;
+mod selection;
+mod tail;
 mod texture;
 
 use crate::effects::EffectPlan;
@@ -39,6 +41,7 @@ pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
 use pixels::{BLOCK, BlockPixels, FinishedPixel, SampleLimits};
+use selection::{LightSelection, LightUsers, Reached};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's. Larger ones leave
@@ -192,12 +195,25 @@ struct FrameInput<'a> {
     filter: PixelFilter,
     /// The lights that shine, the sky last.
     lights: Vec<LightSource>,
+    /// Which of them are looked at where; `None` if all are everywhere.
+    selection: Option<LightSelection<'a>>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: MediumStack,
     has_ranked_glass: bool,
     reuse: Option<Reuse<'a>>,
     /// Whether any light must be traced in every frame.
     has_always_traced: bool,
+}
+
+impl FrameInput<'_> {
+    /// The points, of so many, that source number `at` is traced at.
+    fn reached<'u>(&self, at: usize, points: usize, users: &'u LightUsers) -> Reached<'u> {
+        let source = &self.lights[at];
+        match &self.selection {
+            Some(_) if !source.is_sky() => users.of(at),
+            _ => Reached::All(points, source.channel),
+        }
+    }
 }
 
 /// What blocks leave behind beside their pixels.
@@ -365,7 +381,12 @@ impl Renderer<'_> {
         Some(())
     }
 
-    fn input<'a>(&self, camera: &Camera, stream: u32, reuse: Option<Reuse<'a>>) -> FrameInput<'a> {
+    fn input<'a>(
+        &'a self,
+        camera: &Camera,
+        stream: u32,
+        reuse: Option<Reuse<'a>>,
+    ) -> FrameInput<'a> {
         let own = camera.to_scene(&self.scene.recentring);
         let is_ranked = |m: &Material| m.glass.as_ref().is_some_and(medium_stack::is_ranked);
         let has_ranked_glass = self.scene.materials.iter().any(is_ranked);
@@ -376,13 +397,15 @@ impl Renderer<'_> {
             }
             false => MediumStack::default(),
         };
+        let lights = self.light_sources(reuse);
         FrameInput {
             camera: own,
             pixel_size: own.pixel_size(),
             stream,
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
-            lights: self.light_sources(reuse),
+            selection: self.light_selection(&lights),
+            lights,
             around_eye,
             has_ranked_glass,
             reuse,

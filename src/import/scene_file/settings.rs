@@ -43,6 +43,8 @@ pub(super) struct Settings {
     shadow_samples: Samples,
     /// Sky rays per camera sample where the sky lights the scene.
     sky_samples: Samples,
+    /// In scenes of more than 8 lights, look at every light at every point, not only at those that matter there.
+    all_lights: bool,
     /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
     /// shadows end where the shading does.
     smooth_terminator: bool,
@@ -120,6 +122,7 @@ impl Default for Settings {
             filter: s.filter,
             shadow_samples: Int::clamped(s.shadow_samples.into()),
             sky_samples: Int::clamped(s.sky_samples.into()),
+            all_lights: s.all_lights,
             smooth_terminator: s.smooth_terminator,
             bounces: Int::clamped(s.bounces.into()),
             cutoff: Share(shortest(s.cutoff)),
@@ -170,6 +173,7 @@ impl Settings {
             filter: self.filter,
             shadow_samples: self.shadow_samples.u32(),
             sky_samples: self.sky_samples.u32(),
+            all_lights: self.all_lights,
             smooth_terminator: self.smooth_terminator,
             bounces: self.bounces.u32(),
             cutoff: self.cutoff.0 as f32,
