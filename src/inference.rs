@@ -89,6 +89,13 @@ pub fn check_rays(rays: u32) -> u32 {
     (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays)
 }
 
+/// Number of check rays to one of several lights, which saves `rays` and sends this `share` of what arrives without
+/// shadows. The check is of all lights together, so that weak ones need few.
+pub fn shared_check_rays(rays: u32, share: f32) -> u32 {
+    let all = check_rays(rays);
+    ((2.0 * share * all as f32).ceil() as u32).clamp(all.min(1), all)
+}
+
 /// The result of the check rays for one light at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Checked {

@@ -4,7 +4,7 @@
 use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
 use crate::error::counted;
-use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
+use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays, shared_check_rays};
 use crate::scene::{Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
@@ -58,7 +58,11 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
             && is_worth(scene, rays_of(channel, settings).saturating_mul(settings.spp))
     });
     let cost = PointCost::of(scene, &kept, settings);
-    if cost.traced > cost.checked + cost.lookup { kept } else { Channels::of(scene, cells, |_| false) }
+    if cost.traced > cost.checked + cost.lookup {
+        kept
+    } else {
+        Channels::of(scene, cells, |_| false)
+    }
 }
 
 /// Whether a light's shadowing is looked up in other frames, and why.
@@ -160,9 +164,14 @@ impl PointCost {
         let sum = |of: &dyn Fn(u32) -> u32| -> f64 {
             channels.iter().map(|channel| share(channel) * f64::from(of(rays(channel)))).sum()
         };
+        let checks: &dyn Fn(u32) -> u32 = match channels.slots() {
+            0 => &check_rays,
+            // As if all lights were as bright.
+            _ => &|rays| shared_check_rays(rays, 1.0 / mean.max(1.0) as f32),
+        };
         Self {
             traced: shadow_ray(scene) * sum(&|rays| rays),
-            checked: shadow_ray(scene) * CHECK_RAY * sum(&check_rays),
+            checked: shadow_ray(scene) * CHECK_RAY * sum(checks),
             lookup: LOOKUP_IN_ALL + JOINING * f64::from(samples),
         }
     }

@@ -340,6 +340,7 @@ fn is_point(point: &SurfacePoint) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inference::SKY_LIGHT;
     use crate::math::DVec3;
     use crate::scene::Pose;
 
@@ -369,7 +370,7 @@ mod tests {
         let points: Vec<_> =
             places.map(|(x, y)| TracedPoint { x, y, point: point(x, y) }).collect();
         let ratio = |i: usize| if i % 5 == 0 { f32::NAN } else { i as f32 / 100.0 };
-        TracedPoints { points, ratios: (0..96).map(ratio).collect() }
+        TracedPoints { points, ratios: (0..96).map(ratio).collect(), lights: Vec::new() }
     }
 
     fn findings() -> Vec<Finding> {
@@ -399,6 +400,21 @@ mod tests {
         let own = own.with_findings(findings());
         // By text, since NaN does not equal itself.
         assert_eq!(format!("{back:?}"), format!("{own:?}"));
+    }
+
+    #[test]
+    fn where_lights_are_selected_every_point_says_whose_its_ratios_are() {
+        let terms = Compatibility { selected: true, ..terms() };
+        let lights = (0..96).map(|i| if i % 2 == 0 { i / 8 } else { SKY_LIGHT }).collect();
+        let traced = TracedPoints { lights, ..traced() };
+        let (camera, findings) = (camera(), findings());
+        let (camera, traced, findings, settings) = (&camera, &traced, &findings[..], "spp 1");
+        let crop = None;
+        let record =
+            ReferenceRecord { terms: &terms, frame: 7, camera, crop, traced, findings, settings };
+        let back = read(&record.encode().expect("small enough"), &terms).expect("whole");
+        let own = Reference::new(Reference::SUPPLIED, camera, traced, 2);
+        assert_eq!(format!("{back:?}"), format!("{:?}", own.with_findings(findings.to_vec())));
     }
 
     #[test]

@@ -214,6 +214,3 @@ fn root(bounds: &Bounds3) -> Bounds3 {
     let margin = DVec3::splat(1e-6 * bounds.radius());
     Bounds3 { min: bounds.min - margin, max: bounds.max + margin }
 }
-
-#[cfg(test)]
-mod tests;

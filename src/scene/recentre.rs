@@ -1,8 +1,8 @@
 //! A world, moved to scene space.
 
 use super::{
-    Collapsed, Corners, Light, LightCells, Material, Mesh, Recentring, Scene, Sphere, Surface, World,
-    WorldMesh, WorldSphere,
+    Collapsed, Corners, Light, LightCells, Material, Mesh, Recentring, Scene, Sphere, Surface,
+    World, WorldMesh, WorldSphere,
     light::{EmittingShape, EmittingSurface},
     too_small, winding,
 };

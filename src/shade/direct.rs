@@ -224,12 +224,7 @@ impl ShadowScratch {
         self.spans.push(Span { end: self.rays.len(), unshadowed });
     }
 
-    pub fn starts(
-        &mut self,
-        renderer: &Renderer,
-        lit: &[ShadingPoint],
-        i: u32,
-    ) -> ShadowStarts {
+    pub fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
         let point = &lit[i as usize];
         *self.starts[i as usize].get_or_insert_with(|| {
             let seen = (&point.si, &point.ray, &point.hit);

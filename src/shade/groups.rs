@@ -11,7 +11,7 @@ use super::{FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
     Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
-    TracedPoints, channel_of, check_rays,
+    TracedPoints, channel_of, check_rays, shared_check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -201,12 +201,7 @@ impl Groups {
     }
 
     /// Groups `lit` into surface points. Where lights are selected, none has a channel at first.
-    pub fn gather_points(
-        &mut self,
-        input: &FrameInput,
-        channels: &Channels,
-        lit: &[ShadingPoint],
-    ) {
+    pub fn gather_points(&mut self, input: &FrameInput, channels: &Channels, lit: &[ShadingPoint]) {
         self.join_points(input, lit);
         let (count, lights) = (self.asked.points.len(), &mut self.asked.lights);
         lights.clear();
@@ -361,7 +356,13 @@ impl Groups {
             return None;
         }
         let samples = self.asked.points[point].samples;
-        let all = check_rays(samples.saturating_mul(rays));
+        let saved = samples.saturating_mul(rays);
+        let all = if self.slots == 0 {
+            check_rays(saved)
+        } else {
+            let shown = &self.asked.unshadowed[point * channels..][..channels];
+            shared_check_rays(saved, shown[channel] / shown.iter().sum::<f32>())
+        };
         let until =
             |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;
         // A run of a net's points is spread evenly where it starts at a multiple of a power of two.

@@ -135,7 +135,8 @@ impl Renderer<'_> {
             for first in (0..reached.len()).step_by(together) {
                 s.clear();
                 let group = || {
-                    let users = (first..reached.len().min(first + together)).map(|k| reached.get(k));
+                    let users =
+                        (first..reached.len().min(first + together)).map(|k| reached.get(k));
                     users.map(|LightUser { point, .. }| &points[point as usize])
                 };
                 for point in group() {

@@ -175,3 +175,173 @@ impl Reached<'_> {
         (0..self.len()).map(move |k| self.get(k))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rgb;
+    use crate::sampling::mix;
+    use crate::scene::{
+        DirectionalLight, DiskLight, Light, Material, PointLight, QuadLight, Scene, SphereLight,
+        SpotLight, World, WorldSphere,
+    };
+    use crate::shade::light::LightSampler;
+
+    /// Random numbers from -1 to 1.
+    fn random(mut seed: u64) -> impl FnMut() -> f64 {
+        move || {
+            seed = mix(seed);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
+    }
+
+    fn vector(next: &mut impl FnMut() -> f64) -> DVec3 {
+        DVec3::new(next(), next(), next())
+    }
+
+    /// A light of random kind, place and size: huge ones stand beside tiny ones.
+    fn light(next: &mut impl FnMut() -> f64) -> Light {
+        let p = vector(next);
+        let normal = vector(next).normalize();
+        let size = libm::exp(-3.0 + 2.5 * next());
+        let radiance = Rgb::new(2.0, 1.0, 0.5) * libm::exp(3.0 * next()) as f32;
+        let two_sided = next() > 0.0;
+        match (3.0 * (next() + 1.0)) as u32 {
+            0 => Light::Point(PointLight { position: p, intensity: radiance * 0.01 }),
+            1 => {
+                let (s, t) = crate::math::orthonormal_basis(normal);
+                let (s, t) = (s * size, t * size * 0.5);
+                let corners = [p - s - t, p + s - t, p + s + t, p - s + t];
+                Light::Quad(QuadLight { corners, radiance, two_sided })
+            }
+            2 => Light::Sphere(SphereLight { centre: p, radius: size, radiance }),
+            3 => Light::Disk(DiskLight { centre: p, normal, radius: size, radiance, two_sided }),
+            4 => {
+                let (cos_outer, intensity) = (0.9 * next(), radiance * 0.01);
+                let cos_inner = cos_outer + 0.05 * (next() + 1.0);
+                let radius = if two_sided { 0.1 * size } else { 0.0 };
+                let (position, direction) = (p, normal);
+                Light::Spot(SpotLight {
+                    position,
+                    direction,
+                    intensity,
+                    cos_inner,
+                    cos_outer,
+                    radius,
+                })
+            }
+            _ => {
+                let irradiance = radiance * 0.001;
+                Light::Directional(DirectionalLight { to_light: normal, irradiance })
+            }
+        }
+    }
+
+    /// A ball of radius 2 around `lights`, and little balls to light.
+    fn scene(lights: Vec<Light>) -> Scene {
+        let mut world = World { lights, ..World::default() };
+        let grey = world.add_material(Material::diffuse("grey", Rgb::splat(0.5)));
+        world.spheres.push(WorldSphere::new("room", DVec3::ZERO, 2.0, grey));
+        world.into_scene(true).expect("a scene")
+    }
+
+    /// Irradiance without shadows, of the brightest colour.
+    fn sent(light: &Light, p: DVec3, n: DVec3) -> f64 {
+        let sampler = LightSampler::new(light);
+        sampler.unshadowed(p, n) * f64::from(sampler.emission.max_element())
+    }
+
+    /// At random points of random scenes what is culled sends less than the limit, what can send nothing is
+    /// black, and every light that shines is a main one or can be chosen.
+    #[test]
+    fn culled_lights_together_stay_below_the_limit() {
+        let limit = culled(&Settings::default());
+        let mut culled_some = 0;
+        for seed in 0..24 {
+            let mut next = random(seed);
+            // Dim lights, of which many are culled, in every other scene.
+            let dim = if seed % 2 == 0 { 1.0 } else { 1e-5 };
+            let mut lights: Vec<Light> = (0..60).map(|_| light(&mut next)).collect();
+            for light in &mut lights {
+                if let Light::Quad(QuadLight { radiance, .. })
+                | Light::Disk(DiskLight { radiance, .. })
+                | Light::Sphere(SphereLight { radiance, .. }) = light
+                {
+                    *radiance *= dim;
+                }
+            }
+            let scene = scene(lights);
+            let cells = scene.light_cells.as_ref().expect("many lights");
+            for k in 0..400 {
+                let p = vector(&mut next) * scene.bounds.max;
+                // On the planes that cells meet in, too.
+                let p = if k % 5 == 0 { DVec3::new(0.0, p.y, 0.5 * scene.bounds.max.z) } else { p };
+                let n = vector(&mut next).normalize();
+                let cell = cells.cell(p);
+                let own = cells.lights(cell, limit);
+                let known: Vec<u32> = own.main().collect();
+                let mut rest = 0.0;
+                for (number, light) in (0..).zip(&scene.lights) {
+                    let sent = sent(light, p, n);
+                    if known.contains(&number) {
+                        continue;
+                    }
+                    if own.tail().probability_of(number) == 0.0 {
+                        rest += sent;
+                        culled_some += usize::from(sent > 0.0);
+                    }
+                    let all = cells.lights(cell, 0.0);
+                    let is_listed = all.main().any(|main| main == number)
+                        || all.tail().probability_of(number) > 0.0;
+                    assert!(is_listed || sent == 0.0, "{seed} {number} {light:?}: {sent}");
+                }
+                assert!(rest <= limit, "{seed} {p}: {rest} of {limit}");
+            }
+        }
+        assert!(culled_some > 1000, "{culled_some}");
+    }
+
+    /// The probabilities of a tail add up to 1, and each light is chosen as often as its own says.
+    #[test]
+    fn a_tail_chooses_by_its_probabilities() {
+        let mut next = random(5);
+        let scene = scene((0..200).map(|_| light(&mut next)).collect());
+        let cells = scene.light_cells.as_ref().expect("many lights");
+        for _ in 0..50 {
+            let lights = cells.lights(cells.cell(vector(&mut next)), 0.0);
+            let tail = lights.tail();
+            assert!(!tail.is_empty());
+            let all: f64 = (0..200).map(|light| tail.probability_of(light)).sum();
+            assert!((all - 1.0).abs() < 1e-9, "{all}");
+            let mut chosen = [0.0; 200];
+            for k in 0..4096 {
+                let (light, probability) = tail.choose((f64::from(k) + 0.5) / 4096.0);
+                assert!((probability - tail.probability_of(light)).abs() < 1e-12);
+                chosen[light as usize] += 1.0 / 4096.0;
+            }
+            for light in 0..200 {
+                let expected = tail.probability_of(light);
+                assert!((chosen[light as usize] - expected).abs() < 1e-3, "{expected}");
+            }
+            assert!(tail.choose(0.0).1 > 0.0 && tail.choose(1.0 - 1e-16).1 > 0.0);
+        }
+    }
+
+    /// Lights in one place, more of them than are ever traced one by one, and lights without radiance.
+    #[test]
+    fn coincident_and_black_lights_have_finite_probabilities() {
+        let point = |intensity| Light::Point(PointLight { position: DVec3::ZERO, intensity });
+        let black = SphereLight { centre: DVec3::X, radius: 0.1, radiance: Rgb::ZERO };
+        let mut lights = vec![point(Rgb::ONE); 40];
+        lights.extend(vec![Light::Sphere(black); 10]);
+        let scene = scene(lights);
+        let cells = scene.light_cells.as_ref().expect("many lights");
+        for p in [DVec3::ZERO, DVec3::splat(1e-9), DVec3::splat(0.4), DVec3::splat(9.0)] {
+            let lights = cells.lights(cells.cell(p), 0.0);
+            assert!(lights.main().chain([]).all(|light| light < 40));
+            let all: f64 = (0..50).map(|light| lights.tail().probability_of(light)).sum();
+            assert!((all - 1.0).abs() < 1e-9, "{p}: {all}");
+            assert!((40..50).all(|light| lights.tail().probability_of(light) == 0.0));
+        }
+    }
+}

@@ -120,7 +120,9 @@ impl Renderer<'_> {
                 self.draw_tail(&point.place, (&tail, selection), pixels, &mut samples);
                 for choice in samples.choices(tail, selection) {
                     let chosen = choice.source.map(|at| &input.lights[at]);
-                    chosen.iter().for_each(|source| self.tail_ray(source, (lit, i), &choice, s, counts));
+                    chosen
+                        .iter()
+                        .for_each(|source| self.tail_ray(source, (lit, i), &choice, s, counts));
                 }
             }
             s.close(Rgb::ZERO);

@@ -99,18 +99,14 @@ impl Lookup<'_> {
 
     /// The mean for a point of `samples` camera samples; `None` where the taps that know the light have too little
     /// weight.
-    fn mean(
-        &self,
-        taps: &Taps,
-        (channel, lights): (usize, &[u32]),
-        samples: u32,
-    ) -> Option<Mean> {
+    fn mean(&self, taps: &Taps, (channel, lights): (usize, &[u32]), samples: u32) -> Option<Mean> {
         let rays = samples as f32 * self.rays[channel] as f32;
         let (one, per_ray) = (f32x4::splat(1.0), f32x4::splat(1.0 / (rays + 2.0)));
         let mut first = f32::NAN;
         let mut sums = Sums::default();
         for four in taps.fours() {
-            let own = self.references[four.reference as usize].known(&four.samples, channel, lights);
+            let own =
+                self.references[four.reference as usize].known(&four.samples, channel, lights);
             let known = own.ratio.cmp_eq(own.ratio);
             let weight = four.weight & known;
             if first.is_nan() {

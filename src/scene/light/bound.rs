@@ -70,9 +70,8 @@ mod tests {
 
     #[test]
     fn a_flat_light_sends_nothing_behind_itself() {
-        let height = |y: f64, two_sided| {
-            most_height(DVec3::Y * y, DVec3::NEG_Y, two_sided, &unit_box())
-        };
+        let height =
+            |y: f64, two_sided| most_height(DVec3::Y * y, DVec3::NEG_Y, two_sided, &unit_box());
         assert_eq!(height(3.0, false), 4.0);
         assert_eq!(height(-1.0, false), 0.0);
         assert_eq!(height(-3.0, true), 4.0);

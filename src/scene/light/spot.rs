@@ -86,7 +86,10 @@ impl LightData for SpotLight {
             return 0.0;
         }
         let shines = match self.is_area() {
-            true => bound::of_sphere(self.position, self.radius, cell) / (PI * self.radius * self.radius),
+            true => {
+                bound::of_sphere(self.position, self.radius, cell)
+                    / (PI * self.radius * self.radius)
+            }
             false => bound::of_point(self.position, cell),
         };
         falloff * shines

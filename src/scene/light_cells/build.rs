@@ -18,7 +18,7 @@ const LOOSEST: f64 = 16.0;
 const SMALLEST: f64 = 1.0 / 1024.0;
 /// The tail's bounds are at most this share of what arrives in the middle of a cell, unless the cell has the most
 /// main lights.
-const TAIL: f64 = 0.02;
+const TAIL: f64 = 0.04;
 
 /// A box whose lights are known.
 struct Open {
@@ -85,7 +85,8 @@ impl LightCells {
     fn halves(&mut self, whole: &Open, lights: &[Light]) -> [Open; 2] {
         let Bounds3 { min, max } = whole.bounds;
         let extent = whole.bounds.extent();
-        let axis = (0..3).fold(0, |most, axis| if extent[axis] > extent[most] { axis } else { most });
+        let axis =
+            (0..3).fold(0, |most, axis| if extent[axis] > extent[most] { axis } else { most });
         let at = 0.5 * min[axis] + 0.5 * max[axis];
         let node = self.nodes.len();
         self.nodes[whole.node] = Node::Halves { axis: axis as u8, at, lower: node as u32 };
@@ -119,7 +120,8 @@ impl LightCells {
         let before = |k: usize| if k == 0 { 0.0 } else { self.lights[first + k - 1].until };
         let most = own.len().min(MOST_MAIN);
         let main = (0..most).find(|k| until - before(*k) <= TAIL * typical).unwrap_or(most);
-        let area = own[..main].iter().filter(|light| lights[light.light as usize].is_area()).count();
+        let area =
+            own[..main].iter().filter(|light| lights[light.light as usize].is_area()).count();
         self.most_area = self.most_area.max(area);
         let [first, count, main] = [first, own.len(), main].map(|n| n as u32);
         self.cells.push(Cell { first, count, main, typical });
