@@ -9,6 +9,8 @@
 mod accuracy;
 #[path = "inbetween/cost.rs"]
 mod cost;
+#[path = "inbetween/lights.rs"]
+mod lights;
 #[path = "../tests/common/moves.rs"]
 mod moves;
 #[path = "inbetween/pan.rs"]
@@ -42,7 +44,7 @@ impl Choice {
 
 type Section = (&'static str, fn(&Choice));
 
-const SECTIONS: [Section; 8] = [
+const SECTIONS: [Section; 9] = [
     ("quality", accuracy::quality),
     ("policies", accuracy::policies),
     ("flicker", accuracy::flicker),
@@ -51,6 +53,7 @@ const SECTIONS: [Section; 8] = [
     ("parts", parts::report),
     ("pan", pan::speed),
     ("effects", pan::effects),
+    ("lights", lights::report),
 ];
 
 fn main() {

@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Glass, Scene, Settings, ShotLens};
+use crate::scene::{Glass, MeanLights, Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +60,7 @@ impl EffectPlan {
             EffectReason { effect: "textures", runs: used.textured > 0, why: textures },
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
+            light_selection(scene, settings),
         ]);
         reasons
     }
@@ -163,6 +164,29 @@ impl EffectPlan {
         };
         (plan, reasons)
     }
+}
+
+/// Whether points look at the lights that matter there only, and how many these are.
+fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
+    let lights = counted(scene.lights.len(), "light");
+    let (runs, why) = match (&scene.light_cells, scene.selected_lights(settings)) {
+        (None, _) => (false, format!("{lights}, all looked at everywhere")),
+        (Some(_), None) => {
+            (false, format!("{lights}, all looked at everywhere: all lights are on"))
+        }
+        (Some(cells), Some(_)) => {
+            let MeanLights { main, area: _, tail } = cells.mean();
+            let memory = cells.memory() as f64 / 1e6;
+            let most = counted(cells.most_area(), "ratio");
+            let why = format!(
+                "{lights}: at a point {main:.1} on average are traced each, {tail:.1} drawn from; \
+                 {} cells of {memory:.1} MB, at most {most} kept for a point",
+                cells.len()
+            );
+            (true, why)
+        }
+    };
+    EffectReason { effect: "light selection", runs, why }
 }
 
 /// Whether a colour does anything: not only what is positive, since what is NaN or negative must

@@ -6,7 +6,7 @@
 
 use crate::film::Provenance;
 use crate::math::{DVec3, Vec3};
-use crate::scene::Scene;
+use crate::scene::{LightCells, Scene};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -89,6 +89,13 @@ pub fn check_rays(rays: u32) -> u32 {
     (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays)
 }
 
+/// Number of check rays to one of several lights, which saves `rays` and sends this `share` of what arrives without
+/// shadows. The check is of all lights together, so that weak ones need few.
+pub fn shared_check_rays(rays: u32, share: f32) -> u32 {
+    let all = check_rays(rays);
+    ((2.0 * share * all as f32).ceil() as u32).clamp(all.min(1), all)
+}
+
 /// The result of the check rays for one light at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Checked {
@@ -111,6 +118,9 @@ pub struct LookupBatch {
     /// For each point and channel the light's contribution to the pixel without shadows:
     /// luminance, exposure applied; 0 where no light can arrive.
     pub unshadowed: Vec<f32>,
+    /// For each point and channel the number of its light, [`NO_LIGHT`] or [`SKY_LIGHT`]; empty where each
+    /// channel has the same light everywhere.
+    pub lights: Vec<u32>,
     /// For each point the ratio in each channel; NaN where it is unknown and must be traced.
     pub ratios: Vec<f32>,
     /// For each point and channel the estimate from other frames; filled by the answering side.
@@ -141,14 +151,17 @@ pub struct TracedPoints {
     pub points: Vec<TracedPoint>,
     /// For each point the ratio in each channel; NaN where it was not traced.
     pub ratios: Vec<f32>,
+    /// For each point the light of each channel, as in [`LookupBatch::lights`].
+    pub lights: Vec<u32>,
 }
 
 impl TracedPoints {
     /// Appends all of `other`.
     pub fn append(&mut self, other: Self) {
-        let Self { mut points, mut ratios } = other;
+        let Self { mut points, mut ratios, mut lights } = other;
         self.points.append(&mut points);
         self.ratios.append(&mut ratios);
+        self.lights.append(&mut lights);
     }
 
     /// The points sorted row by row; points of one pixel keep their order.
@@ -161,9 +174,29 @@ impl TracedPoints {
         let mut order: Vec<u32> = (0..self.points.len() as u32).collect();
         order.par_sort_by_key(|i| place(&self.points[*i as usize]));
         let points = order.iter().map(|i| self.points[*i as usize]).collect();
-        let ratios = |i: &u32| *i as usize * channels..(*i as usize + 1) * channels;
-        let ratios = order.iter().flat_map(|i| &self.ratios[ratios(i)]).copied().collect();
-        Self { points, ratios }
+        let own = |i: &u32| *i as usize * channels..(*i as usize + 1) * channels;
+        let ratios = order.iter().flat_map(|i| &self.ratios[own(i)]).copied().collect();
+        let lights = |i: &u32| self.lights.get(own(i)).unwrap_or_default();
+        let lights = order.iter().flat_map(lights).copied().collect();
+        Self { points, ratios, lights }
+    }
+}
+
+/// Number of no light, of a channel that is free.
+pub const NO_LIGHT: u32 = u32::MAX;
+/// Number of the sky among the lights of channels.
+pub const SKY_LIGHT: u32 = u32::MAX - 1;
+
+/// The channel of a point with the lights `known` that is of the light of channel `k` of a point with the lights
+/// `asked`; `k` itself where each channel has the same light everywhere.
+#[inline]
+pub fn channel_of(known: &[u32], asked: &[u32], k: usize) -> Option<usize> {
+    let Some(light) = asked.get(k) else { return Some(k) };
+    // Neighbours mostly have the same lights.
+    match known.get(k) {
+        _ if *light == NO_LIGHT => None,
+        Some(other) if other == light => Some(k),
+        _ => known.iter().position(|other| other == light),
     }
 }
 
@@ -185,6 +218,9 @@ pub trait Inference: Sync {
 pub enum Channel {
     /// The area light of this index.
     Area(u32),
+    /// One of the lights with an extent that matter at a point, where lights are selected: another one at every
+    /// point.
+    Selected(u32),
     /// The sky.
     Sky,
 }
@@ -198,13 +234,25 @@ pub struct Channels {
     list: Vec<Channel>,
     of_light: Vec<Option<usize>>,
     sky: Option<usize>,
+    slots: usize,
 }
 
 impl Channels {
-    /// Channels for those lights of `scene` that `is_kept` keeps.
-    pub fn of(scene: &Scene, is_kept: impl Fn(Channel) -> bool) -> Self {
+    /// Channels for those lights of `scene` that `is_kept` keeps. Where `cells` select lights, a point has channels
+    /// for as many as matter at most.
+    pub fn of(
+        scene: &Scene,
+        cells: Option<&LightCells>,
+        is_kept: impl Fn(Channel) -> bool,
+    ) -> Self {
         let mut channels = Self { of_light: vec![None; scene.lights.len()], ..Self::default() };
-        for (index, light) in scene.lights.iter().enumerate() {
+        if let Some(cells) = cells {
+            let slots = (0..cells.most_area() as u32).map(Channel::Selected);
+            channels.list.extend(slots.filter(|channel| is_kept(*channel)));
+            channels.slots = channels.list.len();
+        }
+        let lights = if cells.is_some() { &[] } else { &scene.lights[..] };
+        for (index, light) in lights.iter().enumerate() {
             let channel = Channel::Area(index as u32);
             if light.is_area() && is_kept(channel) {
                 channels.of_light[index] = Some(channels.list.len());
@@ -236,6 +284,12 @@ impl Channels {
     /// The channel of light `index`, if its ratio is kept.
     pub fn of_light(&self, index: u32) -> Option<usize> {
         self.of_light.get(index as usize).copied().flatten()
+    }
+
+    /// How many channels, the first ones, are of selected lights; 0 where each channel has the same light
+    /// everywhere.
+    pub fn slots(&self) -> usize {
+        self.slots
     }
 
     /// The sky's channel, if its ratio is kept.

@@ -101,6 +101,11 @@ fn demo_is_no_worse_than_traced() {
 }
 
 #[test]
+fn street_at_night_is_no_worse_than_traced() {
+    is_no_worse_than_traced("street_at_night", [0.3, 0.0]);
+}
+
+#[test]
 fn inferred_frames_flicker_no_more_than_traced_ones() {
     let set = Set::load("cornell", |_| ());
     let stage = set.stage(2);

@@ -44,7 +44,7 @@ fn every_folder_has_a_scene_that_loads_and_has_a_description() {
         cameras_stand_free(&loaded);
         names.push(name);
     }
-    for name in ["spheres_on_terrain", "reflective_spheres", "cornell", "demo"] {
+    for name in ["spheres_on_terrain", "reflective_spheres", "cornell", "demo", "street_at_night"] {
         assert!(names.iter().any(|n| n == name), "{name}");
     }
 }
@@ -168,6 +168,17 @@ fn the_demo_uses_much_and_stays_above_the_ground() {
     assert!(materials.iter().any(|m| m.glass.is_some()));
     assert!(materials.iter().any(|m| m.mirror != Rgb::ZERO));
     assert!(loaded.world.sky.lights && !loaded.world.lights.is_empty());
+}
+
+#[test]
+fn a_few_of_the_lights_of_street_at_night_matter_at_a_point() {
+    let loaded = loaded("street_at_night");
+    assert_eq!(loaded.world.lights.len(), 64);
+    let scene = scene(&loaded);
+    let cells = scene.light_cells.as_ref().expect("many lights");
+    let mean = cells.mean();
+    assert!((1.0..8.0).contains(&mean.main), "{mean:?}");
+    assert!(cells.memory() < 32 << 20, "{} bytes", cells.memory());
 }
 
 #[test]

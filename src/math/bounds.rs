@@ -67,6 +67,16 @@ impl Bounds3 {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
+    /// The least distance from `p` to a point of the box; infinite for an empty box.
+    pub fn distance_to_point(&self, p: DVec3) -> f64 {
+        (self.min - p).max(p - self.max).max(DVec3::ZERO).length()
+    }
+
+    /// The least distance between points of two boxes; infinite where one is empty.
+    pub fn distance_to(&self, other: &Self) -> f64 {
+        (self.min - other.max).max(other.min - self.max).max(DVec3::ZERO).length()
+    }
+
     /// The part `(t_near, t_far)` of the ray `org + t·dir`, t in `[tnear, tfar]`, inside the box.
     ///
     /// `inv_dir` is `1/dir` by component; zero components may be ±infinity. NaN from `0·inf`

@@ -92,7 +92,8 @@ impl WriteOptions {
             s.tone,
         );
         let clamp = s.clamp.map_or_else(String::new, |most| format!(", clamp {most}"));
-        let text = text + &clamp;
+        let lights = if s.all_lights { ", all lights" } else { "" };
+        let text = text + &clamp + lights;
         let display = Display { exposure: s.exposure, tone: s.tone };
         let aovs = s.aovs.clone().unwrap_or_default();
         let (png_bits, settings) = (s.png_bits, text);

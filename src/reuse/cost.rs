@@ -3,7 +3,8 @@
 
 use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
-use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
+use crate::error::counted;
+use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays, shared_check_rays};
 use crate::scene::{Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
@@ -38,7 +39,7 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
 /// Number of shadow rays of one camera sample in a channel.
 pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
-        Channel::Area(_) => settings.shadow_samples,
+        Channel::Area(_) | Channel::Selected(_) => settings.shadow_samples,
         Channel::Sky => settings.sky_samples,
     }
 }
@@ -51,7 +52,7 @@ const DISPUTED: f64 = 0.25;
 fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
     let all = rays_of(channel, settings);
     match channel {
-        Channel::Area(_) => match settings.least_shadow_samples {
+        Channel::Area(_) | Channel::Selected(_) => match settings.least_shadow_samples {
             Some(pilots) => (pilots + (DISPUTED * f64::from(all)) as u32).min(all),
             None => all,
         },
@@ -63,9 +64,10 @@ fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
 /// The lights whose ratios are worth keeping.
 pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
     let plan = EffectPlan::of(scene, settings);
-    let kept = Channels::of(scene, |channel| {
+    let cells = scene.selected_lights(settings);
+    let kept = Channels::of(scene, cells, |channel| {
         let runs = match channel {
-            Channel::Area(_) => plan.area_lights,
+            Channel::Area(_) | Channel::Selected(_) => plan.area_lights,
             Channel::Sky => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
@@ -73,7 +75,11 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
             && is_worth(scene, expected_rays(channel, settings).saturating_mul(settings.spp))
     });
     let cost = PointCost::of(scene, &kept, settings);
-    if cost.traced > cost.checked + cost.lookup { kept } else { Channels::of(scene, |_| false) }
+    if cost.traced > cost.checked + cost.lookup {
+        kept
+    } else {
+        Channels::of(scene, cells, |_| false)
+    }
 }
 
 /// Whether a light's shadowing is looked up in other frames, and why.
@@ -96,18 +102,26 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
         (expected_rays(channel, settings), settings.spp, varies)
     };
     let mut reasons = Vec::new();
-    for (index, light) in scene.lights.iter().enumerate() {
-        let channel = light.is_area().then_some(Channel::Area(index as u32));
-        let looked_up = kept.of_light(index as u32).is_some();
-        let why = channel.map_or_else(
-            || "one hard shadow ray is not worth a lookup".into(),
-            |channel| why(scene, expected(channel), looked_up, diffuse),
-        );
-        reasons.push(LookupReason {
-            light: format!("light {}, {}", index + 1, light.name()),
-            looked_up,
-            why,
-        });
+    let area = |channel, looked_up| why(scene, expected(channel), looked_up, diffuse);
+    let delta = || "one hard shadow ray is not worth a lookup".to_string();
+    if scene.selected_lights(settings).is_some() {
+        // Too many to list: they differ by nothing that decides.
+        let (soft, hard): (Vec<_>, Vec<_>) = scene.lights.iter().partition(|l| l.is_area());
+        let looked_up = kept.slots() > 0;
+        let soft = (soft.len(), "area light", looked_up, area(Channel::Selected(0), looked_up));
+        for (count, kind, looked_up, why) in [soft, (hard.len(), "delta light", false, delta())] {
+            if count > 0 {
+                reasons.push(LookupReason { light: counted(count, kind), looked_up, why });
+            }
+        }
+    } else {
+        for (index, light) in scene.lights.iter().enumerate() {
+            let channel = light.is_area().then_some(Channel::Area(index as u32));
+            let looked_up = kept.of_light(index as u32).is_some();
+            let why = channel.map_or_else(delta, |channel| area(channel, looked_up));
+            let light = format!("light {}, {}", index + 1, light.name());
+            reasons.push(LookupReason { light, looked_up, why });
+        }
     }
     if sky_light {
         let looked_up = kept.sky().is_some();
@@ -167,11 +181,22 @@ struct PointCost {
 impl PointCost {
     fn of(scene: &Scene, channels: &Channels, settings: &Settings) -> Self {
         let samples = settings.spp.min(SAMPLES_TOGETHER);
+        let mean = scene.light_cells.as_ref().map_or(0.0, |cells| cells.mean().area);
+        // Few points have as many lights as they have channels for.
+        let share = |channel| match channel {
+            Channel::Selected(_) => mean / channels.slots() as f64,
+            Channel::Area(_) | Channel::Sky => 1.0,
+        };
         let sum = |of: &dyn Fn(Channel) -> u32| -> f64 {
-            channels.iter().map(|channel| f64::from(of(channel))).sum()
+            channels.iter().map(|channel| share(channel) * f64::from(of(channel))).sum()
         };
         let traced = |channel| samples.saturating_mul(expected_rays(channel, settings));
-        let checked = |channel| check_rays(samples.saturating_mul(rays_of(channel, settings)));
+        let checks: &dyn Fn(u32) -> u32 = match channels.slots() {
+            0 => &check_rays,
+            // As if all lights were as bright.
+            _ => &|rays| shared_check_rays(rays, 1.0 / mean.max(1.0) as f32),
+        };
+        let checked = |channel| checks(samples.saturating_mul(rays_of(channel, settings)));
         Self {
             traced: shadow_ray(scene) * sum(&traced),
             checked: shadow_ray(scene) * CHECK_RAY * sum(&checked),

@@ -77,7 +77,7 @@ impl Inference for Judged<'_> {
 impl Lookup<'_> {
     /// Fills estimates and provenance for all points.
     pub fn estimate(&self, batch: &mut LookupBatch) {
-        let LookupBatch { points, unshadowed, estimates, provenance, .. } = batch;
+        let LookupBatch { points, unshadowed, lights, estimates, provenance, .. } = batch;
         let channels = self.rays.len();
         estimates.clear();
         estimates.resize(points.len() * channels, Estimate::UNKNOWN);
@@ -89,7 +89,11 @@ impl Lookup<'_> {
         let references = References(self.references);
         let mut taps = Taps::new();
         let mut means = Vec::with_capacity(channels);
-        for (((points, unshadowed), estimates), provenance) in each {
+        for (chunk, (((points, unshadowed), estimates), provenance)) in each.enumerate() {
+            let lights = |i: usize| {
+                let own = lights.get((chunk * TOGETHER + i) * channels..);
+                own.and_then(|own| own.get(..channels)).unwrap_or_default()
+            };
             let shown = |i: usize| &unshadowed[i * channels..][..channels];
             let is_lit = |i: usize| shown(i).iter().any(|s| *s != 0.0);
             let mut found: [[Option<Taps4>; ALWAYS]; TOGETHER] = [[None; ALWAYS]; TOGETHER];
@@ -98,7 +102,8 @@ impl Lookup<'_> {
                 references.gather(point, &found[i], &mut taps);
                 if taps.weight >= LEAST_WEIGHT {
                     let own = &mut estimates[i * channels..][..channels];
-                    self.estimate_all(&taps, point, shown(i), &mut means, own);
+                    let shown = (shown(i), lights(i));
+                    self.estimate_all(&taps, point, shown, &mut means, own);
                     provenance[i] = self.provenance(&taps);
                 }
             }

@@ -4,7 +4,7 @@ use super::Lookup;
 use super::check::agrees;
 use super::evidence::{Finding, LightComparison, finding_of};
 use crate::film::Provenance;
-use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint};
+use crate::inference::{Estimate, Inference, LookupBatch, SurfacePoint, channel_of};
 use crate::sampling::mix;
 use std::sync::{Mutex, PoisonError};
 
@@ -82,6 +82,8 @@ struct Note {
     pixel: [u32; 2],
     point: SurfacePoint,
     lights: Vec<LightComparison>,
+    /// The numbers of these lights; empty where they are the same everywhere.
+    numbers: Vec<u32>,
     /// Whether check rays agreed.
     agreed: bool,
 }
@@ -152,8 +154,19 @@ impl Note {
 
     fn join(&mut self, other: &Self) {
         let share = self.point.join(&other.point);
-        for (own, other) in self.lights.iter_mut().zip(&other.lights) {
-            own.join(other, share);
+        for (k, light) in other.lights.iter().enumerate() {
+            match channel_of(&self.numbers, &other.numbers, k) {
+                Some(at) => self.lights[at].join(light, share),
+                None if light.unshadowed == 0.0 => {}
+                // No light of the samples so far.
+                None => {
+                    let dark = LightComparison { unshadowed: 0.0, ..*light };
+                    self.lights.push(dark);
+                    self.numbers.push(other.numbers[k]);
+                    let at = self.lights.len() - 1;
+                    self.lights[at].join(light, share);
+                }
+            }
         }
     }
 }
@@ -171,7 +184,7 @@ impl Inference for Probe<'_> {
     }
 
     fn hear(&self, answered: &LookupBatch) {
-        let LookupBatch { points, pixels, unshadowed, ratios, estimates, .. } = answered;
+        let LookupBatch { points, pixels, unshadowed, lights, ratios, estimates, .. } = answered;
         let channels = self.channels;
         let light = |at: usize| LightComparison {
             unshadowed: unshadowed[at],
@@ -182,6 +195,7 @@ impl Inference for Probe<'_> {
             pixel: pixels[i],
             point: *point,
             lights: (i * channels..(i + 1) * channels).map(light).collect(),
+            numbers: lights.get(i * channels..(i + 1) * channels).unwrap_or_default().to_vec(),
             agreed: !answered.checks.is_empty() && agrees(answered, i, channels, self.tolerance),
         };
         let notes = points.iter().enumerate().map(note);

@@ -6,6 +6,7 @@
 
 mod contrast;
 mod gather;
+mod lists;
 
 use super::evidence::Finding;
 use super::index::Index;
@@ -13,6 +14,7 @@ use crate::inference::{SurfacePoint, TracedPoints};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Camera;
 use gather::Gathered;
+use lists::LightLists;
 use wide::f32x4;
 
 /// Sample number that means: no sample.
@@ -185,6 +187,8 @@ pub struct Reference {
     /// For each sample the ratios and contrasts of the channels after the first.
     more: Vec<Known>,
     channels: usize,
+    /// Whose ratios each sample has; empty where each channel has the same light everywhere.
+    lights: LightLists,
     /// Finds samples that are not in `slots`: points seen in mirrors, through glass or beside another surface.
     pub(super) index: Index,
     /// The findings of the frame's probes.
@@ -222,7 +226,8 @@ impl Reference {
         let samples = samples.collect();
         let more = order.iter().flat_map(|i| (1..channels).map(|channel| known(*i, channel)));
         let more = more.collect();
-        Self { frame, view, slots, samples, more, channels, index, findings: Vec::new() }
+        let lights = LightLists::of(&gathered.lights, &order, channels);
+        Self { frame, view, slots, samples, more, channels, lights, index, findings: Vec::new() }
     }
 
     /// This reference with the findings of the frame's probes.
@@ -262,7 +267,8 @@ impl Reference {
     pub fn memory(&self) -> u64 {
         let samples = size_of_val(&self.samples[..]) + size_of_val(&self.more[..]);
         let findings = size_of_val(&self.findings[..]);
-        (samples + size_of_val(&self.slots[..]) + findings) as u64 + self.index.memory()
+        let own = samples + size_of_val(&self.slots[..]) + findings;
+        own as u64 + self.lights.memory() + self.index.memory()
     }
 
     /// The sample that is seen directly at a pixel; [`NONE`] where there is none, and outside the image.
@@ -272,10 +278,15 @@ impl Reference {
         if is_inside { self.slots[self.view.slot(x as usize, y as usize)] } else { NONE }
     }
 
-    /// Ratios and contrasts of four samples in a channel.
-    pub(super) fn known(&self, samples: &[u32; 4], channel: usize) -> Known4 {
+    /// Ratios and contrasts of four samples in a channel of a point with these `lights`, of which there are none where
+    /// each channel has the same light everywhere. A sample without the light has no ratio, and no contrast.
+    pub(super) fn known(&self, samples: &[u32; 4], channel: usize, lights: &[u32]) -> Known4 {
         let [mut ratio, mut bend, mut wide, mut far] = [[0.0; 4]; 4];
         for (k, sample) in samples.iter().enumerate() {
+            let Some(channel) = self.lights.channel(*sample, lights, channel) else {
+                ratio[k] = f32::NAN;
+                continue;
+            };
             let own = self.known_by(*sample, channel);
             ratio[k] = own.ratio;
             bend[k] = own.bend.get();

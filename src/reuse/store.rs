@@ -50,6 +50,9 @@ pub struct Compatibility {
     pub lights: Vec<String>,
     /// For each light the shadow rays of a pixel: camera samples times shadow samples.
     pub rays: Vec<u32>,
+    /// Whether lights are selected, so that every point says whose ratios it has.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub selected: bool,
 }
 
 /// The head of a record.
@@ -69,6 +72,7 @@ impl Compatibility {
     pub fn of(world: &str, channels: &Channels, settings: &Settings) -> Self {
         let name = |channel| match channel {
             Channel::Area(index) => format!("light {}", index + 1),
+            Channel::Selected(index) => format!("selected light {}", index + 1),
             Channel::Sky => "sky".into(),
         };
         let rays = |c| super::rays_of(c, settings).saturating_mul(settings.spp);
@@ -77,12 +81,18 @@ impl Compatibility {
             recentre: settings.rules.recentre,
             lights: channels.iter().map(name).collect(),
             rays: channels.iter().map(rays).collect(),
+            selected: channels.slots() > 0,
         }
+    }
+
+    /// Words of a point.
+    fn words(&self) -> usize {
+        WORDS + self.lights.len() * if self.selected { 2 } else { 1 }
     }
 
     /// Why references of a job with the compatibility `other` cannot be used here; `None` if they can.
     fn refusal(&self, other: &Self) -> Option<String> {
-        let Self { world, recentre, lights, rays } = self;
+        let Self { world, recentre, lights, rays, selected: _ } = self;
         if *world != other.world {
             return Some("it shows another scene".into());
         }
@@ -141,9 +151,10 @@ impl ReferenceRecord<'_> {
             points: order.len(),
             findings: findings.len(),
         };
-        size_of_record(head.points, channels, head.findings)?;
+        let words = terms.words();
+        size_of_record(head.points, words, head.findings)?;
         let word = |i: usize, column| self.word(order[i], column, channels);
-        let mut raw = columns::planes(order.len(), WORDS + channels, word);
+        let mut raw = columns::planes(order.len(), words, word);
         raw.extend(findings.iter().flat_map(finding_bytes));
         let json = serde_json::to_vec(&head).ok()?;
         let mut body = (json.len() as u32).to_le_bytes().to_vec();
@@ -178,11 +189,14 @@ impl ReferenceRecord<'_> {
             7..10 => n[column - 7].to_bits(),
             10 => footprint.to_bits(),
             11 => cos.to_bits(),
-            _ => match self.traced.ratios[i * channels + column - WORDS] {
-                // One NaN, whatever its bits were.
-                ratio if ratio.is_nan() => f32::NAN.to_bits(),
-                ratio => ratio.to_bits(),
-            },
+            _ if column < WORDS + channels => {
+                match self.traced.ratios[i * channels + column - WORDS] {
+                    // One NaN, whatever its bits were.
+                    ratio if ratio.is_nan() => f32::NAN.to_bits(),
+                    ratio => ratio.to_bits(),
+                }
+            }
+            _ => self.traced.lights[i * channels + column - WORDS - channels],
         }
     }
 }
@@ -222,28 +236,28 @@ pub fn decode(
             "its record claims {width}x{height} pixels, more than it can have"
         )));
     }
-    let (traced, findings) =
-        record_of(body, &head, terms.lights.len(), &camera).ok_or_else(damaged)?;
+    let (traced, findings) = record_of(body, &head, terms, &camera).ok_or_else(damaged)?;
     let camera = camera.to_scene(recentring);
     let reference = Reference::new(Reference::SUPPLIED, &camera, &traced, terms.lights.len());
     Ok((reference.with_findings(findings), *hash))
 }
 
-/// Size of `points` with `channels` ratios each, and of `findings`, bytes; `None` where it is too large.
-fn size_of_record(points: usize, channels: usize, findings: usize) -> Option<usize> {
-    columns::size_of(points, WORDS + channels, findings.checked_mul(FINDING)?)
+/// Size of `points` of so many `words`, and of `findings`, bytes; `None` where it is too large.
+fn size_of_record(points: usize, words: usize, findings: usize) -> Option<usize> {
+    columns::size_of(points, words, findings.checked_mul(FINDING)?)
 }
 
 fn record_of(
     body: &[u8],
     head: &Head,
-    channels: usize,
+    terms: &Compatibility,
     camera: &Camera,
 ) -> Option<(TracedPoints, Vec<Finding>)> {
-    let raw = inflated(body, size_of_record(head.points, channels, head.findings)?)?;
-    let (points, findings) = raw.split_at_checked(4 * (WORDS + channels) * head.points)?;
+    let words = terms.words();
+    let raw = inflated(body, size_of_record(head.points, words, head.findings)?)?;
+    let (points, findings) = raw.split_at_checked(4 * words * head.points)?;
     let findings: Option<Vec<Finding>> = findings.chunks_exact(FINDING).map(finding_of).collect();
-    Some((points_of(points, head.points, channels, camera)?, findings?))
+    Some((points_of(points, head.points, terms, camera)?, findings?))
 }
 
 fn finding_bytes(finding: &Finding) -> [u8; FINDING] {
@@ -271,8 +285,13 @@ fn finding_of(mut bytes: &[u8]) -> Option<Finding> {
     is_sound.then_some(Finding { level, agreed, error, noise })
 }
 
-fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Option<TracedPoints> {
-    let columns = WORDS + channels;
+fn points_of(
+    raw: &[u8],
+    count: usize,
+    terms: &Compatibility,
+    camera: &Camera,
+) -> Option<TracedPoints> {
+    let columns = WORDS + terms.lights.len();
     let word = |i: usize, column: usize| columns::word(raw, count, i, column);
     let mut traced = TracedPoints::default();
     for i in 0..count {
@@ -299,6 +318,8 @@ fn points_of(raw: &[u8], count: usize, channels: usize, camera: &Camera) -> Opti
         }
         traced.points.push(TracedPoint { x, y, point });
         traced.ratios.extend(ratios);
+        // Any number will do: no point has a light that there is not.
+        traced.lights.extend((columns..terms.words()).map(|column| word(i, column)));
     }
     Some(traced)
 }
@@ -319,12 +340,14 @@ fn is_point(point: &SurfacePoint) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inference::SKY_LIGHT;
     use crate::math::DVec3;
     use crate::scene::Pose;
 
     fn terms() -> Compatibility {
         let lights = vec!["light 1".to_string(), "sky".into()];
-        Compatibility { world: "w".into(), recentre: true, lights, rays: vec![16, 64] }
+        let (world, recentre, rays, selected) = ("w".into(), true, vec![16, 64], false);
+        Compatibility { world, recentre, lights, rays, selected }
     }
 
     fn camera() -> Camera {
@@ -347,7 +370,7 @@ mod tests {
         let points: Vec<_> =
             places.map(|(x, y)| TracedPoint { x, y, point: point(x, y) }).collect();
         let ratio = |i: usize| if i % 5 == 0 { f32::NAN } else { i as f32 / 100.0 };
-        TracedPoints { points, ratios: (0..96).map(ratio).collect() }
+        TracedPoints { points, ratios: (0..96).map(ratio).collect(), lights: Vec::new() }
     }
 
     fn findings() -> Vec<Finding> {
@@ -377,6 +400,21 @@ mod tests {
         let own = own.with_findings(findings());
         // By text, since NaN does not equal itself.
         assert_eq!(format!("{back:?}"), format!("{own:?}"));
+    }
+
+    #[test]
+    fn where_lights_are_selected_every_point_says_whose_its_ratios_are() {
+        let terms = Compatibility { selected: true, ..terms() };
+        let lights = (0..96).map(|i| if i % 2 == 0 { i / 8 } else { SKY_LIGHT }).collect();
+        let traced = TracedPoints { lights, ..traced() };
+        let (camera, findings) = (camera(), findings());
+        let (camera, traced, findings, settings) = (&camera, &traced, &findings[..], "spp 1");
+        let crop = None;
+        let record =
+            ReferenceRecord { terms: &terms, frame: 7, camera, crop, traced, findings, settings };
+        let back = read(&record.encode().expect("small enough"), &terms).expect("whole");
+        let own = Reference::new(Reference::SUPPLIED, camera, traced, 2);
+        assert_eq!(format!("{back:?}"), format!("{:?}", own.with_findings(findings.to_vec())));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! One file for each kind says all that a scene needs to know of it ([`LightData`]); nothing else in
 //! this room asks for the kind. How a light shines stands in `shade::light`.
 
+mod bound;
 mod directional;
 mod disk;
 mod point;
@@ -95,6 +96,14 @@ trait LightData {
 
     /// The surface that rays see, in the light's own space; `None` for a light that is not seen.
     fn surface(&self) -> Option<EmittingSurface>;
+
+    /// What the light emits: radiance of an area light, intensity of a point or spot light, irradiance of a
+    /// directional one.
+    fn emission(&self) -> Rgb;
+
+    /// An upper bound of the irradiance without shadows that arrives at any point of the box `cell`, whatever the
+    /// normal there, per unit of emission; infinite where there is none.
+    fn most_irradiance(&self, cell: &Bounds3) -> f64;
 }
 
 /// The visible surface of a light.
@@ -140,5 +149,22 @@ impl Light {
 
     pub(super) fn surface(&self) -> Option<EmittingSurface> {
         self.data().surface()
+    }
+
+    /// An upper bound of the irradiance without shadows that arrives at any point of the box `cell`, whatever the
+    /// normal there: of the brightest of the three colours. Infinite where there is none, as of an emission that
+    /// is no number.
+    pub(super) fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        let [r, g, b] = self.data().emission().to_array().map(|x| f64::from(x).abs());
+        let emission = r.max(g).max(b);
+        if (r + g + b).is_nan() {
+            return f64::INFINITY;
+        }
+        if emission == 0.0 {
+            return 0.0;
+        }
+        // Closed forms are rounded too.
+        let most = emission * self.data().most_irradiance(cell) * (1.0 + 1e-6);
+        if most.is_nan() { f64::INFINITY } else { most }
     }
 }

@@ -14,6 +14,7 @@ mod check;
 mod job;
 mod lens;
 mod light;
+mod light_cells;
 pub mod limits;
 mod material;
 mod mesh;
@@ -36,6 +37,7 @@ pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
     DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
 };
+pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
@@ -110,6 +112,8 @@ pub struct Scene {
     pub bounds: Bounds3,
     /// Meshes that lost triangles to rounding. Tracing does not use it; it is reported.
     pub collapsed: Vec<Collapsed>,
+    /// Which lights matter where; `None` of a scene with few lights, all of which are looked at everywhere.
+    pub light_cells: Option<LightCells>,
 }
 
 impl Scene {
@@ -132,6 +136,11 @@ impl Scene {
             None => &self.spheres[prim_id as usize].surface,
         };
         surface.always_traced || self.traced_regions.iter().any(|region| region.contains(p))
+    }
+
+    /// The cells that lights are selected by; `None` where all are looked at everywhere.
+    pub fn selected_lights(&self, settings: &Settings) -> Option<&LightCells> {
+        self.light_cells.as_ref().filter(|_| !settings.all_lights)
     }
 
     /// Triangles in all meshes.

@@ -1,8 +1,8 @@
 //! A world, moved to scene space.
 
 use super::{
-    Collapsed, Corners, Light, Material, Mesh, Recentring, Scene, Sphere, Surface, World,
-    WorldMesh, WorldSphere,
+    Collapsed, Corners, Light, LightCells, Material, Mesh, Recentring, Scene, Sphere, Surface,
+    World, WorldMesh, WorldSphere,
     light::{EmittingShape, EmittingSurface},
     too_small, winding,
 };
@@ -91,7 +91,7 @@ impl World {
             scene_bounds.include(s.centre - DVec3::splat(s.radius));
             scene_bounds.include(s.centre + DVec3::splat(s.radius));
         }
-        Ok(Scene {
+        let mut scene = Scene {
             recentring,
             meshes,
             spheres,
@@ -102,7 +102,10 @@ impl World {
             traced_regions,
             bounds: scene_bounds,
             collapsed,
-        })
+            light_cells: None,
+        };
+        scene.light_cells = LightCells::of(&scene);
+        Ok(scene)
     }
 }
 

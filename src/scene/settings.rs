@@ -41,6 +41,9 @@ pub struct Settings {
     /// The least sky rays, as [`least_shadow_samples`](Self::least_shadow_samples).
     #[serde(default)]
     pub least_sky_samples: Option<u32>,
+    /// Look at every light at every point, however little it can send there, in scenes of many lights too.
+    #[serde(default)]
+    pub all_lights: bool,
     /// Start shadow rays of smooth meshes on the smooth surface, not on its facets.
     pub smooth_terminator: bool,
     /// Specular bounces after the camera ray.
@@ -141,6 +144,7 @@ impl Default for Settings {
             least_shadow_samples: None,
             sky_samples: 16,
             least_sky_samples: None,
+            all_lights: false,
             smooth_terminator: true,
             bounces: 4,
             cutoff: 1e-3,

@@ -238,7 +238,7 @@ mod tests {
             samples: 1,
         };
         let points = (0..points).map(|i| TracedPoint { x: i % 64, y: i / 64, point }).collect();
-        let traced = TracedPoints { ratios: vec![1.0; 4096], points };
+        let traced = TracedPoints { ratios: vec![1.0; 4096], points, lights: Vec::new() };
         Reference::new(Reference::SUPPLIED, &camera(x), &traced, 1)
     }
 

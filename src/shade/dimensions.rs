@@ -29,3 +29,13 @@ pub(super) fn of_lobe(branch: u32) -> u32 {
 pub(super) fn of_light(branch: u32, light: u32, lights: usize) -> u32 {
     branch.wrapping_mul(lights as u32 + 1).wrapping_add(light)
 }
+
+/// What lights are chosen from the tail, and where on them samples lie, stand beside the lights where lights are
+/// selected: as further `lights` of [`of_light`].
+pub(super) const TAIL: usize = 2;
+
+/// The light that a sample chooses, and the place on it, of `lights` that are [`TAIL`] more than the scene's.
+pub(super) fn of_tail(branch: u32, lights: usize) -> [u32; 2] {
+    // The sky's number is that of the scene's lights.
+    [lights as u32 - 1, lights as u32].map(|number| of_light(branch, number, lights))
+}

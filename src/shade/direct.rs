@@ -9,6 +9,8 @@ use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarge
 use super::pilots::{Findings, Run};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
+use super::selection::{LightUser, LightUsers, Reached};
+use super::tail::TailSamples;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance};
@@ -91,8 +93,10 @@ pub(super) struct LightSource {
     pub pilots: u32,
     /// What its shadow rays count as.
     pub rays: RayKind,
-    /// The channel of its ratio with the number of channels, if the ratio is kept.
-    pub channel: Option<(usize, usize)>,
+    /// The channel of its ratio, if that is kept; where lights are selected, every point has channels of its own.
+    pub channel: Option<u16>,
+    /// Whether its ratio is kept.
+    pub is_kept: bool,
 }
 
 impl LightSource {
@@ -120,13 +124,19 @@ pub(super) struct ShadowScratch {
     u: Vec<[f32; 2]>,
     runs: Runs,
     /// Shading points that the present light must be traced for.
-    wanted: Vec<u32>,
+    wanted: Vec<LightUser>,
     /// For each of these what its rays have found.
     gathered: Vec<Gathered>,
     /// Which of these cast rays now.
     going: Vec<u32>,
     /// What pilots found in the block, light by light.
     findings: Vec<Findings>,
+    /// Channels of a shading point.
+    channels: usize,
+    /// Where each light is traced, if lights are selected.
+    pub users: LightUsers,
+    /// Samples of the tail.
+    pub tail: TailSamples,
     /// Irradiance without shadows, per unit of emission, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
@@ -208,6 +218,16 @@ impl ShadowScratch {
         self.seen.push(seen);
     }
 
+    /// Number of the batch's rays.
+    pub fn ray_count(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Multiplies what is seen along the rays from number `first` on by `light`.
+    pub fn tint_from(&mut self, first: usize, light: Rgb) {
+        self.seen[first..].iter_mut().for_each(|seen| *seen *= light);
+    }
+
     /// What each of the batch's glossy points reflects along its rays that are not occluded.
     pub fn highlights(&self) -> impl Iterator<Item = Rgb> {
         let mut start = 0;
@@ -227,7 +247,7 @@ impl ShadowScratch {
         self.ends.push(self.rays.len());
     }
 
-    fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
+    pub fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
         let point = &lit[i as usize];
         *self.starts[i as usize].get_or_insert_with(|| {
             let seen = (&point.si, &point.ray, &point.hit);
@@ -245,7 +265,8 @@ impl Renderer<'_> {
         stops_early: bool,
     ) -> Vec<LightSource> {
         let channels = reuse.map(|reuse| reuse.channels);
-        let of = |channel: Option<usize>| Some((channel?, channels?.len()));
+        let selects = channels.is_some_and(|channels| channels.slots() > 0);
+        let narrow = |channel: usize| channel as u16;
         let Self { plan, settings, .. } = self;
         let pilots = |least: Option<u32>, all: u32| match least {
             Some(least) if stops_early => least.min(all),
@@ -262,19 +283,30 @@ impl Renderer<'_> {
             };
             if runs {
                 let sampler = LightSampler::new(light);
-                let channel = of(channels.and_then(|channels| channels.of_light(number)));
+                let channel = channels.and_then(|channels| channels.of_light(number)).map(narrow);
+                let is_kept = channel.is_some() || (selects && light.is_area());
                 let pilots = pilots(least, samples);
-                sources.push(LightSource { sampler, number, samples, pilots, rays, channel });
+                sources.push(LightSource {
+                    sampler,
+                    number,
+                    samples,
+                    pilots,
+                    rays,
+                    channel,
+                    is_kept,
+                });
             }
         }
         if plan.sky_light {
+            let channel = channels.and_then(|channels| channels.sky()).map(narrow);
             sources.push(LightSource {
                 sampler: LightSampler::of_sky(&self.scene.sky),
                 number: self.scene.lights.len() as u32,
                 samples: settings.sky_samples,
                 pilots: pilots(settings.least_sky_samples, settings.sky_samples),
                 rays: RayKind::ShadowSky,
-                channel: of(channels.and_then(|channels| channels.sky())),
+                channel,
+                is_kept: channel.is_some(),
             });
         }
         sources
@@ -293,60 +325,85 @@ impl Renderer<'_> {
         scratch.starts.clear();
         scratch.starts.resize(lit.len(), None);
         if let Some(reuse) = &input.reuse {
-            self.light_without_shadows(input, reuse.channels.len(), lit, scratch);
+            scratch.channels = reuse.channels.len();
+            scratch.groups.gather_points(input, reuse.channels, lit);
+        }
+        let mut users = std::mem::take(&mut scratch.users);
+        if let Some(selection) = &input.selection {
+            let points = lit.iter().map(|point| point.si.p);
+            let groups = &mut scratch.groups;
+            let slot = |point, source: &LightSource| {
+                source.is_kept.then(|| groups.slot(point, source.number)).flatten()
+            };
+            users.find(selection, &input.lights, points, |c| selection.of_diffuse(c), slot);
+        }
+        if let Some(reuse) = &input.reuse {
+            self.light_without_shadows(input, lit, &users, scratch);
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
             if scratch.groups.wants_checks() {
-                self.check_answers(input, reuse, lit, pixels, scratch, counts);
+                self.check_answers(input, reuse, (lit, &users), pixels, scratch, counts);
             }
         }
         if self.plan.ambient {
             let ambient = self.scene.sky.ambient * std::f32::consts::PI;
             lit.iter().for_each(|p| pixels.add(p.place.pixel, p.place.sample, p.weight * ambient));
         }
-        for (at, source) in input.lights.iter().enumerate() {
-            self.light_from((at, source), lit, pixels, scratch, counts);
+        for at in 0..input.lights.len() {
+            self.light_from(input, at, (lit, &users), pixels, scratch, counts);
         }
+        if let Some(selection) = &input.selection {
+            let lit = (lit, &users.cells[..]);
+            self.light_tails((input, selection), lit, pixels, scratch, counts);
+        }
+        scratch.users = users;
     }
 
     /// What of the kept lights would arrive if nothing were in the way.
     fn light_without_shadows(
         &self,
         input: &FrameInput,
-        channels: usize,
         lit: &[ShadingPoint],
+        users: &LightUsers,
         s: &mut ShadowScratch,
     ) {
+        let channels = s.channels;
         s.exact.clear();
         s.exact.resize(lit.len() * channels, 0.0);
         s.shown.clear();
         s.shown.resize(lit.len() * channels, 0.0);
-        for source in &input.lights {
-            let Some((channel, _)) = source.channel else { continue };
-            for (i, point) in lit.iter().enumerate() {
+        for (at, source) in input.lights.iter().enumerate().filter(|(_, source)| source.is_kept) {
+            for LightUser { point: i, slot } in input.reached(at, lit.len(), users).iter() {
+                let Some(slot) = slot else { continue };
+                let point = &lit[i as usize];
                 let exact = source.sampler.unshadowed(point.si.p, point.n);
                 let shown = luminance(point.weight * source.sampler.emission) * exact as f32;
-                s.exact[i * channels + channel] = exact;
-                s.shown[i * channels + channel] = shown * self.settings.exposure;
+                let own = i as usize * channels + usize::from(slot);
+                s.exact[own] = exact;
+                s.shown[own] = shown * self.settings.exposure;
             }
         }
     }
 
-    /// Adds the light of one source, the one at `at` in the list, known or traced.
+    /// Adds the light of source number `at`, known or traced.
     fn light_from(
         &self,
-        (at, source): (usize, &LightSource),
-        lit: &[ShadingPoint],
+        input: &FrameInput,
+        at: usize,
+        (lit, users): (&[ShadingPoint], &LightUsers),
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        let wanted = self.use_known((at, source), lit, pixels, s);
+        let source = &input.lights[at];
+        let reached = input.reached(at, lit.len(), users);
+        let wanted = self.use_known((at, source), reached, lit, pixels, s);
         s.gathered.clear();
-        s.gathered.extend(wanted.iter().map(|i| {
-            let exact = match source.channel {
-                Some((channel, channels)) => s.exact[*i as usize * channels + channel],
-                None => source.sampler.unshadowed(lit[*i as usize].si.p, lit[*i as usize].n),
+        s.gathered.extend(wanted.iter().map(|&LightUser { point: i, slot }| {
+            let point = &lit[i as usize];
+            let exact = match slot {
+                Some(slot) => s.exact[i as usize * s.channels + usize::from(slot)],
+                None => source.sampler.unshadowed(point.si.p, point.n),
             };
             Gathered { exact, ..Gathered::default() }
         }));
@@ -355,29 +412,32 @@ impl Renderer<'_> {
         going.extend(0..wanted.len() as u32);
         if let Some(pilots) = Run::pilots(source, self.settings.most_camera_samples()) {
             self.cast((source, &pilots), (lit, &wanted, &going), pixels, s, counts);
-            let pixel_of = |slot: u32| lit[wanted[slot as usize] as usize].place.pixel;
+            let cell_of = |at: u32| {
+                let LightUser { point, .. } = wanted[at as usize];
+                pixels.cell(lit[point as usize].place.pixel)
+            };
             let ShadowScratch { gathered, findings, .. } = s;
             let found = &mut findings[at];
-            for (slot, gathered) in (0..).zip(&*gathered).filter(|(_, g)| g.exact != 0.0) {
+            for (at, gathered) in (0..).zip(&*gathered).filter(|(_, g)| g.exact != 0.0) {
                 // Where all pilots lay below the horizon, nothing is known.
                 let is_unknown = gathered.rays == 0;
                 let open = is_unknown || gathered.open > 0.0;
                 let shut = is_unknown || gathered.open < gathered.all;
-                found.note(pixels.cell(pixel_of(slot)), open, shut);
+                found.note(cell_of(at), open, shut);
             }
             let disputed = found.disputed();
-            going.retain(|slot| disputed.has(pixels.cell(pixel_of(*slot))));
-            for slot in &going {
-                let gathered = &mut gathered[*slot as usize];
+            going.retain(|at| disputed.has(cell_of(*at)));
+            for at in &going {
+                let gathered = &mut gathered[*at as usize];
                 *gathered = Gathered { exact: gathered.exact, ..Gathered::default() };
             }
         }
         self.cast((source, &Run::whole(source)), (lit, &wanted, &going), pixels, s, counts);
-        for (&i, gathered) in wanted.iter().zip(&s.gathered) {
+        for (&LightUser { point: i, slot }, gathered) in wanted.iter().zip(&s.gathered) {
             let point = &lit[i as usize];
             let Gathered { exact, open, all, rays } = *gathered;
-            if let (Some((channel, channels)), true) = (source.channel, rays > 0) {
-                s.groups.add(i as usize, channel, channels, open, all);
+            if let (Some(slot), true) = (slot, rays > 0) {
+                s.groups.add(i as usize, usize::from(slot), s.channels, open, all);
             }
             if open > 0.0 {
                 let unshadowed = source.sampler.emission * exact as f32;
@@ -393,7 +453,7 @@ impl Renderer<'_> {
     fn cast(
         &self,
         (source, run): (&LightSource, &Run),
-        (lit, wanted, going): (&[ShadingPoint], &[u32], &[u32]),
+        (lit, wanted, going): (&[ShadingPoint], &[LightUser], &[u32]),
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
@@ -402,10 +462,10 @@ impl Renderer<'_> {
         let mut u = s.samples(n);
         for group in going.chunks((BATCH / n.max(1)).max(1)) {
             s.clear();
-            for &slot in group {
-                let i = wanted[slot as usize];
+            for &at in group {
+                let i = wanted[at as usize].point;
                 let point = &lit[i as usize];
-                let gathered = s.gathered[slot as usize];
+                let gathered = s.gathered[at as usize];
                 // What is NaN goes on, to be counted at its pixel.
                 let seen = match gathered.exact {
                     0.0 => None,
@@ -430,9 +490,9 @@ impl Renderer<'_> {
             }
             self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
-            for (&slot, &end) in group.iter().zip(&s.ends) {
+            for (&at, &end) in group.iter().zip(&s.ends) {
                 let (open, all) = opened(&s.weights, &s.occluded, start..end);
-                let gathered = &mut s.gathered[slot as usize];
+                let gathered = &mut s.gathered[at as usize];
                 gathered.open += open;
                 gathered.all += all;
                 gathered.rays += (end - start) as u32;
@@ -461,19 +521,26 @@ impl Renderer<'_> {
         &self,
         input: &FrameInput,
         reuse: &Reuse,
-        lit: &[ShadingPoint],
+        (lit, users): (&[ShadingPoint], &LightUsers),
         pixels: &BlockPixels,
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        for source in &input.lights {
-            let Some((at, channels)) = source.channel else { continue };
+        let channels = s.channels;
+        for (at, source) in input.lights.iter().enumerate().filter(|(_, source)| source.is_kept) {
+            let reached = input.reached(at, lit.len(), users);
+            if reached.len() == 0 {
+                continue;
+            }
             s.clear();
             let mut runs = std::mem::take(&mut s.runs);
             runs.start(s.groups.len());
-            for (i, point) in (0..).zip(lit) {
-                let wanted = s.groups.check_rays(i as usize, at, channels, source.samples);
-                let wanted = wanted.filter(|_| s.exact[i as usize * channels + at] != 0.0);
+            for LightUser { point: i, slot } in reached.iter() {
+                let point = &lit[i as usize];
+                let wanted = slot.map(usize::from).and_then(|slot| {
+                    let wanted = s.groups.check_rays(i as usize, slot, channels, source.samples);
+                    wanted.filter(|_| s.exact[i as usize * channels + slot] != 0.0)
+                });
                 if let Some(wanted) = wanted {
                     let own = runs.own(&wanted, |u| {
                         // Samples that tracing does not use: had it any of these, what is traced
@@ -492,34 +559,43 @@ impl Renderer<'_> {
             s.runs = runs;
             self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
-            for (i, end) in s.ends.iter().copied().enumerate() {
+            for (LightUser { point: i, slot }, &end) in reached.iter().zip(&s.ends) {
                 let (open, weight) = opened(&s.weights, &s.occluded, start..end);
                 let rays = end - start;
                 start = end;
-                if rays > 0 {
-                    s.groups.note_checked(i, (at, channels), (open, weight), rays);
+                if let (Some(slot), true) = (slot, rays > 0) {
+                    let at = (usize::from(slot), channels);
+                    s.groups.note_checked(i as usize, at, (open, weight), rays);
                 }
             }
         }
         s.groups.conclude_checks(reuse);
     }
 
-    /// Adds the light of `source` where its ratio is known. Returns the points where it must be traced: all of
-    /// them where no ratio is kept.
+    /// Adds the light of `source` where its ratio is known. Returns those of the points that it reaches where it must
+    /// be traced: all of them where no ratio is kept.
     fn use_known(
         &self,
         (at, source): (usize, &LightSource),
+        reached: Reached,
         lit: &[ShadingPoint],
         pixels: &mut BlockPixels,
         s: &mut ShadowScratch,
-    ) -> Vec<u32> {
+    ) -> Vec<LightUser> {
         let mut wanted = std::mem::take(&mut s.wanted);
         wanted.clear();
-        let Some((channel, channels)) = source.channel else {
-            wanted.extend(0..lit.len() as u32);
+        if !source.is_kept {
+            wanted.extend(reached.iter());
             return wanted;
-        };
-        for (i, point) in lit.iter().enumerate() {
+        }
+        let channels = s.channels;
+        for user in reached.iter() {
+            let Some(channel) = user.slot.map(usize::from) else {
+                wanted.push(user);
+                continue;
+            };
+            let i = user.point as usize;
+            let point = &lit[i];
             let exact = s.exact[i * channels + channel];
             if exact == 0.0 {
                 continue;
@@ -527,7 +603,7 @@ impl Renderer<'_> {
             s.groups.note_lit(i);
             let ratio = s.groups.known(i, channel, channels);
             if ratio.is_nan() {
-                wanted.push(i as u32);
+                wanted.push(user);
             } else {
                 s.findings[at].note_ratio(pixels.cell(point.place.pixel), ratio);
                 let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
@@ -546,8 +622,17 @@ impl Renderer<'_> {
         pixels: &BlockPixels,
         u: &mut [[f32; 2]],
     ) {
-        let dimension = dimensions::of_light(place.branch, source.number, self.scene.lights.len());
+        let dimension = dimensions::of_light(place.branch, source.number, self.light_dimensions());
         pixels.sampler(place.pixel).fill2(first, dimension, u);
+    }
+
+    /// Random dimensions of a branch's lights.
+    pub(super) fn light_dimensions(&self) -> usize {
+        let lights = self.scene.lights.len();
+        match self.scene.selected_lights(self.settings) {
+            None => lights,
+            Some(_) => lights + dimensions::TAIL,
+        }
     }
 
     /// Traces the batch's rays, to a light.
@@ -558,6 +643,11 @@ impl Renderer<'_> {
         counts: &mut RayCounts,
     ) {
         counts[source.rays] += s.rays.len() as u64;
+        self.trace_rays(s, counts);
+    }
+
+    /// Traces the batch's rays, which are counted already.
+    pub(super) fn trace_rays(&self, s: &mut ShadowScratch, counts: &mut RayCounts) {
         s.occluded.clear();
         s.occluded.resize(s.rays.len(), false);
         self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);

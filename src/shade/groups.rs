@@ -10,7 +10,8 @@ use super::point::ShadingPoint;
 use super::{FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
-    Checked, Estimate, LookupBatch, SurfacePoint, TracedPoint, TracedPoints, check_rays,
+    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
+    TracedPoints, channel_of, check_rays, shared_check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -73,6 +74,8 @@ struct Earlier {
     points: Vec<SurfacePoint>,
     /// For each surface and channel what its rays found, and how many there were.
     found: Vec<(Gathered, u32)>,
+    /// For each surface and channel its light, if lights are selected.
+    lights: Vec<u32>,
 }
 
 impl Earlier {
@@ -80,18 +83,28 @@ impl Earlier {
         self.chains.clear();
         self.points.clear();
         self.found.clear();
+        self.lights.clear();
     }
 
-    /// What is known of the surface that `pixel` shows at `point`, in each channel.
-    fn of(&mut self, pixel: u32, point: &SurfacePoint, channels: usize) -> &mut [(Gathered, u32)] {
+    /// What is known of the surface that `pixel` shows at `point`, in each channel, and the lights of these channels.
+    /// At first they are `lights`, none where each channel has a light of its own.
+    fn of(
+        &mut self,
+        pixel: u32,
+        point: &SurfacePoint,
+        channels: usize,
+        lights: &[u32],
+    ) -> (&mut [(Gathered, u32)], &[u32]) {
         let known = self.chains.find(pixel, &self.points, point);
         let at = known.unwrap_or_else(|| {
             self.chains.push(Some(pixel));
             self.points.push(*point);
             self.found.resize(self.points.len() * channels, Default::default());
+            self.lights.extend(lights);
             self.points.len() - 1
         });
-        &mut self.found[at * channels..][..channels]
+        let lights = self.lights.get(at * channels..).and_then(|own| own.get(..channels));
+        (&mut self.found[at * channels..][..channels], lights.unwrap_or_default())
     }
 }
 
@@ -132,6 +145,10 @@ pub(super) struct Groups {
     /// Surface points that a camera ray out of focus ends at; empty where the lens blurs nothing.
     blurred: Vec<bool>,
     order: Vec<(u64, u32)>,
+    /// Channels of a surface point.
+    channels: usize,
+    /// Those of selected lights, which come first.
+    slots: usize,
 }
 
 impl Groups {
@@ -140,7 +157,7 @@ impl Groups {
         self.earlier.clear();
     }
 
-    /// Groups `lit` and asks what is known about each surface point.
+    /// Asks what is known about each surface point of `lit`, which is grouped.
     pub fn ask(
         &mut self,
         input: &FrameInput,
@@ -150,7 +167,6 @@ impl Groups {
         pixels: &BlockPixels,
     ) {
         self.asked.refinement = (pixels.samples_after() as f32 / input.least as f32).max(1.0);
-        self.gather_points(input, lit);
         self.note_blurred(input, lit);
         self.forbid(input, scene, lit);
         self.measure_footprints(lit, pixels);
@@ -184,7 +200,32 @@ impl Groups {
         }
     }
 
-    fn gather_points(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {
+    /// Groups `lit` into surface points. Where lights are selected, none has a channel at first.
+    pub fn gather_points(&mut self, input: &FrameInput, channels: &Channels, lit: &[ShadingPoint]) {
+        self.join_points(input, lit);
+        let (count, lights) = (self.asked.points.len(), &mut self.asked.lights);
+        lights.clear();
+        if channels.slots() > 0 {
+            lights.resize(count * channels.len(), NO_LIGHT);
+            if let Some(sky) = channels.sky() {
+                lights.chunks_exact_mut(channels.len()).for_each(|own| own[sky] = SKY_LIGHT);
+            }
+        }
+        self.slots = channels.slots();
+        self.channels = channels.len();
+    }
+
+    /// The channel of a light at the surface point of shading point `i`: the next free one if it has none yet. `None`
+    /// where all are taken, by lights of other cells.
+    pub fn slot(&mut self, i: u32, light: u32) -> Option<u16> {
+        let first = self.of_lit[i as usize] as usize * self.channels;
+        let own = &mut self.asked.lights[first..][..self.slots];
+        let at = own.iter().position(|other| *other == light || *other == NO_LIGHT)?;
+        own[at] = light;
+        Some(at as u16)
+    }
+
+    fn join_points(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {
         let Self { of_lit, before, asked, pixels, first, chains, .. } = self;
         let points = &mut asked.points;
         of_lit.clear();
@@ -315,7 +356,13 @@ impl Groups {
             return None;
         }
         let samples = self.asked.points[point].samples;
-        let all = check_rays(samples.saturating_mul(rays));
+        let saved = samples.saturating_mul(rays);
+        let all = if self.slots == 0 {
+            check_rays(saved)
+        } else {
+            let shown = &self.asked.unshadowed[point * channels..][..channels];
+            shared_check_rays(saved, shown[channel] / shown.iter().sum::<f32>())
+        };
         let until =
             |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;
         // A run of a net's points is spread evenly where it starts at a multiple of a power of two.
@@ -347,10 +394,16 @@ impl Groups {
         let Self { asked, gathered, earlier, pixels, .. } = self;
         asked.checked.resize(gathered.len(), Checked::default());
         let found = asked.checked.chunks_mut(channels).zip(gathered.chunks_mut(channels));
-        for ((point, pixel), (checked, gathered)) in asked.points.iter().zip(pixels).zip(found) {
+        let points = asked.points.iter().zip(pixels).enumerate();
+        for ((i, (point, pixel)), (checked, gathered)) in points.zip(found) {
             if point.direct && checked.iter().any(|checked| checked.rays > 0) {
-                let all = earlier.of(*pixel, point, channels).iter_mut();
-                for (all, (checked, gathered)) in all.zip(checked.iter_mut().zip(&mut *gathered)) {
+                let lights = asked.lights.get(i * channels..).unwrap_or_default();
+                let lights = &lights[..lights.len().min(channels)];
+                let (all, known) = earlier.of(*pixel, point, channels, lights);
+                for (k, (checked, gathered)) in checked.iter_mut().zip(&mut *gathered).enumerate() {
+                    let Some(all) = channel_of(known, lights, k).map(|at| &mut all[at]) else {
+                        continue;
+                    };
                     all.0.open += gathered.open;
                     all.0.all += gathered.all;
                     all.1 += checked.rays;
@@ -418,6 +471,8 @@ impl Groups {
                     *ratio = if traced.is_nan() { *ratio } else { traced };
                 });
                 sources.ratios.extend(gathered);
+                let lights = self.asked.lights.get(i * channels..).unwrap_or_default();
+                sources.lights.extend(lights.iter().take(channels));
             }
         }
         if let Some(inference) = reuse.inference {
@@ -479,7 +534,7 @@ mod tests {
         let mut earlier = Earlier::default();
         earlier.clear();
         let mut add = |pixel, z, rays| {
-            let found = earlier.of(pixel, &point(z), 2);
+            let (found, _) = earlier.of(pixel, &point(z), 2, &[]);
             found[1].1 += rays;
             [found[0].1, found[1].1]
         };
@@ -490,6 +545,6 @@ mod tests {
         assert_eq!(add(6, 0.0, 4), [0, 4]);
         assert_eq!(add(5, 0.0, 1), [0, 9]);
         earlier.clear();
-        assert_eq!(earlier.of(5, &point(0.0), 2)[1].1, 0);
+        assert_eq!(earlier.of(5, &point(0.0), 2, &[]).0[1].1, 0);
     }
 }

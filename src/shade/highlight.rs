@@ -3,13 +3,16 @@
 //! What a lobe with an extent reflects of a light is estimated twice: by shadow rays to points of the light,
 //! here, and by the rays that follow the lobe's directions and may end on the light. Multiple importance
 //! sampling with the balance heuristic joins the two (Veach and Guibas, 1995). It depends on the view, so that nothing
-//! is kept for other frames.
+//! is kept for other frames. Where lights are selected, the heuristic counts the mean number of samples that choose a
+//! light.
 
 use super::direct::{BATCH, LightSource, ShadowScratch, ShadowStarts};
 use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
 use super::lobe::Lobe;
 use super::pixels::BlockPixels;
 use super::point::SamplePlace;
+use super::selection::{LightSelection, LightUser};
+use super::tail::Choice;
 use super::{FrameInput, Renderer};
 use crate::math::{DVec3, Rgb};
 use crate::stats::RayCounts;
@@ -38,6 +41,8 @@ struct HighlightRays<'s> {
     source: &'s LightSource,
     /// Unshadowed irradiance, which a delta light sends from its one direction.
     exact: f64,
+    /// Samples of the light: where samples choose lights, the mean number that choose this one.
+    count: f64,
     scratch: &'s mut ShadowScratch,
 }
 
@@ -54,9 +59,9 @@ impl SampleSink for HighlightRays<'_> {
         if wi.dot(*ng) <= 0.0 {
             return;
         }
-        let count = f64::from(self.source.samples);
-        let irradiance = density.map_or(self.exact, |density| {
-            let share = self.source.share(density, lobe.pdf(*wo, wi));
+        let count = self.count;
+        let irradiance = density.map_or(self.exact / count, |density| {
+            let share = self.source.share(density, count, lobe.pdf(*wo, wi));
             let radiance = self.source.sampler.radiance_at(*p);
             radiance * wi.dot(*n).max(0.0) / (density * count) * share
         });
@@ -68,31 +73,41 @@ impl SampleSink for HighlightRays<'_> {
 }
 
 impl LightSource {
-    /// The part of a light that its own samples, of density `light`, see, where rays of density `lobe` may end
-    /// on it too.
-    fn share(&self, light: f64, lobe: f64) -> f64 {
+    /// The part of a light that its own samples, `count` of density `light`, see, where rays of density `lobe` may
+    /// end on it too.
+    fn share(&self, light: f64, count: f64, lobe: f64) -> f64 {
         if !self.sampler.is_seen() {
             return 1.0;
         }
         // In this form for a light seen in its own plane, whose density is infinite.
-        1.0 / (1.0 + lobe / (light * f64::from(self.samples)))
+        1.0 / (1.0 + lobe / (light * count))
     }
 }
 
 impl Renderer<'_> {
     /// The part of the emission at the point `p` of the light with number `light` that a ray counts which was
-    /// sent from `org` by a lobe with density `lobe`.
+    /// sent from `org`, of a surface point in `cell`, by a lobe with density `lobe`.
     pub(super) fn share_of_lobe(
         &self,
         input: &FrameInput,
         light: Option<u32>,
         (org, p): (DVec3, DVec3),
-        lobe: f64,
+        (lobe, cell): (f64, u32),
     ) -> f32 {
-        let source = input.lights.iter().find(|source| Some(source.number) == light);
+        let source = match &input.selection {
+            Some(selection) => {
+                light.and_then(|light| selection.source(light)).map(|at| &input.lights[at])
+            }
+            None => input.lights.iter().find(|source| Some(source.number) == light),
+        };
         let density = source.and_then(|source| {
             let view = source.sampler.seen_from(org, DVec3::Z)?;
-            Some(source.share(view.pdf_li(org, p)?, lobe))
+            let count = input.selection.as_ref().map_or(f64::from(source.samples), |selection| {
+                selection.samples_of(cell, source.number, source.samples)
+            });
+            // Where no sample chooses it, the lobe's rays see all of it.
+            (count > 0.0).then_some(())?;
+            Some(source.share(view.pdf_li(org, p)?, count, lobe))
         });
         (1.0 - density.unwrap_or(0.0)) as f32
     }
@@ -106,34 +121,98 @@ impl Renderer<'_> {
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
-        let lights = input.lights.iter().filter(|source| !source.is_sky());
-        for source in lights {
+        let mut users = std::mem::take(&mut s.users);
+        if let Some(selection) = &input.selection {
+            let places = points.iter().map(|point| point.p);
+            users.find(selection, &input.lights, places, |c| selection.of_glossy(c), |_, _| None);
+        }
+        let lights = input.lights.iter().enumerate().filter(|(_, source)| !source.is_sky());
+        for (at, source) in lights {
+            let reached = input.reached(at, points.len(), &users);
             let n = source.samples as usize;
             let mut u = s.samples(n);
-            for group in points.chunks((BATCH / n).max(1)) {
+            let together = (BATCH / n).max(1);
+            for first in (0..reached.len()).step_by(together) {
                 s.clear();
-                for point in group {
-                    let exact = source.sampler.unshadowed(point.p, point.n);
-                    let seen = match exact {
-                        0.0 => None,
-                        _ => source.sampler.seen_from(point.p, point.n),
+                let group = || {
+                    let users =
+                        (first..reached.len().min(first + together)).map(|k| reached.get(k));
+                    users.map(|LightUser { point, .. }| &points[point as usize])
+                };
+                for point in group() {
+                    let sampled = (point.place.sample.wrapping_mul(source.samples), n as f64);
+                    let drawn = |u: &mut [[f32; 2]]| {
+                        self.fill(&point.place, source, sampled.0, pixels, u);
                     };
-                    if let Some(view) = &seen {
-                        let first = point.place.sample.wrapping_mul(source.samples);
-                        self.fill(&point.place, source, first, pixels, &mut u);
-                        let scratch = &mut *s;
-                        let mut rays = HighlightRays { point, view, source, exact, scratch };
-                        view.sample_li(point.p, point.n, &u, &mut rays);
-                    }
+                    self.highlight_rays(source, point, sampled.1, (&mut u, &drawn), s);
                     s.close();
                 }
                 self.trace_shadow_rays(source, s, counts);
-                for (point, seen) in group.iter().zip(s.highlights()) {
+                for (point, seen) in group().zip(s.highlights()) {
                     let light = point.throughput * source.sampler.emission * seen;
                     pixels.add(point.place.pixel, point.place.sample, light);
                 }
             }
             s.give_back(u);
         }
+        if let Some(selection) = &input.selection {
+            let glossy = (points, &users.cells[..]);
+            self.highlight_tails((input, selection), glossy, pixels, s, counts);
+        }
+        s.users = users;
+    }
+
+    /// Pushes the rays of the samples `u`, which `draw` draws, of a light, `count` of which are expected, at a glossy
+    /// point.
+    fn highlight_rays(
+        &self,
+        source: &LightSource,
+        point: &GlossyPoint,
+        count: f64,
+        (u, draw): (&mut [[f32; 2]], &dyn Fn(&mut [[f32; 2]])),
+        scratch: &mut ShadowScratch,
+    ) {
+        let exact = source.sampler.unshadowed(point.p, point.n);
+        let seen = match exact {
+            0.0 => None,
+            _ => source.sampler.seen_from(point.p, point.n),
+        };
+        if let Some(view) = &seen {
+            draw(u);
+            let mut rays = HighlightRays { point, view, source, exact, count, scratch };
+            view.sample_li(point.p, point.n, u, &mut rays);
+        }
+    }
+
+    /// Adds what glossy `points`, which lie in these `cells`, reflect of the lights of their tails.
+    fn highlight_tails(
+        &self,
+        (input, selection): (&FrameInput, &LightSelection),
+        (points, cells): (&[GlossyPoint], &[u32]),
+        pixels: &mut BlockPixels,
+        s: &mut ShadowScratch,
+        counts: &mut RayCounts,
+    ) {
+        let mut samples = std::mem::take(&mut s.tail);
+        for (point, cell) in points.iter().zip(cells) {
+            let tail = selection.of_glossy(*cell).tail();
+            if tail.is_empty() {
+                continue;
+            }
+            self.draw_tail(&point.place, (&tail, selection), pixels, &mut samples);
+            s.clear();
+            for Choice { source, count, place } in samples.choices(tail, selection) {
+                let Some(source) = source.map(|at| &input.lights[at]) else { continue };
+                let before = s.ray_count();
+                self.highlight_rays(source, point, count, (&mut [place], &|_| ()), s);
+                s.tint_from(before, source.sampler.emission);
+                counts[source.rays] += (s.ray_count() - before) as u64;
+            }
+            s.close();
+            self.trace_rays(s, counts);
+            let seen: Rgb = s.highlights().sum();
+            pixels.add(point.place.pixel, point.place.sample, point.throughput * seen);
+        }
+        s.tail = samples;
     }
 }

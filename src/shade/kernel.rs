@@ -38,6 +38,8 @@ struct PathState {
     pdf: f32,
     /// Which branch of the tree ([`dimensions::branch`]).
     branch: u32,
+    /// The cell of lights of the point that a lobe with an extent sent the ray from.
+    cell: u32,
 }
 
 /// Buffers of one worker thread.
@@ -144,8 +146,9 @@ fn camera_rays(
             let lens = pixels.lens_position(pixel as usize, sample);
             scratch.rays.push(input.camera.generate_ray(x, y, lens));
             let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
-            let (medium, pdf) = (None, 0.0);
-            scratch.states.push(PathState { throughput, pixel, sample, medium, pdf, branch });
+            let (medium, pdf, cell) = (None, 0.0, 0);
+            let state = PathState { throughput, pixel, sample, medium, pdf, branch, cell };
+            scratch.states.push(state);
         }
     }
 }
@@ -312,8 +315,8 @@ impl Vertex<'_, '_> {
         if le != Rgb::ZERO {
             if MIRROR && state.pdf > 0.0 {
                 let ends = (ray.org, si.p);
-                let pdf = f64::from(state.pdf);
-                le *= self.renderer.share_of_lobe(self.input, si.surface.light, ends, pdf);
+                let lobe = (f64::from(state.pdf), state.cell);
+                le *= self.renderer.share_of_lobe(self.input, si.surface.light, ends, lobe);
             }
             self.add(state, state.throughput * le);
         }
@@ -361,6 +364,8 @@ impl Vertex<'_, '_> {
         let outside = si.is_outside(wo);
         let sampler = self.pixels.path_sampler(state.pixel);
         let u = || sampler.get2(state.sample, dimensions::of_lobe(state.branch));
+        let selection = self.input.selection.as_ref().filter(|_| !lobe.is_delta());
+        let cell = selection.map_or(0, |selection| selection.cell(si.p));
         for (child, scattered) in (0..).zip(lobe.sample(wo, si.ns, u)) {
             let Some(Scattered { wi: sent, share, tint, transmitted, pdf }) = scattered else {
                 continue;
@@ -374,7 +379,7 @@ impl Vertex<'_, '_> {
             };
             let throughput = state.throughput * share * tint;
             let branch = dimensions::branch(state.branch, child);
-            let next = PathState { throughput, medium, pdf, branch, ..*state };
+            let next = PathState { throughput, medium, pdf, branch, cell, ..*state };
             let sent = self.push::<NESTED>(start, wi, next);
             self.counts[lobe.ray_kind()] += u64::from(sent);
         }

@@ -23,6 +23,8 @@ mod pilots;
 mod pixels;
 mod point;
 mod scattered;
+mod selection;
+mod tail;
 mod texture;
 
 use crate::effects::EffectPlan;
@@ -40,6 +42,7 @@ pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
 use pixels::{BLOCK, BlockPixels, FinishedPixel, SampleLimits};
+use selection::{LightSelection, LightUsers, Reached};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's. Larger ones leave
@@ -205,12 +208,25 @@ struct FrameInput<'a> {
     filter: PixelFilter,
     /// The lights that shine, the sky last.
     lights: Vec<LightSource>,
+    /// Which of them are looked at where; `None` if all are everywhere.
+    selection: Option<LightSelection<'a>>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: MediumStack,
     has_ranked_glass: bool,
     reuse: Option<Reuse<'a>>,
     /// Whether any light must be traced in every frame.
     has_always_traced: bool,
+}
+
+impl FrameInput<'_> {
+    /// The points, of so many, that source number `at` is traced at.
+    fn reached<'u>(&self, at: usize, points: usize, users: &'u LightUsers) -> Reached<'u> {
+        let source = &self.lights[at];
+        match &self.selection {
+            Some(_) if !source.is_sky() => users.of(at),
+            _ => Reached::All(points, source.channel),
+        }
+    }
 }
 
 /// What blocks leave behind beside their pixels.
@@ -383,7 +399,7 @@ impl Renderer<'_> {
         Some(())
     }
 
-    fn input<'a>(&self, job: &FrameJob<'a>) -> FrameInput<'a> {
+    fn input<'a>(&'a self, job: &FrameJob<'a>) -> FrameInput<'a> {
         let FrameJob { camera, stream, reuse, .. } = *job;
         // Single pixels have no neighbours that pilots could be compared with.
         let stops_early = matches!(job.sampling, Sampling::Neighbours);
@@ -397,13 +413,15 @@ impl Renderer<'_> {
             }
             false => MediumStack::default(),
         };
+        let lights = self.light_sources(reuse, stops_early);
         FrameInput {
             camera: own,
             pixel_size: own.pixel_size(),
             stream,
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
-            lights: self.light_sources(reuse, stops_early),
+            selection: self.light_selection(&lights),
+            lights,
             around_eye,
             has_ranked_glass,
             reuse,

@@ -40,6 +40,8 @@ pub(super) struct Settings {
     shadow_samples: Samples<0>,
     /// Sky rays per camera sample where the sky lights the scene: a number, or `[least, most]` as for shadow samples.
     sky_samples: Samples<0>,
+    /// In scenes of more than 8 lights, look at every light at every point, not only at those that matter there.
+    all_lights: bool,
     /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
     /// shadows end where the shading does.
     smooth_terminator: bool,
@@ -117,6 +119,7 @@ impl Default for Settings {
             filter: s.filter,
             shadow_samples: Samples::of_light(s.shadow_samples, s.least_shadow_samples),
             sky_samples: Samples::of_light(s.sky_samples, s.least_sky_samples),
+            all_lights: s.all_lights,
             smooth_terminator: s.smooth_terminator,
             bounces: Int::clamped(s.bounces.into()),
             cutoff: Share(shortest(s.cutoff)),
@@ -171,6 +174,7 @@ impl Settings {
             least_shadow_samples,
             sky_samples,
             least_sky_samples,
+            all_lights: self.all_lights,
             smooth_terminator: self.smooth_terminator,
             bounces: self.bounces.u32(),
             cutoff: self.cutoff.0 as f32,

@@ -57,17 +57,22 @@ pub(super) struct Mean {
 
 impl Lookup<'_> {
     /// Estimates each light at `point`; `shown` are the contributions of the lights to the pixel without
-    /// shadows. `means` is a buffer to reuse.
+    /// shadows, `lights` their numbers, if lights are selected. `means` is a buffer to reuse.
     pub(super) fn estimate_all(
         &self,
         taps: &Taps,
         point: &SurfacePoint,
-        shown: &[f32],
+        (shown, lights): (&[f32], &[u32]),
         means: &mut Vec<Option<Mean>>,
         estimates: &mut [Estimate],
     ) {
         means.clear();
-        means.extend((0..shown.len()).map(|channel| self.mean(taps, channel, point.samples)));
+        let mean = |channel| {
+            // A free channel, or a light that does not shine here.
+            let is_asked = lights.is_empty() || shown[channel] != 0.0;
+            is_asked.then(|| self.mean(taps, (channel, lights), point.samples)).flatten()
+        };
+        means.extend((0..shown.len()).map(mean));
         let seen = means.iter().zip(shown).map(|(mean, s)| mean.map_or(0.0, |m| s * m.ratio));
         let steps = steps_per_radiance(seen.sum());
         // Lights err together: what is beside a shadow's edge is beside that of the next lamp too.
@@ -94,13 +99,14 @@ impl Lookup<'_> {
 
     /// The mean for a point of `samples` camera samples; `None` where the taps that know the light have too little
     /// weight.
-    fn mean(&self, taps: &Taps, channel: usize, samples: u32) -> Option<Mean> {
+    fn mean(&self, taps: &Taps, (channel, lights): (usize, &[u32]), samples: u32) -> Option<Mean> {
         let rays = samples as f32 * self.rays[channel] as f32;
         let (one, per_ray) = (f32x4::splat(1.0), f32x4::splat(1.0 / (rays + 2.0)));
         let mut first = f32::NAN;
         let mut sums = Sums::default();
         for four in taps.fours() {
-            let own = self.references[four.reference as usize].known(&four.samples, channel);
+            let own =
+                self.references[four.reference as usize].known(&four.samples, channel, lights);
             let known = own.ratio.cmp_eq(own.ratio);
             let weight = four.weight & known;
             if first.is_nan() {

@@ -2,7 +2,7 @@
 //! with the pixels at one fixed offset, so that the compiler can use vector instructions.
 
 use super::{Contrast, NONE};
-use crate::inference::{SAME_SURFACE, SurfacePoint};
+use crate::inference::{NO_LIGHT, SAME_SURFACE, SurfacePoint};
 use rayon::prelude::*;
 
 /// Largest distance, in pixels, of the neighbours that a pixel is compared with.
@@ -54,6 +54,20 @@ impl<T: Copy + Sync> Image<T> {
         Self { stride, values }
     }
 
+    /// The figures at some pixels, row by row, of an image of this size; `none` elsewhere.
+    fn of_some(
+        [width, height]: [usize; 2],
+        none: T,
+        some: impl Iterator<Item = (usize, T)>,
+    ) -> Self {
+        let stride = width + 2 * REACH;
+        let mut values = vec![none; stride * (height + 2 * REACH)];
+        some.for_each(|(i, value)| {
+            values[(i / width + REACH) * stride + REACH + i % width] = value;
+        });
+        Self { stride, values }
+    }
+
     /// Row `y` of the image, shifted by an offset of [`AROUND`].
     fn row(&self, y: usize, [right, down]: [usize; 2]) -> &[T] {
         let width = self.stride - 2 * REACH;
@@ -66,10 +80,11 @@ impl<T: Copy + Sync> Image<T> {
 }
 
 /// For each of `points` the contrasts in each of `channels`. Only the points that pixels see directly have known
-/// ones; `slots` has their numbers, in rows of `width` pixels.
+/// ones; `slots` has their numbers, in rows of `width` pixels. `lights` has the light of each ratio; none where each
+/// channel has the same light everywhere.
 pub(super) fn contrasts(
     points: &[SurfacePoint],
-    ratios: &[f32],
+    (ratios, lights): (&[f32], &[u32]),
     slots: &[u32],
     (width, channels): (usize, usize),
 ) -> Vec<Contrast> {
@@ -79,23 +94,103 @@ pub(super) fn contrasts(
     }
     let own = |i: usize| (slots[i] != NONE).then_some(slots[i] as usize);
     let same = same_surface(points, slots.len(), width, own);
-    let mut bend = vec![0.0; slots.len()];
-    let (mut wide, mut far) = (bend.clone(), bend.clone());
-    for channel in 0..channels {
-        let ratio = |i| own(i).map(|own| ratios[own * channels + channel]);
-        let known = Image::of(slots.len(), width, f32::NAN, ratio);
-        let rows = bend.par_chunks_mut(width).zip(wide.par_chunks_mut(width));
-        let rows = rows.zip(same.par_chunks(width)).enumerate();
-        rows.for_each(|(y, ((bend, wide), same))| near_row(&known, y, same, bend, wide));
-        let known = Image::of(slots.len(), width, f32::NAN, |i| Some(wide[i]));
-        let rows = far.par_chunks_mut(width).zip(same.par_chunks(width)).enumerate();
-        rows.for_each(|(y, (far, same))| far_row(&known, y, same, far));
-        for (i, own) in (0..slots.len()).filter_map(|i| Some((i, own(i)?))) {
-            let (bend, wide, far) = (bend[i], wide[i], far[i]);
-            contrasts[own * channels + channel] = Contrast { bend, wide, far };
+    let mut buffers = Buffers::default();
+    if lights.is_empty() {
+        let all = Part { first: [0, 0], size: [width, slots.len() / width] };
+        for channel in 0..channels {
+            let ratio = |i| own(i).map(|own| ratios[own * channels + channel]);
+            let known = Image::of(slots.len(), width, f32::NAN, ratio);
+            buffers.fill(&known, (&same, width), &all);
+            for (i, own) in (0..slots.len()).filter_map(|i| Some((i, own(i)?))) {
+                contrasts[own * channels + channel] = buffers.at(i);
+            }
+        }
+        return contrasts;
+    }
+    let shines = |at: &usize| lights[*at] != NO_LIGHT && !ratios[*at].is_nan();
+    let of_pixel = |i: usize| own(i).map(|own| (own * channels..(own + 1) * channels, i));
+    let all = (0..slots.len()).filter_map(of_pixel);
+    let all = all.flat_map(|(own, i)| own.filter(shines).map(move |at| (lights[at], i, at)));
+    let mut all: Vec<(u32, usize, usize)> = all.collect();
+    all.sort_by_key(|(light, _, _)| *light);
+    // Each light by itself, in the part of the image where its ratio is known.
+    for of_light in all.chunk_by(|a, b| a.0 == b.0) {
+        let part = Part::around(of_light.iter().map(|(_, i, _)| [i % width, i / width]));
+        let known = of_light.iter().map(|(_, i, at)| (part.index(*i, width), ratios[*at]));
+        let known = Image::of_some(part.size, f32::NAN, known);
+        buffers.fill(&known, (&same, width), &part);
+        for (_, i, at) in of_light {
+            contrasts[*at] = buffers.at(part.index(*i, width));
         }
     }
     contrasts
+}
+
+/// A rectangle of an image.
+struct Part {
+    /// Its first column and row.
+    first: [usize; 2],
+    /// Its columns and rows.
+    size: [usize; 2],
+}
+
+impl Part {
+    /// The smallest one with all `places`, columns and rows.
+    fn around(places: impl Iterator<Item = [usize; 2]>) -> Self {
+        let (mut first, mut last) = ([usize::MAX; 2], [0; 2]);
+        for place in places {
+            for axis in [0, 1] {
+                first[axis] = first[axis].min(place[axis]);
+                last[axis] = last[axis].max(place[axis]);
+            }
+        }
+        Self { first, size: [0, 1].map(|axis| last[axis] + 1 - first[axis]) }
+    }
+
+    /// The place in the part, row by row, of pixel `i` of an image of this `width`.
+    fn index(&self, i: usize, width: usize) -> usize {
+        let [x, y] = self.first;
+        (i / width - y) * self.size[0] + i % width - x
+    }
+
+    /// The rows of `image`, which has this `width`, within the part.
+    fn rows<'i, T: Sync>(
+        &self,
+        image: &'i [T],
+        width: usize,
+    ) -> impl IndexedParallelIterator<Item = &'i [T]> {
+        let Self { first: [x, y], size: [columns, rows] } = *self;
+        let rows = image[y * width..(y + rows) * width].par_chunks(width);
+        rows.map(move |row| &row[x..x + columns])
+    }
+}
+
+/// Contrasts of one light in a part of the image.
+#[derive(Default)]
+struct Buffers {
+    bend: Vec<f32>,
+    wide: Vec<f32>,
+    far: Vec<f32>,
+}
+
+impl Buffers {
+    fn fill(&mut self, known: &Image<f32>, (same, width): (&[u32], usize), part: &Part) {
+        let Self { bend, wide, far } = self;
+        let [columns, rows] = part.size;
+        for buffer in [&mut *bend, wide, far] {
+            buffer.resize(columns * rows, 0.0);
+        }
+        let rows = bend.par_chunks_mut(columns).zip(wide.par_chunks_mut(columns));
+        let rows = rows.zip(part.rows(same, width)).enumerate();
+        rows.for_each(|(y, ((bend, wide), same))| near_row(known, y, same, bend, wide));
+        let known = Image::of(wide.len(), columns, f32::NAN, |i| Some(wide[i]));
+        let rows = far.par_chunks_mut(columns).zip(part.rows(same, width)).enumerate();
+        rows.for_each(|(y, (far, same))| far_row(&known, y, same, far));
+    }
+
+    fn at(&self, i: usize) -> Contrast {
+        Contrast { bend: self.bend[i], wide: self.wide[i], far: self.far[i] }
+    }
 }
 
 /// For each pixel a bit for each neighbour of [`AROUND`] that shows the same surface; `own` is the number of the
@@ -192,7 +287,7 @@ mod tests {
         let points: Vec<SurfacePoint> = places.clone().map(point).collect();
         let ratios: Vec<f32> = places.map(|(x, y)| ratio(x, y)).collect();
         let slots: Vec<u32> = (0..81).collect();
-        contrasts(&points, &ratios, &slots, (9, 1))
+        contrasts(&points, (&ratios, &[]), &slots, (9, 1))
     }
 
     const MIDDLE: usize = 4 * 9 + 4;

@@ -38,4 +38,12 @@ impl LightData for DirectionalLight {
     fn surface(&self) -> Option<EmittingSurface> {
         None
     }
+
+    fn emission(&self) -> Rgb {
+        self.irradiance
+    }
+
+    fn most_irradiance(&self, _cell: &Bounds3) -> f64 {
+        1.0
+    }
 }

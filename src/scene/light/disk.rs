@@ -1,11 +1,11 @@
 //! A disk light.
 
-use super::{EmittingShape, EmittingSurface, LightData, place};
+use super::{EmittingShape, EmittingSurface, LightData, bound, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb, orthonormal_basis};
 use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Corners of the surface that rays see, an even number: its rim is off the circle by at most 1/4,000 of the radius.
 const CORNERS: u32 = 128;
@@ -82,5 +82,17 @@ impl LightData for DiskLight {
             radiance: self.radiance,
             two_sided: self.two_sided,
         })
+    }
+
+    fn emission(&self) -> Rgb {
+        self.radiance
+    }
+
+    fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        let height = bound::most_height(self.centre, self.normal, self.two_sided, cell);
+        let reach = (DVec3::ONE - self.normal * self.normal).max(DVec3::ZERO).to_array();
+        let reach = DVec3::from(reach.map(f64::sqrt)) * self.radius;
+        let around = Bounds3 { min: self.centre - reach, max: self.centre + reach };
+        bound::of_flat(PI * self.radius * self.radius, &around, height, cell)
     }
 }

@@ -1,6 +1,6 @@
 //! A point light.
 
-use super::{EmittingSurface, LightData};
+use super::{EmittingSurface, LightData, bound};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -40,5 +40,13 @@ impl LightData for PointLight {
 
     fn surface(&self) -> Option<EmittingSurface> {
         None
+    }
+
+    fn emission(&self) -> Rgb {
+        self.intensity
+    }
+
+    fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        bound::of_point(self.position, cell)
     }
 }

@@ -1,6 +1,6 @@
 //! A quad light.
 
-use super::{EmittingShape, EmittingSurface, LightData};
+use super::{EmittingShape, EmittingSurface, LightData, bound};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -69,5 +69,17 @@ impl LightData for QuadLight {
             radiance: self.radiance,
             two_sided: self.two_sided,
         })
+    }
+
+    fn emission(&self) -> Rgb {
+        self.radiance
+    }
+
+    fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        // A corner may lie a rounding error off the plane of the others.
+        let height =
+            |corner: &DVec3| bound::most_height(*corner, self.normal(), self.two_sided, cell);
+        let height = self.corners.iter().map(height).fold(0.0, f64::max);
+        bound::of_flat(self.area(), &self.bounds(), height, cell)
     }
 }

@@ -1,6 +1,6 @@
 //! A sphere light.
 
-use super::{EmittingShape, EmittingSurface, LightData, place};
+use super::{EmittingShape, EmittingSurface, LightData, bound, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -49,5 +49,13 @@ impl LightData for SphereLight {
             radiance: self.radiance,
             two_sided: false,
         })
+    }
+
+    fn emission(&self) -> Rgb {
+        self.radiance
+    }
+
+    fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        bound::of_sphere(self.centre, self.radius, cell)
     }
 }

@@ -1,10 +1,11 @@
 //! A spot light.
 
-use super::{EmittingSurface, LightData, place};
+use super::{EmittingSurface, LightData, bound, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// A cone of light with a smooth edge. With a radius it is a small sphere that shines into the cone and casts
 /// soft shadows; without, it is a delta light. It is not seen itself.
@@ -22,6 +23,22 @@ pub struct SpotLight {
     pub cos_outer: f64,
     /// Radius of the sphere that shines; 0 for hard shadows.
     pub radius: f64,
+}
+
+impl SpotLight {
+    /// The share of the axis' intensity that is sent at an angle of this cosine from the axis: smooth from 1 to 0
+    /// between the two angles, cubic in the cosine (Pharr, Jakob and Humphreys, 2023, section 12.2.1).
+    pub fn falloff(&self, cos: f64) -> f64 {
+        let Self { cos_inner, cos_outer, .. } = *self;
+        if cos >= cos_inner {
+            return 1.0;
+        }
+        if cos <= cos_outer {
+            return 0.0;
+        }
+        let x = (cos - cos_outer) / (cos_inner - cos_outer);
+        x * x * (3.0 - 2.0 * x)
+    }
 }
 
 impl LightData for SpotLight {
@@ -56,5 +73,25 @@ impl LightData for SpotLight {
 
     fn surface(&self) -> Option<EmittingSurface> {
         None
+    }
+
+    fn emission(&self) -> Rgb {
+        self.intensity
+    }
+
+    fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        let cos = bound::most_cos(self.position, self.direction, cell);
+        let falloff = self.falloff(cos);
+        if falloff == 0.0 {
+            return 0.0;
+        }
+        let shines = match self.is_area() {
+            true => {
+                bound::of_sphere(self.position, self.radius, cell)
+                    / (PI * self.radius * self.radius)
+            }
+            false => bound::of_point(self.position, cell),
+        };
+        falloff * shines
     }
 }

@@ -11,10 +11,7 @@ use std::f64::consts::PI;
 /// the light's middle.
 pub(super) struct Spot {
     body: Body,
-    position: DVec3,
-    direction: DVec3,
-    cos_inner: f64,
-    cos_outer: f64,
+    light: SpotLight,
 }
 
 /// What shines.
@@ -26,14 +23,14 @@ enum Body {
 
 impl Spot {
     pub fn new(light: &SpotLight) -> Self {
-        let SpotLight { position, direction, intensity, cos_inner, cos_outer, radius } = *light;
+        let SpotLight { position, intensity, radius, .. } = *light;
         let body = if radius > 0.0 {
             let sphere = SphereLight { centre: position, radius, radiance: intensity };
             Body::Sphere(Sphere::new(&sphere), 1.0 / (PI * radius * radius))
         } else {
             Body::Point(Point::new(&PointLight { position, intensity }))
         };
-        Self { body, position, direction, cos_inner, cos_outer }
+        Self { body, light: light.clone() }
     }
 
     pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {
@@ -64,18 +61,9 @@ impl Spot {
         })
     }
 
-    /// The share of the axis' intensity that is sent towards `p`: smooth from 1 to 0 between the two angles, cubic in
-    /// the cosine (Pharr, Jakob and Humphreys, 2023, section 12.2.1).
+    /// The share of the axis' intensity that is sent towards `p`.
     fn falloff(&self, p: DVec3) -> f64 {
-        let away = p - self.position;
-        let cos = (away.dot(self.direction) / away.length()).clamp(-1.0, 1.0);
-        if cos >= self.cos_inner {
-            return 1.0;
-        }
-        if cos <= self.cos_outer {
-            return 0.0;
-        }
-        let x = (cos - self.cos_outer) / (self.cos_inner - self.cos_outer);
-        x * x * (3.0 - 2.0 * x)
+        let away = p - self.light.position;
+        self.light.falloff((away.dot(self.light.direction) / away.length()).clamp(-1.0, 1.0))
     }
 }

@@ -40,7 +40,7 @@ fn numbers_of_samples_may_be_the_least_and_the_most() {
 fn every_setting_reaches_its_place() {
     let loaded = good(
         "[settings]\nsize = [320, 200]\nspp = 7\nfilter = 'tent'\nshadow_samples = 5\n\
-         sky_samples = 6\nsmooth_terminator = false\nbounces = 2\ncutoff = 0.25\nseed = 11\n\
+         sky_samples = 6\nall_lights = true\nsmooth_terminator = false\nbounces = 2\ncutoff = 0.25\nseed = 11\n\
          exposure = 1.5\nclamp = 2.5\n\
          tone = 'filmic'\npng_bits = 16\nintersector = 'oracle'\nisa = 'sse4.2'\n\
          build_quality = 'low'\ncompact = true\n\
@@ -54,7 +54,7 @@ fn every_setting_reaches_its_place() {
     assert_eq!((s.shadow_samples, s.sky_samples, s.bounces, s.png_bits), (5, 6, 2, 16));
     assert_eq!((s.cutoff, s.exposure, s.isa.as_deref()), (0.25, 1.5, Some("sse4.2")));
     assert_eq!(s.clamp, Some(2.5));
-    assert!(!s.smooth_terminator);
+    assert!(!s.smooth_terminator && s.all_lights);
     assert_eq!((s.build_quality, s.compact), (BuildQuality::Low, true));
     // What is left at its default would show here.
     let d = SceneSettings::default();

@@ -1,0 +1,216 @@
+//! Which of many lights matter where: a fixed tree of boxes over the scene, each with its lights by an upper bound of
+//! what they can send there.
+//!
+//! Made once of a scene alone, so that the lights of a point are a function of its position. In each box
+//! (*cell*) the lights are in three parts. The brightest are its *main* lights: they are traced one by one. Those
+//! whose bounds together stay below a limit are culled. Samples choose among the others, the *tail*, in
+//! proportion to their bounds (Shirley, Wang and Zimmerman, 1996), which leaves the mean as it is.
+//!
+//! Not done: bounds know neither shadows nor the normals of surfaces.
+
+mod build;
+mod count;
+
+use crate::math::{Bounds3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Up to so many lights, all are looked at everywhere: the bytes of such scenes do not depend on this module.
+pub(crate) const FEW_LIGHTS: usize = 8;
+/// Most main lights of a cell.
+pub(crate) const MOST_MAIN: usize = 16;
+
+/// The lights of all places of a scene.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LightCells {
+    nodes: Vec<Node>,
+    cells: Vec<Cell>,
+    /// The lights of all cells, those of a cell in a row, the largest bound first.
+    lights: Vec<CellLight>,
+    /// The most main lights with an extent of any cell.
+    most_area: usize,
+    /// Means over the scene's surfaces.
+    mean: MeanLights,
+}
+
+/// A box of the tree.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+enum Node {
+    /// Cut in two across `axis`: the lower half is node `lower`, the upper half the one after it.
+    Halves {
+        axis: u8,
+        at: f64,
+        lower: u32,
+    },
+    Cell(u32),
+}
+
+/// A box that is not cut any further.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Cell {
+    /// Its first light in the list of all.
+    first: u32,
+    /// The number of lights that can send it anything.
+    count: u32,
+    /// The number of main lights, which come first.
+    main: u32,
+    /// What all of the lights send to the middle of the cell, at most: irradiance.
+    typical: f64,
+}
+
+/// A light in a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CellLight {
+    /// Its number among the scene's lights.
+    pub light: u32,
+    /// The bounds of this light and of all after it, summed: irradiance, infinite where a bound is.
+    rest: f64,
+    /// The weights of this light and of all before it, summed: bounds that are finite, more than 0.
+    until: f64,
+}
+
+/// Mean numbers of lights at a point of the scene's surfaces.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanLights {
+    /// Main lights.
+    pub main: f64,
+    /// Main lights with an extent.
+    pub area: f64,
+    /// Lights of the tail.
+    pub tail: f64,
+}
+
+/// The lights of one cell.
+#[derive(Debug, Clone, Copy)]
+pub struct CellLights<'c> {
+    lights: &'c [CellLight],
+    main: usize,
+    typical: f64,
+}
+
+/// Lights that samples choose from.
+#[derive(Debug, Clone, Copy)]
+pub struct Tail<'c> {
+    lights: &'c [CellLight],
+    /// The weights of the lights before.
+    before: f64,
+    typical: f64,
+}
+
+impl LightCells {
+    /// Number of the cell of `p`. A point outside the scene belongs to a cell at its edge.
+    pub fn cell(&self, p: DVec3) -> u32 {
+        let mut node = 0;
+        loop {
+            match self.nodes[node as usize] {
+                Node::Cell(cell) => return cell,
+                Node::Halves { axis, at, lower } => {
+                    node = lower + u32::from(p[usize::from(axis)] >= at);
+                }
+            }
+        }
+    }
+
+    /// The lights of a cell but for those that together send an irradiance of at most `culled` to any of its
+    /// points.
+    pub fn lights(&self, cell: u32, culled: f64) -> CellLights<'_> {
+        let Cell { first, count, main, typical } = self.cells[cell as usize];
+        let all = &self.lights[first as usize..][..count as usize];
+        let lights = &all[..all.partition_point(|light| light.rest > culled)];
+        CellLights { lights, main: (main as usize).min(lights.len()), typical }
+    }
+
+    /// The most main lights with an extent of any cell.
+    pub fn most_area(&self) -> usize {
+        self.most_area
+    }
+
+    /// Mean numbers of lights at a point of the scene's surfaces, of those that can send it anything.
+    pub fn mean(&self) -> MeanLights {
+        self.mean
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Whether there are no cells: never.
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    /// Memory, bytes.
+    pub fn memory(&self) -> u64 {
+        let Self { nodes, cells, lights, most_area: _, mean: _ } = self;
+        (size_of_val(&nodes[..]) + size_of_val(&cells[..]) + size_of_val(&lights[..])) as u64
+    }
+}
+
+impl<'c> CellLights<'c> {
+    /// Numbers of the main lights.
+    pub fn main(&self) -> impl ExactSizeIterator<Item = u32> + 'c {
+        self.lights[..self.main].iter().map(|light| light.light)
+    }
+
+    /// The others.
+    pub fn tail(&self) -> Tail<'c> {
+        let (main, lights) = self.lights.split_at(self.main);
+        let before = main.last().map_or(0.0, |light| light.until);
+        Tail { lights, before, typical: self.typical }
+    }
+}
+
+impl Tail<'_> {
+    /// Whether it has no light.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
+    /// Number of lights.
+    pub fn len(&self) -> usize {
+        self.lights.len()
+    }
+
+    /// Number of samples of the tail where a main light has `samples`: as many where it sends a quarter of the
+    /// cell's light, from a quarter to four times as many.
+    pub fn samples(&self, samples: u32) -> u32 {
+        let share = (4.0 * self.total() / self.typical).clamp(0.25, 4.0);
+        // Of no number too.
+        let share = if share.is_nan() { 4.0 } else { share };
+        (f64::from(samples) * share).ceil().max(1.0) as u32
+    }
+
+    /// The largest number of [`samples`](Self::samples) of any tail.
+    pub fn most_samples(samples: u32) -> u32 {
+        samples.saturating_mul(4).max(1)
+    }
+
+    /// The light at `u` in [0, 1), and the probability with which it is chosen.
+    pub fn choose(&self, u: f64) -> (u32, f64) {
+        let at = self.before + u * self.total();
+        let k = self.lights.partition_point(|light| light.until <= at);
+        let k = k.min(self.lights.len() - 1);
+        (self.lights[k].light, self.probability(k))
+    }
+
+    /// The probability with which the light of this number is chosen; 0 of any other.
+    pub fn probability_of(&self, light: u32) -> f64 {
+        let k = self.lights.iter().position(|other| other.light == light);
+        k.map_or(0.0, |k| self.probability(k))
+    }
+
+    fn probability(&self, k: usize) -> f64 {
+        let before = if k == 0 { self.before } else { self.lights[k - 1].until };
+        (self.lights[k].until - before) / self.total()
+    }
+
+    fn total(&self) -> f64 {
+        self.lights.last().map_or(0.0, |light| light.until) - self.before
+    }
+}
+
+/// The box that the tree divides: a little larger than that of the surfaces, for what is rounded.
+fn root(bounds: &Bounds3) -> Bounds3 {
+    let margin = DVec3::splat(1e-6 * bounds.radius());
+    Bounds3 { min: bounds.min - margin, max: bounds.max + margin }
+}

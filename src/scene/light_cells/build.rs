@@ -1,0 +1,167 @@
+//! The tree of cells, made of a scene: the cell with the loosest bounds, and the largest, is cut next.
+
+use super::{Cell, CellLight, FEW_LIGHTS, LightCells, MOST_MAIN, MeanLights, Node, root};
+use crate::math::{Bounds3, DVec3};
+use crate::scene::{Light, Scene};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Most cells.
+const MOST_CELLS: usize = 1 << 14;
+/// Most bounds that are computed, and lights of all cells.
+const MOST_BOUNDS: usize = 1 << 21;
+/// A cell whose bounds sum up to less than this times what arrives in its middle is not cut.
+const TIGHT: f64 = 1.25;
+/// Looser bounds than this count as this loose.
+const LOOSEST: f64 = 16.0;
+/// Smallest diagonal of a cell that is cut, in diagonals of the scene.
+const SMALLEST: f64 = 1.0 / 1024.0;
+/// The tail's bounds are at most this share of what arrives in the middle of a cell, unless the cell has the most
+/// main lights.
+const TAIL: f64 = 0.04;
+
+/// A box whose lights are known.
+struct Open {
+    bounds: Bounds3,
+    node: usize,
+    lights: Vec<BoundedLight>,
+    /// What all lights send to the middle, at most.
+    typical: f64,
+}
+
+/// A light with the bound of what it sends to a box, more than 0.
+#[derive(Clone, Copy)]
+struct BoundedLight {
+    light: u32,
+    bound: f64,
+    /// The bound where it is finite.
+    weight: f64,
+}
+
+impl LightCells {
+    /// The cells of `scene`; `None` where it has few lights.
+    pub(in crate::scene) fn of(scene: &Scene) -> Option<Self> {
+        if scene.lights.len() <= FEW_LIGHTS {
+            return None;
+        }
+        let mut cells = Self {
+            nodes: vec![Node::Cell(0)],
+            cells: Vec::new(),
+            lights: Vec::new(),
+            most_area: 0,
+            mean: MeanLights::default(),
+        };
+        for open in cells.divide(&scene.lights, root(&scene.bounds)) {
+            cells.close(open, &scene.lights);
+        }
+        cells.mean = cells.count(scene);
+        Some(cells)
+    }
+
+    /// Makes the nodes of the tree; returns its leaves.
+    fn divide(&mut self, lights: &[Light], root: Bounds3) -> Vec<Open> {
+        let smallest = SMALLEST * root.radius();
+        let all: Vec<u32> = (0..lights.len() as u32).collect();
+        let mut open = vec![Open::new(root, 0, &all, lights)];
+        let mut queue = BinaryHeap::new();
+        queue.extend(open[0].gain(smallest).map(|gain| (gain, Reverse(0))));
+        let mut bounds = all.len();
+        while let Some((_, Reverse(at))) = queue.pop() {
+            let next: usize = open[at].lights.len();
+            if open.len() >= MOST_CELLS || bounds + 4 * next > MOST_BOUNDS {
+                break;
+            }
+            bounds += 4 * next;
+            let [lower, upper] = self.halves(&open[at], lights);
+            open[at] = lower;
+            open.push(upper);
+            for at in [at, open.len() - 1] {
+                queue.extend(open[at].gain(smallest).map(|gain| (gain, Reverse(at))));
+            }
+        }
+        open
+    }
+
+    fn halves(&mut self, whole: &Open, lights: &[Light]) -> [Open; 2] {
+        let Bounds3 { min, max } = whole.bounds;
+        let extent = whole.bounds.extent();
+        let axis =
+            (0..3).fold(0, |most, axis| if extent[axis] > extent[most] { axis } else { most });
+        let at = 0.5 * min[axis] + 0.5 * max[axis];
+        let node = self.nodes.len();
+        self.nodes[whole.node] = Node::Halves { axis: axis as u8, at, lower: node as u32 };
+        self.nodes.extend([Node::Cell(0); 2]);
+        let known: Vec<u32> = whole.lights.iter().map(|light| light.light).collect();
+        let with = |mut corner: DVec3| {
+            corner[axis] = at;
+            corner
+        };
+        let lower = Bounds3 { min, max: with(max) };
+        let upper = Bounds3 { min: with(min), max };
+        [Open::new(lower, node, &known, lights), Open::new(upper, node + 1, &known, lights)]
+    }
+
+    /// Makes a cell of a leaf.
+    fn close(&mut self, open: Open, lights: &[Light]) {
+        let Open { bounds: _, node, lights: mut own, typical } = open;
+        self.nodes[node] = Node::Cell(self.cells.len() as u32);
+        own.sort_by(|a, b| b.bound.total_cmp(&a.bound).then(a.light.cmp(&b.light)));
+        let first = self.lights.len();
+        let mut until = 0.0;
+        self.lights.extend(own.iter().map(|light| {
+            until += light.weight;
+            CellLight { light: light.light, rest: light.bound, until }
+        }));
+        let mut rest = 0.0;
+        for light in self.lights[first..].iter_mut().rev() {
+            rest += light.rest;
+            light.rest = rest;
+        }
+        let before = |k: usize| if k == 0 { 0.0 } else { self.lights[first + k - 1].until };
+        let most = own.len().min(MOST_MAIN);
+        let main = (0..most).find(|k| until - before(*k) <= TAIL * typical).unwrap_or(most);
+        let area =
+            own[..main].iter().filter(|light| lights[light.light as usize].is_area()).count();
+        self.most_area = self.most_area.max(area);
+        let [first, count, main] = [first, own.len(), main].map(|n| n as u32);
+        self.cells.push(Cell { first, count, main, typical });
+    }
+}
+
+impl Open {
+    /// A box, with those of the lights `known` that can send it anything.
+    fn new(bounds: Bounds3, node: usize, known: &[u32], lights: &[Light]) -> Self {
+        let place = |p: DVec3| Bounds3 { min: p, max: p };
+        let middle = place(bounds.centre());
+        let mut typical = 0.0;
+        let mut own = Vec::with_capacity(known.len());
+        for number in known {
+            let light = &lights[*number as usize];
+            let bound = light.most_irradiance(&bounds);
+            if bound == 0.0 {
+                continue;
+            }
+            let at_middle = light.most_irradiance(&middle);
+            typical += if at_middle.is_finite() { at_middle } else { 0.0 };
+            // A light without an extent in the box: as from a corner, or anything.
+            let weight = [bound, light.most_irradiance(&place(bounds.max)), 1.0];
+            let weight = weight.into_iter().find(|w| w.is_finite() && *w > 0.0).unwrap_or(1.0);
+            own.push(BoundedLight { light: *number, bound, weight });
+        }
+        Self { bounds, node, lights: own, typical }
+    }
+
+    /// What cutting the box promises, greater where it is greater; `None` where nothing.
+    fn gain(&self, smallest: f64) -> Option<u64> {
+        let radius = self.bounds.radius();
+        let bounds: f64 = self.lights.iter().map(|light| light.bound).sum();
+        let looseness = bounds / self.typical;
+        // Bounds of no light are 0/0.
+        if self.lights.is_empty() || radius < smallest || looseness < TIGHT {
+            return None;
+        }
+        let looseness = if looseness < LOOSEST { looseness } else { LOOSEST };
+        // Positive numbers are in the order of their bits.
+        Some((radius * (looseness - 1.0)).to_bits())
+    }
+}
