@@ -47,6 +47,8 @@ fn exr_frames_hold_colour_alone_unless_more_is_asked_for() {
         ("--aovs provenance", "B G R reuse.provenance", false),
         ("--maps", &format!("B G R {maps}"), false),
         ("--maps --aovs depth", &format!("B G R Z {maps}"), false),
+        ("--maps --spp 2..8", &format!("B G R {maps} samples"), false),
+        ("--maps --spp 2..8 --policy off", "B G R samples", false),
         ("--references base", "B G R", true),
         ("--references base --aovs none", "B G R", false),
         ("--aovs all", &all, true),
