@@ -280,14 +280,18 @@ mod tests {
             own.map(|c| c.options).collect()
         };
         let four = Settings { spp: 4, ..Settings::default() };
-        let expected = ["--spp 1", "--spp 8", "--spp 16", "--spp 2..8", "--spp 4..16", "--spp 4..32"];
+        let expected =
+            ["--spp 1", "--spp 8", "--spp 16", "--spp 2..8", "--spp 4..16", "--spp 4..32"];
         assert_eq!(list(&four), expected);
         let range = Settings { most_spp: Some(16), ..four };
-        let expected =
-            ["--spp 1", "--spp 4", "--spp 8", "--spp 16", "--spp 2..8", "--spp 4..32"];
+        let expected = ["--spp 1", "--spp 4", "--spp 8", "--spp 16", "--spp 2..8", "--spp 4..32"];
         assert_eq!(list(&range), expected);
         let most = Settings { spp: MAX_SAMPLES, ..Settings::default() };
-        assert!(list(&most).iter().all(|options| !options.ends_with(&format!("{MAX_SAMPLES}..{MAX_SAMPLES}"))));
+        assert!(
+            list(&most)
+                .iter()
+                .all(|options| !options.ends_with(&format!("{MAX_SAMPLES}..{MAX_SAMPLES}")))
+        );
     }
 
     #[test]
