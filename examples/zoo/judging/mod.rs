@@ -127,7 +127,10 @@ pub fn judge(
             (job.wall, job.cpu) = (timed.wall, timed.cpu);
         }
     }
-    Ok(Verdict { equal_rays, ..Verdict::new(pictures, frames, jobs) })
+    let verdict = Verdict::new(pictures, frames, jobs);
+    // The audit's truth has the frame's own camera samples, so it knows nothing of their error.
+    let audit = verdict.audit.filter(|_| settings.most.is_none());
+    Ok(Verdict { equal_rays, audit, ..verdict })
 }
 
 /// Numbers of the frames that are judged: all of a short move; of a long one in-between frames in
