@@ -46,7 +46,7 @@ fn inferred_tiles_are_no_worse_than_traced_ones() {
         if let Some(change) = change {
             specimen = change(specimen, SEED);
         }
-        let settings = Settings { spp, light: 16 };
+        let settings = Settings { spp, most: None, light: 16 };
         let verdict =
             judge(&program, &specimen, settings, &plan, &folder.path().join(&specimen.name))
                 .unwrap_or_else(|e| panic!("{family}: {e}"));

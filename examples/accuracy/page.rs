@@ -120,10 +120,16 @@ fn intersection() -> [Turned; 10] {
     ]
 }
 
-fn sampling() -> [Turned; 6] {
+fn sampling() -> [Turned; 8] {
     [
         ("four times the camera samples", |s| format!("--spp {}", 4 * s.setting("spp"))),
         ("a quarter of them", |s| format!("--spp {}", (s.setting("spp") / 4).max(1))),
+        ("up to four times as many where samples differ", |s| {
+            format!("--spp {0}..{1}", s.setting("spp"), 4 * s.setting("spp"))
+        }),
+        ("up to eight times", |s| {
+            format!("--spp {0}..{1}", s.setting("spp"), 8 * s.setting("spp"))
+        }),
         ("four times the shadow samples", |s| {
             format!("--shadow-samples {}", 4 * s.setting("shadow_samples"))
         }),

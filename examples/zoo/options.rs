@@ -25,7 +25,11 @@ pub struct Options {
     /// Pixels of a frame; tiles of 32 x 32 are judged
     #[arg(long, default_value = "160x96", value_parser = size)]
     size: [u32; 2],
-    /// Camera samples and light samples of every scene, as 4,16, instead of random ones
+    /// Camera samples and light samples of every scene, as 4,16 or 4..16,16, instead of random ones
+    ///
+    /// With a range of camera samples the truth has many camera samples of its own, since traced and inferred frames
+    /// take different numbers, and errors include those of edges. Uniform samples are rendered too, and the error of the
+    /// range is compared with theirs at equal rays.
     #[arg(long, value_parser = settings)]
     pub settings: Option<Settings>,
     /// Only scenes of these families
@@ -103,11 +107,18 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 }
 
 fn settings(text: &str) -> Result<Settings, String> {
-    let (spp, light) = text.split_once(',').ok_or("wanted: SPP,LIGHT, as 4,16")?;
+    let (camera, light) = text.split_once(',').ok_or("wanted: SPP,LIGHT, as 4,16 or 4..16,16")?;
     let number = |text: &str| text.parse::<usize>().map_err(|e| format!("{text}: {e}"));
-    let settings = Settings { spp: number(spp)?, light: number(light)? };
+    let (spp, most) = match camera.split_once("..") {
+        Some((least, most)) => (number(least)?, Some(number(most)?)),
+        None => (number(camera)?, None),
+    };
+    let settings = Settings { spp, most, light: number(light)? };
     if settings.spp == 0 || settings.light == 0 {
         return Err("wanted: at least one sample of each".into());
+    }
+    if settings.most.is_some_and(|most| most <= settings.spp) {
+        return Err("wanted: more samples at the end of a range than at its start".into());
     }
     Ok(settings)
 }

@@ -3,6 +3,7 @@
 
 use super::knobs::{Candidate, Group, Knob};
 use crate::effects::EffectPlan;
+use crate::scene::limits::MAX_SAMPLES;
 use crate::scene::{BuildQuality, HitRules, IntersectorKind, Policy, Recheck, Settings};
 
 /// The default first, then each knob of `groups` alone, then combinations. Left out are knobs that by
@@ -94,9 +95,16 @@ impl List<'_> {
     }
 
     fn samples(&mut self, plan: &EffectPlan) {
-        for spp in around(self.base.spp) {
-            let options = format!("--spp {spp}");
-            self.add(Knob::CameraSamples, options, |s| (s.spp, s.most_spp) = (spp, None));
+        let base = self.base.spp;
+        let [less, more] = around(base);
+        let counts = [less, base, base.saturating_mul(2).min(MAX_SAMPLES), more];
+        // The default is there already.
+        let uniform = counts.into_iter().map(|spp| (spp, None));
+        let wider = base.saturating_mul(8).min(MAX_SAMPLES);
+        let ranges = [(base.div_ceil(2), counts[2]), (base, more), (base, wider)];
+        let ranges = ranges.map(|(least, most)| (least, (most > least).then_some(most)));
+        for (spp, most_spp) in uniform.chain(ranges) {
+            self.add_camera_samples(spp, most_spp);
         }
         if plan.area_lights {
             for n in around(self.base.shadow_samples) {
@@ -114,6 +122,12 @@ impl List<'_> {
                 });
             }
         }
+    }
+
+    fn add_camera_samples(&mut self, spp: u32, most_spp: Option<u32>) {
+        let given = Settings { spp, most_spp, ..self.base.clone() };
+        let options = format!("--spp {}", given.camera_samples());
+        self.add(Knob::CameraSamples, options, |s| *s = given);
     }
 
     fn specular(&mut self) {
@@ -172,11 +186,13 @@ impl List<'_> {
         let base = self.base;
         let (shadow, sky) = (with_base(base.shadow_samples), with_base(base.sky_samples));
         let lit = usize::from(plan.area_lights || plan.sky_light);
-        for spp in with_base(base.spp) {
+        let [less, spp, more] = with_base(base.spp);
+        let range = (spp, (more > spp).then_some(more));
+        for (spp, most_spp) in [(less, None), (spp, None), (more, None), range] {
             // Without soft light there is but one number of shadow samples: none.
             for k in if lit == 1 { 0..3 } else { 1..2 } {
-                let mut options = format!("--spp {spp}");
-                let mut settings = Settings { spp, most_spp: None, ..base.clone() };
+                let mut settings = Settings { spp, most_spp, ..base.clone() };
+                let mut options = format!("--spp {}", settings.camera_samples());
                 // Samples of what is not there would only make twins.
                 if plan.area_lights {
                     options += &format!(" --shadow-samples {}", shadow[k]);
@@ -210,7 +226,7 @@ fn times(factor: f64, x: f32) -> f32 {
 
 /// A quarter of `n` samples, at least one, and four times `n`.
 fn around(n: u32) -> [u32; 2] {
-    [(n / 4).max(1), n.saturating_mul(4).clamp(1, crate::scene::limits::MAX_SAMPLES)]
+    [(n / 4).max(1), n.saturating_mul(4).clamp(1, MAX_SAMPLES)]
 }
 
 #[cfg(test)]
@@ -257,6 +273,29 @@ mod tests {
         assert_eq!((segments(&all), segments(&few)), (2, 0));
         assert_eq!(candidates(&base, &nothing, 10, &yes, &[]).len(), 1);
         assert_eq!((times(10.0, 0.001), times(0.1, 0.001)), (0.01, 0.0001));
+    }
+
+    #[test]
+    fn ranges_of_camera_samples_stand_beside_single_numbers() {
+        let list = |base: &Settings| -> Vec<String> {
+            let yes = |_: &Settings| true;
+            let all = candidates(base, &EffectPlan::EVERYTHING, 9, &yes, &[Group::Samples]);
+            let own = all.into_iter().filter(|c| c.knob == Knob::CameraSamples);
+            own.map(|c| c.options).collect()
+        };
+        let four = Settings { spp: 4, ..Settings::default() };
+        let expected =
+            ["--spp 1", "--spp 8", "--spp 16", "--spp 2..8", "--spp 4..16", "--spp 4..32"];
+        assert_eq!(list(&four), expected);
+        let range = Settings { most_spp: Some(16), ..four };
+        let expected = ["--spp 1", "--spp 4", "--spp 8", "--spp 16", "--spp 2..8", "--spp 4..32"];
+        assert_eq!(list(&range), expected);
+        let most = Settings { spp: MAX_SAMPLES, ..Settings::default() };
+        assert!(
+            list(&most)
+                .iter()
+                .all(|options| !options.ends_with(&format!("{MAX_SAMPLES}..{MAX_SAMPLES}")))
+        );
     }
 
     #[test]

@@ -56,6 +56,9 @@ pub struct TrialRecord {
     pub rays_per_frame: f64,
     /// Rays by kind, of all frames made.
     pub rays: RayCounts,
+    /// Camera samples a pixel, mean of the move; `None` where all pixels take as many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_samples: Option<f64>,
     /// Memory of the intersector and of the references, bytes.
     pub memory: u64,
     /// How far off its frames are.

@@ -15,7 +15,7 @@
 //! A [`Ledger`] keeps the measurements of a sweep on disk, trial by trial, so that a sweep that was
 //! stopped or killed goes on.
 //!
-//! Not done: knobs that the program does not have (adaptive sampling, texture filters).
+//! Not done: knobs that the program does not have (texture filters).
 
 mod candidates;
 mod change;

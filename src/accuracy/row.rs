@@ -36,6 +36,8 @@ pub struct CandidateRow {
     pub change: Option<Change>,
     /// Rays a frame.
     pub rays_per_frame: f64,
+    /// Camera samples a pixel; `None` where all pixels take as many.
+    pub camera_samples: Option<f64>,
     /// Rays by kind, of all frames made in a turn.
     pub rays: RayCounts,
     /// Intersector and references, bytes.
@@ -120,6 +122,7 @@ pub(super) fn row(candidate: &Candidate, own: &Taken, default: Option<&Taken>) -
             .and_then(|d| sure(&own.ratios(d, 0, |e| Errors::from(e.errors).rmse_steps))),
         change: default.map(|_| own.change()),
         rays_per_frame: first.rays_per_frame,
+        camera_samples: first.camera_samples,
         rays: first.rays,
         memory_bytes: own.0.values().map(|entry| entry.memory).max().unwrap_or(0),
         on_front: false,

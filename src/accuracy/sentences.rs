@@ -22,7 +22,10 @@ fn sentence(default: &CandidateRow, row: &CandidateRow) -> String {
         Some(Group::Tree) => format!("{}; {}", changed(), tree(default, row)),
         _ => error(default, row),
     };
-    format!("{}: {}, {what}.", row.options, time(row))
+    let samples = row.camera_samples.map_or(String::new(), |mean| {
+        format!("; {} camera samples a pixel in the mean", short(mean))
+    });
+    format!("{}: {}, {what}{samples}.", row.options, time(row))
 }
 
 /// What its tree takes.

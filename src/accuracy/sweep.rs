@@ -69,7 +69,12 @@ impl Sweep<'_> {
     /// # Errors
     /// As [`TrialContext::trace`].
     pub fn least_noise(&self) -> Result<f64> {
-        let best = self.candidates.iter().max_by_key(|c| samples(&c.settings));
+        let most = |c: &&Candidate| {
+            let s = &c.settings;
+            // A range comes near to the error of its upper end.
+            samples(&Settings { spp: s.most_camera_samples(), most_spp: None, ..s.clone() })
+        };
+        let best = self.candidates.iter().max_by_key(most);
         let Some(best) = best else { return Ok(0.0) };
         let frame = [self.shown_frame()];
         let mut frames = Vec::new();
@@ -232,6 +237,7 @@ impl Sweep<'_> {
             took: start.elapsed().as_secs_f64(),
             rays: trial.rays,
             rays_per_frame: trial.rays_per_frame,
+            camera_samples: trial.camera_samples,
             memory: trial.memory,
             ..TrialRecord::default()
         };
@@ -245,10 +251,12 @@ struct Tried {
     entry: TrialRecord,
 }
 
-/// Samples a pixel, of the camera and of the lights; roughly what a setting costs.
+/// Samples a pixel, of the camera and of the lights; roughly what a setting costs. A range counts as the geometric
+/// mean of its ends.
 fn samples(s: &Settings) -> u64 {
     let lights = u64::from(s.shadow_samples) + u64::from(s.sky_samples) + 1;
-    u64::from(s.spp) * lights
+    let [least, most] = [s.spp, s.most_camera_samples()].map(u64::from);
+    (least * most).isqrt() * lights
 }
 
 /// The default, then the others, in every second turn in reverse.

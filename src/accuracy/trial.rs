@@ -27,6 +27,8 @@ pub struct Trial {
     pub rays: RayCounts,
     /// Rays per frame.
     pub rays_per_frame: f64,
+    /// Camera samples a pixel; `None` where all pixels take as many.
+    pub camera_samples: Option<f64>,
     /// Memory of the intersector and of the references, bytes.
     pub memory: u64,
 }
@@ -50,6 +52,7 @@ pub fn run(
     maker.expect(&order);
     let mut frames = Frames::new();
     let (mut seconds, mut cpu, mut rays) = (Vec::new(), Vec::new(), Vec::new());
+    let mut samples = Vec::new();
     let mut all_rays = RayCounts::default();
     for frame in order {
         let (start, cpu_start) = (Instant::now(), cpu_now());
@@ -59,6 +62,7 @@ pub fn run(
         let cast = rays_of(&made);
         rays.push((frame, cast.total() as f64));
         all_rays += cast;
+        samples.extend(made.film.mean_samples().map(|mean| (frame, mean)));
         if chosen.contains(&frame) {
             let image = context.pool.install(|| displayed(&made.film, settings));
             frames.insert(frame, image);
@@ -70,6 +74,7 @@ pub fn run(
         cpu_seconds: cut.mean(cpu.into_iter()),
         rays: all_rays,
         rays_per_frame: cut.mean(rays.into_iter()),
+        camera_samples: (!samples.is_empty()).then(|| cut.mean(samples.into_iter())),
         memory: intersector.memory() + maker.reference_memory(),
         cut,
     })

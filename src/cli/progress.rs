@@ -151,6 +151,7 @@ mod tests {
             write_seconds: 0.01,
             bytes: 1,
             rays,
+            samples: None,
             reuse: Default::default(),
             audit: None,
             bad: Default::default(),

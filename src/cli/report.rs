@@ -31,7 +31,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// frames that are there, so it can be made while the job runs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Maps need a render with --maps that inferred something. The page is put beside the frames:
+Maps need a render with --maps that inferred something or had --spp MIN..MAX. The page is put beside the frames:
 out/frame.report.html for out/frame_####.png.
 
 Examples:
@@ -119,7 +119,7 @@ impl Job {
             state: self.state(),
             gaps: self.standing.gaps(),
             facts: self.facts(),
-            maps: film::maps_of(&film),
+            maps: film::maps_of(self, &film),
             film,
             shown,
             charts: charts::all(self),
@@ -154,6 +154,10 @@ impl Job {
             ("Rays".into(), words::short(self.rays().total() as f64)),
             ("Files".into(), words::bytes(bytes)),
         ];
+        if let Some(samples) = self.samples() {
+            let mean = format!("{} ({})", words::short(samples), self.settings.camera_samples());
+            facts.push(("Camera samples a pixel".into(), mean));
+        }
         if let Some(share) = self.reuse().share() {
             facts.push(("Surface points inferred".into(), words::percent(share)));
         }
@@ -179,6 +183,12 @@ impl Job {
         let mut sum = RayCounts::default();
         self.rows.iter().for_each(|row| sum += row.rays);
         sum
+    }
+
+    /// Mean number of camera samples of a pixel; `None` where all pixels take as many.
+    fn samples(&self) -> Option<f64> {
+        let means: Vec<f64> = self.rows.iter().filter_map(|row| row.samples).collect();
+        (!means.is_empty()).then(|| means.iter().sum::<f64>() / means.len() as f64)
     }
 
     fn reuse(&self) -> ReuseCounts {

@@ -9,6 +9,7 @@ use crate::cluster::Communicator;
 use crate::error::{Diagnostic, Error, Result};
 use crate::film::Image;
 use crate::output::manifest::{self, Header, Manifest};
+use crate::output::maps::{Map, MapScales};
 use crate::output::{Format, FramePattern, VERSION, WriteOptions};
 use crate::reuse::store::Compatibility;
 use crate::scene::{
@@ -163,7 +164,7 @@ impl Request {
             header,
             recipes: setup.recipes.clone(),
             write: WriteOptions {
-                maps: self.options.maps.then(|| setup.settings.reuse.farthest()),
+                maps: self.options.maps.then(|| MapScales::of(&setup.settings)),
                 ..WriteOptions::of(&setup.settings, None)
             },
             overwrite: self.options.overwrite,
@@ -182,9 +183,12 @@ pub fn aovs(
     pattern: &FramePattern,
 ) -> Result<Aovs> {
     let policy = settings.reuse.policy;
-    if options.maps && policy == Policy::Off {
+    let scales = MapScales::of(settings);
+    if options.maps && scales.maps().next().is_none() {
         return Err(Error::Usage(
-            "--maps shows what is inferred; with --policy off every frame is traced".into(),
+            "--maps shows what is inferred, and how many camera samples pixels have; with --policy off every \
+             frame is traced, and without --spp MIN..MAX all pixels have as many"
+                .into(),
         ));
     }
     if pattern.format() != Format::Exr {
@@ -201,7 +205,7 @@ pub fn aovs(
     let builds_on = !options.references.is_empty() && policy == Policy::Surface;
     let needed = || builds_on.then_some(Aov::Reference).into_iter().collect();
     let asked = settings.aovs.clone().unwrap_or_else(needed);
-    let maps = options.maps.then(|| Aovs::from(Aov::MAPS));
+    let maps = options.maps.then(|| scales.maps().map(Map::aov).collect());
     let all: Aovs = std::iter::once(asked).chain(maps).collect();
     all.under(policy, settings.most_spp.is_some()).map_err(|aov| {
         let needed = match aov {

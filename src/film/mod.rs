@@ -109,6 +109,14 @@ impl Film {
         }
     }
 
+    /// Mean number of camera samples of the pixels that have any; `None` where all have as many.
+    pub fn mean_samples(&self) -> Option<f64> {
+        let samples = self.samples.as_ref()?;
+        let sum: u64 = samples.iter().map(|n| u64::from(*n)).sum();
+        let pixels = samples.iter().filter(|n| **n > 0).count();
+        Some(sum as f64 / pixels.max(1) as f64)
+    }
+
     /// Index of pixel `(x, y)`.
     pub fn index(&self, x: u32, y: u32) -> usize {
         y as usize * self.width as usize + x as usize

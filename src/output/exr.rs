@@ -4,8 +4,7 @@
 //! A film's channels are `R G B`, and of its AOVs those that are asked for: `Z` (distance along the view axis, infinity
 //! where nothing is hit), `P.X P.Y P.Z` (position), `N.X N.Y N.Z` (normal), `albedo.R albedo.G
 //! albedo.B`, `backward.u backward.v` (motion, pixels), all f32, and `mesh_id` (u32, 0 where nothing
-//! is hit). World units throughout. Where pixels take different numbers of camera samples, `samples` (u32) has
-//! them. A later AOV is another [`ExrChannel`] in the list.
+//! is hit). World units throughout. [`maps`](super::maps) adds its own. A later AOV is another [`ExrChannel`] in the list.
 //!
 //! The files hold at most one attribute that the crate `exr` keeps in a hash map, whose order differs
 //! from run to run: the same film is the same bytes.
@@ -85,14 +84,10 @@ impl ExrChannels {
     }
 }
 
-/// The film's colour, and what it has of the first hits and of sample counts among `aovs`.
+/// The film's colour, and what it has of the first hits among `aovs`.
 pub fn channels_of(film: &Film, aovs: &Aovs) -> Vec<ExrChannel> {
     let mut channels = Vec::new();
     push_vectors(&mut channels, ["R", "G", "B"], &film.rgb);
-    if let Some(samples) = film.samples.as_ref().filter(|_| aovs.has(Aov::Samples)) {
-        let samples = ExrSamples::U32(samples.clone());
-        channels.push(ExrChannel { name: "samples".into(), samples });
-    }
     let Some(g) = &film.gbuffer else { return channels };
     if aovs.has(Aov::Depth) {
         channels.push(ExrChannel { name: "Z".into(), samples: ExrSamples::F32(g.depth.clone()) });

@@ -1,6 +1,7 @@
 //! File formats of frames, and options for writing films.
 
 use super::Display;
+use super::maps::MapScales;
 use crate::error::{Error, Result};
 use crate::scene::{Aovs, Settings, ToneCurve};
 use serde::{Deserialize, Serialize};
@@ -52,9 +53,8 @@ pub struct WriteOptions {
     pub settings: String,
     /// What exr frames hold beside colour, as far as the film has it.
     pub aovs: Aovs,
-    /// Set if maps of reuse are written as files beside frames that are not exr: the distance that is
-    /// painted white, in the unit of the film's distances.
-    pub maps: Option<f32>,
+    /// Set if maps are written as files beside frames that are not exr.
+    pub maps: Option<MapScales>,
     /// An attribute of exr frames: name and bytes.
     pub attribute: Option<(&'static str, Arc<[u8]>)>,
 }

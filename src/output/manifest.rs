@@ -101,6 +101,9 @@ pub struct Row {
     pub rank: u32,
     /// Rays cast for it.
     pub rays: RayCounts,
+    /// Mean number of camera samples of a pixel; `None` where all pixels take as many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<f64>,
     /// Surface points inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
@@ -110,7 +113,7 @@ pub struct Row {
     /// Invalid camera samples.
     #[serde(default, skip_serializing_if = "BadSamples::is_none")]
     pub bad: BadSamples,
-    /// Files of its maps of reuse.
+    /// Files of its maps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub maps: Vec<MapRow>,
     /// Why the frame, which is left from an earlier job, does not belong to this sequence.

@@ -1,11 +1,13 @@
-//! Maps of reuse: where a frame's light comes from, painted over the frame.
+//! Maps: where a frame's light comes from and how many camera samples its pixels have, painted over the frame.
 //!
 //! A map is a png file beside its frame, `frame_0001_provenance.png`, or channels of an exr frame. The colours below
 //! are linear.
 
 mod read;
+mod scales;
 
 pub use read::of_exr;
+pub use scales::MapScales;
 
 use super::exr::{ExrChannel, ExrSamples};
 use super::{Display, WriteOptions, Written, png};
@@ -44,11 +46,40 @@ pub enum Map {
     Distance,
     /// Errors of the audited pixels.
     Audit,
+    /// Number of camera samples.
+    Samples,
+}
+
+impl MapScales {
+    /// The maps that frames can have.
+    pub fn maps(self) -> impl Iterator<Item = Map> {
+        Map::ALL.into_iter().filter(move |map| match map {
+            Map::Samples => self.samples.is_some(),
+            Map::Provenance | Map::Frame | Map::Distance | Map::Audit => self.farthest.is_some(),
+        })
+    }
+
+    /// Explanation of `map`, in a line.
+    pub fn meaning(self, map: Map) -> String {
+        let Some([least, most]) = self.samples.filter(|_| map == Map::Samples) else {
+            return map.meaning().into();
+        };
+        let at = |step: u8| {
+            let ratio = f64::from(most) / f64::from(least);
+            f64::from(least) * ratio.powf(f64::from(step) / 4.0)
+        };
+        let [violet, red, orange] = [1, 2, 3].map(|step| at(step).round());
+        format!(
+            "{} Black: {least}, violet: about {violet}, red: {red}, orange: {orange}, white: {most}.",
+            map.meaning()
+        )
+    }
 }
 
 impl Map {
     /// All maps.
-    pub const ALL: [Self; 4] = [Self::Provenance, Self::Frame, Self::Distance, Self::Audit];
+    pub const ALL: [Self; 5] =
+        [Self::Provenance, Self::Frame, Self::Distance, Self::Audit, Self::Samples];
 
     /// Name of the map in its files' and channel's names.
     pub fn name(self) -> &'static str {
@@ -57,26 +88,31 @@ impl Map {
             Self::Frame => "frame",
             Self::Distance => "distance",
             Self::Audit => "audit",
+            Self::Samples => "samples",
         }
     }
 
     /// The map as a channel of exr frames.
-    fn aov(self) -> Aov {
+    pub fn aov(self) -> Aov {
         match self {
             Self::Provenance => Aov::Provenance,
             Self::Frame => Aov::Frame,
             Self::Distance => Aov::Distance,
             Self::Audit => Aov::Audit,
+            Self::Samples => Aov::Samples,
         }
     }
 
     /// Name of the map's channel, for example `reuse.provenance`.
     fn channel_name(self) -> String {
-        format!("reuse.{}", self.name())
+        match self {
+            Self::Samples => self.name().into(),
+            _ => format!("reuse.{}", self.name()),
+        }
     }
 
-    /// Explanation of the map, in a line.
-    pub fn meaning(self) -> &'static str {
+    /// Explanation of the map without its scale.
+    fn meaning(self) -> &'static str {
         match self {
             Self::Provenance => {
                 "Pink: traced. Red: inferred from earlier frames, blue: from later ones, grey: from \
@@ -92,6 +128,7 @@ impl Map {
                 "Where the audit looked: white right, red too bright, blue too dark, full at 16 \
                  display steps."
             }
+            Self::Samples => "How many camera samples each pixel has.",
         }
     }
 
@@ -101,9 +138,9 @@ impl Map {
         path.with_file_name(format!("{stem}_{}.png", self.name()))
     }
 
-    /// The map painted over the film in grey, linear display values. The distance `farthest`, in
-    /// the unit of [`Provenance::distance`], is white.
-    pub fn paint(self, film: &Film, display: &Display, farthest: f32) -> Film {
+    /// The map painted over the film in grey, linear display values.
+    pub fn paint(self, film: &Film, display: &Display, scales: MapScales) -> Film {
+        let farthest = scales.farthest.unwrap_or(1.0);
         let mut out = Film::new(film.width, film.height, false);
         for (i, c) in out.rgb.iter_mut().enumerate() {
             let grey = Rgb::splat(luminance(display.tone(film.rgb[i])));
@@ -113,6 +150,7 @@ impl Map {
                 Self::Frame => inferred(&source, grey, || by_frame(source.frame)),
                 Self::Distance => inferred(&source, grey, || heat(source.distance / farthest)),
                 Self::Audit => grey * DARK,
+                Self::Samples => by_samples(film, i, grey, scales),
             };
         }
         if self == Self::Audit {
@@ -134,8 +172,8 @@ impl Map {
         let path = self.path(path);
         // The paint is display values already.
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        let farthest = options.maps.unwrap_or(1.0);
-        let painted = self.paint(film, &options.display, farthest);
+        let scales = options.maps.unwrap_or(MapScales { farthest: None, samples: None });
+        let painted = self.paint(film, &options.display, scales);
         let options = WriteOptions { display, png_bits: 8, ..options.clone() };
         png::write(&path, &painted, &options).map(|written| (path, written))
     }
@@ -149,6 +187,7 @@ impl Map {
             Self::Frame => ExrSamples::U32((0..n).map(|i| source(i).frame).collect()),
             Self::Distance => ExrSamples::F32((0..n).map(|i| source(i).distance).collect()),
             Self::Audit => ExrSamples::F32(film.audit.clone().unwrap_or_else(|| vec![f32::NAN; n])),
+            Self::Samples => ExrSamples::U32(film.samples.clone().unwrap_or_default()),
         };
         ExrChannel { name: self.channel_name(), samples }
     }
@@ -156,7 +195,8 @@ impl Map {
 
 /// The maps among `aovs` as channels of an exr frame.
 pub fn channels_of(film: &Film, aovs: &Aovs) -> Vec<ExrChannel> {
-    let asked = Map::ALL.into_iter().filter(|map| aovs.has(map.aov()));
+    let is_there = |map: &Map| *map != Map::Samples || film.samples.is_some();
+    let asked = Map::ALL.into_iter().filter(|map| aovs.has(map.aov()) && is_there(map));
     asked.map(|map| map.channel(film)).collect()
 }
 
@@ -176,6 +216,14 @@ fn by_provenance(source: &Provenance, grey: Rgb) -> Rgb {
 
 fn inferred(source: &Provenance, grey: Rgb, paint: impl FnOnce() -> Rgb) -> Rgb {
     if source.is_inferred() { painted(grey, paint()) } else { grey * DARK }
+}
+
+/// Pixels that were not asked for are dark.
+fn by_samples(film: &Film, at: usize, grey: Rgb, scales: MapScales) -> Rgb {
+    match film.samples.as_ref().map_or(0, |samples| samples[at]) {
+        0 => grey * DARK,
+        count => painted(grey, heat(scales.share_of(count))),
+    }
 }
 
 /// A colour for each frame; white for frames of another shot.
@@ -232,6 +280,7 @@ fn paint_audit(film: &Film, out: &mut Film) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Policy, Settings};
 
     fn film() -> Film {
         let mut film = Film::new(6, 5, false);
@@ -250,10 +299,12 @@ mod tests {
         film
     }
 
+    const SCALES: MapScales = MapScales { farthest: Some(1.0), samples: Some([4, 64]) };
+
     #[test]
     fn each_provenance_has_its_colour() {
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        let map = Map::Provenance.paint(&film(), &display, 1.0);
+        let map = Map::Provenance.paint(&film(), &display, SCALES);
         let [traced, earlier, later, both, background] = [0, 1, 2, 3, 4].map(|i| map.rgb[i]);
         assert!(traced.x > traced.z && traced.z > traced.y, "pink: {traced}");
         assert!(earlier.x > 2.0 * earlier.y.max(earlier.z), "red: {earlier}");
@@ -269,7 +320,7 @@ mod tests {
             assert!(apart > 0.5, "{frame}: {apart}");
         }
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        let map = Map::Frame.paint(&film(), &display, 1.0);
+        let map = Map::Frame.paint(&film(), &display, SCALES);
         assert_eq!(map.rgb[0], map.rgb[4]);
         assert_ne!(map.rgb[2], map.rgb[3]);
     }
@@ -288,9 +339,39 @@ mod tests {
         (audit[8], audit[9]) = (-12.0, 1.0);
         film.audit = Some(audit);
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        let map = Map::Audit.paint(&film, &display, 1.0);
+        let map = Map::Audit.paint(&film, &display, SCALES);
         assert!(map.rgb[9].z > map.rgb[9].x, "the worse, too dark, is blue: {}", map.rgb[9]);
         assert!(map.rgb[10].x > map.rgb[10].z && map.rgb[29] == map.rgb[23]);
+    }
+
+    #[test]
+    fn more_camera_samples_are_brighter_by_their_ratio() {
+        let mut film = film();
+        film.rgb.fill(Rgb::ZERO);
+        film.samples = Some((0..30).map(|i| if i < 5 { 4 << i } else { 0 }).collect());
+        let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
+        let map = Map::Samples.paint(&film, &display, SCALES);
+        for (i, share) in [0.0, 0.25, 0.5, 0.75, 1.0].into_iter().enumerate() {
+            let expected = heat(share) * (1.0 - GREY);
+            assert!((map.rgb[i] - expected).abs().max_element() < 1e-4, "{i}: {}", map.rgb[i]);
+        }
+        assert_eq!(map.rgb[5], Rgb::ZERO, "not asked for");
+        assert_eq!(
+            SCALES.meaning(Map::Samples),
+            "How many camera samples each pixel has. Black: 4, violet: about 8, red: 16, orange: 32, white: 64."
+        );
+    }
+
+    #[test]
+    fn frames_have_the_maps_that_their_settings_allow() {
+        let maps = |policy, most_spp| {
+            let mut settings = Settings { spp: 2, most_spp, ..Settings::default() };
+            settings.reuse.policy = policy;
+            MapScales::of(&settings).maps().count()
+        };
+        assert_eq!(maps(Policy::Off, None), 0);
+        assert_eq!(maps(Policy::Off, Some(8)), 1);
+        assert_eq!((maps(Policy::Surface, None), maps(Policy::Surface, Some(8))), (4, 5));
     }
 
     #[test]

@@ -51,8 +51,6 @@ impl Aov {
         Self::Audit,
         Self::Reference,
     ];
-    /// The maps of reuse.
-    pub const MAPS: [Self; 4] = [Self::Provenance, Self::Frame, Self::Distance, Self::Audit];
 
     /// Its name on the command line and in the scene file: one of [`Aovs::NAMES`].
     pub fn name(self) -> &'static str {

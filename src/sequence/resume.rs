@@ -7,7 +7,6 @@ use super::recipe::Recipe;
 use super::target::{LEFTOVER_AGE, Target};
 use crate::error::{Error, Result, counted};
 use crate::output::manifest::{Foreign, Header, Manifest, MapRow, Row, Turn, manifest_path};
-use crate::output::maps::Map;
 use crate::output::{PathKind, atomic};
 use crate::scene::FrameRange;
 use crate::stats::{AuditSums, BadSamples};
@@ -232,7 +231,7 @@ fn state(
     let recipe = target.recipes.get(frame);
     refuse_other_view(&path, row, recipe)?;
     let whole = *hash == row.blake3;
-    if whole && target.has_map_files() && !has_maps(found, row) {
+    if whole && !has_maps(target, found, row) {
         return Ok(State::Damaged(Damage::LacksMaps));
     }
     Ok(match whole {
@@ -242,10 +241,13 @@ fn state(
     })
 }
 
-/// Whether all maps of a frame exist and have the hashes in its row.
-fn has_maps(found: &FrameFiles, row: &Row) -> bool {
+/// Whether all maps of a frame that the job has exist and have the hashes in its row.
+fn has_maps(target: &Target, found: &FrameFiles, row: &Row) -> bool {
     let is_whole = |map: &MapRow| found.maps.contains(&(map.file.clone(), map.blake3.clone()));
-    row.maps.len() == Map::ALL.len() && row.maps.iter().all(is_whole)
+    match target.map_files().count() {
+        0 => true,
+        count => row.maps.len() == count && row.maps.iter().all(is_whole),
+    }
 }
 
 /// Rows of frames of another sequence that a job over `frames` does not replace.

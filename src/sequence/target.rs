@@ -3,7 +3,7 @@
 use super::recipe::Recipes;
 use crate::error::Result;
 use crate::output::manifest::{Header, Journal};
-use crate::output::maps::Map;
+use crate::output::maps::{Map, MapScales};
 use crate::output::{Format, FramePattern, WriteOptions};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -28,9 +28,10 @@ pub struct Target {
 }
 
 impl Target {
-    /// Whether frames have maps in files of their own.
-    pub fn has_map_files(&self) -> bool {
-        self.write.maps.is_some() && self.pattern.format() != Format::Exr
+    /// The maps that frames have in files of their own.
+    pub fn map_files(&self) -> impl Iterator<Item = Map> {
+        let scales = self.write.maps.filter(|_| self.pattern.format() != Format::Exr);
+        scales.into_iter().flat_map(MapScales::maps)
     }
 
     /// The journal to which rank `rank` appends its rows: rank 0 to the manifest at `path`, others to their part
@@ -45,8 +46,7 @@ impl Target {
     /// Paths of all files of frame `frame`: the picture and its maps.
     pub(super) fn paths(&self, frame: u32) -> Vec<PathBuf> {
         let frame = self.pattern.path(frame);
-        let maps = Map::ALL.iter().filter(|_| self.has_map_files());
-        let maps: Vec<PathBuf> = maps.map(|map| map.path(&frame)).collect();
+        let maps: Vec<PathBuf> = self.map_files().map(|map| map.path(&frame)).collect();
         std::iter::once(frame).chain(maps).collect()
     }
 }

@@ -9,7 +9,6 @@ use super::maker::Made;
 use super::target::Target;
 use crate::error::{Error, Result};
 use crate::output::manifest::{AuditRow, Journal, MapRow, Row};
-use crate::output::maps::Map;
 use crate::output::{WriteOptions, write_image};
 use crate::reuse::audit::rmse;
 use crate::reuse::store::ATTRIBUTE;
@@ -33,6 +32,9 @@ pub struct FrameReport {
     pub bytes: u64,
     /// Rays cast.
     pub rays: RayCounts,
+    /// Mean number of camera samples of a pixel; `None` where all pixels take as many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<f64>,
     /// Surface points inferred.
     #[serde(default, skip_serializing_if = "ReuseCounts::is_none")]
     pub reuse: ReuseCounts,
@@ -130,8 +132,18 @@ impl<'a> FrameWriter<'a> {
         let row = Row { audit, rank: self.context.rank, seconds, ..files };
         self.open_journal()?.append(&row)?;
         let write_seconds = start.elapsed().as_secs_f64();
-        let Row { bytes, bad, rays, reuse, .. } = row;
-        Ok(FrameReport { frame, trace_seconds, write_seconds, bytes, rays, reuse, audit, bad })
+        let Row { bytes, bad, rays, samples, reuse, .. } = row;
+        Ok(FrameReport {
+            frame,
+            trace_seconds,
+            write_seconds,
+            bytes,
+            rays,
+            samples,
+            reuse,
+            audit,
+            bad,
+        })
     }
 }
 
@@ -156,11 +168,9 @@ fn write_files(target: &Target, frame: u32, made: &Made) -> Result<Row> {
     let options = WriteOptions { attribute, ..target.write.clone() };
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut maps = Vec::new();
-    if target.has_map_files() {
-        for map in Map::ALL {
-            let (path, written) = map.write(&path, film, &options)?;
-            maps.push(MapRow { file: name(&path), blake3: written.hash.to_hex().to_string() });
-        }
+    for map in target.map_files() {
+        let (path, written) = map.write(&path, film, &options)?;
+        maps.push(MapRow { file: name(&path), blake3: written.hash.to_hex().to_string() });
     }
     let written = write_image(&path, film, &options)?;
     let file = name(&path);
@@ -177,6 +187,7 @@ fn write_files(target: &Target, frame: u32, made: &Made) -> Result<Row> {
         ended: SystemTime::now().duration_since(UNIX_EPOCH).ok().map(|t| t.as_secs_f64()),
         rank: 0,
         rays: *rays,
+        samples: film.mean_samples(),
         reuse: *reuse,
         audit: None,
         bad: film.bad,

@@ -1,9 +1,10 @@
 //! Adaptive camera samples: pixels whose samples differ, or whose neighbours do, take more of them.
 //!
 //! Every pixel takes the least number of samples first. Then each goes on, a few samples at a time, until it has as
-//! many as their differences call for (Neyman, 1934: in proportion to the standard deviation). Four samples miss a
-//! thin edge more often than not, so differences between neighbouring pixels count too. All samples
-//! are averaged, those by which the choice was made too; `docs/accuracy.md` has the bias.
+//! many as their differences call for (Neyman, 1934: in proportion to the standard deviation). The standard deviation
+//! of four samples is itself noisy, and four samples miss a thin edge more often than not. So those of the neighbours, and
+//! differences between neighbouring pixels, count too. All samples are averaged, those by which the choice was made too;
+//! `docs/accuracy.md` has the bias.
 //!
 //! The choice depends on a pixel, its eight neighbours and the settings alone.
 
@@ -12,9 +13,10 @@ use rayon::prelude::*;
 
 /// Pixels whose samples have this standard deviation, in display steps, take all the samples that they may.
 const FULL: f32 = 24.0;
-/// A neighbour's standard deviation counts as this share of an own one: an edge that crosses it often goes on here,
-/// between the samples.
-const BESIDE: f32 = 0.5;
+/// Weight of a pixel's own variance beside those of its neighbours.
+const OWN: f32 = 4.0;
+/// Weight of the variance of a neighbour that shares an edge with it; the others have 1.
+const ADJACENT: f32 = 2.0;
 /// Share of a pixel's difference from the mean of two opposite neighbours that counts as standard deviation: an edge
 /// at the border of two pixels shows in neither's samples.
 const BEND: f32 = 0.5;
@@ -98,33 +100,35 @@ impl Until<'_> {
 /// suggest nothing.
 pub(super) fn beside(spreads: &[SampleSpread], width: u32) -> Vec<f32> {
     let width = width.max(1) as usize;
-    let of = |i: usize| beside_of(spreads, width, i);
-    (0..spreads.len()).into_par_iter().with_min_len(1024).map(of).collect()
-}
-
-fn beside_of(spreads: &[SampleSpread], width: usize, i: usize) -> f32 {
     let height = spreads.len() / width;
-    let own = &spreads[i];
-    if own.count == 0 {
-        return 0.0;
-    }
-    let (x, y) = ((i % width) as isize, (i / width) as isize);
-    let at = |dx: isize, dy: isize| {
-        let (x, y) = (x + dx, y + dy);
-        let is_inside = x >= 0 && y >= 0 && x < width as isize && y < height as isize;
-        let found = is_inside.then(|| &spreads[y as usize * width + x as usize]);
-        found.filter(|spread| spread.count > 0)
+    let of = |i: usize| {
+        let own = &spreads[i];
+        if own.count == 0 {
+            return 0.0;
+        }
+        let (x, y) = ((i % width) as isize, (i / width) as isize);
+        let at = |dx: isize, dy: isize| {
+            let (x, y) = (x + dx, y + dy);
+            let is_inside = x >= 0 && y >= 0 && x < width as isize && y < height as isize;
+            let found = is_inside.then(|| &spreads[y as usize * width + x as usize]);
+            found.filter(|spread| spread.count > 0)
+        };
+        let (mut squares, mut weights) = (OWN * own.deviation().powi(2), OWN);
+        let mut most = 0f32;
+        for (dx, dy) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
+            let pair = [at(dx, dy), at(-dx, -dy)];
+            let weight = if dx == 0 || dy == 0 { ADJACENT } else { 1.0 };
+            for spread in pair.into_iter().flatten() {
+                // An invalid sample of a neighbour says nothing.
+                squares += weight * spread.deviation().powi(2);
+                weights += weight;
+            }
+            if let [Some(a), Some(b)] = pair {
+                let bend = own.mean - 0.5 * (a.mean + b.mean);
+                most = most.max(BEND * (bend.length_squared() / 3.0).sqrt());
+            }
+        }
+        most.max((squares / weights).sqrt())
     };
-    let mut most = 0f32;
-    for (dx, dy) in [(1, 0), (0, 1), (1, 1), (1, -1)] {
-        let pair = [at(dx, dy), at(-dx, -dy)];
-        for spread in pair.into_iter().flatten() {
-            most = most.max(BESIDE * spread.deviation());
-        }
-        if let [Some(a), Some(b)] = pair {
-            let bend = own.mean - 0.5 * (a.mean + b.mean);
-            most = most.max(BEND * (bend.length_squared() / 3.0).sqrt());
-        }
-    }
-    most
+    (0..spreads.len()).into_par_iter().with_min_len(1024).map(of).collect()
 }

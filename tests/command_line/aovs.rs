@@ -47,13 +47,18 @@ fn exr_frames_hold_colour_alone_unless_more_is_asked_for() {
         ("--aovs provenance", "B G R reuse.provenance", false),
         ("--maps", &format!("B G R {maps}"), false),
         ("--maps --aovs depth", &format!("B G R Z {maps}"), false),
+        ("--maps --spp 2..8", &format!("B G R {maps} samples"), false),
+        ("--maps --spp 2..8 --policy off", "B G R samples", false),
         ("--references base", "B G R", true),
         ("--references base --aovs none", "B G R", false),
         ("--aovs all", &all, true),
         ("--aovs all --policy colour", &all, false),
         ("--aovs all --policy off", &format!("B G {FIRST_HITS}"), false),
     ] {
-        job.done(&format!("{LINE} -o o/f_#.exr {options} --overwrite"));
+        // An option is given once.
+        let line =
+            if options.contains("--spp") { LINE.replace(" --spp 1", "") } else { LINE.into() };
+        job.done(&format!("{line} -o o/f_#.exr {options} --overwrite"));
         assert_eq!(held(&job, "o/f_2.exr"), (channels.into(), has_reference), "{options}");
     }
 }

@@ -97,7 +97,7 @@ fn motion_leads_to_where_the_surface_was() {
 fn maps_lie_beside_their_frames_and_come_back_when_lost() {
     let job = Job::new();
     scene(&job, "scene.toml", &pan(9, 1.0));
-    job.refused("render scene.toml --maps --policy off", "--maps … --policy off");
+    job.refused("render scene.toml --maps --policy off", "--maps … --policy off … --spp MIN..MAX");
     job.done("render scene.toml -o o/f_#.png --frames 1..3 --maps");
     assert_eq!(job.names("o").len(), 3 * 5 + 1);
     let map = job.read("o/f_2_provenance.png");

@@ -22,6 +22,10 @@ pub struct Render {
     frames: Option<[usize; 2]>,
     /// On shadow and sky samples.
     factor: usize,
+    /// As many camera samples in every pixel, instead of those of the settings.
+    camera: Option<usize>,
+    /// The seed, where it is not the program's own: of camera samples too.
+    seed: Option<usize>,
     /// Of the frames' names.
     ending: &'static str,
 }
@@ -35,8 +39,20 @@ impl Render {
             policy,
             frames: None,
             factor: 1,
+            camera: None,
+            seed: None,
             ending: "exr",
         }
+    }
+
+    /// The same with as many camera samples in every pixel.
+    pub fn with_camera_samples(self, spp: usize) -> Self {
+        Self { camera: Some(spp), ..self }
+    }
+
+    /// The same with other random numbers, those of camera samples too.
+    pub fn with_seed(self, seed: usize) -> Self {
+        Self { seed: Some(seed), ..self }
     }
 
     /// The same to png files.
@@ -53,6 +69,8 @@ impl Render {
             policy: "off",
             frames,
             factor,
+            camera: None,
+            seed: None,
             ending: "exr",
         }
     }
@@ -81,6 +99,17 @@ impl Spent {
         of("load_seconds") + of("build_seconds")
     }
 
+    /// Rays of frame `number`, those of its probes too.
+    pub fn rays(&self, number: usize) -> f64 {
+        let frames = self.stats["frames"].as_array();
+        let own = frames.and_then(|all| all.iter().find(|f| f["frame"] == number));
+        let sum = |rays: &Value| -> f64 {
+            let kinds = rays.as_object().into_iter().flatten();
+            kinds.filter_map(|(_, n)| n.as_f64()).sum()
+        };
+        own.map_or(0.0, |f| sum(&f["rays"]) + sum(&f["audit"]["sums"]["rays"]))
+    }
+
     pub fn remove_frames(&self) -> Result<(), Failure> {
         Ok(std::fs::remove_dir_all(&self.frames)?)
     }
@@ -102,18 +131,22 @@ impl Program {
     ) -> Result<Spent, Failure> {
         let frames = folder.join(&render.name);
         let light = (settings.light * render.factor).to_string();
+        let camera = render.camera.map_or(settings, |spp| settings.uniform(spp)).camera_samples();
         let stats = folder.join(format!("{}.json", render.name));
         let mut command = Command::new(&self.path);
         command
             .arg("render")
             .arg(folder.join(&render.scene))
             .args(["--size", &format!("{}x{}", size[0], size[1])])
-            .args(["--spp", &settings.spp.to_string()])
+            .args(["--spp", &camera])
             .args(["--shadow-samples", &light, "--sky-samples", &light])
             .args(["--policy", render.policy, "--no-video", "--overwrite", "-q", "--stats"])
             .arg(&stats)
             .arg("-o")
             .arg(frames.join(format!("frame_####.{}", render.ending)));
+        if let Some(seed) = render.seed {
+            command.args(["--seed", &seed.to_string()]);
+        }
         if let Some([first, last]) = render.frames {
             command.args(["--frames", &format!("{first}..{last}")]);
         }

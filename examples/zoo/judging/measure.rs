@@ -2,6 +2,7 @@
 
 use super::audit::AuditCheck;
 use super::contract::{DEVIATIONS, FLOOR, TRACES, Tile, mean};
+use super::equal_rays::EqualRays;
 use super::frame::Picture;
 use super::job::Spent;
 use serde_json::Value;
@@ -124,6 +125,8 @@ pub struct Verdict {
     /// Share of the points of in-between frames inferred, seen directly and in mirrors or glass.
     pub inferred_share: [Option<f64>; 2],
     pub audit: Option<AuditCheck>,
+    /// The comparison with uniform samples, where camera samples are a range.
+    pub equal_rays: Option<EqualRays>,
     /// The jobs that infer and that trace.
     pub jobs: [Spent; 2],
     pub pictures: Vec<Pictures>,
@@ -139,6 +142,7 @@ impl Verdict {
             flicker: flicker(&pictures),
             inferred_share: ["direct", "specular"].map(|kind| share(&jobs[0].stats, kind, last)),
             audit: AuditCheck::new(&jobs[0].stats, &frames, last),
+            equal_rays: None,
             frames,
             jobs,
             pictures,

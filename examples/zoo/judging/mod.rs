@@ -11,15 +11,21 @@
 //!   16 times the samples and independent of all that is judged by it, and their difference is its
 //!   own noise.
 //!
+//! With a range of camera samples the frames have different numbers of these, so errors of edges count. Then all but
+//! the first two have seeds, and camera samples, of their own, and the truth has four times the most camera samples of a
+//! pixel instead of more light samples. Uniform samples are rendered as well ([`EqualRays`]).
+//!
 //! All errors are in display steps of 1/255, not rounded.
 
 mod audit;
 mod contract;
+mod equal_rays;
 mod frame;
 mod job;
 mod measure;
 
 pub use contract::{FLOOR, Tile};
+pub use equal_rays::EqualRays;
 pub use frame::{Picture, SIDE};
 pub use job::{Program, Spent};
 pub use measure::{FrameFigures, Pictures, Verdict};
@@ -34,6 +40,8 @@ pub type Failure = Box<dyn std::error::Error>;
 
 /// Light samples of each half of the truth over those of a traced frame.
 const TRUER: usize = 8;
+/// Camera samples of each half of the truth over the most of a pixel, where these are a range.
+const TRUER_CAMERA: usize = 4;
 
 /// How scenes are rendered.
 #[derive(Clone, Copy)]
@@ -72,7 +80,12 @@ pub fn judge(
     let first = |k: usize| 1000 * (k + 1);
     let other = |k: usize, name: &str, factor: usize| -> Result<Spent, Failure> {
         specimen.write(folder, &format!("{name}.toml"), &poses, first(k))?;
-        run(Render::of_others(name, [first(k), poses.len()], factor))
+        let render = |factor| Render::of_others(name, [first(k), poses.len()], factor);
+        run(match settings.most {
+            None => render(factor),
+            Some(_) if factor == 1 => render(1).with_seed(first(k)),
+            Some(most) => render(1).with_seed(first(k)).with_camera_samples(TRUER_CAMERA * most),
+        })
     };
     let others = [
         other(0, "again1", 1)?,
@@ -92,6 +105,16 @@ pub fn judge(
             &[of(d, 3)?, of(e, 4)?],
         ));
     }
+    let equal_rays = match settings.most {
+        None => None,
+        Some(most) => {
+            let move_of =
+                |policy, spp| run(Render::of_move("uniform", policy).with_camera_samples(spp));
+            let between: Vec<&Pictures> =
+                pictures.iter().filter(|p| p.frame != 1 && p.frame != frames).collect();
+            Some(EqualRays::new([&inferred, &traced], &between, [settings.spp, most], move_of)?)
+        }
+    };
     for job in others.iter().chain([&inferred, &traced]) {
         job.remove_frames()?;
     }
@@ -104,7 +127,10 @@ pub fn judge(
             (job.wall, job.cpu) = (timed.wall, timed.cpu);
         }
     }
-    Ok(Verdict::new(pictures, frames, jobs))
+    let verdict = Verdict::new(pictures, frames, jobs);
+    // The audit's truth has the frame's own camera samples, so it knows nothing of their error.
+    let audit = verdict.audit.filter(|_| settings.most.is_none());
+    Ok(Verdict { equal_rays, audit, ..verdict })
 }
 
 /// Numbers of the frames that are judged: all of a short move; of a long one in-between frames in

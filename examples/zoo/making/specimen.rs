@@ -12,10 +12,24 @@ use std::path::Path;
 /// Samples of a render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// Camera samples a pixel.
+    /// Camera samples a pixel; the least where `most` is given.
     pub spp: usize,
+    /// The most camera samples of a pixel; `None` where all pixels take as many.
+    pub most: Option<usize>,
     /// Shadow samples a light, and sky samples.
     pub light: usize,
+}
+
+impl Settings {
+    /// The value of `--spp`.
+    pub fn camera_samples(&self) -> String {
+        self.most.map_or_else(|| self.spp.to_string(), |most| format!("{}..{most}", self.spp))
+    }
+
+    /// The same with as many camera samples in every pixel.
+    pub fn uniform(self, spp: usize) -> Self {
+        Self { spp, most: None, ..self }
+    }
 }
 
 /// A scene with its camera move.
@@ -153,5 +167,5 @@ fn settings(dice: &mut Dice, soft_lights: usize) -> Settings {
     } else {
         16
     };
-    Settings { spp: spp.min(affordable), light: 16 }
+    Settings { spp: spp.min(affordable), most: None, light: 16 }
 }

@@ -16,7 +16,7 @@ pub struct Told {
     pub name: String,
     #[serde(rename = "move")]
     pub kind: &'static str,
-    pub spp: usize,
+    pub spp: String,
     pub light: usize,
     pub frames: Vec<Frame>,
     pub flicker: Option<[f64; 2]>,
@@ -31,6 +31,9 @@ pub struct Told {
     /// Off over surface, CPU.
     pub speed: f64,
     pub audit: Option<Audit>,
+    /// Decibels by which a range of camera samples is nearer to the truth than uniform samples of as many rays,
+    /// inferred and traced.
+    pub gains: Option<[f64; 2]>,
     pub worst_tile: Option<WorstTile>,
 }
 
@@ -106,7 +109,7 @@ impl Told {
             family: FAMILIES[specimen.family].name,
             name: specimen.name.clone(),
             kind: specimen.kind.name(),
-            spp: settings.spp,
+            spp: settings.camera_samples(),
             light: settings.light,
             frames: verdict.frames.iter().map(Frame::new).collect(),
             flicker: verdict.flicker,
@@ -123,6 +126,7 @@ impl Told {
                 rmse_traced: audit.traced,
                 traced_truly: audit.traced_truly,
             }),
+            gains: verdict.equal_rays.map(|equal| equal.gains()),
             worst_tile: verdict.worst_tile().map(|(frame, tile)| WorstTile {
                 frame,
                 place: tile.place,
@@ -158,8 +162,11 @@ impl Told {
             Some(a) => format!("{:5.2}{}", a.rmse[0], if a.holds { ' ' } else { '!' }),
         };
         let kept = |keeps: fn(&Frame) -> bool| self.frames.iter().filter(|f| keeps(f)).count();
+        let gains = self.gains.map_or(String::new(), |[inferred, traced]| {
+            format!("  against uniform {inferred:+.2} {traced:+.2} dB")
+        });
         format!(
-            "{:5} {:15} {:9} {:>2},{:<3} {:+8.2}  {:6.2}/{:<6.2}  {tile:24}  {:4.1}/{:<4.1} {:6.2}  {} {}  {:5.2}  {audit}  {}/{} of {}",
+            "{:5} {:15} {:9} {:>2},{:<3} {:+8.2}  {:6.2}/{:<6.2}  {tile:24}  {:4.1}/{:<4.1} {:6.2}  {} {}  {:5.2}  {audit}  {}/{} of {}{gains}",
             self.index,
             self.name,
             self.kind,

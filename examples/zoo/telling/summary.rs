@@ -42,6 +42,20 @@ pub fn summary(told: &[Told], frames_of_move: usize) -> Summary {
     let audits: Vec<bool> = told.iter().filter_map(|t| Some(t.audit.as_ref()?.holds)).collect();
     let holds = audits.iter().filter(|holds| **holds).count();
     summary.want("audits whose interval holds the truth", [holds, audits.len()], 0.95);
+    for (k, name) in ["inferred", "traced"].into_iter().enumerate() {
+        let gains: Vec<f64> = told.iter().filter_map(|t| Some(t.gains?[k])).collect();
+        if gains.is_empty() {
+            continue;
+        }
+        let met = gains.iter().filter(|gain| **gain >= -0.2).count();
+        let what = format!("moves at most 0.2 dB above uniform samples of as many rays, {name}");
+        summary.want(&what, [met, gains.len()], 1.0);
+        let worst = gains.iter().copied().fold(f64::INFINITY, f64::min);
+        summary.tell(&format!(
+            "  nearer by {:.2} dB in the median, {worst:.2} at worst",
+            median(&gains)
+        ));
+    }
     let speeds: Vec<f64> = told.iter().map(|t| t.speed).collect();
     let slow = speeds.iter().filter(|s| **s < 1.0 / 1.05).count();
     if frames_of_move >= LONG {

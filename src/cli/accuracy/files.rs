@@ -81,7 +81,7 @@ pub fn write(args: &AccuracyArgs, outcome: &Outcome, command: &[String]) -> Resu
 /// Columns of the CSV, as in the page's tables, up to the rays of a turn by kind.
 const BEFORE_RAYS: &str = "knob,options,seconds,seconds_low,seconds_high,cpu_seconds,cpu_seconds_low,\
     cpu_seconds_high,time_ratio,time_ratio_low,time_ratio_high,cpu_ratio,cpu_ratio_low,cpu_ratio_high,confidence,mse,rmse_steps,psnr,ssim,flip,share_over_2,flicker,\
-    error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame";
+    error_ratio,error_ratio_low,error_ratio_high,pixels_over_2_from_default,rays_per_frame,camera_samples";
 /// The columns after those.
 const AFTER_RAYS: &str = "build_seconds,memory_bytes,on_front,on_cpu_front";
 
@@ -109,6 +109,8 @@ fn line(row: &CandidateRow) -> String {
     cells.extend(ratio(&row.error_ratio));
     cells.push(row.change.map_or(String::new(), |c| c.over_2.to_string()));
     cells.push(number(row.rays_per_frame));
+    // Empty where all pixels take as many.
+    cells.push(row.camera_samples.map_or(String::new(), number));
     cells.extend(RayKind::ALL.map(|kind| row.rays[kind].to_string()));
     cells.push(number(row.build_seconds.median.interval.estimate));
     cells.push(row.memory_bytes.to_string());

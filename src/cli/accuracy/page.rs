@@ -232,6 +232,9 @@ fn details(outcome: &Outcome, scene: &str, given: &[Given]) -> Vec<Detail> {
             };
             figures.push(("Time against default", with_changes(ratio) + word));
         }
+        if let Some(mean) = row.camera_samples {
+            figures.push(("Camera samples a pixel", short(mean)));
+        }
         figures.extend([
             ("RMSE", format!("{}/255", short(e.rmse_steps))),
             ("PSNR", format!("{} dB", short(e.psnr))),

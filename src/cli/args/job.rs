@@ -35,7 +35,8 @@ pub struct JobArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
     pub fps: Option<f64>,
     /// Write maps of where each frame's light comes from (traced or inferred, from which frame, at what
-    /// distance) and of its audited errors; as pictures beside png and ppm frames, as channels of exr frames
+    /// distance), of its audited errors, and with --spp MIN..MAX of the numbers of camera samples; as pictures
+    /// beside png and ppm frames, as channels of exr frames
     #[arg(long, help_heading = "Reuse")]
     pub maps: bool,
     /// Surface policy: infer also from the exr frames in this folder, made by an earlier job of the same

@@ -7,7 +7,7 @@ use crate::stats::RayKind;
 
 /// All charts that have data.
 pub fn all(job: &Job) -> Vec<Chart> {
-    let charts = [Some(seconds(job)), reuse(job), Some(rays(job)), audit(job)];
+    let charts = [Some(seconds(job)), reuse(job), samples(job), Some(rays(job)), audit(job)];
     charts.into_iter().flatten().filter(|_| !job.rows.is_empty()).collect()
 }
 
@@ -52,6 +52,16 @@ fn reuse(job: &Job) -> Option<Chart> {
         frames: frames(job),
         lines,
         most: Some(100.0),
+        ..Chart::default()
+    })
+}
+
+fn samples(job: &Job) -> Option<Chart> {
+    job.samples()?;
+    Some(Chart {
+        caption: "Camera samples a pixel, mean of a frame".into(),
+        frames: frames(job),
+        lines: vec![series(job, "camera samples", |row| row.samples)],
         ..Chart::default()
     })
 }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::{Encoding, Film, Image};
 use crate::math::Rgb;
 use crate::output::manifest::{MapRow, Row};
-use crate::output::maps::{self, Map};
+use crate::output::maps::{self, Map, MapScales};
 use crate::output::{Display, read_image};
 use crate::page::job::PlayerFrame;
 use crate::page::{Picture, words};
@@ -30,16 +30,18 @@ pub fn pictures(job: &Job, every: usize, width: u32) -> (Vec<PlayerFrame>, Vec<u
 fn offered(job: &Job) -> Vec<Map> {
     let says = |map: &Map| match map {
         Map::Audit => job.audited().is_some(),
+        Map::Samples => job.samples().is_some(),
         Map::Provenance | Map::Frame | Map::Distance => job.reuse().is_inferred(),
     };
     Map::ALL.into_iter().filter(says).collect()
 }
 
 /// The maps that the film has, with their meanings.
-pub fn maps_of(film: &[PlayerFrame]) -> Vec<(String, String)> {
+pub fn maps_of(job: &Job, film: &[PlayerFrame]) -> Vec<(String, String)> {
+    let scales = MapScales::of(&job.settings);
     let has = |map: &Map| film.iter().any(|frame| frame.maps.contains_key(map.name()));
     let maps = Map::ALL.into_iter().filter(has);
-    maps.map(|map| (map.name().into(), map.meaning().into())).collect()
+    maps.map(|map| (map.name().into(), scales.meaning(map))).collect()
 }
 
 fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<PlayerFrame> {
@@ -54,7 +56,7 @@ fn shown(job: &Job, row: &Row, wanted: &[Map], width: u32) -> Result<PlayerFrame
     let mut text = text(row);
     let mut pictures = BTreeMap::new();
     if image.encoding == Encoding::Linear {
-        let painted = maps::of_exr(&path, &display, settings.reuse.farthest())?;
+        let painted = maps::of_exr(&path, &display, MapScales::of(settings))?;
         for (map, film) in painted.into_iter().filter(|(map, _)| wanted.contains(map)) {
             pictures.insert(map.name().to_string(), Picture::jpeg(&paint(&film), width)?);
         }
@@ -93,6 +95,9 @@ fn text(row: &Row) -> String {
         words::seconds(row.seconds),
         words::short(row.rays.total() as f64)
     );
+    if let Some(samples) = row.samples {
+        text += &format!(", {} camera samples a pixel", words::short(samples));
+    }
     if let Some(share) = row.reuse.share() {
         text += &format!(", {} of the surface points inferred", words::percent(share));
     }

@@ -174,20 +174,24 @@ fn flatten(table: &mut Table, group: &str, value: &Value) {
 
 /// Every frame.
 pub fn frames(job: &Job) -> Table {
-    let head = ["frame", "file", "size", "seconds", "rays", "inferred", "error (1/255)", "rank"];
+    // The column of means is there only where pixels take different numbers.
+    let mut head = vec!["frame", "file", "size", "seconds", "rays"];
+    head.extend(job.samples().map(|_| "camera samples"));
+    head.extend(["inferred", "error (1/255)", "rank"]);
     let mut table = Table::new("Frames", &head);
     for row in &job.rows {
         let error = row.audit.and_then(|audit| audit.rmse).map_or("–".into(), |[e, ..]| steps(e));
-        table.rows.push(vec![
+        let mut cells = vec![
             row.frame.to_string(),
             row.file.clone(),
             bytes(row.bytes),
             short(row.seconds),
             count(row.rays.total()),
-            row.reuse.share().map_or("–".into(), percent),
-            error,
-            row.rank.to_string(),
-        ]);
+        ];
+        cells.extend(job.samples().map(|_| row.samples.map_or("–".into(), short)));
+        let inferred = row.reuse.share().map_or("–".into(), percent);
+        cells.extend([inferred, error, row.rank.to_string()]);
+        table.rows.push(cells);
     }
     table
 }

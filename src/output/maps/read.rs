@@ -1,6 +1,6 @@
 //! Reading maps from the channels of an exr frame.
 
-use super::{Display, Film, Map, Provenance, ProvenanceKind, Rgb};
+use super::{Display, Film, Map, MapScales, Provenance, ProvenanceKind, Rgb};
 use crate::error::{Error, Result};
 use crate::output::DEFAULT_MEMORY_LIMIT;
 use crate::output::exr::{self, ExrChannels, ExrSamples};
@@ -9,22 +9,22 @@ use std::io::BufReader;
 use std::path::Path;
 
 /// The maps that the exr frame at `path` has, painted as for a png frame: linear display
-/// values. `farthest` is as in [`Map::paint`].
+/// values.
 ///
 /// # Errors
 /// [`Error::Io`] and [`Error::Input`] when the file cannot be read.
-pub fn of_exr(path: &Path, display: &Display, farthest: f32) -> Result<Vec<(Map, Film)>> {
+pub fn of_exr(path: &Path, display: &Display, scales: MapScales) -> Result<Vec<(Map, Film)>> {
     let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
     let channels = exr::decode(path, BufReader::new(file), DEFAULT_MEMORY_LIMIT)?;
     let Some(film) = film_of(&channels) else { return Ok(Vec::new()) };
     let has = |map: Map| channels.list.iter().any(|channel| channel.name == map.channel_name());
     // The provenance says which pixels the two others are of.
     let is_whole = |map: &Map| match map {
-        Map::Provenance | Map::Audit => has(*map),
+        Map::Provenance | Map::Audit | Map::Samples => has(*map),
         Map::Frame | Map::Distance => has(*map) && has(Map::Provenance),
     };
     let maps = Map::ALL.into_iter().filter(is_whole);
-    Ok(maps.map(|map| (map, map.paint(&film, display, farthest))).collect())
+    Ok(maps.map(|map| (map, map.paint(&film, display, scales))).collect())
 }
 
 /// The film with the data of the maps' channels, as far as there are such channels; `None` without colour.
@@ -48,6 +48,7 @@ fn film_of(channels: &ExrChannels) -> Option<Film> {
     };
     film.provenance = Some((0..r.len()).map(source).collect());
     film.audit = channels.f32("reuse.audit").map(<[f32]>::to_vec);
+    film.samples = numbers("samples").cloned();
     Some(film)
 }
 
@@ -70,6 +71,8 @@ mod tests {
         let source = |i: u32| Provenance { kind: known(i % 5), frame: i, distance: i as f32 / 4.0 };
         film.provenance = Some((0..6).map(source).collect());
         film.audit = Some(vec![f32::NAN, 3.0, f32::NAN, -8.0, f32::NAN, f32::NAN]);
+        film.samples = Some(vec![4, 4, 9, 16, 4, 0]);
+        let scales = MapScales { farthest: Some(2.0), samples: Some([4, 16]) };
         let with = |list| WriteOptions {
             aovs: Aovs::parse(list).expect("a list"),
             ..WriteOptions::default()
@@ -77,20 +80,21 @@ mod tests {
         let path = folder.path().join("a.exr");
         write_image(&path, &film, &with("all")).expect("written");
         let display = Display { exposure: 1.0, tone: ToneCurve::Srgb };
-        let maps = of_exr(&path, &display, 2.0).expect("read");
+        let maps = of_exr(&path, &display, scales).expect("read");
         assert_eq!(maps.len(), Map::ALL.len());
         for (map, painted) in maps {
-            assert_eq!(painted.rgb, map.paint(&film, &display, 2.0).rgb, "{}", map.name());
+            assert_eq!(painted.rgb, map.paint(&film, &display, scales).rgb, "{}", map.name());
         }
         let plain = folder.path().join("b.exr");
         for (list, expected) in [
             ("none", &[][..]),
             ("audit", &[Map::Audit]),
+            ("samples", &[Map::Samples]),
             ("frame", &[]),
             ("provenance,distance", &[Map::Provenance, Map::Distance]),
         ] {
             write_image(&plain, &film, &with(list)).expect("written");
-            let found = of_exr(&plain, &display, 2.0).expect("read");
+            let found = of_exr(&plain, &display, scales).expect("read");
             assert_eq!(found.iter().map(|(map, _)| *map).collect::<Vec<_>>(), expected, "{list}");
         }
     }
