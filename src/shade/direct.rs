@@ -9,8 +9,8 @@ use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarge
 use super::pilots::{Findings, Run};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
-use super::selection::{LightUser, LightUsers, Reached};
-use super::tail::TailSamples;
+use super::selection::{LightUser, LightUsers, Reached, TailSamples};
+use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 use crate::math::{DVec3, Rgb, luminance};
@@ -78,36 +78,6 @@ impl SampleSink for ShadowRays<'_> {
             self.scratch.rays.push(self.starts.ray_to(&sample.target));
             self.scratch.weights.push(sample.weight);
         }
-    }
-}
-
-/// A light that shines in this frame.
-pub(super) struct LightSource {
-    pub sampler: LightSampler,
-    /// Its number among the scene's lights, the sky last.
-    pub number: u32,
-    /// Shadow rays of one camera sample.
-    pub samples: u32,
-    /// Shadow rays of one camera sample that are cast before: where these find the same all around, there are no
-    /// others. As many as `samples` if there are none.
-    pub pilots: u32,
-    /// What its shadow rays count as.
-    pub rays: RayKind,
-    /// The channel of its ratio, if that is kept; where lights are selected, every point has channels of its own.
-    pub channel: Option<u16>,
-    /// Whether its ratio is kept.
-    pub is_kept: bool,
-}
-
-impl LightSource {
-    /// Whether it is the sky.
-    pub fn is_sky(&self) -> bool {
-        self.rays == RayKind::ShadowSky
-    }
-
-    /// Whether its samples are drawn at random: a delta light has one.
-    fn is_sampled(&self) -> bool {
-        self.rays != RayKind::ShadowDelta
     }
 }
 

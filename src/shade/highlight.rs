@@ -6,13 +6,13 @@
 //! is kept for other frames. Where lights are selected, the heuristic counts the mean number of samples that choose a
 //! light.
 
-use super::direct::{BATCH, LightSource, ShadowScratch, ShadowStarts};
+use super::direct::{BATCH, ShadowScratch, ShadowStarts};
 use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
 use super::lobe::Lobe;
 use super::pixels::BlockPixels;
 use super::point::SamplePlace;
-use super::selection::{LightSelection, LightUser};
-use super::tail::Choice;
+use super::selection::{Choice, LightSelection, LightUser};
+use super::source::LightSource;
 use super::{FrameInput, Renderer};
 use crate::math::{DVec3, Rgb};
 use crate::stats::RayCounts;

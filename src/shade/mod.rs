@@ -24,6 +24,7 @@ mod pixels;
 mod point;
 mod scattered;
 mod selection;
+mod source;
 mod tail;
 mod texture;
 
@@ -37,12 +38,12 @@ use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 pub use adaptive::SampleSpread;
 use adaptive::Until;
-use direct::LightSource;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
 use pixels::{BLOCK, BlockPixels, FinishedPixel, SampleLimits};
 use selection::{LightSelection, LightUsers, Reached};
+use source::LightSource;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's. Larger ones leave

@@ -8,8 +8,8 @@
 //! The choice depends on the block alone, so it is the same for any threads, ranks and crop. A shadow that no pilot
 //! of these pixels meets is missed; `docs/accuracy.md` has a bound on that error.
 
-use super::direct::LightSource;
 use super::pixels::BLOCK;
+use super::source::LightSource;
 
 /// How far away pilots count, pixels, each way.
 const REACH: u32 = 2;

@@ -5,9 +5,9 @@
 //! ([`super::tail`]).
 
 use super::Renderer;
-use super::direct::LightSource;
+use super::source::LightSource;
 use crate::math::DVec3;
-use crate::scene::{CellLights, LightCells, Settings};
+use crate::scene::{CellLights, LightCells, Settings, Tail};
 use std::f64::consts::PI;
 
 /// Culled lights together change a white surface by at most so much, display steps of 1/255, even where nothing else
@@ -57,6 +57,39 @@ pub(super) enum Reached<'u> {
     /// So many points, all of a chunk, and where its ratios are kept.
     All(usize, Option<u16>),
     Some(&'u [LightUser]),
+}
+
+/// Random numbers of the samples at one point.
+#[derive(Default)]
+pub(super) struct TailSamples {
+    pub choices: Vec<[f32; 2]>,
+    pub places: Vec<[f32; 2]>,
+}
+
+/// A sample's light.
+pub(super) struct Choice {
+    /// Its place among the frame's sources; `None` of a light that does not shine.
+    pub source: Option<usize>,
+    /// Mean number of the samples that choose it.
+    pub count: f64,
+    /// The place on it.
+    pub place: [f32; 2],
+}
+
+impl TailSamples {
+    /// The samples' choices among the lights of `tail`.
+    pub fn choices<'s>(
+        &'s self,
+        tail: Tail<'s>,
+        selection: &'s LightSelection,
+    ) -> impl Iterator<Item = Choice> + 's {
+        let samples = self.choices.len() as f64;
+        self.choices.iter().zip(&self.places).map(move |(choice, place)| {
+            let (light, probability) = tail.choose(f64::from(choice[0]));
+            let source = selection.source(light);
+            Choice { source, count: samples * probability, place: *place }
+        })
+    }
 }
 
 /// The irradiance that the culled lights of a point may send together.

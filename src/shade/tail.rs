@@ -4,48 +4,16 @@
 //! from there over the probability is on average what arrives from the whole tail. No ratio of it is kept for other
 //! frames: every point traces its own.
 
-use super::direct::{BATCH, LightSource, ShadowScratch, ShadowStarts};
+use super::direct::{BATCH, ShadowScratch, ShadowStarts};
 use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
-use super::selection::LightSelection;
+use super::selection::{Choice, LightSelection, TailSamples};
+use super::source::LightSource;
 use super::{FrameInput, Renderer, dimensions};
 use crate::math::{DVec3, Rgb};
 use crate::scene::Tail;
 use crate::stats::RayCounts;
-
-/// Random numbers of the samples at one point.
-#[derive(Default)]
-pub(super) struct TailSamples {
-    choices: Vec<[f32; 2]>,
-    places: Vec<[f32; 2]>,
-}
-
-/// A sample's light.
-pub(super) struct Choice {
-    /// Its place among the frame's sources; `None` of a light that does not shine.
-    pub source: Option<usize>,
-    /// Mean number of the samples that choose it.
-    pub count: f64,
-    /// The place on it.
-    pub place: [f32; 2],
-}
-
-impl TailSamples {
-    /// The samples' choices among the lights of `tail`.
-    pub fn choices<'s>(
-        &'s self,
-        tail: Tail<'s>,
-        selection: &'s LightSelection,
-    ) -> impl Iterator<Item = Choice> + 's {
-        let samples = self.choices.len() as f64;
-        self.choices.iter().zip(&self.places).map(move |(choice, place)| {
-            let (light, probability) = tail.choose(f64::from(choice[0]));
-            let source = selection.source(light);
-            Choice { source, count: samples * probability, place: *place }
-        })
-    }
-}
 
 /// The shadow ray of one sample.
 struct TailRay<'s> {
