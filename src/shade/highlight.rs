@@ -140,11 +140,11 @@ impl Renderer<'_> {
                     users.map(|LightUser { point, .. }| &points[point as usize])
                 };
                 for point in group() {
-                    let sampled = (point.place.sample.wrapping_mul(source.samples), n as f64);
-                    let drawn = |u: &mut [[f32; 2]]| {
-                        self.fill(&point.place, source, sampled.0, pixels, u);
+                    let draw = |u: &mut [[f32; 2]]| {
+                        let first = point.place.sample.wrapping_mul(source.samples);
+                        self.fill(&point.place, source, first, pixels, u);
                     };
-                    self.highlight_rays(source, point, sampled.1, (&mut u, &drawn), s);
+                    self.highlight_rays(source, point, n as f64, &mut u, draw, s);
                     s.close();
                 }
                 self.trace_shadow_rays(source, s, counts);
@@ -169,7 +169,8 @@ impl Renderer<'_> {
         source: &LightSource,
         point: &GlossyPoint,
         count: f64,
-        (u, draw): (&mut [[f32; 2]], &dyn Fn(&mut [[f32; 2]])),
+        u: &mut [[f32; 2]],
+        draw: impl FnOnce(&mut [[f32; 2]]),
         scratch: &mut ShadowScratch,
     ) {
         let exact = source.sampler.unshadowed(point.p, point.n);
@@ -204,7 +205,7 @@ impl Renderer<'_> {
             for Choice { source, count, place } in samples.choices(tail, selection) {
                 let Some(source) = source.map(|at| &input.lights[at]) else { continue };
                 let before = s.ray_count();
-                self.highlight_rays(source, point, count, (&mut [place], &|_| ()), s);
+                self.highlight_rays(source, point, count, &mut [place], |_| (), s);
                 s.tint_from(before, source.sampler.emission);
                 counts[source.rays] += (s.ray_count() - before) as u64;
             }

@@ -30,7 +30,7 @@ struct TailRay<'s> {
 impl SampleSink for TailRay<'_> {
     fn push(&mut self, sample: LightSample) {
         let irradiance = match sample.target {
-            ShadowTarget::Point(end) => self.from_point(end.point),
+            ShadowTarget::Point(end) => self.irradiance_from(end.point),
             ShadowTarget::Direction(_) | ShadowTarget::Sky(_) => self.exact,
         };
         let light = self.source.sampler.emission * (irradiance / self.count) as f32;
@@ -42,7 +42,7 @@ impl SampleSink for TailRay<'_> {
 }
 
 impl TailRay<'_> {
-    fn from_point(&self, point: DVec3) -> f64 {
+    fn irradiance_from(&self, point: DVec3) -> f64 {
         let p = self.point.si.p;
         let Some(density) = self.view.pdf_li(p, point) else { return self.exact };
         let wi = (point - p).normalize();
