@@ -122,10 +122,10 @@ impl Source {
         is_bare.then(|| (number, format!("{sign}{}{left}.{}{right}", zero(left), zero(right))))
     }
 
-    /// An unknown name in quotes is a value, any other a key.
+    /// An unknown name in quotes is a value, and so is one in an array; any other is a key.
     fn kind_at(&self, span: &Span) -> &'static str {
         let at = self.text.as_bytes().get(span.start);
-        if matches!(at, Some(b'"' | b'\'')) { "value" } else { "key" }
+        if matches!(at, Some(b'"' | b'\'' | b'[')) { "value" } else { "key" }
     }
 }
 

@@ -36,19 +36,9 @@ pub(super) struct PngBits(pub u8);
 pub(super) struct Isa(pub String);
 
 /// The name of an AOV, or of all or none.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(transparent)]
 pub(super) struct AovName(pub Aovs);
-
-impl<'de> Deserialize<'de> for AovName {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        Aovs::parse(&name).map(Self).map_err(|name| {
-            let names = Aovs::NAMES.join("`, `");
-            D::Error::custom(format_args!("there is no AOV `{name}`; there are `{names}`"))
-        })
-    }
-}
 
 inline_schema!(AovName, |_| json_schema!({ "enum": Aovs::NAMES }));
 
