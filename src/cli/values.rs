@@ -75,8 +75,8 @@ pub fn light_samples(text: &str) -> Result<SampleNumber, String> {
 }
 
 fn samples(name: &str, fewest: u32, text: &str) -> Result<SampleNumber, String> {
-    let number = |text: &str, fewest: u32| {
-        let most = limits::MAX_SAMPLES;
+    let most = limits::MAX_SAMPLES;
+    let number = |text: &str| {
         let count = text.trim().parse().ok().filter(|n| (fewest..=most).contains(n));
         count.ok_or_else(|| {
             format!(
@@ -85,12 +85,14 @@ fn samples(name: &str, fewest: u32, text: &str) -> Result<SampleNumber, String> 
         })
     };
     let Some((least, most)) = text.split_once("..") else {
-        return Ok(SampleNumber { least: number(text, fewest)?, most: None });
+        return Ok(SampleNumber { least: number(text)?, most: None });
     };
-    let (least, most) = (number(least, 1)?, number(most, 1)?);
-    match least <= most {
-        true => Ok(SampleNumber { least, most: (most > least).then_some(most) }),
-        false => Err(format!("the least {name}, {least}, are more than the most, {most}")),
+    match (number(least)?, number(most)?) {
+        (0, _) => Err(format!("a range of {name} starts at 1; 0 alone means none")),
+        (least, most) if most < least => {
+            Err(format!("{least}..{most} ends before it starts: write {most}..{least}"))
+        }
+        (least, most) => Ok(SampleNumber { least, most: (most > least).then_some(most) }),
     }
 }
 

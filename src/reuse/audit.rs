@@ -40,8 +40,8 @@ pub struct AuditedPixel {
     pub weight: f64,
     /// Pixels with one group number are neighbours that were drawn together; their errors are alike.
     pub group: u64,
-    /// How many times as many camera samples as the traces have a traced frame takes of it: its squared error is
-    /// smaller by that.
+    /// How many times as many camera samples as the traces the frame has of it, where it is traced: its squared error
+    /// is smaller by that.
     pub refinement: f64,
 }
 
@@ -110,10 +110,11 @@ pub fn sums(shown: &AuditedFrame, drawn: &[AuditedPixel], traces: [&[Rgb]; 2]) -
             sums.inferred_pixels += others as u64;
             group.inferred.get_or_insert_default().add(squares.error, others, UNSEEN_INFERRED);
         }
-        let mean = (others * squares.error + squares.trace) / weight;
+        let trace = squares.trace / refinement;
+        let mean = (others * squares.error + trace) / weight;
         let unseen = if shown.is_inferred(i) { UNSEEN_INFERRED } else { UNSEEN };
         group.shown.add(mean, *weight, unseen);
-        group.traced.add(squares.trace / refinement, *weight, UNSEEN);
+        group.traced.add(trace, *weight, UNSEEN);
     }
     for Group { inferred, shown, traced } in groups.values() {
         inferred.iter().for_each(|part| part.add_to(&mut sums.inferred));

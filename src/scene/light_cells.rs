@@ -64,8 +64,9 @@ pub struct CellLight {
     pub light: u32,
     /// The bounds of this light and of all after it, summed: irradiance, infinite where a bound is.
     rest: f64,
-    /// The weights of this light and of all before it, summed: bounds that are finite, more than 0.
-    until: f64,
+    /// The weights of this light and of all after it, summed from the last on, so that a far brighter light rounds
+    /// none of them away.
+    weights: f64,
 }
 
 /// Mean numbers of lights at a point of the scene's surfaces.
@@ -84,6 +85,8 @@ pub struct MeanLights {
 pub struct CellLights<'c> {
     lights: &'c [CellLight],
     main: usize,
+    /// The weights of culled lights.
+    culled: f64,
     typical: f64,
 }
 
@@ -91,8 +94,8 @@ pub struct CellLights<'c> {
 #[derive(Debug, Clone, Copy)]
 pub struct Tail<'c> {
     lights: &'c [CellLight],
-    /// The weights of the lights before.
-    before: f64,
+    /// The weights of the lights after it.
+    after: f64,
     typical: f64,
 }
 
@@ -115,8 +118,9 @@ impl LightCells {
     pub fn lights(&self, cell: u32, culled: f64) -> CellLights<'_> {
         let Cell { first, count, main, typical } = self.cells[cell as usize];
         let all = &self.lights[first as usize..][..count as usize];
-        let lights = &all[..all.partition_point(|light| light.rest > culled)];
-        CellLights { lights, main: (main as usize).min(lights.len()), typical }
+        let (lights, culled) = all.split_at(all.partition_point(|light| light.rest > culled));
+        let culled = culled.first().map_or(0.0, |light| light.weights);
+        CellLights { lights, main: (main as usize).min(lights.len()), culled, typical }
     }
 
     /// The most main lights with an extent of any cell.
@@ -154,9 +158,7 @@ impl<'c> CellLights<'c> {
 
     /// The others.
     pub fn tail(&self) -> Tail<'c> {
-        let (main, lights) = self.lights.split_at(self.main);
-        let before = main.last().map_or(0.0, |light| light.until);
-        Tail { lights, before, typical: self.typical }
+        Tail { lights: &self.lights[self.main..], after: self.culled, typical: self.typical }
     }
 }
 
@@ -187,9 +189,14 @@ impl Tail<'_> {
 
     /// The light at `u` in [0, 1), and the probability with which it is chosen.
     pub fn choose(&self, u: f64) -> (u32, f64) {
-        let at = self.before + u * self.total();
-        let k = self.lights.partition_point(|light| light.until <= at);
-        let k = k.min(self.lights.len() - 1);
+        let at = self.first() - u * self.total();
+        // The last light has all that is left.
+        let others = &self.lights[1..];
+        let k = match self.is_even() {
+            true => (u * self.lights.len() as f64) as usize,
+            false => others.partition_point(|light| light.weights >= at),
+        };
+        let k = k.min(others.len());
         (self.lights[k].light, self.probability(k))
     }
 
@@ -200,12 +207,24 @@ impl Tail<'_> {
     }
 
     fn probability(&self, k: usize) -> f64 {
-        let before = if k == 0 { self.before } else { self.lights[k - 1].until };
-        (self.lights[k].until - before) / self.total()
+        if self.is_even() {
+            return 1.0 / self.lights.len() as f64;
+        }
+        let after = self.lights.get(k + 1).map_or(self.after, |light| light.weights);
+        (self.lights[k].weights - after) / self.total()
+    }
+
+    /// Whether the weights tell nothing, since those of culled lights are too large beside them.
+    fn is_even(&self) -> bool {
+        self.total() <= f64::EPSILON * self.after
     }
 
     fn total(&self) -> f64 {
-        self.lights.last().map_or(0.0, |light| light.until) - self.before
+        self.first() - self.after
+    }
+
+    fn first(&self) -> f64 {
+        self.lights.first().map_or(self.after, |light| light.weights)
     }
 }
 

@@ -28,7 +28,6 @@ struct Content {
     rgb: Vec<Rgb>,
     gbuffer: Option<GBuffer>,
     samples: Option<Vec<u32>>,
-    wanted: Vec<(u32, u32)>,
     provenance: Option<Vec<Provenance>>,
     bad: BadSamples,
     rays: RayCounts,
@@ -89,7 +88,7 @@ pub fn mask(strip: Strip, settings: &Settings) -> Vec<bool> {
 
 /// The bytes of a rendered strip.
 pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
-    let Rendered { film, rays, sources, reuse, spreads: _, pilots: _, wanted } = rendered;
+    let Rendered { film, rays, sources, reuse, spreads: _, pilots: _ } = rendered;
     let Range { start, end } = rows(strip, film.height);
     let own = film.index(0, start)..film.index(0, end);
     // The audit is made once the strips are joined.
@@ -98,7 +97,6 @@ pub fn encode(rendered: Rendered, strip: Strip) -> Result<Vec<u8>> {
         rgb: rgb[own.clone()].to_vec(),
         gbuffer: gbuffer.map(|g| g.part(own.clone())),
         samples: samples.map(|samples| samples[own.clone()].to_vec()),
-        wanted,
         provenance: provenance.map(|p| p[own].to_vec()),
         bad,
         rays,
@@ -116,7 +114,7 @@ fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
     let mut film = Film::new(width, height, false);
     film.rgb.clear();
     let (mut rays, mut reuse) = (RayCounts::default(), ReuseCounts::default());
-    let (mut sources, mut wanted) = (TracedPoints::default(), Vec::new());
+    let mut sources = TracedPoints::default();
     for bytes in strips {
         let content = unpack(bytes)?;
         let Content { rgb, gbuffer, samples, provenance, bad, .. } = content;
@@ -134,13 +132,12 @@ fn join(strips: &[Arc<[u8]>], width: u32, height: u32) -> Result<Rendered> {
         rays += content.rays;
         reuse += content.reuse;
         sources.append(content.sources);
-        wanted.extend(content.wanted);
     }
     if film.rgb.len() as u64 != u64::from(width) * u64::from(height) {
         return Err(Error::Failed("strips of another rank do not make a frame".into()));
     }
     let (spreads, pilots) = (Vec::new(), Vec::new());
-    Ok(Rendered { film, rays, sources, reuse, spreads, pilots, wanted })
+    Ok(Rendered { film, rays, sources, reuse, spreads, pilots })
 }
 
 fn pack(content: &Content) -> Result<Vec<u8>> {
@@ -201,14 +198,12 @@ mod tests {
             reuse: ReuseCounts::default(),
             spreads: Vec::new(),
             pilots: Vec::new(),
-            wanted: vec![(1, 2)],
         };
         let strip = |number| Strip { number, of: 3, is_source: true };
         let bytes = |number| encode(rendered(&film), strip(number)).expect("packed").into();
         let strips: Vec<Arc<[u8]>> = (0..3).map(bytes).collect();
         let joined = join(&strips, width, height).expect("joined");
         assert_eq!((&joined.film, joined.rays[RayKind::Camera]), (&film, 9));
-        assert_eq!(joined.wanted, [(1, 2); 3]);
         assert!(join(&strips[..2], width, height).is_err());
         assert!(join(&[vec![1, 2, 3].into()], width, height).is_err());
     }

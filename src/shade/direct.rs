@@ -6,7 +6,7 @@
 
 use super::groups::{CheckRays, Groups};
 use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
-use super::pilots::{Findings, Run};
+use super::pilots::Run;
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::selection::{LightUser, LightUsers, Reached, TailSamples};
@@ -99,8 +99,6 @@ pub(super) struct ShadowScratch {
     gathered: Vec<Gathered>,
     /// Which of these cast rays now.
     going: Vec<u32>,
-    /// What pilots found in the block, light by light.
-    findings: Vec<Findings>,
     /// Channels of a shading point.
     channels: usize,
     /// Where each light is traced, if lights are selected.
@@ -156,11 +154,9 @@ struct Gathered {
 }
 
 impl ShadowScratch {
-    /// Starts another block of pixels, lit by as many lights.
-    pub fn start_block(&mut self, lights: usize) {
+    /// Starts another block of pixels.
+    pub fn start_block(&mut self) {
         self.groups.start_block();
-        self.findings.clear();
-        self.findings.resize(lights, Findings::default());
     }
 
     pub fn clear(&mut self) {
@@ -382,23 +378,22 @@ impl Renderer<'_> {
         going.extend(0..wanted.len() as u32);
         if let Some(pilots) = Run::pilots(source, self.settings.most_camera_samples()) {
             self.cast((source, &pilots), (lit, &wanted, &going), pixels, s, counts);
-            let cell_of = |at: u32| {
-                let LightUser { point, .. } = wanted[at as usize];
-                pixels.cell(lit[point as usize].place.pixel)
-            };
-            let ShadowScratch { gathered, findings, .. } = s;
-            let found = &mut findings[at];
-            for (at, gathered) in (0..).zip(&*gathered).filter(|(_, g)| g.exact != 0.0) {
+            let pixel_of = |user: &LightUser| lit[user.point as usize].place.pixel;
+            for (user, gathered) in wanted.iter().zip(&s.gathered) {
                 // Where all pilots lay below the horizon, nothing is known.
                 let is_unknown = gathered.rays == 0;
                 let open = is_unknown || gathered.open > 0.0;
                 let shut = is_unknown || gathered.open < gathered.all;
-                found.note(cell_of(at), open, shut);
+                if gathered.exact != 0.0 {
+                    pixels.note_pilots(at, pixel_of(user), open, shut);
+                }
             }
-            let disputed = found.disputed();
-            going.retain(|at| disputed.has(cell_of(*at)));
-            for at in &going {
-                let gathered = &mut gathered[*at as usize];
+            let disputed = pixels.disputed(at);
+            going.retain(|k| {
+                disputed.has(pixels.place_in_block(pixel_of(&wanted[*k as usize])))
+            });
+            for k in &going {
+                let gathered = &mut s.gathered[*k as usize];
                 *gathered = Gathered { exact: gathered.exact, ..Gathered::default() };
             }
         }
@@ -575,7 +570,7 @@ impl Renderer<'_> {
             if ratio.is_nan() {
                 wanted.push(user);
             } else {
-                s.findings[at].note_ratio(pixels.cell(point.place.pixel), ratio);
+                pixels.note_ratio(at, point.place.pixel, ratio);
                 let light = point.weight * source.sampler.emission * (exact as f32 * ratio);
                 pixels.add(point.place.pixel, point.place.sample, light);
             }

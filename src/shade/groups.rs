@@ -5,9 +5,9 @@
 //! one another there. Those out of focus are traced always. What is traced is gathered per surface point and becomes a source.
 
 use super::dimensions::ROOT;
-use super::pixels::{BLOCK, BlockPixels};
+use super::pixels::BlockPixels;
 use super::point::ShadingPoint;
-use super::{FrameInput, Reuse};
+use super::{BLOCK, FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
     Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
@@ -140,7 +140,7 @@ pub(super) struct Groups {
     traced: Vec<bool>,
     /// Whether any kept light could shine on it.
     lit: Vec<bool>,
-    /// Surface points that must be traced; empty where the scene has none.
+    /// Surface points that must be traced whatever is known.
     forbidden: Vec<bool>,
     /// Surface points that a camera ray out of focus ends at; empty where the lens blurs nothing.
     blurred: Vec<bool>,
@@ -168,7 +168,7 @@ impl Groups {
     ) {
         self.asked.refinement = (pixels.samples_after() as f32 / input.least as f32).max(1.0);
         self.note_blurred(input, lit);
-        self.forbid(input, scene, lit);
+        self.forbid(input, scene, lit, pixels);
         self.measure_footprints(lit, pixels);
         self.gather_unshadowed(reuse.channels.len(), unshadowed);
         let (count, channels) = (self.asked.points.len(), reuse.channels.len());
@@ -301,7 +301,7 @@ impl Groups {
         order.sort_unstable();
         for run in order.chunk_by(|a, b| a.0 == b.0) {
             let mut grid = [NONE; PIXELS];
-            let cell = |at: u32| pixels.cell(self.pixels[at as usize]);
+            let cell = |at: u32| pixels.place_in_block(self.pixels[at as usize]);
             run.iter().for_each(|(_, at)| grid[cell(*at)] = *at);
             for (_, at) in run {
                 let own = points[*at as usize];
@@ -319,16 +319,22 @@ impl Groups {
     }
 
     /// Notes the surface points that must be traced whatever is known.
-    fn forbid(&mut self, input: &FrameInput, scene: &Scene, lit: &[ShadingPoint]) {
-        self.forbidden.clear();
-        if !input.has_always_traced {
-            return;
-        }
-        self.forbidden.resize(self.asked.points.len(), false);
-        for (point, group) in lit.iter().zip(&self.of_lit) {
-            let prim = point.si.prim;
-            self.forbidden[*group as usize] |=
-                scene.is_always_traced(prim.geom_id, prim.prim_id, point.si.p);
+    fn forbid(
+        &mut self,
+        input: &FrameInput,
+        scene: &Scene,
+        lit: &[ShadingPoint],
+        pixels: &BlockPixels,
+    ) {
+        let Self { of_lit, forbidden, pixels: pixel_of, .. } = self;
+        forbidden.clear();
+        forbidden.extend(pixel_of.iter().map(|pixel| pixels.is_traced(*pixel)));
+        if input.has_always_traced {
+            for (point, group) in lit.iter().zip(&*of_lit) {
+                let prim = point.si.prim;
+                forbidden[*group as usize] |=
+                    scene.is_always_traced(prim.geom_id, prim.prim_id, point.si.p);
+            }
         }
     }
 

@@ -110,7 +110,7 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
     left: &mut Left,
 ) -> RayCounts {
     let mut counts = RayCounts::default();
-    scratch.shadow.start_block(input.lights.len());
+    scratch.shadow.start_block();
     let most = renderer.settings.most_camera_samples();
     while let Some(samples) = pixels.start_samples(input, until, most) {
         camera_rays(input, pixels, samples, scratch);

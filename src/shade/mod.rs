@@ -41,11 +41,15 @@ use adaptive::Until;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
-use pixels::{BLOCK, BlockPixels, FinishedPixel, SampleLimits};
+use pilots::Findings;
+use pixels::{BlockPixels, FinishedPixel, SampleLimits};
 use selection::{LightSelection, LightUsers, Reached};
 use source::LightSource;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+/// Edge of a block in pixels.
+const BLOCK: u32 = 8;
 /// Edge of a tile, the unit of parallel work, in pixels; a multiple of the block's. Larger ones leave
 /// threads idle at a frame's end: glass makes a tile cost twenty times its neighbour.
 const TILE: u32 = 16;
@@ -165,7 +169,7 @@ pub struct Known<'a> {
 pub enum Sampling<'a> {
     /// Its own samples and those of its neighbours, which are looked at even where they are not asked for.
     Neighbours,
-    /// Its own samples and those of the neighbours that are asked for.
+    /// Its own samples.
     Alone,
     /// The numbers given for each pixel of the film.
     As(&'a [u32]),
@@ -185,9 +189,6 @@ pub struct Rendered {
     pub spreads: Vec<SampleSpread>,
     /// The same of the least number of samples, where more followed a pixel's own differences alone.
     pub pilots: Vec<SampleSpread>,
-    /// Of pixels that had been rendered before: the index, and the number of samples that the pixel would have had
-    /// here.
-    pub wanted: Vec<(u32, u32)>,
 }
 
 impl Rendered {
@@ -215,6 +216,8 @@ struct FrameInput<'a> {
     around_eye: MediumStack,
     has_ranked_glass: bool,
     reuse: Option<Reuse<'a>>,
+    /// Whether the points of any light may cast pilots alone.
+    has_pilots: bool,
     /// Whether any light must be traced in every frame.
     has_always_traced: bool,
 }
@@ -248,6 +251,8 @@ struct TileDone {
     provenance: Vec<Provenance>,
     /// Of more pixels, where they lie with what their samples say.
     spreads: Vec<(u32, SampleSpread)>,
+    /// What pilots found, for blocks whose pixels may go on.
+    findings: Vec<([u32; 2], Vec<Findings>)>,
     rays: RayCounts,
     bad: BadSamples,
     left: Left,
@@ -335,30 +340,31 @@ impl Renderer<'_> {
         let part = Part { image: full, crop, own, mask: job.mask, known, with_neighbours };
         let mut rendered = Rendered::new(job, self.settings.most_spp.is_some());
         let Some(most) = self.settings.most_spp else {
-            let pass = Pass { region: own, until: Until::Count(self.settings.spp), goes_on: false };
+            let pass = Pass::first(own, self.settings.spp);
             self.pass((job, &input, &part, 1.0), &pass, &mut rendered, stop, progress)?;
             rendered.take_over(job, &part);
             return Some(rendered);
         };
         let region = if with_neighbours { aligned(&grown(&own), &full) } else { own };
-        let pilots = Pass { region, until: Until::Count(self.settings.spp), goes_on: false };
-        self.pass((job, &input, &part, 0.5), &pilots, &mut rendered, stop, progress)?;
+        let first = Pass::first(region, self.settings.spp);
+        let findings = self.pass((job, &input, &part, 0.5), &first, &mut rendered, stop, progress)?;
         rendered.take_over_pilots(job);
-        if matches!(job.sampling, Sampling::Alone) {
-            rendered.pilots = rendered.spreads.clone();
-        }
-        let beside;
+        let beside = match job.sampling {
+            Sampling::Neighbours => adaptive::beside(&rendered.spreads, camera.width),
+            Sampling::Alone => {
+                rendered.pilots = rendered.spreads.clone();
+                vec![0.0; rendered.spreads.len()]
+            }
+            Sampling::As(_) => Vec::new(),
+        };
         let until = match job.sampling {
             Sampling::As(counts) => Until::Each(counts),
-            Sampling::Neighbours | Sampling::Alone => {
-                beside = adaptive::beside(&rendered.spreads, camera.width);
-                Until::Differences { beside: &beside, most }
-            }
+            Sampling::Neighbours | Sampling::Alone => Until::Differences { beside: &beside, most },
         };
-        let more = Pass { region: own, until, goes_on: true };
-        self.pass((job, &input, &part, 0.5), &more, &mut rendered, stop, progress)?;
+        // Pixels that were rendered already may lack samples that their neighbours call for.
         rendered.take_over(job, &part);
-        rendered.note_wanted(&part, &until);
+        let more = Pass { region: own, until, goes_on: true, findings };
+        self.pass((job, &input, &part, 0.5), &more, &mut rendered, stop, progress)?;
         rendered.finish_samples(&part);
         Some(rendered)
     }
@@ -372,7 +378,7 @@ impl Renderer<'_> {
         rendered: &mut Rendered,
         stop: &AtomicBool,
         progress: &dyn Progress,
-    ) -> Option<()> {
+    ) -> Option<BlockFindings> {
         let region = &pass.region;
         let samples = u64::from(region.x1 - region.x0)
             * u64::from(region.y1 - region.y0)
@@ -396,8 +402,12 @@ impl Renderer<'_> {
         } else {
             take_turns(&tiles, start, one)
         };
-        done?.into_iter().for_each(|tile| rendered.add(tile));
-        Some(())
+        let mut findings = BlockFindings::new();
+        for mut tile in done? {
+            findings.extend(tile.findings.drain(..));
+            rendered.add(tile);
+        }
+        Some(findings)
     }
 
     fn input<'a>(&'a self, job: &FrameJob<'a>) -> FrameInput<'a> {
@@ -422,6 +432,7 @@ impl Renderer<'_> {
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
             selection: self.light_selection(&lights),
+            has_pilots: lights.iter().any(|light| light.pilots < light.samples),
             lights,
             around_eye,
             has_ranked_glass,
@@ -454,8 +465,7 @@ impl Renderer<'_> {
                 let is_asked_for = !is_own || part.is_masked_in(at);
                 is_asked_for
                     && match before {
-                        _ if part.is_known(at) => false,
-                        None => true,
+                        None => !part.is_known(at),
                         Some(before) => {
                             let spread = &before.spreads[at];
                             spread.count < pass.until.count(at, Some(spread))
@@ -467,11 +477,18 @@ impl Renderer<'_> {
                 continue;
             }
             if let Some(before) = before {
-                pixels.resume(&before.film, &before.spreads);
+                pixels.resume(&before.film, &before.spreads, |at| part.is_known(at));
+            }
+            let place = [block.x0, block.y0];
+            if input.has_pilots {
+                pixels.start_pilots(input.lights.len(), pass.findings.get(&place));
             }
             let mut unused = Left::default();
             let left = if is_own { &mut out.left } else { &mut unused };
             let rays = kernel(self, input, &pass.until, pixels, scratch, left);
+            if input.has_pilots && is_adaptive && !pass.goes_on {
+                out.findings.push((place, pixels.findings().to_vec()));
+            }
             // What lies around a rank's rows are another rank's own.
             if is_own {
                 out.rays += rays;
@@ -519,6 +536,18 @@ struct Pass<'p> {
     until: Until<'p>,
     /// Whether the pixels have samples already.
     goes_on: bool,
+    /// What pilots found with these, by block.
+    findings: BlockFindings,
+}
+
+/// What pilots found of each light, by the first column and row of a block.
+type BlockFindings = HashMap<[u32; 2], Vec<Findings>>;
+
+impl Pass<'_> {
+    /// The first `spp` samples of each pixel of `region`.
+    fn first(region: Rect, spp: u32) -> Self {
+        Self { region, until: Until::Count(spp), goes_on: false, findings: BlockFindings::new() }
+    }
 }
 
 /// Which part of the image is wanted.
@@ -600,7 +629,6 @@ impl Rendered {
             reuse,
             spreads,
             pilots: Vec::new(),
-            wanted: Vec::new(),
         }
     }
 
@@ -651,16 +679,6 @@ impl Rendered {
                 to.set(at, &from.get(at));
             }
         }
-    }
-
-    /// Notes how many samples the pixels would have that were taken over.
-    fn note_wanted(&mut self, part: &Part, until: &Until) {
-        let known = part.known.unwrap_or_default().iter().enumerate().filter(|(_, known)| **known);
-        let wanted = known.map(|(at, _)| at).filter(|at| part.is_masked_in(*at)).map(|at| {
-            let own = &self.spreads[at];
-            (at as u32, until.count(at, Some(own)).max(own.count))
-        });
-        self.wanted = wanted.collect();
     }
 
     /// Notes how many samples each pixel has, and clears those that were not asked for.

@@ -8,7 +8,7 @@
 //! The choice depends on the block alone, so it is the same for any threads, ranks and crop. A shadow that no pilot
 //! of these pixels meets is missed; `docs/accuracy.md` has a bound on that error.
 
-use super::pixels::BLOCK;
+use super::BLOCK;
 use super::source::LightSource;
 
 /// How far away pilots count, pixels, each way.
@@ -22,16 +22,16 @@ const _: () = assert!(BLOCK * BLOCK == u64::BITS, "a bit for each pixel of a blo
 
 /// Pixels of a block, a bit for each, row by row.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Cells(u64);
+pub(super) struct PixelMask(u64);
 
-impl Cells {
-    /// Whether the pixel at `cell` is among them.
-    pub fn has(self, cell: usize) -> bool {
-        self.0 >> cell & 1 == 1
+impl PixelMask {
+    /// Whether the pixel at `place` of the block is among them.
+    pub fn has(self, place: usize) -> bool {
+        self.0 >> place & 1 == 1
     }
 
-    fn add(&mut self, cell: usize, is_in: bool) {
-        self.0 |= u64::from(is_in) << cell;
+    fn add(&mut self, place: usize, is_in: bool) {
+        self.0 |= u64::from(is_in) << place;
     }
 
     /// These and the pixels next to them.
@@ -47,27 +47,27 @@ impl Cells {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Findings {
     /// Pixels in which any reached the light.
-    open: Cells,
+    open: PixelMask,
     /// Pixels in which any did not.
-    shut: Cells,
+    shut: PixelMask,
 }
 
 impl Findings {
-    /// Notes what the pilots of the pixel at `cell` found: whether any reached the light, and whether any did not.
-    pub fn note(&mut self, cell: usize, open: bool, shut: bool) {
-        self.open.add(cell, open);
-        self.shut.add(cell, shut);
+    /// Notes what the pilots of the pixel at `place` of the block found: whether any reached the light, and whether any did not.
+    pub fn note(&mut self, place: usize, open: bool, shut: bool) {
+        self.open.add(place, open);
+        self.shut.add(place, shut);
     }
 
     /// Notes the ratio of a light that is known from other frames.
-    pub fn note_ratio(&mut self, cell: usize, ratio: f32) {
-        self.note(cell, ratio > ROUNDING, ratio < 1.0 - ROUNDING);
+    pub fn note_ratio(&mut self, place: usize, ratio: f32) {
+        self.note(place, ratio > ROUNDING, ratio < 1.0 - ROUNDING);
     }
 
     /// The pixels around which pilots disagree.
-    pub fn disputed(&self) -> Cells {
-        let near = |cells: Cells| (0..REACH).fold(cells, |cells, _| cells.grown());
-        Cells(near(self.open).0 & near(self.shut).0)
+    pub fn disputed(&self) -> PixelMask {
+        let near = |pixels: PixelMask| (0..REACH).fold(pixels, |pixels, _| pixels.grown());
+        PixelMask(near(self.open).0 & near(self.shut).0)
     }
 }
 
@@ -107,21 +107,21 @@ mod tests {
 
     #[test]
     fn pixels_grow_by_one_each_way_and_not_across_the_block() {
-        let of = |cells: &[(usize, usize)]| {
-            cells.iter().fold(0u64, |all, (x, y)| all | 1 << (y * 8 + x))
+        let of = |pixels: &[(usize, usize)]| {
+            pixels.iter().fold(0u64, |all, (x, y)| all | 1 << (y * 8 + x))
         };
-        let corner = Cells(of(&[(7, 0)])).grown();
-        assert_eq!(corner, Cells(of(&[(6, 0), (7, 0), (6, 1), (7, 1)])));
-        let edge = Cells(of(&[(0, 7)])).grown();
-        assert_eq!(edge, Cells(of(&[(0, 7), (1, 7), (0, 6), (1, 6)])));
-        assert_eq!(Cells(of(&[(3, 3)])).grown().0.count_ones(), 9);
+        let corner = PixelMask(of(&[(7, 0)])).grown();
+        assert_eq!(corner, PixelMask(of(&[(6, 0), (7, 0), (6, 1), (7, 1)])));
+        let edge = PixelMask(of(&[(0, 7)])).grown();
+        assert_eq!(edge, PixelMask(of(&[(0, 7), (1, 7), (0, 6), (1, 6)])));
+        assert_eq!(PixelMask(of(&[(3, 3)])).grown().0.count_ones(), 9);
     }
 
     #[test]
     fn pixels_are_disputed_where_pilots_nearby_disagree() {
         let mut found = Findings::default();
-        (0..64).for_each(|cell| found.note(cell, true, false));
-        assert_eq!(found.disputed(), Cells(0));
+        (0..64).for_each(|place| found.note(place, true, false));
+        assert_eq!(found.disputed(), PixelMask(0));
         found.note(0, true, true);
         assert_eq!(found.disputed().0.count_ones(), 9);
         assert!(found.disputed().has(18) && !found.disputed().has(3));

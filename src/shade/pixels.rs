@@ -1,7 +1,8 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
 use super::adaptive::{SampleSpread, Until};
-use super::{FrameInput, dimensions};
+use super::pilots::{Findings, PixelMask};
+use super::{BLOCK, FrameInput, dimensions};
 use crate::film::{Film, GPixel, Provenance, ProvenanceKind};
 use crate::inference::SAMPLES_TOGETHER;
 use crate::math::Rgb;
@@ -10,8 +11,6 @@ use crate::scene::Rect;
 use crate::stats::Fault;
 use std::ops::Range;
 
-/// Edge of a block in pixels.
-pub(super) const BLOCK: u32 = 8;
 /// What no light looks like.
 const MAGENTA: Rgb = Rgb::new(1.0, 0.0, 1.0);
 
@@ -37,6 +36,10 @@ pub(super) struct BlockPixels {
     chunk: Range<u32>,
     /// The pixels that take them.
     active: Vec<u32>,
+    /// Of each pixel whether no light of it is inferred.
+    is_traced: Vec<bool>,
+    /// What pilots found of each light; empty where no light has any.
+    findings: Vec<Findings>,
     /// Invalid light of the present chunk of samples: pixel, sample, fault.
     suspects: Vec<(u32, u32, Fault)>,
     /// Pixels with such a sample, once a sample.
@@ -133,6 +136,8 @@ impl BlockPixels {
             spreads: Vec::new(),
             chunk: 0..0,
             active: Vec::new(),
+            is_traced: Vec::new(),
+            findings: Vec::new(),
             suspects: Vec::new(),
             bad: Vec::new(),
             records: Vec::new(),
@@ -173,6 +178,8 @@ impl BlockPixels {
         self.sums.resize(self.places.len(), Rgb::ZERO);
         self.taken.clear();
         self.taken.resize(self.places.len(), 0);
+        self.is_traced.clear();
+        self.is_traced.resize(self.places.len(), false);
         self.spreads.clear();
         if self.limits.spread.is_some() {
             self.spreads.resize(self.places.len(), SampleSpread::default());
@@ -190,9 +197,16 @@ impl BlockPixels {
 
     /// Goes on where `film` and `spreads` (one for each of its pixels) left off, with further samples of the same
     /// pixels.
-    pub fn resume(&mut self, film: &Film, spreads: &[SampleSpread]) {
+    /// Those that are `known` show traces alone, as probes do.
+    pub fn resume(
+        &mut self,
+        film: &Film,
+        spreads: &[SampleSpread],
+        known: impl Fn(usize) -> bool,
+    ) {
         for (i, (x, y)) in self.places.iter().enumerate() {
             let at = film.index(*x, *y);
+            self.is_traced[i] = known(at);
             self.taken[i] = spreads[at].count;
             self.spreads[i] = spreads[at];
             self.sums[i] = film.rgb[at] * spreads[at].count as f32;
@@ -208,15 +222,53 @@ impl BlockPixels {
     }
 
     /// Where a pixel lies in its block: row by row.
-    pub fn cell(&self, pixel: u32) -> usize {
+    pub fn place_in_block(&self, pixel: u32) -> usize {
         let (x, y) = self.place(pixel);
         ((y % BLOCK) * BLOCK + x % BLOCK) as usize
+    }
+
+    /// Starts to note what pilots find of as many lights, or goes on with what they found before.
+    pub fn start_pilots(&mut self, lights: usize, before: Option<&Vec<Findings>>) {
+        self.findings.clear();
+        match before {
+            Some(before) => self.findings.extend_from_slice(before),
+            None => self.findings.resize(lights, Findings::default()),
+        }
+    }
+
+    /// What pilots found of each light; empty where there are none.
+    pub fn findings(&self) -> &[Findings] {
+        &self.findings
+    }
+
+    /// Notes whether any pilots of a pixel reached a light, and whether any did not.
+    pub fn note_pilots(&mut self, light: usize, pixel: u32, open: bool, shut: bool) {
+        let place = self.place_in_block(pixel);
+        self.findings[light].note(place, open, shut);
+    }
+
+    /// Notes the ratio of a light that is known from other frames, which counts as pilots do.
+    pub fn note_ratio(&mut self, light: usize, pixel: u32, ratio: f32) {
+        if !self.findings.is_empty() {
+            let place = self.place_in_block(pixel);
+            self.findings[light].note_ratio(place, ratio);
+        }
+    }
+
+    /// The pixels around which pilots to a light disagree.
+    pub fn disputed(&self, light: usize) -> PixelMask {
+        self.findings[light].disputed()
     }
 
     /// Notes where the light of a pixel's surface point comes from; `None` where it was traced.
     pub fn join_provenance(&mut self, pixel: u32, inferred: Option<&Provenance>) {
         let traced = Provenance { kind: ProvenanceKind::Traced, ..Provenance::default() };
         self.provenance[pixel as usize].join(inferred.unwrap_or(&traced));
+    }
+
+    /// Whether no light of a pixel is inferred.
+    pub fn is_traced(&self, pixel: u32) -> bool {
+        self.is_traced[pixel as usize]
     }
 
     /// Pixels in the block.

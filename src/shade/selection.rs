@@ -371,10 +371,45 @@ mod tests {
         let cells = scene.light_cells.as_ref().expect("many lights");
         for p in [DVec3::ZERO, DVec3::splat(1e-9), DVec3::splat(0.4), DVec3::splat(9.0)] {
             let lights = cells.lights(cells.cell(p), 0.0);
-            assert!(lights.main().chain([]).all(|light| light < 40));
+            assert!(lights.main().all(|light| light < 40));
             let all: f64 = (0..50).map(|light| lights.tail().probability_of(light)).sum();
             assert!((all - 1.0).abs() < 1e-9, "{p}: {all}");
             assert!((40..50).all(|light| lights.tail().probability_of(light) == 0.0));
+        }
+    }
+
+    /// A light that is far brighter than all others, and lights next to the faces between cells, whose bounds there are
+    /// as far above what they send to most of the cell.
+    #[test]
+    fn a_far_larger_bound_rounds_no_other_light_away() {
+        let mut next = random(515);
+        let face = |at: f64| DVec3::new(if at.is_sign_negative() { -1e-17 } else { 1e-17 }, at, 0.3);
+        for (near, brightest) in [(0, 1e22f32), (0, 1.0), (3, 1.0), (30, 1.0), (30, 1e18)] {
+            let point = |position, intensity| {
+                Light::Point(PointLight { position, intensity: Rgb::splat(intensity) })
+            };
+            let mut lights: Vec<Light> = (0..40).map(|_| point(vector(&mut next), 0.01)).collect();
+            lights.extend((0..near).map(|_| point(face(next()), 0.01)));
+            lights.push(point(vector(&mut next), brightest));
+            let count = lights.len() as u32;
+            let scene = scene(lights);
+            let cells = scene.light_cells.as_ref().expect("many lights");
+            for _ in 0..200 {
+                let p = vector(&mut next) * DVec3::new(1e-3, 1.0, 1.0);
+                let tail = cells.lights(cells.cell(p), 0.0).tail();
+                if tail.is_empty() {
+                    continue;
+                }
+                assert!((1..=Tail::most_samples(8)).contains(&tail.samples(8)));
+                let all: f64 = (0..count).map(|light| tail.probability_of(light)).sum();
+                assert!((all - 1.0).abs() < 1e-9, "{near} {brightest}: {all}");
+                let (light, probability) = tail.choose(0.5 + 0.5 * next());
+                assert!(probability > 0.0 && probability == tail.probability_of(light));
+                // Where only the usual lights are in the tail, each is chosen now and then.
+                let usual = tail.len() as u32 <= 40 && brightest == 1.0;
+                let least = (0..40).map(|light| tail.probability_of(light)).filter(|p| *p > 0.0);
+                assert!(!usual || least.fold(1.0, f64::min) > 1e-6, "{near}");
+            }
         }
     }
 }

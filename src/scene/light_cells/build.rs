@@ -20,6 +20,10 @@ const SMALLEST: f64 = 1.0 / 1024.0;
 /// main lights.
 const TAIL: f64 = 0.04;
 
+/// A light may send this many times as much next to it, in or beside a box, as to the middle and the corners of the box:
+/// samples choose it no more often for more.
+const NEAR: f64 = 64.0;
+
 /// A box whose lights are known.
 struct Open {
     bounds: Bounds3,
@@ -34,7 +38,8 @@ struct Open {
 struct BoundedLight {
     light: u32,
     bound: f64,
-    /// The bound where it is finite.
+    /// In proportion to it samples choose the light, more than 0 and finite: the bound, where that is not far above
+    /// what arrives in most of the box.
     weight: f64,
 }
 
@@ -107,25 +112,36 @@ impl LightCells {
         self.nodes[node] = Node::Cell(self.cells.len() as u32);
         own.sort_by(|a, b| b.bound.total_cmp(&a.bound).then(a.light.cmp(&b.light)));
         let first = self.lights.len();
-        let mut until = 0.0;
         self.lights.extend(own.iter().map(|light| {
-            until += light.weight;
-            CellLight { light: light.light, rest: light.bound, until }
+            let BoundedLight { light, bound: rest, weight: weights } = *light;
+            CellLight { light, rest, weights }
         }));
-        let mut rest = 0.0;
+        let (mut rest, mut weights) = (0.0, 0.0);
         for light in self.lights[first..].iter_mut().rev() {
             rest += light.rest;
-            light.rest = rest;
+            weights += light.weights;
+            (light.rest, light.weights) = (rest, weights);
         }
-        let before = |k: usize| if k == 0 { 0.0 } else { self.lights[first + k - 1].until };
         let most = own.len().min(MOST_MAIN);
-        let main = (0..most).find(|k| until - before(*k) <= TAIL * typical).unwrap_or(most);
+        let is_tail = |light: &CellLight| light.weights <= TAIL * typical;
+        let main = self.lights[first..][..most].iter().position(is_tail).unwrap_or(most);
         let area =
             own[..main].iter().filter(|light| lights[light.light as usize].is_area()).count();
         self.most_area = self.most_area.max(area);
         let [first, count, main] = [first, own.len(), main].map(|n| n as u32);
         self.cells.push(Cell { first, count, main, typical });
     }
+}
+
+/// The most that a light sends to any corner of a box, where that is finite.
+fn far_end(light: &Light, bounds: &Bounds3) -> f64 {
+    let Bounds3 { min, max } = *bounds;
+    let corners = (0..8).map(|corner: u32| {
+        let side = |axis: u32| f64::from(corner >> axis & 1);
+        let p = min + (max - min) * DVec3::new(side(0), side(1), side(2));
+        light.most_irradiance(&Bounds3 { min: p, max: p })
+    });
+    corners.filter(|irradiance| irradiance.is_finite()).fold(0.0, f64::max)
 }
 
 impl Open {
@@ -143,9 +159,11 @@ impl Open {
             }
             let at_middle = light.most_irradiance(&middle);
             typical += if at_middle.is_finite() { at_middle } else { 0.0 };
-            // A light without an extent in the box: as from a corner, or anything.
-            let weight = [bound, light.most_irradiance(&place(bounds.max)), 1.0];
-            let weight = weight.into_iter().find(|w| w.is_finite() && *w > 0.0).unwrap_or(1.0);
+            let is_near = bound.is_infinite() || bound > NEAR * at_middle;
+            let far = if is_near { far_end(light, &bounds) } else { 0.0 };
+            let most = NEAR * if at_middle.is_finite() { at_middle.max(far) } else { far };
+            let weight = if most > 0.0 { bound.min(most) } else { bound };
+            let weight = if weight.is_finite() { weight } else { 1.0 };
             own.push(BoundedLight { light: *number, bound, weight });
         }
         Self { bounds, node, lights: own, typical }

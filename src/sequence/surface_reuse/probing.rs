@@ -19,7 +19,6 @@ use crate::scene::Camera;
 use crate::shade::{FrameJob, Known, Rendered, Sampling};
 use crate::stats::{AuditSums, RayCounts};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Added to a frame's number (at most a million) to seed the light samples of the probes' two traces, and of
@@ -146,12 +145,11 @@ impl SurfaceReuse<'_> {
     ) -> Result<Option<AuditSums>> {
         let [first, second] = &probed.traces;
         let is_inferred = rendered.reuse.is_inferred();
-        let wanted: HashMap<u32, u32> = rendered.wanted.iter().copied().collect();
         let drawn = |i: usize| {
             let (index, weight) = (i as u32, probed.draw.weight());
             let group = probed.draw.group(index % camera.width, index / camera.width);
-            let count = |wanted: &u32| f64::from(*wanted) / f64::from(probed.counts[i]);
-            let refinement = wanted.get(&index).map_or(1.0, count);
+            let samples = rendered.film.samples.as_ref().map(|samples| f64::from(samples[i]));
+            let refinement = samples.map_or(1.0, |shown| shown / f64::from(probed.counts[i]));
             AuditedPixel { index, weight, group, refinement }
         };
         let (rays, inferred) = match is_inferred {
