@@ -73,6 +73,55 @@ fn rays_for_the_error_of_uniform_samples() {
     }
 }
 
+/// The figures of `docs/accuracy.md` for a choice that knows each pixel's error at every number of samples: no rule
+/// takes fewer rays.
+#[test]
+#[ignore = "minutes"]
+fn the_fewest_rays_that_any_choice_could_take() {
+    const COUNTS: [u32; 6] = [2, 4, 8, 16, 32, 64];
+    const SEEDS: u64 = 5;
+    for scene in SCENES {
+        let set = Set::load(scene, |_| ());
+        let (stage, shot) = (set.stage(2), set.shot(16));
+        let base = Settings { width: 320, height: 180, ..set.settings.clone() };
+        let picture = |spp, seed| {
+            codes(&base, &stage.traced(&uniform(&base, spp, seed), &shot, 8, 8))
+        };
+        let truth = picture(1024, 99);
+        // Mean squared error of each pixel, for each number of samples.
+        let errors = COUNTS.map(|spp| {
+            let mut sums = vec![0.0; truth.len()];
+            for seed in 1..=SEEDS {
+                for (sum, pair) in sums.iter_mut().zip(picture(spp, seed).iter().zip(&truth)) {
+                    *sum += mean_square(&[*pair.0], &[*pair.1]) / SEEDS as f64;
+                }
+            }
+            sums
+        });
+        let mean = |of: &dyn Fn(usize) -> f64| (0..truth.len()).map(of).sum::<f64>() / truth.len() as f64;
+        for (target, least) in [(16, 2), (16, 4), (64, 2), (64, 4)] {
+            let at = COUNTS.iter().position(|count| *count == target).unwrap();
+            let goal = mean(&|i| errors[at][i]);
+            let counts: Vec<usize> = (0..COUNTS.len()).filter(|k| COUNTS[*k] >= least).collect();
+            // The best choice for a price of a sample (Everett, 1963).
+            let choose = |price: f64, i: usize| {
+                let cost = |k: &usize| errors[*k][i] + price * f64::from(COUNTS[*k]);
+                *counts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap()
+            };
+            let (mut low, mut high) = (1e-14f64, 1e2f64);
+            for _ in 0..80 {
+                let price = (low * high).sqrt();
+                let error = mean(&|i| errors[choose(price, i)][i]);
+                *(if error > goal { &mut high } else { &mut low }) = price;
+            }
+            let rays = mean(&|i| f64::from(COUNTS[choose(low, i)]));
+            let share = 100.0 * rays / f64::from(target);
+            println!("{scene}: from {least} on, for the error of {target}: {share:.0} % of the rays");
+            assert!((1.0..100.0).contains(&share));
+        }
+    }
+}
+
 /// The choice by samples that are part of the mean makes pictures too flat at edges: by how much is stated in
 /// `docs/accuracy.md`.
 #[test]

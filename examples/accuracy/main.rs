@@ -1,5 +1,5 @@
-//! `./x accuracy`: what accuracy costs on three scenes. Sweeps them with the program, and writes the
-//! measured part of `docs/accuracy.md` and its pictures from what came out. Some minutes a scene; a run
+//! `./x accuracy`: what accuracy costs on the scenes of `scenes/`. Sweeps them with the program, and writes the
+//! measured part of `docs/accuracy.md` and its pictures from what came out. Up to an hour a scene; a run
 //! that was stopped goes on. The pages of the sweeps lie in `out/accuracy`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program for people")]
@@ -11,17 +11,17 @@ mod sweep;
 
 use sweep::Sweep;
 
-/// The scenes: name, and size of the frames.
-const SCENES: [(&str, &str); 3] =
-    [("cornell", "128x128"), ("reflective_spheres", "160x120"), ("spheres_on_terrain", "64x36")];
+/// The scenes.
+const SCENES: [&str; 5] =
+    ["cornell", "demo", "reflective_spheres", "spheres_on_terrain", "street_at_night"];
 
 fn main() {
     let named: Vec<String> = std::env::args().skip(1).collect();
     let is_meant = |name: &str| named.is_empty() || named.iter().any(|n| n == name);
     let sweeps: Vec<Sweep> = SCENES
         .iter()
-        .filter(|(name, _)| is_meant(name))
-        .map(|(name, size)| Sweep::run(name, size))
+        .filter(|name| is_meant(name))
+        .map(|name| Sweep::run(name))
         .collect();
     assert!(!sweeps.is_empty(), "no such scene: {}", named.join(" "));
     for sweep in &sweeps {

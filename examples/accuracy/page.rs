@@ -48,8 +48,8 @@ fn how(out: &mut String, sweeps: &[Sweep]) {
         percent(confidence)
     );
     head(out, "", sweeps);
-    line(out, "size, camera and shadow samples", sweeps, |s| {
-        format!("{}, {}, {}", s.size, s.setting("spp"), s.setting("shadow_samples"))
+    line(out, "camera, shadow and sky samples", sweeps, |s| {
+        ["spp", "shadow_samples", "sky_samples"].map(|name| s.setting(name).to_string()).join(", ")
     });
     line(out, "a frame by default", sweeps, |s| {
         let m = s.default_row().seconds;
@@ -120,7 +120,7 @@ fn intersection() -> [Turned; 10] {
     ]
 }
 
-fn sampling() -> [Turned; 8] {
+fn sampling() -> [Turned; 9] {
     [
         ("four times the camera samples", |s| format!("--spp {}", 4 * s.setting("spp"))),
         ("a quarter of them", |s| format!("--spp {}", (s.setting("spp") / 4).max(1))),
@@ -135,6 +135,10 @@ fn sampling() -> [Turned; 8] {
         }),
         ("a quarter of them", |s| {
             format!("--shadow-samples {}", (s.setting("shadow_samples") / 4).max(1))
+        }),
+        ("an eighth where pilots agree", |s| {
+            let n = s.setting("shadow_samples");
+            format!("--shadow-samples {}..{n}", (n / 8).max(1))
         }),
         ("four times the sky samples", |s| {
             format!("--sky-samples {}", 4 * s.setting("sky_samples"))

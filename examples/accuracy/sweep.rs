@@ -7,12 +7,11 @@ use std::process::Command;
 /// The folder of the repository.
 pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// What the sweeps are called with.
-pub const OPTIONS: &str = "--turns 6 --reference-spp 512";
+pub const OPTIONS: &str = "--size 640x360 --turns 5 --frames 5,6 --reference-spp 512";
 
 /// What came out for a scene.
 pub struct Sweep {
     pub name: &'static str,
-    pub size: &'static str,
     /// `accuracy.json`.
     pub json: Value,
     pub rows: Vec<Row>,
@@ -60,7 +59,7 @@ impl Measured {
 
 impl Sweep {
     /// Runs the program, which goes on where it was stopped.
-    pub fn run(name: &'static str, size: &'static str) -> Self {
+    pub fn run(name: &'static str) -> Self {
         let folder = PathBuf::from(format!("{ROOT}/out/accuracy/{name}"));
         let program = std::env::current_exe()
             .unwrap()
@@ -69,23 +68,23 @@ impl Sweep {
             .expect("cargo build --release, first")
             .join("tweenray");
         let scene = format!("scenes/{name}/scene.toml");
-        println!("tweenray accuracy {scene} --size {size} {OPTIONS} -o out/accuracy/{name}");
+        println!("tweenray accuracy {scene} {OPTIONS} -o out/accuracy/{name}");
         let status = Command::new(program)
-            .args(["accuracy", &scene, "--size", size, "-o"])
+            .args(["accuracy", &scene, "-o"])
             .arg(&folder)
             .args(OPTIONS.split(' '))
             .current_dir(ROOT)
             .status()
             .unwrap();
         assert!(status.success(), "the sweep of {name} ended with {status}");
-        Self::read(name, size, folder)
+        Self::read(name, folder)
     }
 
-    fn read(name: &'static str, size: &'static str, folder: PathBuf) -> Self {
+    fn read(name: &'static str, folder: PathBuf) -> Self {
         let bytes = std::fs::read(folder.join("accuracy.json")).unwrap();
         let json: Value = serde_json::from_slice(&bytes).unwrap();
         let rows = json["rows"].as_array().unwrap().iter().map(Row::read).collect();
-        Self { name, size, json, rows, folder }
+        Self { name, json, rows, folder }
     }
 
     pub fn default_row(&self) -> &Row {

@@ -113,6 +113,11 @@ impl List<'_> {
                     (s.shadow_samples, s.least_shadow_samples) = (n, None);
                 });
             }
+            let n = self.base.shadow_samples;
+            if let Some(pilots) = pilots(n) {
+                let options = format!("--shadow-samples {pilots}..{n}");
+                self.add(Knob::ShadowSamples, options, |s| s.least_shadow_samples = Some(pilots));
+            }
         }
         if plan.sky_light {
             for n in around(self.base.sky_samples) {
@@ -120,6 +125,11 @@ impl List<'_> {
                 self.add(Knob::SkySamples, options, |s| {
                     (s.sky_samples, s.least_sky_samples) = (n, None);
                 });
+            }
+            let n = self.base.sky_samples;
+            if let Some(pilots) = pilots(n) {
+                let options = format!("--sky-samples {pilots}..{n}");
+                self.add(Knob::SkySamples, options, |s| s.least_sky_samples = Some(pilots));
             }
         }
     }
@@ -216,12 +226,25 @@ impl List<'_> {
                 }
             }
         }
+        // Samples of both kinds only where they differ.
+        let n = base.shadow_samples;
+        if let (Some(most), true, Some(pilots)) = (range.1, plan.area_lights, pilots(n)) {
+            let options = format!("--spp {spp}..{most} --shadow-samples {pilots}..{n}");
+            self.add(Knob::Combination, options, |s| {
+                (s.spp, s.most_spp, s.least_shadow_samples) = (spp, Some(most), Some(pilots));
+            });
+        }
     }
 }
 
 /// `x` times `factor` in decimal digits: ten times 0.001 is 0.01, not 0.010000001.
 fn times(factor: f64, x: f32) -> f32 {
     (factor * x.to_string().parse::<f64>().unwrap_or(f64::from(x))) as f32
+}
+
+/// How many of `n` samples may be pilots; `None` where they would hardly be fewer.
+fn pilots(n: u32) -> Option<u32> {
+    (n >= 4).then_some((n / 8).max(1))
 }
 
 /// A quarter of `n` samples, at least one, and four times `n`.
@@ -296,6 +319,19 @@ mod tests {
                 .iter()
                 .all(|options| !options.ends_with(&format!("{MAX_SAMPLES}..{MAX_SAMPLES}")))
         );
+    }
+
+    #[test]
+    fn pilots_stand_beside_all_samples_of_light() {
+        let list = |n: u32| -> Vec<String> {
+            let base = Settings { shadow_samples: n, sky_samples: n, ..Settings::default() };
+            let yes = |_: &Settings| true;
+            let all = candidates(&base, &EffectPlan::EVERYTHING, 9, &yes, &[Group::Samples]);
+            all.into_iter().map(|c| c.options).filter(|o| o.contains("..") && !o.contains("spp")).collect()
+        };
+        assert_eq!(list(16), ["--shadow-samples 2..16", "--sky-samples 2..16"]);
+        assert_eq!(list(4), ["--shadow-samples 1..4", "--sky-samples 1..4"]);
+        assert_eq!(list(1), [""; 0]);
     }
 
     #[test]
