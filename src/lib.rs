@@ -51,7 +51,7 @@ pub mod ray;
 pub mod sampling;
 pub mod stats;
 
-// Floor 1: the only room with `unsafe`.
+// Floor 1: the room with most of the `unsafe` code; the rest is at the edge to MPI.
 #[allow(unsafe_code)]
 pub mod embree;
 

@@ -31,6 +31,8 @@ pub enum RayKind {
     Invalid,
 }
 
+const _: () = assert!(RayKind::Invalid as usize + 1 == RayKind::ALL.len(), "the last kind");
+
 impl RayKind {
     /// All kinds, in the order in which they are stored and shown.
     pub const ALL: [Self; 9] = [
@@ -44,6 +46,15 @@ impl RayKind {
         Self::Retry,
         Self::Invalid,
     ];
+
+    /// Whether it ends at a light, shadows aside.
+    pub fn is_shadow(self) -> bool {
+        match self {
+            Self::ShadowArea | Self::ShadowDelta | Self::ShadowSky => true,
+            Self::Camera | Self::Mirror | Self::Glossy | Self::Glass | Self::Retry => false,
+            Self::Invalid => false,
+        }
+    }
 
     /// The kinds that were traced.
     pub fn traced() -> impl Iterator<Item = Self> {
@@ -100,7 +111,7 @@ impl RayCounts {
 
     /// Shadow rays of all kinds.
     pub fn shadow(&self) -> u64 {
-        self[RayKind::ShadowArea] + self[RayKind::ShadowDelta] + self[RayKind::ShadowSky]
+        RayKind::ALL.into_iter().filter(|kind| kind.is_shadow()).map(|kind| self[kind]).sum()
     }
 }
 

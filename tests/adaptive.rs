@@ -84,9 +84,8 @@ fn the_fewest_rays_that_any_choice_could_take() {
         let set = Set::load(scene, |_| ());
         let (stage, shot) = (set.stage(2), set.shot(16));
         let base = Settings { width: 320, height: 180, ..set.settings.clone() };
-        let picture = |spp, seed| {
-            codes(&base, &stage.traced(&uniform(&base, spp, seed), &shot, 8, 8))
-        };
+        let picture =
+            |spp, seed| codes(&base, &stage.traced(&uniform(&base, spp, seed), &shot, 8, 8));
         let truth = picture(1024, 99);
         // Mean squared error of each pixel, for each number of samples.
         let errors = COUNTS.map(|spp| {
@@ -98,7 +97,8 @@ fn the_fewest_rays_that_any_choice_could_take() {
             }
             sums
         });
-        let mean = |of: &dyn Fn(usize) -> f64| (0..truth.len()).map(of).sum::<f64>() / truth.len() as f64;
+        let mean =
+            |of: &dyn Fn(usize) -> f64| (0..truth.len()).map(of).sum::<f64>() / truth.len() as f64;
         for (target, least) in [(16, 2), (16, 4), (64, 2), (64, 4)] {
             let at = COUNTS.iter().position(|count| *count == target).unwrap();
             let goal = mean(&|i| errors[at][i]);
@@ -116,7 +116,9 @@ fn the_fewest_rays_that_any_choice_could_take() {
             }
             let rays = mean(&|i| f64::from(COUNTS[choose(low, i)]));
             let share = 100.0 * rays / f64::from(target);
-            println!("{scene}: from {least} on, for the error of {target}: {share:.0} % of the rays");
+            println!(
+                "{scene}: from {least} on, for the error of {target}: {share:.0} % of the rays"
+            );
             assert!((1.0..100.0).contains(&share));
         }
     }
@@ -181,8 +183,8 @@ fn a_part_of_a_frame_has_the_bytes_of_the_whole() {
     }
 }
 
-/// Pixels that were rendered before, as probes are, change no other pixel. They go on to the samples that they would
-/// have had in the whole.
+/// Pixels that were rendered before, as probes are, have the samples in the end that they have in the whole, and no other
+/// pixel changes.
 #[test]
 fn pixels_around_probes_have_the_bytes_of_the_whole() {
     let set = Set::load("spheres_on_terrain", |_| ());
@@ -201,18 +203,15 @@ fn pixels_around_probes_have_the_bytes_of_the_whole() {
     let known = Some(Known { mask: &mask, rendered: &probes });
     let rest = render(&FrameJob { known, ..FrameJob::whole(&camera, 5) });
     let samples = whole.samples.as_ref().unwrap();
-    for i in (0..mask.len()).filter(|i| !mask[*i]) {
-        let own = (rest.film.rgb[i], rest.film.samples.as_ref().unwrap()[i]);
-        assert_eq!(own, (whole.rgb[i], samples[i]), "{i}");
-    }
     let after = rest.film.samples.as_ref().unwrap();
     assert_eq!(after, samples);
-    for i in (0..mask.len()).filter(|i| mask[*i]) {
-        // A mean that is gone on with is rounded once more.
-        let [own, other] = [&rest.film, &whole].map(|film| film.rgb[i]);
-        assert!((own - other).abs().max_element() <= 1e-6 * other.max_element(), "{i}: {own} {other}");
-    }
-    let gone_on = probes.sample_counts().iter().zip(after).filter(|(own, all)| **own > 0 && own < all).count();
+    assert_eq!(rest.film.rgb, whole.rgb);
+    let gone_on = probes
+        .sample_counts()
+        .iter()
+        .zip(after)
+        .filter(|(own, all)| **own > 0 && own < all)
+        .count();
     assert!(gone_on > 50, "{gone_on}");
 }
 

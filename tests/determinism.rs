@@ -12,8 +12,8 @@ use tweenray::film::Film;
 use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    BuildQuality, DirectionalLight, Filter, Glass, Lens, Light, Material, QuadLight, Rect, Sky,
-    SphereLight, ThinLens, World, WorldMesh, WorldSphere,
+    BuildQuality, DirectionalLight, DiskLight, Filter, Glass, Lens, Light, Material, QuadLight,
+    Rect, Sky, SphereLight, SpotLight, ThinLens, World, WorldMesh, WorldSphere,
 };
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
@@ -51,6 +51,21 @@ fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
             centre,
             radius: 0.4,
             radiance: Rgb::splat(9.0),
+        }));
+        world.lights.push(Light::Disk(DiskLight {
+            centre: DVec3::new(2.5, 3.5, -1.0),
+            normal: DVec3::NEG_Y,
+            radius: 0.5,
+            radiance: Rgb::splat(5.0),
+            two_sided: false,
+        }));
+        world.lights.push(Light::Spot(SpotLight {
+            position: DVec3::new(0.5, 3.0, 2.5),
+            direction: DVec3::new(0.0, -1.0, -0.6).normalize(),
+            intensity: Rgb::splat(6.0),
+            cos_inner: 0.9,
+            cos_outer: 0.8,
+            radius: 0.1,
         }));
     }
     world.lights.push(Light::Directional(DirectionalLight {
@@ -263,7 +278,16 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
                     disk.centre *= s;
                     disk.radius *= s;
                 }
-                Light::Spot(_) | Light::Point(_) | Light::Directional(_) => {}
+                Light::Spot(spot) => {
+                    spot.position *= s;
+                    spot.radius *= s;
+                    spot.intensity *= (s * s) as f32;
+                }
+                Light::Point(point) => {
+                    point.position *= s;
+                    point.intensity *= (s * s) as f32;
+                }
+                Light::Directional(_) => {}
             }
         }
         let glass = w.materials.iter_mut().filter_map(|m| m.glass.as_mut());

@@ -18,11 +18,8 @@ const SCENES: [&str; 5] =
 fn main() {
     let named: Vec<String> = std::env::args().skip(1).collect();
     let is_meant = |name: &str| named.is_empty() || named.iter().any(|n| n == name);
-    let sweeps: Vec<Sweep> = SCENES
-        .iter()
-        .filter(|name| is_meant(name))
-        .map(|name| Sweep::run(name))
-        .collect();
+    let sweeps: Vec<Sweep> =
+        SCENES.iter().filter(|name| is_meant(name)).map(|name| Sweep::run(name)).collect();
     assert!(!sweeps.is_empty(), "no such scene: {}", named.join(" "));
     for sweep in &sweeps {
         plot::write(sweep);

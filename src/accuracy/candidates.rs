@@ -327,7 +327,10 @@ mod tests {
             let base = Settings { shadow_samples: n, sky_samples: n, ..Settings::default() };
             let yes = |_: &Settings| true;
             let all = candidates(&base, &EffectPlan::EVERYTHING, 9, &yes, &[Group::Samples]);
-            all.into_iter().map(|c| c.options).filter(|o| o.contains("..") && !o.contains("spp")).collect()
+            all.into_iter()
+                .map(|c| c.options)
+                .filter(|o| o.contains("..") && !o.contains("spp"))
+                .collect()
         };
         assert_eq!(list(16), ["--shadow-samples 2..16", "--sky-samples 2..16"]);
         assert_eq!(list(4), ["--shadow-samples 1..4", "--sky-samples 1..4"]);

@@ -15,7 +15,7 @@ use std::sync::atomic::AtomicBool;
 pub struct TrialContext<'a> {
     /// The scene, recentred or not as `rules.recentre` of the default says.
     pub scene: &'a Scene,
-    /// The scene with `rules.recentre` the other way, where a candidate needs it.
+    /// The scene with the opposite value of `rules.recentre`; `None` where no candidate needs it.
     pub otherwise: Option<&'a Scene>,
     /// The camera's move.
     pub shot: &'a Shot,

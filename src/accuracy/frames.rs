@@ -26,7 +26,13 @@ pub(super) fn timed_frames(count: u32) -> Vec<u32> {
 
 /// How a setting divides a move into key frames, which are traced whole, and in-between frames.
 #[derive(Debug, Clone, Copy)]
-pub struct Cut(Option<Pyramid>, u32);
+pub struct Cut {
+    /// `None` where every frame is traced whole.
+    pyramid: Option<Pyramid>,
+    /// By its key frames the frames are weighed. Where every frame is traced whole it is that of the settings' segment,
+    /// so that means over the same frames are of the same frames' errors whatever the policy.
+    weighed: Pyramid,
+}
 
 impl Cut {
     /// The division of a move of `frames` frames under `settings`. `looks_up` says whether frames look up
@@ -37,38 +43,42 @@ impl Cut {
             Policy::Surface => looks_up.then_some(settings.reuse.segment),
             Policy::Colour => Some((frames - 1).max(1)),
         };
-        Self(segment.map(|segment| Pyramid { segment, frames }), frames)
+        let pyramid = |segment| Pyramid { segment, frames };
+        let weighed = pyramid(segment.unwrap_or(settings.reuse.segment));
+        Self { pyramid: segment.map(pyramid), weighed }
     }
 
     /// Number of key frames of the move.
     pub fn keys(&self) -> u32 {
-        self.0.map_or(self.1, |pyramid| pyramid.keys())
+        self.pyramid.map_or(self.weighed.frames, |pyramid| pyramid.keys())
     }
 
     /// Whether `frame` is a key frame.
     pub fn is_key(&self, frame: u32) -> bool {
-        self.0.is_none_or(|pyramid| pyramid.is_key(frame))
+        self.pyramid.is_none_or(|pyramid| pyramid.is_key(frame))
     }
 
     /// `frames` with all frames that they are inferred from.
     pub fn with_ancestors(&self, frames: &[u32]) -> Vec<u32> {
-        let ancestors = |f: &u32| self.0.map_or(Vec::new(), |pyramid| pyramid.ancestors(*f));
+        let ancestors = |f: &u32| self.pyramid.map_or(Vec::new(), |pyramid| pyramid.ancestors(*f));
         let mut all: BTreeSet<u32> = frames.iter().flat_map(ancestors).collect();
         all.extend(frames);
         all.into_iter().collect()
     }
 
     /// The mean over the move of values measured on some frames, by number: the means over key frames and
-    /// over in-between frames, weighed by how many the move has. A kind without a value is left out.
+    /// over in-between frames, weighed by how many the move has. A kind without a value is left out. Frames weigh alike
+    /// where all are traced: an error that differs from frame to frame must not seem to differ between policies.
     pub fn mean(&self, measured: impl Iterator<Item = (u32, f64)>) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
         for (frame, value) in measured {
-            let (sum, count) = &mut sums[usize::from(self.is_key(frame))];
+            let (sum, count) = &mut sums[usize::from(self.weighed.is_key(frame))];
             *sum += value;
             *count += 1.0;
         }
-        let keys = self.keys();
-        let weights = [f64::from(self.1 - keys), f64::from(keys)];
+        let Pyramid { frames, .. } = self.weighed;
+        let keys = self.weighed.keys();
+        let weights = [f64::from(frames - keys), f64::from(keys)];
         let kinds = || sums.iter().zip(weights).filter(|((_, count), _)| *count > 0.0);
         let total: f64 = kinds().map(|((sum, count), weight)| weight * sum / count).sum();
         total / kinds().map(|(_, weight)| weight).sum::<f64>()
@@ -112,7 +122,8 @@ mod tests {
         assert_eq!(cut.mean([(2, 1.0)].into_iter()), 1.0);
         assert_eq!(cut.with_ancestors(&[1, 17]), [1, 17, 33, 65]);
         let off = Cut::of(&settings, 65, false);
-        assert_eq!(off.mean([(1, 1.0), (2, 3.0)].into_iter()), 2.0);
+        // The same frames weigh alike where all are traced.
+        assert_eq!(off.mean([(1, 1.0), (2, 3.0)].into_iter()), (2.0 + 63.0 * 3.0) / 65.0);
         assert_eq!(off.with_ancestors(&[17]), [17]);
     }
 }

@@ -138,7 +138,7 @@ impl Knob {
 /// A setting that is measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// The knob that it turns.
+    /// The option, or group of options, in which it differs from the default.
     pub knob: Knob,
     /// Command-line options of the setting; empty for the default.
     pub options: String,

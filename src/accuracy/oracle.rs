@@ -37,8 +37,9 @@ pub struct OracleCrop {
     pub change: Change,
 }
 
-/// Renders the middle of `frame` with both, one sample of everything; `None` where even a few pixels
-/// would take the oracle minutes, or where the default is the oracle.
+/// Renders a crop amid `frame` with the default's intersector and with the oracle, one camera sample a pixel and one
+/// sample of each light, and compares the two. `None` where even the smallest crop would take the oracle longer than
+/// about ten seconds, or where the default is the oracle.
 ///
 /// # Errors
 /// As [`TrialContext::trace`].

@@ -93,7 +93,7 @@ pub struct Convergence<'a> {
     pub frames: &'a [u32],
     /// Largest root mean square change, in display steps.
     pub wanted: f64,
-    /// Most camera samples.
+    /// Largest number of camera samples a pixel; no doubling exceeds it.
     pub most: u32,
 }
 

@@ -62,7 +62,7 @@ pub struct Spread {
     /// The middle.
     #[serde(flatten)]
     pub median: Median,
-    /// One value a turn.
+    /// The measured values behind the median, one for each repetition.
     pub turns: Vec<f64>,
 }
 

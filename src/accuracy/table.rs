@@ -26,7 +26,7 @@ impl Measured {
         measured
     }
 
-    /// The default's.
+    /// The row of the default settings.
     pub fn default_row(&self) -> &CandidateRow {
         &self.rows[0]
     }

@@ -84,7 +84,7 @@ fn interval(seconds: &[f64]) -> Interval {
     median(seconds).map_or(NOTHING, |median| median.interval)
 }
 
-/// The seconds of each, turn by turn.
+/// Does the three `works` in rotation, [`TIMES`] times. Returns for each work the wall seconds of its runs.
 fn in_turns(works: [&dyn Fn() -> Result<()>; 3]) -> Result<[Vec<f64>; 3]> {
     let mut seconds = [const { Vec::new() }; 3];
     for _ in 0..TIMES {

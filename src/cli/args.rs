@@ -50,7 +50,7 @@ pub struct SettingArgs {
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::crop)]
     pub crop: Option<Rect>,
     /// Camera samples per pixel: a number, or the least and the most, as in 4..16, where a pixel takes
-    /// more than the least as far as its samples, or its neighbours', differ [default: 4]
+    /// more than the least as far as its samples, or its neighbours', differ [default: 4..16]
     #[arg(long, value_name = "N|MIN..MAX", allow_negative_numbers = true, value_parser = values::camera_samples)]
     pub spp: Option<SampleNumber>,
     /// Pixel filter [default: box]

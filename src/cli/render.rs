@@ -156,7 +156,7 @@ fn load(
         interrupt.limit(start, request.options.time_limit);
     }
     comm.set_exchange(request.options.exchange);
-    comm.agree(args.choice.check(&request))?;
+    comm.agree(args.choice.check(&mut request, &args.settings))?;
     say::unless(quiet, &request.warnings, |w| say::warning(w));
     share_isa(comm, &mut request.settings, quiet)?;
     Ok(request)

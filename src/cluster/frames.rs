@@ -24,7 +24,7 @@ use std::time::Instant;
 pub struct Outcome {
     /// The reports of all finished frames, in frame order, each with its rank. On rank 0 only.
     pub frames: Vec<(u32, FrameReport)>,
-    /// Number of frames that were not rendered. On rank 0 only.
+    /// Number of frames that were not rendered; 0 on ranks other than 0.
     pub unfinished: usize,
     /// Notes of all ranks for the user, without duplicates. On rank 0 only.
     pub notes: Vec<String>,

@@ -158,7 +158,7 @@ impl Session {
             .collect()
     }
 
-    /// Whether a send is not complete.
+    /// Advances this rank's sends; whether any is not complete yet.
     pub fn has_pending_sends(&self) -> bool {
         !self.complete_sends()
     }

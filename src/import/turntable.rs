@@ -40,7 +40,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     for found in untextured::find(&world, 0) {
         warnings.push(Diagnostic::new(path, found.message()).help(found.help()));
     }
-    let mut settings = Settings::default();
+    let mut settings = Settings::for_files();
     if let Some((width, height)) = options.size {
         (settings.width, settings.height) = (width, height);
     }

@@ -11,11 +11,10 @@ use crate::output::Display;
 use crate::stats::{AuditSums, DrawnSum};
 use std::collections::BTreeMap;
 
-/// Squared error assumed for traced pixels that were not drawn: that of one display step, since noise is alike
-/// everywhere.
+/// Largest squared error that the audit may have missed in a traced pixel, squared display steps. It raises only the
+/// upper end of the interval, not the estimate. Noise is alike everywhere, so one step is enough.
 const UNSEEN: f64 = 1.0;
-/// Squared error assumed for inferred pixels that were not drawn: that of eight display steps, since their errors
-/// are rare and large.
+/// The same of an inferred pixel: eight display steps, since errors of inferred pixels are rare and large.
 const UNSEEN_INFERRED: f64 = 64.0;
 /// Display steps from black to white.
 const STEPS: f64 = 255.0;
@@ -156,9 +155,9 @@ impl Part {
 pub struct Rmse {
     /// RMSE of the inferred pixels.
     pub inferred: Interval,
-    /// RMSE of all pixels of the audited frames.
+    /// RMSE of the audited frames as they are shown, inferred and traced pixels together.
     pub shown: Interval,
-    /// RMSE of the same frames if they had been traced.
+    /// RMSE that the same frames would have if every pixel had been traced.
     pub traced: Interval,
 }
 

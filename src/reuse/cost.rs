@@ -36,7 +36,8 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
     f64::from(rays) * shadow_ray(scene) > LOOKUP
 }
 
-/// Number of shadow rays of one camera sample in a channel.
+/// Number of shadow rays that one camera sample casts to the light of a channel; the largest number where points
+/// may stop after pilot rays.
 pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
         Channel::Area(_) | Channel::Selected(_) => settings.shadow_samples,
@@ -161,11 +162,15 @@ fn why(
 
 /// The cost of a frame that cast `rays` and looked up `lookups` surface points.
 pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
-    CAMERA_RAY * rays[RayKind::Camera] as f64
-        + SPECULAR_RAY
-            * (rays[RayKind::Mirror] + rays[RayKind::Glossy] + rays[RayKind::Glass]) as f64
-        + SHADOW_RAY * rays.shadow() as f64
-        + LOOKUP * lookups as f64
+    let of_kind = |kind| match kind {
+        RayKind::Camera => CAMERA_RAY,
+        RayKind::Mirror | RayKind::Glossy | RayKind::Glass => SPECULAR_RAY,
+        RayKind::ShadowArea | RayKind::ShadowDelta | RayKind::ShadowSky => SHADOW_RAY,
+        // Second tries are few, and part of what their first ones cost.
+        RayKind::Retry | RayKind::Invalid => 0.0,
+    };
+    let of_rays = RayKind::ALL.map(|kind| of_kind(kind) * rays[kind] as f64);
+    of_rays.iter().sum::<f64>() + LOOKUP * lookups as f64
 }
 
 /// Costs of the light of one surface point, whose camera samples are shaded together.

@@ -11,8 +11,8 @@
 use super::risk::{LEVELS, STEPS, risk_of, shown};
 use crate::inference::Estimate;
 
-/// A level is judged by its own findings and those of so many levels on either side, whose errors are scaled
-/// with the risk.
+/// Number of adjacent levels, on each side, whose findings count too when a level is judged. Their errors are scaled
+/// by the ratio of the risks.
 const BESIDE: usize = 1;
 /// This share of the squared risk is added once to the errors that a level's probes found: a few probes
 /// without an error say little where errors could be large.
@@ -28,7 +28,8 @@ const UNSEEN_SHARE: f64 = 0.5;
 /// frames know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
-    /// Level of the estimate's risk, a step on one of four scales; below the number of levels of all.
+    /// Level of the estimate's risk: an index into the levels of four scales, one scale after another (detail and all
+    /// else, for points seen directly and for points seen in mirrors or through glass).
     pub level: u8,
     /// Whether check rays agreed with the estimate.
     pub agreed: bool,

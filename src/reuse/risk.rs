@@ -17,8 +17,8 @@ pub const LEVELS: usize = 4 * STEPS;
 /// A risk above this many standard deviations of tracing's noise is detail, not noise.
 const MOST_OF_NOISE: f32 = 6.0;
 
-/// The features of an estimate from which its risk is computed, all lights together, in display steps. NaN where
-/// too few samples are known.
+/// The features of an estimate from which its risk is computed, all lights together. Differences are in display steps, NaN
+/// where too few samples are known.
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
     /// Largest difference between a tap's ratio and the mean of two samples on opposite sides of it: a mean of taps

@@ -24,7 +24,7 @@ use std::path::Path;
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// First bytes of a record; the last letter is the layout's version.
 const MAGIC: &[u8; 8] = b"twrayrf4";
-/// Words of a point without its ratios.
+/// Number of 32-bit words of a point, without its ratios and the numbers of their lights.
 const WORDS: usize = 12;
 /// Bytes of a finding.
 const FINDING: usize = 3 * 4;
@@ -50,7 +50,7 @@ pub struct Compatibility {
     pub lights: Vec<String>,
     /// For each light the shadow rays of a pixel: camera samples times shadow samples.
     pub rays: Vec<u32>,
-    /// Whether lights are selected, so that every point says whose ratios it has.
+    /// Whether every point has its own list of lights, as in scenes of many lights; else all have the same.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub selected: bool,
 }

@@ -202,7 +202,8 @@ impl Place {
 pub(super) struct References<'a>(pub &'a [&'a Reference]);
 
 impl References<'_> {
-    /// Gathers the samples about `point` in `taps`; `found` has those of the first references already.
+    /// Collects the samples near `point` in `taps`, which is cleared first. `found` has the samples of the first
+    /// [`ALWAYS`] references; further references are searched until the weights sum up to [`ENOUGH_WEIGHT`].
     pub(super) fn gather(&self, point: &SurfacePoint, found: &[Option<Taps4>], taps: &mut Taps) {
         taps.clear();
         found.iter().flatten().for_each(|four| taps.push(four));

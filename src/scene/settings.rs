@@ -87,6 +87,13 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// The settings of a scene file that gives none, and of a bare mesh: the [`default`](Self::default), but up to 16
+    /// camera samples a pixel as far as they differ (`docs/decisions/027-adaptive-by-default.md`). In code, a number
+    /// beside `..Settings::default()` means that number.
+    pub fn for_files() -> Self {
+        Self { most_spp: Some(16), ..Self::default() }
+    }
+
     /// [`Self::clamp`] as radiance.
     pub fn most_radiance(&self) -> Option<f32> {
         self.clamp.map(|most| (most / self.exposure).max(f32::MIN_POSITIVE))

@@ -97,7 +97,8 @@ impl<'a> Checkpoints<'a> {
         Some((found, bytes))
     }
 
-    /// Whether there is a file that may hold the reference of a frame; it is not read.
+    /// Whether the reference of a frame seems to be on disk: the manifest lists a frame's file that holds it, or there
+    /// is a checkpoint. No file is opened, so [`read`](Self::read) may still give `None`.
     pub fn has(&self, frame: u32) -> bool {
         self.row(frame).is_some() || self.path(frame).exists()
     }

@@ -120,7 +120,7 @@ impl<'a> FrameWriter<'a> {
         frames.into_iter().try_for_each(|made| done(self.write(made)?))
     }
 
-    /// Writes a frame and its maps, then its row.
+    /// Writes a frame's maps, then its image, and appends its row to this rank's journal. Returns its times and counts.
     fn write(
         &mut self,
         MadeFrame { frame, made, trace_seconds }: MadeFrame,

@@ -28,6 +28,8 @@ const BEND: f32 = 0.5;
 pub struct SampleSpread {
     /// How many samples.
     pub count: u32,
+    /// The sum of their radiance, before exposure, to which further samples are added.
+    pub(super) sum: Rgb,
     /// Mean of their values. NaN once one of them was invalid.
     mean: Vec3,
     /// Sum of the squared distances from the mean, all channels (Welford, 1962: sums of squares themselves would round

@@ -389,9 +389,7 @@ impl Renderer<'_> {
                 }
             }
             let disputed = pixels.disputed(at);
-            going.retain(|k| {
-                disputed.has(pixels.place_in_block(pixel_of(&wanted[*k as usize])))
-            });
+            going.retain(|k| disputed.has(pixels.place_in_block(pixel_of(&wanted[*k as usize]))));
             for k in &going {
                 let gathered = &mut s.gathered[*k as usize];
                 *gathered = Gathered { exact: gathered.exact, ..Gathered::default() };

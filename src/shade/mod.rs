@@ -347,7 +347,8 @@ impl Renderer<'_> {
         };
         let region = if with_neighbours { aligned(&grown(&own), &full) } else { own };
         let first = Pass::first(region, self.settings.spp);
-        let findings = self.pass((job, &input, &part, 0.5), &first, &mut rendered, stop, progress)?;
+        let findings =
+            self.pass((job, &input, &part, 0.5), &first, &mut rendered, stop, progress)?;
         rendered.take_over_pilots(job);
         let beside = match job.sampling {
             Sampling::Neighbours => adaptive::beside(&rendered.spreads, camera.width),
@@ -622,14 +623,7 @@ impl Rendered {
         film.provenance = job.reuse.map(|_| vec![Provenance::default(); pixels]);
         let spreads = vec![SampleSpread::default(); if is_adaptive { pixels } else { 0 }];
         let (rays, reuse) = (RayCounts::default(), ReuseCounts::default());
-        Self {
-            film,
-            rays,
-            sources: TracedPoints::default(),
-            reuse,
-            spreads,
-            pilots: Vec::new(),
-        }
+        Self { film, rays, sources: TracedPoints::default(), reuse, spreads, pilots: Vec::new() }
     }
 
     fn add(&mut self, tile: TileDone) {

@@ -198,18 +198,13 @@ impl BlockPixels {
     /// Goes on where `film` and `spreads` (one for each of its pixels) left off, with further samples of the same
     /// pixels.
     /// Those that are `known` show traces alone, as probes do.
-    pub fn resume(
-        &mut self,
-        film: &Film,
-        spreads: &[SampleSpread],
-        known: impl Fn(usize) -> bool,
-    ) {
+    pub fn resume(&mut self, film: &Film, spreads: &[SampleSpread], known: impl Fn(usize) -> bool) {
         for (i, (x, y)) in self.places.iter().enumerate() {
             let at = film.index(*x, *y);
             self.is_traced[i] = known(at);
             self.taken[i] = spreads[at].count;
             self.spreads[i] = spreads[at];
-            self.sums[i] = film.rgb[at] * spreads[at].count as f32;
+            self.sums[i] = spreads[at].sum;
             if let Some(provenance) = &film.provenance {
                 self.provenance[i] = provenance[at];
             }
@@ -479,9 +474,12 @@ impl BlockPixels {
             let rgb = if flagged { MAGENTA } else { sum * (1.0 / self.taken[i] as f32) };
             let record = self.records.get(i).map(|r| r.pixel);
             let mut spread = self.spreads.get(i).copied();
-            if flagged {
-                // More samples would be added to magenta.
-                spread.iter_mut().for_each(SampleSpread::spoil);
+            if let Some(spread) = &mut spread {
+                spread.sum = sum;
+                if flagged {
+                    // More samples would be added to magenta.
+                    spread.spoil();
+                }
             }
             FinishedPixel { x, y, rgb, record, provenance: self.provenance[i], spread }
         })

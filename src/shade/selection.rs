@@ -239,7 +239,8 @@ mod tests {
         let size = libm::exp(-3.0 + 2.5 * next());
         let radiance = Rgb::new(2.0, 1.0, 0.5) * libm::exp(3.0 * next()) as f32;
         let two_sided = next() > 0.0;
-        match (3.0 * (next() + 1.0)) as u32 {
+        let kinds = Light::KINDS.len();
+        match (0.5 * kinds as f64 * (next() + 1.0)) as usize {
             0 => Light::Point(PointLight { position: p, intensity: radiance * 0.01 }),
             1 => {
                 let (s, t) = crate::math::orthonormal_basis(normal);
@@ -263,10 +264,11 @@ mod tests {
                     radius,
                 })
             }
-            _ => {
+            5 => {
                 let irradiance = radiance * 0.001;
                 Light::Directional(DirectionalLight { to_light: normal, irradiance })
             }
+            kind => panic!("{} lights are not drawn", Light::KINDS[kind]),
         }
     }
 
@@ -383,7 +385,8 @@ mod tests {
     #[test]
     fn a_far_larger_bound_rounds_no_other_light_away() {
         let mut next = random(515);
-        let face = |at: f64| DVec3::new(if at.is_sign_negative() { -1e-17 } else { 1e-17 }, at, 0.3);
+        let face =
+            |at: f64| DVec3::new(if at.is_sign_negative() { -1e-17 } else { 1e-17 }, at, 0.3);
         for (near, brightest) in [(0, 1e22f32), (0, 1.0), (3, 1.0), (30, 1.0), (30, 1e18)] {
             let point = |position, intensity| {
                 Light::Point(PointLight { position, intensity: Rgb::splat(intensity) })

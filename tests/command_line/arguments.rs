@@ -33,10 +33,10 @@ fn invalid_arguments_are_refused_with_what_is_valid() {
     job.refused("render cube.obj --size 640", "640 … 640x360");
     job.refused("render cube.obj --size 70000x1", "70000x1 … 32768");
     job.refused("render cube.obj --spp 0", "from 1 to 65536");
-    job.refused("render cube.obj --spp 4..2", "least");
+    job.refused("render cube.obj --spp 4..2", "write 2..4");
     job.refused("render cube.obj --spp 4..16 --target psnr=40", "not predicted");
-    job.refused("render cube.obj --shadow-samples 16..4", "least");
-    job.refused("render cube.obj --sky-samples 0..4", "from 1 to 65536");
+    job.refused("render cube.obj --shadow-samples 16..4", "write 4..16");
+    job.refused("render cube.obj --sky-samples 0..4", "starts at 1");
     job.refused("render cube.obj --shadow-samples 2..8 --target psnr=40", "not predicted");
     job.refused("render cube.obj --frames 9..3", "frame 9 … frame 3");
     job.refused("render cube.obj --frames 0", "--frames … from 1");

@@ -186,7 +186,7 @@ fn a_script_holds_what_was_asked_for_and_invalid_options_are_refused_before_the_
         ("--nodes 2 --time 30m -- --references .", "--references . … exr"),
         ("--nodes 2 --time 30m -- --policy colour --references .", "--policy surface"),
         ("--nodes 2 --time 30m -- --policy colour --upload 1=none.png", "none.png"),
-        ("--nodes 2 --time 30m -- --policy off --maps", "--maps"),
+        ("--nodes 2 --time 30m -- --policy off --spp 4 --maps", "--maps"),
         ("--nodes 2 --time 30m -- --sp 4", "'--sp'"),
         ("--nodes 2 --time 30m -- --frames 900", "900 … 1..48"),
         ("--nodes 2 --time 30m -- --overwrite", "--overwrite … -o"),

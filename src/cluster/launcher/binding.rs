@@ -27,7 +27,7 @@ pub struct Binding {
     pub cores: usize,
     /// Number of threads of that rank.
     pub threads: usize,
-    /// Number of cores that the launcher had.
+    /// Number of cores of the node that the launcher may use.
     pub of: usize,
     /// Number of the launcher's cores that no rank may use.
     pub idle: usize,

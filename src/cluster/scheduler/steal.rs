@@ -58,8 +58,8 @@ impl Scheduler {
         Some(first)
     }
 
-    /// Whether the victim owns all tasks of the batch and all wait. The first task may be made: it is
-    /// a key frame, which another batch may have needed.
+    /// Whether `victim` owns all tasks of the batch and has started none of them. Only the first task may be finished
+    /// already, by any rank: it is a key frame, which another batch may have needed.
     fn is_untouched(&self, batch: usize, victim: u32) -> bool {
         let range = self.batches[batch].clone();
         range.clone().all(|t| {

@@ -111,7 +111,7 @@ pub(super) struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        let s = scene::Settings::default();
+        let s = scene::Settings::for_files();
         let job = JobOptions::default();
         Self {
             size: List([s.width, s.height].map(|x| Int::clamped(x.into()))),

@@ -34,7 +34,8 @@ impl LightLists {
         own
     }
 
-    /// The channel of a sample that has the light of channel `k` of a point with the lights `asked`.
+    /// Index of the light `asked[k]` in the list of lights of `sample`; `None` if the sample has no ratio of that
+    /// light. Where `asked` is empty all points have the same lights, so it is `k`.
     #[inline]
     pub fn channel(&self, sample: u32, asked: &[u32], k: usize) -> Option<usize> {
         if asked.is_empty() {

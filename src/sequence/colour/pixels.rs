@@ -5,7 +5,8 @@ use crate::reuse::colour::{Entry, InferredColour, KnownColours};
 use crate::scene::{Camera, Rect, Settings};
 use crate::stats::ReuseCounts;
 
-/// The pixels of the film that were traced, as entries.
+/// The colours of those pixels of the film that were traced: for each the pixel's index, its radiance and the distance
+/// of its first hit from the camera.
 pub(super) fn discoveries(
     frame: u32,
     film: &Film,

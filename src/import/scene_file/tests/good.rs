@@ -12,7 +12,8 @@ use std::time::Duration;
 #[test]
 fn an_empty_file_is_an_empty_scene_with_all_defaults() {
     let loaded = good("");
-    assert_eq!(loaded.settings, SceneSettings::default());
+    assert_eq!(loaded.settings, SceneSettings::for_files());
+    assert_eq!(loaded.settings.camera_samples(), "4..16");
     assert_eq!((loaded.shot.frames, loaded.shot.vfov_degrees), (48, 40.0));
     assert_eq!(
         (loaded.options.fps, loaded.options.frames, loaded.options.output),

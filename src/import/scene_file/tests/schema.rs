@@ -63,7 +63,7 @@ fn ranges_and_defaults_are_in_the_schema() {
     let settings = &schema()["$defs"]["Settings"]["properties"];
     assert_eq!(settings["spp"]["anyOf"][0]["maximum"], 65_536);
     assert_eq!(settings["shadow_samples"]["anyOf"][0]["maximum"], 65_536);
-    assert_eq!(settings["spp"]["default"], 4);
+    assert_eq!(settings["spp"]["default"], serde_json::json!([4, 16]));
     assert_eq!(settings["cutoff"]["default"], 0.001);
     let reuse = &schema()["$defs"]["Reuse"]["properties"];
     assert_eq!(
