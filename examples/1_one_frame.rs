@@ -14,7 +14,7 @@ use tweenray::scene::{World, WorldMesh, WorldSphere};
 use tweenray::shade::Renderer;
 
 fn main() -> Result<()> {
-    // What is not set has the command line's defaults: 640 x 360 pixels, four samples each.
+    // What is not set has its default, as the 640 x 360 pixels. A number of samples means that number in every pixel.
     let settings = Settings { spp: 16, ..Settings::default() };
     render(&settings, Path::new("one_frame.png"))
 }

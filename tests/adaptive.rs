@@ -198,7 +198,7 @@ fn pixels_around_probes_have_the_bytes_of_the_whole() {
     let camera = shot.camera(5, 96, 54).unwrap();
     let mask: Vec<bool> = (0..96 * 54).map(|i| i % 7 == 3).collect();
     let job = FrameJob::whole(&camera, 5);
-    let probes = FrameJob { mask: Some(&mask), sampling: Sampling::Alone, ..job };
+    let probes = FrameJob { mask: Some(&mask), sampling: Sampling::Own, ..job };
     let probes = render(&probes);
     let known = Some(Known { mask: &mask, rendered: &probes });
     let rest = render(&FrameJob { known, ..FrameJob::whole(&camera, 5) });
@@ -213,6 +213,22 @@ fn pixels_around_probes_have_the_bytes_of_the_whole() {
         .filter(|(own, all)| **own > 0 && own < all)
         .count();
     assert!(gone_on > 50, "{gone_on}");
+}
+
+/// A key frame of policy colour is traced whole, so its pixels have the samples of a traced frame.
+#[test]
+fn a_key_frame_of_policy_colour_has_the_bytes_of_a_traced_one() {
+    let set = Set::load("cornell", |_| ());
+    let (stage, shot) = (set.stage(2), set.shot(16));
+    for least in [1, 4] {
+        let mut settings = Settings { most_spp: Some(16), ..set.settings((64, 48), least, 4) };
+        let [colour, off] = [Policy::Colour, Policy::Off].map(|policy| {
+            settings.reuse.policy = policy;
+            stage.frames(&settings, &shot, &[1]).remove(0).film
+        });
+        assert_eq!((colour.rgb, colour.samples), (off.rgb, off.samples), "{least}");
+        assert!(off.bad.total() == 0);
+    }
 }
 
 /// In-between frames too, whose probes lie beyond the crop as well.

@@ -30,7 +30,7 @@ pub struct Cut {
     /// `None` where every frame is traced whole.
     pyramid: Option<Pyramid>,
     /// By its key frames the frames are weighed. Where every frame is traced whole it is that of the settings' segment,
-    /// so that means over the same frames are of the same frames' errors whatever the policy.
+    /// so that frames weigh alike under policies surface and off.
     weighed: Pyramid,
 }
 
@@ -68,7 +68,7 @@ impl Cut {
 
     /// The mean over the move of values measured on some frames, by number: the means over key frames and
     /// over in-between frames, weighed by how many the move has. A kind without a value is left out. Frames weigh alike
-    /// where all are traced: an error that differs from frame to frame must not seem to differ between policies.
+    /// under policies surface and off: an error that differs from frame to frame must not seem to differ between them.
     pub fn mean(&self, measured: impl Iterator<Item = (u32, f64)>) -> f64 {
         let mut sums = [(0.0, 0.0); 2];
         for (frame, value) in measured {

@@ -57,6 +57,8 @@ pub fn on_a_crop(context: &TrialContext, frame: u32) -> Result<Option<OracleCrop
     let crop = Rect { x0, y0, x1: x0 + width, y1: y0 + height };
     let mut settings = context.base.clone();
     (settings.spp, settings.shadow_samples, settings.sky_samples) = (1, 1, 1);
+    settings.most_spp = None;
+    (settings.least_shadow_samples, settings.least_sky_samples) = (None, None);
     settings.crop = Some(crop);
     settings.reuse.policy = Policy::Off;
     let oracle = Oracle::new(context.scene);

@@ -76,13 +76,8 @@ impl ChoiceArgs {
         self.target.is_some() || self.budget.is_some()
     }
 
-    /// Refuses those of the command line's `options` whose effect cannot be predicted. Camera samples that the scene
-    /// file or the default gives are chosen anew, all pixels with as many.
-    pub fn check(&self, request: &mut Request, options: &SettingArgs) -> Result<()> {
-        if self.is_any() && options.spp.is_none() {
-            request.settings.most_spp = None;
-        }
-        let request = &*request;
+    /// Refuses options whose effect cannot be predicted.
+    pub fn check(&self, request: &Request) -> Result<()> {
         let settings = &request.settings;
         let obstacle = match () {
             () if !self.is_any() => None,

@@ -8,6 +8,7 @@ use crate::import::{self, Loaded};
 use crate::output::FramePattern;
 use crate::scene::limits::MAX_EDGE;
 use crate::scene::{Aovs, Collapsed, Policy, Scene, Settings};
+use crate::shade::SampleSpread;
 use std::path::{Path, PathBuf};
 
 /// Reads the scene and applies the options to its settings.
@@ -105,13 +106,17 @@ fn check_memory(settings: &Settings, memory: Option<u64>) -> Result<()> {
 /// Bytes that the frames in memory take at most, pixels alone: colour (12 a pixel) and, if exr frames may hold them,
 /// first-hit records (52). There are four of each: one is traced while the one before is encoded, which takes a copy,
 /// and its tiles hold their pixels until all are finished, with their places (4). Where pixels take different numbers
-/// of samples, what is known of these adds 52.
+/// of samples, what is known of these adds a spread in the frame, one with its place in the tiles, and two numbers (8); under
+/// policy surface the probes have two spreads and a number more.
 pub fn frame_bytes(settings: &Settings) -> u64 {
     let has_first_hits = settings.aovs.as_ref().is_some_and(Aovs::have_first_hits)
         || settings.reuse.policy == Policy::Colour;
     // A cropped film has the full size, black outside.
     let each = 4 + 4 * (12 + if has_first_hits { 52 } else { 0 });
-    settings.pixel_count() * (each + if settings.most_spp.is_some() { 52 } else { 0 })
+    let spread = size_of::<SampleSpread>() as u64;
+    let of_probes = if settings.reuse.policy == Policy::Surface { 2 * spread + 4 } else { 0 };
+    let adaptive = 2 * spread + 4 + 8 + of_probes;
+    settings.pixel_count() * (each + if settings.most_spp.is_some() { adaptive } else { 0 })
 }
 
 #[cfg(test)]
@@ -124,6 +129,9 @@ mod tests {
         let large = Settings { width: 30_000, height: 30_000, ..Settings::default() };
         let error = check_memory(&large, Some(8 << 30)).expect_err("too large").to_string();
         assert!(error.contains("46.8 GB") && error.contains("8.6 GB"), "{error}");
+        let adaptive = Settings { most_spp: Some(16), ..large.clone() };
+        let error = check_memory(&adaptive, Some(8 << 30)).expect_err("too large").to_string();
+        assert!(error.contains("176.4 GB"), "{error}");
         let all = Settings { aovs: Some(Aovs::All), ..large };
         let error = check_memory(&all, Some(8 << 30)).expect_err("too large").to_string();
         assert!(error.contains("234.0 GB"), "{error}");

@@ -151,12 +151,13 @@ fn load(
     interrupt.goes_on(NOTHING_DONE.into());
     interrupt.before_slurm_ends();
     interrupt.limit(start, args.job.time_limit);
-    let mut request = Request::load(comm, &args.scene, &args.settings, &args.job)?;
+    let mut request =
+        Request::load(comm, &args.scene, (&args.settings, args.choice.is_any()), &args.job)?;
     if args.job.time_limit.is_none() {
         interrupt.limit(start, request.options.time_limit);
     }
     comm.set_exchange(request.options.exchange);
-    comm.agree(args.choice.check(&mut request, &args.settings))?;
+    comm.agree(args.choice.check(&request))?;
     say::unless(quiet, &request.warnings, |w| say::warning(w));
     share_isa(comm, &mut request.settings, quiet)?;
     Ok(request)

@@ -72,16 +72,16 @@ pub struct Setup {
 }
 
 impl Request {
-    /// Reads the scene and applies the options to it. All ranks call it.
+    /// Reads the scene and applies the options to it; `chooses` as for [`read`](Self::read). All ranks call it.
     pub fn load(
         comm: &Communicator,
         scene: &SceneArgs,
-        settings: &SettingArgs,
+        (settings, chooses): (&SettingArgs, bool),
         job: &JobArgs,
     ) -> Result<Self> {
         // Before the work of reading a scene.
         comm.agree(machine::best_isa())?;
-        let read = comm.from_node(|| Self::read(scene, settings, job));
+        let read = comm.from_node(|| Self::read(scene, settings, job, chooses));
         let mut request = comm.agree(read)?;
         let terms = comm.agree(request.setup(request.settings.clone()))?.terms;
         let on = (&request.scene, &request.settings, &terms);

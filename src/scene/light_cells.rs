@@ -64,8 +64,8 @@ pub struct CellLight {
     pub light: u32,
     /// The bounds of this light and of all after it, summed: irradiance, infinite where a bound is.
     rest: f64,
-    /// The weights of this light and of all after it, summed from the last on, so that a far brighter light rounds
-    /// none of them away.
+    /// The weights of this light and of all after it, summed from the last on, so that a far larger bound rounds none
+    /// of those after it away.
     weights: f64,
 }
 
@@ -196,7 +196,9 @@ impl Tail<'_> {
             true => (u * self.lights.len() as f64) as usize,
             false => others.partition_point(|light| light.weights >= at),
         };
-        let k = k.min(others.len());
+        // At the end of the range u may be rounded to what is culled.
+        let can_be_chosen = |k: &usize| self.probability(*k) > 0.0;
+        let k = (0..=k.min(others.len())).rev().find(can_be_chosen).unwrap_or(0);
         (self.lights[k].light, self.probability(k))
     }
 

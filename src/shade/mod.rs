@@ -41,7 +41,7 @@ use adaptive::Until;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
-use pilots::Findings;
+use pilots::LightFindings;
 use pixels::{BlockPixels, FinishedPixel, SampleLimits};
 use selection::{LightSelection, LightUsers, Reached};
 use source::LightSource;
@@ -169,8 +169,10 @@ pub struct Known<'a> {
 pub enum Sampling<'a> {
     /// Its own samples and those of its neighbours, which are looked at even where they are not asked for.
     Neighbours,
-    /// Its own samples.
+    /// Its own samples and those of the neighbours that are asked for.
     Alone,
+    /// Its own samples: so it has no more than with those of its neighbours.
+    Own,
     /// The numbers given for each pixel of the film.
     As(&'a [u32]),
 }
@@ -252,7 +254,7 @@ struct TileDone {
     /// Of more pixels, where they lie with what their samples say.
     spreads: Vec<(u32, SampleSpread)>,
     /// What pilots found, for blocks whose pixels may go on.
-    findings: Vec<([u32; 2], Vec<Findings>)>,
+    findings: Vec<([u32; 2], LightFindings)>,
     rays: RayCounts,
     bad: BadSamples,
     left: Left,
@@ -351,8 +353,10 @@ impl Renderer<'_> {
             self.pass((job, &input, &part, 0.5), &first, &mut rendered, stop, progress)?;
         rendered.take_over_pilots(job);
         let beside = match job.sampling {
-            Sampling::Neighbours => adaptive::beside(&rendered.spreads, camera.width),
-            Sampling::Alone => {
+            Sampling::Neighbours | Sampling::Alone => {
+                adaptive::beside(&rendered.spreads, camera.width)
+            }
+            Sampling::Own => {
                 rendered.pilots = rendered.spreads.clone();
                 vec![0.0; rendered.spreads.len()]
             }
@@ -360,7 +364,9 @@ impl Renderer<'_> {
         };
         let until = match job.sampling {
             Sampling::As(counts) => Until::Each(counts),
-            Sampling::Neighbours | Sampling::Alone => Until::Differences { beside: &beside, most },
+            Sampling::Neighbours | Sampling::Alone | Sampling::Own => {
+                Until::Differences { beside: &beside, most }
+            }
         };
         // Pixels that were rendered already may lack samples that their neighbours call for.
         rendered.take_over(job, &part);
@@ -487,8 +493,8 @@ impl Renderer<'_> {
             let mut unused = Left::default();
             let left = if is_own { &mut out.left } else { &mut unused };
             let rays = kernel(self, input, &pass.until, pixels, scratch, left);
-            if input.has_pilots && is_adaptive && !pass.goes_on {
-                out.findings.push((place, pixels.findings().to_vec()));
+            if input.has_pilots && is_adaptive && is_own && !pass.goes_on {
+                out.findings.push((place, pixels.findings().collect()));
             }
             // What lies around a rank's rows are another rank's own.
             if is_own {
@@ -541,8 +547,8 @@ struct Pass<'p> {
     findings: BlockFindings,
 }
 
-/// What pilots found of each light, by the first column and row of a block.
-type BlockFindings = HashMap<[u32; 2], Vec<Findings>>;
+/// What pilots found of those lights that have any, by the first column and row of a block.
+type BlockFindings = HashMap<[u32; 2], LightFindings>;
 
 impl Pass<'_> {
     /// The first `spp` samples of each pixel of `region`.

@@ -44,13 +44,16 @@ impl PixelMask {
 }
 
 /// What the pilots of a block's pixels found of one light.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Findings {
     /// Pixels in which any reached the light.
     open: PixelMask,
     /// Pixels in which any did not.
     shut: PixelMask,
 }
+
+/// What pilots found of some lights, by their place among the frame's sources.
+pub(super) type LightFindings = Vec<(u32, Findings)>;
 
 impl Findings {
     /// Notes what the pilots of the pixel at `place` of the block found: whether any reached the light, and whether any did not.

@@ -1,7 +1,7 @@
 //! The pixels of one block while it is rendered: sums, records, samplers.
 
 use super::adaptive::{SampleSpread, Until};
-use super::pilots::{Findings, PixelMask};
+use super::pilots::{Findings, LightFindings, PixelMask};
 use super::{BLOCK, FrameInput, dimensions};
 use crate::film::{Film, GPixel, Provenance, ProvenanceKind};
 use crate::inference::SAMPLES_TOGETHER;
@@ -223,17 +223,18 @@ impl BlockPixels {
     }
 
     /// Starts to note what pilots find of as many lights, or goes on with what they found before.
-    pub fn start_pilots(&mut self, lights: usize, before: Option<&Vec<Findings>>) {
+    pub fn start_pilots(&mut self, lights: usize, before: Option<&LightFindings>) {
         self.findings.clear();
-        match before {
-            Some(before) => self.findings.extend_from_slice(before),
-            None => self.findings.resize(lights, Findings::default()),
+        self.findings.resize(lights, Findings::default());
+        for (light, found) in before.into_iter().flatten() {
+            self.findings[*light as usize] = *found;
         }
     }
 
-    /// What pilots found of each light; empty where there are none.
-    pub fn findings(&self) -> &[Findings] {
-        &self.findings
+    /// What pilots found, of those lights that have any.
+    pub fn findings(&self) -> impl Iterator<Item = (u32, Findings)> {
+        let all = (0..).zip(self.findings.iter().copied());
+        all.filter(|(_, found)| *found != Findings::default())
     }
 
     /// Notes whether any pilots of a pixel reached a light, and whether any did not.

@@ -406,8 +406,15 @@ mod tests {
                 assert!((1..=Tail::most_samples(8)).contains(&tail.samples(8)));
                 let all: f64 = (0..count).map(|light| tail.probability_of(light)).sum();
                 assert!((all - 1.0).abs() < 1e-9, "{near} {brightest}: {all}");
-                let (light, probability) = tail.choose(0.5 + 0.5 * next());
-                assert!(probability > 0.0 && probability == tail.probability_of(light));
+                for u in [0.0, 0.5 + 0.5 * next(), 1.0 - f64::EPSILON / 2.0] {
+                    for limit in [0.0, 1e-6, 1e-3, 0.1] {
+                        let tail = cells.lights(cells.cell(p), limit).tail();
+                        if !tail.is_empty() {
+                            let (light, probability) = tail.choose(u);
+                            assert!(probability > 0.0 && probability == tail.probability_of(light));
+                        }
+                    }
+                }
                 // Where only the usual lights are in the tail, each is chosen now and then.
                 let usual = tail.len() as u32 <= 40 && brightest == 1.0;
                 let least = (0..40).map(|light| tail.probability_of(light)).filter(|p| *p > 0.0);

@@ -14,11 +14,20 @@ use crate::sequence::{WorldHash, check_upload, shot_fingerprint};
 use std::path::{Path, PathBuf};
 
 impl Request {
-    /// Reads all files.
+    /// Reads all files. With `chooses` the program chooses camera samples, all pixels with as many, unless `args` say how
+    /// many.
     ///
     /// Errors: `Error::Input` and `Error::Usage`.
-    pub(super) fn read(scene: &SceneArgs, args: &SettingArgs, job: &JobArgs) -> Result<Self> {
+    pub(super) fn read(
+        scene: &SceneArgs,
+        args: &SettingArgs,
+        job: &JobArgs,
+        chooses: bool,
+    ) -> Result<Self> {
         let mut loaded = job::load(scene, args)?;
+        if chooses && args.spp.is_none() {
+            loaded.settings.most_spp = None;
+        }
         let (frames, pattern) = place(scene, job, &mut loaded)?;
         let Loaded { world, shot, settings, options, mut warnings, files, .. } = loaded;
         let aovs = super::aovs(args, &options, &settings, &pattern)?;

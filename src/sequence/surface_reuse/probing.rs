@@ -65,7 +65,7 @@ impl Probed {
 
 /// As many camera samples as `counts` has, where pixels have different numbers.
 fn sampling_of(counts: &[u32]) -> Sampling<'_> {
-    if counts.is_empty() { Sampling::Alone } else { Sampling::As(counts) }
+    if counts.is_empty() { Sampling::Own } else { Sampling::As(counts) }
 }
 
 impl SurfaceReuse<'_> {
@@ -102,9 +102,11 @@ impl SurfaceReuse<'_> {
             let rendered = self.render(job, Some(&probe as &dyn Inference), &())?;
             Result::Ok((rendered, probe))
         };
-        let (first, own) = trace(STREAMS[0], Some(lookup), Sampling::Alone)?;
+        let (first, own) = trace(STREAMS[0], Some(lookup), Sampling::Own)?;
         let counts = first.sample_counts();
-        let (second, again) = trace(STREAMS[1], None, sampling_of(&counts))?;
+        let (mut second, again) = trace(STREAMS[1], None, sampling_of(&counts))?;
+        // Only the first is gone on with.
+        second.spreads = Vec::new();
         let samples = |[x, y]: [u32; 2]| {
             counts.get(first.film.index(x, y)).copied().unwrap_or(r.settings.spp)
         };
