@@ -139,8 +139,10 @@ mod tests {
         ]);
         let e = Errors::of(&truth, &still, &cut).expect("one size");
         assert!(e.flicker.expect("neighbours") < 1e-3, "{e:?}");
-        assert!((e.rmse_steps - 4.0 * (2f64 / 3.0).sqrt()).abs() < 1e-3, "{e:?}");
-        assert!((e.share_over_2 - 2.0 / 3.0).abs() < 1e-9);
+        // Frame 1 stands for two frames of nine, the others for seven.
+        let share = (2.0 + 7.0 * 0.5) / 9.0;
+        assert!((e.rmse_steps - 4.0 * f64::sqrt(share)).abs() < 1e-3, "{e:?}");
+        assert!((e.share_over_2 - share).abs() < 1e-9);
         let changing = Frames::from([
             (1, flat(0.2 + steps(1.0))),
             (2, flat(0.3 - steps(2.0))),
