@@ -68,15 +68,17 @@ impl ShadowStarts {
 /// Shadow rays of one shading point: to each sample that lies above the horizon.
 struct ShadowRays<'s> {
     starts: ShadowStarts,
+    /// The point's unit normal.
+    n: DVec3,
     scratch: &'s mut ShadowScratch,
 }
 
 impl SampleSink for ShadowRays<'_> {
     #[inline(always)] // So that the kind of target is known.
     fn push(&mut self, sample: LightSample) {
-        if sample.weight > 0.0 {
-            self.scratch.rays.push(self.starts.ray_to(&sample.target));
-            self.scratch.weights.push(sample.weight);
+        let weight = sample.pdf.weight(self.n);
+        if weight > 0.0 {
+            self.scratch.push(self.starts.ray_to(&sample.target), weight);
         }
     }
 }
@@ -176,6 +178,13 @@ impl ShadowScratch {
     /// Takes the room back.
     pub fn give_back(&mut self, u: Vec<[f32; 2]>) {
         self.u = u;
+    }
+
+    /// Adds a ray of a diffuse point, with the weight of its sample.
+    #[inline(always)] // Once for each shadow ray.
+    fn push(&mut self, ray: Ray, weight: f64) {
+        self.rays.push(ray);
+        self.weights.push(weight);
     }
 
     /// Adds a ray of a glossy point, which reflects `seen` of the light along it.
@@ -443,9 +452,9 @@ impl Renderer<'_> {
                     if s.is_open() && n == source.samples as usize {
                         // All below the horizon, but some of the light is above: a point of that
                         // decides, or the horizon's own shadow would be counted twice.
-                        if let Some(sample) = seen.above(point.si.p, point.n) {
-                            let starts = s.starts(self, lit, i);
-                            ShadowRays { starts, scratch: s }.push(sample);
+                        if let Some(target) = seen.above(point.si.p, point.n) {
+                            let ray = s.starts(self, lit, i).ray_to(&target);
+                            s.push(ray, 1.0);
                         }
                     }
                 }
@@ -476,7 +485,8 @@ impl Renderer<'_> {
     ) {
         let point = &lit[i as usize];
         let starts = s.starts(self, lit, i);
-        seen.sample_li(point.si.p, point.n, u, &mut ShadowRays { starts, scratch: s });
+        let mut rays = ShadowRays { starts, n: point.n, scratch: s };
+        seen.sample_li(point.si.p, u, &mut rays);
     }
 
     /// Casts the check rays that the inference wants, and tells it what they found.

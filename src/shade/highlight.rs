@@ -7,7 +7,7 @@
 //! light.
 
 use super::direct::{BATCH, ShadowScratch, ShadowStarts};
-use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
+use super::light::{LightSample, SampleSink};
 use super::lobe::Lobe;
 use super::pixels::BlockPixels;
 use super::point::SamplePlace;
@@ -37,7 +37,6 @@ pub(super) struct GlossyPoint {
 /// Shadow rays of one glossy point to one light.
 struct HighlightRays<'s> {
     point: &'s GlossyPoint,
-    view: &'s LightView<'s>,
     source: &'s LightSource,
     /// Unshadowed irradiance, which a delta light sends from its one direction.
     exact: f64,
@@ -48,22 +47,16 @@ struct HighlightRays<'s> {
 
 impl SampleSink for HighlightRays<'_> {
     fn push(&mut self, sample: LightSample) {
-        let GlossyPoint { lobe, p, n, ng, wo, starts, .. } = self.point;
-        let (wi, density) = match sample.target {
-            ShadowTarget::Point(end) => {
-                ((end.point - *p).normalize(), self.view.pdf_li(*p, end.point))
-            }
-            ShadowTarget::Direction(wi) | ShadowTarget::Sky(wi) => (wi, None),
-        };
+        let GlossyPoint { lobe, n, ng, wo, starts, .. } = self.point;
+        let wi = sample.wi;
         // The lobe's rays below the facet are mirrored and count whole.
         if wi.dot(*ng) <= 0.0 {
             return;
         }
         let count = self.count;
-        let irradiance = density.map_or(self.exact / count, |density| {
+        let irradiance = sample.pdf.per_steradian().map_or(self.exact / count, |density| {
             let share = self.source.share(density, count, lobe.pdf(*wo, wi));
-            let radiance = self.source.sampler.radiance_at(*p);
-            radiance * wi.dot(*n).max(0.0) / (density * count) * share
+            sample.radiance * wi.dot(*n).max(0.0) / (density * count) * share
         });
         let seen = lobe.f(*wo, wi) * irradiance as f32;
         if seen != Rgb::ZERO {
@@ -180,8 +173,8 @@ impl Renderer<'_> {
         };
         if let Some(view) = &seen {
             draw(u);
-            let mut rays = HighlightRays { point, view, source, exact, count, scratch };
-            view.sample_li(point.p, point.n, u, &mut rays);
+            let mut rays = HighlightRays { point, source, exact, count, scratch };
+            view.sample_li(point.p, u, &mut rays);
         }
     }
 

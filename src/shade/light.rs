@@ -9,12 +9,14 @@ mod disk;
 mod flat;
 mod point;
 mod quad;
+mod sample;
 mod sky;
 mod sphere;
 mod spot;
 
+pub use sample::{AreaPdf, LightSample, Pdf, SampleSink, ShadowTarget};
+
 use super::irradiance;
-use crate::intersect::RayEnd;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Light, Sky};
 use directional::Directional;
@@ -57,34 +59,6 @@ enum View<'a> {
     Sky(SkyView),
 }
 
-/// A point of a light, or a direction to it, as seen from a surface point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LightSample {
-    /// Where the shadow ray goes.
-    pub target: ShadowTarget,
-    /// Unshadowed irradiance that the sample stands for, up to a factor that all samples of one
-    /// surface point share; 0 where the light does not shine.
-    pub weight: f64,
-}
-
-/// Whoever takes samples. A trait and no closure: its method is inlined for every kind of light, which saves
-/// a twentieth of a traced frame.
-pub trait SampleSink {
-    /// Takes one more.
-    fn push(&mut self, sample: LightSample);
-}
-
-/// Where a shadow ray goes, scene space.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ShadowTarget {
-    /// To a point of a light.
-    Point(RayEnd),
-    /// Along this direction without end, from the smooth surface that the facet stands for.
-    Direction(DVec3),
-    /// Along this direction without end, from the facet.
-    Sky(DVec3),
-}
-
 impl LightSampler {
     /// Prepares `light`, scene space.
     pub fn new(light: &Light) -> Self {
@@ -120,16 +94,6 @@ impl LightSampler {
         }
     }
 
-    /// Radiance towards `p` per unit of emission, where it is the same all over the light.
-    pub fn radiance_at(&self, p: DVec3) -> f64 {
-        match &self.shape {
-            Shape::Spot(light) => light.radiance_at(p),
-            Shape::Quad(_) | Shape::Sphere(_) | Shape::Disk(_) | Shape::Sky(_) => 1.0,
-            // These have an intensity or an irradiance.
-            Shape::Point(_) | Shape::Directional(_) => f64::NAN,
-        }
-    }
-
     /// Whether rays can end on the light's surface.
     pub fn is_seen(&self) -> bool {
         match &self.shape {
@@ -144,7 +108,7 @@ impl LightSampler {
             Shape::Point(light) => View::Point(light),
             Shape::Directional(light) => View::Directional(light),
             Shape::Quad(light) => View::Quad(light),
-            Shape::Sphere(light) => View::Sphere(light.seen_from(p)?),
+            Shape::Sphere(light) => View::Sphere(light.seen_from(p, 1.0)?),
             Shape::Disk(light) => View::Disk(light),
             Shape::Spot(light) => light.seen_from(p)?,
             Shape::Sky(_) => View::Sky(SkyView::above(n)),
@@ -153,17 +117,17 @@ impl LightSampler {
 }
 
 impl LightView<'_> {
-    /// Gives `sink` the light's point or direction for each of `u` in the unit square, as seen from `p` with unit
-    /// normal `n`. All at once, so that nothing asks for the kind sample by sample.
-    pub fn sample_li(&self, p: DVec3, n: DVec3, u: &[[f32; 2]], sink: &mut impl SampleSink) {
+    /// Gives `sink` the light's point or direction for each of `u` in the unit square, as seen from `p`, which the
+    /// view was made for. All at once, so that nothing asks for the kind sample by sample.
+    pub fn sample_li(&self, p: DVec3, u: &[[f32; 2]], sink: &mut impl SampleSink) {
         let u = u.iter().map(|u| u.map(f64::from));
         match &self.0 {
             View::Point(light) => u.for_each(|_| sink.push(light.sample_li(p))),
             View::Directional(light) => u.for_each(|_| sink.push(light.sample_li())),
-            View::Quad(light) => u.for_each(|u| sink.push(light.sample_li(p, n, u))),
-            View::Sphere(light) => u.for_each(|u| sink.push(light.sample_li(p, n, u))),
-            View::Disk(light) => u.for_each(|u| sink.push(light.sample_li(p, n, u))),
-            View::Sky(sky) => u.for_each(|u| sink.push(sky.sample_li(n, u))),
+            View::Quad(light) => u.for_each(|u| sink.push(light.sample_li(p, u))),
+            View::Sphere(light) => u.for_each(|u| sink.push(light.sample_li(p, u))),
+            View::Disk(light) => u.for_each(|u| sink.push(light.sample_li(p, u))),
+            View::Sky(sky) => u.for_each(|u| sink.push(sky.sample_li(u))),
         }
     }
 
@@ -180,7 +144,7 @@ impl LightView<'_> {
 
     /// A point of the light above the horizon of `n`, in the middle of what is: for slivers that
     /// no sample meets. `None` where nothing is.
-    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<ShadowTarget> {
         match &self.0 {
             View::Quad(light) => light.above(p, n),
             View::Sphere(light) => light.above(p, n),
@@ -188,13 +152,6 @@ impl LightView<'_> {
             // Each sample of these lies above.
             View::Point(_) | View::Directional(_) | View::Sky(_) => None,
         }
-    }
-}
-
-impl LightSample {
-    /// The one sample of a delta light.
-    fn of_delta(target: ShadowTarget) -> Self {
-        Self { target, weight: 1.0 }
     }
 }
 

@@ -5,20 +5,19 @@
 //! frames: every point traces its own.
 
 use super::direct::{BATCH, ShadowScratch, ShadowStarts};
-use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
+use super::light::{LightSample, SampleSink};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::selection::{Choice, LightSelection, TailSamples};
 use super::source::LightSource;
 use super::{FrameInput, Renderer, dimensions};
-use crate::math::{DVec3, Rgb};
+use crate::math::Rgb;
 use crate::scene::Tail;
 use crate::stats::RayCounts;
 
 /// The shadow ray of one sample.
 struct TailRay<'s> {
     point: &'s ShadingPoint,
-    view: &'s LightView<'s>,
     source: &'s LightSource,
     starts: ShadowStarts,
     /// Irradiance without shadows, which a delta light sends from its one direction.
@@ -29,24 +28,14 @@ struct TailRay<'s> {
 
 impl SampleSink for TailRay<'_> {
     fn push(&mut self, sample: LightSample) {
-        let irradiance = match sample.target {
-            ShadowTarget::Point(end) => self.irradiance_from(end.point),
-            ShadowTarget::Direction(_) | ShadowTarget::Sky(_) => self.exact,
-        };
+        let irradiance = sample.pdf.per_steradian().map_or(self.exact, |density| {
+            sample.radiance * sample.wi.dot(self.point.n).max(0.0) / density
+        });
         let light = self.source.sampler.emission * (irradiance / self.count) as f32;
         let seen = self.point.weight * light;
         if seen != Rgb::ZERO {
             self.scratch.push_highlight(self.starts.ray_to(&sample.target), seen);
         }
-    }
-}
-
-impl TailRay<'_> {
-    fn irradiance_from(&self, point: DVec3) -> f64 {
-        let p = self.point.si.p;
-        let Some(density) = self.view.pdf_li(p, point) else { return self.exact };
-        let wi = (point - p).normalize();
-        self.source.sampler.radiance_at(p) * wi.dot(self.point.n).max(0.0) / density
     }
 }
 
@@ -123,8 +112,8 @@ impl Renderer<'_> {
         let Some(view) = source.sampler.seen_from(point.si.p, point.n) else { return };
         let (before, starts) = (s.ray_count(), s.starts(self, lit, i));
         let count = choice.count;
-        let mut ray = TailRay { point, view: &view, source, starts, exact, count, scratch: s };
-        view.sample_li(point.si.p, point.n, &[choice.place], &mut ray);
+        let mut ray = TailRay { point, source, starts, exact, count, scratch: s };
+        view.sample_li(point.si.p, &[choice.place], &mut ray);
         counts[source.rays] += (s.ray_count() - before) as u64;
     }
 }

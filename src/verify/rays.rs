@@ -104,8 +104,8 @@ impl Lit {
         let seen = seen.filter(|_| sampler.unshadowed(self.p, self.n) != 0.0)?;
         let u = if light.is_area() { [rng.random(), rng.random()] } else { [0.5; 2] };
         let mut drawn = Drawn(None);
-        seen.sample_li(self.p, self.n, &[u], &mut drawn);
-        let sample = drawn.0.filter(|sample| sample.weight > 0.0)?;
+        seen.sample_li(self.p, &[u], &mut drawn);
+        let sample = drawn.0.filter(|sample| sample.pdf.weight(self.n) > 0.0)?;
         Some(self.starts.ray_to(&sample.target))
     }
 }

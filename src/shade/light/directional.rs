@@ -1,6 +1,6 @@
 //! A directional light.
 
-use super::{LightSample, ShadowTarget, is_lit};
+use super::{LightSample, Pdf, ShadowTarget, is_lit};
 use crate::math::DVec3;
 use crate::scene::DirectionalLight;
 
@@ -22,6 +22,8 @@ impl Directional {
 
     #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self) -> LightSample {
-        LightSample::of_delta(ShadowTarget::Direction(self.to_light))
+        let wi = self.to_light;
+        let (target, pdf) = (ShadowTarget::Direction(wi), Pdf::Delta);
+        LightSample { target, wi, radiance: f64::INFINITY, pdf }
     }
 }

@@ -1,7 +1,7 @@
 //! A disk light.
 
-use super::LightSample;
 use super::flat::Flat;
+use super::{LightSample, ShadowTarget};
 use crate::intersect::PlaneError;
 use crate::math::{DVec3, orthonormal_basis};
 use crate::sampling::concentric_disk;
@@ -25,10 +25,11 @@ impl Disk {
         let (s, t) = (basis.0 * light.radius, basis.1 * light.radius);
         let plane_error =
             PlaneError::of(&[light.centre - s, light.centre + s, light.centre + t * 0.024]);
+        let area = PI * light.radius * light.radius;
         Self {
             centre: light.centre,
             radius: light.radius,
-            plane: Flat { normal: light.normal, plane_error },
+            plane: Flat { normal: light.normal, plane_error, area },
             basis,
             two_sided: light.two_sided,
         }
@@ -60,18 +61,18 @@ impl Disk {
 
     /// Uniform over the area.
     #[inline(always)] // Once for each shadow ray.
-    pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
+    pub fn sample_li(&self, p: DVec3, u: [f64; 2]) -> LightSample {
         let (x, y, _) = concentric_disk(u);
         let point = self.centre + (self.basis.0 * x + self.basis.1 * y) * self.radius;
-        self.plane.sample_li(p, n, point)
+        self.plane.sample_li(p, point)
     }
 
     pub fn pdf_li(&self, p: DVec3, point: DVec3) -> f64 {
-        self.plane.pdf_li(p, point, PI * self.radius * self.radius)
+        self.plane.pdf(p, point).per_steradian()
     }
 
     /// The middle of the part above the horizon, on the diameter that rises most.
-    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<ShadowTarget> {
         let along = n - self.plane.normal * n.dot(self.plane.normal);
         let rise = along.length() * self.radius;
         let height = (self.centre - p).dot(n);
@@ -81,7 +82,7 @@ impl Disk {
         let lowest = (-height / rise).max(-1.0);
         let at = if lowest.is_finite() { 0.5 * (1.0 + lowest) } else { 0.0 };
         let point = self.centre + along.normalize_or_zero() * (self.radius * at);
-        Some(self.plane.alone(point))
+        Some(self.plane.target(point))
     }
 }
 
@@ -201,7 +202,6 @@ impl Circle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ShadowTarget;
     use super::*;
     use crate::math::Rgb;
     use std::f64::consts::PI;
@@ -324,8 +324,8 @@ mod tests {
     #[test]
     fn slivers_above_the_horizon_have_a_point() {
         let disk = disk(DVec3::new(2.0, 0.0, -0.99), DVec3::NEG_X, 1.0);
-        let sample = disk.above(DVec3::ZERO, DVec3::Z).expect("a sliver is above");
-        let ShadowTarget::Point(target) = sample.target else { panic!("a point") };
+        let target = disk.above(DVec3::ZERO, DVec3::Z).expect("a sliver is above");
+        let ShadowTarget::Point(target) = target else { panic!("a point") };
         assert!(target.point.z > 0.0 && target.point.z < 0.01);
         assert!(disk.above(DVec3::ZERO, DVec3::NEG_Y).is_some());
         assert!(disk.above(DVec3::Z * 0.1, DVec3::Z).is_none());

@@ -1,6 +1,6 @@
 //! What flat lights have in common.
 
-use super::{LightSample, ShadowTarget};
+use super::{AreaPdf, LightSample, Pdf, ShadowTarget};
 use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 
@@ -10,30 +10,33 @@ pub(super) struct Flat {
     pub normal: DVec3,
     /// What f32 may make of the triangles that show it.
     pub plane_error: PlaneError,
+    /// The light's area.
+    pub area: f64,
 }
 
 impl Flat {
-    /// `point` of the light, one of many that are uniform over its area, as seen from `p` with unit normal `n`.
+    /// `point` of the light, one of many that are uniform over its area, as seen from `p`.
     #[inline(always)] // Once for each shadow ray.
-    pub fn sample_li(&self, p: DVec3, n: DVec3, point: DVec3) -> LightSample {
-        let to_light = point - p;
-        let d2 = to_light.length_squared();
-        let cos_light = to_light.dot(self.normal).abs();
-        let weight = (to_light.dot(n) * cos_light / (d2 * d2)).max(0.0);
-        LightSample { weight, ..self.alone(point) }
+    pub fn sample_li(&self, p: DVec3, point: DVec3) -> LightSample {
+        let pdf = self.pdf(p, point);
+        LightSample {
+            target: self.target(point),
+            wi: pdf.to_light.normalize(),
+            radiance: 1.0,
+            pdf: Pdf::Area(pdf),
+        }
     }
 
-    /// Density per steradian at `point`, seen from `p`, of points that are uniform over `area`.
-    pub fn pdf_li(&self, p: DVec3, point: DVec3, area: f64) -> f64 {
-        let to_light = point - p;
-        let d2 = to_light.length_squared();
-        d2 * d2.sqrt() / (to_light.dot(self.normal).abs() * area)
-    }
-
-    /// `point` of the light where it stands for all of it.
+    /// Density at `point`, seen from `p`, of points that are uniform over the area.
     #[inline(always)]
-    pub fn alone(&self, point: DVec3) -> LightSample {
-        let target = RayEnd { point, normal: self.normal, plane_error: self.plane_error };
-        LightSample { target: ShadowTarget::Point(target), weight: 1.0 }
+    pub fn pdf(&self, p: DVec3, point: DVec3) -> AreaPdf {
+        AreaPdf { to_light: point - p, normal: self.normal, area: self.area }
+    }
+
+    /// `point` of the light, for a shadow ray.
+    #[inline(always)]
+    pub fn target(&self, point: DVec3) -> ShadowTarget {
+        let Self { normal, plane_error, .. } = *self;
+        ShadowTarget::Point(RayEnd { point, normal, plane_error })
     }
 }

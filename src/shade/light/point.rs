@@ -1,6 +1,6 @@
 //! A point light.
 
-use super::{LightSample, ShadowTarget, is_lit};
+use super::{LightSample, Pdf, ShadowTarget, is_lit};
 use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 use crate::scene::PointLight;
@@ -26,12 +26,14 @@ impl Point {
     #[inline(always)] // Once for each shadow ray.
     pub fn sample_li(&self, p: DVec3) -> LightSample {
         let point = self.position;
+        let wi = (point - p).normalize();
         // No surface to stop short of: the normal along the ray costs a few ulp.
-        let normal = (p - point).normalize();
-        LightSample::of_delta(ShadowTarget::Point(RayEnd {
-            point,
-            normal,
-            plane_error: PlaneError::EXACT,
-        }))
+        let end = RayEnd { point, normal: -wi, plane_error: PlaneError::EXACT };
+        LightSample {
+            target: ShadowTarget::Point(end),
+            wi,
+            radiance: f64::INFINITY,
+            pdf: Pdf::Delta,
+        }
     }
 }

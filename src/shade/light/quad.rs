@@ -1,7 +1,7 @@
 //! A quad light.
 
 use super::flat::Flat;
-use super::{LightSample, irradiance};
+use super::{LightSample, ShadowTarget, irradiance};
 use crate::intersect::PlaneError;
 use crate::math::DVec3;
 use crate::sampling::QuadWarp;
@@ -18,10 +18,12 @@ pub(super) struct Quad {
 impl Quad {
     pub fn new(light: &QuadLight) -> Self {
         let plane_error = PlaneError::of_quad(&light.corners);
+        let [a, b, c, d] = light.corners;
+        let area = 0.5 * (c - a).cross(d - b).length();
         Self {
             warp: QuadWarp::new(light.corners),
             corners: light.corners,
-            plane: Flat { normal: light.normal(), plane_error },
+            plane: Flat { normal: light.normal(), plane_error, area },
             two_sided: light.two_sided,
         }
     }
@@ -35,17 +37,16 @@ impl Quad {
 
     /// Uniform over the area.
     #[inline(always)] // Once for each shadow ray.
-    pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
-        self.plane.sample_li(p, n, self.warp.point(u))
+    pub fn sample_li(&self, p: DVec3, u: [f64; 2]) -> LightSample {
+        self.plane.sample_li(p, self.warp.point(u))
     }
 
     pub fn pdf_li(&self, p: DVec3, point: DVec3) -> f64 {
-        let [a, b, c, d] = self.corners;
-        self.plane.pdf_li(p, point, 0.5 * (c - a).cross(d - b).length())
+        self.plane.pdf(p, point).per_steradian()
     }
 
-    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<ShadowTarget> {
         let point = irradiance::middle_above(p, n, &self.warp.corners())?;
-        Some(self.plane.alone(point))
+        Some(self.plane.target(point))
     }
 }

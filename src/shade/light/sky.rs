@@ -1,6 +1,6 @@
 //! The constant sky as a light.
 
-use super::{LightSample, ShadowTarget};
+use super::{LightSample, Pdf, ShadowTarget};
 use crate::math::{DVec3, orthonormal_basis};
 use crate::sampling::{cosine_hemisphere, to_world};
 
@@ -16,18 +16,21 @@ impl SkyDome {
 
 /// The hemisphere over one surface point.
 pub(super) struct SkyView {
+    n: DVec3,
     basis: (DVec3, DVec3),
 }
 
 impl SkyView {
     pub fn above(n: DVec3) -> Self {
-        Self { basis: orthonormal_basis(n) }
+        Self { n, basis: orthonormal_basis(n) }
     }
 
-    /// Weighted by the cosine, so that all samples count alike.
+    /// By the cosine, so that all samples count alike.
     #[inline(always)] // Once for each shadow ray.
-    pub fn sample_li(&self, n: DVec3, u: [f64; 2]) -> LightSample {
-        let direction = to_world(cosine_hemisphere(u), self.basis, n);
-        LightSample { target: ShadowTarget::Sky(direction), weight: 1.0 }
+    pub fn sample_li(&self, u: [f64; 2]) -> LightSample {
+        let local = cosine_hemisphere(u);
+        let wi = to_world(local, self.basis, self.n);
+        let (target, pdf) = (ShadowTarget::Sky(wi), Pdf::Cosine(local.z));
+        LightSample { target, wi, radiance: 1.0, pdf }
     }
 }

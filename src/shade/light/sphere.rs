@@ -1,6 +1,6 @@
 //! A sphere light.
 
-use super::{LightSample, ShadowTarget, irradiance};
+use super::{LightSample, Pdf, ShadowTarget, irradiance};
 use crate::intersect::{PlaneError, RayEnd};
 use crate::math::DVec3;
 use crate::sampling::SphereCone;
@@ -21,10 +21,10 @@ impl Sphere {
         irradiance::sphere(p, n, self.centre, self.radius)
     }
 
-    /// `None` from within.
-    pub fn seen_from(&self, p: DVec3) -> Option<SphereView> {
+    /// `None` from within. It sends `radiance` towards `p`, per unit of emission.
+    pub fn seen_from(&self, p: DVec3, radiance: f64) -> Option<SphereView> {
         let cone = SphereCone::new(self.centre, self.radius, p)?;
-        Some(SphereView { cone, centre: self.centre })
+        Some(SphereView { cone, centre: self.centre, radiance })
     }
 }
 
@@ -32,23 +32,31 @@ impl Sphere {
 pub(super) struct SphereView {
     cone: SphereCone,
     centre: DVec3,
+    /// Per unit of emission.
+    radiance: f64,
 }
 
 impl SphereView {
     /// Uniform over the solid angle (Shirley, Wang and Zimmerman, 1996).
     #[inline(always)] // Once for each shadow ray.
-    pub fn sample_li(&self, p: DVec3, n: DVec3, u: [f64; 2]) -> LightSample {
-        let (dir, distance) = self.cone.direction(u);
-        LightSample { target: self.target(p + dir * distance), weight: dir.dot(n).max(0.0) }
+    pub fn sample_li(&self, p: DVec3, u: [f64; 2]) -> LightSample {
+        let (drawn, distance) = self.cone.direction(u);
+        let point = p + drawn * distance;
+        LightSample {
+            target: self.target(point),
+            wi: (point - p).normalize(),
+            radiance: self.radiance,
+            pdf: Pdf::SolidAngle { density: self.pdf_li(), drawn },
+        }
     }
 
     pub fn pdf_li(&self) -> f64 {
         1.0 / self.cone.solid_angle()
     }
 
-    pub fn above(&self, p: DVec3, n: DVec3) -> Option<LightSample> {
+    pub fn above(&self, p: DVec3, n: DVec3) -> Option<ShadowTarget> {
         let (dir, distance) = self.cone.above(n)?;
-        Some(LightSample { target: self.target(p + dir * distance), weight: 1.0 })
+        Some(self.target(p + dir * distance))
     }
 
     fn target(&self, point: DVec3) -> ShadowTarget {

@@ -45,19 +45,13 @@ impl Spot {
             }
     }
 
-    /// Radiance of the sphere towards `p`, per unit of intensity; NaN of a point.
-    pub fn radiance_at(&self, p: DVec3) -> f64 {
-        match &self.body {
-            Body::Point(_) => f64::NAN,
-            Body::Sphere(_, radiance) => radiance * self.falloff(p),
-        }
-    }
-
     /// The body as seen from `p`; `None` from within.
     pub fn seen_from(&self, p: DVec3) -> Option<View<'_>> {
         Some(match &self.body {
             Body::Point(point) => View::Point(point),
-            Body::Sphere(sphere, _) => View::Sphere(sphere.seen_from(p)?),
+            Body::Sphere(sphere, radiance) => {
+                View::Sphere(sphere.seen_from(p, radiance * self.falloff(p))?)
+            }
         })
     }
 
