@@ -59,7 +59,7 @@ pub use frames::chosen_frames;
 pub use knobs::{Candidate, Group, Knob};
 pub use ledger::{Ledger, TrialRecord};
 pub use oracle::{OracleCrop, on_a_crop};
-pub use predictor::{Prediction, Predictor, SampleRange};
+pub use predictor::{Prediction, Predictor};
 pub use probe::{FixedSettings, SettingsProbe};
 pub use reference::{Convergence, Doubling, Step, Truth, truth_settings};
 pub use row::{CandidateRow, Spread};

@@ -79,61 +79,36 @@ impl Prediction {
     }
 }
 
-/// The numbers of samples to choose from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SampleRange {
-    /// Camera samples.
-    pub spp: Vec<u32>,
-    /// Shadow samples.
-    pub shadow: Vec<u32>,
-    /// Sky samples.
-    pub sky: Vec<u32>,
-}
-
-impl SampleRange {
-    fn all(&self) -> impl Iterator<Item = SampleCounts> + '_ {
-        let lights = move |shadow: u32| self.sky.iter().map(move |sky| (shadow, *sky));
-        let lights = self.shadow.iter().flat_map(move |shadow| lights(*shadow));
-        lights.flat_map(|(shadow, sky)| {
-            self.spp.iter().map(move |spp| SampleCounts { spp: *spp, shadow, sky })
-        })
-    }
-}
-
 impl Predictor {
+    /// The squared error that is predicted of `samples`, under any policy.
+    pub fn squared_error(&self, samples: SampleCounts) -> f64 {
+        let errors: Vec<f64> = self.model.errors(samples).collect();
+        self.excess * worst(&errors, &self.doubts) + self.bias + self.rounding
+    }
+
     /// What is predicted of `samples` under the policy of `mode`.
     pub fn of(&self, mode: &ReuseMode, samples: SampleCounts) -> Prediction {
-        let errors: Vec<f64> = self.model.errors(samples).collect();
-        let sampling = self.excess * worst(&errors, &self.doubts);
         let n = f64::from(samples.spp);
         let by = [1.0, n, n * f64::from(samples.shadow), n * f64::from(samples.sky)];
         Prediction {
             samples,
             bounces: self.bounces,
             reuse: mode.reuse,
-            squared_error: sampling + self.bias + self.rounding,
+            squared_error: self.squared_error(samples),
             figure: None,
             seconds: by.iter().zip(mode.seconds).map(|(x, seconds)| x * seconds).sum(),
         }
     }
 
-    /// The least squared error that is predicted of a setting of `mode`.
-    pub fn least(&self, mode: &ReuseMode, range: &SampleRange) -> f64 {
-        range
-            .all()
-            .map(|samples| self.of(mode, samples).squared_error)
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    /// The fastest setting of `mode` whose squared error is predicted to be at most `allowed`; of those that
-    /// are hardly slower the one with the least error.
+    /// The fastest setting of `mode`, with samples among `range`, whose squared error is predicted to be at most
+    /// `allowed`; of those that are hardly slower the one with the least error.
     pub fn fastest(
         &self,
         mode: &ReuseMode,
-        range: &SampleRange,
+        range: &[SampleCounts],
         allowed: f64,
     ) -> Option<Prediction> {
-        let all = range.all().map(|samples| self.of(mode, samples));
+        let all = range.iter().map(|samples| self.of(mode, *samples));
         let found: Vec<Prediction> = all.filter(|p| p.squared_error <= allowed).collect();
         let least = found.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
         let alike = found.into_iter().filter(|p| p.seconds <= ALIKE * least);
@@ -144,10 +119,10 @@ impl Predictor {
     /// where it lets none through.
     pub fn best_within(
         &self,
-        range: &SampleRange,
+        range: &[SampleCounts],
         fits: &dyn Fn(&Prediction) -> bool,
     ) -> Option<Prediction> {
-        let of_mode = |mode| range.all().map(move |samples| self.of(mode, samples));
+        let of_mode = |mode| range.iter().map(move |samples| self.of(mode, *samples));
         let all = || self.modes.iter().flat_map(of_mode);
         let best = all().filter(fits).min_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
         best.or_else(|| all().min_by(|a, b| a.seconds.total_cmp(&b.seconds)))
@@ -162,9 +137,8 @@ impl Predictor {
 
     /// Scales errors so that the setting of `measured` has the one measured.
     pub fn correct_error(&mut self, measured: &Prediction) {
-        let Some(mode) = self.modes.first() else { return };
         let fixed = self.bias + self.rounding;
-        let sampling = self.of(mode, measured.samples).squared_error - fixed;
+        let sampling = self.squared_error(measured.samples) - fixed;
         let was = (measured.squared_error - fixed).max(0.1 * measured.squared_error);
         self.excess *= was / sampling.max(1e-12);
     }
@@ -210,8 +184,9 @@ pub(super) mod tests {
         }
     }
 
-    fn range() -> SampleRange {
-        SampleRange { spp: vec![1, 2, 4, 8, 16, 32, 64], shadow: vec![1, 4, 16], sky: vec![1] }
+    fn range() -> Vec<SampleCounts> {
+        let spp = |shadow| [1, 2, 4, 8, 16, 32, 64].map(|spp| SampleCounts { spp, shadow, sky: 1 });
+        [1, 4, 16].map(spp).concat()
     }
 
     #[test]

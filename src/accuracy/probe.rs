@@ -8,7 +8,6 @@ use super::context::TrialContext;
 use super::effort::Effort;
 use super::error_model::{NoiseSources, SampleCounts};
 use super::patches::{Patches, one_sample};
-use super::predictor::SampleRange;
 use super::reference::truth_settings;
 use crate::effects::EffectPlan;
 use crate::error::Result;
@@ -18,9 +17,12 @@ use crate::scene::{FrameRange, Settings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Number of frames, edge of a patch and pixels of a frame for figures that need neighbouring pixels (SSIM,
-/// FLIP).
-const WIDE: (u32, u32, u32) = (4, 48, 9_300);
+/// Number of frames for figures that need neighbouring pixels (SSIM, FLIP).
+const WIDE_FRAMES: u32 = 4;
+/// Edge of the patches for these figures.
+const WIDE_EDGE: u32 = 48;
+/// Pixels of a frame in all of its patches.
+const WIDE_PIXELS: u32 = 9_300;
 /// Pixels of the picture that is traced to measure how fast tracing is.
 const PILOT: f64 = 12_000.0;
 /// Numbers of camera samples to choose from. Sobol points are laid out best in powers of two; between them a quarter
@@ -87,23 +89,24 @@ impl SettingsProbe<'_> {
     }
 
     /// The numbers of samples to choose from.
-    pub fn range(&self) -> SampleRange {
+    pub fn range(&self) -> Vec<SampleCounts> {
         let (base, plan) = (self.context.base, self.plan());
         let among = |is_free: bool, all: &[u32], given: u32| match is_free {
             true => all.to_vec(),
             false => vec![given],
         };
         let spp = among(!self.given.spp, &CAMERA_SAMPLES, base.spp);
-        SampleRange {
-            // A time is to be used, not kept by half of it.
-            spp: if self.goal.is_none() && spp.len() > 1 { between(&spp) } else { spp },
-            shadow: among(
-                plan.area_lights && !self.given.shadow,
-                &LIGHT_SAMPLES,
-                base.shadow_samples,
-            ),
-            sky: among(plan.sky_light && !self.given.sky, &LIGHT_SAMPLES, base.sky_samples),
+        // A time is to be used, not kept by half of it.
+        let spp = if self.goal.is_none() && spp.len() > 1 { between(&spp) } else { spp };
+        let is_free = (plan.area_lights && !self.given.shadow, plan.sky_light && !self.given.sky);
+        let skies = among(is_free.1, &LIGHT_SAMPLES, base.sky_samples);
+        let mut all = Vec::new();
+        for shadow in among(is_free.0, &LIGHT_SAMPLES, base.shadow_samples) {
+            for &sky in &skies {
+                all.extend(spp.iter().map(|&spp| SampleCounts { spp, shadow, sky }));
+            }
         }
+        all
     }
 
     /// Patches of the job's frames from which the goal's figure can be estimated.
@@ -111,16 +114,10 @@ impl SettingsProbe<'_> {
     /// # Errors
     /// As [`Patches::by_contrast`].
     pub(super) fn patches(&self, effort: Effort) -> Result<Patches> {
+        let frames = self.frames_looked_at(effort, 0.5);
         match self.is_wide() {
-            true => {
-                let (frames, edge, pixels) = WIDE;
-                let frames = spread(self.frames, frames, 0.5);
-                Ok(Patches::grid(self.context.base, &frames, edge, pixels, DRAW_OF_PROBE))
-            }
-            false => {
-                let frames = spread(self.frames, effort.frames, 0.5);
-                Patches::by_contrast(self.context, &frames, effort, DRAW_OF_PROBE)
-            }
+            true => Ok(self.wide_patches(&frames, DRAW_OF_PROBE)),
+            false => Patches::by_contrast(self.context, &frames, effort, DRAW_OF_PROBE),
         }
     }
 
@@ -134,25 +131,30 @@ impl SettingsProbe<'_> {
         effort: Effort,
         image: &dyn Fn(u32) -> Result<Image>,
     ) -> Result<(Vec<u32>, Patches)> {
-        let base = self.context.base;
-        Ok(match self.is_wide() {
-            true => {
-                let (frames, edge, pixels) = WIDE;
-                let frames = spread(self.frames, frames, 0.1);
-                let patches = Patches::grid(base, &frames, edge, pixels, DRAW_OF_CHECK);
-                (frames, patches)
-            }
+        let (base, frames) = (self.context.base, self.frames_looked_at(effort, 0.1));
+        let patches = match self.is_wide() {
+            true => self.wide_patches(&frames, DRAW_OF_CHECK),
             false => {
-                let frames = spread(self.frames, effort.frames, 0.1);
-                let count = checked_pixels(effort);
-                let patches = Patches::by_contrast_of(base, &frames, image, count, DRAW_OF_CHECK)?;
-                (frames, patches)
+                // More than a probe, which traces each several times.
+                let count = effort.pixels + effort.pixels / 2;
+                Patches::by_contrast_of(base, &frames, image, count, DRAW_OF_CHECK)?
             }
-        })
+        };
+        Ok((frames, patches))
     }
 
+    /// Whether the goal's figure needs neighbouring pixels.
     fn is_wide(&self) -> bool {
         matches!(self.goal, Some(Goal::Ssim(_) | Goal::Flip(_)))
+    }
+
+    fn wide_patches(&self, frames: &[u32], seed: u64) -> Patches {
+        Patches::grid(self.context.base, frames, WIDE_EDGE, WIDE_PIXELS, seed)
+    }
+
+    fn frames_looked_at(&self, effort: Effort, offset: f64) -> Vec<u32> {
+        let count = if self.is_wide() { WIDE_FRAMES } else { effort.frames };
+        spread(self.frames, count, offset)
     }
 
     pub(super) fn plan(&self) -> EffectPlan {
@@ -182,12 +184,6 @@ fn between(numbers: &[u32]) -> Vec<u32> {
     let mut all: Vec<u32> = numbers.windows(2).flat_map(steps).collect();
     all.extend(numbers.last());
     all
-}
-
-/// Pixels that a check of `effort` looks at in each frame: more than a probe, which traces each several
-/// times.
-pub(super) fn checked_pixels(effort: Effort) -> u32 {
-    effort.pixels + effort.pixels / 2
 }
 
 /// `count` of `frames`, evenly spread; `offset` in [0, 1) shifts them.

@@ -37,7 +37,7 @@ struct Measured {
 }
 
 /// A probe that goes on.
-pub(super) struct Search<'a> {
+struct Search<'a> {
     probe: &'a SettingsProbe<'a>,
     patches: Patches,
     truth: PatchImages,
@@ -45,7 +45,7 @@ pub(super) struct Search<'a> {
     reference: SampleCounts,
     measured: Vec<Measured>,
     /// What was found so far.
-    pub predictor: Predictor,
+    predictor: Predictor,
 }
 
 impl SettingsProbe<'_> {
@@ -75,10 +75,7 @@ impl SettingsProbe<'_> {
 
 impl<'a> Search<'a> {
     /// Traces the sweep, fits the model to it, and chooses the bounces.
-    ///
-    /// # Errors
-    /// As [`Patches::trace`].
-    pub fn begin(probe: &'a SettingsProbe<'a>, effort: Effort) -> Result<Self> {
+    fn begin(probe: &'a SettingsProbe<'a>, effort: Effort) -> Result<Self> {
         let (context, patches) = (probe.context, probe.patches(effort)?);
         let reference = samples_of_reference(SampleCounts { spp: 8, shadow: 2, sky: 2 });
         let truth = patches.trace(context, &converged(context.base, reference))?;
@@ -98,10 +95,9 @@ impl<'a> Search<'a> {
             modes: Vec::new(),
             excess: 1.0,
         };
-        let largest = |p: &SampleErrors| p.errors.iter().copied().fold(0.0, f64::max);
         let in_reach = match probe.goal {
             Some(goal @ Goal::Psnr(_)) => goal.largest(),
-            _ => IN_REACH * points.iter().map(largest).fold(f64::INFINITY, f64::min),
+            _ => IN_REACH * points.iter().map(|p| largest(&p.errors)).fold(f64::INFINITY, f64::min),
         };
         let mut search = Self { probe, patches, truth, reference, measured: Vec::new(), predictor };
         let (bounces, bias) = search.bounces(BIAS * in_reach)?;
@@ -109,17 +105,11 @@ impl<'a> Search<'a> {
         Ok(search)
     }
 
-    /// For each reuse policy the fastest setting found whose figure was measured to be at most `allowed`;
-    /// the predictor's errors then go through the fastest of these.
-    ///
-    /// # Errors
-    /// As [`Patches::trace`].
-    pub fn fastest(&mut self, goal: Goal, allowed: f64) -> Result<Vec<Prediction>> {
-        let mut found = Vec::new();
-        for mode in self.predictor.modes.clone() {
-            found.extend(self.fastest_of(&mode, goal, allowed)?);
-        }
-        Ok(found)
+    /// For each reuse policy the fastest setting found whose figure was measured to be at most `allowed`.
+    fn fastest(&mut self, goal: Goal, allowed: f64) -> Result<Vec<Prediction>> {
+        let modes = self.predictor.modes.clone();
+        let found = modes.iter().map(|mode| self.fastest_of(mode, goal, allowed));
+        found.filter_map(Result::transpose).collect()
     }
 
     fn fastest_of(
@@ -133,11 +123,13 @@ impl<'a> Search<'a> {
             true => allowed,
             false => {
                 let usual = SampleCounts { spp: 4, shadow: 4, sky: 4 };
+                let predicted = |samples| self.predictor.squared_error(samples);
+                let least = range.iter().copied().map(predicted).fold(f64::INFINITY, f64::min);
                 // Samples that are given may leave nothing as good to choose from.
-                self.predictor.of(mode, usual).squared_error.max(self.predictor.least(mode, &range))
+                predicted(usual).max(least)
             }
         };
-        let (mut bracket, mut aim, mut best) = (Bracket::default(), Some(start), None);
+        let (mut bracket, mut aim, mut best) = (Bracket::OPEN, Some(start), None);
         for _ in 0..TRIALS {
             let guess = aim.and_then(|aim| self.predictor.fastest(mode, &range, aim));
             let (Some(guess), Some(tried)) = (guess, aim) else { break };
@@ -201,7 +193,7 @@ impl<'a> Search<'a> {
             settings.bounces = bounces;
             let seen = self.patches.trace(probe.context, &settings)?;
             let (errors, _) = squared_errors(&self.patches, &truth, &seen);
-            Ok(errors.into_iter().fold(0.0, f64::max))
+            Ok(largest(&errors))
         };
         let least = left_out(most)?;
         for bounces in numbers {
@@ -222,13 +214,10 @@ struct Bracket {
     missed: f64,
 }
 
-impl Default for Bracket {
-    fn default() -> Self {
-        Self { reached: 0.0, missed: f64::INFINITY }
-    }
-}
-
 impl Bracket {
+    /// Before anything is tried.
+    const OPEN: Self = Self { reached: 0.0, missed: f64::INFINITY };
+
     /// The squared error to try after `tried`, by which the goal `is_reached` or not: `wanted`, if that lies
     /// between the bounds; else their geometric mean. `None` where the bounds are close, or where nothing much
     /// larger than what reached the goal is wanted.
@@ -248,6 +237,10 @@ impl Bracket {
         let is_between = self.reached < wanted && wanted < self.missed;
         Some(if is_between { wanted } else { (self.reached * self.missed).sqrt() })
     }
+}
+
+fn largest(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
 }
 
 /// The settings of the sweep.
@@ -285,7 +278,7 @@ mod tests {
 
     /// The squared errors tried where the goal is reached up to `limit`, and the figure rises by `power`.
     fn tried(start: f64, limit: f64, power: f64) -> Vec<f64> {
-        let (mut bracket, mut aim, mut all) = (Bracket::default(), Some(start), Vec::new());
+        let (mut bracket, mut aim, mut all) = (Bracket::OPEN, Some(start), Vec::new());
         while let Some(tried) = aim.filter(|_| all.len() < 20) {
             all.push(tried);
             let ratio = (tried / limit).powf(power);
@@ -309,7 +302,7 @@ mod tests {
 
     #[test]
     fn nothing_more_is_tried_where_a_cheaper_setting_would_miss() {
-        let mut bracket = Bracket::default();
+        let mut bracket = Bracket::OPEN;
         // 4 was allowed, 2.5 predicted of what was tried, and 1.2 times that came out of 4.
         assert_eq!(bracket.next(4.0, 2.5 / 0.75, true), None);
     }
