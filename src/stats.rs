@@ -47,15 +47,6 @@ impl RayKind {
         Self::Invalid,
     ];
 
-    /// Whether it ends at a light, shadows aside.
-    pub fn is_shadow(self) -> bool {
-        match self {
-            Self::ShadowArea | Self::ShadowDelta | Self::ShadowSky => true,
-            Self::Camera | Self::Mirror | Self::Glossy | Self::Glass | Self::Retry => false,
-            Self::Invalid => false,
-        }
-    }
-
     /// The kinds that were traced.
     pub fn traced() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|kind| *kind != Self::Invalid)
@@ -107,11 +98,6 @@ impl RayCounts {
     /// All rays that were traced, second tries included.
     pub fn total(&self) -> u64 {
         RayKind::traced().map(|kind| self[kind]).sum()
-    }
-
-    /// Shadow rays of all kinds.
-    pub fn shadow(&self) -> u64 {
-        RayKind::ALL.into_iter().filter(|kind| kind.is_shadow()).map(|kind| self[kind]).sum()
     }
 }
 

@@ -53,11 +53,6 @@ impl Cut {
         self.pyramid.map_or(self.weighed.frames, |pyramid| pyramid.keys())
     }
 
-    /// Whether `frame` is a key frame.
-    pub fn is_key(&self, frame: u32) -> bool {
-        self.pyramid.is_none_or(|pyramid| pyramid.is_key(frame))
-    }
-
     /// `frames` with all frames that they are inferred from.
     pub fn with_ancestors(&self, frames: &[u32]) -> Vec<u32> {
         let ancestors = |f: &u32| self.pyramid.map_or(Vec::new(), |pyramid| pyramid.ancestors(*f));
