@@ -227,19 +227,23 @@ pub enum BuildQuality {
     High,
 }
 
-/// Switches of the rules in `docs/architecture.md`, "Intersection: trust nothing".
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+// `docs/architecture.md`, "Intersection: trust nothing", describes the rules; a scene file's schema has these lines.
+/// The rules that make hits trustworthy: each can be switched off to see what it is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields, expecting = "a table")]
+#[schemars(rename = "Rules")]
 pub struct HitRules {
-    /// Embree's ROBUST traversal.
+    /// Watertight traversal of Embree.
     pub robust: bool,
-    /// A deterministic second try for a camera or specular ray that misses near a triangle, or whose
-    /// hit it cannot have met first.
+    /// A second try for a camera or specular ray that misses near a triangle, or hits a back from
+    /// outside.
     pub retry: bool,
-    /// Which hits are recomputed in f64.
+    /// Which hits are recomputed in f64 at once: "risky" (grazing, slivers, near an edge; the others
+    /// when shaded), "always", "off".
     pub recheck: Recheck,
-    /// Move spawned rays' origins by their rounding-error bound and exclude their primitive.
+    /// Start secondary rays outside the rounding error of their hit.
     pub spawn_offset: bool,
-    /// Move the scene to its own centre and to unit size.
+    /// Trace the scene about its own centre at unit size.
     pub recentre: bool,
 }
 

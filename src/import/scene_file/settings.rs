@@ -17,7 +17,7 @@ use samples::Samples;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
-use switches::{AovName, Isa, PngBits, Rules};
+use switches::{AovName, Isa, PngBits};
 
 /// Image columns or rows.
 pub(super) type Pixels = Int<1, { limits::MAX_EDGE as i64 }>;
@@ -74,7 +74,7 @@ pub(super) struct Settings {
     /// Whether Embree's tree takes less memory, and more time to trace.
     compact: bool,
     /// The rules that make hits trustworthy.
-    rules: Rules,
+    rules: HitRules,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, as `[x0, y0, x1, y1]`; row 0 is the top.
     /// Absent: all of them.
     crop: Option<At<List<Corner, 4>>>,
@@ -133,7 +133,7 @@ impl Default for Settings {
             isa: None,
             build_quality: s.build_quality,
             compact: s.compact,
-            rules: Rules::default(),
+            rules: s.rules,
             crop: None,
             flag_bad: s.flag_bad,
             strict: job.strict,
@@ -161,7 +161,6 @@ impl Settings {
     ///
     /// Errors: a crop that leaves the image or is empty.
     pub fn build(&self, source: &Source, reuse: ReuseSettings) -> Result<scene::Settings> {
-        let Rules { robust, retry, recheck, spawn_offset, recentre } = self.rules;
         let (shadow_samples, least_shadow_samples) = self.shadow_samples.to_light();
         let (sky_samples, least_sky_samples) = self.sky_samples.to_light();
         Ok(scene::Settings {
@@ -188,7 +187,7 @@ impl Settings {
             isa: self.isa.as_ref().map(|isa| isa.0.clone()),
             build_quality: self.build_quality,
             compact: self.compact,
-            rules: HitRules { robust, retry, recheck, spawn_offset, recentre },
+            rules: self.rules,
             reuse,
             crop: self.crop.as_ref().map(|c| self.crop(c, source)).transpose()?,
             flag_bad: self.flag_bad,

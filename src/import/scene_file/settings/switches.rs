@@ -1,29 +1,11 @@
-//! Settings that are a choice: rules on or off, instruction set, bits, AOVs.
+//! Settings that are a choice: instruction set, bits, AOVs.
 
 use crate::import::scene_file::number::Int;
 use crate::import::scene_file::schema::inline_schema;
-use crate::scene::{Aovs, HitRules, Recheck, limits::ISAS};
-use schemars::{JsonSchema, json_schema};
+use crate::scene::{Aovs, limits::ISAS};
+use schemars::json_schema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
-
-/// The rules that make hits trustworthy: each can be switched off to see what it is worth.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields, expecting = "a table")]
-pub(super) struct Rules {
-    /// Watertight traversal of Embree.
-    pub robust: bool,
-    /// A second try for a camera or specular ray that misses near a triangle, or hits a back from
-    /// outside.
-    pub retry: bool,
-    /// Which hits are recomputed in f64 at once: "risky" (grazing, slivers, near an edge; the others
-    /// when shaded), "always", "off".
-    pub recheck: Recheck,
-    /// Start secondary rays outside the rounding error of their hit.
-    pub spawn_offset: bool,
-    /// Trace the scene about its own centre at unit size.
-    pub recentre: bool,
-}
 
 /// Bits a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -65,10 +47,3 @@ impl<'de> Deserialize<'de> for PngBits {
 }
 
 inline_schema!(PngBits, |_| json_schema!({ "enum": [8, 16] }));
-
-impl Default for Rules {
-    fn default() -> Self {
-        let HitRules { robust, retry, recheck, spawn_offset, recentre } = HitRules::default();
-        Self { robust, retry, recheck, spawn_offset, recentre }
-    }
-}
