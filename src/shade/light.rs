@@ -159,3 +159,94 @@ impl LightView<'_> {
 fn is_lit(cos: f64) -> bool {
     cos > 0.0 || cos.is_nan()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{
+        DirectionalLight, DiskLight, PointLight, QuadLight, SphereLight, SpotLight,
+    };
+
+    /// Samples that were given.
+    struct All(Vec<LightSample>);
+
+    impl SampleSink for All {
+        fn push(&mut self, sample: LightSample) {
+            self.0.push(sample);
+        }
+    }
+
+    fn samples(light: &LightSampler, p: DVec3, n: DVec3) -> Vec<LightSample> {
+        let at = |k: u32| (k as f32 + 0.5) / 64.0;
+        let u: Vec<[f32; 2]> = (0..64 * 64).map(|k| [at(k % 64), at(k / 64)]).collect();
+        let mut all = All(Vec::new());
+        light.seen_from(p, n).expect("outside").sample_li(p, &u, &mut all);
+        all.0
+    }
+
+    fn lights(radius: f64) -> [Light; 4] {
+        let (centre, radiance) = (DVec3::new(0.3, 2.0, -0.4), Rgb::ONE);
+        let (normal, intensity, two_sided) = (DVec3::NEG_Y, Rgb::ONE, true);
+        let corners = [[-0.6, -0.5], [0.9, -0.4], [0.7, 0.8], [-0.5, 0.6]];
+        let corners = corners.map(|[x, z]| centre + DVec3::new(x, 0.0, z));
+        [
+            Light::Quad(QuadLight { corners, radiance, two_sided }),
+            Light::Sphere(SphereLight { centre, radius: 0.7, radiance }),
+            Light::Disk(DiskLight { centre, normal, radius: 0.7, radiance, two_sided }),
+            Light::Spot(SpotLight {
+                position: centre,
+                direction: normal,
+                intensity,
+                cos_inner: 0.99,
+                cos_outer: 0.5,
+                radius,
+            }),
+        ]
+    }
+
+    /// Radiance times cosine over density is on average the irradiance in closed form, and each sample's weight is in
+    /// proportion to it.
+    #[test]
+    fn samples_add_up_to_the_irradiance_without_shadows() {
+        let sky = LightSampler::of_sky(&Sky { radiance: Rgb::ONE, ..Sky::default() });
+        let area = lights(0.2).map(|light| LightSampler::new(&light));
+        // The horizon of the second normal cuts most of the lights.
+        let cut = DVec3::new(0.95, 0.1, 0.3).normalize();
+        for (n, tolerance) in [(DVec3::Y, 2e-3), (cut, 2e-2)] {
+            let p = DVec3::new(0.5, 0.1, 0.2);
+            for (kind, light) in area.iter().chain([&sky]).enumerate() {
+                let (mut sum, mut share) = (0.0, None);
+                let all = samples(light, p, n);
+                for LightSample { wi, radiance, pdf, .. } in &all {
+                    let density = pdf.per_steradian().expect("an area light");
+                    let irradiance = radiance * wi.dot(n).max(0.0) / density;
+                    sum += irradiance;
+                    assert!((wi.length() - 1.0).abs() < 1e-12);
+                    if irradiance > 1e-6 {
+                        let ratio = pdf.weight(n) / irradiance;
+                        let same = *share.get_or_insert(ratio);
+                        assert!((ratio / same - 1.0).abs() < 1e-6, "{kind}: {ratio} {same}");
+                    }
+                }
+                let (mean, exact) = (sum / all.len() as f64, light.unshadowed(p, n));
+                assert!((mean - exact).abs() < tolerance * exact, "{kind} {n}: {mean} for {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_delta_light_has_one_direction_and_no_density() {
+        let [position, p] = [DVec3::new(0.0, 3.0, 4.0), DVec3::ZERO];
+        let point = Light::Point(PointLight { position, intensity: Rgb::ONE });
+        let to_light = position / 5.0;
+        let sun = Light::Directional(DirectionalLight { to_light, irradiance: Rgb::ONE });
+        let [.., spot] = lights(0.0);
+        for light in [point, sun, spot] {
+            for sample in samples(&LightSampler::new(&light), p, DVec3::Y) {
+                assert!((sample.wi.length() - 1.0).abs() < 1e-15 && sample.wi.y > 0.5);
+                assert_eq!((sample.pdf.per_steradian(), sample.pdf.weight(DVec3::Y)), (None, 1.0));
+                assert_eq!(sample.radiance, f64::INFINITY);
+            }
+        }
+    }
+}
