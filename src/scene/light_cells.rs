@@ -2,9 +2,9 @@
 //! what they can send there.
 //!
 //! Made once of a scene alone, so that the lights of a point are a function of its position. In each box
-//! (*cell*) the lights are in three parts. The brightest are its *main* lights: they are traced one by one. Those
-//! whose bounds together stay below a limit are culled. Samples choose among the others, the *tail*, in
-//! proportion to their bounds (Shirley, Wang and Zimmerman, 1996), which leaves the mean as it is.
+//! (*cell*) the lights are in three parts. Those that matter somewhere in the region around it are its *main* lights: they
+//! are traced one by one. Those whose bounds together stay below a limit are culled. Samples choose among the others,
+//! the *tail* (Shirley, Wang and Zimmerman, 1996), which leaves the mean as it is.
 //!
 //! Not done: bounds know neither shadows nor the normals of surfaces.
 
