@@ -84,7 +84,7 @@ impl FarField {
     }
 
     /// Irradiance of up to four lights at `p` with unit normal `n`, per unit of emission.
-    pub fn irradiance<'f>(four: [Option<&'f Self>; 4], (p, n): (DVec3, DVec3)) -> [f64; 4] {
+    pub fn irradiance(four: [Option<&Self>; 4], (p, n): (DVec3, DVec3)) -> [f64; 4] {
         let four = four.map(|field| field.unwrap_or(&Self::DARK));
         let lanes = |of: fn(&Self) -> f64| f64x4::from(four.map(of));
         let (zero, one) = (f64x4::ZERO, f64x4::ONE);
