@@ -175,9 +175,9 @@ fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
             (false, format!("{lights}, all looked at everywhere: all lights are on"))
         }
         (Some(cells), Some(_)) => {
-            let MeanLights { main, area: _, tail } = cells.mean();
+            let MeanLights { main, area: _, tail, tail_samples: _ } = cells.mean();
             let memory = cells.memory() as f64 / 1e6;
-            let most = counted(cells.most_area(), "ratio");
+            let most = counted(cells.most_area() + cells.tints().len(), "ratio");
             let why = format!(
                 "{lights}: at a point {main:.1} on average are traced each, {tail:.1} drawn from; \
                  {} cells of {memory:.1} MB, at most {most} kept for a point",

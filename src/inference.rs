@@ -186,6 +186,8 @@ impl TracedPoints {
 pub const NO_LIGHT: u32 = u32::MAX;
 /// Number of the sky among the lights of channels.
 pub const SKY_LIGHT: u32 = u32::MAX - 1;
+/// Number of the first part of the tail among the lights of channels; those of the other parts lie below.
+pub const TAIL_LIGHT: u32 = u32::MAX - 2;
 
 /// The channel of a point with the lights `known` that is of the light of channel `k` of a point with the lights
 /// `asked`; `k` itself where each channel has the same light everywhere.
@@ -221,6 +223,9 @@ pub enum Channel {
     /// One of the lights with an extent that matter at a point, where lights are selected: another one at every
     /// point.
     Selected(u32),
+    /// The part of this number of the light that samples choose, where lights are selected. The parts differ in
+    /// colour.
+    Tail(u32),
     /// The sky.
     Sky,
 }
@@ -228,13 +233,15 @@ pub enum Channel {
 /// The lights whose ratios are kept.
 ///
 /// For an area light the ratio is that of shadowed to unshadowed irradiance at the shading normal;
-/// for the sky that of arriving to unoccluded irradiance. Neither depends on where the camera is.
+/// for the sky that of arriving to unoccluded irradiance; for the tail that of shadowed irradiance to a stand-in for
+/// the unshadowed one. None depends on where the camera is.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Channels {
     list: Vec<Channel>,
     of_light: Vec<Option<usize>>,
     sky: Option<usize>,
     slots: usize,
+    tail: usize,
 }
 
 impl Channels {
@@ -250,6 +257,11 @@ impl Channels {
             let slots = (0..cells.most_area() as u32).map(Channel::Selected);
             channels.list.extend(slots.filter(|channel| is_kept(*channel)));
             channels.slots = channels.list.len();
+            if channels.slots > 0 {
+                let parts = (0..cells.tints().len() as u32).map(Channel::Tail);
+                channels.list.extend(parts.filter(|channel| is_kept(*channel)));
+                channels.tail = channels.list.len() - channels.slots;
+            }
         }
         let lights = if cells.is_some() { &[] } else { &scene.lights[..] };
         for (index, light) in lights.iter().enumerate() {
@@ -290,6 +302,11 @@ impl Channels {
     /// everywhere.
     pub fn slots(&self) -> usize {
         self.slots
+    }
+
+    /// The channels of the tail, if its ratios are kept.
+    pub fn tail(&self) -> std::ops::Range<usize> {
+        self.slots..self.slots + self.tail
     }
 
     /// The sky's channel, if its ratio is kept.

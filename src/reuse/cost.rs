@@ -5,7 +5,7 @@ use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
 use crate::error::counted;
 use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays, shared_check_rays};
-use crate::scene::{Scene, Settings};
+use crate::scene::{MeanLights, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
 /// Cost of a camera ray with the evaluation of its surface: the unit of cost.
@@ -40,7 +40,7 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
 /// may stop after pilot rays.
 pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
-        Channel::Area(_) | Channel::Selected(_) => settings.shadow_samples,
+        Channel::Area(_) | Channel::Selected(_) | Channel::Tail(_) => settings.shadow_samples,
         Channel::Sky => settings.sky_samples,
     }
 }
@@ -57,8 +57,8 @@ fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
             Some(pilots) => (pilots + (DISPUTED * f64::from(all)) as u32).min(all),
             None => all,
         },
-        // Hardly any point sees all of the sky or nothing.
-        Channel::Sky => all,
+        // Hardly any point sees all of the sky or nothing; the tail has no pilots.
+        Channel::Tail(_) | Channel::Sky => all,
     }
 }
 
@@ -68,7 +68,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
     let cells = scene.selected_lights(settings);
     let kept = Channels::of(scene, cells, |channel| {
         let runs = match channel {
-            Channel::Area(_) | Channel::Selected(_) => plan.area_lights,
+            Channel::Area(_) | Channel::Selected(_) | Channel::Tail(_) => plan.area_lights,
             Channel::Sky => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
@@ -186,10 +186,13 @@ struct PointCost {
 impl PointCost {
     fn of(scene: &Scene, channels: &Channels, settings: &Settings) -> Self {
         let samples = settings.spp.min(SAMPLES_TOGETHER);
-        let mean = scene.light_cells.as_ref().map_or(0.0, |cells| cells.mean().area);
+        let mean = scene.light_cells.as_ref().map(|cells| cells.mean()).unwrap_or_default();
+        let MeanLights { area, tail_samples, .. } = mean;
         // Few points have as many lights as they have channels for.
         let share = |channel| match channel {
-            Channel::Selected(_) => mean / channels.slots() as f64,
+            Channel::Selected(_) => area / channels.slots() as f64,
+            // All parts have the same rays.
+            Channel::Tail(_) => tail_samples / channels.tail().len() as f64,
             Channel::Area(_) | Channel::Sky => 1.0,
         };
         let sum = |of: &dyn Fn(Channel) -> u32| -> f64 {
@@ -199,7 +202,7 @@ impl PointCost {
         let checks: &dyn Fn(u32) -> u32 = match channels.slots() {
             0 => &check_rays,
             // As if all lights were as bright.
-            _ => &|rays| shared_check_rays(rays, 1.0 / mean.max(1.0) as f32),
+            _ => &|rays| shared_check_rays(rays, 1.0 / area.max(1.0) as f32),
         };
         let checked = |channel| checks(samples.saturating_mul(rays_of(channel, settings)));
         Self {

@@ -73,6 +73,7 @@ impl Compatibility {
         let name = |channel| match channel {
             Channel::Area(index) => format!("light {}", index + 1),
             Channel::Selected(index) => format!("selected light {}", index + 1),
+            Channel::Tail(part) => format!("part {} of the weak lights", part + 1),
             Channel::Sky => "sky".into(),
         };
         let rays = |c| super::rays_of(c, settings).saturating_mul(settings.spp);

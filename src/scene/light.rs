@@ -6,6 +6,7 @@
 mod bound;
 mod directional;
 mod disk;
+mod far_field;
 mod point;
 mod quad;
 mod sky;
@@ -14,6 +15,7 @@ mod spot;
 
 pub use directional::DirectionalLight;
 pub use disk::DiskLight;
+pub use far_field::FarField;
 pub use point::PointLight;
 pub use quad::QuadLight;
 pub use sky::Sky;
@@ -104,6 +106,9 @@ trait LightData {
     /// An upper bound of the irradiance without shadows that arrives at any point of the box `cell`, whatever the
     /// normal there, per unit of emission; infinite where there is none.
     fn most_irradiance(&self, cell: &Bounds3) -> f64;
+
+    /// What arrives of the light at points that are far from it.
+    fn far_field(&self) -> FarField;
 }
 
 /// The visible surface of a light.
@@ -149,6 +154,17 @@ impl Light {
 
     pub(super) fn surface(&self) -> Option<EmittingSurface> {
         self.data().surface()
+    }
+
+    /// What arrives of the light at points that are far from it, shadows aside, per unit of emission; scene space.
+    pub fn far_field(&self) -> FarField {
+        self.data().far_field()
+    }
+
+    /// What the light emits: radiance of an area light, intensity of a point or spot light, irradiance of a
+    /// directional one.
+    pub fn emission(&self) -> Rgb {
+        self.data().emission()
     }
 
     /// An upper bound of the irradiance without shadows that arrives at any point of the box `cell`, whatever the

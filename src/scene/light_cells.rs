@@ -2,16 +2,16 @@
 //! what they can send there.
 //!
 //! Made once of a scene alone, so that the lights of a point are a function of its position. In each box
-//! (*cell*) the lights are in three parts. The brightest are its *main* lights: they are traced one by one. Those
-//! whose bounds together stay below a limit are culled. Samples choose among the others, the *tail*, in
-//! proportion to their bounds (Shirley, Wang and Zimmerman, 1996), which leaves the mean as it is.
+//! (*cell*) the lights are in three parts. Those that matter somewhere in the region around it are its *main* lights: they
+//! are traced one by one. Those whose bounds together stay below a limit are culled. Samples choose among the others,
+//! the *tail* (Shirley, Wang and Zimmerman, 1996), which leaves the mean as it is.
 //!
 //! Not done: bounds know neither shadows nor the normals of surfaces.
 
 mod build;
 mod count;
 
-use crate::math::{Bounds3, DVec3};
+use crate::math::{Bounds3, DVec3, Rgb};
 use serde::{Deserialize, Serialize};
 
 /// Up to so many lights, all are looked at everywhere: the bytes of such scenes do not depend on this module.
@@ -28,6 +28,8 @@ pub struct LightCells {
     lights: Vec<CellLight>,
     /// The most main lights with an extent of any cell.
     most_area: usize,
+    /// Colours whose sums are the light of any tail.
+    tints: Vec<Rgb>,
     /// Means over the scene's surfaces.
     mean: MeanLights,
 }
@@ -78,6 +80,8 @@ pub struct MeanLights {
     pub area: f64,
     /// Lights of the tail.
     pub tail: f64,
+    /// Samples of the tail, over those of a main light.
+    pub tail_samples: f64,
 }
 
 /// The lights of one cell.
@@ -128,6 +132,12 @@ impl LightCells {
         self.most_area
     }
 
+    /// Colours whose sums are the light of any tail: one where all lights have the same colour, else the three
+    /// primaries; none where no cell has a tail.
+    pub fn tints(&self) -> &[Rgb] {
+        &self.tints
+    }
+
     /// Mean numbers of lights at a point of the scene's surfaces, of those that can send it anything.
     pub fn mean(&self) -> MeanLights {
         self.mean
@@ -145,7 +155,7 @@ impl LightCells {
 
     /// Memory, bytes.
     pub fn memory(&self) -> u64 {
-        let Self { nodes, cells, lights, most_area: _, mean: _ } = self;
+        let Self { nodes, cells, lights, most_area: _, tints: _, mean: _ } = self;
         (size_of_val(&nodes[..]) + size_of_val(&cells[..]) + size_of_val(&lights[..])) as u64
     }
 }
@@ -173,13 +183,26 @@ impl Tail<'_> {
         self.lights.len()
     }
 
+    /// Numbers of the lights, the largest bound first.
+    pub fn numbers(&self) -> impl ExactSizeIterator<Item = u32> + '_ {
+        self.lights.iter().map(|light| light.light)
+    }
+
+    /// The tail from light number `first` on.
+    pub fn after(&self, first: usize) -> Self {
+        Self { lights: self.lights.get(first..).unwrap_or_default(), ..*self }
+    }
+
     /// Number of samples of the tail where a main light has `samples`: as many where it sends a quarter of the
     /// cell's light, from a quarter to four times as many.
     pub fn samples(&self, samples: u32) -> u32 {
+        (f64::from(samples) * self.samples_share()).ceil().max(1.0) as u32
+    }
+
+    fn samples_share(&self) -> f64 {
         let share = (4.0 * self.total() / self.typical).clamp(0.25, 4.0);
         // Of no number too.
-        let share = if share.is_nan() { 4.0 } else { share };
-        (f64::from(samples) * share).ceil().max(1.0) as u32
+        if share.is_nan() { 4.0 } else { share }
     }
 
     /// The largest number of [`samples`](Self::samples) of any tail.
@@ -221,7 +244,8 @@ impl Tail<'_> {
         self.total() <= f64::EPSILON * self.after
     }
 
-    fn total(&self) -> f64 {
+    /// What all of the lights send at most: the sum of their weights.
+    pub fn total(&self) -> f64 {
         self.first() - self.after
     }
 

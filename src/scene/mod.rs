@@ -35,7 +35,8 @@ pub use camera::{Camera, Pose};
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
-    DirectionalLight, DiskLight, Light, PointLight, QuadLight, Sky, SphereLight, SpotLight,
+    DirectionalLight, DiskLight, FarField, Light, PointLight, QuadLight, Sky, SphereLight,
+    SpotLight,
 };
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
 pub use material::{Glass, Material, MaterialId, Texture, TextureId};

@@ -187,6 +187,17 @@ impl ShadowScratch {
         self.weights.push(weight);
     }
 
+    /// Irradiance without shadows in a channel of a shading point, by the place of both.
+    pub fn exact(&self, at: usize) -> f64 {
+        self.exact[at]
+    }
+
+    /// Notes it, and what of it the pixel would show.
+    pub fn note_exact(&mut self, at: usize, exact: f64, shown: f32) {
+        self.exact[at] = exact;
+        self.shown[at] = shown;
+    }
+
     /// Adds a ray of a glossy point, which reflects `seen` of the light along it.
     pub fn push_highlight(&mut self, ray: Ray, seen: Rgb) {
         self.rays.push(ray);
@@ -311,9 +322,13 @@ impl Renderer<'_> {
                 source.is_kept.then(|| groups.slot(point, source.number)).flatten()
             };
             users.find(selection, &input.lights, points, |c| selection.of_diffuse(c), slot);
+            self.look_at_tails(selection, (lit, &users.cells), scratch);
         }
         if let Some(reuse) = &input.reuse {
             self.light_without_shadows(input, lit, &users, scratch);
+            if let Some(selection) = &input.selection {
+                self.tails_without_shadows((selection, reuse), lit, scratch);
+            }
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
             if scratch.groups.wants_checks() {
@@ -511,7 +526,8 @@ impl Renderer<'_> {
             for LightUser { point: i, slot } in reached.iter() {
                 let point = &lit[i as usize];
                 let wanted = slot.map(usize::from).and_then(|slot| {
-                    let wanted = s.groups.check_rays(i as usize, slot, channels, source.samples);
+                    let own = slot..slot + 1;
+                    let wanted = s.groups.check_rays(i as usize, own, channels, source.samples);
                     wanted.filter(|_| s.exact[i as usize * channels + slot] != 0.0)
                 });
                 if let Some(wanted) = wanted {
@@ -541,6 +557,9 @@ impl Renderer<'_> {
                     s.groups.note_checked(i as usize, at, (open, weight), rays);
                 }
             }
+        }
+        if let Some(selection) = &input.selection {
+            self.check_tails((input, selection, reuse), (lit, &users.cells), pixels, s, counts);
         }
         s.groups.conclude_checks(reuse);
     }

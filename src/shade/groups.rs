@@ -10,8 +10,8 @@ use super::point::ShadingPoint;
 use super::{BLOCK, FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
-    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
-    TracedPoints, channel_of, check_rays, shared_check_rays,
+    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TAIL_LIGHT,
+    TracedPoint, TracedPoints, channel_of, check_rays, shared_check_rays,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -207,6 +207,10 @@ impl Groups {
         lights.clear();
         if channels.slots() > 0 {
             lights.resize(count * channels.len(), NO_LIGHT);
+            for (number, part) in (0..).zip(channels.tail()) {
+                let number = TAIL_LIGHT - number;
+                lights.chunks_exact_mut(channels.len()).for_each(|own| own[part] = number);
+            }
             if let Some(sky) = channels.sky() {
                 lights.chunks_exact_mut(channels.len()).for_each(|own| own[sky] = SKY_LIGHT);
             }
@@ -348,17 +352,17 @@ impl Groups {
         !self.asked.checks.is_empty()
     }
 
-    /// The check rays in `channel` that shading point `i` casts, where tracing would cast `rays` from each
-    /// of them; `None` where none is wanted.
+    /// The check rays in `own` channels, which are of the same rays, that shading point `i` casts, where tracing would
+    /// cast `rays` from each of them; `None` where none is wanted.
     pub fn check_rays(
         &self,
         i: usize,
-        channel: usize,
+        own: Range<usize>,
         channels: usize,
         rays: u32,
     ) -> Option<CheckRays> {
         let point = self.of_lit[i] as usize;
-        if !self.asked.checks[point * channels + channel] {
+        if !self.asked.checks[point * channels..][own.clone()].contains(&true) {
             return None;
         }
         let samples = self.asked.points[point].samples;
@@ -367,7 +371,8 @@ impl Groups {
             check_rays(saved)
         } else {
             let shown = &self.asked.unshadowed[point * channels..][..channels];
-            shared_check_rays(saved, shown[channel] / shown.iter().sum::<f32>())
+            let sent: f32 = shown[own].iter().sum();
+            shared_check_rays(saved, sent / shown.iter().sum::<f32>())
         };
         let until =
             |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;

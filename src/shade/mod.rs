@@ -9,6 +9,7 @@
 mod adaptive;
 mod dimensions;
 mod direct;
+mod far_lights;
 mod groups;
 mod highlight;
 mod irradiance;

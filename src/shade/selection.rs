@@ -5,8 +5,9 @@
 //! ([`super::tail`]).
 
 use super::Renderer;
+use super::far_lights::{FarLights, TailsSeen};
 use super::source::LightSource;
-use crate::math::DVec3;
+use crate::math::{DVec3, Rgb};
 use crate::scene::{CellLights, LightCells, Settings, Tail};
 use std::f64::consts::PI;
 
@@ -27,6 +28,8 @@ pub(super) struct LightSelection<'a> {
     pub samples: u32,
     /// For each light of the scene its place among the frame's sources.
     sources: Vec<u32>,
+    /// The lights of the scene as diffuse points see those of a tail.
+    pub far: FarLights,
 }
 
 /// A point that a light is traced at.
@@ -64,6 +67,20 @@ pub(super) enum Reached<'u> {
 pub(super) struct TailSamples {
     pub choices: Vec<[f32; 2]>,
     pub places: Vec<[f32; 2]>,
+    /// The tails of the points of a chunk.
+    pub seen: TailsSeen,
+    /// What samples found at some points of a chunk.
+    pub found: Vec<FoundLight>,
+}
+
+/// What samples of the tail found at a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FoundLight {
+    /// The point's number in the chunk.
+    pub point: u32,
+    /// Number of samples.
+    pub rays: u32,
+    pub irradiance: Rgb,
 }
 
 /// A sample's light.
@@ -106,11 +123,17 @@ impl Renderer<'_> {
             sources[source.number as usize] = at;
         }
         let samples = self.settings.shadow_samples;
-        Some(LightSelection { cells, culled: culled(self.settings), samples, sources })
+        let far = FarLights::of(&self.scene.lights);
+        Some(LightSelection { cells, culled: culled(self.settings), samples, sources, far })
     }
 }
 
 impl LightSelection<'_> {
+    /// Colours that the tail's ratios are kept of.
+    pub fn tints(&self) -> &[Rgb] {
+        self.cells.tints()
+    }
+
     /// Number of the cell of `p`.
     pub fn cell(&self, p: DVec3) -> u32 {
         self.cells.cell(p)

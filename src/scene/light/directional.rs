@@ -1,6 +1,6 @@
 //! A directional light.
 
-use super::{EmittingSurface, LightData};
+use super::{EmittingSurface, FarField, LightData};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -41,6 +41,10 @@ impl LightData for DirectionalLight {
 
     fn emission(&self) -> Rgb {
         self.irradiance
+    }
+
+    fn far_field(&self) -> FarField {
+        FarField::parallel(self.to_light)
     }
 
     fn most_irradiance(&self, _cell: &Bounds3) -> f64 {

@@ -1,6 +1,6 @@
 //! A disk light.
 
-use super::{EmittingShape, EmittingSurface, LightData, bound, place};
+use super::{EmittingShape, EmittingSurface, FarField, LightData, bound, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb, orthonormal_basis};
 use crate::scene::Recentring;
@@ -86,6 +86,11 @@ impl LightData for DiskLight {
 
     fn emission(&self) -> Rgb {
         self.radiance
+    }
+
+    fn far_field(&self) -> FarField {
+        let area = PI * self.radius * self.radius;
+        FarField::flat((self.centre, self.radius), area, self.normal, self.two_sided)
     }
 
     fn most_irradiance(&self, cell: &Bounds3) -> f64 {

@@ -1,6 +1,6 @@
 //! A point light.
 
-use super::{EmittingSurface, LightData, bound};
+use super::{EmittingSurface, FarField, LightData, bound};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -44,6 +44,10 @@ impl LightData for PointLight {
 
     fn emission(&self) -> Rgb {
         self.intensity
+    }
+
+    fn far_field(&self) -> FarField {
+        FarField::everywhere(self.position, 0.0, 1.0)
     }
 
     fn most_irradiance(&self, cell: &Bounds3) -> f64 {

@@ -1,6 +1,6 @@
 //! A quad light.
 
-use super::{EmittingShape, EmittingSurface, LightData, bound};
+use super::{EmittingShape, EmittingSurface, FarField, LightData, bound};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -73,6 +73,12 @@ impl LightData for QuadLight {
 
     fn emission(&self) -> Rgb {
         self.radiance
+    }
+
+    fn far_field(&self) -> FarField {
+        let centre = self.corners.iter().sum::<DVec3>() / 4.0;
+        let reach = self.corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
+        FarField::flat((centre, reach), self.area(), self.normal(), self.two_sided)
     }
 
     fn most_irradiance(&self, cell: &Bounds3) -> f64 {

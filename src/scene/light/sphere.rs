@@ -1,10 +1,11 @@
 //! A sphere light.
 
-use super::{EmittingShape, EmittingSurface, LightData, bound, place};
+use super::{EmittingShape, EmittingSurface, FarField, LightData, bound, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// A sphere that emits outwards.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,6 +54,10 @@ impl LightData for SphereLight {
 
     fn emission(&self) -> Rgb {
         self.radiance
+    }
+
+    fn far_field(&self) -> FarField {
+        FarField::everywhere(self.centre, self.radius, PI * self.radius * self.radius)
     }
 
     fn most_irradiance(&self, cell: &Bounds3) -> f64 {

@@ -1,6 +1,6 @@
 //! A spot light.
 
-use super::{EmittingSurface, LightData, bound, place};
+use super::{EmittingSurface, FarField, LightData, bound, place};
 use crate::error::Result;
 use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
@@ -77,6 +77,11 @@ impl LightData for SpotLight {
 
     fn emission(&self) -> Rgb {
         self.intensity
+    }
+
+    fn far_field(&self) -> FarField {
+        let cosines = [self.cos_inner, self.cos_outer];
+        FarField::cone((self.position, self.radius), self.direction, cosines)
     }
 
     fn most_irradiance(&self, cell: &Bounds3) -> f64 {

@@ -1,10 +1,11 @@
 //! The tree of cells, made of a scene: the cell with the loosest bounds, and the largest, is cut next.
 
 use super::{Cell, CellLight, FEW_LIGHTS, LightCells, MOST_MAIN, MeanLights, Node, root};
-use crate::math::{Bounds3, DVec3};
+use crate::math::{Bounds3, DVec3, Rgb};
 use crate::scene::{Light, Scene};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::rc::Rc;
 
 /// Most cells.
 const MOST_CELLS: usize = 1 << 14;
@@ -16,9 +17,15 @@ const TIGHT: f64 = 1.25;
 const LOOSEST: f64 = 16.0;
 /// Smallest diagonal of a cell that is cut, in diagonals of the scene.
 const SMALLEST: f64 = 1.0 / 1024.0;
-/// The tail's bounds are at most this share of what arrives in the middle of a cell, unless the cell has the most
-/// main lights.
-const TAIL: f64 = 0.04;
+/// Regions for each light of the scene. All cells in a region have the same main lights.
+const REGIONS: usize = 2;
+/// A light is a main one in a region where it sends this share of what arrives at any of the places that are looked at.
+const SHARE: f64 = 0.1;
+/// Places in a region that are looked at, along each axis.
+const ACROSS: u32 = 3;
+
+/// Lights have one colour where the shares of their primaries differ by no more.
+const SAME_COLOUR: f32 = 1e-3;
 
 /// A light may send this many times as much next to it, in or beside a box, as to the middle and the corners of the box:
 /// samples choose it no more often for more.
@@ -29,6 +36,8 @@ struct Open {
     bounds: Bounds3,
     node: usize,
     lights: Vec<BoundedLight>,
+    /// Numbers of the main lights, those of the region that the box lies in.
+    main: Rc<[u32]>,
     /// What all lights send to the middle, at most.
     typical: f64,
 }
@@ -54,10 +63,14 @@ impl LightCells {
             cells: Vec::new(),
             lights: Vec::new(),
             most_area: 0,
+            tints: Vec::new(),
             mean: MeanLights::default(),
         };
         for open in cells.divide(&scene.lights, root(&scene.bounds)) {
             cells.close(open, &scene.lights);
+        }
+        if cells.cells.iter().any(|cell| cell.count > cell.main) {
+            cells.tints = tints(&scene.lights);
         }
         cells.mean = cells.count(scene);
         Some(cells)
@@ -67,11 +80,17 @@ impl LightCells {
     fn divide(&mut self, lights: &[Light], root: Bounds3) -> Vec<Open> {
         let smallest = SMALLEST * root.radius();
         let all: Vec<u32> = (0..lights.len() as u32).collect();
+        let regions = REGIONS * lights.len();
         let mut open = vec![Open::new(root, 0, &all, lights)];
         let mut queue = BinaryHeap::new();
         queue.extend(open[0].gain(smallest).map(|gain| (gain, Reverse(0))));
         let mut bounds = all.len();
+        let mut has_main = false;
         while let Some((_, Reverse(at))) = queue.pop() {
+            if !has_main && open.len() >= regions {
+                open.iter_mut().for_each(|open| open.choose_main(lights));
+                has_main = true;
+            }
             let next: usize = open[at].lights.len();
             if open.len() >= MOST_CELLS || bounds + 4 * next > MOST_BOUNDS {
                 break;
@@ -83,6 +102,9 @@ impl LightCells {
             for at in [at, open.len() - 1] {
                 queue.extend(open[at].gain(smallest).map(|gain| (gain, Reverse(at))));
             }
+        }
+        if !has_main {
+            open.iter_mut().for_each(|open| open.choose_main(lights));
         }
         open
     }
@@ -103,14 +125,19 @@ impl LightCells {
         };
         let lower = Bounds3 { min, max: with(max) };
         let upper = Bounds3 { min: with(min), max };
-        [Open::new(lower, node, &known, lights), Open::new(upper, node + 1, &known, lights)]
+        [(lower, node), (upper, node + 1)].map(|(bounds, node)| Open {
+            main: whole.main.clone(),
+            ..Open::new(bounds, node, &known, lights)
+        })
     }
 
     /// Makes a cell of a leaf.
     fn close(&mut self, open: Open, lights: &[Light]) {
-        let Open { bounds: _, node, lights: mut own, typical } = open;
+        let Open { bounds: _, node, lights: mut own, main, typical } = open;
         self.nodes[node] = Node::Cell(self.cells.len() as u32);
+        let is_main = |own: &BoundedLight| main.contains(&own.light);
         own.sort_by(|a, b| b.bound.total_cmp(&a.bound).then(a.light.cmp(&b.light)));
+        own.sort_by_cached_key(|own| !is_main(own));
         let first = self.lights.len();
         self.lights.extend(own.iter().map(|light| {
             let BoundedLight { light, bound: rest, weight: weights } = *light;
@@ -122,14 +149,24 @@ impl LightCells {
             weights += light.weights;
             (light.rest, light.weights) = (rest, weights);
         }
-        let most = own.len().min(MOST_MAIN);
-        let is_tail = |light: &CellLight| light.weights <= TAIL * typical;
-        let main = self.lights[first..][..most].iter().position(is_tail).unwrap_or(most);
+        let main = own.iter().filter(|own| is_main(own)).count();
         let area =
             own[..main].iter().filter(|light| lights[light.light as usize].is_area()).count();
         self.most_area = self.most_area.max(area);
         let [first, count, main] = [first, own.len(), main].map(|n| n as u32);
         self.cells.push(Cell { first, count, main, typical });
+    }
+}
+
+/// The one colour that all `lights` have, else the three primaries.
+fn tints(lights: &[Light]) -> Vec<Rgb> {
+    let mut colours = lights.iter().map(Light::emission).filter(|colour| *colour != Rgb::ZERO);
+    let of = |colour: Rgb| colour / colour.element_sum();
+    let first = colours.next().map_or(Rgb::ONE, of);
+    if colours.all(|colour| (of(colour) - first).abs().max_element() <= SAME_COLOUR) {
+        vec![first]
+    } else {
+        vec![Rgb::X, Rgb::Y, Rgb::Z]
     }
 }
 
@@ -166,7 +203,34 @@ impl Open {
             let weight = if weight.is_finite() { weight } else { 1.0 };
             own.push(BoundedLight { light: *number, bound, weight });
         }
-        Self { bounds, node, lights: own, typical }
+        Self { bounds, node, lights: own, main: Rc::new([]), typical }
+    }
+
+    /// Chooses the main lights of all boxes within this one: those that somewhere in it send more than [`SHARE`] of what
+    /// arrives, or of the most that may arrive anywhere.
+    fn choose_main(&mut self, lights: &[Light]) {
+        let Bounds3 { min, max } = self.bounds;
+        let mut shares = vec![0.0f64; self.lights.len()];
+        let mut sent = vec![0.0; self.lights.len()];
+        for k in 0..ACROSS * ACROSS * ACROSS {
+            let at = [k, k / ACROSS, k / ACROSS / ACROSS]
+                .map(|k| (f64::from(k % ACROSS) + 0.5) / f64::from(ACROSS));
+            let p = min + (max - min) * DVec3::from(at);
+            let place = Bounds3 { min: p, max: p };
+            for (sent, own) in sent.iter_mut().zip(&self.lights) {
+                *sent = lights[own.light as usize].most_irradiance(&place);
+            }
+            let all: f64 = sent.iter().sum();
+            for (share, sent) in shares.iter_mut().zip(&sent) {
+                *share = share.max(sent / all);
+            }
+        }
+        let mut order: Vec<usize> = (0..shares.len()).collect();
+        let least = SHARE;
+        order.retain(|k| shares[*k] >= least || self.lights[*k].bound.is_infinite());
+        order.sort_by(|a, b| shares[*b].total_cmp(&shares[*a]).then(a.cmp(b)));
+        order.truncate(MOST_MAIN);
+        self.main = order.into_iter().map(|k| self.lights[k].light).collect();
     }
 
     /// What cutting the box promises, greater where it is greater; `None` where nothing.

@@ -37,8 +37,10 @@ impl LightCells {
             });
         }
         let share = 1.0 / f64::from(next.max(1));
-        let MeanLights { main, area, tail } = means;
-        MeanLights { main: main * share, area: area * share, tail: tail * share }
+        let MeanLights { main, area, tail, tail_samples } = means;
+        let [main, area, tail, tail_samples] =
+            [main, area, tail, tail_samples].map(|sum| sum * share);
+        MeanLights { main, area, tail, tail_samples }
     }
 
     fn count_at(&self, p: DVec3, scene: &Scene, sums: &mut MeanLights) {
@@ -46,7 +48,9 @@ impl LightCells {
         let is_area = |light: &u32| scene.lights[*light as usize].is_area();
         sums.main += lights.main().len() as f64;
         sums.area += lights.main().filter(is_area).count() as f64;
-        sums.tail += lights.tail().len() as f64;
+        let tail = lights.tail();
+        sums.tail += tail.len() as f64;
+        sums.tail_samples += if tail.is_empty() { 0.0 } else { tail.samples_share() };
     }
 }
 
