@@ -71,8 +71,30 @@ fn lamp(k: u32, p: DVec3) -> Light {
     }
 }
 
-fn hall_job(count: u32, glossy: bool, (width, height): (u32, u32)) -> Job {
-    let mut job = job(hall(count, glossy), pose((0.5, 1.7, 3.5), (0.0, 0.4, -6.0)), width, height);
+/// A floor under rows of `count` upright panels, every other one of which shines to the left, the others to the right.
+/// Wherever a point lies, it sees the backs of half of them.
+fn panels(count: u32) -> World {
+    let mut world = hall(0, false);
+    for k in 0..count {
+        let (x, z) = (-7.5 + 1.5 * f64::from(k % 11), 3.0 - 2.0 * f64::from(k / 11));
+        let p = DVec3::new(x, 1.5, z);
+        let corners = [(-0.2, -0.2), (-0.2, 0.2), (0.2, 0.2), (0.2, -0.2)];
+        let mut corners = corners.map(|(y, z)| p + DVec3::new(0.0, y, z));
+        if k % 2 == 0 {
+            corners.reverse();
+        }
+        let radiance = Rgb::splat(6.0);
+        world.lights.push(Light::Quad(QuadLight { corners, radiance, two_sided: false }));
+    }
+    world
+}
+
+fn hall_job(count: u32, glossy: bool, size: (u32, u32)) -> Job {
+    job_of(hall(count, glossy), size)
+}
+
+fn job_of(world: World, (width, height): (u32, u32)) -> Job {
+    let mut job = job(world, pose((0.5, 1.7, 3.5), (0.0, 0.4, -6.0)), width, height);
     (job.settings.spp, job.settings.shadow_samples, job.settings.bounces) = (2, 4, 2);
     job
 }
@@ -94,10 +116,10 @@ fn picture(scene: &Scene, intersector: &dyn Intersector, job: &Job, seed: u64) -
 const SQUARE: usize = 8;
 
 /// Pictures with selected lights and with all differ by chance alone, in each part and in sum.
-fn is_unbiased(glossy: bool) {
+fn assert_unbiased(name: &str, world: World) {
     const PICTURES: u64 = 200;
     let (width, height) = (24, 16);
-    let job = hall_job(64, glossy, (width, height));
+    let job = job_of(world, (width, height));
     let scene = job.world.clone().into_scene(true).unwrap();
     let intersector = intersect::build(&scene, &job.settings, 1).unwrap();
     let across = width as usize / SQUARE;
@@ -129,21 +151,24 @@ fn is_unbiased(glossy: bool) {
     let worst = sums.iter().map(|part| z(part).abs()).fold(0.0, f64::max);
     let whole = sums[sums.len() - 1];
     let off = whole[0] / whole[2];
-    println!(
-        "glossy {glossy}: off by {off:.1e} of all light, z {:.2}, worst {worst:.2}",
-        z(&whole)
-    );
+    println!("{name}: off by {off:.1e} of all light, z {:.2}, worst {worst:.2}", z(&whole));
     assert!(off.abs() < 4e-3 && worst < 4.0, "{off} {worst}");
 }
 
 #[test]
 fn selected_lights_are_as_bright_as_all() {
-    is_unbiased(false);
+    assert_unbiased("diffuse", hall(64, false));
 }
 
 #[test]
 fn selected_lights_are_as_bright_as_all_on_glossy_surfaces() {
-    is_unbiased(true);
+    assert_unbiased("glossy", hall(64, true));
+}
+
+/// The tail of 120 lights is longer than what points look at light by light.
+#[test]
+fn the_backs_of_lights_are_dark_however_many_there_are() {
+    assert_unbiased("backs", panels(120));
 }
 
 fn on_threads(job: &Job, threads: usize) -> Film {
