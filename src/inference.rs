@@ -189,6 +189,13 @@ pub const SKY_LIGHT: u32 = u32::MAX - 1;
 /// Number of the first part of the tail among the lights of channels; those of the other parts lie below.
 pub const TAIL_LIGHT: u32 = u32::MAX - 2;
 
+/// The most that a ratio of the light of this number can be, `None` of a scene that selects no lights: the tail's
+/// ratios are to a stand-in, which may be less than what arrives.
+pub fn most_ratio(light: Option<&u32>) -> f32 {
+    let is_tail = light.is_some_and(|light| (TAIL_LIGHT - 2..=TAIL_LIGHT).contains(light));
+    if is_tail { f32::MAX } else { 1.0 }
+}
+
 /// The channel of a point with the lights `known` that is of the light of channel `k` of a point with the lights
 /// `asked`; `k` itself where each channel has the same light everywhere.
 #[inline]

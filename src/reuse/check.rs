@@ -24,8 +24,9 @@ pub fn agrees(batch: &LookupBatch, at: usize, channels: usize, tolerance: f32) -
         if checked.rays > 0 {
             rays += checked.rays;
             further += unshadowed * (checked.ratio - estimate.ratio);
-            let of_ray = unshadowed * unshadowed * estimate.ratio * (1.0 - estimate.ratio);
-            variance += of_ray / checked.rays as f32;
+            // A tail's ratio may be above 1, where no ray is blocked.
+            let of_ray = (estimate.ratio * (1.0 - estimate.ratio)).max(0.0);
+            variance += unshadowed * unshadowed * of_ray / checked.rays as f32;
         }
     }
     let steps = steps_per_radiance(estimated);

@@ -14,7 +14,7 @@ use super::columns::{self, deflated, inflated, take, take_u32};
 use super::evidence::Finding;
 use super::risk::LEVELS;
 use crate::error::{Error, Result};
-use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints};
+use crate::inference::{Channel, Channels, SurfacePoint, TracedPoint, TracedPoints, most_ratio};
 use crate::math::Vec3;
 use crate::scene::{Camera, Recentring, Rect, Settings};
 use serde::{Deserialize, Serialize};
@@ -73,7 +73,10 @@ impl Compatibility {
         let name = |channel| match channel {
             Channel::Area(index) => format!("light {}", index + 1),
             Channel::Selected(index) => format!("selected light {}", index + 1),
-            Channel::Tail(part) => format!("part {} of the weak lights", part + 1),
+            // How many lights are too weak to count depends on the exposure.
+            Channel::Tail(part) => {
+                format!("part {} of the weak lights, exposure {}", part + 1, settings.exposure)
+            }
             Channel::Sky => "sky".into(),
         };
         let rays = |c| super::rays_of(c, settings).saturating_mul(settings.spp);
@@ -310,17 +313,21 @@ fn points_of(
         };
         let (x, y) = (word(i, 0), word(i, 1));
         let ratios = (WORDS..columns).map(float);
+        let lights = (columns..terms.words()).map(|column| word(i, column));
         let is_sound = x < camera.width
             && y < camera.height
             && is_point(&point)
-            && ratios.clone().all(|r| r.is_nan() || (0.0..=1.0).contains(&r));
+            && ratios.clone().enumerate().all(|(channel, ratio)| {
+                let most = most_ratio(lights.clone().nth(channel).as_ref());
+                ratio.is_nan() || (0.0..=most).contains(&ratio)
+            });
         if !is_sound {
             return None;
         }
         traced.points.push(TracedPoint { x, y, point });
         traced.ratios.extend(ratios);
         // Any number will do: no point has a light that there is not.
-        traced.lights.extend((columns..terms.words()).map(|column| word(i, column)));
+        traced.lights.extend(lights);
     }
     Some(traced)
 }
@@ -341,7 +348,7 @@ fn is_point(point: &SurfacePoint) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inference::SKY_LIGHT;
+    use crate::inference::{SKY_LIGHT, TAIL_LIGHT};
     use crate::math::DVec3;
     use crate::scene::Pose;
 
@@ -406,8 +413,15 @@ mod tests {
     #[test]
     fn where_lights_are_selected_every_point_says_whose_its_ratios_are() {
         let terms = Compatibility { selected: true, ..terms() };
-        let lights = (0..96).map(|i| if i % 2 == 0 { i / 8 } else { SKY_LIGHT }).collect();
-        let traced = TracedPoints { lights, ..traced() };
+        let light = |i: u32| match i % 2 {
+            0 if i < 48 => i / 8,
+            0 => TAIL_LIGHT,
+            _ => SKY_LIGHT,
+        };
+        let lights: Vec<u32> = (0..96).map(light).collect();
+        let mut traced = TracedPoints { lights, ..traced() };
+        // The tail's stand-in may be less than what arrives.
+        traced.ratios[50] = 16.0;
         let (camera, findings) = (camera(), findings());
         let (camera, traced, findings, settings) = (&camera, &traced, &findings[..], "spp 1");
         let crop = None;
@@ -416,6 +430,11 @@ mod tests {
         let back = read(&record.encode().expect("small enough"), &terms).expect("whole");
         let own = Reference::new(Reference::SUPPLIED, camera, traced, 2);
         assert_eq!(format!("{back:?}"), format!("{:?}", own.with_findings(findings.to_vec())));
+        // No other light's ratio is above 1.
+        let mut wrong = traced.clone();
+        wrong.ratios[0] = 16.0;
+        let record = ReferenceRecord { traced: &wrong, ..record };
+        assert!(read(&record.encode().expect("small enough"), &terms).is_err());
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! What the lights of a tail send to one point, shadows aside, as if each were far away.
+//! What the lights of a tail send to one point, shadows aside, as if each were far away: in closed form those that are
+//! not, such as a long tube above the point.
 //!
 //! The sum is a stand-in for the closed forms of dozens of lights: the ratio of the shadowed light to it can be kept for
 //! other frames as that of a main light. Samples choose a light by its share of the sum, so that light that nothing
@@ -6,6 +7,7 @@
 //!
 //! Lights beyond the first [`MOST`] of a tail count with their bounds.
 
+use super::light::LightSampler;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{FarField, Light, Tail};
 
@@ -17,8 +19,9 @@ pub(super) struct FarLights(Vec<FarLight>);
 
 struct FarLight {
     field: FarField,
+    sampler: LightSampler,
     emission: Rgb,
-    /// Mean of the emission's colours.
+    /// Mean of the emission's colours, each without its sign.
     mean: f64,
 }
 
@@ -60,8 +63,11 @@ pub(super) struct Chosen {
 impl FarLights {
     pub fn of(lights: &[Light]) -> Self {
         let far = |light: &Light| {
-            let (field, emission) = (light.far_field(), light.emission());
-            FarLight { field, emission, mean: f64::from(emission.element_sum()) / 3.0 }
+            let (field, sampler) = (light.far_field(), LightSampler::new(light));
+            let emission = light.emission();
+            // Negative light is sampled too, and counted at its pixel.
+            let mean = f64::from(emission.abs().element_sum()) / 3.0;
+            FarLight { field, sampler, emission, mean }
         };
         Self(lights.iter().map(far).collect())
     }
@@ -84,6 +90,10 @@ impl TailsSeen {
             let field = |far: Option<&'f FarLight>| far.map(|far| &far.field);
             let irradiance = FarField::irradiance(four.map(field), at);
             for (far, irradiance) in four.into_iter().flatten().zip(irradiance) {
+                let irradiance = match far.field.is_close(at.0) {
+                    true => far.sampler.unshadowed(at.0, at.1),
+                    false => irradiance,
+                };
                 sent += far.emission * irradiance as f32;
                 sum += far.mean * irradiance;
                 self.sums.push(sum);
@@ -106,7 +116,7 @@ impl TailsSeen {
 }
 
 impl TailSeen<'_> {
-    /// Irradiance, shadows aside; not a number where any of the lights is none.
+    /// Irradiance, shadows aside; NaN where the emission of a light is NaN.
     pub fn sent(&self) -> Rgb {
         self.sent
     }

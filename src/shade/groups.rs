@@ -32,6 +32,14 @@ struct Gathered {
     all: f64,
 }
 
+impl Gathered {
+    /// NaN where nothing would arrive.
+    fn ratio(&self) -> f32 {
+        // What would arrive of a tail is a stand-in, and may be next to nothing.
+        ((self.open / self.all) as f32).clamp(0.0, f32::MAX)
+    }
+}
+
 /// Which of a list of surface points belong to a pixel of the block.
 #[derive(Default)]
 struct Chains {
@@ -476,7 +484,7 @@ impl Groups {
                 let (x, y) = pixels.place(self.pixels[i]);
                 sources.points.push(TracedPoint { x, y, point: *point });
                 let own = i * channels..(i + 1) * channels;
-                let gathered = self.gathered[own.clone()].iter().map(|g| (g.open / g.all) as f32);
+                let gathered = self.gathered[own.clone()].iter().map(Gathered::ratio);
                 let ratios = &mut self.asked.ratios[own];
                 ratios.iter_mut().zip(gathered.clone()).for_each(|(ratio, traced)| {
                     *ratio = if traced.is_nan() { *ratio } else { traced };

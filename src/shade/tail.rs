@@ -17,10 +17,6 @@ use crate::scene::Tail;
 use crate::stats::RayCounts;
 use std::ops::Range;
 
-/// Kept ratios are those to this many times what is sent without shadows: the stand-in may be less than what arrives,
-/// and a ratio above 1 would be cut off.
-const HEADROOM: f64 = 1.25;
-
 /// The shadow ray of one sample.
 struct TailRay<'s> {
     point: &'s ShadingPoint,
@@ -148,7 +144,7 @@ impl Renderer<'_> {
         for (i, point) in lit.iter().enumerate() {
             let sent = s.tail.seen.of(i).sent();
             for (at, tint) in channels.places(i) {
-                let exact = HEADROOM * part(sent, tint);
+                let exact = part(sent, tint);
                 let shown = luminance(point.weight * tint) * exact as f32;
                 s.note_exact(at, exact, shown * self.settings.exposure);
             }

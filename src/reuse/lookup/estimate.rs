@@ -2,7 +2,7 @@
 //! risk.
 
 use super::{LEAST_WEIGHT, Lookup};
-use crate::inference::{Estimate, SurfacePoint};
+use crate::inference::{Estimate, SurfacePoint, most_ratio};
 use crate::reuse::risk::Features;
 use crate::reuse::taps::{ENOUGH_WEIGHT, Taps, sum};
 use wide::{CmpEq, CmpGt, f32x4};
@@ -56,8 +56,8 @@ pub(super) struct Mean {
 }
 
 impl Mean {
-    /// Bend and both contrasts. Where lights are selected, what is not known of one of many counts as its largest value,
-    /// from full light to none, and not as that of all lights.
+    /// Bend and both contrasts. Where lights are selected, what is not known of one of many counts as at a straight edge
+    /// from its full light to none, and not as that of all lights.
     fn contrasts(&self, are_selected: bool) -> [f32; 3] {
         let or = |x: f32, most: f32| if are_selected && x.is_nan() { most } else { x };
         [or(self.bend, 0.5), or(self.wide, 1.0), or(self.far, 1.0)]
@@ -131,7 +131,8 @@ impl Lookup<'_> {
             sums.mean += share * further;
             // Laplace's rule of succession: where all rays were open the next need not be.
             let open = (own.ratio & known) * f32x4::splat(rays / (rays + 2.0)) + per_ray;
-            sums.spread += share * open * (one - open);
+            // A tail's ratio may be above 1.
+            sums.spread += share * open * (one - open).fast_max(f32x4::ZERO);
             sums.bend.note(own.bend);
             sums.wide.note(own.wide);
             sums.far.note(own.far);
@@ -144,7 +145,7 @@ impl Lookup<'_> {
         let mean = sum(sums.mean) * share;
         Some(Mean {
             // Rounding may leave it a little outside.
-            ratio: (first + mean).clamp(0.0, 1.0),
+            ratio: (first + mean).clamp(0.0, most_ratio(lights.get(channel))),
             bend: sums.bend.get(),
             wide: sums.wide.get(),
             far: sums.far.get(),

@@ -8,6 +8,8 @@ use crate::math::DVec3;
 use std::f64::consts::PI;
 use wide::{CmpGe, f64x4};
 
+/// A light is close within so many times its radius.
+const CLOSE: f64 = 3.0;
 /// A squared distance that is none.
 const NO_DISTANCE: f64 = 1e-60;
 
@@ -83,6 +85,12 @@ impl FarField {
         Self { centre, reach, axis, cone: 1.0, cos_outer, sharpness, ..Self::DARK }
     }
 
+    /// Whether the light is so near to `p`, or so large, that the distance to its middle says little.
+    pub fn is_close(&self, p: DVec3) -> bool {
+        let close = CLOSE * self.reach;
+        self.centre.distance_squared(p) < close * close * self.is_near
+    }
+
     /// Irradiance of up to four lights at `p` with unit normal `n`, per unit of emission.
     pub fn irradiance(four: [Option<&Self>; 4], (p, n): (DVec3, DVec3)) -> [f64; 4] {
         let four = four.map(|field| field.unwrap_or(&Self::DARK));
@@ -99,7 +107,7 @@ impl FarField {
         let along_axis =
             to_x * lanes(|f| f.axis.x) + to_y * lanes(|f| f.axis.y) + to_z * lanes(|f| f.axis.z);
         let reach = lanes(|f| f.reach);
-        let risen = risen(along_n * inverse, (reach * inverse).min(one));
+        let risen = risen(along_n * inverse, (reach * inverse).min(f64x4::splat(2.0)));
         // The cosine at the light.
         let cos = -along_axis * inverse;
         let facing = cos.max(-cos * lanes(|f| f.two_sided));
@@ -114,7 +122,7 @@ impl FarField {
 }
 
 /// Mean cosine above the horizon over lights whose middles are seen at angles of cosine `cos` from the normal, and whose
-/// radius over distance is `reach`, at most 1: smooth, and 0 only where all of a light is below.
+/// radius over distance is `reach`, at most 2: smooth, and 0 only where all of a light is below.
 fn risen(cos: f64x4, reach: f64x4) -> f64x4 {
     let above = (cos + reach).max(f64x4::ZERO);
     let partly = above * above / (reach * f64x4::splat(4.0)).max(f64x4::splat(f64::MIN_POSITIVE));

@@ -24,7 +24,7 @@ const SHARE: f64 = 0.1;
 /// Places in a region that are looked at, along each axis.
 const ACROSS: u32 = 3;
 
-/// Lights have one colour where the shares of their primaries differ by no more.
+/// Lights have one colour where the shares of each primary differ by no more than this part of the larger share.
 const SAME_COLOUR: f32 = 1e-3;
 
 /// A light may send this many times as much next to it, in or beside a box, as to the middle and the corners of the box:
@@ -163,7 +163,8 @@ fn tints(lights: &[Light]) -> Vec<Rgb> {
     let mut colours = lights.iter().map(Light::emission).filter(|colour| *colour != Rgb::ZERO);
     let of = |colour: Rgb| colour / colour.element_sum();
     let first = colours.next().map_or(Rgb::ONE, of);
-    if colours.all(|colour| (of(colour) - first).abs().max_element() <= SAME_COLOUR) {
+    let is_same = |own: Rgb| (own - first).abs().cmple(SAME_COLOUR * own.max(first)).all();
+    if colours.all(|colour| is_same(of(colour))) {
         vec![first]
     } else {
         vec![Rgb::X, Rgb::Y, Rgb::Z]
@@ -206,8 +207,8 @@ impl Open {
         Self { bounds, node, lights: own, main: Rc::new([]), typical }
     }
 
-    /// Chooses the main lights of all boxes within this one: those that somewhere in it send more than [`SHARE`] of what
-    /// arrives, or of the most that may arrive anywhere.
+    /// Chooses the main lights of all boxes within this one: those that somewhere in it send at least [`SHARE`] of what
+    /// arrives, and those without a bound.
     fn choose_main(&mut self, lights: &[Light]) {
         let Bounds3 { min, max } = self.bounds;
         let mut shares = vec![0.0f64; self.lights.len()];
@@ -226,8 +227,7 @@ impl Open {
             }
         }
         let mut order: Vec<usize> = (0..shares.len()).collect();
-        let least = SHARE;
-        order.retain(|k| shares[*k] >= least || self.lights[*k].bound.is_infinite());
+        order.retain(|k| shares[*k] >= SHARE || self.lights[*k].bound.is_infinite());
         order.sort_by(|a, b| shares[*b].total_cmp(&shares[*a]).then(a.cmp(b)));
         order.truncate(MOST_MAIN);
         self.main = order.into_iter().map(|k| self.lights[k].light).collect();
