@@ -186,13 +186,22 @@ impl TracedPoints {
 pub const NO_LIGHT: u32 = u32::MAX;
 /// Number of the sky among the lights of channels.
 pub const SKY_LIGHT: u32 = u32::MAX - 1;
-/// Number of the first part of the tail among the lights of channels; those of the other parts lie below.
-pub const TAIL_LIGHT: u32 = u32::MAX - 2;
+/// The largest number of a part of a tail among the lights of channels.
+const TAIL_LIGHT: u32 = u32::MAX - 2;
+/// Most parts of a tail.
+const TAIL_PARTS: u32 = 3;
+
+/// Number among the lights of channels of a `part` of the tail with this set of lights
+/// ([`CellLights::tail_set`](crate::scene::CellLights::tail_set)).
+pub fn tail_light(set: u32, part: u32) -> u32 {
+    TAIL_LIGHT - (TAIL_PARTS * set + part)
+}
 
 /// The most that a ratio of the light of this number can be, `None` of a scene that selects no lights: the tail's
 /// ratios are to a stand-in, which may be less than what arrives.
 pub fn most_ratio(light: Option<&u32>) -> f32 {
-    let is_tail = light.is_some_and(|light| (TAIL_LIGHT - 2..=TAIL_LIGHT).contains(light));
+    // The lights of a scene take the lower half of the numbers.
+    let is_tail = light.is_some_and(|light| (u32::MAX / 2..=TAIL_LIGHT).contains(light));
     if is_tail { f32::MAX } else { 1.0 }
 }
 

@@ -348,7 +348,7 @@ fn is_point(point: &SurfacePoint) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inference::{SKY_LIGHT, TAIL_LIGHT};
+    use crate::inference::{SKY_LIGHT, tail_light};
     use crate::math::DVec3;
     use crate::scene::Pose;
 
@@ -415,7 +415,7 @@ mod tests {
         let terms = Compatibility { selected: true, ..terms() };
         let light = |i: u32| match i % 2 {
             0 if i < 48 => i / 8,
-            0 => TAIL_LIGHT,
+            0 => tail_light(5, 1),
             _ => SKY_LIGHT,
         };
         let lights: Vec<u32> = (0..96).map(light).collect();

@@ -327,7 +327,8 @@ impl Renderer<'_> {
         if let Some(reuse) = &input.reuse {
             self.light_without_shadows(input, lit, &users, scratch);
             if let Some(selection) = &input.selection {
-                self.tails_without_shadows((selection, reuse), lit, scratch);
+                let points = (lit, &users.cells[..]);
+                self.tails_without_shadows((selection, reuse), points, scratch);
             }
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);

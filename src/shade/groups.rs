@@ -10,8 +10,8 @@ use super::point::ShadingPoint;
 use super::{BLOCK, FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
-    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TAIL_LIGHT,
-    TracedPoint, TracedPoints, channel_of, check_rays, shared_check_rays,
+    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
+    TracedPoints, channel_of, check_rays, shared_check_rays, tail_light,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -215,10 +215,6 @@ impl Groups {
         lights.clear();
         if channels.slots() > 0 {
             lights.resize(count * channels.len(), NO_LIGHT);
-            for (number, part) in (0..).zip(channels.tail()) {
-                let number = TAIL_LIGHT - number;
-                lights.chunks_exact_mut(channels.len()).for_each(|own| own[part] = number);
-            }
             if let Some(sky) = channels.sky() {
                 lights.chunks_exact_mut(channels.len()).for_each(|own| own[sky] = SKY_LIGHT);
             }
@@ -235,6 +231,16 @@ impl Groups {
         let at = own.iter().position(|other| *other == light || *other == NO_LIGHT)?;
         own[at] = light;
         Some(at as u16)
+    }
+
+    /// Notes the tail's set of lights at shading point `i`, whose parts have these channels. Of camera samples of one
+    /// surface point in several sets, the first counts.
+    pub fn note_tail(&mut self, i: usize, set: u32, channels: Range<usize>) {
+        let first = self.of_lit[i] as usize * self.channels;
+        for (part, channel) in (0..).zip(channels) {
+            let own = &mut self.asked.lights[first + channel];
+            *own = if *own == NO_LIGHT { tail_light(set, part) } else { *own };
+        }
     }
 
     fn join_points(&mut self, input: &FrameInput, lit: &[ShadingPoint]) {

@@ -137,11 +137,13 @@ impl Renderer<'_> {
     pub(super) fn tails_without_shadows(
         &self,
         (selection, reuse): (&LightSelection, &Reuse),
-        lit: &[ShadingPoint],
+        (lit, cells): (&[ShadingPoint], &[u32]),
         s: &mut ShadowScratch,
     ) {
         let Some(channels) = TailChannels::of(reuse, selection) else { return };
-        for (i, point) in lit.iter().enumerate() {
+        for (i, (point, cell)) in lit.iter().zip(cells).enumerate() {
+            let set = selection.of_diffuse(*cell).tail_set();
+            s.groups.note_tail(i, set, channels.range());
             let sent = s.tail.seen.of(i).sent();
             for (at, tint) in channels.places(i) {
                 let exact = part(sent, tint);

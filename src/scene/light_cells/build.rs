@@ -4,7 +4,7 @@ use super::{Cell, CellLight, FEW_LIGHTS, LightCells, MOST_MAIN, MeanLights, Node
 use crate::math::{Bounds3, DVec3, Rgb};
 use crate::scene::{Light, Scene};
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 use std::rc::Rc;
 
 /// Most cells.
@@ -66,8 +66,13 @@ impl LightCells {
             tints: Vec::new(),
             mean: MeanLights::default(),
         };
+        let mut sets = BTreeMap::new();
         for open in cells.divide(&scene.lights, root(&scene.bounds)) {
-            cells.close(open, &scene.lights);
+            let mut main = open.main.to_vec();
+            main.sort_unstable();
+            let next = sets.len() as u32;
+            let tail_set = *sets.entry(main).or_insert(next);
+            cells.close(open, tail_set, &scene.lights);
         }
         if cells.cells.iter().any(|cell| cell.count > cell.main) {
             cells.tints = tints(&scene.lights);
@@ -132,7 +137,7 @@ impl LightCells {
     }
 
     /// Makes a cell of a leaf.
-    fn close(&mut self, open: Open, lights: &[Light]) {
+    fn close(&mut self, open: Open, tail_set: u32, lights: &[Light]) {
         let Open { bounds: _, node, lights: mut own, main, typical } = open;
         self.nodes[node] = Node::Cell(self.cells.len() as u32);
         let is_main = |own: &BoundedLight| main.contains(&own.light);
@@ -154,7 +159,7 @@ impl LightCells {
             own[..main].iter().filter(|light| lights[light.light as usize].is_area()).count();
         self.most_area = self.most_area.max(area);
         let [first, count, main] = [first, own.len(), main].map(|n| n as u32);
-        self.cells.push(Cell { first, count, main, typical });
+        self.cells.push(Cell { first, count, main, tail_set, typical });
     }
 }
 
