@@ -55,15 +55,6 @@ pub(super) struct Mean {
     weight: f32,
 }
 
-impl Mean {
-    /// Bend and both contrasts. Where lights are selected, what is not known of one of many counts as at a straight edge
-    /// from its full light to none, and not as that of all lights.
-    fn contrasts(&self, are_selected: bool) -> [f32; 3] {
-        let or = |x: f32, most: f32| if are_selected && x.is_nan() { most } else { x };
-        [or(self.bend, 0.5), or(self.wide, 1.0), or(self.far, 1.0)]
-    }
-}
-
 impl Lookup<'_> {
     /// Estimates each light at `point`; `shown` are the contributions of the lights to the pixel without
     /// shadows, `lights` their numbers, if lights are selected. `means` is a buffer to reuse.
@@ -92,10 +83,9 @@ impl Lookup<'_> {
         for (mean, shown) in means.iter().zip(shown).filter(|(_, shown)| **shown != 0.0) {
             let Some(mean) = mean else { continue };
             let by = steps * shown;
-            let [bend, wide, far] = mean.contrasts(!lights.is_empty());
-            features.bend += by * bend;
-            features.wide += by * wide;
-            features.far += by * far;
+            features.bend += by * mean.bend;
+            features.wide += by * mean.wide;
+            features.far += by * mean.far;
             variance += by * by * mean.variance;
             features.unshadowed += shown;
             features.is_whole &= f64::from(mean.weight) >= ENOUGH_WEIGHT;
