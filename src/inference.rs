@@ -192,7 +192,7 @@ const TAIL_LIGHT: u32 = u32::MAX - 2;
 const TAIL_PARTS: u32 = 3;
 
 /// Number among the lights of channels of a `part` of the tail with this set of lights
-/// ([`CellLights::tail_set`](crate::scene::CellLights::tail_set)).
+/// ([`LightCells::tail_set`](crate::scene::LightCells::tail_set)).
 pub fn tail_light(set: u32, part: u32) -> u32 {
     TAIL_LIGHT - (TAIL_PARTS * set + part)
 }

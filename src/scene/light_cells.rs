@@ -93,7 +93,6 @@ pub struct CellLights<'c> {
     main: usize,
     /// The weights of culled lights.
     culled: f64,
-    tail_set: u32,
     typical: f64,
 }
 
@@ -123,12 +122,17 @@ impl LightCells {
     /// The lights of a cell but for those that together send an irradiance of at most `culled` to any of its
     /// points.
     pub fn lights(&self, cell: u32, culled: f64) -> CellLights<'_> {
-        let Cell { first, count, main, tail_set, typical } = self.cells[cell as usize];
+        let Cell { first, count, main, tail_set: _, typical } = self.cells[cell as usize];
         let all = &self.lights[first as usize..][..count as usize];
         let (lights, culled) = all.split_at(all.partition_point(|light| light.rest > culled));
         let culled = culled.first().map_or(0.0, |light| light.weights);
         let main = (main as usize).min(lights.len());
-        CellLights { lights, main, culled, tail_set, typical }
+        CellLights { lights, main, culled, typical }
+    }
+
+    /// Number of the set of lights in the tail of a cell: cells of one number have the same tail, but for culled lights.
+    pub fn tail_set(&self, cell: u32) -> u32 {
+        self.cells[cell as usize].tail_set
     }
 
     /// The most main lights with an extent of any cell.
@@ -168,11 +172,6 @@ impl<'c> CellLights<'c> {
     /// Numbers of the main lights.
     pub fn main(&self) -> impl ExactSizeIterator<Item = u32> + 'c {
         self.lights[..self.main].iter().map(|light| light.light)
-    }
-
-    /// Number of the tail's set of lights: cells of one number have the same tail, but for culled lights.
-    pub fn tail_set(&self) -> u32 {
-        self.tail_set
     }
 
     /// The others.

@@ -20,7 +20,6 @@ pub(super) struct FarLights(Vec<FarLight>);
 struct FarLight {
     field: FarField,
     sampler: LightSampler,
-    emission: Rgb,
     /// Mean of the emission's colours, each without its sign.
     mean: f64,
 }
@@ -64,10 +63,9 @@ impl FarLights {
     pub fn of(lights: &[Light]) -> Self {
         let far = |light: &Light| {
             let (field, sampler) = (light.far_field(), LightSampler::new(light));
-            let emission = light.emission();
             // Negative light is sampled too, and counted at its pixel.
-            let mean = f64::from(emission.abs().element_sum()) / 3.0;
-            FarLight { field, sampler, emission, mean }
+            let mean = f64::from(sampler.emission.abs().element_sum()) / 3.0;
+            FarLight { field, sampler, mean }
         };
         Self(lights.iter().map(far).collect())
     }
@@ -94,7 +92,7 @@ impl TailsSeen {
                     true => far.sampler.unshadowed(at.0, at.1),
                     false => irradiance,
                 };
-                sent += far.emission * irradiance as f32;
+                sent += far.sampler.emission * irradiance as f32;
                 sum += far.mean * irradiance;
                 self.sums.push(sum);
             }

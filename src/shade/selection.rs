@@ -129,6 +129,11 @@ impl Renderer<'_> {
 }
 
 impl LightSelection<'_> {
+    /// Number of the set of lights in the tail of a cell.
+    pub fn tail_set(&self, cell: u32) -> u32 {
+        self.cells.tail_set(cell)
+    }
+
     /// Colours that the tail's ratios are kept of.
     pub fn tints(&self) -> &[Rgb] {
         self.cells.tints()

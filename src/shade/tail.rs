@@ -142,8 +142,7 @@ impl Renderer<'_> {
     ) {
         let Some(channels) = TailChannels::of(reuse, selection) else { return };
         for (i, (point, cell)) in lit.iter().zip(cells).enumerate() {
-            let set = selection.of_diffuse(*cell).tail_set();
-            s.groups.note_tail(i, set, channels.range());
+            s.groups.note_tail(i, selection.tail_set(*cell), channels.range());
             let sent = s.tail.seen.of(i).sent();
             for (at, tint) in channels.places(i) {
                 let exact = part(sent, tint);

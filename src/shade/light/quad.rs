@@ -18,12 +18,10 @@ pub(super) struct Quad {
 impl Quad {
     pub fn new(light: &QuadLight) -> Self {
         let plane_error = PlaneError::of_quad(&light.corners);
-        let [a, b, c, d] = light.corners;
-        let area = 0.5 * (c - a).cross(d - b).length();
         Self {
             warp: QuadWarp::new(light.corners),
             corners: light.corners,
-            plane: Flat { normal: light.normal(), plane_error, area },
+            plane: Flat { normal: light.normal(), plane_error, area: light.area() },
             two_sided: light.two_sided,
         }
     }
