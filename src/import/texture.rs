@@ -40,6 +40,24 @@ pub(super) fn load_cached(
 /// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than
 /// [`MAX_IMAGE_BYTES`], before memory is asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
+    let image = decode(path)?;
+    let (width, height) = (image.width(), image.height());
+    let texels = linear(image);
+    if texels.iter().any(|c| Fault::of(c.to_array()).is_some()) {
+        return Err(bad_pixel(path));
+    }
+    Ok(Texture { name: path.display().to_string(), width, height, texels })
+}
+
+/// The error of an image with a value that is no amount of light.
+pub(super) fn bad_pixel(path: &Path) -> Error {
+    Error::input(path, "a pixel of the image is negative or not a finite number")
+}
+
+/// The image of a file, with at least one pixel.
+///
+/// Errors: those of [`load_texture`] but for its pixels' values.
+pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
     let bytes = super::source::read(path)?;
     let bad = |e: image::ImageError| Error::input(path, format!("not a readable image: {e}"));
     let mut limits = Limits::default();
@@ -61,13 +79,7 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
     }
     let mut decoder = reader()?;
     decoder.limits(limits);
-    let image = decoder.decode().map_err(bad)?;
-    let texels = linear(image);
-    if texels.iter().any(|c| Fault::of(c.to_array()).is_some()) {
-        let message = "a pixel of the image is negative or not a finite number";
-        return Err(Error::input(path, message));
-    }
-    Ok(Texture { name: path.display().to_string(), width, height, texels })
+    decoder.decode().map_err(bad)
 }
 
 fn linear(image: DynamicImage) -> Vec<Rgb> {

@@ -1,5 +1,6 @@
 //! Materials and textures: the parameters of a surface's scattering. How it scatters stands in `shade::lobe`.
 
+use super::MaskId;
 use crate::math::{Rgb, bulk};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +19,8 @@ pub struct Material {
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureId>,
+    /// Mask of its cut-outs: where it says so, the surface is not there. None on glass.
+    pub alpha: Option<MaskId>,
     /// Reflectance of a mirror, both sides.
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
@@ -37,6 +40,7 @@ impl Material {
             name: name.into(),
             diffuse: Rgb::ZERO,
             texture: None,
+            alpha: None,
             mirror: Rgb::ZERO,
             roughness: 0.0,
             glass: None,

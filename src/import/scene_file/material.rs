@@ -5,7 +5,7 @@ use super::number::{Int, Ior, Share};
 use super::report::Source;
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
-use crate::scene::{self, TextureId};
+use crate::scene::{self, MaskId, TextureId};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -19,6 +19,10 @@ pub(super) struct Material {
     pub diffuse: Option<Reflectance>,
     /// Image file, relative to the scene file, that multiplies `diffuse`.
     pub texture: Option<At<String>>,
+    /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
+    /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
+    /// colours, as stored. Not on glass.
+    pub alpha: Option<At<String>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
     /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
@@ -26,7 +30,7 @@ pub(super) struct Material {
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
-    /// meshes of up to 64 flat quads, then light the scene; other meshes only glow.
+    /// meshes of up to 64 flat quads, then light the scene; other meshes and those with `alpha` only glow.
     pub emission: Option<Amount>,
     /// Whether the back of a face emits too.
     #[serde(default)]
@@ -57,12 +61,13 @@ fn window_glass() -> Ior {
 }
 
 impl Material {
-    /// As scene data; `texture` is the decoded image's index.
+    /// As scene data; `texture` and `alpha` are the indices of the decoded images.
     pub fn build(
         &self,
         name: &str,
         source: &Source,
         texture: Option<TextureId>,
+        alpha: Option<MaskId>,
     ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
@@ -75,6 +80,7 @@ impl Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture,
+            alpha,
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
             glass,
@@ -89,6 +95,11 @@ impl Material {
 
     fn check(&self, source: &Source) -> Result<()> {
         if let Some(glass) = &self.glass {
+            if let Some(alpha) = &self.alpha {
+                let message =
+                    "glass has no cut-outs: its body is closed, and a hole would leave it open";
+                return Err(source.fault(&alpha.span, message).into());
+            }
             let others = self.diffuse.is_some() || self.texture.is_some() || self.mirror.is_some();
             if others || self.emission.is_some() {
                 let message = "glass stands alone: a material that has it has neither `diffuse`, \

@@ -285,6 +285,8 @@ const TOGETHER: &[Case] = &[
     ("[[mesh]]\nfile = ¦'scene.tml'\n", "cannot read", "did you mean `scene.toml`?"),
     ("[[mesh]]\nfile = ¦'scene.toml'\n", "no mesh format", ".ply"),
     ("[material.a]\ntexture = ¦'wood.png'\n", "cannot read", ""),
+    ("[material.a]\nalpha = ¦'leaf.png'\n", "cannot read", ""),
+    ("[material.a]\nalpha = ¦0.5\n", "expected a string", ""),
     (
         "[[mesh]]\nterrain = {}\ntransform = [¦{ matrix = [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0]] }]\n",
         "flattens",
