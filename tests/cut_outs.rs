@@ -10,6 +10,7 @@ use common::{Job, job, pose};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use std::sync::atomic::AtomicBool;
+use tweenray::effects::EffectPlan;
 use tweenray::film::Film;
 use tweenray::intersect::{
     self, EmbreeIntersector, Hit, Intersector, Oracle, Ray, SurfaceInteraction,
@@ -430,6 +431,20 @@ fn a_mask_without_holes_changes_no_byte() {
     let mut masked = forest_job(true);
     masked.world.masks[0].texels.fill(255);
     assert_eq!(whole, on_threads(&masked, 2));
+}
+
+#[test]
+fn the_effect_plan_says_whether_rays_pass_through_holes() {
+    let pose = Pose { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
+    let lens = Shot::new(CameraPath::Still(pose), 1, 60.0).lens;
+    for (cut, why) in
+        [(true, "1 material with alpha in use, holes in 2 of 3 surfaces"), (false, "0 ")]
+    {
+        let reasons = EffectPlan::reasons(&thicket(cut), &Settings::default(), &lens);
+        let reason = reasons.iter().find(|reason| reason.effect == "alpha cut-outs").unwrap();
+        assert_eq!(reason.runs, cut);
+        assert!(reason.why.starts_with(why), "{}", reason.why);
+    }
 }
 
 #[test]
