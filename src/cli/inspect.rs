@@ -137,7 +137,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
         camera_end: CameraView::at(&shot, shot.frames, &settings)?,
         memory: Memory {
             geometry: scene.meshes.iter().map(mesh_bytes).sum(),
-            textures: scene.textures.iter().map(|t| 12 * t.texels.len() as u64).sum(),
+            textures: scene.textures.iter().map(|t| t.bytes()).sum(),
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },

@@ -17,7 +17,7 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
     let bare = world.meshes[first..].iter().filter(|mesh| mesh.uvs.is_none());
     bare.filter_map(|mesh| {
         let material = &world.materials[mesh.material as usize];
-        let texture = &world.textures[material.texture? as usize];
+        let texture = &world.textures[material.texture?.image as usize];
         Some(Untextured {
             mesh: mesh.name.clone(),
             material: material.name.clone(),

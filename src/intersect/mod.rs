@@ -7,6 +7,7 @@ mod coarse;
 mod coincident;
 mod conservative;
 pub mod court;
+mod derivatives;
 mod embree;
 mod facts;
 mod interaction;
@@ -15,6 +16,7 @@ mod sphere;
 mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
+pub use derivatives::{curvature, uv_gradients};
 pub use embree::EmbreeIntersector;
 pub use interaction::{PlaneError, RayEnd, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 pub use oracle::{CourtHit, Oracle};

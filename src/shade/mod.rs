@@ -7,6 +7,7 @@
 //! Not done: light through glass (its shadow is opaque), diffuse interreflection.
 
 mod adaptive;
+mod cone;
 mod dimensions;
 mod direct;
 mod far_lights;
@@ -39,6 +40,7 @@ use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 pub use adaptive::SampleSpread;
 use adaptive::Until;
+use cone::RayCone;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
@@ -226,6 +228,14 @@ struct FrameInput<'a> {
 }
 
 impl FrameInput<'_> {
+    /// The cone of a camera ray (unit direction): one of as many as the pixel has samples, at least, that cover it side by
+    /// side.
+    fn cone(&self, ray: &Ray) -> RayCone {
+        let cos = ray.dir.dot(self.camera.forward);
+        let spread = self.pixel_size * cos / f64::from(self.least).sqrt();
+        RayCone { width: 0.0, spread: spread as f32 }
+    }
+
     /// The points, of so many, that source number `at` is traced at.
     fn reached<'u>(&self, at: usize, points: usize, users: &'u LightUsers) -> Reached<'u> {
         let source = &self.lights[at];

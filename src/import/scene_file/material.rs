@@ -3,6 +3,7 @@
 use super::at::At;
 use super::number::{Int, Ior, Share};
 use super::report::Source;
+use super::texture::NamedTexture;
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::scene::{self, TextureId};
@@ -17,8 +18,8 @@ pub(super) struct Material {
     /// Diffuse reflectance (albedo), linear RGB or one number for grey. Absent: 0, or 1 where
     /// there is a `texture`.
     pub diffuse: Option<Reflectance>,
-    /// Image file, relative to the scene file, that multiplies `diffuse`.
-    pub texture: Option<At<String>>,
+    /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it lies on the surface.
+    pub texture: Option<At<NamedTexture>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
     /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
@@ -57,12 +58,12 @@ fn window_glass() -> Ior {
 }
 
 impl Material {
-    /// As scene data; `texture` is the decoded image's index.
+    /// As scene data; `image` is the index of the decoded image of the texture.
     pub fn build(
         &self,
         name: &str,
         source: &Source,
-        texture: Option<TextureId>,
+        image: Option<TextureId>,
     ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
@@ -74,7 +75,7 @@ impl Material {
         Ok(scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
-            texture,
+            texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
             glass,
