@@ -143,10 +143,14 @@ fn camera_rays(
 ) {
     scratch.rays.clear();
     scratch.states.clear();
+    let is_sampled = input.camera.lens.is_sampled();
     for sample in samples {
         for pixel in pixels.active() {
             let (x, y) = pixels.sample_position(pixel as usize, sample);
-            let lens = pixels.lens_position(pixel as usize, sample);
+            let lens = match is_sampled {
+                true => pixels.lens_position(pixel as usize, sample),
+                false => [0.5; 2],
+            };
             let ray = input.camera.generate_ray(x, y, lens);
             let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
             let (medium, pdf, cell, cone) = (None, 0.0, 0, input.cone(&ray));

@@ -209,6 +209,9 @@ struct FrameInput<'a> {
     camera: Camera,
     /// Edge of a pixel at distance 1 along the view axis, scene units.
     pixel_size: f64,
+    /// Spread of the cone of a camera ray along the view axis; 0 where no material shows an image. The samples of a pixel, as
+    /// many as it has at least, cover it side by side.
+    spread: f64,
     stream: u32,
     /// The least number of camera samples of a pixel.
     least: u32,
@@ -228,12 +231,11 @@ struct FrameInput<'a> {
 }
 
 impl FrameInput<'_> {
-    /// The cone of a camera ray (unit direction): one of as many as the pixel has samples, at least, that cover it side by
-    /// side.
+    /// The cone of a camera ray (unit direction).
+    #[inline(always)]
     fn cone(&self, ray: &Ray) -> RayCone {
         let cos = ray.dir.dot(self.camera.forward);
-        let spread = self.pixel_size * cos / f64::from(self.least).sqrt();
-        RayCone { width: 0.0, spread: spread as f32 }
+        RayCone { width: 0.0, spread: (self.spread * cos) as f32 }
     }
 
     /// The points, of so many, that source number `at` is traced at.
@@ -446,6 +448,10 @@ impl Renderer<'_> {
         FrameInput {
             camera: own,
             pixel_size: own.pixel_size(),
+            spread: match self.plan.textures {
+                true => own.pixel_size() / f64::from(self.settings.spp).sqrt(),
+                false => 0.0,
+            },
             stream,
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
