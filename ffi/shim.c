@@ -18,7 +18,7 @@ _Static_assert(sizeof(struct RTCRayHit16) == 1344, "size of RTCRayHit16");
 _Static_assert(sizeof(struct RTCRayQueryContext) == 8, "size of RTCRayQueryContext");
 _Static_assert(sizeof(TrRay) == 72, "size of TrRay");
 _Static_assert(sizeof(TrSphere) == 32, "size of TrSphere");
-_Static_assert(sizeof(TrQuery) == 24, "size of TrQuery");
+_Static_assert(sizeof(TrQuery) == 40, "size of TrQuery");
 
 unsigned tr_version_header(void) { return RTC_VERSION; }
 
@@ -41,12 +41,15 @@ void tr_end_tracing(unsigned saved) { (void)saved; }
 typedef struct Context {
   struct RTCRayQueryContext base;
   const TrQuery* query;
+  /* MXCSR outside of tracing. */
+  unsigned saved;
 } Context;
 
 static Context context_of(const TrQuery* query) {
   Context context;
   rtcInitRayQueryContext(&context.base);
   context.query = query;
+  context.saved = 0;
   return context;
 }
 
@@ -69,6 +72,32 @@ static int has_passed(const TrQuery* query, unsigned geom, unsigned prim) {
   for (unsigned k = 0; k < query->passed_count; k++)
     if (query->passed[k].prim == prim && query->passed[k].geom == geom) return 1;
   return 0;
+}
+
+/* Whether the surface is there where ray number `id`, as it was asked for, meets it. Rust decides, so MXCSR
+   must be what it is outside of tracing. */
+static int is_there(const TrQuery* query, unsigned id, unsigned geom, unsigned prim, unsigned root) {
+  TrPrim met = {geom, prim};
+  return query->holes->is_there(query->holes, &query->asked[id], met, root);
+}
+
+/* Drops candidates where the surface has a hole. */
+static void drop_holes(const struct RTCFilterFunctionNArguments* args) {
+  const Context* context = (const Context*)args->context;
+  tr_end_tracing(context->saved);
+  for (unsigned i = 0; i < args->N; i++) {
+    if (args->valid[i] != -1) continue;
+    unsigned id = *id_at(args->ray, args->N, RAY_ID, i);
+    unsigned prim = *id_at(args->hit, args->N, HIT_PRIM, i);
+    unsigned geom = *id_at(args->hit, args->N, HIT_GEOM, i);
+    if (!is_there(context->query, id, geom, prim, 0)) args->valid[i] = 0;
+  }
+  tr_begin_tracing();
+}
+
+void tr_set_holes(RTCGeometry geometry) {
+  rtcSetGeometryIntersectFilterFunction(geometry, drop_holes);
+  rtcSetGeometryOccludedFilterFunction(geometry, drop_holes);
 }
 
 /* Drops the primitive that a ray leaves, and those that it passed, from its candidates. */
@@ -98,14 +127,14 @@ void tr_intersect(RTCScene scene, unsigned width, const int* valid, void* rayhit
   args.context = &context.base;
   args.flags = query_flags(query->flags);
   args.filter = (query->flags & TR_EXCLUDE) ? drop_excluded : NULL;
-  unsigned saved = tr_begin_tracing();
+  context.saved = tr_begin_tracing();
   switch (width) {
     case 1: rtcIntersect1(scene, rayhits, &args); break;
     case 4: rtcIntersect4(valid, scene, rayhits, &args); break;
     case 8: rtcIntersect8(valid, scene, rayhits, &args); break;
     case 16: rtcIntersect16(valid, scene, rayhits, &args); break;
   }
-  tr_end_tracing(saved);
+  tr_end_tracing(context.saved);
 }
 
 void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
@@ -116,14 +145,14 @@ void tr_occluded(RTCScene scene, unsigned width, const int* valid, void* packet,
   args.context = &context.base;
   args.flags = query_flags(query->flags);
   args.filter = (query->flags & TR_EXCLUDE) ? drop_excluded : NULL;
-  unsigned saved = tr_begin_tracing();
+  context.saved = tr_begin_tracing();
   switch (width) {
     case 1: rtcOccluded1(scene, packet, &args); break;
     case 4: rtcOccluded4(valid, scene, packet, &args); break;
     case 8: rtcOccluded8(valid, scene, packet, &args); break;
     case 16: rtcOccluded16(valid, scene, packet, &args); break;
   }
-  tr_end_tracing(saved);
+  tr_end_tracing(context.saved);
 }
 
 /* Spheres: the f64 test of src/intersect/sphere.rs on the f64 ray, so that Embree's spheres are
@@ -156,9 +185,32 @@ static double dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/* A sphere and a ray of a packet that may meet it. */
+typedef struct Meeting {
+  const Context* context;
+  const TrSphere* sphere;
+  /* Which ray of the query. */
+  unsigned ray;
+  unsigned geom;
+  unsigned prim;
+  double tnear;
+  double tfar;
+} Meeting;
+
+/* Whether root number `which`, at `t`, is a hit. */
+static int counts(const Meeting* m, unsigned which, double t) {
+  const TrQuery* query = m->context->query;
+  if (!(t >= m->tnear && t <= m->tfar)) return 0;
+  if (!query->holes) return 1;
+  tr_end_tracing(m->context->saved);
+  int there = is_there(query, m->ray, m->geom, m->prim, which);
+  tr_begin_tracing();
+  return there;
+}
+
 /* The hit parameter in [tnear, tfar], or NaN. */
-static double sphere_root(const TrRay* ray, const TrSphere* s, int leaving, double tnear,
-                          double tfar) {
+static double sphere_root(const Meeting* m, const TrRay* ray, int leaving) {
+  const TrSphere* s = m->sphere;
   double a = dot(ray->dir, ray->dir);
   double to_centre[3], offset[3];
   for (int i = 0; i < 3; i++) to_centre[i] = s->centre[i] - ray->org[i];
@@ -169,11 +221,12 @@ static double sphere_root(const TrRay* ray, const TrSphere* s, int leaving, doub
   double half_chord = sqrt(inside / a);
   double near_root = middle - half_chord, far_root = middle + half_chord;
   if (leaving) {
-    double other = fabs(near_root) > fabs(far_root) ? near_root : far_root;
-    return other > 0.0 && other >= tnear && other <= tfar ? other : NAN;
+    unsigned which = fabs(near_root) > fabs(far_root) ? 0 : 1;
+    double other = which == 0 ? near_root : far_root;
+    return other > 0.0 && counts(m, which, other) ? other : NAN;
   }
-  if (near_root >= tnear && near_root <= tfar) return near_root;
-  if (far_root >= tnear && far_root <= tfar) return far_root;
+  if (counts(m, 0, near_root)) return near_root;
+  if (counts(m, 1, far_root)) return far_root;
   return NAN;
 }
 
@@ -183,7 +236,9 @@ static double lane_root(void* rays, unsigned n, unsigned lane, const Context* co
   if (has_passed(context->query, geom, prim)) return NAN;
   int leaving = ray->exclude_geom == geom && ray->exclude_prim == prim;
   double tfar = *float_at(rays, n, RAY_TFAR, lane);
-  return sphere_root(ray, &spheres[prim], leaving, ray->tnear, fmin(tfar, ray->tfar));
+  unsigned id = *id_at(rays, n, RAY_ID, lane);
+  Meeting m = {context, &spheres[prim], id, geom, prim, ray->tnear, fmin(tfar, ray->tfar)};
+  return sphere_root(&m, ray, leaving);
 }
 
 static void sphere_intersect(const struct RTCIntersectFunctionNArguments* args) {

@@ -29,18 +29,31 @@ typedef struct TrPrim {
 
 enum { TR_COHERENT = 1, TR_EXCLUDE = 2 };
 
+/* Decides where surfaces have holes, as `tweenray::embree::Registered` begins: whether `prim` is there
+   where `ray` meets it, on a sphere at its first (0) or second (1) root. */
+typedef struct TrHoles {
+  _Bool (*is_there)(const struct TrHoles* self, const TrRay* ray, TrPrim prim, unsigned root);
+} TrHoles;
+
 /* What a query needs beside its packet, as `tweenray::embree::Query` lays it out. */
 typedef struct TrQuery {
   /* The f64 originals; lane i of a packet stands for rays[id of lane i]. */
   const TrRay* rays;
+  /* The same rays before they were moved or turned; read with holes only. */
+  const TrRay* asked;
   /* Primitives that no ray of the packet may hit; read with TR_EXCLUDE only. */
   const TrPrim* passed;
+  /* NULL in a scene without holes. */
+  const TrHoles* holes;
   unsigned passed_count;
   unsigned flags;
 } TrQuery;
 
 /* The version of the Embree header this was compiled with: major * 10000 + minor * 100 + patch. */
 unsigned tr_version_header(void);
+
+/* Lets queries ask for holes in `geometry`, of triangles: their `holes` must not be NULL. */
+void tr_set_holes(RTCGeometry geometry);
 
 /* Turns `geometry` (a user geometry) into `count` analytic spheres, which must outlive it. */
 void tr_set_spheres(RTCGeometry geometry, const TrSphere* spheres, unsigned count);

@@ -56,6 +56,7 @@ impl EffectPlan {
         let (blurs, lens) = lens.reason();
         let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
         reasons.extend([
+            cut_outs(scene, &UsedMaterials::of(scene)),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -170,6 +171,20 @@ impl EffectPlan {
     }
 }
 
+/// Whether rays pass through holes of surfaces, and of how many.
+fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
+    let meshes = scene.meshes.iter().filter(|mesh| scene.mesh_mask(mesh).is_some()).count();
+    let spheres = scene.spheres.iter().filter(|s| scene.mask(s.surface).is_some()).count();
+    let cut = meshes + spheres;
+    let surfaces = scene.meshes.len() + scene.spheres.len();
+    let materials = counted(used.cut_out, "material");
+    let why = match used.cut_out {
+        0 => format!("{materials} with alpha in use"),
+        _ => format!("{materials} with alpha in use, holes in {cut} of {surfaces} surfaces"),
+    };
+    EffectReason { effect: "alpha cut-outs", runs: cut > 0, why }
+}
+
 /// Whether points look at the lights that matter there only, and how many these are.
 fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
     let lights = counted(scene.lights.len(), "light");
@@ -222,6 +237,7 @@ struct UsedMaterials {
     ranked: usize,
     absorbing: usize,
     textured: usize,
+    cut_out: usize,
 }
 
 impl UsedMaterials {
@@ -243,6 +259,7 @@ impl UsedMaterials {
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
             counts.textured += usize::from(material.texture.is_some());
+            counts.cut_out += usize::from(material.alpha.is_some());
         }
         counts
     }

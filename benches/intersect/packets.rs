@@ -30,7 +30,7 @@ pub fn report(scene: &Scene, committed: &CommittedScene, camera_rays: &[Ray]) {
         let mut candidates: Vec<Candidate> = Vec::new();
         for coherent in [true, false] {
             // Shadow rays leave a surface, whose primitive they exclude.
-            let flags = QueryFlags { coherent, exclude: !closest, passed: &[] };
+            let flags = QueryFlags { coherent, exclude: !closest, ..QueryFlags::default() };
             let width = |run: fn(&CommittedScene, &[Ray], QueryFlags, bool)| -> Candidate {
                 (String::new(), Box::new(move || run(committed, rays, flags, closest)))
             };

@@ -46,6 +46,8 @@ struct Inspection {
     spheres: usize,
     materials: usize,
     textures: usize,
+    /// Masks of cut-outs.
+    masks: usize,
     /// A floor and a lamp are added; the figures above and `bounds` are without them.
     adds_floor_and_lamp: bool,
     lights: Lights,
@@ -83,6 +85,7 @@ struct CameraView {
 #[derive(Serialize)]
 struct Memory {
     geometry: u64,
+    /// Textures, and masks of cut-outs.
     textures: u64,
     intersector: u64,
     frame: u64,
@@ -128,6 +131,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
         // Floor and lamp have one each.
         materials: scene.materials.len() - if stage.is_some() { 2 } else { 0 },
         textures: scene.textures.len(),
+        masks: scene.masks.len(),
         adds_floor_and_lamp: stage.is_some(),
         lights: Lights::of(&scene),
         bounds: world_bounds(&scene, &meshes),
@@ -137,7 +141,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
         camera_end: CameraView::at(&shot, shot.frames, &settings)?,
         memory: Memory {
             geometry: scene.meshes.iter().map(mesh_bytes).sum(),
-            textures: scene.textures.iter().map(|t| t.bytes()).sum(),
+            textures: texture_bytes(&scene),
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
@@ -192,6 +196,11 @@ fn world_bounds(scene: &Scene, meshes: &[&Mesh]) -> Option<[[f64; 3]; 2]> {
     (!bounds.is_empty()).then(|| [corner(bounds.min), corner(bounds.max)])
 }
 
+fn texture_bytes(scene: &Scene) -> u64 {
+    let masks: u64 = scene.masks.iter().map(|mask| mask.texels.len() as u64).sum();
+    masks + scene.textures.iter().map(|t| t.bytes()).sum::<u64>()
+}
+
 fn mesh_bytes(mesh: &Mesh) -> u64 {
     let normals = mesh.normals.as_ref();
     let uvs = mesh.uvs.as_ref();
@@ -206,6 +215,14 @@ fn mesh_bytes(mesh: &Mesh) -> u64 {
 }
 
 impl Inspection {
+    fn images(&self) -> String {
+        let textures = counted(self.textures, "texture");
+        match self.masks {
+            0 => textures,
+            masks => format!("{textures}, {}", counted(masks, "alpha mask")),
+        }
+    }
+
     fn to_text(&self) -> String {
         let mut lines = vec![
             format!("scene      {}", self.scene),
@@ -217,7 +234,7 @@ impl Inspection {
                 if self.meshes == 1 { "mesh" } else { "meshes" },
                 counted(self.spheres, "sphere")
             ),
-            format!("materials  {}, {}", self.materials, counted(self.textures, "texture")),
+            format!("materials  {}, {}", self.materials, self.images()),
             format!("lights     {}", self.lights.to_text()),
         ];
         if let Some([min, max]) = self.bounds {

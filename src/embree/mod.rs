@@ -4,10 +4,13 @@
 //! queries; knows nothing of materials, rules or retries. Only a committed scene can be traced,
 //! and it borrows the buffers that Embree shares.
 
+mod holes;
 mod options;
 mod packet;
 mod yardstick;
 
+pub use holes::Holes;
+use holes::Registered;
 pub use options::{BuildOptions, Quality};
 use packet::Query;
 pub use packet::{Packet, PacketHit, QueryFlags};
@@ -32,6 +35,7 @@ pub struct SphereData {
 }
 
 unsafe extern "C" {
+    fn tr_set_holes(geometry: sys::RTCGeometry);
     fn tr_set_spheres(geometry: sys::RTCGeometry, spheres: *const SphereData, count: u32);
     fn tr_intersect(
         scene: sys::RTCScene,
@@ -137,6 +141,7 @@ pub struct SceneBuilder<'g> {
     device: Device,
     spheres: Vec<Box<[SphereData]>>,
     indices: Vec<Box<[[u32; 3]]>>,
+    holes: Option<Box<Registered<'g>>>,
     next_id: u32,
     geometry: PhantomData<&'g ()>,
 }
@@ -177,9 +182,15 @@ impl<'g> SceneBuilder<'g> {
             device,
             spheres: Vec::new(),
             indices: Vec::new(),
+            holes: None,
             next_id: 0,
             geometry: PhantomData,
         })
+    }
+
+    /// Takes holes out of the surfaces that are added from now on.
+    pub fn set_holes(&mut self, holes: Box<dyn Holes + 'g>) {
+        self.holes = Some(Box::new(Registered::new(holes)));
     }
 
     /// Adds a triangle mesh and returns its `geom_id` (0, 1, 2, … in order).
@@ -209,7 +220,14 @@ impl<'g> SceneBuilder<'g> {
             omit.for_each(|prim| own[prim as usize] = [own[prim as usize][0]; 3]);
             triangles = &own;
         }
+        let id = self.next_id;
+        let has_holes = self.holes.as_ref().is_some_and(|holes| holes.are_in(id));
         let id = self.add(sys::RTC_GEOMETRY_TYPE_TRIANGLE, |geometry| {
+            if has_holes {
+                // SAFETY: the geometry is live and not committed yet. The filter reads what every query of
+                // `CommittedScene` brings with it where there are holes.
+                unsafe { tr_set_holes(geometry) };
+            }
             // SAFETY: both slices live for 'g, which the committed scene borrows, or are boxes that
             // do not move and are dropped after the scene (as with spheres); sizes, strides
             // and the 16-byte read of the last vertex were checked above ("rtcSetSharedGeometry-
@@ -296,6 +314,7 @@ impl<'g> SceneBuilder<'g> {
             device: self.device,
             spheres: self.spheres,
             _indices: self.indices,
+            holes: self.holes,
             width,
             geometry: PhantomData,
         })
@@ -308,6 +327,7 @@ pub struct CommittedScene<'g> {
     device: Device,
     spheres: Vec<Box<[SphereData]>>,
     _indices: Vec<Box<[[u32; 3]]>>,
+    holes: Option<Box<Registered<'g>>>,
     width: usize,
     geometry: PhantomData<&'g ()>,
 }
@@ -339,10 +359,10 @@ impl CommittedScene<'_> {
         flags: QueryFlags,
     ) {
         packet.check_lanes(valid, rays);
-        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags));
+        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags, self.holes.as_deref()));
         let at = std::ptr::from_mut(packet).cast();
         // SAFETY: `Packet<W>` has the layout and alignment of RTCRayHitW (asserted in packet.rs),
-        // `lanes` is aligned, every valid lane has its ray (checked above), and the slices behind
+        // `lanes` is aligned, every valid lane has its ray (checked above), and the slices and holes behind
         // `query` outlive the call.
         unsafe { tr_intersect(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }
     }
@@ -356,7 +376,7 @@ impl CommittedScene<'_> {
         flags: QueryFlags,
     ) {
         packet.check_lanes(valid, rays);
-        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags));
+        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags, self.holes.as_deref()));
         let at = std::ptr::from_mut(packet).cast();
         // SAFETY: as for `intersect`; RTCRayW is the front part of RTCRayHitW.
         unsafe { tr_occluded(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }

@@ -1,7 +1,9 @@
 //! Packets of rays in Embree's own layout.
 
+use super::holes::Registered;
 use crate::math::Vec3;
 use crate::ray::{PrimRef, Ray};
+use std::ffi::c_void;
 
 /// `RTCRayHitW`: W rays and their hits, structure of arrays. W is 1, 4, 8 or 16.
 #[repr(C, align(64))]
@@ -39,7 +41,7 @@ const _: () = {
     assert!(size_of::<Packet<4>>() >= size_of::<embree4_sys::RTCRayHit4>());
     assert!(size_of::<Packet<1>>() >= size_of::<embree4_sys::RTCRayHit>());
     assert!(size_of::<Ray>() == 72);
-    assert!(size_of::<Query>() == 24);
+    assert!(size_of::<Query>() == 40);
 };
 
 /// A hit as Embree returns it, f32.
@@ -58,7 +60,7 @@ pub struct PacketHit {
 }
 
 /// Flags of a query.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct QueryFlags<'p> {
     /// Neighbouring rays go similar ways.
     pub coherent: bool,
@@ -66,23 +68,32 @@ pub struct QueryFlags<'p> {
     pub exclude: bool,
     /// Primitives that no ray of the packet may hit.
     pub passed: &'p [PrimRef],
+    /// The rays of the packet before they were moved or turned, by which holes are decided; read in a scene
+    /// with [`Holes`](super::Holes) only.
+    pub asked: &'p [Ray],
 }
 
-/// A query as `ffi/shim.h` lays it out. Its pointers are those of the slices it was made of.
+/// A query as `ffi/shim.h` lays it out. Its pointers are those of the slices and of the box it was made of.
 #[repr(C)]
 pub(super) struct Query {
     rays: *const Ray,
+    asked: *const Ray,
     passed: *const PrimRef,
+    holes: *const c_void,
     passed_count: u32,
     flags: u32,
 }
 
 impl Query {
-    pub(super) fn new(rays: &[Ray], flags: QueryFlags) -> Self {
+    /// Panics where there are `holes` and fewer rays asked for than `rays`: callbacks would read past the slice.
+    pub(super) fn new(rays: &[Ray], flags: QueryFlags, holes: Option<&Registered>) -> Self {
+        assert!(holes.is_none() || flags.asked.len() >= rays.len());
         let filter = flags.exclude || !flags.passed.is_empty();
         Self {
             rays: rays.as_ptr(),
+            asked: flags.asked.as_ptr(),
             passed: flags.passed.as_ptr(),
+            holes: holes.map_or(std::ptr::null(), |holes| std::ptr::from_ref(holes).cast()),
             passed_count: flags.passed.len() as u32,
             flags: u32::from(flags.coherent) | u32::from(filter) << 1,
         }

@@ -46,7 +46,7 @@ impl CommittedScene<'_> {
     /// f64, no rules. The rays go in the order in which the renderer's blocks send them.
     ///
     /// Errors: image edges that are not multiples of 8, an instruction set without packets of 8,
-    /// a scene with analytic spheres (they need the f64 rays that this loop does not have).
+    /// a scene with analytic spheres or with holes (they need the f64 rays that this loop does not have).
     pub fn bare_camera_loop(&self, camera: &BareCamera) -> Result<BareTally> {
         let wrong = if camera.width % 8 != 0 || camera.height % 8 != 0 {
             "image edges that are multiples of 8"
@@ -54,9 +54,11 @@ impl CommittedScene<'_> {
             "packets of 8"
         } else if self.spheres.iter().any(|s| !s.is_empty()) {
             "a scene of triangles only"
+        } else if self.holes.is_some() {
+            "a scene without holes"
         } else {
             // SAFETY: the scene is committed; `camera` is laid out as TrCamera and outlives the
-            // call; without spheres no callback looks for f64 rays in the context.
+            // call; without spheres and holes no callback looks for f64 rays in the context.
             return Ok(unsafe { tr_bare_camera_loop(self.scene.0, camera) });
         };
         Err(Error::Usage(format!("the bare loop needs {wrong}")))

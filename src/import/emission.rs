@@ -3,7 +3,7 @@
 //! An analytic sphere becomes a sphere light; a mesh that consists of flat convex quads (pairs of
 //! triangles, at most [`MAX_LIGHTS`]) becomes quad lights. [`World::into_scene`] gives lights their
 //! surface, so the sphere or mesh itself leaves the world. Any other mesh keeps its emission: it
-//! is seen, and casts no light.
+//! is seen, and casts no light. So does a surface with cut-outs, since lights have no holes.
 
 use super::lamps::{MAX_LIGHTS, joined};
 use crate::math::DVec3;
@@ -14,6 +14,8 @@ use crate::scene::{Light, Material, QuadLight, SphereLight, World, WorldMesh};
 pub(super) enum Note {
     /// The mesh of this name is visible but lights nothing.
     CastsNoLight(String),
+    /// The surface of this name is visible but lights nothing, since it has cut-outs.
+    HasHoles(String),
     /// The surface of this name became a light, which reflects nothing.
     ReflectsNothing(String),
 }
@@ -23,6 +25,9 @@ impl Note {
     pub fn message(&self) -> String {
         match self {
             Self::CastsNoLight(name) => format!("`{name}` emits: it is seen, but casts no light"),
+            Self::HasHoles(name) => {
+                format!("`{name}` emits and has cut-outs: it is seen, but casts no light")
+            }
             Self::ReflectsNothing(name) => {
                 format!("`{name}` became a light: its reflectance is ignored")
             }
@@ -35,6 +40,7 @@ impl Note {
             Self::CastsNoLight(_) => format!(
                 "a sphere, or a mesh of at most {MAX_LIGHTS} flat quads, lights the scene when it emits"
             ),
+            Self::HasHoles(_) => "a light has no holes: take `alpha` from its material".into(),
             Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
         }
     }
@@ -47,7 +53,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
     let materials = &world.materials;
     for mesh in world.meshes.split_off(first_mesh) {
         let material = &materials[mesh.material as usize];
-        match quads(&mesh).filter(|_| emits(material)) {
+        match quads(&mesh).filter(|_| shines(material)) {
             Some(quads) => {
                 notes.extend(material.reflects().then(|| Note::ReflectsNothing(mesh.name.clone())));
                 let light = |corners| {
@@ -57,18 +63,19 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
                 world.lights.extend(quads.into_iter().map(light));
             }
             None => {
-                notes.extend(emits(material).then(|| Note::CastsNoLight(mesh.name.clone())));
+                notes.extend(emits(material).then(|| dark(material, mesh.name.clone())));
                 world.meshes.push(mesh);
             }
         }
     }
     for sphere in world.spheres.split_off(first_sphere) {
         let material = &materials[sphere.material as usize];
-        if emits(material) {
+        if shines(material) {
             notes.extend(material.reflects().then_some(Note::ReflectsNothing(sphere.name)));
             let (centre, radius, radiance) = (sphere.centre, sphere.radius, material.emission);
             world.lights.push(Light::Sphere(SphereLight { centre, radius, radiance }));
         } else {
+            notes.extend(emits(material).then(|| dark(material, sphere.name.clone())));
             world.spheres.push(sphere);
         }
     }
@@ -77,6 +84,16 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
 
 fn emits(material: &Material) -> bool {
     material.emission.max_element() > 0.0
+}
+
+/// Whether a surface may become a light.
+fn shines(material: &Material) -> bool {
+    emits(material) && material.alpha.is_none()
+}
+
+/// The note about an emitting surface that becomes none.
+fn dark(material: &Material, name: String) -> Note {
+    if material.alpha.is_some() { Note::HasHoles(name) } else { Note::CastsNoLight(name) }
 }
 
 /// The mesh as quads, if each pair of consecutive triangles makes one.
@@ -151,5 +168,15 @@ mod tests {
         assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 1, 1));
         let scene = world.into_scene(true).expect("a scene");
         assert_eq!(scene.spheres.len(), 2);
+    }
+
+    #[test]
+    fn what_has_cut_outs_glows_and_is_no_light() {
+        let mut world = world(lamp(vec![[0, 1, 2], [0, 2, 3]], 0.0));
+        world.materials[0].alpha = Some(0);
+        world.spheres.push(WorldSphere::new("ball", DVec3::X, 0.5, 0));
+        let holes = |name: &str| Note::HasHoles(name.into());
+        assert_eq!(adopt(&mut world, 0, 0), [holes("lamp"), holes("ball")]);
+        assert_eq!((world.spheres.len(), world.lights.len(), world.meshes.len()), (1, 0, 1));
     }
 }

@@ -3,6 +3,7 @@
 //! [`load`] takes a scene file (TOML) or a bare mesh. All input is validated here: in the results
 //! indices are in range and numbers are finite.
 
+mod alpha;
 mod convert;
 mod course;
 mod emission;
@@ -24,6 +25,7 @@ mod tidy;
 mod turntable;
 mod untextured;
 
+pub use alpha::load_mask;
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
 pub use mesh_file::load_model;

@@ -40,6 +40,20 @@ pub(super) fn load_cached(
 /// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than
 /// [`MAX_IMAGE_BYTES`], before memory is asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
+    let image = decode(path)?;
+    let size = [image.width(), image.height()];
+    texture(path.display().to_string(), size, image).ok_or_else(|| bad_pixel(path))
+}
+
+/// The error of an image with a value that is no amount of light.
+pub(super) fn bad_pixel(path: &Path) -> Error {
+    Error::input(path, "a pixel of the image is negative or not a finite number")
+}
+
+/// The image of a file, with at least one pixel.
+///
+/// Errors: those of [`load_texture`] but for its pixels' values.
+pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
     let bytes = super::source::read(path)?;
     let bad = |e: image::ImageError| Error::input(path, format!("not a readable image: {e}"));
     let mut limits = Limits::default();
@@ -66,11 +80,7 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
     }
     let mut decoder = reader()?;
     decoder.limits(limits);
-    let image = decoder.decode().map_err(bad)?;
-    let size = [width, height];
-    texture(path.display().to_string(), size, image).ok_or_else(|| {
-        Error::input(path, "a pixel of the image is negative or not a finite number")
-    })
+    decoder.decode().map_err(bad)
 }
 
 /// The image as it is kept: in codes of 8 bits if it has no more. `None` where a pixel is no light.

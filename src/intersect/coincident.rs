@@ -4,11 +4,12 @@
 //! others are taken out before it builds: no ray pays for the rule, and a thousand copies of a
 //! mesh trace as fast as one.
 //!
-//! Glass with a priority is left alone: where two such bodies touch, a ray crosses both boundaries.
+//! Glass with a priority is left alone: where two such bodies touch, a ray crosses both boundaries. What
+//! lies behind a surface with cut-outs stays as well, since it is seen through the holes.
 
 use super::PrimRef;
 use crate::math::Vec3;
-use crate::scene::Scene;
+use crate::scene::{Scene, Surface};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,9 +18,17 @@ const TASK: usize = 1 << 16;
 /// Bits of the filter a triangle: 3 % of those without a copy pass it.
 const BITS_EACH: usize = 32;
 
-/// Every primitive that has the very corners (in any order) or the very sphere of a lower one,
-/// ascending.
-pub(super) fn copies(scene: &Scene) -> Vec<PrimRef> {
+/// Primitives that have the very corners (in any order) or the very sphere of a lower one, ascending.
+#[derive(Default)]
+pub(super) struct Copies {
+    /// Those that are never hit.
+    pub hidden: Vec<PrimRef>,
+    /// Those that are hit through the holes of a lower one, with that one: the next lower of several.
+    pub behind: Vec<(PrimRef, PrimRef)>,
+}
+
+/// The copies in `scene`.
+pub(super) fn copies(scene: &Scene) -> Copies {
     let mut copies = triangle_copies(scene);
     let geom_id = scene.sphere_geom_id();
     let mut spheres: Vec<([u64; 4], u32)> = scene
@@ -33,16 +42,17 @@ pub(super) fn copies(scene: &Scene) -> Vec<PrimRef> {
     spheres.sort_unstable();
     for same in spheres.chunk_by(|a, b| a.0 == b.0) {
         let prims = same.iter().map(|(_, prim_id)| PrimRef { geom_id, prim_id: *prim_id });
-        copies.extend(all_but_first(scene, prims));
+        copies.add(scene, prims);
     }
-    copies.sort_unstable();
+    copies.hidden.sort_unstable();
+    copies.behind.sort_unstable();
     copies
 }
 
 /// Corners as bits, in ascending order; both zeros are one.
 type Key = [[u32; 3]; 3];
 
-fn triangle_copies(scene: &Scene) -> Vec<PrimRef> {
+fn triangle_copies(scene: &Scene) -> Copies {
     // First a Bloom filter over all triangles, so that only the few which may have a copy are
     // sorted: of ten million, that is the difference between a tenth of a second and several.
     let filter = Filter::new(scene.triangle_count());
@@ -59,24 +69,48 @@ fn triangle_copies(scene: &Scene) -> Vec<PrimRef> {
         .collect();
     suspects.par_sort_unstable();
     let groups = suspects.chunk_by(|a, b| a.0 == b.0);
-    groups.flat_map(|same| all_but_first(scene, same.iter().map(|(_, prim)| *prim))).collect()
+    let mut copies = Copies::default();
+    groups.for_each(|same| copies.add(scene, same.iter().map(|(_, prim)| *prim)));
+    copies
 }
 
-/// Of coincident primitives, ascending, those that are never hit.
-fn all_but_first<'s>(
-    scene: &'s Scene,
-    mut prims: impl Iterator<Item = PrimRef> + 's,
-) -> impl Iterator<Item = PrimRef> + 's {
-    let first_is_ranked = prims.next().is_some_and(|prim| is_ranked_glass(scene, prim));
-    prims.filter(move |prim| !(first_is_ranked && is_ranked_glass(scene, *prim)))
+impl Copies {
+    /// Adds those of coincident primitives, ascending. The first one without holes hides the others, unless it is
+    /// glass with a priority and they are, too.
+    fn add(&mut self, scene: &Scene, prims: impl Iterator<Item = PrimRef>) {
+        let (mut lower, mut whole_is_ranked) = (None, None);
+        for prim in prims {
+            let is_ranked = is_ranked_glass(scene, prim);
+            if whole_is_ranked.is_some_and(|ranked| !(ranked && is_ranked)) {
+                self.hidden.push(prim);
+                continue;
+            }
+            self.behind.extend(lower.map(|lower| (prim, lower)));
+            if has_holes(scene, prim) {
+                lower = Some(prim);
+            } else if whole_is_ranked.is_none() {
+                whole_is_ranked = Some(is_ranked);
+            }
+        }
+    }
+}
+
+fn surface_of(scene: &Scene, prim: PrimRef) -> Surface {
+    match scene.meshes.get(prim.geom_id as usize) {
+        Some(mesh) => mesh.surface,
+        None => scene.spheres[prim.prim_id as usize].surface,
+    }
+}
+
+fn has_holes(scene: &Scene, prim: PrimRef) -> bool {
+    match scene.meshes.get(prim.geom_id as usize) {
+        Some(mesh) => scene.mesh_mask(mesh).is_some(),
+        None => scene.mask(surface_of(scene, prim)).is_some(),
+    }
 }
 
 fn is_ranked_glass(scene: &Scene, prim: PrimRef) -> bool {
-    let surface = match scene.meshes.get(prim.geom_id as usize) {
-        Some(mesh) => mesh.surface,
-        None => scene.spheres[prim.prim_id as usize].surface,
-    };
-    let glass = &scene.materials[surface.material as usize].glass;
+    let glass = &scene.materials[surface_of(scene, prim).material as usize].glass;
     glass.as_ref().is_some_and(|g| g.priority.is_some())
 }
 

@@ -12,6 +12,8 @@
 //!
 //! Shadow rays report no primitive: of these, only validation and coincidence reach them.
 //!
+//! In a scene with cut-outs a filter takes the holes out of what Embree finds (`cut_outs.rs`), for every ray alike.
+//!
 //! A batch goes through Embree, the second tries and the recheck a block at a time, so that each
 //! step works on arrays; what they leave open is settled ray by ray.
 
@@ -19,7 +21,8 @@ mod block;
 mod recheck;
 
 use super::coarse::{Bundle, CoarseTree};
-use super::coincident;
+use super::coincident::{self, Copies};
+use super::cut_outs::CutOuts;
 use super::facts::MeshFacts;
 use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
@@ -27,7 +30,7 @@ use crate::embree::{
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
-use crate::scene::{BuildQuality, HitRules, Scene, Settings};
+use crate::scene::{BuildQuality, HitRules, Mesh, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
 /// Half an ulp at 1 in f32.
@@ -54,6 +57,8 @@ pub struct EmbreeIntersector<'s> {
     coarse: CoarseTree,
     meshes: Vec<MeshFacts>,
     bounds: Bounds3,
+    /// Whether anything in the scene has cut-outs.
+    has_holes: bool,
 }
 
 /// Embree's answer for a ray.
@@ -114,11 +119,16 @@ impl<'s> EmbreeIntersector<'s> {
         };
         let near = if rules.recentre { NEAR } else { f64::INFINITY };
         let mut builder = SceneBuilder::new(&options)?;
-        let copies = coincident::copies(scene);
+        let Copies { hidden, behind } = coincident::copies(scene);
+        let cut_outs = CutOuts::of(scene, behind);
+        let has_holes = cut_outs.is_some();
+        if let Some(cut_outs) = cut_outs {
+            builder.set_holes(Box::new(cut_outs));
+        }
         let copies_in = |geom_id: u32| {
-            let first = copies.partition_point(|copy| copy.geom_id < geom_id);
-            let end = copies.partition_point(|copy| copy.geom_id <= geom_id);
-            copies[first..end].iter().map(|copy| copy.prim_id)
+            let first = hidden.partition_point(|copy| copy.geom_id < geom_id);
+            let end = hidden.partition_point(|copy| copy.geom_id <= geom_id);
+            hidden[first..end].iter().map(|copy| copy.prim_id)
         };
         for (mesh, geom_id) in scene.meshes.iter().zip(0..) {
             let omit = copies_in(geom_id);
@@ -129,7 +139,7 @@ impl<'s> EmbreeIntersector<'s> {
             spheres.map(|s| SphereData { centre: s.centre.to_array(), radius: s.radius }).collect();
         builder.add_spheres(spheres, copies_in(scene.sphere_geom_id()))?;
         let margin = rounding_margin(&scene.bounds);
-        let meshes: Vec<MeshFacts> = scene.meshes.iter().map(MeshFacts::of).collect();
+        let meshes: Vec<MeshFacts> = scene.meshes.iter().map(|m| facts_of(scene, m)).collect();
         let coarse = match rules.retry {
             true => CoarseTree::new(scene, &meshes, margin),
             false => CoarseTree::default(),
@@ -137,7 +147,7 @@ impl<'s> EmbreeIntersector<'s> {
         let Bounds3 { min, max } = scene.bounds;
         let bounds = Bounds3 { min: min - margin, max: max + margin };
         let committed = builder.commit()?;
-        Ok(Self { committed, scene, rules, near, coarse, meshes, bounds })
+        Ok(Self { committed, scene, rules, near, coarse, meshes, bounds, has_holes })
     }
 
     /// Whether the ray's f32 origin would be too coarse.
@@ -188,7 +198,8 @@ impl<'s> EmbreeIntersector<'s> {
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
-        let flags = QueryFlags { coherent: false, exclude, passed };
+        let asked = std::slice::from_ref(ray);
+        let flags = QueryFlags { coherent: false, exclude, passed, asked };
         self.committed.intersect(&[-1], &mut packet, std::slice::from_ref(&moved), flags);
         packet.hit(0).map(|hit| Candidate { hit, shift })
     }
@@ -263,6 +274,12 @@ impl<'s> EmbreeIntersector<'s> {
             self.pursue(ray, turn, &mut passed)
         })
     }
+}
+
+/// The facts of a mesh. With holes it is as good as open: backs are seen through them.
+fn facts_of(scene: &Scene, mesh: &Mesh) -> MeshFacts {
+    let facts = MeshFacts::of(mesh);
+    MeshFacts { closed: facts.closed && scene.mesh_mask(mesh).is_none(), ..facts }
 }
 
 /// How far rounding a ray to f32 may move it within `bounds`.

@@ -1,9 +1,9 @@
 //! From a [`Hit`] to a surface point, and from there to new rays.
 
-use super::triangle::{self, PlaneHit};
+use super::triangle;
 use super::{Hit, PrimRef, Ray};
 use crate::math::{DVec3, Vec2};
-use crate::scene::{Mesh, Scene, Surface};
+use crate::scene::{Mesh, Scene, Sphere, Surface};
 use std::f64::consts::{PI, TAU};
 
 /// A hit expanded, scene space, f64.
@@ -223,15 +223,17 @@ fn on_triangle(mesh: &Mesh, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
         }
         None => ng,
     };
-    let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
-        let [ta, tb, tc] = uvs.get(prim, triangle);
-        ta * weights[0] as f32 + tb * weights[1] as f32 + tc * weights[2] as f32
-    });
+    let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| uv_at(uvs.get(prim, triangle), weights));
     // Embree rounds the origin (its error scales with the coordinates) and then works with
     // differences to the corners of this triangle and its neighbours (scales with the edges).
     let size = e1.abs().max(e2.abs()).max_element();
     let offset = ROUNDING * (2.0 * p.abs().dot(ng.abs()) + 2.0 * size);
     SurfaceInteraction { p, ng, ns, uv, surface: mesh.surface, prim: hit.prim, offset }
+}
+
+/// Texture coordinates between those of a triangle's corners.
+pub(super) fn uv_at([a, b, c]: [Vec2; 3], weights: [f64; 3]) -> Vec2 {
+    a * weights[0] as f32 + b * weights[1] as f32 + c * weights[2] as f32
 }
 
 /// The hit in f64. A rough one gets here what the recheck gives the others: the corners are at
@@ -240,18 +242,15 @@ fn refined(ray: &Ray, corners: &[DVec3; 3], hit: &Hit) -> Hit {
     if !hit.rough {
         return *hit;
     }
-    let met = triangle::meet_plane(ray, corners).filter(PlaneHit::is_inside);
     // A rough hit is one that Embree's error bound has cleared; should f64 doubt it all the same,
     // the nearest point is right.
-    let nearest = || triangle::nearest_on_outline(ray, corners).map(|(met, _)| met);
-    let Some(met) = met.or_else(nearest) else { return *hit };
+    let Some(met) = triangle::meet_or_nearest(ray, corners) else { return *hit };
     Hit { t: met.t, u: met.u, v: met.v, rough: false, ..*hit }
 }
 
 fn on_sphere(scene: &Scene, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
     let sphere = &scene.spheres[hit.prim.prim_id as usize];
-    let from_centre = ray.at(hit.t) - sphere.centre;
-    let ng = from_centre.normalize();
+    let ng = sphere_normal(sphere, ray, hit.t);
     let p = sphere.centre + ng * sphere.radius;
     // Spheres are tested in f64 on the f64 ray, and the root where a ray leaves its sphere does not
     // count, so a start on the surface is safe; moved by f32's bound it would be 1e-7 off.
@@ -260,20 +259,26 @@ fn on_sphere(scene: &Scene, ray: &Ray, hit: &Hit) -> SurfaceInteraction {
         p,
         ng,
         ns: ng,
-        uv: sphere_uv(scene, sphere.surface, ng),
+        uv: if needs_uv(scene, sphere.surface) { sphere_uv(ng) } else { Vec2::ZERO },
         surface: sphere.surface,
         prim: hit.prim,
         offset,
     }
 }
 
+/// The unit normal on the outside of `sphere` where `ray` meets it.
+pub(super) fn sphere_normal(sphere: &Sphere, ray: &Ray, t: f64) -> DVec3 {
+    (ray.at(t) - sphere.centre).normalize()
+}
+
+/// Whether anything asks for the texture coordinates of a sphere's point, which cost two arcs.
+fn needs_uv(scene: &Scene, surface: Surface) -> bool {
+    scene.materials[surface.material as usize].texture.is_some()
+}
+
 /// Longitude and latitude of the unit vector `n` as texture coordinates, poles on y: the image's middle
-/// faces +z, its side edges meet at -z, and seen from outside it is not mirrored. Zero where no texture
-/// asks for them, since they cost two arcs.
-fn sphere_uv(scene: &Scene, surface: Surface, n: DVec3) -> Vec2 {
-    if scene.materials[surface.material as usize].texture.is_none() {
-        return Vec2::ZERO;
-    }
+/// faces +z, its side edges meet at -z, and seen from outside it is not mirrored.
+pub(super) fn sphere_uv(n: DVec3) -> Vec2 {
     let u = 0.75 - libm::atan2(n.z, n.x) / TAU;
     let v = 1.0 - libm::atan2(libm::hypot(n.x, n.z), n.y) / PI;
     Vec2::new(u as f32, v as f32)

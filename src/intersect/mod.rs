@@ -7,6 +7,7 @@ mod coarse;
 mod coincident;
 mod conservative;
 pub mod court;
+pub mod cut_outs;
 mod derivatives;
 mod embree;
 mod facts;

@@ -1,11 +1,11 @@
 //! The f64 oracle: every ray against every triangle, each close call settled by the exact court.
 //!
 //! Of hits at the same `t` the lowest `(geom_id, prim_id)` wins; the conventions for edges, planes and
-//! degenerate triangles are the court's ([`super::court`]). No tree: about a nanosecond a pair.
+//! degenerate triangles are the court's ([`super::court`]). Holes are those of [`super::cut_outs`]. No tree: about a nanosecond a pair.
 
 use super::conservative::{BLOCK, Block, ShearedRay, Triangles};
 use super::court::{Line, Meeting, Place};
-use super::{Hit, Intersector, PrimRef, Ray, sphere};
+use super::{Hit, Intersector, PrimRef, Ray, cut_outs};
 use crate::math::DVec3;
 use crate::scene::Scene;
 use crate::stats::{RayCounts, RayKind};
@@ -22,6 +22,8 @@ pub struct Oracle<'s> {
     starts: Vec<usize>,
     /// Largest coordinate of any triangle.
     reach: f64,
+    /// Whether any mesh has cut-outs.
+    has_holes: bool,
 }
 
 /// A hit with the court's view of it.
@@ -49,7 +51,9 @@ impl<'s> Oracle<'s> {
             .iter()
             .filter(|m| !m.bounds.is_empty())
             .fold(0f64, |reach, m| reach.max(m.bounds.largest_coordinate()));
-        Self { scene, triangles: Triangles::new(scene.triangle_count(), corners), starts, reach }
+        let triangles = Triangles::new(scene.triangle_count(), corners);
+        let has_holes = scene.meshes.iter().any(|mesh| scene.mesh_mask(mesh).is_some());
+        Self { scene, triangles, starts, reach, has_holes }
     }
 
     /// `ray` (valid) as the court sees it in this scene.
@@ -63,13 +67,17 @@ impl<'s> Oracle<'s> {
         Some(mesh.corners(prim.prim_id as usize))
     }
 
-    /// Where `ray` first hits a sphere between its ends.
+    /// Whether the triangle is there where `ray` meets it, and not a hole.
+    pub fn is_there(&self, ray: &Ray, prim: PrimRef) -> bool {
+        !self.has_holes || cut_outs::is_there(self.scene, ray, prim)
+    }
+
+    /// Where `ray` first hits a sphere between its ends; a hole is no hit.
     ///
     /// # Panics
     /// When `prim` is no sphere.
     pub fn sphere_root(&self, ray: &Ray, prim: PrimRef) -> Option<f64> {
-        let s = &self.scene.spheres[prim.prim_id as usize];
-        sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude)
+        cut_outs::sphere_root(self.scene, ray, prim)
     }
 
     /// All hits of `ray` between its ends, nearest first, ties by primitive: a ray exactly through
@@ -87,7 +95,7 @@ impl<'s> Oracle<'s> {
     }
 
     /// All triangles that the line of `ray` meets or passes within `margin` (scene space), whatever
-    /// the ray's ends and excluded primitive.
+    /// the ray's ends, excluded primitive and holes.
     pub fn near(&self, ray: &Ray, margin: f64) -> Vec<PrimRef> {
         if !ray.is_valid() {
             return Vec::new();
@@ -133,7 +141,9 @@ impl<'s> Oracle<'s> {
                 let Some(meeting) = lines[index].meet(&self.triangles.corners(triangle)) else {
                     continue;
                 };
-                if let Some(hit) = counts(&rays[index], &meeting, self.prim(triangle)) {
+                let (ray, prim) = (&rays[index], self.prim(triangle));
+                let hit = counts(ray, &meeting, prim).filter(|_| self.is_there(ray, prim));
+                if let Some(hit) = hit {
                     wants[index] = on_hit(index, hit);
                 }
             }
@@ -148,12 +158,9 @@ impl<'s> Oracle<'s> {
     ) {
         let geom_id = self.scene.sphere_geom_id();
         for (index, ray) in rays.iter().enumerate() {
-            for (prim_id, s) in self.scene.spheres.iter().enumerate() {
-                let prim = PrimRef { geom_id, prim_id: prim_id as u32 };
-                let leaving = prim == ray.exclude;
-                let Some(t) = sphere::first_root(ray, s.centre, s.radius, leaving) else {
-                    continue;
-                };
+            for prim_id in 0..self.scene.spheres.len() as u32 {
+                let prim = PrimRef { geom_id, prim_id };
+                let Some(t) = self.sphere_root(ray, prim) else { continue };
                 let hit = Hit { t, u: 0.0, v: 0.0, prim, rough: false };
                 wants[index] &= on_hit(index, CourtHit { hit, place: Place::Inside });
             }

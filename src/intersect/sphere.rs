@@ -3,12 +3,31 @@
 use super::Ray;
 use crate::math::DVec3;
 
-/// The first root in `[tnear, tfar]`, or `None`.
+/// The first root in `[tnear, tfar]` where the surface `is_there`, or `None`.
+///
+/// A ray that leaves this sphere (`leaving`) starts on it: its near root is that start and does not count.
+pub(super) fn first_root(
+    ray: &Ray,
+    centre: DVec3,
+    radius: f64,
+    leaving: bool,
+    is_there: impl Fn(f64) -> bool,
+) -> Option<f64> {
+    let [near, far] = roots(ray, centre, radius)?;
+    let counts = |t: f64| (ray.tnear..=ray.tfar).contains(&t) && is_there(t);
+    if leaving {
+        // The start is whichever root is nearer to zero; only the other one is a hit.
+        let other = if near.abs() > far.abs() { near } else { far };
+        return (other > 0.0 && counts(other)).then_some(other);
+    }
+    [near, far].into_iter().find(|t| counts(*t))
+}
+
+/// Both roots, ascending, whatever the ray's ends; `None` where the line passes the sphere by.
 ///
 /// The distance from the centre to the line is taken from the point of the line nearest the
-/// centre, not from `b² − ac`, which cancels for far spheres (Haines et al., 2019). A ray that
-/// leaves this sphere (`leaving`) starts on it: its near root is that start and does not count.
-pub(super) fn first_root(ray: &Ray, centre: DVec3, radius: f64, leaving: bool) -> Option<f64> {
+/// centre, not from `b² − ac`, which cancels for far spheres (Haines et al., 2019).
+pub(super) fn roots(ray: &Ray, centre: DVec3, radius: f64) -> Option<[f64; 2]> {
     let a = ray.dir.length_squared();
     let to_centre = centre - ray.org;
     let middle = to_centre.dot(ray.dir) / a;
@@ -18,19 +37,25 @@ pub(super) fn first_root(ray: &Ray, centre: DVec3, radius: f64, leaving: bool) -
         return None;
     }
     let half_chord = (inside / a).sqrt();
-    let in_range = |t: f64| (ray.tnear..=ray.tfar).contains(&t);
-    let (near, far) = (middle - half_chord, middle + half_chord);
-    if leaving {
-        // The start is whichever root is nearer to zero; only the other one is a hit.
-        let other = if near.abs() > far.abs() { near } else { far };
-        return (other > 0.0 && in_range(other)).then_some(other);
-    }
-    [near, far].into_iter().find(|t| in_range(*t))
+    Some([middle - half_chord, middle + half_chord])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn first_root(ray: &Ray, centre: DVec3, radius: f64, leaving: bool) -> Option<f64> {
+        super::first_root(ray, centre, radius, leaving, |_| true)
+    }
+
+    #[test]
+    fn a_root_in_a_hole_does_not_count() {
+        let ray = Ray::new(DVec3::new(-3.0, 0.0, 0.0), DVec3::X);
+        let first =
+            |is_there: fn(f64) -> bool| super::first_root(&ray, DVec3::ZERO, 1.0, false, is_there);
+        assert_eq!(first(|t| t > 3.0), Some(4.0));
+        assert_eq!(first(|_| false), None);
+    }
 
     #[test]
     fn finds_entry_from_outside_and_exit_from_inside() {

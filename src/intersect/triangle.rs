@@ -56,6 +56,13 @@ pub(super) fn nearest_on_outline(ray: &Ray, corners: &[DVec3; 3]) -> Option<(Pla
     best
 }
 
+/// Where `ray` meets the triangle, or the point of its outline that is nearest to the line. `None` where no
+/// corner is a number away. A function of the ray's line and of the corners alone.
+pub(super) fn meet_or_nearest(ray: &Ray, corners: &[DVec3; 3]) -> Option<PlaneHit> {
+    let met = meet_plane(ray, corners).filter(PlaneHit::is_inside);
+    met.or_else(|| nearest_on_outline(ray, corners).map(|(nearest, _)| nearest))
+}
+
 /// Intersects `ray`'s line with the plane of the triangle `corners`.
 ///
 /// `None` for a ray in the plane (convention: it hits nothing) and for a degenerate triangle.

@@ -1,11 +1,12 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{World, WorldMesh};
+use super::{AlphaMask, Material, World, WorldMesh};
 use crate::error::{Error, Result};
 
 impl World {
-    /// Refuses indices of materials and vertices that there are not, and lights and spheres whose place
-    /// is no number: no bounds would hold them. (The numbers of meshes are finite by invariant.)
+    /// Refuses indices of materials, masks and vertices that there are not, glass with cut-outs, and lights and
+    /// spheres whose place is no number: no bounds would hold them. (The numbers of meshes are finite by
+    /// invariant.)
     pub(super) fn check(&self) -> Result<()> {
         let meshes = self.meshes.iter().map(|m| (&m.name, m.material));
         let spheres = self.spheres.iter().map(|s| (&s.name, s.material));
@@ -15,8 +16,33 @@ impl World {
             let message = format!("`{name}` is of material {material}, counted from 0, of {count}");
             return Err(Error::Usage(message));
         }
+        self.materials.iter().try_for_each(|material| self.check_mask(material))?;
         self.meshes.iter().try_for_each(check_vertices)?;
         self.check_finite()
+    }
+
+    fn check_mask(&self, material: &Material) -> Result<()> {
+        let Some(id) = material.alpha else { return Ok(()) };
+        let name = &material.name;
+        let Some(mask) = self.masks.get(id as usize) else {
+            let count = self.masks.len();
+            let message = format!("`{name}` has the mask {id}, counted from 0, of {count}");
+            return Err(Error::Usage(message));
+        };
+        if !mask.is_whole() {
+            let AlphaMask { name: mask, width, height, texels } = mask;
+            let count = texels.len();
+            let message =
+                format!("the mask `{mask}` of {width} x {height} texels has {count} of them");
+            return Err(Error::Usage(message));
+        }
+        if material.glass.is_some() {
+            let message = format!(
+                "`{name}` is glass with cut-outs: a body of glass is closed, and a hole would leave it open"
+            );
+            return Err(Error::Usage(message));
+        }
+        Ok(())
     }
 
     fn check_finite(&self) -> Result<()> {
@@ -49,7 +75,7 @@ fn check_vertices(mesh: &WorldMesh) -> Result<()> {
 mod tests {
     use super::*;
     use crate::math::{DVec3, Rgb};
-    use crate::scene::{Material, WorldSphere};
+    use crate::scene::WorldSphere;
 
     #[test]
     fn indices_out_of_range_are_refused_by_name() {
@@ -66,5 +92,20 @@ mod tests {
         bad.meshes = vec![floor(2, 0)];
         bad.spheres = vec![WorldSphere::new("ball", DVec3::ZERO, 1.0, 1)];
         assert!(refusal(bad).contains("`ball` is of material 1"));
+    }
+
+    #[test]
+    fn masks_that_are_not_there_or_on_glass_are_refused_by_name() {
+        let refusal = |material: Material, masks: Vec<AlphaMask>| {
+            let world = World { materials: vec![material], masks, ..World::default() };
+            world.into_scene(true).expect_err("no scene").to_string()
+        };
+        let leaf = Material { alpha: Some(0), ..Material::diffuse("leaf", Rgb::ONE) };
+        let mask = AlphaMask { name: "m".into(), width: 2, height: 2, texels: vec![0; 4] };
+        assert!(refusal(leaf.clone(), vec![]).contains("`leaf` has the mask 0"));
+        let short = AlphaMask { texels: vec![0; 3], ..mask.clone() };
+        assert!(refusal(leaf, vec![short]).contains("`m` of 2 x 2 texels has 3"));
+        let pane = Material { alpha: Some(0), ..Material::glass("pane", 1.5) };
+        assert!(refusal(pane, vec![mask]).contains("`pane` is glass with cut-outs"));
     }
 }

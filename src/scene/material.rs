@@ -1,6 +1,6 @@
 //! Materials: the parameters of a surface's scattering. How it scatters stands in `shade::lobe`.
 
-use super::TextureMap;
+use super::{MaskId, TextureMap};
 use crate::math::Rgb;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +17,8 @@ pub struct Material {
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureMap>,
+    /// Mask of its cut-outs: where it says so, the surface is not there. None on glass.
+    pub alpha: Option<MaskId>,
     /// Reflectance of a mirror, both sides.
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
@@ -36,6 +38,7 @@ impl Material {
             name: name.into(),
             diffuse: Rgb::ZERO,
             texture: None,
+            alpha: None,
             mirror: Rgb::ZERO,
             roughness: 0.0,
             glass: None,

@@ -8,6 +8,7 @@
 //! Not done: instances share no memory; every placed mesh is its own copy
 //! (`docs/decisions`).
 
+mod alpha;
 mod aovs;
 mod camera;
 mod check;
@@ -31,6 +32,7 @@ mod too_small;
 mod weld;
 mod winding;
 
+pub use alpha::{AlphaMask, MaskId};
 pub use aovs::{Aov, Aovs};
 pub use camera::{Camera, Pose};
 pub use job::JobOptions;
@@ -83,6 +85,8 @@ pub struct World {
     pub materials: Vec<Material>,
     /// Decoded images, named by [`TextureId`].
     pub textures: Vec<Texture>,
+    /// Masks of cut-outs, named by [`MaskId`].
+    pub masks: Vec<AlphaMask>,
     /// Lights. None has a surface in `meshes` or `spheres` yet.
     /// Area lights get their emitting surface from [`World::into_scene`].
     pub lights: Vec<Light>,
@@ -105,6 +109,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Textures.
     pub textures: Vec<Texture>,
+    /// Masks of cut-outs.
+    pub masks: Vec<AlphaMask>,
     /// Lights, area lights included.
     pub lights: Vec<Light>,
     /// The light of rays that hit nothing.
@@ -144,6 +150,17 @@ impl Scene {
     /// The cells that lights are selected by; `None` where all are looked at everywhere.
     pub fn selected_lights(&self, settings: &Settings) -> Option<&LightCells> {
         self.light_cells.as_ref().filter(|_| !settings.all_lights)
+    }
+
+    /// The mask of a surface, if its material has one.
+    pub fn mask(&self, surface: Surface) -> Option<&AlphaMask> {
+        let id = self.materials[surface.material as usize].alpha?;
+        Some(&self.masks[id as usize])
+    }
+
+    /// The mask that cuts holes into `mesh`: none without texture coordinates, which say where they lie.
+    pub fn mesh_mask(&self, mesh: &Mesh) -> Option<&AlphaMask> {
+        mesh.uvs.as_ref().and_then(|_| self.mask(mesh.surface))
     }
 
     /// Triangles in all meshes.

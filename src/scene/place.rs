@@ -50,8 +50,16 @@ impl World {
     pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
         let (_, mirrors) = normal_matrix(transform)?;
         // Materials stay as they are given, and the sky is the same in all directions.
-        let World { meshes, spheres, materials: _, textures: _, lights, sky: _, traced_regions } =
-            self;
+        let World {
+            meshes,
+            spheres,
+            materials: _,
+            textures: _,
+            masks: _,
+            lights,
+            sky: _,
+            traced_regions,
+        } = self;
         meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;
         for sphere in spheres {
             move_sphere(&sphere.name, &mut sphere.centre, &mut sphere.radius, transform)?;
@@ -68,6 +76,7 @@ impl World {
             mut spheres,
             mut materials,
             textures,
+            masks,
             lights,
             sky: _,
             traced_regions,
@@ -79,10 +88,15 @@ impl World {
         for texture in materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
             texture.image += first_texture;
         }
+        let first_mask = self.masks.len() as u32;
+        for mask in materials.iter_mut().filter_map(|m| m.alpha.as_mut()) {
+            *mask += first_mask;
+        }
         self.meshes.append(&mut meshes);
         self.spheres.append(&mut spheres);
         self.materials.append(&mut materials);
         self.textures.extend(textures);
+        self.masks.extend(masks);
         self.lights.extend(lights);
         self.traced_regions.extend(traced_regions);
     }
@@ -146,7 +160,7 @@ pub(super) fn uniform_scale(what: &str, instead: &str, transform: &DAffine3) -> 
 mod tests {
     use super::*;
     use crate::math::{Bounds3, DQuat, Rgb};
-    use crate::scene::{Light, QuadLight, WorldSphere};
+    use crate::scene::{AlphaMask, Light, QuadLight, WorldSphere};
 
     fn triangle() -> WorldMesh {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, 1.0)];
@@ -205,6 +219,7 @@ mod tests {
             spheres: vec![WorldSphere::new("ball", DVec3::X, 2.0, 0)],
             materials: vec![Material {
                 texture: Some(crate::scene::TextureMap::of(0)),
+                alpha: Some(0),
                 ..Material::black("m")
             }],
             lights: vec![Light::Quad(light)],
@@ -261,9 +276,14 @@ mod tests {
         other.meshes.push(triangle());
         let image = crate::scene::Texture::from_linear("image", [1, 1], vec![Rgb::ONE]);
         world.textures.push(image);
+        for name in ["fence", "leaf"] {
+            let (width, height, texels) = (1, 1, vec![0]);
+            world.masks.push(AlphaMask { name: name.into(), width, height, texels });
+        }
         world.append(other);
         let image = |material: &Material| material.texture.expect("a texture").image;
         assert_eq!((world.meshes[0].material, world.spheres[1].material), (1, 1));
         assert_eq!(world.materials.iter().map(image).collect::<Vec<_>>(), [0, 1]);
+        assert_eq!((world.materials[0].alpha, world.materials[1].alpha), (Some(0), Some(2)));
     }
 }

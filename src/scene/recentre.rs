@@ -97,6 +97,7 @@ impl World {
             spheres,
             materials: self.materials,
             textures: self.textures,
+            masks: self.masks,
             lights,
             sky: self.sky,
             traced_regions,

@@ -3,7 +3,7 @@
 //! So frames are kept when a comment changes, a file is renamed or a setting moves between scene file and
 //! command line, but not when a vertex, a light or a key pose changes.
 
-use crate::scene::{Corners, Material, Shot, Texture, World, WorldMesh, WorldSphere};
+use crate::scene::{AlphaMask, Corners, Material, Shot, Texture, World, WorldMesh, WorldSphere};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
@@ -34,7 +34,8 @@ pub struct WorldHash {
 impl WorldHash {
     /// Hashes everything in `world` that pixels depend on.
     pub fn of(world: &World) -> Self {
-        let World { meshes, spheres, materials, textures, lights, sky, traced_regions } = world;
+        let World { meshes, spheres, materials, textures, masks, lights, sky, traced_regions } =
+            world;
         let mut parts = Vec::new();
         // Names are for people.
         for (n, mesh) in (1..).zip(meshes) {
@@ -43,6 +44,9 @@ impl WorldHash {
         }
         for (n, texture) in (1..).zip(textures) {
             parts.push((format!("texture {n}"), Hash::of(|hash| hash.texture(texture))));
+        }
+        for (n, mask) in (1..).zip(masks) {
+            parts.push((format!("mask {n}"), Hash::of(|hash| hash.mask(mask))));
         }
         for (n, sphere) in (1..).zip(spheres) {
             let WorldSphere { name: _, centre, radius, material: _, always_traced: _ } = sphere;
@@ -161,6 +165,12 @@ impl Hash {
         self.array(texture.image_bytes());
     }
 
+    fn mask(&mut self, mask: &AlphaMask) {
+        let AlphaMask { name: _, width, height, texels } = mask;
+        self.text(&(width, height));
+        self.array(texels);
+    }
+
     /// The length goes first, so that no two lists of arrays run together into the same bytes.
     fn array<T: bytemuck::NoUninit>(&mut self, values: &[T]) {
         self.0.update(&(values.len() as u64).to_le_bytes());
@@ -189,6 +199,12 @@ mod tests {
                 ..WorldMesh::new("a", vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]], 0)
             }],
             materials: vec![Material::diffuse("m", Rgb::ONE)],
+            masks: vec![AlphaMask {
+                name: "leaf".into(),
+                width: 2,
+                height: 1,
+                texels: vec![0, 255],
+            }],
             ..World::default()
         }
     }
@@ -205,13 +221,16 @@ mod tests {
         let mut renamed = world();
         renamed.meshes[0].name = "b".into();
         renamed.materials[0].name = "n".into();
+        renamed.masks[0].name = "frond".into();
         assert_eq!(base, fingerprint(&renamed, &shot()));
 
-        let changes: [fn(&mut World); 7] = [
+        let changes: [fn(&mut World); 9] = [
             |w| w.meshes[0].positions[1].x += 1e-15,
             |w| w.meshes[0].triangles[0] = [0, 2, 1],
             |w| w.meshes[0].normals = None,
             |w| w.materials[0].diffuse.x = 0.5,
+            |w| w.materials[0].alpha = Some(0),
+            |w| w.masks[0].texels[1] = 254,
             |w| w.sky.lights = false,
             |w| w.meshes[0].always_traced = true,
             |w| w.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }],

@@ -60,7 +60,8 @@ impl<'a> Closely<'a> {
         // A ray that leaves a sphere may meet its far side.
         let leaves_it =
             hit.prim == self.ray.exclude && self.check.oracle.corners(hit.prim).is_some();
-        if pass.ulps > BAND_ULPS || leaves_it {
+        let is_hole = !self.check.oracle.is_there(&self.ray, hit.prim);
+        if pass.ulps > BAND_ULPS || leaves_it || is_hole {
             return Some(Difference { class: Class::Phantom, ulps: pass.ulps });
         }
         let length = self.ray.dir.length();
@@ -154,6 +155,7 @@ impl<'a> Closely<'a> {
         self.near()
             .into_iter()
             .filter(|prim| *prim != self.ray.exclude)
+            .filter(|prim| self.check.oracle.is_there(&self.ray, *prim))
             .filter_map(|prim| {
                 let pass = self.pass(prim);
                 let t = pass.t?;
@@ -201,12 +203,14 @@ impl<'a> Closely<'a> {
     /// Whether the ray, moved aside by `by`, certainly hits `prim` before `limit`.
     fn is_hit_beside(&self, prim: PrimRef, by: DVec3, limit: f64) -> bool {
         let pass = self.pass(prim);
+        let moved = Ray { org: self.ray.org + by, ..self.ray };
         let t = match self.check.oracle.corners(prim) {
             Some(corners) => self.line.moved(by).meet(&corners).map(|m| m.t),
-            None => self.sphere_root(&Ray { org: self.ray.org + by, ..self.ray }, prim),
+            None => self.sphere_root(&moved, prim),
         };
         let certain = |t: f64| t >= self.ray.tnear && t <= limit && !self.at_end(t, &pass);
-        prim != self.ray.exclude && t.is_some_and(certain)
+        let is_met = prim != self.ray.exclude && t.is_some_and(certain);
+        is_met && self.check.oracle.is_there(&moved, prim)
     }
 
     /// Ways aside: around on two circles, and straight off the edges of the triangles near by, which

@@ -129,9 +129,10 @@ impl<'a> Check<'a> {
         self.volume(geom_id).is_some_and(|volume| volume < 0.0)
     }
 
-    /// Whether every edge of the mesh has a partner that runs the other way.
+    /// Whether every edge of the mesh has a partner that runs the other way, and no holes are cut out of it.
     fn is_closed(&self, geom_id: u32) -> bool {
-        self.volume(geom_id).is_some()
+        let has_holes = self.scene.mesh_mask(&self.scene.meshes[geom_id as usize]).is_some();
+        !has_holes && self.volume(geom_id).is_some()
     }
 
     fn volume(&self, geom_id: u32) -> Option<f64> {

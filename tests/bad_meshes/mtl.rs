@@ -46,6 +46,10 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nmap_Kd gone.png\n", Warns(1, "gone.png")),
     ("newmtl a\nmap_Kd -o 1 1 -clamp on no image.png\n", Warns(2, "texture option `-clamp`")),
     ("newmtl a\nmap_Kd bad.mtl\n", Warns(1, "bad.mtl")),
+    ("newmtl a\nmap_d\n", Line(2, "`map_d` without a file name")),
+    ("newmtl a\nmap_d gone.png\n", Warns(1, "cut-outs left out")),
+    ("newmtl a\nmap_d -imfchan m bad.mtl\n", Warns(2, "texture option `-imfchan`")),
+    ("newmtl a\nillum 7\nNi 1.5\nmap_d x.png\n", Warns(1, "glass has none")),
     ("newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\n", Warns(3, "defined again")),
     ("newmtl a\nd 0.5\n", Warns(1, "rendered opaque")),
     ("newmtl a\nillum 7\n", Warns(1, "glass without `Ni`")),
@@ -115,6 +119,25 @@ fn textures_are_linear_and_shared() {
     let factors: Vec<f32> = model.world.materials.iter().map(|m| m.diffuse.x).collect();
     assert_eq!(factors, [1.0, 0.5]);
     assert_eq!(model.files.len(), 3);
+}
+
+#[test]
+fn map_d_cuts_holes_and_is_shared() {
+    let pgm = b"P5 2 1 255\n\x00\xff";
+    let mtl = b"newmtl a\nillum 4\nmap_d leaf.pgm\nnewmtl b\nKd .5 .5 .5\nmap_d leaf.pgm\n\
+                newmtl c\nKe 1 1 1\nmap_d leaf.pgm\n";
+    let obj = "mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
+               usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\nusemtl c\nf 2/2 3/3 1/1\n";
+    let others: &[(&str, &[u8])] = &[("x.mtl", mtl), ("leaf.pgm", pgm)];
+    let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
+    let [mask] = &model.world.masks[..] else { panic!("one mask") };
+    assert_eq!(mask.texels, [0, 255]);
+    assert!(model.world.materials.iter().all(|m| m.alpha == Some(0) && m.glass.is_none()));
+    assert_eq!(model.files.len(), 3);
+    // A glowing leaf is no light.
+    assert_eq!((model.world.meshes.len(), model.world.lights.len()), (3, 0));
+    let [warning] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
+    assert!(warning.message.contains("`c` emits and has cut-outs"), "{warning}");
 }
 
 #[test]

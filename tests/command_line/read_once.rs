@@ -5,7 +5,7 @@ use super::launch::{mpirun, under_mpirun};
 use std::fs;
 use std::time::{Duration, Instant};
 
-/// A scene of several files: a mesh with a library and a picture on it.
+/// A scene of several files: a mesh with a library, a picture on it and holes in it.
 fn scene_of_files(job: &Job) {
     let cube = String::from_utf8(job.read("cube.obj")).expect("text");
     fs::create_dir(job.path("scene")).expect("made");
@@ -23,7 +23,9 @@ fn scene_of_files(job: &Job) {
         .collect();
     let mesh = format!("mtllib own.mtl\nusemtl tiled\n{corners}{faces}");
     fs::write(job.path("scene/cube.obj"), mesh).expect("written");
-    fs::write(job.path("scene/own.mtl"), "newmtl tiled\nKd 1 1 1\nmap_Kd tiles.ppm\n").expect("ok");
+    // Three of the four texels are dark: holes.
+    let library = "newmtl tiled\nKd 1 1 1\nmap_Kd tiles.ppm\nmap_d tiles.ppm\n";
+    fs::write(job.path("scene/own.mtl"), library).expect("written");
     let picture = [b"P6 2 2 255\n".as_slice(), &[9, 200, 40, 90, 90, 250, 250, 9, 0, 70, 7, 7]];
     fs::write(job.path("scene/tiles.ppm"), picture.concat()).expect("written");
     let text = "[camera]\nframes = 6\n[settings]\nsize = [48, 27]\nspp = 1\nvideo = false\n\

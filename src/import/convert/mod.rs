@@ -44,6 +44,9 @@ pub fn convert(input: &Path, output: &Path) -> Result<ConvertReport> {
     if !world.textures.is_empty() {
         lost.push("textures");
     }
+    if !world.masks.is_empty() {
+        lost.push("cut-outs");
+    }
     if !world.lights.is_empty() {
         lost.push("lights");
     }

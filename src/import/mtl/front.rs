@@ -69,9 +69,9 @@ impl Front {
             "d" => self.dissolve(words),
             "Tr" => self.transparency(words),
             "illum" => self.illum(words),
-            "map_Kd" => self.image(words, line.number),
-            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "map_d" | "map_bump" | "map_Bump"
-            | "bump" | "disp" | "decal" | "refl" | "norm" | "map_Tr" | "map_refl" | "map_Kn" => {
+            "map_Kd" | "map_d" => self.image(&text, words, line.number),
+            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "map_bump" | "map_Bump" | "bump"
+            | "disp" | "decal" | "refl" | "norm" | "map_Tr" | "map_refl" | "map_Kn" => {
                 self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
                 Ok(())
             }
@@ -151,8 +151,13 @@ impl Front {
         Ok(())
     }
 
-    /// `map_Kd [options] file`. The file's name may hold blanks.
-    fn image(&mut self, mut words: Words<'_>, line: usize) -> std::result::Result<(), String> {
+    /// `map_Kd [options] file`, or `map_d`. The file's name may hold blanks.
+    fn image(
+        &mut self,
+        keyword: &str,
+        mut words: Words<'_>,
+        line: usize,
+    ) -> std::result::Result<(), String> {
         loop {
             let mut ahead = words;
             let arguments = match ahead.next() {
@@ -171,7 +176,10 @@ impl Front {
                 // The second and third number of -s, -o and -t may be left out.
                 let is_value = ahead.next().is_some_and(|w| arguments == 1 || number(w).is_ok());
                 if !is_value && used == 0 {
-                    return Err(format!("`map_Kd`: the option `{}` lacks a value", show(option)));
+                    return Err(format!(
+                        "`{keyword}`: the option `{}` lacks a value",
+                        show(option)
+                    ));
                 }
                 if is_value {
                     words = ahead;
@@ -180,9 +188,9 @@ impl Front {
         }
         let name = String::from_utf8_lossy(words.rest()).into_owned();
         if name.is_empty() {
-            return Err("`map_Kd` without a file name".into());
+            return Err(format!("`{keyword}` without a file name"));
         }
-        self.put(format_args!("map_Kd {name}"));
+        self.put(format_args!("{keyword} {name}"));
         Ok(())
     }
 

@@ -3,9 +3,10 @@
 //! | MTL | ours |
 //! |---|---|
 //! | `Kd`, `map_Kd` | diffuse reflectance, texture |
+//! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
 //! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
 //! | `illum` 3 or 5 with `Ks` | perfect mirror of reflectance `Ks` beside the diffuse part |
-//! | `illum` 6 or 7; 4 or 9 unless `d` is 1; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
+//! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
 
 use super::front::Source;
@@ -62,8 +63,8 @@ fn is_glass(mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {
     let clear = mtl.dissolve.is_some_and(|d| d < 1.0);
     match mtl.illumination_model {
         Some(6 | 7) => true,
-        // 3ds Max writes `illum 4` with `d 1` for what is plainly opaque.
-        Some(4 | 9) => clear || mtl.dissolve.is_none(),
+        // 3ds Max writes `illum 4` with `d 1` for what is plainly opaque. A map says what is transparent.
+        Some(4 | 9) => clear || (mtl.dissolve.is_none() && mtl.dissolve_texture.is_none()),
         _ if clear && mtl.optical_density.is_some() => true,
         _ => {
             if clear {

@@ -5,6 +5,7 @@
 mod front;
 mod meaning;
 
+use super::alpha::{self, MaskCache};
 use super::model::Model;
 use super::source;
 use super::texture::{self, TextureCache};
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct Libraries {
     entries: HashMap<String, Entry>,
     textures: TextureCache,
+    masks: MaskCache,
     loaded: Vec<PathBuf>,
 }
 
@@ -76,7 +78,7 @@ impl Libraries {
     }
 
     /// Adds the material that `usemtl NAME` on `line` of `obj` asks for to the model's world,
-    /// and its texture. An unknown name is a warning, and the default material.
+    /// and its images. An unknown name is a warning, and the default material.
     pub fn material(
         &mut self,
         obj: &Path,
@@ -106,6 +108,16 @@ impl Libraries {
                     model.warnings.push(place(format!("texture left out: {error}")));
                 }
             }
+        }
+        if let Some(image) = &entry.parsed.dissolve_texture {
+            let file = source::beside(&entry.library, image);
+            let is_glass = material.glass.is_some();
+            let mask = match is_glass {
+                true => Err("glass has none, `map_d` is ignored".into()),
+                false => alpha::load_cached(&file, &mut self.masks, model),
+            };
+            let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
+            material.alpha = mask.map_err(warn).ok();
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)

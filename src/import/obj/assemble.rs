@@ -83,8 +83,16 @@ pub(super) fn assemble(
 
 /// Adds a mesh, or lights in its place where it emits and is simple enough.
 fn add(path: &Path, mesh: WorldMesh, model: &mut Model) {
-    let emission = model.world.materials[mesh.material as usize].emission;
+    let material = &model.world.materials[mesh.material as usize];
+    let emission = material.emission;
     if emission == Rgb::ZERO {
+        model.world.meshes.push(mesh);
+    } else if material.alpha.is_some() {
+        let message = format!(
+            "`{}` emits and has cut-outs (`map_d`): it glows but lights nothing",
+            mesh.name
+        );
+        model.warnings.push(Diagnostic::new(path, message));
         model.world.meshes.push(mesh);
     } else if let Some(lights) = lamps::of_mesh(&mesh, emission) {
         model.world.lights.extend(lights);

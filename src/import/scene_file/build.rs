@@ -81,11 +81,10 @@ impl<'a> Builder<'a> {
     }
 
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
-        let image = match &material.texture {
-            Some(texture) => Some(self.add_texture(&NamedTexture::file(texture))?),
-            None => None,
-        };
-        let built = material.build(name, self.source, image)?;
+        let texture = material.texture.as_ref().map(NamedTexture::file);
+        let image = texture.map(|file| self.add_texture(&file)).transpose()?;
+        let alpha = material.alpha.as_ref().map(|file| self.add_mask(file)).transpose()?;
+        let built = material.build(name, self.source, image, alpha)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
         self.materials.insert(name, Named { id, span: material.span.clone(), used: false });
@@ -103,6 +102,18 @@ impl<'a> Builder<'a> {
         self.note_file(&path);
         self.world.textures.push(texture);
         Ok(self.world.textures.len() as scene::TextureId - 1)
+    }
+
+    fn add_mask(&mut self, file: &At<String>) -> Result<scene::MaskId> {
+        let path = self.beside(file);
+        let same = |mask: &scene::AlphaMask| Path::new(&mask.name) == path;
+        if let Some(known) = self.world.masks.iter().position(same) {
+            return Ok(known as scene::MaskId);
+        }
+        let mask = import::load_mask(&path).map_err(|e| self.at_key(file, e))?;
+        self.note_file(&path);
+        self.world.masks.push(mask);
+        Ok(self.world.masks.len() as scene::MaskId - 1)
     }
 
     fn add_mesh(&mut self, mesh: &At<Mesh>) -> Result<()> {
@@ -136,8 +147,10 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
+    /// Whether the material has an image to lay on.
     fn is_textured(&self, id: MaterialId) -> bool {
-        self.world.materials[id as usize].texture.is_some()
+        let material = &self.world.materials[id as usize];
+        material.texture.is_some() || material.alpha.is_some()
     }
 
     fn add_sphere(&mut self, sphere: &At<Sphere>) -> Result<()> {
@@ -174,6 +187,7 @@ impl<'a> Builder<'a> {
         if bare {
             world.materials.clear();
             world.textures.clear();
+            world.masks.clear();
         }
         Ok(world)
     }

@@ -6,7 +6,7 @@ use super::report::Source;
 use super::texture::NamedTexture;
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
-use crate::scene::{self, TextureId};
+use crate::scene::{self, MaskId, TextureId};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -20,6 +20,10 @@ pub(super) struct Material {
     pub diffuse: Option<Reflectance>,
     /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it lies on the surface.
     pub texture: Option<At<NamedTexture>>,
+    /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
+    /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
+    /// colours, as stored. Not on glass.
+    pub alpha: Option<At<String>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
     /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
@@ -27,7 +31,7 @@ pub(super) struct Material {
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
-    /// meshes of up to 64 flat quads, then light the scene; other meshes only glow.
+    /// meshes of up to 64 flat quads, then light the scene; other meshes and those with `alpha` only glow.
     pub emission: Option<Amount>,
     /// Whether the back of a face emits too.
     #[serde(default)]
@@ -58,12 +62,13 @@ fn window_glass() -> Ior {
 }
 
 impl Material {
-    /// As scene data; `image` is the index of the decoded image of the texture.
+    /// As scene data; `image` and `alpha` are the indices of the decoded images.
     pub fn build(
         &self,
         name: &str,
         source: &Source,
         image: Option<TextureId>,
+        alpha: Option<MaskId>,
     ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
@@ -76,6 +81,7 @@ impl Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
+            alpha,
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
             glass,
@@ -90,6 +96,11 @@ impl Material {
 
     fn check(&self, source: &Source) -> Result<()> {
         if let Some(glass) = &self.glass {
+            if let Some(alpha) = &self.alpha {
+                let message =
+                    "glass has no cut-outs: its body is closed, and a hole would leave it open";
+                return Err(source.fault(&alpha.span, message).into());
+            }
             let others = self.diffuse.is_some() || self.texture.is_some() || self.mirror.is_some();
             if others || self.emission.is_some() {
                 let message = "glass stands alone: a material that has it has neither `diffuse`, \

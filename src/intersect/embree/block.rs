@@ -22,6 +22,15 @@ fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
     })
 }
 
+/// Rays on their way through Embree.
+#[derive(Clone, Copy)]
+struct Cast<'c> {
+    /// As Embree sees them, moved or turned.
+    rays: &'c [Ray],
+    /// As they were asked for: what decides on holes. Without any in the scene they may be the same.
+    asked: &'c [Ray],
+}
+
 /// A block after Embree.
 struct Block<'b> {
     /// As they were asked for.
@@ -56,11 +65,12 @@ impl EmbreeIntersector<'_> {
             cast = &moved[..rays.len()];
         }
         let mut found = [NOTHING; BLOCK];
-        let mut hit = self.trace::<W>(cast, valid, &mut found);
+        let mut hit = self.trace::<W>(Cast { rays: cast, asked: rays }, valid, &mut found);
         if self.retries() {
             let missed = self.missed_near(cast, valid & !hit);
             let mut doubtful = missed | self.doubtful_lanes(cast, hit, &found);
             for turn in TURNS {
+                let cast = Cast { rays: cast, asked: rays };
                 let nearer = self.try_again::<W>(cast, &shifts, doubtful, turn, &mut found, counts);
                 hit |= nearer;
                 doubtful &= !nearer;
@@ -73,14 +83,14 @@ impl EmbreeIntersector<'_> {
     }
 
     /// Sends the `valid` lanes through Embree in packets; returns those that hit.
-    fn trace<const W: usize>(&self, rays: &[Ray], valid: Lanes, found: &mut [PacketHit]) -> Lanes {
+    fn trace<const W: usize>(&self, cast: Cast, valid: Lanes, found: &mut [PacketHit]) -> Lanes {
         let mut packet = Packet::<W>::new();
         let mut hit = 0;
-        for (k, rays) in rays.chunks(W).enumerate() {
+        for (k, (rays, asked)) in cast.rays.chunks(W).zip(cast.asked.chunks(W)).enumerate() {
             let mask = fill(&mut packet, rays, valid >> (k * W));
-            let flags = QueryFlags { coherent: true, exclude: false, passed: &[] };
+            let flags = QueryFlags { coherent: true, exclude: false, passed: &[], asked };
             self.committed.intersect(&mask, &mut packet, rays, flags);
-            self.trace_past_own(rays, &mut packet);
+            self.trace_past_own(Cast { rays, asked }, &mut packet);
             for lane in 0..rays.len() {
                 if let Some(candidate) = packet.hit(lane) {
                     found[k * W + lane] = candidate;
@@ -93,7 +103,8 @@ impl EmbreeIntersector<'_> {
 
     /// Traces those rays again that met the triangle which they leave. Few do, since they start off
     /// it, and a filter on every ray's candidates costs more.
-    fn trace_past_own<const W: usize>(&self, rays: &[Ray], packet: &mut Packet<W>) {
+    fn trace_past_own<const W: usize>(&self, cast: Cast, packet: &mut Packet<W>) {
+        let Cast { rays, asked } = cast;
         let mut mask = [0; W];
         for (lane, ray) in rays.iter().enumerate() {
             let is_triangle = (ray.exclude.geom_id as usize) < self.meshes.len();
@@ -103,7 +114,7 @@ impl EmbreeIntersector<'_> {
             }
         }
         if mask != [0; W] {
-            let flags = QueryFlags { coherent: false, exclude: true, passed: &[] };
+            let flags = QueryFlags { coherent: false, exclude: true, passed: &[], asked };
             self.committed.intersect(&mask, packet, rays, flags);
         }
     }
@@ -143,13 +154,14 @@ impl EmbreeIntersector<'_> {
     /// those that hit.
     fn try_again<const W: usize>(
         &self,
-        rays: &[Ray],
+        cast: Cast,
         shifts: &[f64; BLOCK],
         doubtful: Lanes,
         turn: Turn,
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
     ) -> Lanes {
+        let rays = cast.rays;
         counts[RayKind::Retry] += u64::from(doubtful.count_ones());
         let mut hit = 0;
         let mut left = doubtful;
@@ -157,14 +169,20 @@ impl EmbreeIntersector<'_> {
         while left != 0 {
             let mut lanes = [0; PART];
             let mut again = [rays[0]; PART];
+            let mut asked = self.has_holes.then_some(again);
             let mut tried = 0;
             for (k, lane) in each(left).take(PART).enumerate() {
                 (lanes[k], again[k]) = (lane, self.nudged(&rays[lane], shifts[lane], turn));
+                if let Some(asked) = &mut asked {
+                    asked[k] = cast.asked[lane];
+                }
                 left &= !(1 << lane);
                 tried = k + 1;
             }
             let mut found_again = [NOTHING; PART];
-            let hit_again = self.trace::<W>(&again[..tried], Lanes::MAX, &mut found_again);
+            let asked = &asked.as_ref().unwrap_or(&again)[..tried];
+            let turned = Cast { rays: &again[..tried], asked };
+            let hit_again = self.trace::<W>(turned, Lanes::MAX, &mut found_again);
             for (k, lane) in lanes[..tried].iter().enumerate() {
                 let is_hit = hit_again >> k & 1 == 1;
                 if is_hit && self.is_nearer(&rays[*lane], &found_again[k], &found[*lane]) {
@@ -199,7 +217,7 @@ impl EmbreeIntersector<'_> {
             counts[RayKind::Invalid] += rays.len() as u64 - u64::from(valid.count_ones());
             let mask = fill(&mut packet, rays, valid);
             let exclude = rays.iter().any(|ray| ray.exclude != PrimRef::NONE);
-            let flags = QueryFlags { coherent: false, exclude, passed: &[] };
+            let flags = QueryFlags { coherent: false, exclude, passed: &[], asked: rays };
             self.committed.occluded(&mask, &mut packet, rays, flags);
             for (lane, out) in occluded.iter_mut().enumerate() {
                 *out = mask[lane] != 0 && packet.is_occluded(lane);

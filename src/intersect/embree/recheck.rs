@@ -1,6 +1,6 @@
 //! The recheck: Embree's f32 hit computed again in f64, or found out to be none.
 
-use super::super::sphere;
+use super::super::cut_outs;
 use super::super::triangle::{self, PlaneHit};
 use super::{Candidate, EmbreeIntersector, ROUNDING};
 use crate::embree::PacketHit;
@@ -80,8 +80,7 @@ impl EmbreeIntersector<'_> {
     }
 
     pub(super) fn recheck_sphere(&self, ray: &Ray, prim: PrimRef) -> Option<Hit> {
-        let s = &self.scene.spheres[prim.prim_id as usize];
-        let t = sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude)?;
+        let t = cut_outs::sphere_root(self.scene, ray, prim)?;
         Some(Hit { t, u: 0.0, v: 0.0, prim, rough: false })
     }
 }

@@ -289,6 +289,8 @@ const TOGETHER: &[Case] = &[
     ("[material.a]\ntexture = { file = 'a', ¦wrp = 'clamp' }\n", "unknown key `wrp`", "`wrap`"),
     ("[material.a]\ntexture = { file = 'a', wrap = ¦'tile' }\n", "unknown value `tile`", ""),
     ("[material.a]\ntexture = { file = 'a', scale = [1, ¦0] }\n", "found 0", ""),
+    ("[material.a]\nalpha = ¦'leaf.png'\n", "cannot read", ""),
+    ("[material.a]\nalpha = ¦0.5\n", "expected a string", ""),
     (
         "[[mesh]]\nterrain = {}\ntransform = [¦{ matrix = [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0]] }]\n",
         "flattens",

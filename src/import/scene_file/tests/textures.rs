@@ -1,4 +1,4 @@
-//! Texture coordinates of the shapes, in closed form, and what is said of meshes without.
+//! Texture coordinates of the shapes, in closed form, what is said of meshes without, and cut-outs.
 
 use super::*;
 use crate::math::{DVec2, DVec3, Vec2};
@@ -135,4 +135,62 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
     // Scaled to (2, 6), turned to (-6, 2), moved.
     let moved = map("b").transform.transform_point2(DVec2::new(1.0, 2.0));
     assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");
+}
+
+/// Loads a scene file with `text` beside a mask of two texels, `leaf.pgm`, and a triangle without coordinates.
+fn cut(text: &str) -> Result<Loaded> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("leaf.pgm"), b"P5 2 1 255\n\x00\xff").expect("written");
+    std::fs::write(at("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").expect("written");
+    std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
+    load(&at("scene.toml"), &LoadOptions::default())
+}
+
+const LEAF: &str = "[material.leaf]\ndiffuse = 0.5\nalpha = 'leaf.pgm'\n";
+
+#[test]
+fn alpha_is_a_mask_that_materials_share_and_shapes_have_coordinates_for() {
+    let quad = "[[mesh]]\nquad = { corner = [0, 0, 0], edges = [[1, 0, 0], [0, 1, 0]] }\n";
+    let text = format!(
+        "{LEAF}[material.frond]\nmirror = 0.5\nalpha = 'leaf.pgm'\n{quad}material = 'leaf'\n\
+         {quad}material = 'frond'\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n"
+    );
+    let loaded = cut(&text).expect("a scene");
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let world = &loaded.world;
+    let [mask] = &world.masks[..] else { panic!("one mask") };
+    assert_eq!((mask.width, mask.height, &mask.texels[..]), (2, 1, &[0, 255][..]));
+    assert!(world.materials.iter().all(|m| m.alpha == Some(0) && m.texture.is_none()));
+    assert!(world.meshes.iter().all(|mesh| mesh.uvs.is_some()));
+    assert_eq!(loaded.files.len(), 2);
+}
+
+#[test]
+fn a_mesh_without_coordinates_for_its_alpha_is_named() {
+    let loaded =
+        cut(&format!("{LEAF}[[mesh]]\nfile = 't.obj'\nname = 'wing'\nmaterial = 'leaf'\n"));
+    let loaded = loaded.expect("a scene");
+    let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
+    assert!(warning.message.contains("`wing`") && warning.message.contains("nothing"), "{warning}");
+}
+
+#[test]
+fn what_emits_and_has_cut_outs_is_no_light() {
+    let text = "[material.glow]\nemission = 3\nalpha = 'leaf.pgm'\n[[sphere]]\ncentre = [3, 0, 0]\n\
+                radius = 1\nmaterial = 'glow'\n[[mesh]]\nmaterial = 'glow'\n\
+                quad = { corner = [0, 0, 0], edges = [[1, 0, 0], [0, 1, 0]] }\n";
+    let loaded = cut(text).expect("a scene");
+    let world = &loaded.world;
+    assert_eq!((world.lights.len(), world.meshes.len(), world.spheres.len()), (0, 1, 1));
+    assert_eq!(loaded.warnings.len(), 2);
+    assert!(loaded.warnings.iter().all(|w| w.message.contains("has cut-outs")));
+}
+
+#[test]
+fn glass_with_alpha_is_refused_at_the_key() {
+    let error = cut("[material.pane]\nglass = {}\nalpha = 'leaf.pgm'\n").expect_err("refused");
+    let Error::Input(fault) = error else { panic!("{error}") };
+    assert_eq!(fault.line, Some(4));
+    assert!(fault.message.contains("glass has no cut-outs"), "{fault}");
 }

@@ -1,0 +1,131 @@
+//! Alpha masks: where a surface is, and where it has holes.
+//!
+//! A mask holds numbers as the image's file stores them, in 8 bits, and only whether they reach a half
+//! matters. Not done: partial cover. A surface is there, or it is not.
+
+use crate::math::{Vec2, bulk};
+use serde::{Deserialize, Serialize};
+
+/// Index into `Scene::masks`.
+pub type MaskId = u32;
+
+/// Half of full alpha. No texel has it: whole numbers lie above or below.
+const HALF: f32 = 127.5;
+
+/// An image's alpha: 0 is a hole, 255 a surface. Row 0 at the top.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AlphaMask {
+    /// The file it came from.
+    pub name: String,
+    /// Columns, at least one.
+    pub width: u32,
+    /// Rows, at least one.
+    pub height: u32,
+    /// `width · height` texels, row by row.
+    #[serde(with = "bulk")]
+    pub texels: Vec<u8>,
+}
+
+impl AlphaMask {
+    /// Whether the surface is there at the texture coordinates `uv`: whether the alpha between the middles of the
+    /// four texels around it, bilinear, is at least a half. The image repeats; (0, 0) is its lower left corner.
+    pub fn is_there(&self, uv: Vec2) -> bool {
+        let (x0, x1, fx) = around(uv.x, self.width);
+        let (y0, y1, fy) = around(1.0 - uv.y, self.height);
+        let at = |x: usize, y: usize| f32::from(self.texels[y * self.width as usize + x]);
+        let between = |a: f32, b: f32, share: f32| a + (b - a) * share;
+        let upper = between(at(x0, y0), at(x1, y0), fx);
+        let lower = between(at(x0, y1), at(x1, y1), fx);
+        between(upper, lower, fy) >= HALF
+    }
+
+    /// Whether it has as many texels as its size says, and any.
+    pub fn is_whole(&self) -> bool {
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        pixels > 0 && pixels == self.texels.len() as u64
+    }
+}
+
+/// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first.
+/// The row repeats. What is no number, or too large to have a fraction, counts as 0.
+fn around(u: f32, n: u32) -> (usize, usize, f32) {
+    const WHOLE_FROM: f32 = 8_388_608.0;
+    let share = if u.abs() < WHOLE_FROM { u - floor(u) } else { 0.0 };
+    let x = share * n as f32 - 0.5;
+    let whole = floor(x);
+    let last = n as usize - 1;
+    let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
+    let second = if first == last { 0 } else { first + 1 };
+    (first, second, x - whole)
+}
+
+/// The whole number at or below `x`, which an `i32` holds. Not `f32::floor`, which may be a call.
+fn floor(x: f32) -> f32 {
+    let towards_zero = x as i32 as f32;
+    if x < towards_zero { towards_zero - 1.0 } else { towards_zero }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mask(width: u32, texels: &[u8]) -> AlphaMask {
+        let height = texels.len() as u32 / width;
+        AlphaMask { name: "mask".into(), width, height, texels: texels.to_vec() }
+    }
+
+    #[test]
+    fn below_a_half_is_a_hole() {
+        for (texel, there) in [(0, false), (127, false), (128, true), (255, true)] {
+            assert_eq!(mask(1, &[texel]).is_there(Vec2::new(0.3, 0.6)), there, "{texel}");
+        }
+    }
+
+    #[test]
+    fn a_checker_is_cut_along_the_edges_of_its_texels() {
+        // Upper row: hole, surface.
+        let checker = mask(2, &[0, 255, 255, 0]);
+        for i in 0..100 {
+            for j in 0..100 {
+                let (u, v) = ((i as f32 + 0.5) / 100.0, (j as f32 + 0.5) / 100.0);
+                let there = (u < 0.5) == (v < 0.5);
+                assert_eq!(checker.is_there(Vec2::new(u, v)), there, "{u} {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_slope_is_cut_where_it_reaches_a_half() {
+        // Texel middles at 0.25 and 0.75: 100 and 200, so a half is reached at 0.25 + 0.5 · 27.5 / 100.
+        let slope = mask(2, &[100, 200]);
+        let edge = 0.25 + 0.5 * 0.275;
+        assert!(!slope.is_there(Vec2::new(edge - 1e-5, 0.5)));
+        assert!(slope.is_there(Vec2::new(edge + 1e-5, 0.5)));
+    }
+
+    #[test]
+    fn coordinates_repeat_and_never_leave_the_image() {
+        let checker = mask(2, &[0, 255, 255, 0]);
+        for whole in [-3.0, -1.0, 0.0, 1.0, 7.0] {
+            assert!(checker.is_there(Vec2::new(whole + 0.25, 0.25 - whole)));
+            assert!(!checker.is_there(Vec2::new(whole + 0.25, 0.75 - whole)));
+        }
+        for bad in [1e30, -1e30, 8_388_607.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e-30] {
+            // No panic is what counts.
+            let _ = checker.is_there(Vec2::new(bad, bad));
+        }
+    }
+
+    #[test]
+    fn a_mask_is_whole_with_as_many_texels_as_its_size_says() {
+        assert!(mask(2, &[0, 1, 2, 3]).is_whole());
+        let with = |width, height, texels: usize| AlphaMask {
+            name: String::new(),
+            width,
+            height,
+            texels: vec![0; texels],
+        };
+        assert!(!with(2, 2, 3).is_whole() && !with(0, 2, 0).is_whole());
+        assert!(!with(1 << 31, 4, 0).is_whole());
+    }
+}
