@@ -18,6 +18,8 @@ pub struct EffectPlan {
     pub nested_glass: bool,
     /// Some of the glass absorbs light along the way.
     pub absorption: bool,
+    /// Some material shows an image: paths carry how wide they are.
+    pub textures: bool,
     /// Some surface reflects diffusely: the light there can be kept for other frames.
     pub diffuse: bool,
     /// Diffuse or glossy surfaces are lit by area lights with shadow samples.
@@ -47,18 +49,14 @@ impl EffectPlan {
         Self::with_reasons(scene, settings).0
     }
 
-    /// Why each effect runs or not, what only data decide (textures, normals, the lens) among them.
+    /// Why each effect runs or not, what only data decide (normals, the lens) among them.
     pub fn reasons(scene: &Scene, settings: &Settings, lens: &ShotLens) -> Vec<EffectReason> {
         let mut reasons = Self::with_reasons(scene, settings).1;
-        let used = UsedMaterials::of(scene);
         let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
         let (blurs, lens) = lens.reason();
-        let textures =
-            format!("{} in use{}", counted(used.textured, "textured material"), bare(scene));
         let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
         reasons.extend([
-            EffectReason { effect: "textures", runs: used.textured > 0, why: textures },
-            cut_outs(scene, &used),
+            cut_outs(scene, &UsedMaterials::of(scene)),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -72,6 +70,7 @@ impl EffectPlan {
         glass: true,
         nested_glass: true,
         absorption: true,
+        textures: true,
         diffuse: true,
         area_lights: true,
         delta_lights: true,
@@ -120,6 +119,11 @@ impl EffectPlan {
                 "absorption",
                 used.absorbing > 0 && bounces > 0,
                 format!("{} that absorb in use", counted(used.absorbing, "glass material")),
+            ),
+            textures: decide(
+                "textures",
+                used.textured > 0,
+                format!("{} in use{}", counted(used.textured, "textured material"), bare(scene)),
             ),
             diffuse,
             area_lights: decide(

@@ -198,7 +198,7 @@ fn world_bounds(scene: &Scene, meshes: &[&Mesh]) -> Option<[[f64; 3]; 2]> {
 
 fn texture_bytes(scene: &Scene) -> u64 {
     let masks: u64 = scene.masks.iter().map(|mask| mask.texels.len() as u64).sum();
-    masks + scene.textures.iter().map(|t| 12 * t.texels.len() as u64).sum::<u64>()
+    masks + scene.textures.iter().map(|t| t.bytes()).sum::<u64>()
 }
 
 fn mesh_bytes(mesh: &Mesh) -> u64 {

@@ -1,13 +1,13 @@
-//! Image files to textures: linear RGB, f32.
+//! Image files to textures.
 //!
-//! Integer formats are sRGB, by table; Radiance HDR is linear as it stands. Alpha is dropped.
+//! Integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand. Alpha is dropped.
 
 use super::model::Model;
 use crate::error::{Diagnostic, Error, Result};
-use crate::math::Rgb;
+use crate::math::{Rgb, srgb_decode};
 use crate::scene::{Texture, TextureId};
 use crate::stats::Fault;
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -35,18 +35,14 @@ pub(super) fn load_cached(
     loaded
 }
 
-/// Reads an image (png, jpeg, hdr, pnm; the content decides).
+/// Reads an image: bmp, exr, hdr, jpeg, png, pnm, or tga. The content decides, but for tga, which the name tells.
 ///
 /// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than
 /// [`MAX_IMAGE_BYTES`], before memory is asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
     let image = decode(path)?;
-    let (width, height) = (image.width(), image.height());
-    let texels = linear(image);
-    if texels.iter().any(|c| Fault::of(c.to_array()).is_some()) {
-        return Err(bad_pixel(path));
-    }
-    Ok(Texture { name: path.display().to_string(), width, height, texels })
+    let size = [image.width(), image.height()];
+    texture(path.display().to_string(), size, image).ok_or_else(|| bad_pixel(path))
 }
 
 /// The error of an image with a value that is no amount of light.
@@ -65,9 +61,14 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
     limits.max_image_width = Some(1 << 16);
     limits.max_image_height = Some(1 << 16);
     let reader = || {
-        ImageReader::new(std::io::Cursor::new(&bytes))
+        let mut reader = ImageReader::new(std::io::Cursor::new(&bytes))
             .with_guessed_format()
-            .map_err(|e| Error::io("read", path, e))
+            .map_err(|e| Error::io("read", path, e))?;
+        // A tga file does not begin with anything of its own.
+        if let (None, Ok(named)) = (reader.format(), ImageFormat::from_path(path)) {
+            reader.set_format(named);
+        }
+        Ok::<_, Error>(reader)
     };
     // Some decoders ask for memory before they look at the limits: the size comes first.
     let (width, height) = reader()?.into_dimensions().map_err(bad)?;
@@ -82,34 +83,28 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
     decoder.decode().map_err(bad)
 }
 
-fn linear(image: DynamicImage) -> Vec<Rgb> {
+/// The image as it is kept: in codes of 8 bits if it has no more. `None` where a pixel is no light.
+fn texture(name: String, size: [u32; 2], image: DynamicImage) -> Option<Texture> {
     match image {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            image.into_rgb32f().pixels().map(|p| Rgb::from_array(p.0)).collect()
+            let image = image.into_rgb32f();
+            let texels: Vec<Rgb> = image.pixels().map(|p| Rgb::from_array(p.0)).collect();
+            let is_light = texels.iter().all(|c| Fault::of(c.to_array()).is_none());
+            is_light.then(|| Texture::from_linear(name, size, texels))
         }
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
         | DynamicImage::ImageRgb16(_)
         | DynamicImage::ImageRgba16(_) => {
-            let table = srgb_table(65_536);
+            let decode = |code: usize| srgb_decode(code as f64 / 65_535.0) as f32;
+            let table: Vec<f32> = (0..65_536).map(decode).collect();
             let texel = |p: &image::Rgb<u16>| Rgb::from_array(p.0.map(|c| table[c as usize]));
-            image.into_rgb16().pixels().map(texel).collect()
+            let texels = image.into_rgb16().pixels().map(texel).collect();
+            Some(Texture::from_linear(name, size, texels))
         }
         _ => {
-            let table = srgb_table(256);
-            let texel = |p: &image::Rgb<u8>| Rgb::from_array(p.0.map(|c| table[c as usize]));
-            image.into_rgb8().pixels().map(texel).collect()
+            let texels = image.into_rgb8().pixels().map(|p| p.0).collect();
+            Some(Texture::from_srgb(name, size, texels))
         }
     }
-}
-
-/// Linear values of `n` evenly spaced sRGB codes from 0 to 1 (IEC 61966-2-1), rounded once.
-fn srgb_table(n: usize) -> Vec<f32> {
-    let decode = |i: usize| {
-        let code = i as f64 / (n - 1) as f64;
-        let value =
-            if code <= 0.04045 { code / 12.92 } else { libm::pow((code + 0.055) / 1.055, 2.4) };
-        value as f32
-    };
-    (0..n).map(decode).collect()
 }

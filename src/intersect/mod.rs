@@ -8,6 +8,7 @@ mod coincident;
 mod conservative;
 pub mod court;
 pub mod cut_outs;
+mod derivatives;
 mod embree;
 mod facts;
 mod interaction;
@@ -16,6 +17,7 @@ mod sphere;
 mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
+pub use derivatives::{curvature, uv_gradients};
 pub use embree::EmbreeIntersector;
 pub use interaction::{PlaneError, RayEnd, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 pub use oracle::{CourtHit, Oracle};

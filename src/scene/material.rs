@@ -1,13 +1,11 @@
-//! Materials and textures: the parameters of a surface's scattering. How it scatters stands in `shade::lobe`.
+//! Materials: the parameters of a surface's scattering. How it scatters stands in `shade::lobe`.
 
-use super::MaskId;
-use crate::math::{Rgb, bulk};
+use super::{MaskId, TextureMap};
+use crate::math::Rgb;
 use serde::{Deserialize, Serialize};
 
 /// Index into `Scene::materials`.
 pub type MaterialId = u32;
-/// Index into `Scene::textures`.
-pub type TextureId = u32;
 
 /// A surface's parameters. Components add up: the course's materials are diffuse and
 /// mirror-like at once. Reflectances are linear RGB in `[0, 1]`.
@@ -18,7 +16,7 @@ pub struct Material {
     /// Diffuse reflectance (albedo), Lambertian, both sides.
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
-    pub texture: Option<TextureId>,
+    pub texture: Option<TextureMap>,
     /// Mask of its cut-outs: where it says so, the surface is not there. None on glass.
     pub alpha: Option<MaskId>,
     /// Reflectance of a mirror, both sides.
@@ -99,18 +97,4 @@ impl Glass {
     pub fn clear(ior: f64) -> Self {
         Self { ior, tint: Rgb::ONE, absorption: Rgb::ZERO, priority: None }
     }
-}
-
-/// A decoded image, linear RGB, row 0 at the top.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Texture {
-    /// The file it came from.
-    pub name: String,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// `width · height` texels, row by row.
-    #[serde(with = "bulk")]
-    pub texels: Vec<Rgb>,
 }

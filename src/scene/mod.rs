@@ -26,6 +26,7 @@ mod recentring;
 mod reuse;
 mod settings;
 mod spline;
+mod texture;
 mod time;
 mod too_small;
 mod weld;
@@ -41,7 +42,7 @@ pub use light::{
     SpotLight,
 };
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
-pub use material::{Glass, Material, MaterialId, Texture, TextureId};
+pub use material::{Glass, Material, MaterialId};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentring::Recentring;
@@ -49,6 +50,7 @@ pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
     BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
 };
+pub use texture::{Texture, TextureId, TextureLevel, TextureMap, Wrap};
 pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
 pub(crate) use weld::weld;

@@ -86,7 +86,7 @@ impl World {
         meshes.iter_mut().for_each(|mesh| mesh.material += first_material);
         spheres.iter_mut().for_each(|sphere| sphere.material += first_material);
         for texture in materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
-            *texture += first_texture;
+            texture.image += first_texture;
         }
         let first_mask = self.masks.len() as u32;
         for mask in materials.iter_mut().filter_map(|m| m.alpha.as_mut()) {
@@ -217,7 +217,11 @@ mod tests {
         };
         World {
             spheres: vec![WorldSphere::new("ball", DVec3::X, 2.0, 0)],
-            materials: vec![Material { texture: Some(0), alpha: Some(0), ..Material::black("m") }],
+            materials: vec![Material {
+                texture: Some(crate::scene::TextureMap::of(0)),
+                alpha: Some(0),
+                ..Material::black("m")
+            }],
             lights: vec![Light::Quad(light)],
             ..World::default()
         }
@@ -270,19 +274,16 @@ mod tests {
         world.textures = vec![];
         let mut other = with_sphere();
         other.meshes.push(triangle());
-        world.textures.push(crate::scene::Texture {
-            name: "image".into(),
-            width: 1,
-            height: 1,
-            texels: vec![Rgb::ONE],
-        });
+        let image = crate::scene::Texture::from_linear("image", [1, 1], vec![Rgb::ONE]);
+        world.textures.push(image);
         for name in ["fence", "leaf"] {
             let (width, height, texels) = (1, 1, vec![0]);
             world.masks.push(AlphaMask { name: name.into(), width, height, texels });
         }
         world.append(other);
+        let image = |material: &Material| material.texture.expect("a texture").image;
         assert_eq!((world.meshes[0].material, world.spheres[1].material), (1, 1));
-        assert_eq!((world.materials[0].texture, world.materials[1].texture), (Some(0), Some(1)));
+        assert_eq!(world.materials.iter().map(image).collect::<Vec<_>>(), [0, 1]);
         assert_eq!((world.materials[0].alpha, world.materials[1].alpha), (Some(0), Some(2)));
     }
 }

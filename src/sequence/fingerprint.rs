@@ -160,9 +160,9 @@ impl Hash {
     }
 
     fn texture(&mut self, texture: &Texture) {
-        let Texture { name: _, width, height, texels } = texture;
-        self.text(&(width, height));
-        self.array(texels);
+        // Names are for people; the smaller levels follow from the image.
+        self.text(&(texture.levels()[0].width, texture.levels()[0].height));
+        self.array(texture.image_bytes());
     }
 
     fn mask(&mut self, mask: &AlphaMask) {

@@ -6,6 +6,7 @@
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
 use super::adaptive::Until;
+use super::cone::RayCone;
 use super::direct::{ShadowScratch, ShadowStarts};
 use super::highlight::GlossyPoint;
 use super::lobe::{self, Lobe, Scattered};
@@ -14,7 +15,7 @@ use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::{FrameInput, Left, Renderer, dimensions, medium, optics};
 use crate::film::GPixel;
-use crate::intersect::{Hit, Ray, SurfaceInteraction};
+use crate::intersect::{Hit, Ray, SurfaceInteraction, curvature};
 use crate::math::{DVec3, Rgb};
 use crate::scene::MaterialId;
 use crate::stats::{RayCounts, RayKind};
@@ -40,6 +41,8 @@ struct PathState {
     branch: u32,
     /// The cell of lights of the point that a lobe with an extent sent the ray from.
     cell: u32,
+    /// What the ray stands for, where it starts or, once that is known, ends; of no width where no material shows an image.
+    cone: RayCone,
 }
 
 /// Buffers of one worker thread.
@@ -140,14 +143,19 @@ fn camera_rays(
 ) {
     scratch.rays.clear();
     scratch.states.clear();
+    let is_sampled = input.camera.lens.is_sampled();
     for sample in samples {
         for pixel in pixels.active() {
             let (x, y) = pixels.sample_position(pixel as usize, sample);
-            let lens = pixels.lens_position(pixel as usize, sample);
-            scratch.rays.push(input.camera.generate_ray(x, y, lens));
+            let lens = match is_sampled {
+                true => pixels.lens_position(pixel as usize, sample),
+                false => [0.5; 2],
+            };
+            let ray = input.camera.generate_ray(x, y, lens);
             let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
-            let (medium, pdf, cell) = (None, 0.0, 0);
-            let state = PathState { throughput, pixel, sample, medium, pdf, branch, cell };
+            let (medium, pdf, cell, cone) = (None, 0.0, 0, input.cone(&ray));
+            scratch.rays.push(ray);
+            let state = PathState { throughput, pixel, sample, medium, pdf, branch, cell, cone };
             scratch.states.push(state);
         }
     }
@@ -168,6 +176,10 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
         hits.clear();
         hits.resize(rays.len(), None);
         renderer.intersector.intersect_batch(rays, hits, counts);
+        if renderer.plan.textures {
+            let ends = rays.iter().zip(hits.iter()).zip(states.iter_mut());
+            ends.for_each(|((ray, hit), state)| state.widen(ray, hit.as_ref()));
+        }
         if depth == 0 && pixels.wants_records() {
             record(renderer, input, pixels, rays, hits, states);
         }
@@ -294,6 +306,9 @@ impl Vertex<'_, '_> {
             ray = crossing.last.spawn(ray.dir, renderer.settings.rules.spawn_offset);
             self.counts[RayKind::Glass] += 1;
             hit = renderer.intersector.intersect(&ray, self.counts);
+            if renderer.plan.textures {
+                state.widen(&ray, hit.as_ref());
+            }
         }
         // Given up, and not silently.
         self.add(&state, Rgb::NAN);
@@ -321,7 +336,8 @@ impl Vertex<'_, '_> {
             self.add(state, state.throughput * le);
         }
         if lobe::is_diffuse(material) {
-            let reflectance = state.throughput * lobe::albedo(scene, material, &si);
+            let seen = (&si, wo, state.cone);
+            let reflectance = state.throughput * lobe::albedo(scene, material, seen);
             self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
         }
         if !may_bounce {
@@ -370,18 +386,38 @@ impl Vertex<'_, '_> {
             let Some(Scattered { wi: sent, share, tint, transmitted, pdf }) = scattered else {
                 continue;
             };
-            let wi = optics::keep_side(sent, si.ng, outside != transmitted);
+            let wi = optics::keep_side(sent, si.ng, outside != transmitted.is_some());
             // Light samples do not stand for directions that were mirrored.
             let pdf = if wi == sent { pdf as f32 } else { 0.0 };
             let (start, medium) = match transmitted {
-                true => (starts.transmitted, starts.behind),
-                false => (starts.reflected, state.medium),
+                Some(_) => (starts.transmitted, starts.behind),
+                None => (starts.reflected, state.medium),
             };
+            let cone = self.scattered_cone(state.cone, si, outside, transmitted);
             let throughput = state.throughput * share * tint;
             let branch = dimensions::branch(state.branch, child);
-            let next = PathState { throughput, medium, pdf, branch, cell, ..*state };
+            let next = PathState { throughput, medium, pdf, branch, cell, cone, ..*state };
             let sent = self.push::<NESTED>(start, wi, next);
             self.counts[lobe.ray_kind()] += u64::from(sent);
+        }
+    }
+
+    /// `cone` after reflection or, by what has an index of refraction `transmitted` times as large, refraction at `si`.
+    fn scattered_cone(
+        &self,
+        cone: RayCone,
+        si: &SurfaceInteraction,
+        outside: bool,
+        transmitted: Option<f64>,
+    ) -> RayCone {
+        if !self.renderer.plan.textures {
+            return cone;
+        }
+        let outward = curvature(self.renderer.scene, si);
+        let curvature = if outside { outward } else { -outward };
+        match transmitted {
+            Some(eta) => cone.refracted(curvature, eta),
+            None => cone.reflected(curvature),
         }
     }
 
@@ -419,6 +455,12 @@ struct Starts<'w> {
 }
 
 impl PathState {
+    /// Brings the cone to the end of its ray.
+    fn widen(&mut self, ray: &Ray, hit: Option<&Hit>) {
+        let length = hit.map_or(0.0, |hit| hit.t * ray.dir.length());
+        self.cone = self.cone.advanced(length);
+    }
+
     fn place(&self) -> SamplePlace {
         SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
     }
@@ -449,7 +491,7 @@ fn record(
                 depth: scene.recentring.length_to_world(along) as f32,
                 position: scene.recentring.point_to_world(si.p).as_vec3(),
                 normal: normal.as_vec3(),
-                albedo: lobe::albedo(scene, material, &si),
+                albedo: lobe::albedo(scene, material, (&si, -ray.dir, state.cone)),
                 mesh_id: index + 1,
             }
         });

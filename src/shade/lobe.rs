@@ -36,8 +36,8 @@ pub(super) struct Scattered {
     pub share: f32,
     /// The same by wavelength.
     pub tint: Rgb,
-    /// Whether the ray goes on behind the surface.
-    pub transmitted: bool,
+    /// Where the ray goes on behind the surface: the index of refraction there over that before it.
+    pub transmitted: Option<f64>,
     /// Density of the direction among the lobe's, per steradian; 0 of a delta lobe.
     pub pdf: f64,
 }

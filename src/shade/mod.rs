@@ -7,6 +7,7 @@
 //! Not done: light through glass (its shadow is opaque), diffuse interreflection.
 
 mod adaptive;
+mod cone;
 mod dimensions;
 mod direct;
 mod far_lights;
@@ -39,6 +40,7 @@ use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 pub use adaptive::SampleSpread;
 use adaptive::Until;
+use cone::RayCone;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
@@ -207,6 +209,9 @@ struct FrameInput<'a> {
     camera: Camera,
     /// Edge of a pixel at distance 1 along the view axis, scene units.
     pixel_size: f64,
+    /// Spread of the cone of a camera ray along the view axis; 0 where no material shows an image. The samples of a pixel, as
+    /// many as it has at least, cover it side by side.
+    spread: f64,
     stream: u32,
     /// The least number of camera samples of a pixel.
     least: u32,
@@ -226,6 +231,13 @@ struct FrameInput<'a> {
 }
 
 impl FrameInput<'_> {
+    /// The cone of a camera ray (unit direction).
+    #[inline(always)]
+    fn cone(&self, ray: &Ray) -> RayCone {
+        let cos = ray.dir.dot(self.camera.forward);
+        RayCone { width: 0.0, spread: (self.spread * cos) as f32 }
+    }
+
     /// The points, of so many, that source number `at` is traced at.
     fn reached<'u>(&self, at: usize, points: usize, users: &'u LightUsers) -> Reached<'u> {
         let source = &self.lights[at];
@@ -436,6 +448,10 @@ impl Renderer<'_> {
         FrameInput {
             camera: own,
             pixel_size: own.pixel_size(),
+            spread: match self.plan.textures {
+                true => own.pixel_size() / f64::from(self.settings.spp).sqrt(),
+                false => 0.0,
+            },
             stream,
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),

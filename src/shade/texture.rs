@@ -1,27 +1,119 @@
-//! Texture lookups.
+//! Texture lookups, filtered by what the ray covers.
+//!
+//! The ellipse that a ray covers is cut into as many round pieces as it is longer than wide, side by side
+//! along its longer axis (McCormack, Perry, Farkas and Jouppi, 1999), and each is looked up in the two mip levels whose
+//! texels are about as large (Williams, 1983).
 
-use crate::math::{Rgb, Vec2};
-use crate::scene::Texture;
+use crate::math::{DVec2, Rgb, Vec2};
+use crate::scene::{Scene, Texture, TextureLevel, TextureMap, Wrap};
 
-/// Bilinear lookup, repeating; `(0, 0)` is the image's lower left corner.
-pub(super) fn bilinear(texture: &Texture, uv: Vec2) -> Rgb {
-    let (x0, x1, fx) = texels(repeat(uv.x), texture.width);
-    let (y0, y1, fy) = texels(repeat(1.0 - uv.y), texture.height);
-    let at = |x: usize, y: usize| texture.texels[y * texture.width as usize + x];
-    let upper = at(x0, y0).lerp(at(x1, y0), fx);
-    let lower = at(x0, y1).lerp(at(x1, y1), fx);
-    upper.lerp(lower, fy)
+/// Most pieces of an ellipse. A longer one is taken to be wider.
+const MOST_PIECES: f64 = 16.0;
+
+/// The mean of what `map` shows over the ellipse around `uv` with the conjugate diameters `footprint`, both in the
+/// surface's texture coordinates.
+pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
+    let TextureMap { image, wrap, transform } = map;
+    let uv = transform.transform_point2(uv.as_dvec2()).as_vec2();
+    let footprint = footprint.map(|axis| transform.transform_vector2(axis));
+    filtered(&scene.textures[*image as usize], *wrap, uv, footprint)
 }
 
-/// The two texels of `n` in a row between whose middles `u` of [0, 1] lies, and how far from the first.
-fn texels(u: f32, n: u32) -> (usize, usize, f32) {
-    let x = u * n as f32 - 0.5;
-    let whole = floor(x);
-    // The row repeats: before the first texel lies the last.
+/// The mean of `texture` over the ellipse around `uv` with the conjugate diameters `footprint`, both in the image's
+/// coordinates, of which `(0, 0)` is the lower left corner.
+fn filtered(texture: &Texture, wrap: Wrap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
+    let levels = texture.levels();
+    let size = DVec2::new(f64::from(levels[0].width), f64::from(levels[0].height));
+    let ellipse = Ellipse::of(footprint.map(|axis| axis * size));
+    // Texels are larger than what the ray covers. Nor is what is not a number above 1.
+    let is_minified = ellipse.major > 1.0 && ellipse.major < f64::MAX;
+    if !is_minified {
+        return bilinear(&levels[0], wrap, uv);
+    }
+    let minor = ellipse.minor.max(ellipse.major / MOST_PIECES).max(1.0);
+    let pieces = (ellipse.major / minor).ceil();
+    let reach = ellipse.axis / size * (ellipse.major - minor);
+    let level = libm::log2(minor);
+    let mut sum = Rgb::ZERO;
+    for piece in 0..pieces as u32 {
+        let along = (f64::from(piece) + 0.5) / pieces - 0.5;
+        sum += trilinear(levels, wrap, uv + (reach * along).as_vec2(), level);
+    }
+    sum / pieces as f32
+}
+
+/// Principal diameters of an ellipse, texels.
+struct Ellipse {
+    major: f64,
+    minor: f64,
+    /// Unit direction of the longer one.
+    axis: DVec2,
+}
+
+impl Ellipse {
+    /// The ellipse with the conjugate diameters `a` and `b`: the image of a circle under the matrix of these columns, so its
+    /// diameters are the singular values.
+    fn of([a, b]: [DVec2; 2]) -> Self {
+        let (x, y, xy) = (a.x * a.x + b.x * b.x, a.y * a.y + b.y * b.y, a.x * a.y + b.x * b.y);
+        let (mean, half) = (0.5 * (x + y), 0.5 * (x - y));
+        let apart = (half * half + xy * xy).sqrt();
+        let major = (mean + apart).sqrt();
+        let minor = if major > 0.0 { a.perp_dot(b).abs() / major } else { 0.0 };
+        // Of two forms of the eigenvector the one that is not a difference of equal numbers.
+        let axis =
+            if half >= 0.0 { DVec2::new(half + apart, xy) } else { DVec2::new(xy, apart - half) };
+        Self { major, minor, axis: axis.try_normalize().unwrap_or(DVec2::X) }
+    }
+}
+
+/// Lookup between two of `levels`; `level` is at least 0.
+fn trilinear(levels: &[TextureLevel], wrap: Wrap, uv: Vec2, level: f64) -> Rgb {
+    let last = levels.len() - 1;
+    let whole = level as usize;
+    if whole >= last {
+        return bilinear(&levels[last], wrap, uv);
+    }
+    let fine = bilinear(&levels[whole], wrap, uv);
+    let fraction = (level - whole as f64) as f32;
+    match fraction {
+        0.0 => fine,
+        _ => fine.lerp(bilinear(&levels[whole + 1], wrap, uv), fraction),
+    }
+}
+
+/// Bilinear lookup in one level.
+#[inline(always)]
+fn bilinear(level: &TextureLevel, wrap: Wrap, uv: Vec2) -> Rgb {
+    let (x0, x1, fx) = texels(uv.x, level.width, wrap);
+    let (y0, y1, fy) = texels(1.0 - uv.y, level.height, wrap);
+    let [a, b, c, d] = level.four([x0, x1], [y0, y1]);
+    a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
+}
+
+/// The two texels of `n` in a row between whose middles `u` lies, and how far from the first.
+#[inline(always)] // Up to 64 times in a lookup.
+fn texels(u: f32, n: u32, wrap: Wrap) -> (usize, usize, f32) {
     let last = n as usize - 1;
-    let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
-    let second = if first < last { first + 1 } else { 0 };
-    (first, second, x - whole)
+    let clamped = |u: f32| {
+        let x = (u * n as f32 - 0.5).clamp(0.0, last as f32);
+        let first = x as usize;
+        (first, (first + 1).min(last), x - first as f32)
+    };
+    match wrap {
+        Wrap::Repeat => {
+            let x = repeat(u) * n as f32 - 0.5;
+            let whole = floor(x);
+            // Before the first texel lies the last.
+            let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
+            let second = if first < last { first + 1 } else { 0 };
+            (first, second, x - whole)
+        }
+        Wrap::Clamp => clamped(if u.is_nan() { 0.0 } else { u.clamp(0.0, 1.0) }),
+        Wrap::Mirror => {
+            let there_and_back = 2.0 * repeat(0.5 * u);
+            clamped(there_and_back.min(2.0 - there_and_back))
+        }
+    }
 }
 
 /// The fraction of a coordinate; 0 beyond f32's whole numbers, and of what is not a number.
@@ -41,25 +133,92 @@ fn floor(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn checker() -> Texture {
-        let texels = vec![Rgb::ZERO, Rgb::ONE, Rgb::ONE, Rgb::ZERO];
-        Texture { name: "checker".into(), width: 2, height: 2, texels }
+    const POINT: [DVec2; 2] = [DVec2::ZERO; 2];
+
+    fn checker(edge: u32) -> Texture {
+        let texels = (0..edge * edge).map(|i| Rgb::splat(((i % edge + i / edge) % 2) as f32));
+        Texture::from_linear("checker", [edge, edge], texels.collect())
     }
 
     #[test]
     fn texel_middles_are_exact_and_v_points_up() {
         // Upper row: black, white.
-        assert_eq!(bilinear(&checker(), Vec2::new(0.25, 0.75)), Rgb::ZERO);
-        assert_eq!(bilinear(&checker(), Vec2::new(0.75, 0.75)), Rgb::ONE);
-        assert_eq!(bilinear(&checker(), Vec2::new(0.25, 0.25)), Rgb::ONE);
+        let at = |u, v| filtered(&checker(2), Wrap::Repeat, Vec2::new(u, v), POINT);
+        assert_eq!(at(0.25, 0.75), Rgb::ZERO);
+        assert_eq!(at(0.75, 0.75), Rgb::ONE);
+        assert_eq!(at(0.25, 0.25), Rgb::ONE);
     }
 
     #[test]
     fn coordinates_repeat_and_never_leave_the_image() {
+        let tiny = [DVec2::splat(1e-300), DVec2::ZERO];
+        let unknown = [DVec2::splat(f64::NAN), DVec2::X];
+        let wide = [DVec2::splat(1e200), DVec2::splat(f64::INFINITY)];
+        let huge = [DVec2::splat(1e30), DVec2::new(1.0, -1e30)];
         for uv in [(1.25, 0.75), (-0.75, -0.25), (1e30, 0.0), (f32::NAN, f32::INFINITY)] {
-            let c = bilinear(&checker(), Vec2::new(uv.0, uv.1));
-            assert!(c.is_finite(), "{uv:?}");
+            for footprint in [POINT, tiny, unknown, wide, huge] {
+                for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+                    let c = filtered(&checker(2), wrap, Vec2::new(uv.0, uv.1), footprint);
+                    assert!(c.is_finite(), "{uv:?} {footprint:?} {wrap:?}");
+                }
+            }
         }
-        assert_eq!(bilinear(&checker(), Vec2::new(1.25, 0.75)), Rgb::ZERO);
+        let once_more = filtered(&checker(2), Wrap::Repeat, Vec2::new(1.25, 0.75), POINT);
+        assert_eq!(once_more, Rgb::ZERO);
+    }
+
+    #[test]
+    fn beyond_its_edges_an_image_goes_on_as_it_is_told() {
+        let ramp = (0..4).map(|i| Rgb::splat(i as f32)).collect();
+        let texture = Texture::from_linear("ramp", [4, 1], ramp);
+        let at = |wrap, u| filtered(&texture, wrap, Vec2::new(u, 0.5), POINT).x;
+        let middles = [-0.375, -0.125, 0.125, 0.875, 1.125, 1.375, 1.875, 2.125];
+        for (wrap, expected) in [
+            (Wrap::Repeat, [2.0, 3.0, 0.0, 3.0, 0.0, 1.0, 3.0, 0.0]),
+            (Wrap::Clamp, [0.0, 0.0, 0.0, 3.0, 3.0, 3.0, 3.0, 3.0]),
+            (Wrap::Mirror, [1.0, 0.0, 0.0, 3.0, 3.0, 2.0, 0.0, 0.0]),
+        ] {
+            assert_eq!(middles.map(|u| at(wrap, u)), expected, "{wrap:?}");
+        }
+        // Texels on both sides of an edge are mixed as those of the image that follows.
+        assert_eq!(at(Wrap::Repeat, 1.0), 1.5);
+        assert_eq!(at(Wrap::Mirror, 1.0), 3.0);
+    }
+
+    #[test]
+    fn an_ellipse_has_its_principal_diameters() {
+        for turn in [0.0, 0.3, 1.0, 2.0, 3.0] {
+            let (sin, cos) = (libm::sin(turn), libm::cos(turn));
+            let (major, minor) = (DVec2::new(cos, sin) * 5.0, DVec2::new(-sin, cos) * 2.0);
+            // Conjugate diameters of the same ellipse.
+            for phase in [0.0, 0.7, 2.5] {
+                let (s, c) = (libm::sin(phase), libm::cos(phase));
+                let ellipse = Ellipse::of([major * c + minor * s, minor * c - major * s]);
+                assert!((ellipse.major - 5.0).abs() < 1e-12);
+                assert!((ellipse.minor - 2.0).abs() < 1e-12);
+                assert!(ellipse.axis.perp_dot(major).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn what_lies_far_away_has_the_mean_colour() {
+        let texture = checker(64);
+        for (u, v) in [(0.1, 0.2), (0.77, 0.5)] {
+            let far = [DVec2::new(0.5, 0.1), DVec2::new(0.0, 0.06)];
+            let seen = filtered(&texture, Wrap::Repeat, Vec2::new(u, v), far);
+            assert!((seen - Rgb::splat(0.5)).abs().max_element() < 1e-6, "{seen}");
+        }
+    }
+
+    #[test]
+    fn a_long_footprint_blurs_along_itself_alone() {
+        // Stripes of four texels across u.
+        let stripe = |i: u32| Rgb::splat(((i % 64 / 4) % 2) as f32);
+        let texture = Texture::from_linear("stripes", [64, 64], (0..4096).map(stripe).collect());
+        let (long, short) = (DVec2::splat(0.25), DVec2::splat(1.0 / 64.0));
+        let at = |axes| filtered(&texture, Wrap::Repeat, Vec2::new(6.0 / 64.0, 0.4), axes);
+        assert_eq!(at([long * DVec2::Y, short * DVec2::X]), Rgb::ONE);
+        assert!((at([long * DVec2::X, short * DVec2::Y]) - Rgb::splat(0.5)).abs().x < 0.05);
     }
 }

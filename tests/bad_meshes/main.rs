@@ -98,5 +98,5 @@ pub(crate) fn sound(model: &Model) {
     assert!(world.spheres.iter().all(|s| s.radius > 0.0 && s.centre.is_finite()));
     assert!(world.spheres.iter().all(|s| (s.material as usize) < world.materials.len()));
     let textures = world.materials.iter().filter_map(|m| m.texture);
-    assert!(textures.into_iter().all(|t| (t as usize) < world.textures.len()));
+    assert!(textures.into_iter().all(|t| (t.image as usize) < world.textures.len()));
 }

@@ -17,7 +17,9 @@ use super::texture::{self, TextureCache};
 use super::{lamps, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DVec3, Rgb, Vec2};
-use crate::scene::{Corners, Light, Material, MaterialId, SphereLight, WorldMesh, WorldSphere};
+use crate::scene::{
+    Corners, Light, Material, MaterialId, SphereLight, TextureMap, WorldMesh, WorldSphere,
+};
 use statements::{CourseMaterial, Face, File};
 use std::path::Path;
 
@@ -57,7 +59,7 @@ fn convert(
     out.emits_back = true;
     if let Some((line, name)) = &source.texture {
         match texture::load_cached(&source::beside(path, name), textures, model) {
-            Ok(id) => (out.texture, out.diffuse) = (Some(id), Rgb::ONE),
+            Ok(id) => (out.texture, out.diffuse) = (Some(TextureMap::of(id)), Rgb::ONE),
             Err(error) => {
                 let message = format!("texture left out: {error}");
                 model.warnings.push(Diagnostic::new(path, message).line(*line));

@@ -10,7 +10,7 @@ use super::model::Model;
 use super::source;
 use super::texture::{self, TextureCache};
 use crate::error::{Diagnostic, Result};
-use crate::scene::MaterialId;
+use crate::scene::{MaterialId, TextureMap};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -101,7 +101,7 @@ impl Libraries {
             let file = source::beside(&entry.library, image);
             match texture::load_cached(&file, &mut self.textures, model) {
                 Ok(id) => {
-                    material.texture = Some(id);
+                    material.texture = Some(TextureMap::of(id));
                     material.diffuse = meaning::textured(&entry.parsed);
                 }
                 Err(error) => {

@@ -5,11 +5,13 @@ use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
 use super::report::Source;
+use super::texture::NamedTexture;
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::{self, Model, emission, untextured};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
-use std::collections::BTreeMap;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Triangles that all generators of a scene file may make together: some 5 GB of memory, and as
@@ -23,6 +25,8 @@ pub(super) struct Builder<'a> {
     pub warnings: Vec<Diagnostic>,
     /// Every file read, the scene file first, each once.
     pub files: Vec<PathBuf>,
+    /// Images that no material has asked for yet.
+    images: HashMap<PathBuf, Result<scene::Texture>>,
     materials: BTreeMap<&'a str, Named>,
     default_material: Option<MaterialId>,
     generated: u64,
@@ -32,6 +36,14 @@ struct Named {
     id: MaterialId,
     span: Span,
     used: bool,
+}
+
+/// The images of all materials of `file`, each once, read on all threads.
+fn images(source: &Source, file: &SceneFile) -> HashMap<PathBuf, Result<scene::Texture>> {
+    let textures = file.material.values().filter_map(|material| material.texture.as_ref());
+    let path = |texture| import::source::beside(&source.path, &NamedTexture::file(texture).value);
+    let paths: BTreeSet<PathBuf> = textures.map(path).collect();
+    paths.into_par_iter().map(|path| (path.clone(), import::load_texture(&path))).collect()
 }
 
 impl<'a> Builder<'a> {
@@ -44,6 +56,7 @@ impl<'a> Builder<'a> {
             world: World::default(),
             warnings: Vec::new(),
             files: vec![source.path.clone()],
+            images: images(source, file),
             materials: BTreeMap::new(),
             default_material: None,
             generated: 0,
@@ -68,9 +81,10 @@ impl<'a> Builder<'a> {
     }
 
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
-        let texture = material.texture.as_ref().map(|file| self.add_texture(file)).transpose()?;
+        let texture = material.texture.as_ref().map(NamedTexture::file);
+        let image = texture.map(|file| self.add_texture(&file)).transpose()?;
         let alpha = material.alpha.as_ref().map(|file| self.add_mask(file)).transpose()?;
-        let built = material.build(name, self.source, texture, alpha)?;
+        let built = material.build(name, self.source, image, alpha)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
         self.materials.insert(name, Named { id, span: material.span.clone(), used: false });
@@ -83,7 +97,8 @@ impl<'a> Builder<'a> {
         if let Some(known) = self.world.textures.iter().position(same) {
             return Ok(known as scene::TextureId);
         }
-        let texture = import::load_texture(&path).map_err(|e| self.at_key(file, e))?;
+        let loaded = self.images.remove(&path).unwrap_or_else(|| import::load_texture(&path));
+        let texture = loaded.map_err(|e| self.at_key(file, e))?;
         self.note_file(&path);
         self.world.textures.push(texture);
         Ok(self.world.textures.len() as scene::TextureId - 1)

@@ -3,6 +3,7 @@
 use super::at::At;
 use super::number::{Int, Ior, Share};
 use super::report::Source;
+use super::texture::NamedTexture;
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::scene::{self, MaskId, TextureId};
@@ -17,8 +18,8 @@ pub(super) struct Material {
     /// Diffuse reflectance (albedo), linear RGB or one number for grey. Absent: 0, or 1 where
     /// there is a `texture`.
     pub diffuse: Option<Reflectance>,
-    /// Image file, relative to the scene file, that multiplies `diffuse`.
-    pub texture: Option<At<String>>,
+    /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it lies on the surface.
+    pub texture: Option<At<NamedTexture>>,
     /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
     /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
     /// colours, as stored. Not on glass.
@@ -61,12 +62,12 @@ fn window_glass() -> Ior {
 }
 
 impl Material {
-    /// As scene data; `texture` and `alpha` are the indices of the decoded images.
+    /// As scene data; `image` and `alpha` are the indices of the decoded images.
     pub fn build(
         &self,
         name: &str,
         source: &Source,
-        texture: Option<TextureId>,
+        image: Option<TextureId>,
         alpha: Option<MaskId>,
     ) -> Result<scene::Material> {
         self.check(source)?;
@@ -79,7 +80,7 @@ impl Material {
         Ok(scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
-            texture,
+            texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
             alpha,
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),

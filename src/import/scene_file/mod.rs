@@ -23,6 +23,7 @@ mod settings;
 mod shapes;
 #[cfg(test)]
 mod tests;
+mod texture;
 mod time;
 mod transform;
 mod vector;

@@ -28,14 +28,14 @@ impl Dielectric {
             wi: optics::reflect(wo, n),
             share: split.reflectance as f32,
             tint: Rgb::ONE,
-            transmitted: false,
+            transmitted: None,
             pdf: 0.0,
         };
         let refracted = split.refracted.map(|wi| Scattered {
             wi,
             share: (1.0 - split.reflectance) as f32,
             tint: self.tint,
-            transmitted: true,
+            transmitted: Some(self.eta),
             pdf: 0.0,
         });
         [Some(reflected), refracted]

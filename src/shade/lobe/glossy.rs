@@ -62,7 +62,7 @@ impl Glossy {
         let [cos_o, cos_i, _] = self.cosines(wo, wi)?;
         let share = shadowed(self.alpha, cos_o, cos_i) as f32;
         let pdf = self.pdf(wo, wi);
-        Some(Scattered { wi, share, tint: self.tint, transmitted: false, pdf })
+        Some(Scattered { wi, share, tint: self.tint, transmitted: None, pdf })
     }
 
     /// Cosines between the normal and `wo`, `wi` and the microfacet between them; `None` where one of the

@@ -20,6 +20,6 @@ impl Mirror {
     #[inline(always)]
     pub fn sample(&self, wo: DVec3, n: DVec3) -> Scattered {
         let (wi, tint) = (optics::reflect(wo, n), self.reflectance);
-        Scattered { wi, share: 1.0, tint, transmitted: false, pdf: 0.0 }
+        Scattered { wi, share: 1.0, tint, transmitted: None, pdf: 0.0 }
     }
 }

@@ -6,7 +6,9 @@ use crate::suite::{Outcome, Size};
 use rayon::prelude::*;
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Corners, Glass, Material, Sky, Texture, World, WorldMesh, WorldSphere};
+use tweenray::scene::{
+    Corners, Glass, Material, Sky, Texture, TextureMap, World, WorldMesh, WorldSphere,
+};
 
 fn glass(tint: f32, priority: Option<u8>) -> Material {
     let glass = Glass { tint: Rgb::splat(tint), priority, ..Glass::clear(1.5) };
@@ -17,12 +19,7 @@ fn glass(tint: f32, priority: Option<u8>) -> Material {
 fn unit_sphere(material: Material, exact: bool) -> World {
     let mut world = World::default();
     world.materials.push(material);
-    world.textures.push(Texture {
-        name: "white".into(),
-        width: 2,
-        height: 2,
-        texels: vec![Rgb::ONE; 4],
-    });
+    world.textures.push(Texture::from_linear("white", [2, 2], vec![Rgb::ONE; 4]));
     if exact {
         world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, 0));
     } else {
@@ -57,7 +54,10 @@ fn furnaces() -> Vec<(String, World, f32)> {
             let half = grey * 0.5;
             add("diffuse and mirror", Material { mirror: half, ..Material::diffuse("dm", half) });
             if !exact {
-                add("textured", Material { texture: Some(0), ..Material::diffuse("t", grey) });
+                add(
+                    "textured",
+                    Material { texture: Some(TextureMap::of(0)), ..Material::diffuse("t", grey) },
+                );
             }
         }
     }

@@ -9,7 +9,7 @@ use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, DirectionalLight, Glass, Light, Material, PointLight, QuadLight, Sky, SphereLight,
-    Texture, World, WorldSphere,
+    Texture, TextureMap, World, WorldSphere,
 };
 
 /// Everything that has a parameter, side by side.
@@ -22,11 +22,10 @@ fn world() -> World {
         Material { mirror: Rgb::splat(0.7), ..Material::black("mirror") },
         Material { glass: Some(glass), ..Material::black("glass") },
         Material { glass: Some(ranked), ..Material::black("ranked") },
-        Material { texture: Some(0), ..Material::diffuse("poster", Rgb::ONE) },
+        Material { texture: Some(TextureMap::of(0)), ..Material::diffuse("poster", Rgb::ONE) },
         Material { emission: Rgb::splat(0.8), emits_back: true, ..Material::black("glow") },
     ];
-    let texels = vec![Rgb::splat(0.6); 16];
-    world.textures.push(Texture { name: "poster".into(), width: 4, height: 4, texels });
+    world.textures.push(Texture::from_linear("poster", [4, 4], vec![Rgb::splat(0.6); 16]));
     let p = DVec3::new;
     let floor = [p(-4.0, 0.0, 3.0), p(4.0, 0.0, 3.0), p(4.0, 0.0, -3.0), p(-4.0, 0.0, -3.0)];
     world.meshes.push(common::quad(floor, 0));
@@ -68,6 +67,10 @@ fn quad(world: &mut World) -> &mut QuadLight {
     quad
 }
 
+fn poster(world: &mut World, colour: Rgb) {
+    world.textures[0] = Texture::from_linear("poster", [4, 4], vec![colour; 16]);
+}
+
 /// Sites whose value is light or a share of it, one channel or all.
 const LIGHT: [Site; 20] = [
     ("diffuse", |w, v| w.materials[0].diffuse.y = v),
@@ -78,8 +81,8 @@ const LIGHT: [Site; 20] = [
     ("ranked glass tint", |w, v| w.materials[3].glass.as_mut().unwrap().tint = Rgb::splat(v)),
     ("glass ior", |w, v| w.materials[2].glass.as_mut().unwrap().ior = v.into()),
     ("ranked glass ior", |w, v| w.materials[3].glass.as_mut().unwrap().ior = v.into()),
-    ("texture", |w, v| w.textures[0].texels.fill(Rgb::splat(v))),
-    ("texture, red", |w, v| w.textures[0].texels.iter_mut().for_each(|t| t.x = v)),
+    ("texture", |w, v| poster(w, Rgb::splat(v))),
+    ("texture, red", |w, v| poster(w, Rgb::new(v, 0.6, 0.6))),
     ("textured diffuse", |w, v| w.materials[4].diffuse = Rgb::splat(v)),
     ("emission", |w, v| w.materials[5].emission.z = v),
     ("quad light", |w, v| quad(w).radiance = Rgb::splat(v)),

@@ -285,6 +285,10 @@ const TOGETHER: &[Case] = &[
     ("[[mesh]]\nfile = ¦'scene.tml'\n", "cannot read", "did you mean `scene.toml`?"),
     ("[[mesh]]\nfile = ¦'scene.toml'\n", "no mesh format", ".ply"),
     ("[material.a]\ntexture = ¦'wood.png'\n", "cannot read", ""),
+    ("[material.a]\ntexture = ¦{ file = 'wood.png' }\n", "cannot read", ""),
+    ("[material.a]\ntexture = { file = 'a', ¦wrp = 'clamp' }\n", "unknown key `wrp`", "`wrap`"),
+    ("[material.a]\ntexture = { file = 'a', wrap = ¦'tile' }\n", "unknown value `tile`", ""),
+    ("[material.a]\ntexture = { file = 'a', scale = [1, ¦0] }\n", "found 0", ""),
     ("[material.a]\nalpha = ¦'leaf.png'\n", "cannot read", ""),
     ("[material.a]\nalpha = ¦0.5\n", "expected a string", ""),
     (

@@ -1,8 +1,8 @@
 //! Texture coordinates of the shapes, in closed form, what is said of meshes without, and cut-outs.
 
 use super::*;
-use crate::math::{DVec3, Vec2};
-use crate::scene::WorldMesh;
+use crate::math::{DVec2, DVec3, Vec2};
+use crate::scene::{TextureMap, WorldMesh, Wrap};
 
 /// A job whose one mesh is `mesh`, of a material with a texture.
 fn textured(mesh: &str) -> Loaded {
@@ -114,6 +114,27 @@ fn a_mesh_without_texture_coordinates_is_named_with_its_material() {
     let [warning] = &loaded.warnings[..] else { panic!("{:?}", loaded.warnings) };
     assert!(warning.message.contains("`wing`") && warning.message.contains("`paper`"), "{warning}");
     assert_eq!(warning.line, Some(4));
+}
+
+#[test]
+fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("white.ppm"), b"P6 1 1 255\n\xff\xff\xff").expect("written");
+    let text = "[material.a]\ntexture = 'white.ppm'\n[material.b]\ntexture = { file = 'white.ppm', \
+                wrap = 'mirror', scale = [2, 3], rotate = 90, offset = [0.5, 0] }\n\
+                [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n";
+    std::fs::write(at("scene.toml"), text).expect("written");
+    let world = load(&at("scene.toml"), &LoadOptions::default()).expect("a scene").world;
+    let map = |name: &str| {
+        let material = world.materials.iter().find(|m| m.name == name).expect("a material");
+        material.texture.expect("a texture")
+    };
+    assert_eq!(map("a"), TextureMap::of(0));
+    assert_eq!((map("b").image, map("b").wrap), (0, Wrap::Mirror));
+    // Scaled to (2, 6), turned to (-6, 2), moved.
+    let moved = map("b").transform.transform_point2(DVec2::new(1.0, 2.0));
+    assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");
 }
 
 /// Loads a scene file with `text` beside a mask of two texels, `leaf.pgm`, and a triangle without coordinates.

@@ -1,0 +1,125 @@
+//! How texture coordinates and normals change along a surface.
+
+use super::SurfaceInteraction;
+use crate::math::DVec3;
+use crate::scene::{Mesh, Scene};
+use std::f64::consts::{PI, TAU};
+
+/// Gradients of the texture coordinates u and v along the surface at `si`, per unit of length of scene space. Zero
+/// where there are no coordinates; not finite on triangles without area and at a sphere's poles.
+pub fn uv_gradients(scene: &Scene, si: &SurfaceInteraction) -> [DVec3; 2] {
+    match scene.meshes.get(si.prim.geom_id as usize) {
+        Some(mesh) => on_triangle(mesh, si.prim.prim_id as usize),
+        None => on_sphere(scene.spheres[si.prim.prim_id as usize].radius, si.ng),
+    }
+}
+
+/// Curvature at `si` of the surface that the shading normals stand for, the mean of all directions, per unit of length of
+/// scene space: positive where it bulges to the outside, 0 where it is flat.
+pub fn curvature(scene: &Scene, si: &SurfaceInteraction) -> f64 {
+    let Some(mesh) = scene.meshes.get(si.prim.geom_id as usize) else {
+        return 1.0 / scene.spheres[si.prim.prim_id as usize].radius;
+    };
+    let Some(normals) = &mesh.normals else { return 0.0 };
+    let prim = si.prim.prim_id as usize;
+    let p = mesh.corners(prim);
+    let n = normals.get(prim, mesh.triangles[prim]).map(|n| n.as_dvec3());
+    let sum: f64 = [(0, 1), (1, 2), (2, 0)]
+        .into_iter()
+        .map(|(a, b)| (n[b] - n[a]).dot(p[b] - p[a]) / (p[b] - p[a]).length_squared())
+        .sum();
+    let mean = sum / 3.0;
+    // Files differ in the side that normals point to.
+    let outward = (n[0] + n[1] + n[2]).dot(si.ng);
+    if !mean.is_finite() || outward == 0.0 { 0.0 } else { mean * outward.signum() }
+}
+
+fn on_triangle(mesh: &Mesh, prim: usize) -> [DVec3; 2] {
+    let Some(uvs) = &mesh.uvs else { return [DVec3::ZERO; 2] };
+    let [ta, tb, tc] = uvs.get(prim, mesh.triangles[prim]).map(|t| t.as_dvec2());
+    let [a, b, c] = mesh.corners(prim);
+    let (e1, e2) = (b - a, c - a);
+    let n = e1.cross(e2);
+    // The vectors in the plane whose products with the edges are 1 and 0.
+    let area = n.length_squared();
+    let (along1, along2) = (e2.cross(n) / area, n.cross(e1) / area);
+    let (d1, d2) = (tb - ta, tc - ta);
+    [along1 * d1.x + along2 * d2.x, along1 * d1.y + along2 * d2.y]
+}
+
+/// Of longitude and latitude, as [`SurfaceInteraction::uv`] has them, at the unit normal `n`.
+fn on_sphere(radius: f64, n: DVec3) -> [DVec3; 2] {
+    let across = (n.x * n.x + n.z * n.z).sqrt();
+    let u = DVec3::new(n.z, 0.0, -n.x) / (TAU * radius * across * across);
+    let v = (DVec3::Y - n * n.y) / (PI * radius * across);
+    [u, v]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::{Intersector, Oracle, Ray};
+    use crate::math::{Rgb, Vec2, Vec3};
+    use crate::scene::{Corners, Material, Texture, TextureMap, World, WorldMesh, WorldSphere};
+    use crate::stats::RayCounts;
+
+    /// The surface that a ray from `org` along `dir` meets.
+    fn meet(scene: &Scene, org: DVec3, dir: DVec3) -> SurfaceInteraction {
+        let oracle = Oracle::new(scene);
+        let ray = Ray::new(org, dir);
+        let hit = oracle.intersect(&ray, &mut RayCounts::default()).expect("a hit");
+        SurfaceInteraction::new(scene, &ray, &hit)
+    }
+
+    /// Gradients against differences of coordinates of two hits close together.
+    fn check(scene: &Scene, org: DVec3, target: DVec3) {
+        let si = meet(scene, org, target - org);
+        let gradients = uv_gradients(scene, &si);
+        for step in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let step = (step - si.ng * step.dot(si.ng)) * 1e-3;
+            let near = meet(scene, org, si.p + step - org);
+            let moved = near.p - si.p;
+            let expected = (near.uv - si.uv).as_dvec2();
+            let found = [gradients[0].dot(moved), gradients[1].dot(moved)];
+            let error = (found[0] - expected.x).hypot(found[1] - expected.y);
+            assert!(error < 2e-3 * expected.length() + 1e-6, "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn gradients_tell_how_coordinates_change() {
+        let mut world = World::default();
+        let one = Texture::from_linear("t", [1, 1], vec![Rgb::ONE]);
+        world.textures.push(one);
+        let id = world
+            .add_material(Material { texture: Some(TextureMap::of(0)), ..Material::black("m") });
+        world.spheres.push(WorldSphere::new("s", DVec3::new(5.0, 0.0, 0.0), 1.5, id));
+        let p = vec![DVec3::ZERO, DVec3::new(2.0, 0.1, 0.3), DVec3::new(0.4, 1.8, -0.2)];
+        let uvs = vec![Vec2::new(0.1, 0.7), Vec2::new(1.3, 0.2), Vec2::new(-0.4, 2.0)];
+        let mesh = WorldMesh::new("t", p, vec![[0, 1, 2]], id);
+        world.meshes.push(WorldMesh { uvs: Some(Corners { values: uvs, corners: None }), ..mesh });
+        let scene = world.into_scene(false).expect("a scene");
+        check(&scene, DVec3::new(0.5, 0.4, 4.0), DVec3::new(0.6, 0.5, 0.0));
+        check(&scene, DVec3::new(4.0, 3.0, 6.0), DVec3::new(4.6, 0.4, 1.0));
+    }
+
+    #[test]
+    fn a_mesh_of_a_ball_is_curved_as_the_ball_is() {
+        let mut world = World::default();
+        let id = world.add_material(Material::diffuse("m", Rgb::ONE));
+        let p = vec![
+            DVec3::new(0.1, 0.0, 1.0).normalize() * 2.0,
+            DVec3::new(-0.05, 0.1, 1.0).normalize() * 2.0,
+            DVec3::new(-0.05, -0.1, 1.0).normalize() * 2.0,
+        ];
+        for sign in [1.0f32, -1.0] {
+            let values = p.iter().map(|p| p.normalize().as_vec3() * sign).collect::<Vec<Vec3>>();
+            let mesh = WorldMesh::new("ball", p.clone(), vec![[0, 1, 2]], id);
+            world.meshes =
+                vec![WorldMesh { normals: Some(Corners { values, corners: None }), ..mesh }];
+            let scene = world.clone().into_scene(false).expect("a scene");
+            let si = meet(&scene, DVec3::Z * 9.0, -DVec3::Z);
+            assert!((curvature(&scene, &si) - 0.5).abs() < 1e-3);
+        }
+    }
+}

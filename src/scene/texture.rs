@@ -1,0 +1,285 @@
+//! Images that materials show, with their mip levels.
+
+use crate::math::{DAffine2, DVec3, Rgb, bulk, srgb_decode};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
+
+/// Index into `Scene::textures`.
+pub type TextureId = u32;
+
+/// An image and smaller copies of it, down to a single texel (mip levels; Williams, 1983). Row 0 is at the top.
+///
+/// Each texel of a level is the mean, in linear RGB, of what it covers of the level before. The levels
+/// take a third of the memory of the image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Texture {
+    /// The file it came from.
+    pub name: String,
+    /// The image itself first; each half as wide and high as the one before, rounded down.
+    levels: Vec<TextureLevel>,
+}
+
+/// One mip level.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TextureLevel {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width · height` texels, row by row.
+    texels: Texels,
+}
+
+/// Texels as they lie in memory.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+enum Texels {
+    /// sRGB codes of 8 bits, 3 bytes a texel.
+    Srgb(#[serde(with = "bulk")] Vec<[u8; 3]>),
+    /// Linear RGB, 12 bytes a texel.
+    Linear(#[serde(with = "bulk")] Vec<Rgb>),
+}
+
+/// How a material lays an image on a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TextureMap {
+    /// The image.
+    pub image: TextureId,
+    /// What is seen beyond the image's edges.
+    pub wrap: Wrap,
+    /// From the surface's texture coordinates to the image's, of which `(0, 0)` is the lower left corner and
+    /// `(1, 1)` the upper right one.
+    pub transform: DAffine2,
+}
+
+/// What is seen beyond the edges of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Wrap {
+    /// The image again.
+    Repeat,
+    /// The nearest texel of the edge.
+    Clamp,
+    /// The image again, every other one mirrored.
+    Mirror,
+}
+
+impl TextureMap {
+    /// The image where the texture coordinates put it, repeated.
+    pub fn of(image: TextureId) -> Self {
+        Self { image, wrap: Wrap::Repeat, transform: DAffine2::IDENTITY }
+    }
+}
+
+/// Linear values of the sRGB codes of 8 bits, rounded once.
+static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| srgb_decode(code as f64 / 255.0) as f32));
+
+/// The linear values between which a code is the nearest: from `BETWEEN[code - 1]` to `BETWEEN[code]`.
+static BETWEEN: LazyLock<[f32; 255]> =
+    LazyLock::new(|| std::array::from_fn(|code| srgb_decode((code as f64 + 0.5) / 255.0) as f32));
+
+impl Texture {
+    /// A texture of `width · height` sRGB codes, row by row, and its mip levels. These are rounded to codes too.
+    ///
+    /// # Panics
+    /// Where there are not `width · height` texels, or none.
+    pub fn from_srgb(name: impl Into<String>, size: [u32; 2], texels: Vec<[u8; 3]>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Srgb(texels)))
+    }
+
+    /// The same of linear RGB, whose mip levels are not rounded.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_linear(name: impl Into<String>, size: [u32; 2], texels: Vec<Rgb>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Linear(texels)))
+    }
+
+    fn with_levels(name: String, image: TextureLevel) -> Self {
+        let mut levels = vec![image];
+        while let Some(next) = levels.last().and_then(TextureLevel::halved) {
+            levels.push(next);
+        }
+        Self { name, levels }
+    }
+
+    /// The mip levels, the image itself first.
+    pub fn levels(&self) -> &[TextureLevel] {
+        &self.levels
+    }
+
+    /// Bytes of all texels.
+    pub fn bytes(&self) -> u64 {
+        self.levels.iter().map(|level| level.bytes().len() as u64).sum()
+    }
+
+    /// Bytes of the texels of the image itself, from which all else follows; their layout is that of the memory.
+    pub fn image_bytes(&self) -> &[u8] {
+        self.levels[0].bytes()
+    }
+}
+
+impl TextureLevel {
+    fn new([width, height]: [u32; 2], texels: Texels) -> Self {
+        let count = match &texels {
+            Texels::Srgb(codes) => codes.len(),
+            Texels::Linear(values) => values.len(),
+        };
+        assert_eq!(count, width as usize * height as usize, "texels of a texture");
+        assert!(count > 0, "a texture without texels");
+        Self { width, height, texels }
+    }
+
+    /// The texel in `column` and `row`, linear RGB.
+    ///
+    /// # Panics
+    /// Outside of the level.
+    pub fn texel(&self, column: usize, row: usize) -> Rgb {
+        self.four([column; 2], [row; 2])[0]
+    }
+
+    /// The texels in two columns and two rows, row by row, linear RGB.
+    ///
+    /// # Panics
+    /// Outside of the level.
+    #[inline(always)] // Up to 32 times in a lookup.
+    pub fn four(&self, columns: [usize; 2], rows: [usize; 2]) -> [Rgb; 4] {
+        let width = self.width as usize;
+        let ([left, right], [upper, lower]) = (columns, rows);
+        let (upper, lower) = (upper * width, lower * width);
+        match &self.texels {
+            Texels::Srgb(codes) => {
+                let table: &[f32; 256] = &LINEAR;
+                let texel = |at: usize| {
+                    let [r, g, b] = codes[at];
+                    Rgb::new(table[r as usize], table[g as usize], table[b as usize])
+                };
+                [
+                    texel(upper + left),
+                    texel(upper + right),
+                    texel(lower + left),
+                    texel(lower + right),
+                ]
+            }
+            Texels::Linear(values) => [
+                values[upper + left],
+                values[upper + right],
+                values[lower + left],
+                values[lower + right],
+            ],
+        }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match &self.texels {
+            Texels::Srgb(codes) => bytemuck::cast_slice(codes),
+            Texels::Linear(values) => bytemuck::cast_slice(values),
+        }
+    }
+
+    /// The next level; `None` after a single texel.
+    fn halved(&self) -> Option<Self> {
+        if self.width == 1 && self.height == 1 {
+            return None;
+        }
+        let (columns, rows) = (Covered::of(self.width), Covered::of(self.height));
+        let size = [columns.len(), rows.len()];
+        let mean = |place: usize| {
+            let (column, row) = (place % size[0], place / size[0]);
+            let across = |y: usize| -> DVec3 {
+                columns.parts(column).map(|(x, part)| self.texel(x, y).as_dvec3() * part).sum()
+            };
+            rows.parts(row).map(|(y, part)| across(y) * part).sum::<DVec3>().as_vec3()
+        };
+        let means = (0..size[0] * size[1]).into_par_iter().map(mean);
+        let texels = match self.texels {
+            Texels::Srgb(_) => Texels::Srgb(means.map(|mean| mean.to_array().map(code)).collect()),
+            Texels::Linear(_) => Texels::Linear(means.collect()),
+        };
+        Some(Self::new(size.map(|n| n as u32), texels))
+    }
+}
+
+/// Which texels of a row each texel of a row half as long covers.
+struct Covered {
+    /// Texels of the longer row over those of the shorter one: 2, but for odd numbers.
+    ratio: f64,
+    from: usize,
+}
+
+impl Covered {
+    fn of(count: u32) -> Self {
+        let to = (count / 2).max(1);
+        Self { ratio: f64::from(count) / f64::from(to), from: count as usize }
+    }
+
+    fn len(&self) -> usize {
+        (self.from as f64 / self.ratio).round() as usize
+    }
+
+    /// The texels that number `at` covers, each with its part of the whole.
+    fn parts(&self, at: usize) -> impl Iterator<Item = (usize, f64)> {
+        let (start, end) = (at as f64 * self.ratio, (at + 1) as f64 * self.ratio);
+        let ratio = self.ratio;
+        (start as usize..self.from.min(end.ceil() as usize)).filter_map(move |x| {
+            let covered = end.min(x as f64 + 1.0) - start.max(x as f64);
+            (covered > 0.0).then_some((x, covered / ratio))
+        })
+    }
+}
+
+/// The sRGB code nearest to a linear value.
+fn code(linear: f32) -> u8 {
+    BETWEEN.partition_point(|bound| *bound <= linear) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::srgb_encode;
+
+    #[test]
+    fn codes_are_the_nearest() {
+        for c in 0..=255u8 {
+            assert_eq!(code(LINEAR[c as usize]), c);
+        }
+        for i in 0..=10_000 {
+            let linear = i as f32 / 10_000.0;
+            let exact = 255.0 * srgb_encode(f64::from(linear));
+            assert!((f64::from(code(linear)) - exact).abs() < 0.500_1, "{linear}");
+        }
+    }
+
+    #[test]
+    fn every_level_has_the_mean_of_the_image() {
+        for size in [[1, 1], [4, 4], [5, 3], [1, 7], [64, 10], [33, 17]] {
+            let count = size[0] * size[1];
+            let value = |i: u32| Rgb::new(((i * 37) % 11) as f32, ((i * 53) % 7) as f32, 1.0);
+            let texture = Texture::from_linear("t", size, (0..count).map(value).collect());
+            let mean = |level: &TextureLevel| {
+                let rows = 0..level.height as usize;
+                let sum: DVec3 = rows
+                    .flat_map(|y| (0..level.width as usize).map(move |x| (x, y)))
+                    .map(|(x, y)| level.texel(x, y).as_dvec3())
+                    .sum();
+                sum / f64::from(level.width * level.height)
+            };
+            let wanted = mean(&texture.levels[0]);
+            for level in &texture.levels {
+                assert!((mean(level) - wanted).abs().max_element() < 1e-5, "{size:?}");
+                assert!(level.texel(0, 0).z == 1.0, "what is the same everywhere stays it");
+            }
+            let last = texture.levels.last().expect("a level");
+            assert_eq!((last.width, last.height), (1, 1));
+        }
+    }
+
+    #[test]
+    fn codes_are_averaged_as_light() {
+        // Half of the light of black and white is code 188, not 128.
+        let texture = Texture::from_srgb("t", [2, 1], vec![[0; 3], [255; 3]]);
+        assert_eq!(texture.levels.len(), 2);
+        assert_eq!(texture.levels[1].texels, Texels::Srgb(vec![[188; 3]]));
+        assert_eq!(texture.bytes(), 9);
+    }
+}
