@@ -35,7 +35,7 @@ pub(super) fn load_cached(
     loaded
 }
 
-/// Reads the mask of an image (png, jpeg, hdr, pnm; the content decides).
+/// Reads the mask of an image, in the formats of [`super::load_texture`].
 ///
 /// Errors: those of [`super::load_texture`].
 pub fn load_mask(path: &Path) -> Result<AlphaMask> {
@@ -45,7 +45,7 @@ pub fn load_mask(path: &Path) -> Result<AlphaMask> {
     Ok(AlphaMask { name: path.display().to_string(), width, height, texels })
 }
 
-/// Alpha in 8 bits; `None` where a value is negative or not finite.
+/// Alpha in 8 bits; `None` where a value that counts is negative or not finite.
 fn texels(image: &DynamicImage) -> Option<Vec<u8>> {
     let colour = image.color();
     let (channels, has_alpha) = (usize::from(colour.channel_count()), colour.has_alpha());
@@ -67,18 +67,17 @@ fn codes<T: Copy + Into<f64>>(
     has_alpha: bool,
     most: f64,
 ) -> Option<Vec<u8>> {
-    let is_value = |x: &T| (0.0..=f64::MAX).contains(&(*x).into());
-    if !samples.iter().all(is_value) {
-        return None;
-    }
     let pixels = || samples.chunks_exact(channels);
     let alpha = |pixel: &[T]| -> f64 { pixel[channels - 1].into() };
-    let cuts = has_alpha && pixels().any(|pixel| alpha(pixel) < most);
+    let cuts = has_alpha && pixels().any(|pixel| alpha(pixel) < most || alpha(pixel).is_nan());
     let colours = channels - usize::from(has_alpha);
     let mean =
         |pixel: &[T]| pixel[..colours].iter().map(|x| (*x).into()).sum::<f64>() / colours as f64;
-    let code = |value: f64| (value / most * 255.0).round().min(255.0) as u8;
-    Some(pixels().map(|pixel| code(if cuts { alpha(pixel) } else { mean(pixel) })).collect())
+    let code = |value: f64| {
+        let is_value = (0.0..=f64::MAX).contains(&value);
+        is_value.then(|| (value / most * 255.0).round().min(255.0) as u8)
+    };
+    pixels().map(|pixel| code(if cuts { alpha(pixel) } else { mean(pixel) })).collect()
 }
 
 #[cfg(test)]

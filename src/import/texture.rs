@@ -27,7 +27,9 @@ pub(super) fn load_cached(
         return known.clone();
     }
     let loaded = load_texture(path).map_err(|e| e.to_string()).map(|texture| {
-        model.files.push(path.to_path_buf());
+        if !model.files.iter().any(|file| file == path) {
+            model.files.push(path.to_path_buf());
+        }
         model.world.textures.push(texture);
         model.world.textures.len() as TextureId - 1
     });

@@ -34,7 +34,10 @@ fn covers_triangle(mask: &AlphaMask, mesh: &Mesh, ray: &Ray, prim_id: u32) -> bo
     let Some(uvs) = &mesh.uvs else { return true };
     let Some(met) = triangle::meet_or_nearest(ray, &mesh.corners(prim)) else { return true };
     let weights = [1.0 - met.u - met.v, met.u, met.v];
-    mask.is_there(uv_at(uvs.get(prim, mesh.triangles[prim]), weights))
+    let at = uvs.get(prim, mesh.triangles[prim]);
+    // A face without coordinates in a file that has some for others: (0, 0) three times.
+    let is_laid = at[0] != at[1] || at[1] != at[2];
+    !is_laid || mask.is_there(uv_at(at, weights))
 }
 
 fn covers_sphere(mask: &AlphaMask, sphere: &Sphere, ray: &Ray, t: f64) -> bool {

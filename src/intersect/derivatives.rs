@@ -22,13 +22,11 @@ pub fn curvature(scene: &Scene, si: &SurfaceInteraction) -> f64 {
     };
     let Some(normals) = &mesh.normals else { return 0.0 };
     let prim = si.prim.prim_id as usize;
-    let p = mesh.corners(prim);
+    let [a, b, c] = mesh.corners(prim);
     let n = normals.get(prim, mesh.triangles[prim]).map(|n| n.as_dvec3());
-    let sum: f64 = [(0, 1), (1, 2), (2, 0)]
-        .into_iter()
-        .map(|(a, b)| (n[b] - n[a]).dot(p[b] - p[a]) / (p[b] - p[a]).length_squared())
-        .sum();
-    let mean = sum / 3.0;
+    // Half of the divergence of the normals.
+    let [along1, along2] = dual(b - a, c - a);
+    let mean = 0.5 * (along1.dot(n[1] - n[0]) + along2.dot(n[2] - n[0]));
     // Files differ in the side that normals point to.
     let outward = (n[0] + n[1] + n[2]).dot(si.ng);
     if !mean.is_finite() || outward == 0.0 { 0.0 } else { mean * outward.signum() }
@@ -38,13 +36,16 @@ fn on_triangle(mesh: &Mesh, prim: usize) -> [DVec3; 2] {
     let Some(uvs) = &mesh.uvs else { return [DVec3::ZERO; 2] };
     let [ta, tb, tc] = uvs.get(prim, mesh.triangles[prim]).map(|t| t.as_dvec2());
     let [a, b, c] = mesh.corners(prim);
-    let (e1, e2) = (b - a, c - a);
-    let n = e1.cross(e2);
-    // The vectors in the plane whose products with the edges are 1 and 0.
-    let area = n.length_squared();
-    let (along1, along2) = (e2.cross(n) / area, n.cross(e1) / area);
+    let [along1, along2] = dual(b - a, c - a);
     let (d1, d2) = (tb - ta, tc - ta);
     [along1 * d1.x + along2 * d2.x, along1 * d1.y + along2 * d2.y]
+}
+
+/// The vectors in the plane of two edges whose products with them are 1 and 0, and 0 and 1.
+fn dual(e1: DVec3, e2: DVec3) -> [DVec3; 2] {
+    let n = e1.cross(e2);
+    let area = n.length_squared();
+    [e2.cross(n) / area, n.cross(e1) / area]
 }
 
 /// Of longitude and latitude, as [`SurfaceInteraction::uv`] has them, at the unit normal `n`.
@@ -101,6 +102,22 @@ mod tests {
         let scene = world.into_scene(false).expect("a scene");
         check(&scene, DVec3::new(0.5, 0.4, 4.0), DVec3::new(0.6, 0.5, 0.0));
         check(&scene, DVec3::new(4.0, 3.0, 6.0), DVec3::new(4.6, 0.4, 1.0));
+    }
+
+    #[test]
+    fn a_cylinder_is_half_as_curved_as_a_ball() {
+        let mut world = World::default();
+        let id = world.add_material(Material::diffuse("m", Rgb::ONE));
+        // Long triangles along the axis y of a cylinder of radius 2.
+        let on = |angle: f64| DVec3::new(libm::sin(angle), 0.0, libm::cos(angle));
+        let p = [(-0.02, -5.0), (0.02, -5.0), (0.0, 5.0)];
+        let positions = p.map(|(angle, y)| on(angle) * 2.0 + DVec3::Y * y).to_vec();
+        let values = p.map(|(angle, _)| on(angle).as_vec3()).to_vec();
+        let mesh = WorldMesh::new("cylinder", positions, vec![[0, 1, 2]], id);
+        world.meshes = vec![WorldMesh { normals: Some(Corners { values, corners: None }), ..mesh }];
+        let scene = world.into_scene(false).expect("a scene");
+        let si = meet(&scene, DVec3::Z * 9.0, -DVec3::Z);
+        assert!((curvature(&scene, &si) - 0.25).abs() < 1e-3, "{}", curvature(&scene, &si));
     }
 
     #[test]

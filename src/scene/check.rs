@@ -4,7 +4,7 @@ use super::{AlphaMask, Material, World, WorldMesh};
 use crate::error::{Error, Result};
 
 impl World {
-    /// Refuses indices of materials, masks and vertices that there are not, glass with cut-outs, and lights and
+    /// Refuses indices of materials, textures, masks and vertices that there are not, glass with cut-outs, and lights and
     /// spheres whose place is no number: no bounds would hold them. (The numbers of meshes are finite by
     /// invariant.)
     pub(super) fn check(&self) -> Result<()> {
@@ -16,9 +16,27 @@ impl World {
             let message = format!("`{name}` is of material {material}, counted from 0, of {count}");
             return Err(Error::Usage(message));
         }
-        self.materials.iter().try_for_each(|material| self.check_mask(material))?;
+        self.materials.iter().try_for_each(|material| {
+            self.check_texture(material)?;
+            self.check_mask(material)
+        })?;
         self.meshes.iter().try_for_each(check_vertices)?;
         self.check_finite()
+    }
+
+    fn check_texture(&self, material: &Material) -> Result<()> {
+        let Some(map) = &material.texture else { return Ok(()) };
+        let (name, count) = (&material.name, self.textures.len());
+        if map.image as usize >= count {
+            let message =
+                format!("`{name}` has the texture {}, counted from 0, of {count}", map.image);
+            return Err(Error::Usage(message));
+        }
+        if !map.transform.is_finite() {
+            let message = format!("the texture of `{name}` lies by numbers that are not finite");
+            return Err(Error::Usage(message));
+        }
+        Ok(())
     }
 
     fn check_mask(&self, material: &Material) -> Result<()> {

@@ -87,6 +87,7 @@ pub(super) enum Until<'p> {
 
 impl Until<'_> {
     /// How many samples the pixel at `at` of the image shall have, the differences among whose samples are `spread`.
+    #[inline(always)]
     pub fn count(&self, at: usize, spread: Option<&SampleSpread>) -> u32 {
         match self {
             Self::Count(count) => *count,

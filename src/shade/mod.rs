@@ -235,7 +235,8 @@ impl FrameInput<'_> {
     #[inline(always)]
     fn cone(&self, ray: &Ray) -> RayCone {
         let cos = ray.dir.dot(self.camera.forward);
-        RayCone { width: 0.0, spread: (self.spread * cos) as f32 }
+        // A pixel off the axis is seen under a solid angle of cos³.
+        RayCone { width: 0.0, spread: (self.spread * cos * cos.sqrt()) as f32 }
     }
 
     /// The points, of so many, that source number `at` is traced at.

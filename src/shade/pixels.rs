@@ -324,9 +324,15 @@ impl BlockPixels {
         self.chunk = start..end;
         self.offsets.clear();
         self.lens.clear();
-        for sampler in &self.film_samplers {
-            self.offsets.extend(offsets_of(most, &input.filter, sampler, self.chunk.clone()));
-            if input.camera.lens.is_sampled() {
+        if most == 1 {
+            self.offsets.resize(self.places.len(), [0.0; 2]);
+        } else {
+            for sampler in &self.film_samplers {
+                self.offsets.extend(offsets_of(most, &input.filter, sampler, self.chunk.clone()));
+            }
+        }
+        if input.camera.lens.is_sampled() {
+            for sampler in &self.film_samplers {
                 self.lens.extend(lens_positions(sampler, self.chunk.clone()));
             }
         }

@@ -14,7 +14,14 @@ const MOST_PIECES: f64 = 16.0;
 /// surface's texture coordinates.
 pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
     let TextureMap { image, wrap, transform } = map;
-    let uv = transform.transform_point2(uv.as_dvec2()).as_vec2();
+    // Whole turns come off before f32 rounds the rest away.
+    let near = |x: f64| match wrap {
+        Wrap::Repeat if x.abs() > 1.0 => x - x.floor(),
+        Wrap::Mirror if x.abs() > 1.0 => x - 2.0 * (0.5 * x).floor(),
+        Wrap::Repeat | Wrap::Mirror | Wrap::Clamp => x,
+    };
+    let uv = transform.transform_point2(uv.as_dvec2());
+    let uv = Vec2::new(near(uv.x) as f32, near(uv.y) as f32);
     let footprint = footprint.map(|axis| transform.transform_vector2(axis));
     filtered(&scene.textures[*image as usize], *wrap, uv, footprint)
 }
@@ -25,18 +32,19 @@ fn filtered(texture: &Texture, wrap: Wrap, uv: Vec2, footprint: [DVec2; 2]) -> R
     let levels = texture.levels();
     let size = DVec2::new(f64::from(levels[0].width), f64::from(levels[0].height));
     let ellipse = Ellipse::of(footprint.map(|axis| axis * size));
-    // Texels are larger than what the ray covers. Nor is what is not a number above 1.
+    // Else texels are larger than what the ray covers, or coordinates have no gradient that could say how large it is.
     let is_minified = ellipse.major > 1.0 && ellipse.major < f64::MAX;
     if !is_minified {
         return bilinear(&levels[0], wrap, uv);
     }
     let minor = ellipse.minor.max(ellipse.major / MOST_PIECES).max(1.0);
     let pieces = (ellipse.major / minor).ceil();
+    // From the middle of the first piece to that of the last.
     let reach = ellipse.axis / size * (ellipse.major - minor);
     let level = libm::log2(minor);
     let mut sum = Rgb::ZERO;
     for piece in 0..pieces as u32 {
-        let along = (f64::from(piece) + 0.5) / pieces - 0.5;
+        let along = f64::from(piece) / (pieces - 1.0).max(1.0) - 0.5;
         sum += trilinear(levels, wrap, uv + (reach * along).as_vec2(), level);
     }
     sum / pieces as f32
@@ -132,6 +140,8 @@ fn floor(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::DAffine2;
+    use crate::scene::World;
 
     const POINT: [DVec2; 2] = [DVec2::ZERO; 2];
 
@@ -208,6 +218,39 @@ mod tests {
             let far = [DVec2::new(0.5, 0.1), DVec2::new(0.0, 0.06)];
             let seen = filtered(&texture, Wrap::Repeat, Vec2::new(u, v), far);
             assert!((seen - Rgb::splat(0.5)).abs().max_element() < 1e-6, "{seen}");
+        }
+    }
+
+    #[test]
+    fn pieces_cover_the_ellipse_from_end_to_end() {
+        // One white column far from the next: it is seen from as far as half of the ellipse and of a texel.
+        let white = |i: u32| Rgb::splat(if i % 64 == 32 { 1.0 } else { 0.0 });
+        let texture = Texture::from_linear("line", [64, 64], (0..4096).map(white).collect());
+        let seen = |texels: f64| {
+            let long = [DVec2::new(8.0 / 64.0, 0.0), DVec2::new(0.0, 1.0 / 64.0)];
+            let u = (32.5 + texels) / 64.0;
+            filtered(&texture, Wrap::Repeat, Vec2::new(u as f32, 0.5), long).x
+        };
+        assert!(seen(0.0) > 0.12 && seen(3.4) > 0.12, "{} {}", seen(0.0), seen(3.4));
+        assert!(seen(4.6) == 0.0);
+    }
+
+    #[test]
+    fn coordinates_far_away_keep_their_fraction() {
+        let scene = |image| Scene {
+            textures: vec![image],
+            ..World::default().into_scene(false).expect("a scene")
+        };
+        let ramp = (0..64).map(|i| Rgb::splat(i as f32)).collect();
+        let scene = scene(Texture::from_linear("ramp", [64, 1], ramp));
+        let transform = DAffine2::from_scale(DVec2::splat(100.0));
+        for (wrap, expected) in [(Wrap::Repeat, 12.3), (Wrap::Mirror, 12.3)] {
+            let map = TextureMap { image: 0, wrap, transform };
+            // 100 · 1.25 = 125 is odd, so what is mirrored runs backwards: at 1.24 it does not.
+            let u = (124.0 + (12.3 + 0.5) / 64.0) / 100.0;
+            let seen = mapped(&scene, &map, Vec2::new(u as f32, 0.5), POINT).x;
+            let rounding = 64.0 * 100.0 * f32::EPSILON;
+            assert!((seen - expected).abs() < rounding, "{wrap:?}: {seen}");
         }
     }
 
