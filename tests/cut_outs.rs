@@ -18,7 +18,7 @@ use tweenray::intersect::{
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
     AlphaMask, CameraPath, HitRules, IntersectorKind, Light, Material, PointLight, Pose, QuadLight,
-    Scene, Settings, Shot, World, WorldMesh, WorldSphere,
+    Scene, Settings, Shot, TextureMap, World, WorldMesh, WorldSphere,
 };
 use tweenray::stats::RayCounts;
 use tweenray::verify::{Check, Class};
@@ -48,7 +48,8 @@ const EDGE: u32 = 4;
 fn card_before_a_wall() -> World {
     let mut world = World::default();
     world.masks.push(checker(EDGE));
-    let black = world.add_material(Material { alpha: Some(0), ..Material::black("card") });
+    let black =
+        world.add_material(Material { alpha: Some(TextureMap::of(0)), ..Material::black("card") });
     let glow = Material { emission: Rgb::ONE, emits_back: true, ..Material::black("wall") };
     let glow = world.add_material(glow);
     let square = |half: f64, z: f64| {
@@ -132,7 +133,8 @@ fn glass_shows_what_is_behind_holes() {
 fn card_above_a_floor(light: Light) -> Job {
     let mut world = World::default();
     world.masks.push(checker(EDGE));
-    let black = world.add_material(Material { alpha: Some(0), ..Material::black("card") });
+    let black =
+        world.add_material(Material { alpha: Some(TextureMap::of(0)), ..Material::black("card") });
     let white = world.add_material(Material::diffuse("floor", Rgb::ONE));
     let square = |half: f64, y: f64| {
         [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
@@ -202,7 +204,7 @@ fn thicket(cut: bool) -> Scene {
     let middles: Vec<DVec3> = (0..600).map(|_| leaves::in_ball(&mut rng) * 3.0).collect();
     let mut world = World::default();
     let white = Material::diffuse("leaf", Rgb::ONE);
-    let leaf = world.add_material(Material { alpha: cut.then_some(0), ..white });
+    let leaf = world.add_material(Material { alpha: cut.then(|| TextureMap::of(0)), ..white });
     world.masks.push(leaves::mask(32));
     world.meshes.push(leaves::cards(&middles, 0.4, &mut rng));
     world.spheres.push(WorldSphere::new("ball", DVec3::new(0.5, 0.2, -0.3), 1.0, leaf));
@@ -304,7 +306,8 @@ fn of_cards_at_one_place_the_lowest_that_is_there_is_hit() {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let corners = corners.map(|(x, y)| DVec3::new(x, y, 0.0));
     for alpha in [Some(0), Some(1), Some(2), None, None] {
-        let white = Material { alpha, ..Material::diffuse("white", Rgb::ONE) };
+        let white =
+            Material { alpha: alpha.map(TextureMap::of), ..Material::diffuse("white", Rgb::ONE) };
         let material = world.add_material(white);
         world.meshes.push(card(corners, material));
     }
@@ -339,7 +342,7 @@ fn a_ray_through_a_hole_of_a_sphere_meets_its_far_side() {
     let mut world = World::default();
     let texels = [0, 255].repeat(4);
     world.masks.push(AlphaMask { name: "stripes".into(), width: 8, height: 1, texels });
-    let white = Material { alpha: Some(0), ..Material::diffuse("white", Rgb::ONE) };
+    let white = Material { alpha: Some(TextureMap::of(0)), ..Material::diffuse("white", Rgb::ONE) };
     let white = world.add_material(white);
     world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, white));
     let scene = world.into_scene(true).unwrap();

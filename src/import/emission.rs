@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn what_has_cut_outs_glows_and_is_no_light() {
         let mut world = world(lamp(vec![[0, 1, 2], [0, 2, 3]], 0.0));
-        world.materials[0].alpha = Some(0);
+        world.materials[0].alpha = Some(crate::scene::TextureMap::of(0));
         world.spheres.push(WorldSphere::new("ball", DVec3::X, 0.5, 0));
         let holes = |name: &str| Note::HasHoles(name.into());
         assert_eq!(adopt(&mut world, 0, 0), [holes("lamp"), holes("ball")]);

@@ -25,7 +25,7 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
     bare.flat_map(|mesh| {
         let material = &world.materials[mesh.material as usize];
         let texture = material.texture.map(|map| world.textures[map.image as usize].name.clone());
-        let mask = material.alpha.map(|id| world.masks[id as usize].name.clone());
+        let mask = material.alpha.map(|map| world.masks[map.image as usize].name.clone());
         let images = texture.map(Image::Texture).into_iter().chain(mask.map(Image::Mask));
         images.map(|image| Untextured::new(mesh, material, image))
     })

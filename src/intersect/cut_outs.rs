@@ -9,7 +9,7 @@
 use super::interaction::{sphere_normal, sphere_uv, uv_at};
 use super::{PrimRef, Ray, sphere, triangle};
 use crate::embree::Holes;
-use crate::scene::{AlphaMask, Mesh, Scene, Sphere};
+use crate::scene::{LaidMask, Mesh, Scene, Sphere};
 
 /// Whether the triangle `prim` is there where the line of `ray` meets it or, where it passes the triangle by, at
 /// the nearest point of the outline. A sphere always is: [`sphere_root`] looks at its roots.
@@ -29,7 +29,7 @@ pub fn sphere_root(scene: &Scene, ray: &Ray, prim: PrimRef) -> Option<f64> {
     sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude, is_there)
 }
 
-fn covers_triangle(mask: &AlphaMask, mesh: &Mesh, ray: &Ray, prim_id: u32) -> bool {
+fn covers_triangle(mask: LaidMask, mesh: &Mesh, ray: &Ray, prim_id: u32) -> bool {
     let prim = prim_id as usize;
     let Some(uvs) = &mesh.uvs else { return true };
     let Some(met) = triangle::meet_or_nearest(ray, &mesh.corners(prim)) else { return true };
@@ -40,7 +40,7 @@ fn covers_triangle(mask: &AlphaMask, mesh: &Mesh, ray: &Ray, prim_id: u32) -> bo
     !is_laid || mask.is_there(uv_at(at, weights))
 }
 
-fn covers_sphere(mask: &AlphaMask, sphere: &Sphere, ray: &Ray, t: f64) -> bool {
+fn covers_sphere(mask: LaidMask, sphere: &Sphere, ray: &Ray, t: f64) -> bool {
     mask.is_there(sphere_uv(sphere_normal(sphere, ray, t)))
 }
 
@@ -51,7 +51,7 @@ fn covers_sphere(mask: &AlphaMask, sphere: &Sphere, ray: &Ray, t: f64) -> bool {
 pub(super) struct CutOuts<'s> {
     scene: &'s Scene,
     /// The mask of each mesh.
-    masks: Vec<Option<&'s AlphaMask>>,
+    masks: Vec<Option<LaidMask<'s>>>,
     /// Primitives and the next lower one at the same place that has holes, ascending.
     behind: Vec<(PrimRef, PrimRef)>,
 }
@@ -71,7 +71,7 @@ impl<'s> CutOuts<'s> {
             Some(None) => true,
             Some(Some(mask)) => {
                 let mesh = &self.scene.meshes[prim.geom_id as usize];
-                covers_triangle(mask, mesh, ray, prim.prim_id)
+                covers_triangle(*mask, mesh, ray, prim.prim_id)
             }
             None => self.covers_root(ray, &self.scene.spheres[prim.prim_id as usize], root),
         }

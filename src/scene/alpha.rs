@@ -3,6 +3,7 @@
 //! A mask holds numbers as the image's file stores them, in 8 bits, and only whether they reach a half
 //! matters. Not done: partial cover. A surface is there, or it is not.
 
+use super::{TextureMap, Wrap};
 use crate::math::{Vec2, bulk};
 use serde::{Deserialize, Serialize};
 
@@ -27,11 +28,11 @@ pub struct AlphaMask {
 }
 
 impl AlphaMask {
-    /// Whether the surface is there at the texture coordinates `uv`: whether the alpha between the middles of the
-    /// four texels around it, bilinear, is at least a half. The image repeats; (0, 0) is its lower left corner.
-    pub fn is_there(&self, uv: Vec2) -> bool {
-        let (x0, x1, fx) = around(uv.x, self.width);
-        let (y0, y1, fy) = around(1.0 - uv.y, self.height);
+    /// Whether the surface is there at `uv`, of which (0, 0) is the lower left corner of the image: whether the alpha
+    /// between the middles of the four texels around it, bilinear, is at least a half.
+    pub fn is_there(&self, wrap: Wrap, uv: Vec2) -> bool {
+        let (x0, x1, fx) = wrap.two_texels(uv.x, self.width);
+        let (y0, y1, fy) = wrap.two_texels(1.0 - uv.y, self.height);
         let at = |x: usize, y: usize| f32::from(self.texels[y * self.width as usize + x]);
         let between = |a: f32, b: f32, share: f32| a + (b - a) * share;
         let upper = between(at(x0, y0), at(x1, y0), fx);
@@ -46,28 +47,24 @@ impl AlphaMask {
     }
 }
 
-/// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first.
-/// The row repeats. What is no number, or too large to have a fraction, counts as 0.
-fn around(u: f32, n: u32) -> (usize, usize, f32) {
-    const WHOLE_FROM: f32 = 8_388_608.0;
-    let share = if u.abs() < WHOLE_FROM { u - floor(u) } else { 0.0 };
-    let x = share * n as f32 - 0.5;
-    let whole = floor(x);
-    let last = n as usize - 1;
-    let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
-    let second = if first == last { 0 } else { first + 1 };
-    (first, second, x - whole)
+/// A mask as it lies on a surface.
+#[derive(Debug, Clone, Copy)]
+pub struct LaidMask<'s> {
+    pub(super) mask: &'s AlphaMask,
+    pub(super) map: &'s TextureMap,
 }
 
-/// The whole number at or below `x`, which an `i32` holds. Not `f32::floor`, which may be a call.
-fn floor(x: f32) -> f32 {
-    let towards_zero = x as i32 as f32;
-    if x < towards_zero { towards_zero - 1.0 } else { towards_zero }
+impl LaidMask<'_> {
+    /// Whether the surface is there at its texture coordinates `uv`.
+    pub fn is_there(&self, uv: Vec2) -> bool {
+        self.mask.is_there(self.map.wrap, self.map.place(uv))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{DAffine2, DVec2};
 
     fn mask(width: u32, texels: &[u8]) -> AlphaMask {
         let height = texels.len() as u32 / width;
@@ -77,7 +74,11 @@ mod tests {
     #[test]
     fn below_a_half_is_a_hole() {
         for (texel, there) in [(0, false), (127, false), (128, true), (255, true)] {
-            assert_eq!(mask(1, &[texel]).is_there(Vec2::new(0.3, 0.6)), there, "{texel}");
+            assert_eq!(
+                mask(1, &[texel]).is_there(Wrap::Repeat, Vec2::new(0.3, 0.6)),
+                there,
+                "{texel}"
+            );
         }
     }
 
@@ -89,7 +90,7 @@ mod tests {
             for j in 0..100 {
                 let (u, v) = ((i as f32 + 0.5) / 100.0, (j as f32 + 0.5) / 100.0);
                 let there = (u < 0.5) == (v < 0.5);
-                assert_eq!(checker.is_there(Vec2::new(u, v)), there, "{u} {v}");
+                assert_eq!(checker.is_there(Wrap::Repeat, Vec2::new(u, v)), there, "{u} {v}");
             }
         }
     }
@@ -99,21 +100,36 @@ mod tests {
         // Texel middles at 0.25 and 0.75: 100 and 200, so a half is reached at 0.25 + 0.5 · 27.5 / 100.
         let slope = mask(2, &[100, 200]);
         let edge = 0.25 + 0.5 * 0.275;
-        assert!(!slope.is_there(Vec2::new(edge - 1e-5, 0.5)));
-        assert!(slope.is_there(Vec2::new(edge + 1e-5, 0.5)));
+        assert!(!slope.is_there(Wrap::Repeat, Vec2::new(edge - 1e-5, 0.5)));
+        assert!(slope.is_there(Wrap::Repeat, Vec2::new(edge + 1e-5, 0.5)));
     }
 
     #[test]
     fn coordinates_repeat_and_never_leave_the_image() {
         let checker = mask(2, &[0, 255, 255, 0]);
         for whole in [-3.0, -1.0, 0.0, 1.0, 7.0] {
-            assert!(checker.is_there(Vec2::new(whole + 0.25, 0.25 - whole)));
-            assert!(!checker.is_there(Vec2::new(whole + 0.25, 0.75 - whole)));
+            assert!(checker.is_there(Wrap::Repeat, Vec2::new(whole + 0.25, 0.25 - whole)));
+            assert!(!checker.is_there(Wrap::Repeat, Vec2::new(whole + 0.25, 0.75 - whole)));
         }
         for bad in [1e30, -1e30, 8_388_607.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e-30] {
             // No panic is what counts.
-            let _ = checker.is_there(Vec2::new(bad, bad));
+            let _ = checker.is_there(Wrap::Repeat, Vec2::new(bad, bad));
         }
+    }
+
+    #[test]
+    fn a_mask_lies_as_its_map_says() {
+        let checker = mask(2, &[0, 255, 255, 0]);
+        let transform = DAffine2::from_scale(DVec2::new(4.0, 1.0));
+        let map = TextureMap { transform, ..TextureMap::of(0) };
+        let laid = LaidMask { mask: &checker, map: &map };
+        // Texels are an eighth wide.
+        for (u, there) in [(0.06, true), (0.19, false), (0.31, true), (0.94, false)] {
+            assert_eq!(laid.is_there(Vec2::new(u, 0.25)), there, "{u}");
+        }
+        let clamped = TextureMap { wrap: Wrap::Clamp, ..map };
+        let laid = LaidMask { mask: &checker, map: &clamped };
+        assert!(!laid.is_there(Vec2::new(0.31, 0.25)));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{AlphaMask, Material, World, WorldMesh};
+use super::{AlphaMask, Material, TextureMap, World, WorldMesh};
 use crate::error::{Error, Result};
 
 impl World {
@@ -32,19 +32,17 @@ impl World {
                 format!("`{name}` has the texture {}, counted from 0, of {count}", map.image);
             return Err(Error::Usage(message));
         }
-        if !map.transform.is_finite() {
-            let message = format!("the texture of `{name}` lies by numbers that are not finite");
-            return Err(Error::Usage(message));
-        }
-        Ok(())
+        check_map(map, "texture", name)
     }
 
     fn check_mask(&self, material: &Material) -> Result<()> {
-        let Some(id) = material.alpha else { return Ok(()) };
+        let Some(map) = &material.alpha else { return Ok(()) };
         let name = &material.name;
-        let Some(mask) = self.masks.get(id as usize) else {
+        check_map(map, "mask", name)?;
+        let Some(mask) = self.masks.get(map.image as usize) else {
             let count = self.masks.len();
-            let message = format!("`{name}` has the mask {id}, counted from 0, of {count}");
+            let message =
+                format!("`{name}` has the mask {}, counted from 0, of {count}", map.image);
             return Err(Error::Usage(message));
         };
         if !mask.is_whole() {
@@ -75,6 +73,14 @@ impl World {
             None => Ok(()),
         }
     }
+}
+
+fn check_map(map: &TextureMap, what: &str, material: &str) -> Result<()> {
+    if map.transform.is_finite() {
+        return Ok(());
+    }
+    let message = format!("the {what} of `{material}` lies by numbers that are not finite");
+    Err(Error::Usage(message))
 }
 
 fn check_vertices(mesh: &WorldMesh) -> Result<()> {
@@ -118,12 +124,13 @@ mod tests {
             let world = World { materials: vec![material], masks, ..World::default() };
             world.into_scene(true).expect_err("no scene").to_string()
         };
-        let leaf = Material { alpha: Some(0), ..Material::diffuse("leaf", Rgb::ONE) };
+        let leaf =
+            Material { alpha: Some(TextureMap::of(0)), ..Material::diffuse("leaf", Rgb::ONE) };
         let mask = AlphaMask { name: "m".into(), width: 2, height: 2, texels: vec![0; 4] };
         assert!(refusal(leaf.clone(), vec![]).contains("`leaf` has the mask 0"));
         let short = AlphaMask { texels: vec![0; 3], ..mask.clone() };
         assert!(refusal(leaf, vec![short]).contains("`m` of 2 x 2 texels has 3"));
-        let pane = Material { alpha: Some(0), ..Material::glass("pane", 1.5) };
+        let pane = Material { alpha: Some(TextureMap::of(0)), ..Material::glass("pane", 1.5) };
         assert!(refusal(pane, vec![mask]).contains("`pane` is glass with cut-outs"));
     }
 }

@@ -1,6 +1,6 @@
 //! Materials: the parameters of a surface's scattering. How it scatters stands in `shade::lobe`.
 
-use super::{MaskId, TextureMap};
+use super::TextureMap;
 use crate::math::Rgb;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub struct Material {
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureMap>,
     /// Mask of its cut-outs: where it says so, the surface is not there. None on glass.
-    pub alpha: Option<MaskId>,
+    pub alpha: Option<TextureMap>,
     /// Reflectance of a mirror, both sides.
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.

@@ -32,7 +32,7 @@ mod too_small;
 mod weld;
 mod winding;
 
-pub use alpha::{AlphaMask, MaskId};
+pub use alpha::{AlphaMask, LaidMask, MaskId};
 pub use aovs::{Aov, Aovs};
 pub use camera::{Camera, Pose};
 pub use job::JobOptions;
@@ -153,13 +153,13 @@ impl Scene {
     }
 
     /// The mask of a surface, if its material has one.
-    pub fn mask(&self, surface: Surface) -> Option<&AlphaMask> {
-        let id = self.materials[surface.material as usize].alpha?;
-        Some(&self.masks[id as usize])
+    pub fn mask(&self, surface: Surface) -> Option<LaidMask<'_>> {
+        let map = self.materials[surface.material as usize].alpha.as_ref()?;
+        Some(LaidMask { mask: &self.masks[map.image as usize], map })
     }
 
     /// The mask that cuts holes into `mesh`: none without texture coordinates, which say where they lie.
-    pub fn mesh_mask(&self, mesh: &Mesh) -> Option<&AlphaMask> {
+    pub fn mesh_mask(&self, mesh: &Mesh) -> Option<LaidMask<'_>> {
         mesh.uvs.as_ref().and_then(|_| self.mask(mesh.surface))
     }
 

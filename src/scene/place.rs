@@ -90,7 +90,7 @@ impl World {
         }
         let first_mask = self.masks.len() as u32;
         for mask in materials.iter_mut().filter_map(|m| m.alpha.as_mut()) {
-            *mask += first_mask;
+            mask.image += first_mask;
         }
         self.meshes.append(&mut meshes);
         self.spheres.append(&mut spheres);
@@ -219,7 +219,7 @@ mod tests {
             spheres: vec![WorldSphere::new("ball", DVec3::X, 2.0, 0)],
             materials: vec![Material {
                 texture: Some(crate::scene::TextureMap::of(0)),
-                alpha: Some(0),
+                alpha: Some(crate::scene::TextureMap::of(0)),
                 ..Material::black("m")
             }],
             lights: vec![Light::Quad(light)],
@@ -284,6 +284,7 @@ mod tests {
         let image = |material: &Material| material.texture.expect("a texture").image;
         assert_eq!((world.meshes[0].material, world.spheres[1].material), (1, 1));
         assert_eq!(world.materials.iter().map(image).collect::<Vec<_>>(), [0, 1]);
-        assert_eq!((world.materials[0].alpha, world.materials[1].alpha), (Some(0), Some(2)));
+        let mask = |material: &Material| material.alpha.expect("a mask").image;
+        assert_eq!(world.materials.iter().map(mask).collect::<Vec<_>>(), [0, 2]);
     }
 }

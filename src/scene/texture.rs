@@ -1,6 +1,6 @@
 //! Images that materials show, with their mip levels.
 
-use crate::math::{DAffine2, DVec3, Rgb, bulk, srgb_decode};
+use crate::math::{DAffine2, DVec3, Rgb, Vec2, bulk, srgb_decode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -43,8 +43,8 @@ enum Texels {
 /// How a material lays an image on a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TextureMap {
-    /// The image.
-    pub image: TextureId,
+    /// The image: index into `Scene::textures`, or into `Scene::masks` where it is a mask.
+    pub image: u32,
     /// What is seen beyond the image's edges.
     pub wrap: Wrap,
     /// From the surface's texture coordinates to the image's, of which `(0, 0)` is the lower left corner and
@@ -65,9 +65,63 @@ pub enum Wrap {
 
 impl TextureMap {
     /// The image where the texture coordinates put it, repeated.
-    pub fn of(image: TextureId) -> Self {
+    pub fn of(image: u32) -> Self {
         Self { image, wrap: Wrap::Repeat, transform: DAffine2::IDENTITY }
     }
+
+    /// The image's coordinates at the surface's texture coordinates `uv`; where the image repeats, less whole
+    /// repetitions, lest f32 rounds the rest away.
+    pub fn place(&self, uv: Vec2) -> Vec2 {
+        let near = |x: f64| match self.wrap {
+            Wrap::Repeat if x.abs() > 1.0 => x - x.floor(),
+            Wrap::Mirror if x.abs() > 1.0 => x - 2.0 * (0.5 * x).floor(),
+            Wrap::Repeat | Wrap::Mirror | Wrap::Clamp => x,
+        };
+        let uv = self.transform.transform_point2(uv.as_dvec2());
+        Vec2::new(near(uv.x) as f32, near(uv.y) as f32)
+    }
+}
+
+impl Wrap {
+    /// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first; the row
+    /// goes from 0 to 1. What is no number, or too large to have a fraction, counts as 0.
+    #[inline(always)] // Up to 64 times in a lookup.
+    pub fn two_texels(self, u: f32, n: u32) -> (usize, usize, f32) {
+        let last = n as usize - 1;
+        let clamped = |u: f32| {
+            let x = (u * n as f32 - 0.5).clamp(0.0, last as f32);
+            let first = x as usize;
+            (first, (first + 1).min(last), x - first as f32)
+        };
+        match self {
+            Self::Repeat => {
+                let x = repeat(u) * n as f32 - 0.5;
+                let whole = floor(x);
+                // Before the first texel lies the last.
+                let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
+                let second = if first < last { first + 1 } else { 0 };
+                (first, second, x - whole)
+            }
+            Self::Clamp => clamped(if u.is_nan() { 0.0 } else { u.clamp(0.0, 1.0) }),
+            Self::Mirror => {
+                let there_and_back = 2.0 * repeat(0.5 * u);
+                clamped(there_and_back.min(2.0 - there_and_back))
+            }
+        }
+    }
+}
+
+/// The fraction of a coordinate; 0 beyond f32's whole numbers, and of what is not a number.
+fn repeat(x: f32) -> f32 {
+    const WHOLE_FROM: f32 = 8_388_608.0;
+    if x.abs() < WHOLE_FROM { x - floor(x) } else { 0.0 }
+}
+
+/// The next whole number below `x`, which an `i32` holds. Not `f32::floor`, which is a call where the
+/// processor's instruction for it cannot be counted on.
+fn floor(x: f32) -> f32 {
+    let whole = x as i32 as f32;
+    if x < whole { whole - 1.0 } else { whole }
 }
 
 /// Linear values of the sRGB codes of 8 bits, rounded once.

@@ -189,8 +189,8 @@ impl Hash {
 mod tests {
     use super::*;
     use crate::math::{Bounds3, DVec3, Rgb, Vec3};
-    use crate::scene::PointLight;
     use crate::scene::{CameraPath, Light, Material, Pose};
+    use crate::scene::{PointLight, TextureMap};
 
     fn world() -> World {
         World {
@@ -229,7 +229,7 @@ mod tests {
             |w| w.meshes[0].triangles[0] = [0, 2, 1],
             |w| w.meshes[0].normals = None,
             |w| w.materials[0].diffuse.x = 0.5,
-            |w| w.materials[0].alpha = Some(0),
+            |w| w.materials[0].alpha = Some(TextureMap::of(0)),
             |w| w.masks[0].texels[1] = 254,
             |w| w.sky.lights = false,
             |w| w.meshes[0].always_traced = true,

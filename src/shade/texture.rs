@@ -14,14 +14,7 @@ const MOST_PIECES: f64 = 16.0;
 /// surface's texture coordinates.
 pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
     let TextureMap { image, wrap, transform } = map;
-    // Whole turns come off before f32 rounds the rest away.
-    let near = |x: f64| match wrap {
-        Wrap::Repeat if x.abs() > 1.0 => x - x.floor(),
-        Wrap::Mirror if x.abs() > 1.0 => x - 2.0 * (0.5 * x).floor(),
-        Wrap::Repeat | Wrap::Mirror | Wrap::Clamp => x,
-    };
-    let uv = transform.transform_point2(uv.as_dvec2());
-    let uv = Vec2::new(near(uv.x) as f32, near(uv.y) as f32);
+    let uv = map.place(uv);
     let footprint = footprint.map(|axis| transform.transform_vector2(axis));
     filtered(&scene.textures[*image as usize], *wrap, uv, footprint)
 }
@@ -92,49 +85,10 @@ fn trilinear(levels: &[TextureLevel], wrap: Wrap, uv: Vec2, level: f64) -> Rgb {
 /// Bilinear lookup in one level.
 #[inline(always)]
 fn bilinear(level: &TextureLevel, wrap: Wrap, uv: Vec2) -> Rgb {
-    let (x0, x1, fx) = texels(uv.x, level.width, wrap);
-    let (y0, y1, fy) = texels(1.0 - uv.y, level.height, wrap);
+    let (x0, x1, fx) = wrap.two_texels(uv.x, level.width);
+    let (y0, y1, fy) = wrap.two_texels(1.0 - uv.y, level.height);
     let [a, b, c, d] = level.four([x0, x1], [y0, y1]);
     a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
-}
-
-/// The two texels of `n` in a row between whose middles `u` lies, and how far from the first.
-#[inline(always)] // Up to 64 times in a lookup.
-fn texels(u: f32, n: u32, wrap: Wrap) -> (usize, usize, f32) {
-    let last = n as usize - 1;
-    let clamped = |u: f32| {
-        let x = (u * n as f32 - 0.5).clamp(0.0, last as f32);
-        let first = x as usize;
-        (first, (first + 1).min(last), x - first as f32)
-    };
-    match wrap {
-        Wrap::Repeat => {
-            let x = repeat(u) * n as f32 - 0.5;
-            let whole = floor(x);
-            // Before the first texel lies the last.
-            let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
-            let second = if first < last { first + 1 } else { 0 };
-            (first, second, x - whole)
-        }
-        Wrap::Clamp => clamped(if u.is_nan() { 0.0 } else { u.clamp(0.0, 1.0) }),
-        Wrap::Mirror => {
-            let there_and_back = 2.0 * repeat(0.5 * u);
-            clamped(there_and_back.min(2.0 - there_and_back))
-        }
-    }
-}
-
-/// The fraction of a coordinate; 0 beyond f32's whole numbers, and of what is not a number.
-fn repeat(x: f32) -> f32 {
-    const WHOLE_FROM: f32 = 8_388_608.0;
-    if x.abs() < WHOLE_FROM { x - floor(x) } else { 0.0 }
-}
-
-/// The next whole number below `x`, which an `i32` holds. Not `f32::floor`, which is a call where the
-/// processor's instruction for it cannot be counted on.
-fn floor(x: f32) -> f32 {
-    let whole = x as i32 as f32;
-    if x < whole { whole - 1.0 } else { whole }
 }
 
 #[cfg(test)]

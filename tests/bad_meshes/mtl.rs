@@ -1,6 +1,7 @@
 //! Material libraries. tobj 4.0.5 panics on some of these when it meets them bare.
 
 use super::{Expect, Expect::*, check, load_bytes};
+use tweenray::scene::TextureMap;
 
 const OBJ: &[u8] = b"mtllib bad.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -132,7 +133,13 @@ fn map_d_cuts_holes_and_is_shared() {
     let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
     let [mask] = &model.world.masks[..] else { panic!("one mask") };
     assert_eq!(mask.texels, [0, 255]);
-    assert!(model.world.materials.iter().all(|m| m.alpha == Some(0) && m.glass.is_none()));
+    assert!(
+        model
+            .world
+            .materials
+            .iter()
+            .all(|m| m.alpha == Some(TextureMap::of(0)) && m.glass.is_none())
+    );
     assert_eq!(model.files.len(), 3);
     // A glowing leaf is no light.
     assert_eq!((model.world.meshes.len(), model.world.lights.len()), (3, 0));

@@ -5,7 +5,7 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use tweenray::math::{DQuat, DVec3, Rgb, Vec2};
-use tweenray::scene::{AlphaMask, Corners, Material, World, WorldMesh};
+use tweenray::scene::{AlphaMask, Corners, Material, TextureMap, World, WorldMesh};
 
 /// A leaf of `edge` x `edge` texels: a disk that covers half of the image, in steps from 0 to 255 at its rim.
 pub fn mask(edge: u32) -> AlphaMask {
@@ -65,7 +65,7 @@ pub fn forest(trees: u32, leaves: u32, cut: bool) -> World {
     }
     let mut world = World::default();
     let leaf = Material::diffuse("leaf", Rgb::new(0.2, 0.5, 0.1));
-    world.add_material(Material { alpha: cut.then_some(0), ..leaf });
+    world.add_material(Material { alpha: cut.then(|| TextureMap::of(0)), ..leaf });
     let white = world.add_material(Material::diffuse("floor", Rgb::splat(0.7)));
     world.masks.push(mask(64));
     world.meshes.push(cards(&middles, 0.06, &mut rng));

@@ -117,7 +117,7 @@ impl Libraries {
                 false => alpha::load_cached(&file, &mut self.masks, model),
             };
             let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
-            material.alpha = mask.map_err(warn).ok();
+            material.alpha = mask.map_err(warn).ok().map(TextureMap::of);
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)

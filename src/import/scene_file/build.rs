@@ -83,8 +83,9 @@ impl<'a> Builder<'a> {
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
         let texture = material.texture.as_ref().map(NamedTexture::file);
         let image = texture.map(|file| self.add_texture(&file)).transpose()?;
-        let alpha = material.alpha.as_ref().map(|file| self.add_mask(file)).transpose()?;
-        let built = material.build(name, self.source, image, alpha)?;
+        let mask = material.alpha.as_ref().map(NamedTexture::file);
+        let mask = mask.map(|file| self.add_mask(&file)).transpose()?;
+        let built = material.build(name, self.source, image, mask)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
         self.materials.insert(name, Named { id, span: material.span.clone(), used: false });

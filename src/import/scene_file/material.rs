@@ -18,12 +18,13 @@ pub(super) struct Material {
     /// Diffuse reflectance (albedo), linear RGB or one number for grey. Absent: 0, or 1 where
     /// there is a `texture`.
     pub diffuse: Option<Reflectance>,
-    /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it lies on the surface.
+    /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it
+    /// lies on the surface.
     pub texture: Option<At<NamedTexture>>,
     /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
     /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
-    /// colours, as stored. Not on glass.
-    pub alpha: Option<At<String>>,
+    /// colours, as stored. Or a table of the file and how it lies on the surface. Not on glass.
+    pub alpha: Option<At<NamedTexture>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
     /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
@@ -62,13 +63,13 @@ fn window_glass() -> Ior {
 }
 
 impl Material {
-    /// As scene data; `image` and `alpha` are the indices of the decoded images.
+    /// As scene data; `image` and `mask` are the indices of the decoded images.
     pub fn build(
         &self,
         name: &str,
         source: &Source,
         image: Option<TextureId>,
-        alpha: Option<MaskId>,
+        mask: Option<MaskId>,
     ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
@@ -81,7 +82,7 @@ impl Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
-            alpha,
+            alpha: self.alpha.as_ref().zip(mask).map(|(alpha, id)| alpha.build(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
             glass,

@@ -290,7 +290,7 @@ const TOGETHER: &[Case] = &[
     ("[material.a]\ntexture = { file = 'a', wrap = ¦'tile' }\n", "unknown value `tile`", ""),
     ("[material.a]\ntexture = { file = 'a', scale = [1, ¦0] }\n", "found 0", ""),
     ("[material.a]\nalpha = ¦'leaf.png'\n", "cannot read", ""),
-    ("[material.a]\nalpha = ¦0.5\n", "expected a string", ""),
+    ("[material.a]\nalpha = ¦0.5\n", "a file name or a table", ""),
     (
         "[[mesh]]\nterrain = {}\ntransform = [¦{ matrix = [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0]] }]\n",
         "flattens",

@@ -161,7 +161,9 @@ fn alpha_is_a_mask_that_materials_share_and_shapes_have_coordinates_for() {
     let world = &loaded.world;
     let [mask] = &world.masks[..] else { panic!("one mask") };
     assert_eq!((mask.width, mask.height, &mask.texels[..]), (2, 1, &[0, 255][..]));
-    assert!(world.materials.iter().all(|m| m.alpha == Some(0) && m.texture.is_none()));
+    assert!(
+        world.materials.iter().all(|m| m.alpha == Some(TextureMap::of(0)) && m.texture.is_none())
+    );
     assert!(world.meshes.iter().all(|mesh| mesh.uvs.is_some()));
     assert_eq!(loaded.files.len(), 2);
 }
