@@ -209,7 +209,7 @@ fn worst_gain(
 }
 
 fn assert_never_worse(case: &Case) {
-    let worst = worst_gain(case, (96, 54), &[8], 2, &[(4, 16)]);
+    let worst = worst_gain(case, (96, 54), &[8], 6, &[(4, 16)]);
     assert!(worst > 0.0, "{}: {worst:.2} dB", case.name);
 }
 

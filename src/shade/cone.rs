@@ -18,6 +18,13 @@ pub(super) struct RayCone {
 }
 
 impl RayCone {
+    /// The cone of a camera ray whose unit direction has the cosine `cos` to the view axis, along which a cone's spread is
+    /// `spread`. A pixel off the axis is seen under a solid angle of cos³.
+    #[inline(always)]
+    pub fn of_camera(spread: f64, cos: f64) -> Self {
+        Self { width: 0.0, spread: (spread * cos * cos.sqrt()) as f32 }
+    }
+
     /// The cone where its ray has gone `length` further, scene space.
     #[inline(always)]
     pub fn advanced(self, length: f64) -> Self {

@@ -145,6 +145,7 @@ fn camera_rays(
     scratch.states.clear();
     let is_sampled = input.camera.lens.is_sampled();
     for sample in samples {
+        let spread = input.spread(sample);
         for pixel in pixels.active() {
             let (x, y) = pixels.sample_position(pixel as usize, sample);
             let lens = match is_sampled {
@@ -153,7 +154,8 @@ fn camera_rays(
             };
             let ray = input.camera.generate_ray(x, y, lens);
             let (throughput, branch) = (Rgb::ONE, dimensions::ROOT);
-            let (medium, pdf, cell, cone) = (None, 0.0, 0, input.cone(&ray));
+            let (medium, pdf, cell, cone) =
+                (None, 0.0, 0, RayCone::of_camera(spread, ray.dir.dot(input.camera.forward)));
             scratch.rays.push(ray);
             let state = PathState { throughput, pixel, sample, medium, pdf, branch, cell, cone };
             scratch.states.push(state);

@@ -32,7 +32,7 @@ mod texture;
 
 use crate::effects::EffectPlan;
 use crate::film::{Film, GPixel, Provenance};
-use crate::inference::{Channels, Inference, TracedPoints};
+use crate::inference::{Channels, Inference, SAMPLES_TOGETHER, TracedPoints};
 use crate::intersect::{Intersector, Ray};
 use crate::math::Rgb;
 use crate::sampling::PixelFilter;
@@ -40,7 +40,6 @@ use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 pub use adaptive::SampleSpread;
 use adaptive::Until;
-use cone::RayCone;
 pub(crate) use direct::ShadowStarts;
 use kernel::Scratch;
 use medium_stack::MediumStack;
@@ -209,9 +208,8 @@ struct FrameInput<'a> {
     camera: Camera,
     /// Edge of a pixel at distance 1 along the view axis, scene units.
     pixel_size: f64,
-    /// Spread of the cone of a camera ray along the view axis; 0 where no material shows an image. The samples of a pixel, as
-    /// many as it has at least, cover it side by side.
-    spread: f64,
+    /// Whether any material shows an image; else no path has a cone.
+    has_textures: bool,
     stream: u32,
     /// The least number of camera samples of a pixel.
     least: u32,
@@ -231,12 +229,16 @@ struct FrameInput<'a> {
 }
 
 impl FrameInput<'_> {
-    /// The cone of a camera ray (unit direction).
-    #[inline(always)]
-    fn cone(&self, ray: &Ray) -> RayCone {
-        let cos = ray.dir.dot(self.camera.forward);
-        // A pixel off the axis is seen under a solid angle of cos³.
-        RayCone { width: 0.0, spread: (self.spread * cos * cos.sqrt()) as f32 }
+    /// The spread along the view axis of the cone of camera sample number `sample`. As many as a pixel has cover it side by
+    /// side; a pixel that goes on after the least number takes narrower ones.
+    fn spread(&self, sample: u32) -> f64 {
+        if !self.has_textures {
+            return 0.0;
+        }
+        let goes_on = sample >= self.least;
+        let together = (sample / SAMPLES_TOGETHER + 1).saturating_mul(SAMPLES_TOGETHER);
+        let count = if goes_on { together } else { self.least };
+        self.pixel_size / f64::from(count).sqrt()
     }
 
     /// The points, of so many, that source number `at` is traced at.
@@ -449,10 +451,7 @@ impl Renderer<'_> {
         FrameInput {
             camera: own,
             pixel_size: own.pixel_size(),
-            spread: match self.plan.textures {
-                true => own.pixel_size() / f64::from(self.settings.spp).sqrt(),
-                false => 0.0,
-            },
+            has_textures: self.plan.textures,
             stream,
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
