@@ -189,6 +189,9 @@ impl<'g> SceneBuilder<'g> {
     }
 
     /// Takes holes out of the surfaces that are added from now on.
+    ///
+    /// Candidates are asked about where [`Holes::are_in`] says so: those of a mesh in Embree's filter, those of
+    /// spheres, whose test is our own, by a flag of each query, as soon as one geometry of spheres has holes.
     pub fn set_holes(&mut self, holes: Box<dyn Holes + 'g>) {
         self.holes = Some(Box::new(Registered::new(holes)));
     }
@@ -269,6 +272,9 @@ impl<'g> SceneBuilder<'g> {
         let mut spheres = spheres.into_boxed_slice();
         // The shim gives a negative radius no bounds, and Embree leaves it out.
         omit.for_each(|prim| spheres[prim as usize].radius = -1.0);
+        if let Some(holes) = &mut self.holes {
+            holes.in_spheres |= holes.are_in(self.next_id);
+        }
         let id = self.add(sys::RTC_GEOMETRY_TYPE_USER, |geometry| {
             // SAFETY: the boxed slice does not move, and the scene that the geometry is attached
             // to is dropped before the box (field order here and in `CommittedScene`).

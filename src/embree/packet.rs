@@ -89,13 +89,14 @@ impl Query {
     pub(super) fn new(rays: &[Ray], flags: QueryFlags, holes: Option<&Registered>) -> Self {
         assert!(holes.is_none() || flags.asked.len() >= rays.len());
         let filter = flags.exclude || !flags.passed.is_empty();
+        let in_spheres = holes.is_some_and(|holes| holes.in_spheres);
         Self {
             rays: rays.as_ptr(),
             asked: flags.asked.as_ptr(),
             passed: flags.passed.as_ptr(),
             holes: holes.map_or(std::ptr::null(), |holes| std::ptr::from_ref(holes).cast()),
             passed_count: flags.passed.len() as u32,
-            flags: u32::from(flags.coherent) | u32::from(filter) << 1,
+            flags: u32::from(flags.coherent) | u32::from(filter) << 1 | u32::from(in_spheres) << 2,
         }
     }
 }
