@@ -7,7 +7,7 @@
 //! A mesh without texture coordinates has no holes, as nothing says where they lie. Not done: partial cover.
 
 use super::interaction::{sphere_normal, sphere_uv, uv_at};
-use super::{PrimRef, Ray, sphere, triangle};
+use super::{PrimRef, Ray, coincident, sphere, triangle};
 use crate::embree::Holes;
 use crate::scene::{LaidMask, Mesh, Scene, Sphere};
 
@@ -26,7 +26,8 @@ pub fn is_there(scene: &Scene, ray: &Ray, prim: PrimRef) -> bool {
 pub fn sphere_root(scene: &Scene, ray: &Ray, prim: PrimRef) -> Option<f64> {
     let s = &scene.spheres[prim.prim_id as usize];
     let is_there = |t| scene.mask(s.surface).is_none_or(|mask| covers_sphere(mask, s, ray, t));
-    sphere::first_root(ray, s.centre, s.radius, prim == ray.exclude, is_there)
+    let leaving = coincident::starts_on(scene, ray, prim);
+    sphere::first_root(ray, s.centre, s.radius, leaving, is_there)
 }
 
 fn covers_triangle(mask: LaidMask, mesh: &Mesh, ray: &Ray, prim_id: u32) -> bool {
@@ -86,6 +87,14 @@ impl<'s> CutOuts<'s> {
         covers_sphere(mask, s, ray, roots[root])
     }
 
+    /// Whether `ray` starts on the sphere `prim` where it meets it.
+    fn is_start(&self, ray: &Ray, prim: PrimRef, root: usize) -> bool {
+        let starts = coincident::starts_on(self.scene, ray, prim);
+        let s = starts.then(|| &self.scene.spheres[prim.prim_id as usize]);
+        let roots = s.and_then(|s| sphere::roots(ray, s.centre, s.radius));
+        roots.is_some_and(|roots| sphere::end_of_leaving(roots) != Some(root))
+    }
+
     fn next_lower(&self, prim: PrimRef) -> Option<PrimRef> {
         let at = self.behind.binary_search_by_key(&prim, |(higher, _)| *higher).ok()?;
         Some(self.behind[at].1)
@@ -101,7 +110,9 @@ impl Holes for CutOuts<'_> {
 
     fn is_there(&self, ray: &Ray, prim: PrimRef, root: usize) -> bool {
         let lower = std::iter::successors(self.next_lower(prim), |prim| self.next_lower(*prim));
-        self.covers(ray, prim, root) && !lower.into_iter().any(|low| self.covers(ray, low, root))
+        self.covers(ray, prim, root)
+            && !lower.into_iter().any(|low| self.covers(ray, low, root))
+            && !self.is_start(ray, prim, root)
     }
 }
 
