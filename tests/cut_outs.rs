@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+#[path = "cut_outs/closed.rs"]
+mod closed;
 #[path = "cut_outs/coincident.rs"]
 mod coincident;
 mod common;
