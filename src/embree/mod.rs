@@ -13,12 +13,11 @@ pub use holes::Holes;
 use holes::Registered;
 pub use options::{BuildOptions, Quality};
 use packet::Query;
-pub use packet::{Packet, PacketHit, QueryFlags};
+pub use packet::{CastRays, Packet, PacketHit, QueryFlags};
 pub use yardstick::{BareCamera, BareTally};
 
 use crate::error::{Error, Result};
 use crate::math::Vec3;
-use crate::ray::Ray;
 use embree4_sys as sys;
 use std::ffi::{CStr, CString, c_void};
 use std::marker::PhantomData;
@@ -355,34 +354,40 @@ impl CommittedScene<'_> {
         format!("{}.{}.{}", v / 10000, v / 100 % 100, v % 100)
     }
 
-    /// Closest hits of the lanes of `packet` that `valid` marks with -1; lane i stands for
-    /// `rays[i]`, whose excluded primitive is honoured with `flags.exclude`.
+    /// Closest hits of the lanes of `packet` that `valid` marks with -1; lane i stands for ray i of `cast`, whose
+    /// excluded primitive is honoured with `flags.exclude`.
+    ///
+    /// # Panics
+    /// Where `cast` has no ray for a lane that `valid` marks.
     pub fn intersect<const W: usize>(
         &self,
         valid: &[i32; W],
         packet: &mut Packet<W>,
-        rays: &[Ray],
+        cast: CastRays,
         flags: QueryFlags,
     ) {
-        packet.check_lanes(valid, rays);
-        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags, self.holes.as_deref()));
+        packet.check_lanes(valid, cast.rays());
+        let (lanes, query) = (Aligned(*valid), Query::new(cast, flags, self.holes.as_deref()));
         let at = std::ptr::from_mut(packet).cast();
         // SAFETY: `Packet<W>` has the layout and alignment of RTCRayHitW (asserted in packet.rs),
-        // `lanes` is aligned, every valid lane has its ray (checked above), and the slices and holes behind
-        // `query` outlive the call.
+        // `lanes` is aligned, every valid lane has its rays (checked above; `CastRays` has as many of both kinds), and the slices
+        // and holes behind `query` outlive the call.
         unsafe { tr_intersect(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }
     }
 
     /// Marks the lanes that anything blocks: their `tfar` becomes minus infinity.
+    ///
+    /// # Panics
+    /// As [`intersect`](Self::intersect).
     pub fn occluded<const W: usize>(
         &self,
         valid: &[i32; W],
         packet: &mut Packet<W>,
-        rays: &[Ray],
+        cast: CastRays,
         flags: QueryFlags,
     ) {
-        packet.check_lanes(valid, rays);
-        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags, self.holes.as_deref()));
+        packet.check_lanes(valid, cast.rays());
+        let (lanes, query) = (Aligned(*valid), Query::new(cast, flags, self.holes.as_deref()));
         let at = std::ptr::from_mut(packet).cast();
         // SAFETY: as for `intersect`; RTCRayW is the front part of RTCRayHitW.
         unsafe { tr_occluded(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }

@@ -26,7 +26,8 @@ use super::cut_outs::CutOuts;
 use super::facts::MeshFacts;
 use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
-    BuildOptions, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder, SphereData,
+    BuildOptions, CastRays, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder,
+    SphereData,
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
@@ -198,9 +199,9 @@ impl<'s> EmbreeIntersector<'s> {
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
-        let asked = std::slice::from_ref(ray);
-        let flags = QueryFlags { coherent: false, exclude, passed, asked };
-        self.committed.intersect(&[-1], &mut packet, std::slice::from_ref(&moved), flags);
+        let cast = CastRays::moved(std::slice::from_ref(&moved), std::slice::from_ref(ray));
+        let flags = QueryFlags { coherent: false, exclude, passed };
+        self.committed.intersect(&[-1], &mut packet, cast, flags);
         packet.hit(0).map(|hit| Candidate { hit, shift })
     }
 
