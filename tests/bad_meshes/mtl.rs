@@ -148,6 +148,26 @@ fn map_d_cuts_holes_and_is_shared() {
 }
 
 #[test]
+fn images_come_in_the_order_in_which_faces_ask_for_them() {
+    let pgm = |texel: u8| [&b"P5 1 1 255\n"[..], &[texel]].concat();
+    let mtl = b"newmtl a\nmap_Kd 1.pgm\nmap_d 2.pgm\nnewmtl b\nmap_Kd 2.pgm\nmap_d gone.pgm\n\
+                newmtl c\nmap_Kd gone.pgm\nmap_d 1.pgm\nnewmtl unused\nmap_Kd gone too.pgm\n";
+    let obj = "mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
+               usemtl c\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\nusemtl a\nf 2/2 3/3 1/1\n";
+    let (one, two) = (pgm(1), pgm(2));
+    let others: &[(&str, &[u8])] = &[("x.mtl", mtl), ("1.pgm", &one), ("2.pgm", &two)];
+    let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
+    let world = &model.world;
+    assert_eq!(world.masks.iter().map(|mask| mask.texels[0]).collect::<Vec<_>>(), [1, 2]);
+    let codes = world.textures.iter().map(|t| t.image_bytes()[0]);
+    assert_eq!(codes.collect::<Vec<_>>(), [2, 1]);
+    let warnings: Vec<_> = model.warnings.iter().map(|warning| &warning.message[..]).collect();
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[0].contains("`c`: texture left out") && warnings[0].contains("gone.pgm"));
+    assert!(warnings[1].contains("`b`: cut-outs left out") && warnings[1].contains("gone.pgm"));
+}
+
+#[test]
 fn image_bombs_are_refused() {
     let bombs: [&[u8]; 3] = [
         b"P6 65000 65000 255\n\0",

@@ -147,6 +147,32 @@ fn cut(text: &str) -> Result<Loaded> {
     load(&at("scene.toml"), &LoadOptions::default())
 }
 
+#[test]
+fn of_several_images_that_are_not_to_be_had_the_first_in_the_file_is_named() {
+    for (text, name) in [
+        ("[material.z]\nalpha = 'no.png'\n[material.a]\ntexture = 'none.png'\n", "no.png"),
+        ("[material.z]\ntexture = 'none.png'\n[material.a]\nalpha = 'no.png'\n", "none.png"),
+        ("[material.a]\nalpha = 'no.png'\ntexture = 'none.png'\n", "no.png"),
+        ("[material.a]\nalpha = 'scene.toml'\ntexture = 'none.png'\n", "scene.toml"),
+    ] {
+        let Err(Error::Input(fault)) = cut(text) else { panic!("{text}") };
+        // The first line is the sky's.
+        assert_eq!(fault.line, Some(3), "{text}: {fault}");
+        assert!(fault.message.contains(name), "{text}: {fault}");
+    }
+}
+
+#[test]
+fn one_image_may_be_texture_and_mask() {
+    let loaded = cut(
+        "[material.leaf]\ntexture = 'leaf.pgm'\nalpha = 'leaf.pgm'\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n",
+    );
+    let loaded = loaded.expect("a scene");
+    assert_eq!((loaded.world.textures.len(), loaded.world.masks.len()), (1, 1));
+    assert_eq!(loaded.files.len(), 2);
+}
+
 const LEAF: &str = "[material.leaf]\ndiffuse = 0.5\nalpha = 'leaf.pgm'\n";
 
 #[test]
