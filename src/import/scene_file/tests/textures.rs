@@ -164,10 +164,8 @@ fn of_several_images_that_are_not_to_be_had_the_first_in_the_file_is_named() {
 
 #[test]
 fn one_image_may_be_texture_and_mask() {
-    let loaded = cut(
-        "[material.leaf]\ntexture = 'leaf.pgm'\nalpha = 'leaf.pgm'\n\
-         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n",
-    );
+    let loaded = cut("[material.leaf]\ntexture = 'leaf.pgm'\nalpha = 'leaf.pgm'\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n");
     let loaded = loaded.expect("a scene");
     assert_eq!((loaded.world.textures.len(), loaded.world.masks.len()), (1, 1));
     assert_eq!(loaded.files.len(), 2);
