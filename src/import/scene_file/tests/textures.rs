@@ -137,6 +137,31 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
     assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");
 }
 
+#[test]
+fn one_number_scales_both_axes() {
+    let scaled = |scale: &str| {
+        let text = format!(
+            "[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             alpha = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n"
+        );
+        let material = cut(&text).expect("a scene").world.materials[0].clone();
+        assert_eq!(material.texture, material.alpha);
+        material.texture.expect("a texture").transform
+    };
+    assert_eq!(scaled("2"), scaled("[2, 2]"));
+    assert_eq!(scaled("-0.5"), scaled("[-0.5, -0.5]"));
+    let refused = |scale: &str| {
+        let text = format!("[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n");
+        let Err(Error::Input(fault)) = cut(&text) else { panic!("{scale}") };
+        assert_eq!(fault.line, Some(3));
+        fault.message
+    };
+    assert!(refused("0").contains("found 0"));
+    assert!(refused("[1, 2, 3]").contains("array of 2 values"));
+    assert!(refused("'x'").contains("a number or an array of 2 numbers"));
+}
+
 /// Loads a scene file with `text` beside a mask of two texels, `leaf.pgm`, and a triangle without coordinates.
 fn cut(text: &str) -> Result<Loaded> {
     let folder = tempfile::tempdir().expect("a folder");
