@@ -3,13 +3,14 @@
 //! into our materials.
 
 mod front;
+mod image;
 mod meaning;
 
 use super::images::{ImageUse, Images};
 use super::model::Model;
 use super::source;
 use crate::error::{Diagnostic, Result};
-use crate::scene::{MaterialId, TextureMap};
+use crate::scene::MaterialId;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -117,7 +118,7 @@ impl Libraries {
             let file = source::beside(&entry.library, image);
             match self.images.place(&file, ImageUse::Texture, &mut model.world, &mut model.files) {
                 Ok(id) => {
-                    material.texture = Some(TextureMap::of(id));
+                    material.texture = Some(entry.source.texture.map(id));
                     material.diffuse = meaning::textured(&entry.parsed);
                 }
                 Err(error) => {
@@ -136,7 +137,7 @@ impl Libraries {
                 }
             };
             let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
-            material.alpha = mask.map_err(warn).ok().map(TextureMap::of);
+            material.alpha = mask.map_err(warn).ok().map(|id| entry.source.mask.map(id));
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)
