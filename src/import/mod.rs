@@ -9,6 +9,7 @@ mod course;
 mod emission;
 mod framing;
 mod generators;
+mod images;
 mod lamps;
 mod lines;
 mod mesh_file;

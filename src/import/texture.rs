@@ -2,47 +2,28 @@
 //!
 //! Integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand. Alpha is dropped.
 
-use super::model::Model;
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{Rgb, srgb_decode};
-use crate::scene::{Texture, TextureId};
+use crate::scene::Texture;
 use crate::stats::Fault;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The largest image that is decoded, bytes of its own pixel format.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
-
-/// Textures that a model has already, or the reason why not.
-pub(super) type TextureCache = HashMap<PathBuf, std::result::Result<TextureId, String>>;
-
-/// As [`load_texture`], once per file of a model; adds texture and file to it.
-pub(super) fn load_cached(
-    path: &Path,
-    cache: &mut TextureCache,
-    model: &mut Model,
-) -> std::result::Result<TextureId, String> {
-    if let Some(known) = cache.get(path) {
-        return known.clone();
-    }
-    let loaded = load_texture(path).map_err(|e| e.to_string()).map(|texture| {
-        if !model.files.iter().any(|file| file == path) {
-            model.files.push(path.to_path_buf());
-        }
-        model.world.textures.push(texture);
-        model.world.textures.len() as TextureId - 1
-    });
-    cache.insert(path.to_path_buf(), loaded.clone());
-    loaded
-}
 
 /// Reads an image: bmp, exr, hdr, jpeg, png, pnm, or tga. The content decides, but for tga, which the name tells.
 ///
 /// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than
 /// [`MAX_IMAGE_BYTES`], before memory is asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
-    let image = decode(path)?;
+    texture_of(path, decode(path)?)
+}
+
+/// The texture of a decoded image.
+///
+/// Errors: a pixel that is no light.
+pub(super) fn texture_of(path: &Path, image: DynamicImage) -> Result<Texture> {
     let size = [image.width(), image.height()];
     texture(path.display().to_string(), size, image).ok_or_else(|| bad_pixel(path))
 }

@@ -26,25 +26,13 @@ impl World {
 
     fn check_texture(&self, material: &Material) -> Result<()> {
         let Some(map) = &material.texture else { return Ok(()) };
-        let (name, count) = (&material.name, self.textures.len());
-        if map.image as usize >= count {
-            let message =
-                format!("`{name}` has the texture {}, counted from 0, of {count}", map.image);
-            return Err(Error::Usage(message));
-        }
-        check_map(map, "texture", name)
+        image_of(map, &self.textures, "texture", &material.name).map(|_| ())
     }
 
     fn check_mask(&self, material: &Material) -> Result<()> {
         let Some(map) = &material.alpha else { return Ok(()) };
         let name = &material.name;
-        check_map(map, "mask", name)?;
-        let Some(mask) = self.masks.get(map.image as usize) else {
-            let count = self.masks.len();
-            let message =
-                format!("`{name}` has the mask {}, counted from 0, of {count}", map.image);
-            return Err(Error::Usage(message));
-        };
+        let mask = image_of(map, &self.masks, "mask", name)?;
         if !mask.is_whole() {
             let AlphaMask { name: mask, width, height, texels } = mask;
             let count = texels.len();
@@ -75,12 +63,17 @@ impl World {
     }
 }
 
-fn check_map(map: &TextureMap, what: &str, material: &str) -> Result<()> {
-    if map.transform.is_finite() {
-        return Ok(());
+/// The image among `images` that a material lays on surfaces, a "texture" or a "mask".
+fn image_of<'w, T>(map: &TextureMap, images: &'w [T], what: &str, material: &str) -> Result<&'w T> {
+    let (at, count) = (map.image, images.len());
+    let image = images.get(at as usize).ok_or_else(|| {
+        Error::Usage(format!("`{material}` has the {what} {at}, counted from 0, of {count}"))
+    })?;
+    if !map.transform.is_finite() {
+        let message = format!("the {what} of `{material}` lies by numbers that are not finite");
+        return Err(Error::Usage(message));
     }
-    let message = format!("the {what} of `{material}` lies by numbers that are not finite");
-    Err(Error::Usage(message))
+    Ok(image)
 }
 
 fn check_vertices(mesh: &WorldMesh) -> Result<()> {

@@ -1,5 +1,6 @@
 //! Checks an MTL file line by line and hands tobj a clean copy of it.
 
+use super::image::MapOptions;
 use crate::error::{Diagnostic, Result};
 use crate::import::lines::{Line, Lines, Words, check_text, number, show};
 use crate::import::source::Fault;
@@ -16,6 +17,10 @@ pub(super) struct Source {
     pub line: usize,
     /// `Tf`: share of light that passes, linear RGB.
     pub filter: Option<[f64; 3]>,
+    /// How the image of `map_Kd` lies on the surface.
+    pub texture: MapOptions,
+    /// The same of `map_d`.
+    pub mask: MapOptions,
 }
 
 /// Reads the materials of a library: the data of this front, and tobj's.
@@ -86,7 +91,8 @@ impl Front {
         }
         self.put(format_args!("newmtl {}", self.sources.len()));
         self.has_dissolve = false;
-        self.sources.push(Source { name, line, filter: None });
+        let (texture, mask) = (MapOptions::default(), MapOptions::default());
+        self.sources.push(Source { name, line, filter: None, texture, mask });
         Ok(())
     }
 
@@ -151,44 +157,16 @@ impl Front {
         Ok(())
     }
 
-    /// `map_Kd [options] file`, or `map_d`. The file's name may hold blanks.
+    /// `map_Kd [options] file`, or `map_d`.
     fn image(
         &mut self,
         keyword: &str,
-        mut words: Words<'_>,
+        words: Words<'_>,
         line: usize,
     ) -> std::result::Result<(), String> {
-        loop {
-            let mut ahead = words;
-            let arguments = match ahead.next() {
-                Some(b"-s" | b"-o" | b"-t") => 3,
-                Some(b"-mm") => 2,
-                Some(
-                    b"-blendu" | b"-blendv" | b"-cc" | b"-clamp" | b"-bm" | b"-boost" | b"-texres"
-                    | b"-imfchan" | b"-type" | b"-colorspace",
-                ) => 1,
-                _ => break,
-            };
-            let option = words.next().unwrap_or_default();
-            self.notes.add(&format!("texture option `{}` is ignored", show(option)), line);
-            for used in 0..arguments {
-                let mut ahead = words;
-                // The second and third number of -s, -o and -t may be left out.
-                let is_value = ahead.next().is_some_and(|w| arguments == 1 || number(w).is_ok());
-                if !is_value && used == 0 {
-                    return Err(format!(
-                        "`{keyword}`: the option `{}` lacks a value",
-                        show(option)
-                    ));
-                }
-                if is_value {
-                    words = ahead;
-                }
-            }
-        }
-        let name = String::from_utf8_lossy(words.rest()).into_owned();
-        if name.is_empty() {
-            return Err(format!("`{keyword}` without a file name"));
+        let (options, name) = MapOptions::read(keyword, words, line, &mut self.notes)?;
+        if let Some(source) = self.sources.last_mut() {
+            *(if keyword == "map_d" { &mut source.mask } else { &mut source.texture }) = options;
         }
         self.put(format_args!("{keyword} {name}"));
         Ok(())

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `Kd`, `map_Kd` | diffuse reflectance, texture |
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
+//! | `-s`, `-o`, `-clamp` of these | how the image lies ([`super::image`]) |
 //! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
 //! | `illum` 3 or 5 with `Ks` | perfect mirror of reflectance `Ks` beside the diffuse part |
 //! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |

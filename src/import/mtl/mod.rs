@@ -3,14 +3,14 @@
 //! into our materials.
 
 mod front;
+mod image;
 mod meaning;
 
-use super::alpha::{self, MaskCache};
+use super::images::{ImageUse, Images};
 use super::model::Model;
 use super::source;
-use super::texture::{self, TextureCache};
 use crate::error::{Diagnostic, Result};
-use crate::scene::{MaterialId, TextureMap};
+use crate::scene::MaterialId;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -18,8 +18,7 @@ use std::path::{Path, PathBuf};
 #[derive(Default)]
 pub(super) struct Libraries {
     entries: HashMap<String, Entry>,
-    textures: TextureCache,
-    masks: MaskCache,
+    images: Images,
     loaded: Vec<PathBuf>,
 }
 
@@ -27,6 +26,18 @@ struct Entry {
     library: PathBuf,
     source: front::Source,
     parsed: tobj::Material,
+}
+
+impl Entry {
+    /// The images that the material asks for.
+    fn images(&self) -> impl Iterator<Item = (PathBuf, ImageUse)> {
+        let is_glass = meaning::of(&self.source, &self.parsed).0.glass.is_some();
+        let mask = self.parsed.dissolve_texture.as_ref().filter(|_| !is_glass);
+        let texture = self.parsed.diffuse_texture.as_ref();
+        let texture = texture.map(|image| (image, ImageUse::Texture)).into_iter();
+        let images = texture.chain(mask.map(|image| (image, ImageUse::Mask)));
+        images.map(|(image, what)| (source::beside(&self.library, image), what))
+    }
 }
 
 impl Libraries {
@@ -77,6 +88,12 @@ impl Libraries {
         Ok(())
     }
 
+    /// Decodes the images of the materials of these names, each once and on all threads.
+    pub fn read_images<'n>(&mut self, names: impl Iterator<Item = &'n str>) {
+        let wanted = names.filter_map(|name| self.entries.get(name)).flat_map(Entry::images);
+        self.images.read(wanted);
+    }
+
     /// Adds the material that `usemtl NAME` on `line` of `obj` asks for to the model's world,
     /// and its images. An unknown name is a warning, and the default material.
     pub fn material(
@@ -99,9 +116,9 @@ impl Libraries {
         model.warnings.extend(notes.into_iter().map(place));
         if let Some(image) = &entry.parsed.diffuse_texture {
             let file = source::beside(&entry.library, image);
-            match texture::load_cached(&file, &mut self.textures, model) {
+            match self.images.place(&file, ImageUse::Texture, &mut model.world, &mut model.files) {
                 Ok(id) => {
-                    material.texture = Some(TextureMap::of(id));
+                    material.texture = Some(entry.source.texture.map(id));
                     material.diffuse = meaning::textured(&entry.parsed);
                 }
                 Err(error) => {
@@ -111,13 +128,16 @@ impl Libraries {
         }
         if let Some(image) = &entry.parsed.dissolve_texture {
             let file = source::beside(&entry.library, image);
-            let is_glass = material.glass.is_some();
-            let mask = match is_glass {
-                true => Err("glass has none, `map_d` is ignored".into()),
-                false => alpha::load_cached(&file, &mut self.masks, model),
+            let mask = match material.glass {
+                Some(_) => Err("glass has none, `map_d` is ignored".into()),
+                None => {
+                    let Model { world, files, .. } = &mut *model;
+                    let mask = self.images.place(&file, ImageUse::Mask, world, files);
+                    mask.map_err(|error| error.to_string())
+                }
             };
             let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
-            material.alpha = mask.map_err(warn).ok().map(TextureMap::of);
+            material.alpha = mask.map_err(warn).ok().map(|id| entry.source.mask.map(id));
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)

@@ -8,10 +8,10 @@ use super::report::Source;
 use super::texture::NamedTexture;
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
+use crate::import::images::{ImageUse, Images};
 use crate::import::{self, Model, emission, untextured};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
-use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Triangles that all generators of a scene file may make together: some 5 GB of memory, and as
@@ -25,8 +25,8 @@ pub(super) struct Builder<'a> {
     pub warnings: Vec<Diagnostic>,
     /// Every file read, the scene file first, each once.
     pub files: Vec<PathBuf>,
-    /// Images that no material has asked for yet.
-    images: HashMap<PathBuf, Result<scene::Texture>>,
+    /// The images of all materials.
+    images: Images,
     materials: BTreeMap<&'a str, Named>,
     default_material: Option<MaterialId>,
     generated: u64,
@@ -36,14 +36,6 @@ struct Named {
     id: MaterialId,
     span: Span,
     used: bool,
-}
-
-/// The images of all materials of `file`, each once, read on all threads.
-fn images(source: &Source, file: &SceneFile) -> HashMap<PathBuf, Result<scene::Texture>> {
-    let textures = file.material.values().filter_map(|material| material.texture.as_ref());
-    let path = |texture| import::source::beside(&source.path, &NamedTexture::file(texture).value);
-    let paths: BTreeSet<PathBuf> = textures.map(path).collect();
-    paths.into_par_iter().map(|path| (path.clone(), import::load_texture(&path))).collect()
 }
 
 impl<'a> Builder<'a> {
@@ -56,11 +48,12 @@ impl<'a> Builder<'a> {
             world: World::default(),
             warnings: Vec::new(),
             files: vec![source.path.clone()],
-            images: images(source, file),
+            images: Images::default(),
             materials: BTreeMap::new(),
             default_material: None,
             generated: 0,
         };
+        this.read_images(file)?;
         for (name, material) in &file.material {
             this.add_material(name, material)?;
         }
@@ -80,11 +73,33 @@ impl<'a> Builder<'a> {
         Ok(this)
     }
 
+    /// Reads the images of all materials on all threads.
+    ///
+    /// Errors: of those that cannot be read, the one that the scene file names first.
+    fn read_images(&mut self, file: &SceneFile) -> Result<()> {
+        let keys = file.material.values().flat_map(|material| {
+            let texture = material.texture.iter().map(|key| (key, ImageUse::Texture));
+            texture.chain(material.alpha.iter().map(|key| (key, ImageUse::Mask)))
+        });
+        let mut keys: Vec<_> = keys
+            .map(|(key, what)| (NamedTexture::file(key), what))
+            .map(|(key, what)| (self.beside(&key), what, key))
+            .collect();
+        keys.sort_by_key(|(.., key)| key.span.start);
+        self.images.read(keys.iter().map(|(path, what, _)| (path.clone(), *what)));
+        for (path, what, key) in &keys {
+            if let Some(error) = self.images.refusal(path, *what) {
+                return Err(self.at_key(key, error));
+            }
+        }
+        Ok(())
+    }
+
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
         let texture = material.texture.as_ref().map(NamedTexture::file);
-        let image = texture.map(|file| self.add_texture(&file)).transpose()?;
+        let image = texture.map(|file| self.image(&file, ImageUse::Texture)).transpose()?;
         let mask = material.alpha.as_ref().map(NamedTexture::file);
-        let mask = mask.map(|file| self.add_mask(&file)).transpose()?;
+        let mask = mask.map(|file| self.image(&file, ImageUse::Mask)).transpose()?;
         let built = material.build(name, self.source, image, mask)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
@@ -92,29 +107,11 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn add_texture(&mut self, file: &At<String>) -> Result<scene::TextureId> {
+    /// The number of the image in the world.
+    fn image(&mut self, file: &At<String>, what: ImageUse) -> Result<u32> {
         let path = self.beside(file);
-        let same = |t: &scene::Texture| Path::new(&t.name) == path;
-        if let Some(known) = self.world.textures.iter().position(same) {
-            return Ok(known as scene::TextureId);
-        }
-        let loaded = self.images.remove(&path).unwrap_or_else(|| import::load_texture(&path));
-        let texture = loaded.map_err(|e| self.at_key(file, e))?;
-        self.note_file(&path);
-        self.world.textures.push(texture);
-        Ok(self.world.textures.len() as scene::TextureId - 1)
-    }
-
-    fn add_mask(&mut self, file: &At<String>) -> Result<scene::MaskId> {
-        let path = self.beside(file);
-        let same = |mask: &scene::AlphaMask| Path::new(&mask.name) == path;
-        if let Some(known) = self.world.masks.iter().position(same) {
-            return Ok(known as scene::MaskId);
-        }
-        let mask = import::load_mask(&path).map_err(|e| self.at_key(file, e))?;
-        self.note_file(&path);
-        self.world.masks.push(mask);
-        Ok(self.world.masks.len() as scene::MaskId - 1)
+        let found = self.images.place(&path, what, &mut self.world, &mut self.files);
+        found.map_err(|error| self.at_key(file, &error))
     }
 
     fn add_mesh(&mut self, mesh: &At<Mesh>) -> Result<()> {
@@ -181,7 +178,7 @@ impl<'a> Builder<'a> {
         let Model { mut world, warnings, files } = import::load_model(&path, mesh.policy())
             .map_err(|e| match e {
                 Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
-                other => self.at_key(file, other),
+                other => self.at_key(file, &other),
             })?;
         files.iter().for_each(|f| self.note_file(f));
         self.warnings.extend(warnings);
@@ -275,11 +272,11 @@ impl<'a> Builder<'a> {
 
     /// `error` about the file that a key names, at the key; with the nearest file's name where
     /// there is none of that name.
-    fn at_key(&self, file: &At<String>, error: Error) -> Error {
-        let missing = matches!(&error, Error::Io { source, .. }
+    fn at_key(&self, file: &At<String>, error: &Error) -> Error {
+        let missing = matches!(error, Error::Io { source, .. }
             if source.kind() == std::io::ErrorKind::NotFound);
         let (message, help) = match error {
-            Error::Input(d) => (format!("{}: {}", d.file.display(), d.message), d.help),
+            Error::Input(d) => (format!("{}: {}", d.file.display(), d.message), d.help.clone()),
             other => (other.to_string(), None),
         };
         let fault = self.source.fault(&file.span, message);

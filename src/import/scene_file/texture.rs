@@ -3,7 +3,7 @@
 use super::at::At;
 use super::number::{Coordinate, Degrees, Factor};
 use super::schema::inline_schema;
-use super::vector::List;
+use super::vector::{List, OneOr};
 use crate::math::{DAffine2, DVec2};
 use crate::scene::{TextureId, TextureMap, Wrap};
 use schemars::{JsonSchema, json_schema};
@@ -21,9 +21,9 @@ pub(super) struct Texture {
     /// What is seen beyond the image's edges.
     #[serde(default)]
     wrap: Wrapping,
-    /// Factors on the texture coordinates: with `[2, 3]` the image is seen twice side by side and three times one over the other.
+    /// Factors on the texture coordinates, or one for both: with `[2, 3]` the image is seen twice side by side and three times one over the other.
     #[serde(default = "unscaled")]
-    scale: List<Factor, 2>,
+    scale: OneOr<Factor, 2>,
     /// Turn of the texture coordinates about (0, 0), degrees, counter-clockwise; after `scale`.
     #[serde(default = "unturned")]
     rotate: Degrees,
@@ -45,8 +45,8 @@ enum Wrapping {
     Mirror,
 }
 
-fn unscaled() -> List<Factor, 2> {
-    List([Factor(1.0); 2])
+fn unscaled() -> OneOr<Factor, 2> {
+    OneOr([Factor(1.0); 2])
 }
 
 fn unturned() -> Degrees {

@@ -16,7 +16,9 @@ pub(in crate::shade) fn is_diffuse(material: &Material) -> bool {
 pub(in crate::shade) fn albedo(
     scene: &Scene,
     material: &Material,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
 ) -> Rgb {
     let Some(map) = &material.texture else { return material.diffuse };
     let footprint = cone.footprint(scene, si, wo);

@@ -137,6 +137,31 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
     assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");
 }
 
+#[test]
+fn one_number_scales_both_axes() {
+    let scaled = |scale: &str| {
+        let text = format!(
+            "[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             alpha = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n"
+        );
+        let material = cut(&text).expect("a scene").world.materials[0].clone();
+        assert_eq!(material.texture, material.alpha);
+        material.texture.expect("a texture").transform
+    };
+    assert_eq!(scaled("2"), scaled("[2, 2]"));
+    assert_eq!(scaled("-0.5"), scaled("[-0.5, -0.5]"));
+    let refused = |scale: &str| {
+        let text = format!("[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n");
+        let Err(Error::Input(fault)) = cut(&text) else { panic!("{scale}") };
+        assert_eq!(fault.line, Some(3));
+        fault.message
+    };
+    assert!(refused("0").contains("found 0"));
+    assert!(refused("[1, 2, 3]").contains("array of 2 values"));
+    assert!(refused("'x'").contains("a number or an array of 2 numbers"));
+}
+
 /// Loads a scene file with `text` beside a mask of two texels, `leaf.pgm`, and a triangle without coordinates.
 fn cut(text: &str) -> Result<Loaded> {
     let folder = tempfile::tempdir().expect("a folder");
@@ -145,6 +170,30 @@ fn cut(text: &str) -> Result<Loaded> {
     std::fs::write(at("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").expect("written");
     std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
     load(&at("scene.toml"), &LoadOptions::default())
+}
+
+#[test]
+fn of_several_images_that_are_not_to_be_had_the_first_in_the_file_is_named() {
+    for (text, name) in [
+        ("[material.z]\nalpha = 'no.png'\n[material.a]\ntexture = 'none.png'\n", "no.png"),
+        ("[material.z]\ntexture = 'none.png'\n[material.a]\nalpha = 'no.png'\n", "none.png"),
+        ("[material.a]\nalpha = 'no.png'\ntexture = 'none.png'\n", "no.png"),
+        ("[material.a]\nalpha = 'scene.toml'\ntexture = 'none.png'\n", "scene.toml"),
+    ] {
+        let Err(Error::Input(fault)) = cut(text) else { panic!("{text}") };
+        // The first line is the sky's.
+        assert_eq!(fault.line, Some(3), "{text}: {fault}");
+        assert!(fault.message.contains(name), "{text}: {fault}");
+    }
+}
+
+#[test]
+fn one_image_may_be_texture_and_mask() {
+    let loaded = cut("[material.leaf]\ntexture = 'leaf.pgm'\nalpha = 'leaf.pgm'\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n");
+    let loaded = loaded.expect("a scene");
+    assert_eq!((loaded.world.textures.len(), loaded.world.masks.len()), (1, 1));
+    assert_eq!(loaded.files.len(), 2);
 }
 
 const LEAF: &str = "[material.leaf]\ndiffuse = 0.5\nalpha = 'leaf.pgm'\n";
