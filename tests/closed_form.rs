@@ -224,6 +224,67 @@ fn a_glass_sphere_in_a_furnace_vanishes() {
     }
 }
 
+/// A thin pane before a bright wall, in front of a bright sky: it reflects by both of its faces, and lets the rest
+/// straight through with its tint. A plate with two faces, as thin as can be, looks the same.
+#[test]
+fn a_thin_pane_looks_as_a_plate_of_the_same_glass() {
+    let (sky, wall) = (Rgb::new(0.5, 1.0, 2.0), Rgb::new(3.0, 2.0, 1.0));
+    let tint = Rgb::new(1.0, 0.81, 0.64);
+    let picture = |kind, thin: bool, priority: Option<u8>| {
+        let mut world = World { sky: Sky { radiance: sky, ..Sky::default() }, ..World::default() };
+        let of_crossing = if thin { tint } else { Rgb::new(1.0, 0.9, 0.8) };
+        let glass = Glass { thin, tint: of_crossing, ..Glass::clear(1.5) };
+        let pane = world.add_material(Material { glass: Some(glass), ..Material::black("pane") });
+        let face = |z: f64, half: f64| {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| DVec3::new(half * x, half * y, z))
+        };
+        world.meshes.push(quad(face(0.0, 40.0), pane));
+        if !thin {
+            let [a, b, c, d] = face(-1e-3, 40.0);
+            world.meshes.push(quad([d, c, b, a], pane));
+        }
+        let emitter = Material { emission: wall, emits_back: true, ..Material::black("wall") };
+        let emitter = world.add_material(emitter);
+        world.meshes.push(quad(face(-3.0, 400.0), emitter));
+        if let Some(priority) = priority {
+            // Elsewhere, so that paths carry a stack of bodies.
+            let ranked = Glass { priority: Some(priority), ..Glass::clear(1.3) };
+            let ranked = Material { glass: Some(ranked), ..Material::black("ranked") };
+            let ranked = world.add_material(ranked);
+            world.spheres.push(WorldSphere::new("far", DVec3::new(0.0, 0.0, 90.0), 1.0, ranked));
+        }
+        let mut job = job(world, pose((2.0, 1.0, 2.0), (0.0, 0.0, 0.0)), 24, 18);
+        (job.settings.intersector, job.settings.bounces, job.settings.cutoff) = (kind, 40, 1e-7);
+        let (film, _) = render(&job);
+        let eye = DVec3::new(2.0, 1.0, 2.0);
+        common::pixels(&film)
+            .map(|(x, y, rgb)| {
+                let dir = job.camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
+                assert!((eye + dir * (eye.z / -dir.z)).abs().max_element() < 40.0, "{x},{y}");
+                (-dir.z, rgb)
+            })
+            .collect::<Vec<(f64, Rgb)>>()
+    };
+    for kind in BOTH {
+        let plate = picture(kind, false, None);
+        for priority in [None, Some(1)] {
+            let seen = picture(kind, true, priority);
+            for ((cos, rgb), (_, of_plate)) in seen.iter().zip(&plate) {
+                let cos_t = (1.0 - (1.0 - cos * cos) / 2.25).sqrt();
+                let parallel = (1.5 * cos - cos_t) / (1.5 * cos + cos_t);
+                let perpendicular = (cos - 1.5 * cos_t) / (cos + 1.5 * cos_t);
+                let r = 0.5 * (parallel * parallel + perpendicular * perpendicular);
+                let reflected = (2.0 * r / (1.0 + r)) as f32;
+                let expected = sky * reflected + wall * tint * (1.0 - reflected);
+                assert!(rgb.abs_diff_eq(expected, 1e-5), "{kind:?} {cos}: {rgb} {expected}");
+                // Red alone: what goes to and fro in a coloured plate is tinted each time.
+                assert!((rgb.x - of_plate.x).abs() < 1e-5, "{kind:?} {cos}: {rgb} {of_plate}");
+            }
+        }
+    }
+}
+
 /// A ball of coloured glass that does not bend light, before a bright sky: what is left after a chord `x` is
 /// exp(-absorption x), in world units, whatever the scene is scaled by.
 #[test]

@@ -73,7 +73,8 @@ impl Material {
     }
 }
 
-/// A smooth dielectric boundary; the mesh's outward normals point to the outside medium.
+/// A smooth dielectric boundary; the mesh's outward normals point to the outside medium. Or a thin pane: both its faces
+/// are the one surface.
 ///
 /// With a `priority` the body that it bounds may overlap others: where several are, the one of
 /// the highest priority is, and the rest are not (Schmidt and Budge, 2002).
@@ -88,13 +89,16 @@ pub struct Glass {
     /// exp(-absorption x) of light is left (Beer, 1852). Takes a closed surface.
     pub absorption: Rgb,
     /// Which of several bodies at one place is there: the highest. Those that overlap need
-    /// different ones.
+    /// different ones. None of a thin pane.
     pub priority: Option<u8>,
+    /// Whether it is a pane without thickness: light goes straight through it, and nothing is inside. `tint` is then
+    /// of the pane, and `absorption` is zero.
+    pub thin: bool,
 }
 
 impl Glass {
     /// Glass with the index of refraction `ior` that takes nothing from light and overlaps nothing.
     pub fn clear(ior: f64) -> Self {
-        Self { ior, tint: Rgb::ONE, absorption: Rgb::ZERO, priority: None }
+        Self { ior, tint: Rgb::ONE, absorption: Rgb::ZERO, priority: None, thin: false }
     }
 }

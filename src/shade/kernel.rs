@@ -347,7 +347,10 @@ impl Vertex<'_, '_> {
         }
         lobe::for_each_directional::<MIRROR, GLASS>(material, &si, wo, |lobe| {
             let start = (&si, inside);
-            let behind = si.is_outside(wo).then_some(si.surface.material);
+            let behind = match lobe {
+                Lobe::Pane(_) => state.medium,
+                _ => si.is_outside(wo).then_some(si.surface.material),
+            };
             let starts = Starts { reflected: start, transmitted: start, behind };
             self.scatter::<NESTED>(&lobe, &si, wo, &starts, state);
             if MIRROR && !lobe.is_delta() {

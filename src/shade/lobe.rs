@@ -13,7 +13,7 @@ use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb};
 use crate::scene::Material;
 use crate::stats::RayKind;
-pub(super) use dielectric::Dielectric;
+pub(super) use dielectric::{Dielectric, Pane};
 pub(super) use diffuse::{albedo, is_diffuse};
 use glossy::Glossy;
 use mirror::Mirror;
@@ -24,6 +24,7 @@ pub(super) enum Lobe {
     Mirror(Mirror),
     Glossy(Glossy),
     Dielectric(Dielectric),
+    Pane(Pane),
 }
 
 /// A direction that a lobe passes radiance on from.
@@ -61,7 +62,10 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
         });
     }
     if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
-        take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))));
+        take(match glass.thin {
+            true => Lobe::Pane(Pane::new(glass)),
+            false => Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))),
+        });
     }
 }
 
@@ -78,7 +82,7 @@ impl Lobe {
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Glossy(_) => false,
-            Self::Mirror(_) | Self::Dielectric(_) => true,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => true,
         }
     }
 
@@ -87,7 +91,7 @@ impl Lobe {
     pub fn f(&self, wo: DVec3, wi: DVec3) -> Rgb {
         match self {
             Self::Glossy(glossy) => glossy.f(wo, wi),
-            Self::Mirror(_) | Self::Dielectric(_) => Rgb::ZERO,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => Rgb::ZERO,
         }
     }
 
@@ -95,7 +99,7 @@ impl Lobe {
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
         match self {
             Self::Glossy(glossy) => glossy.pdf(wo, wi),
-            Self::Mirror(_) | Self::Dielectric(_) => 0.0,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => 0.0,
         }
     }
 
@@ -113,6 +117,7 @@ impl Lobe {
             Self::Mirror(mirror) => [Some(mirror.sample(wo, n)), None],
             Self::Glossy(glossy) => [glossy.sample(wo, u().map(f64::from)), None],
             Self::Dielectric(dielectric) => dielectric.sample(wo, n),
+            Self::Pane(pane) => pane.sample(wo, n),
         }
     }
 
@@ -122,7 +127,7 @@ impl Lobe {
         match self {
             Self::Mirror(_) => RayKind::Mirror,
             Self::Glossy(_) => RayKind::Glossy,
-            Self::Dielectric(_) => RayKind::Glass,
+            Self::Dielectric(_) | Self::Pane(_) => RayKind::Glass,
         }
     }
 }

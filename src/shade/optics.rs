@@ -37,6 +37,14 @@ pub fn split(wo: DVec3, n: DVec3, eta: f64) -> Split {
     Split { reflectance: fresnel(cos, cos_t, eta), refracted: Some(refracted) }
 }
 
+/// Share that a thin pane with unit normal `n` on either side reflects of light along `wo`, where `ior` is the index of
+/// refraction of the pane over that around it: with R for one face, R + (1-R)² R (1 + R² + R⁴ + ...) by all
+/// reflections between both faces (Stokes, 1862), of unpolarised light at each.
+pub fn pane_reflectance(wo: DVec3, n: DVec3, ior: f64) -> f64 {
+    let of_face = split(wo, n, ior).reflectance;
+    2.0 * of_face / (1.0 + of_face)
+}
+
 /// Unpolarised Fresnel reflectance from the cosines on both sides.
 fn fresnel(cos: f64, cos_t: f64, eta: f64) -> f64 {
     let parallel = (eta * cos - cos_t) / (eta * cos + cos_t);

@@ -39,23 +39,27 @@ pub(super) struct Material {
     pub emits_back: bool,
 }
 
-/// A smooth boundary between glass and air.
+/// A smooth boundary between glass and air, or a thin pane.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Glass {
     /// Index of refraction of the inside relative to the outside.
     #[serde(default = "window_glass")]
     ior: Ior,
-    /// Share of light that each crossing of the surface lets through.
+    /// Share of light that each crossing of the surface lets through: twice of a body, once of a thin pane.
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
     /// Absorption coefficient of the inside, per unit of length, linear RGB or one number for grey: over a
     /// length x the share exp(-absorption x) of the light remains. The surface must be closed, and a camera inside it needs a `priority`. Absent: 0.
-    absorption: Option<Amount>,
+    absorption: Option<At<Amount>>,
     /// For bodies that touch, overlap or lie in one another, as tea in a glass: where several are at one
     /// place, the one of the highest priority counts. `ior` is then that of the body itself. Absent: the
     /// body overlaps nothing.
-    priority: Option<Int<0, 255>>,
+    priority: Option<At<Int<0, 255>>>,
+    /// Whether the surface is a whole pane without thickness, such as a window: light is reflected at both of its faces
+    /// and goes straight through. It need not be closed. Neither `absorption` nor `priority` stands beside it.
+    #[serde(default)]
+    thin: bool,
 }
 
 fn window_glass() -> Ior {
@@ -75,8 +79,9 @@ impl Material {
         let glass = self.glass.as_ref().map(|g| scene::Glass {
             ior: g.ior.0,
             tint: g.tint.rgb(),
-            absorption: g.absorption.unwrap_or_default().rgb(),
-            priority: g.priority.map(|p| p.u32() as u8),
+            absorption: g.absorption.as_ref().map_or_else(Default::default, |a| a.rgb()),
+            priority: g.priority.as_ref().map(|p| p.u32() as u8),
+            thin: g.thin,
         });
         Ok(scene::Material {
             name: name.to_owned(),
@@ -97,6 +102,12 @@ impl Material {
 
     fn check(&self, source: &Source) -> Result<()> {
         if let Some(glass) = &self.glass {
+            let absorption = glass.absorption.as_ref().map(|a| (&a.span, "absorption"));
+            let of_body = absorption.or(glass.priority.as_ref().map(|p| (&p.span, "priority")));
+            if let Some((span, key)) = of_body.filter(|_| glass.thin) {
+                let message = format!("`{key}` is of a body, and a thin pane has no inside");
+                return Err(source.fault(span, message).into());
+            }
             if let Some(alpha) = &self.alpha {
                 let message =
                     "glass has no cut-outs: its body is closed, and a hole would leave it open";

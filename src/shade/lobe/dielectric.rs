@@ -1,4 +1,4 @@
-//! Smooth boundaries of clear media.
+//! Smooth boundaries of clear media, and thin panes.
 
 use super::Scattered;
 use crate::math::{DVec3, Rgb};
@@ -11,6 +11,32 @@ pub(in crate::shade) struct Dielectric {
     pub eta: f64,
     /// Share of light that it lets through.
     pub tint: Rgb,
+}
+
+/// A pane of glass without thickness, with the same medium on both sides.
+pub(in crate::shade) struct Pane {
+    /// Index of refraction of the glass over that of the medium around it.
+    ior: f64,
+    /// Share of the light that is not reflected which it lets through.
+    tint: Rgb,
+}
+
+impl Pane {
+    /// A pane of `glass`.
+    pub fn new(glass: &Glass) -> Self {
+        Self { ior: glass.ior, tint: glass.tint }
+    }
+
+    /// What is reflected at a surface with the unit normal `n` on either side, and what goes straight through.
+    pub fn sample(&self, wo: DVec3, n: DVec3) -> [Option<Scattered>; 2] {
+        let reflectance = optics::pane_reflectance(wo, n, self.ior);
+        let delta = |wi, share: f64, tint, transmitted| {
+            Some(Scattered { wi, share: share as f32, tint, transmitted, pdf: 0.0 })
+        };
+        let reflected = delta(optics::reflect(wo, n), reflectance, Rgb::ONE, None);
+        // An index of 1: rays are not bent.
+        [reflected, delta(-wo, 1.0 - reflectance, self.tint, Some(1.0))]
+    }
 }
 
 impl Dielectric {

@@ -58,6 +58,8 @@ const NAMES: &[Case] = &[
         "no aperture",
         "`radius`",
     ),
+    ("[material.a]\nglass = { thin = true, absorption = ¦0.5 }\n", "`absorption`", ""),
+    ("[material.a]\nglass = { priority = ¦1, thin = true }\n", "`priority`", ""),
     (
         "[camera]\nlens = { radius = 1, f_number = ¦2 }\n\
          keys = [{ eye = [0, 0, 1], target = [0, 0, 0], lens = { radius = 1 } }]\n",
