@@ -57,6 +57,7 @@ impl EffectPlan {
         let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
         reasons.extend([
             cut_outs(scene, &UsedMaterials::of(scene)),
+            vertex_colours(scene, &UsedMaterials::of(scene)),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -185,6 +186,17 @@ fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
     EffectReason { effect: "alpha cut-outs", runs: cut > 0, why }
 }
 
+/// Whether surfaces show colours of vertices, and how many.
+fn vertex_colours(scene: &Scene, used: &UsedMaterials) -> EffectReason {
+    let meshes = scene.meshes.iter().filter(|mesh| mesh.colours.is_some()).count();
+    let materials = counted(used.vertex_colours, "material");
+    let why = match used.vertex_colours {
+        0 => format!("{materials} that shows them in use"),
+        _ => format!("{materials} in use, {meshes} of {} meshes have them", scene.meshes.len()),
+    };
+    EffectReason { effect: "vertex colours", runs: meshes > 0, why }
+}
+
 /// Whether points look at the lights that matter there only, and how many these are.
 fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
     let lights = counted(scene.lights.len(), "light");
@@ -237,6 +249,7 @@ struct UsedMaterials {
     ranked: usize,
     absorbing: usize,
     textured: usize,
+    vertex_colours: usize,
     cut_out: usize,
 }
 
@@ -259,6 +272,7 @@ impl UsedMaterials {
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
             counts.textured += usize::from(material.texture.is_some());
+            counts.vertex_colours += usize::from(material.vertex_colours);
             counts.cut_out += usize::from(material.alpha.is_some());
         }
         counts

@@ -85,6 +85,15 @@ fn check_map(map: &TextureMap, what: &str, material: &str) -> Result<()> {
 
 fn check_vertices(mesh: &WorldMesh) -> Result<()> {
     let count = mesh.positions.len();
+    if let Some(colours) = mesh.colours.as_ref().filter(|c| c.count() != count) {
+        let (name, colours) = (&mesh.name, colours.count());
+        let message = format!("`{name}` has {colours} vertex colours for {count} vertices");
+        return Err(Error::Usage(message));
+    }
+    if mesh.colours.as_ref().is_some_and(|colours| !colours.are_reflectances()) {
+        let message = format!("a vertex colour of `{}` lies outside of 0 to 1", mesh.name);
+        return Err(Error::Usage(message));
+    }
     let most = mesh.triangles.iter().flatten().copied().max();
     match most.filter(|most| *most as usize >= count) {
         Some(most) => Err(Error::Usage(format!(
@@ -99,7 +108,7 @@ fn check_vertices(mesh: &WorldMesh) -> Result<()> {
 mod tests {
     use super::*;
     use crate::math::{DVec3, Rgb};
-    use crate::scene::WorldSphere;
+    use crate::scene::{VertexColours, WorldSphere};
 
     #[test]
     fn indices_out_of_range_are_refused_by_name() {
@@ -116,6 +125,24 @@ mod tests {
         bad.meshes = vec![floor(2, 0)];
         bad.spheres = vec![WorldSphere::new("ball", DVec3::ZERO, 1.0, 1)];
         assert!(refusal(bad).contains("`ball` is of material 1"));
+    }
+
+    #[test]
+    fn vertex_colours_that_do_not_fit_are_refused_by_name() {
+        let refusal = |colours: Vec<Rgb>| {
+            let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Z];
+            let mesh = WorldMesh::new("scan", corners, vec![[0, 1, 2]], 0);
+            let colours = Some(VertexColours::from_linear(colours));
+            let meshes = vec![WorldMesh { colours, ..mesh }];
+            let materials = vec![Material::diffuse("white", Rgb::ONE)];
+            let world = World { meshes, materials, ..World::default() };
+            world.into_scene(true).expect_err("no scene").to_string()
+        };
+        assert!(refusal(vec![Rgb::ONE; 2]).contains("`scan` has 2 vertex colours for 3 vertices"));
+        for bad in [f32::NAN, -0.1, 1.5] {
+            let refused = refusal(vec![Rgb::ONE, Rgb::splat(bad), Rgb::ONE]);
+            assert!(refused.contains("vertex colour of `scan`"), "{bad}: {refused}");
+        }
     }
 
     #[test]

@@ -17,6 +17,8 @@ pub struct Material {
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureMap>,
+    /// Whether the vertex colours of a mesh multiply `diffuse`; what has none counts as white.
+    pub vertex_colours: bool,
     /// Mask of its cut-outs: where it says so, the surface is not there. None on glass.
     pub alpha: Option<TextureMap>,
     /// Reflectance of a mirror, both sides.
@@ -38,6 +40,7 @@ impl Material {
             name: name.into(),
             diffuse: Rgb::ZERO,
             texture: None,
+            vertex_colours: false,
             alpha: None,
             mirror: Rgb::ZERO,
             roughness: 0.0,

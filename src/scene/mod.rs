@@ -29,6 +29,7 @@ mod spline;
 mod texture;
 mod time;
 mod too_small;
+mod vertex_colours;
 mod weld;
 mod winding;
 
@@ -53,6 +54,7 @@ pub use settings::{
 pub use texture::{Texture, TextureId, TextureLevel, TextureMap, Wrap};
 pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
+pub use vertex_colours::VertexColours;
 pub(crate) use weld::weld;
 pub(crate) use winding::{borders, closed_volume};
 

@@ -125,7 +125,7 @@ fn floor(x: f32) -> f32 {
 }
 
 /// Linear values of the sRGB codes of 8 bits, rounded once.
-static LINEAR: LazyLock<[f32; 256]> =
+pub(super) static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| srgb_decode(code as f64 / 255.0) as f32));
 
 /// The linear values between which a code is the nearest: from `BETWEEN[code - 1]` to `BETWEEN[code]`.

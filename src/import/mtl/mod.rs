@@ -10,6 +10,7 @@ use super::model::Model;
 use super::source;
 use super::texture::{self, TextureCache};
 use crate::error::{Diagnostic, Result};
+use crate::math::Rgb;
 use crate::scene::{MaterialId, TextureMap};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -78,18 +79,22 @@ impl Libraries {
     }
 
     /// Adds the material that `usemtl NAME` on `line` of `obj` asks for to the model's world,
-    /// and its images. An unknown name is a warning, and the default material.
+    /// and its images. An unknown name is a warning, and the default material. A `coloured` mesh shows its
+    /// vertex colours, times `Kd`, unless there is a texture.
     pub fn material(
         &mut self,
         obj: &Path,
         line: usize,
-        name: &str,
+        (name, coloured): (&str, bool),
         model: &mut Model,
     ) -> Result<MaterialId> {
         let Some(entry) = self.entries.get(name) else {
             let message = format!("no material `{name}`: plain grey in its place");
             model.warnings.push(Diagnostic::new(obj, message).line(line));
-            return Ok(model.default_material());
+            return Ok(match coloured {
+                true => model.coloured_material(),
+                false => model.default_material(),
+            });
         };
         let place = |message: String| {
             Diagnostic::new(&entry.library, format!("material `{name}`: {message}"))
@@ -107,6 +112,15 @@ impl Libraries {
                 Err(error) => {
                     model.warnings.push(place(format!("texture left out: {error}")));
                 }
+            }
+        }
+        if coloured && material.texture.is_some() {
+            let message = "the texture is shown, the vertex colours are not";
+            model.warnings.push(place(message.into()));
+        } else if coloured && material.diffuse != Rgb::ZERO {
+            material.vertex_colours = true;
+            if entry.parsed.diffuse.is_none() {
+                material.diffuse = Rgb::ONE;
             }
         }
         if let Some(image) = &entry.parsed.dissolve_texture {

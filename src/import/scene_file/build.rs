@@ -137,6 +137,9 @@ impl<'a> Builder<'a> {
         if let Some(id) = over {
             self.world.meshes[meshes..].iter_mut().for_each(|m| m.material = id);
             self.world.spheres[spheres..].iter_mut().for_each(|s| s.material = id);
+            if !self.world.materials[id as usize].vertex_colours {
+                self.world.meshes[meshes..].iter_mut().for_each(|m| m.colours = None);
+            }
         }
         self.world.meshes[meshes..].iter_mut().for_each(|m| m.always_traced = !mesh.reuse);
         self.world.spheres[spheres..].iter_mut().for_each(|s| s.always_traced = !mesh.reuse);
@@ -164,6 +167,10 @@ impl<'a> Builder<'a> {
         let (centre, radius) = (sphere.centre.vec(), sphere.radius.0);
         let always_traced = !sphere.reuse;
         self.world.spheres.push(WorldSphere { name, centre, radius, material, always_traced });
+        if self.world.materials[material as usize].vertex_colours {
+            let message = "an exact sphere has no vertex colours: it shows `diffuse` as it is";
+            self.warnings.push(self.source.fault(&sphere.span, message));
+        }
         self.light_up(meshes, spheres, &sphere.span);
         Ok(())
     }

@@ -16,11 +16,15 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Material {
     /// Diffuse reflectance (albedo), linear RGB or one number for grey. Absent: 0, or 1 where
-    /// there is a `texture`.
+    /// there is a `texture` or `vertex_colours`.
     pub diffuse: Option<Reflectance>,
     /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it
     /// lies on the surface.
     pub texture: Option<At<NamedTexture>>,
+    /// Whether `diffuse` is multiplied by the vertex colours of the mesh file. Without a `material` of the scene file
+    /// a mesh shows its vertex colours anyway.
+    #[serde(default)]
+    pub vertex_colours: bool,
     /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
     /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
     /// colours, as stored. Or a table of the file and how it lies on the surface. Not on glass.
@@ -82,6 +86,7 @@ impl Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
+            vertex_colours: self.vertex_colours,
             alpha: self.alpha.as_ref().zip(mask).map(|(alpha, id)| alpha.build(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
@@ -92,7 +97,8 @@ impl Material {
     }
 
     fn albedo(&self) -> Option<Reflectance> {
-        self.diffuse.or_else(|| self.texture.as_ref().map(|_| Reflectance::white()))
+        let paints = self.texture.is_some() || self.vertex_colours;
+        self.diffuse.or_else(|| paints.then(Reflectance::white))
     }
 
     fn check(&self, source: &Source) -> Result<()> {
@@ -102,10 +108,11 @@ impl Material {
                     "glass has no cut-outs: its body is closed, and a hole would leave it open";
                 return Err(source.fault(&alpha.span, message).into());
             }
-            let others = self.diffuse.is_some() || self.texture.is_some() || self.mirror.is_some();
+            let paints = self.texture.is_some() || self.vertex_colours;
+            let others = self.diffuse.is_some() || paints || self.mirror.is_some();
             if others || self.emission.is_some() {
                 let message = "glass stands alone: a material that has it has neither `diffuse`, \
-                               `texture`, `mirror` nor `emission`";
+                               `texture`, `vertex_colours`, `mirror` nor `emission`";
                 return Err(source.fault(&glass.span, message).into());
             }
         }
