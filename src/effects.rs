@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Glass, MeanLights, Scene, Settings, ShotLens};
+use crate::scene::{Glass, Material, MeanLights, Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +58,7 @@ impl EffectPlan {
         reasons.extend([
             cut_outs(scene, &UsedMaterials::of(scene)),
             vertex_colours(scene, &UsedMaterials::of(scene)),
+            roughness_maps(&UsedMaterials::of(scene), settings),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -186,6 +187,19 @@ fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
     EffectReason { effect: "alpha cut-outs", runs: cut > 0, why }
 }
 
+/// Whether the roughness of mirrors is looked up in images.
+fn roughness_maps(used: &UsedMaterials, settings: &Settings) -> EffectReason {
+    let why =
+        format!("{} in use", counted(used.roughness_maps, "rough mirror material with a map"));
+    let runs = used.roughness_maps > 0 && settings.bounces > 0;
+    EffectReason { effect: "roughness maps", runs, why }
+}
+
+fn has_roughness_map(material: &Material) -> bool {
+    let is_rough = is_something(material.mirror) && material.roughness != 0.0;
+    is_rough && material.roughness_map.is_some()
+}
+
 /// Whether surfaces show colours of vertices, and how many.
 fn vertex_colours(scene: &Scene, used: &UsedMaterials) -> EffectReason {
     let meshes = scene.meshes.iter().filter(|mesh| mesh.colours.is_some()).count();
@@ -228,7 +242,7 @@ fn is_something(colour: Rgb) -> bool {
 
 /// How many meshes have a textured material but no texture coordinates, where any have.
 fn bare(scene: &Scene) -> String {
-    let is_textured = |id: u32| scene.materials[id as usize].texture.is_some();
+    let is_textured = |id: u32| scene.materials[id as usize].has_image();
     let bare = scene.meshes.iter().filter(|m| m.uvs.is_none() && is_textured(m.surface.material));
     match bare.count() {
         0 => String::new(),
@@ -248,7 +262,9 @@ struct UsedMaterials {
     glass: usize,
     ranked: usize,
     absorbing: usize,
+    /// With any image but a mask.
     textured: usize,
+    roughness_maps: usize,
     vertex_colours: usize,
     cut_out: usize,
 }
@@ -271,7 +287,8 @@ impl UsedMaterials {
                 |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
-            counts.textured += usize::from(material.texture.is_some());
+            counts.textured += usize::from(material.has_image());
+            counts.roughness_maps += usize::from(has_roughness_map(material));
             counts.vertex_colours += usize::from(material.vertex_colours);
             counts.cut_out += usize::from(material.alpha.is_some());
         }

@@ -1,6 +1,7 @@
 //! Image files to textures.
 //!
-//! Integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand. Alpha is dropped.
+//! Colours of integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand; their alpha is
+//! dropped. Data are one channel of an image, as it stands.
 
 use super::model::Model;
 use crate::error::{Diagnostic, Error, Result};
@@ -15,25 +16,49 @@ use std::path::{Path, PathBuf};
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
 /// Textures that a model has already, or the reason why not.
-pub(super) type TextureCache = HashMap<PathBuf, std::result::Result<TextureId, String>>;
+pub(super) type TextureCache = HashMap<(PathBuf, ImageUse), std::result::Result<TextureId, String>>;
 
-/// As [`load_texture`], once per file of a model; adds texture and file to it.
+/// What an image's numbers stand for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum ImageUse {
+    /// Reflectances.
+    Colour,
+    /// A number from 0 to 1 in one channel.
+    Data(Channel),
+}
+
+/// A channel of an image. In a grey image red, green and blue are the grey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Channel {
+    /// Red.
+    Red,
+    /// Green: where glTF has the roughness.
+    Green,
+    /// Blue.
+    Blue,
+    /// Alpha.
+    Alpha,
+}
+
+/// As [`load_image`], once per file and use of a model; adds texture and file to it.
 pub(super) fn load_cached(
     path: &Path,
+    image_use: ImageUse,
     cache: &mut TextureCache,
     model: &mut Model,
 ) -> std::result::Result<TextureId, String> {
-    if let Some(known) = cache.get(path) {
+    let key = (path.to_path_buf(), image_use);
+    if let Some(known) = cache.get(&key) {
         return known.clone();
     }
-    let loaded = load_texture(path).map_err(|e| e.to_string()).map(|texture| {
+    let loaded = load_image(path, image_use).map_err(|e| e.to_string()).map(|texture| {
         if !model.files.iter().any(|file| file == path) {
             model.files.push(path.to_path_buf());
         }
         model.world.textures.push(texture);
         model.world.textures.len() as TextureId - 1
     });
-    cache.insert(path.to_path_buf(), loaded.clone());
+    cache.insert(key, loaded.clone());
     loaded
 }
 
@@ -45,6 +70,39 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
     let image = decode(path)?;
     let size = [image.width(), image.height()];
     texture(path.display().to_string(), size, image).ok_or_else(|| bad_pixel(path))
+}
+
+/// Reads an image for a use, in the formats of [`load_texture`].
+///
+/// Errors: those of [`load_texture`], and an alpha channel that the image does not have.
+pub fn load_image(path: &Path, image_use: ImageUse) -> Result<Texture> {
+    match image_use {
+        ImageUse::Colour => load_texture(path),
+        ImageUse::Data(channel) => load_data(path, channel),
+    }
+}
+
+fn load_data(path: &Path, channel: Channel) -> Result<Texture> {
+    let image = decode(path)?;
+    if channel == Channel::Alpha && !image.color().has_alpha() {
+        return Err(Error::input(path, "the image has no alpha channel"));
+    }
+    let at = channel as usize;
+    let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
+    if image.as_flat_samples_u8().is_some() {
+        let texels = image.into_rgba8().pixels().map(|p| p.0[at]).collect();
+        return Ok(Texture::from_data8(name, size, texels));
+    }
+    if image.as_flat_samples_u16().is_some() {
+        let texels = image.into_rgba16().pixels().map(|p| p.0[at]).collect();
+        return Ok(Texture::from_data16(name, size, texels));
+    }
+    let code = |value: f32| {
+        let is_value = value.is_finite() && value >= 0.0;
+        is_value.then(|| (value.min(1.0) * 65_535.0).round() as u16)
+    };
+    let texels: Option<Vec<u16>> = image.into_rgba32f().pixels().map(|p| code(p.0[at])).collect();
+    Ok(Texture::from_data16(name, size, texels.ok_or_else(|| bad_pixel(path))?))
 }
 
 /// The error of an image with a value that is no amount of light.

@@ -17,6 +17,7 @@ pub(super) struct Untextured {
 enum Lacking {
     Texture(String),
     Mask(String),
+    Roughness(String),
     Colours,
 }
 
@@ -29,9 +30,12 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
         let texture = texture.map(|map| world.textures[map.image as usize].name.clone());
         let mask = material.alpha.filter(|_| is_bare);
         let mask = mask.map(|map| world.masks[map.image as usize].name.clone());
+        let roughness = material.roughness_map.filter(|_| is_bare);
+        let roughness = roughness.map(|map| world.textures[map.image as usize].name.clone());
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
-        let lacking = [texture.map(Lacking::Texture), mask.map(Lacking::Mask), colours];
+        let roughness = roughness.map(Lacking::Roughness);
+        let lacking = [texture.map(Lacking::Texture), mask.map(Lacking::Mask), roughness, colours];
         lacking.into_iter().flatten().map(|lacks| Untextured::new(mesh, material, lacks))
     })
 }
@@ -53,6 +57,10 @@ impl Untextured {
                 "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` cuts \
                  nothing out of it"
             ),
+            Lacking::Roughness(file) => format!(
+                "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it has one roughness, \
+                 that of the lower left corner of {file}"
+            ),
             Lacking::Colours => format!(
                 "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its `diffuse` as it is"
             ),
@@ -69,6 +77,9 @@ impl Untextured {
             Lacking::Mask(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without `alpha`"
+            }
+            Lacking::Roughness(_) => {
+                "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it one `roughness`"
             }
             Lacking::Colours => {
                 "write the mesh with vertex colours (`v x y z r g b` in obj, `red`, `green` and `blue` in ply), or \

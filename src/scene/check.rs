@@ -17,22 +17,23 @@ impl World {
             return Err(Error::Usage(message));
         }
         self.materials.iter().try_for_each(|material| {
-            self.check_texture(material)?;
+            self.check_image(material, material.texture.as_ref(), "texture")?;
+            self.check_image(material, material.roughness_map.as_ref(), "roughness map")?;
             self.check_mask(material)
         })?;
         self.meshes.iter().try_for_each(check_vertices)?;
         self.check_finite()
     }
 
-    fn check_texture(&self, material: &Material) -> Result<()> {
-        let Some(map) = &material.texture else { return Ok(()) };
+    fn check_image(&self, material: &Material, map: Option<&TextureMap>, what: &str) -> Result<()> {
+        let Some(map) = map else { return Ok(()) };
         let (name, count) = (&material.name, self.textures.len());
         if map.image as usize >= count {
             let message =
-                format!("`{name}` has the texture {}, counted from 0, of {count}", map.image);
+                format!("`{name}` has the {what} {}, counted from 0, of {count}", map.image);
             return Err(Error::Usage(message));
         }
-        check_map(map, "texture", name)
+        check_map(map, what, name)
     }
 
     fn check_mask(&self, material: &Material) -> Result<()> {

@@ -25,6 +25,8 @@ pub struct Material {
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
     pub roughness: f64,
+    /// Image that multiplies `roughness`, of data from 0 to 1.
+    pub roughness_map: Option<TextureMap>,
     /// Glass; then `diffuse` and `mirror` are zero.
     pub glass: Option<Glass>,
     /// Emitted radiance.
@@ -44,6 +46,7 @@ impl Material {
             alpha: None,
             mirror: Rgb::ZERO,
             roughness: 0.0,
+            roughness_map: None,
             glass: None,
             emission: Rgb::ZERO,
             emits_back: false,
@@ -58,6 +61,16 @@ impl Material {
     /// A perfect mirror.
     pub fn mirror(name: impl Into<String>, reflectance: Rgb) -> Self {
         Self { mirror: reflectance, ..Self::black(name) }
+    }
+
+    /// Whether its scattering is looked up in an image anywhere; cut-outs do not count.
+    pub fn has_image(&self) -> bool {
+        self.texture.is_some() || self.roughness_map.is_some()
+    }
+
+    /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
+    pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
+        [&mut self.texture, &mut self.roughness_map].into_iter().flatten()
     }
 
     /// Whether the surface reflects any light; glass does not count.

@@ -166,7 +166,7 @@ impl Hash {
 
     fn texture(&mut self, texture: &Texture) {
         // Names are for people; the smaller levels follow from the image.
-        self.text(&(texture.levels()[0].width, texture.levels()[0].height));
+        self.text(&(texture.levels()[0].width, texture.levels()[0].height, texture.kind()));
         self.array(texture.image_bytes());
     }
 

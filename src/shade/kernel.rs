@@ -345,7 +345,8 @@ impl Vertex<'_, '_> {
         if !may_bounce {
             return;
         }
-        lobe::for_each_directional::<MIRROR, GLASS>(material, &si, wo, |lobe| {
+        let seen = (&si, wo, state.cone);
+        lobe::for_each_directional::<MIRROR, GLASS>(scene, material, seen, |lobe| {
             let start = (&si, inside);
             let behind = si.is_outside(wo).then_some(si.surface.material);
             let starts = Starts { reflected: start, transmitted: start, behind };

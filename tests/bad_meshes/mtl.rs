@@ -56,7 +56,18 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nillum 7\n", Warns(1, "glass without `Ni`")),
     ("newmtl a\nKd 0.8 0.8 0.8\nKs 0.8 0.8 0.8\nillum 3\n", Warns(1, "to 1")),
     ("newmtl a\nbump bumps.png\n", Warns(2, "`bump`")),
-    ("newmtl a\nPr 0.5\n", Warns(2, "`Pr` is ignored")),
+    ("newmtl a\nPr 0.5\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
+    ("newmtl a\nmap_Pr gone.png\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
+    ("newmtl a\nPr 1.5\n", Line(2, "`Pr 1.5`: from 0 to 1")),
+    ("newmtl a\nPr nan\n", Line(2, "not a finite number")),
+    ("newmtl a\nmap_Pr\n", Line(2, "`map_Pr` without a file name")),
+    ("newmtl a\nmap_Pr -imfchan z a.png\n", Line(2, "takes r, g, b or m")),
+    ("newmtl a\nillum 3\nKs .5 .5 .5\nPr 0.5\nKd 0 0 0\n", Fine),
+    ("newmtl a\nillum 3\nKs .5 .5 .5\nmap_Pr gone.png\n", Warns(1, "roughness map left out")),
+    (
+        "newmtl a\nillum 3\nKs .5 .5 .5\nmap_Pr -imfchan r bad.mtl\n",
+        Warns(1, "roughness map left out"),
+    ),
 ];
 
 #[test]
@@ -120,6 +131,24 @@ fn textures_are_linear_and_shared() {
     let factors: Vec<f32> = model.world.materials.iter().map(|m| m.diffuse.x).collect();
     assert_eq!(factors, [1.0, 0.5]);
     assert_eq!(model.files.len(), 3);
+}
+
+#[test]
+fn map_pr_is_one_channel_as_it_stands() {
+    let mtl = "newmtl a\nillum 3\nKd 0 0 0\nKs 1 1 1\nPr 0.25\nmap_Pr -imfchan b rough.ppm\n\
+               newmtl b\nillum 3\nKd 0 0 0\nKs 1 1 1\nmap_Pr rough.ppm\nnewmtl c\nillum 5\nKd 0 0 0\n\
+               Ks 1 1 1\nPr 0.25\n";
+    let obj = ["a", "b", "c"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
+    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
+    let others = [("bad.mtl", mtl.as_bytes()), ("rough.ppm", image)];
+    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let rough = world.materials.iter().map(|material| {
+        let texel = |map: TextureMap| world.textures[map.image as usize].levels()[0].texel(0, 0).x;
+        (material.roughness, material.roughness_map.map(texel))
+    });
+    let expected = [(1.0, Some(48.0 / 255.0)), (1.0, Some(128.0 / 255.0)), (0.25, None)];
+    assert_eq!(rough.collect::<Vec<_>>(), expected);
 }
 
 #[test]

@@ -13,7 +13,7 @@ mod statements;
 
 use super::model::Model;
 use super::source::{self, Notes};
-use super::texture::{self, TextureCache};
+use super::texture::{self, ImageUse, TextureCache};
 use super::{lamps, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DVec3, Rgb, Vec2};
@@ -58,7 +58,8 @@ fn convert(
     out.emission = source.emitted;
     out.emits_back = true;
     if let Some((line, name)) = &source.texture {
-        match texture::load_cached(&source::beside(path, name), textures, model) {
+        let file = source::beside(path, name);
+        match texture::load_cached(&file, ImageUse::Colour, textures, model) {
             Ok(id) => (out.texture, out.diffuse) = (Some(TextureMap::of(id)), Rgb::ONE),
             Err(error) => {
                 let message = format!("texture left out: {error}");

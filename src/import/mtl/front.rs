@@ -1,14 +1,16 @@
 //! Checks an MTL file line by line and hands tobj a clean copy of it.
 
+use super::meaning;
 use crate::error::{Diagnostic, Result};
 use crate::import::lines::{Line, Lines, Words, check_text, number, show};
 use crate::import::source::Fault;
 use crate::import::source::Notes;
+use crate::import::texture::Channel;
 use std::fmt::Write;
 use std::path::Path;
 
 /// Data of a material that tobj does not return.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Source {
     /// Name, trimmed.
     pub name: String,
@@ -16,6 +18,10 @@ pub(super) struct Source {
     pub line: usize,
     /// `Tf`: share of light that passes, linear RGB.
     pub filter: Option<[f64; 3]>,
+    /// `Pr`: roughness.
+    pub roughness: Option<f64>,
+    /// `map_Pr`: file and channel.
+    pub roughness_map: Option<(String, Channel)>,
 }
 
 /// Reads the materials of a library: the data of this front, and tobj's.
@@ -29,11 +35,21 @@ pub(super) fn read(
     while let Some(line) = lines.next_line() {
         front.line(line).map_err(|message| Fault::new(line.number, message).at(file))?;
     }
-    warnings.extend(std::mem::take(&mut front.notes).into_warnings(file));
     let (materials, _) = tobj::load_mtl_buf(&mut front.clean.as_bytes())
         .map_err(|e| crate::error::Error::input(file, format!("tobj: {e}")))?;
+    for (source, material) in front.sources.iter().zip(&materials) {
+        let has_roughness = source.roughness.is_some() || source.roughness_map.is_some();
+        if has_roughness && meaning::mirror(material).is_none() {
+            front.notes.add(ROUGHNESS_ALONE, source.line);
+        }
+    }
+    warnings.extend(std::mem::take(&mut front.notes).into_warnings(file));
     Ok(front.sources.into_iter().zip(materials).collect())
 }
+
+/// The note on a roughness that says nothing of the picture.
+const ROUGHNESS_ALONE: &str =
+    "`Pr` or `map_Pr` of what is no mirror (`illum 3` with `Ks`) is ignored";
 
 #[derive(Default)]
 struct Front {
@@ -69,7 +85,13 @@ impl Front {
             "d" => self.dissolve(words),
             "Tr" => self.transparency(words),
             "illum" => self.illum(words),
-            "map_Kd" | "map_d" => self.image(&text, words, line.number),
+            "Pr" => self.roughness(words),
+            "map_Kd" | "map_d" => {
+                let name = self.image(&text, words, line.number)?.name;
+                self.put(format_args!("{text} {name}"));
+                Ok(())
+            }
+            "map_Pr" => self.roughness_map(words, line.number),
             "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "map_bump" | "map_Bump" | "bump"
             | "disp" | "decal" | "refl" | "norm" | "map_Tr" | "map_refl" | "map_Kn" => {
                 self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
@@ -86,7 +108,7 @@ impl Front {
         }
         self.put(format_args!("newmtl {}", self.sources.len()));
         self.has_dissolve = false;
-        self.sources.push(Source { name, line, filter: None });
+        self.sources.push(Source { name, line, ..Source::default() });
         Ok(())
     }
 
@@ -110,6 +132,22 @@ impl Front {
         let filter = colour("Tf", words, 1.0)?;
         if let Some(source) = self.sources.last_mut() {
             source.filter = Some(filter);
+        }
+        Ok(())
+    }
+
+    fn roughness(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+        let roughness = number_in("Pr", words, 0.0, 1.0)?;
+        if let Some(source) = self.sources.last_mut() {
+            source.roughness = Some(roughness);
+        }
+        Ok(())
+    }
+
+    fn roughness_map(&mut self, words: Words<'_>, line: usize) -> std::result::Result<(), String> {
+        let NamedImage { name, channel } = self.image("map_Pr", words, line)?;
+        if let Some(source) = self.sources.last_mut() {
+            source.roughness_map = Some((name, channel.unwrap_or(Channel::Green)));
         }
         Ok(())
     }
@@ -151,13 +189,14 @@ impl Front {
         Ok(())
     }
 
-    /// `map_Kd [options] file`, or `map_d`. The file's name may hold blanks.
+    /// `map_Kd [options] file`, or another map. The file's name may hold blanks.
     fn image(
         &mut self,
         keyword: &str,
         mut words: Words<'_>,
         line: usize,
-    ) -> std::result::Result<(), String> {
+    ) -> std::result::Result<NamedImage, String> {
+        let mut channel = None;
         loop {
             let mut ahead = words;
             let arguments = match ahead.next() {
@@ -170,6 +209,13 @@ impl Front {
                 _ => break,
             };
             let option = words.next().unwrap_or_default();
+            if (keyword, option) == ("map_Pr", b"-imfchan") {
+                channel = channel_of(words.next().unwrap_or_default());
+                if channel.is_some() {
+                    continue;
+                }
+                return Err(format!("`{keyword}`: `-imfchan` takes r, g, b or m"));
+            }
             self.notes.add(&format!("texture option `{}` is ignored", show(option)), line);
             for used in 0..arguments {
                 let mut ahead = words;
@@ -190,8 +236,7 @@ impl Front {
         if name.is_empty() {
             return Err(format!("`{keyword}` without a file name"));
         }
-        self.put(format_args!("{keyword} {name}"));
-        Ok(())
+        Ok(NamedImage { name, channel })
     }
 
     fn other(&mut self, keyword: &[u8], line: usize) -> std::result::Result<(), String> {
@@ -201,6 +246,23 @@ impl Front {
         }
         self.notes.add(&format!("`{}` is ignored", show(keyword)), line);
         Ok(())
+    }
+}
+
+/// An image as a statement names it.
+struct NamedImage {
+    name: String,
+    /// Of data, if an option gives it.
+    channel: Option<Channel>,
+}
+
+fn channel_of(word: &[u8]) -> Option<Channel> {
+    match word {
+        b"r" => Some(Channel::Red),
+        b"g" => Some(Channel::Green),
+        b"b" => Some(Channel::Blue),
+        b"m" => Some(Channel::Alpha),
+        _ => None,
     }
 }
 

@@ -5,7 +5,7 @@
 //! | `Kd`, `map_Kd` | diffuse reflectance, texture |
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
 //! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
-//! | `illum` 3 or 5 with `Ks` | perfect mirror of reflectance `Ks` beside the diffuse part |
+//! | `illum` 3 or 5 with `Ks` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
 //! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
 
@@ -32,8 +32,9 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
         out.glass = Some(Glass { tint, ..Glass::clear(ior) });
         return (out, notes);
     }
-    if matches!(mtl.illumination_model, Some(3 | 5)) {
-        out.mirror = mtl.specular.map_or(Rgb::ZERO, rgb);
+    if let Some(mirror) = mirror(mtl) {
+        out.mirror = mirror;
+        out.roughness = source.roughness.unwrap_or(0.0);
     }
     let dark = out.mirror != Rgb::ZERO || out.emission != Rgb::ZERO;
     out.diffuse = match mtl.diffuse {
@@ -57,6 +58,12 @@ pub(super) fn textured(mtl: &tobj::Material) -> Rgb {
         Some(diffuse) if diffuse != Rgb::ZERO => diffuse.min(Rgb::ONE),
         _ => Rgb::ONE,
     }
+}
+
+/// The reflectance of the mirror that it is, if any.
+pub(super) fn mirror(mtl: &tobj::Material) -> Option<Rgb> {
+    let is_mirror = matches!(mtl.illumination_model, Some(3 | 5));
+    mtl.specular.filter(|_| is_mirror).map(rgb).filter(|mirror| *mirror != Rgb::ZERO)
 }
 
 fn is_glass(mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {

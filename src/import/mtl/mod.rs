@@ -8,7 +8,7 @@ mod meaning;
 use super::alpha::{self, MaskCache};
 use super::model::Model;
 use super::source;
-use super::texture::{self, TextureCache};
+use super::texture::{self, ImageUse, TextureCache};
 use crate::error::{Diagnostic, Result};
 use crate::math::Rgb;
 use crate::scene::{MaterialId, TextureMap};
@@ -104,13 +104,27 @@ impl Libraries {
         model.warnings.extend(notes.into_iter().map(place));
         if let Some(image) = &entry.parsed.diffuse_texture {
             let file = source::beside(&entry.library, image);
-            match texture::load_cached(&file, &mut self.textures, model) {
+            match texture::load_cached(&file, ImageUse::Colour, &mut self.textures, model) {
                 Ok(id) => {
                     material.texture = Some(TextureMap::of(id));
                     material.diffuse = meaning::textured(&entry.parsed);
                 }
                 Err(error) => {
                     model.warnings.push(place(format!("texture left out: {error}")));
+                }
+            }
+        }
+        let rough = entry.source.roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO);
+        if let Some((image, channel)) = rough {
+            let file = source::beside(&entry.library, image);
+            let data = ImageUse::Data(*channel);
+            match texture::load_cached(&file, data, &mut self.textures, model) {
+                Ok(id) => {
+                    material.roughness_map = Some(TextureMap::of(id));
+                    material.roughness = 1.0;
+                }
+                Err(error) => {
+                    model.warnings.push(place(format!("roughness map left out: {error}")));
                 }
             }
         }

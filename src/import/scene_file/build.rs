@@ -1,14 +1,13 @@
 //! From the checked tables to a [`World`]: reads meshes and textures, places and merges them.
 
 use super::at::{At, Span};
-use super::material::Material;
+use super::material::{Images, Material};
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
 use super::report::Source;
-use super::texture::NamedTexture;
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
-use crate::import::{self, Model, emission, untextured};
+use crate::import::{self, ImageUse, Model, emission, untextured};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -26,7 +25,9 @@ pub(super) struct Builder<'a> {
     /// Every file read, the scene file first, each once.
     pub files: Vec<PathBuf>,
     /// Images that no material has asked for yet.
-    images: HashMap<PathBuf, Result<scene::Texture>>,
+    images: HashMap<(PathBuf, ImageUse), Result<scene::Texture>>,
+    /// Those in the world.
+    textures: HashMap<(PathBuf, ImageUse), scene::TextureId>,
     materials: BTreeMap<&'a str, Named>,
     default_material: Option<MaterialId>,
     generated: u64,
@@ -38,12 +39,27 @@ struct Named {
     used: bool,
 }
 
-/// The images of all materials of `file`, each once, read on all threads.
-fn images(source: &Source, file: &SceneFile) -> HashMap<PathBuf, Result<scene::Texture>> {
-    let textures = file.material.values().filter_map(|material| material.texture.as_ref());
-    let path = |texture| import::source::beside(&source.path, &NamedTexture::file(texture).value);
-    let paths: BTreeSet<PathBuf> = textures.map(path).collect();
-    paths.into_par_iter().map(|path| (path.clone(), import::load_texture(&path))).collect()
+/// The images of all materials of `file`, each once for each use, read on all threads.
+fn images(
+    source: &Source,
+    file: &SceneFile,
+) -> HashMap<(PathBuf, ImageUse), Result<scene::Texture>> {
+    let named = file.material.values().flat_map(|material| images_of(material));
+    let path = |file: &At<String>| import::source::beside(&source.path, &file.value);
+    let images: BTreeSet<_> = named.map(|(file, image_use)| (path(&file), image_use)).collect();
+    let load = |image: (PathBuf, ImageUse)| {
+        let loaded = import::load_image(&image.0, image.1);
+        (image, loaded)
+    };
+    images.into_par_iter().map(load).collect()
+}
+
+/// The images of a material, but for masks.
+fn images_of(material: &Material) -> impl Iterator<Item = (At<String>, ImageUse)> {
+    let texture = material.texture.as_ref().map(|texture| (texture.image_file(), ImageUse::Colour));
+    let roughness = material.roughness.as_ref().and_then(At::data_file);
+    let roughness = roughness.map(|(file, channel)| (file, ImageUse::Data(channel)));
+    [texture, roughness].into_iter().flatten()
 }
 
 impl<'a> Builder<'a> {
@@ -57,6 +73,7 @@ impl<'a> Builder<'a> {
             warnings: Vec::new(),
             files: vec![source.path.clone()],
             images: images(source, file),
+            textures: HashMap::new(),
             materials: BTreeMap::new(),
             default_material: None,
             generated: 0,
@@ -81,28 +98,36 @@ impl<'a> Builder<'a> {
     }
 
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
-        let texture = material.texture.as_ref().map(NamedTexture::file);
-        let image = texture.map(|file| self.add_texture(&file)).transpose()?;
-        let mask = material.alpha.as_ref().map(NamedTexture::file);
-        let mask = mask.map(|file| self.add_mask(&file)).transpose()?;
-        let built = material.build(name, self.source, image, mask)?;
+        let texture = material.texture.as_ref().map(At::image_file);
+        let alpha = material.alpha.as_ref().map(At::image_file);
+        let roughness = material.roughness.as_ref().and_then(At::data_file);
+        let images = Images {
+            texture: texture.map(|file| self.add_image(&file, ImageUse::Colour)).transpose()?,
+            alpha: alpha.map(|file| self.add_mask(&file)).transpose()?,
+            roughness: roughness
+                .map(|(file, channel)| self.add_image(&file, ImageUse::Data(channel)))
+                .transpose()?,
+        };
+        let built = material.build(name, self.source, &images)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
         self.materials.insert(name, Named { id, span: material.span.clone(), used: false });
         Ok(())
     }
 
-    fn add_texture(&mut self, file: &At<String>) -> Result<scene::TextureId> {
-        let path = self.beside(file);
-        let same = |t: &scene::Texture| Path::new(&t.name) == path;
-        if let Some(known) = self.world.textures.iter().position(same) {
-            return Ok(known as scene::TextureId);
+    fn add_image(&mut self, file: &At<String>, image_use: ImageUse) -> Result<scene::TextureId> {
+        let key = (self.beside(file), image_use);
+        if let Some(known) = self.textures.get(&key) {
+            return Ok(*known);
         }
-        let loaded = self.images.remove(&path).unwrap_or_else(|| import::load_texture(&path));
+        let loaded = self.images.remove(&key);
+        let loaded = loaded.unwrap_or_else(|| import::load_image(&key.0, image_use));
         let texture = loaded.map_err(|e| self.at_key(file, e))?;
-        self.note_file(&path);
+        self.note_file(&key.0);
+        let id = self.world.textures.len() as scene::TextureId;
         self.world.textures.push(texture);
-        Ok(self.world.textures.len() as scene::TextureId - 1)
+        self.textures.insert(key, id);
+        Ok(id)
     }
 
     fn add_mask(&mut self, file: &At<String>) -> Result<scene::MaskId> {
@@ -154,7 +179,7 @@ impl<'a> Builder<'a> {
     /// Whether the material has an image to lay on.
     fn is_textured(&self, id: MaterialId) -> bool {
         let material = &self.world.materials[id as usize];
-        material.texture.is_some() || material.alpha.is_some()
+        material.has_image() || material.alpha.is_some()
     }
 
     fn add_sphere(&mut self, sphere: &At<Sphere>) -> Result<()> {

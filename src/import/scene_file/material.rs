@@ -1,9 +1,9 @@
 //! `[material.NAME]`.
 
 use super::at::At;
-use super::number::{Int, Ior, Share};
+use super::number::{Int, Ior};
 use super::report::Source;
-use super::texture::NamedTexture;
+use super::texture::{ImageTable, Named, NamedTexture, Roughness};
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::scene::{self, MaskId, TextureId};
@@ -31,8 +31,9 @@ pub(super) struct Material {
     pub alpha: Option<At<NamedTexture>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
-    /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
-    roughness: Option<At<Share>>,
+    /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte. Or an image file of it, relative to
+    /// the scene file, whose green counts as it stands; or a table of the file, the channel and how it lies on the surface.
+    pub roughness: Option<At<Roughness>>,
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
@@ -62,19 +63,20 @@ pub(super) struct Glass {
     priority: Option<Int<0, 255>>,
 }
 
+/// Indices of a material's decoded images.
+pub(super) struct Images {
+    pub texture: Option<TextureId>,
+    pub alpha: Option<MaskId>,
+    pub roughness: Option<TextureId>,
+}
+
 fn window_glass() -> Ior {
     Ior(1.5)
 }
 
 impl Material {
-    /// As scene data; `image` and `mask` are the indices of the decoded images.
-    pub fn build(
-        &self,
-        name: &str,
-        source: &Source,
-        image: Option<TextureId>,
-        mask: Option<MaskId>,
-    ) -> Result<scene::Material> {
+    /// As scene data; `images` are the indices of the decoded images.
+    pub fn build(&self, name: &str, source: &Source, images: &Images) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
             ior: g.ior.0,
@@ -82,14 +84,21 @@ impl Material {
             absorption: g.absorption.unwrap_or_default().rgb(),
             priority: g.priority.map(|p| p.u32() as u8),
         });
+        let Images { texture, alpha, roughness } = images;
+        let (roughness, roughness_map) = match (self.roughness.as_deref(), roughness) {
+            (Some(Roughness::Same(share)), _) => (share.0, None),
+            (Some(Roughness::Image(Named(table))), Some(id)) => (1.0, Some(table.map(*id))),
+            (Some(Roughness::Image(_)), None) | (None, _) => (0.0, None),
+        };
         Ok(scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
-            texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
+            texture: self.texture.as_ref().zip(*texture).map(|(texture, id)| texture.0.map(id)),
             vertex_colours: self.vertex_colours,
-            alpha: self.alpha.as_ref().zip(mask).map(|(alpha, id)| alpha.build(id)),
+            alpha: self.alpha.as_ref().zip(*alpha).map(|(alpha, id)| alpha.0.map(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
-            roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
+            roughness,
+            roughness_map,
             glass,
             emission: self.emission.unwrap_or_default().rgb(),
             emits_back: self.emits_back,

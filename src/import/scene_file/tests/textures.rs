@@ -196,3 +196,68 @@ fn glass_with_alpha_is_refused_at_the_key() {
     assert_eq!(fault.line, Some(4));
     assert!(fault.message.contains("glass has no cut-outs"), "{fault}");
 }
+
+/// Loads a scene file with `text` beside images of one pixel: `grey.pgm`, 16 bits, and `rgba.tga`.
+fn data(text: &str) -> Result<Loaded> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("grey.pgm"), b"P5 1 1 65535\n\x80\x00").expect("written");
+    let rgba = image::RgbaImage::from_pixel(1, 1, image::Rgba([10, 128, 30, 40]));
+    rgba.save(at("rgba.png")).expect("written");
+    let text =
+        format!("[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n[material.m]\n{text}");
+    std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
+    load(&at("scene.toml"), &LoadOptions::default())
+}
+
+#[test]
+fn a_roughness_is_a_number_or_a_channel_of_an_image_as_it_stands() {
+    let of = |roughness: &str| {
+        let loaded = data(&format!("mirror = 0.5\nroughness = {roughness}\n")).expect("a scene");
+        let material = &loaded.world.materials[0];
+        let map = material.roughness_map;
+        let texel =
+            map.map(|map| loaded.world.textures[map.image as usize].levels()[0].texel(0, 0).x);
+        (material.roughness, texel)
+    };
+    assert_eq!(of("0.25"), (0.25, None));
+    assert_eq!(of("1"), (1.0, None));
+    for (roughness, code) in [
+        ("'rgba.png'", 128.0),
+        ("{ file = 'rgba.png', wrap = 'clamp' }", 128.0),
+        ("{ file = 'rgba.png', channel = 'r' }", 10.0),
+        ("{ file = 'rgba.png', channel = 'b' }", 30.0),
+        ("{ file = 'rgba.png', channel = 'a' }", 40.0),
+    ] {
+        assert_eq!(of(roughness), (1.0, Some(code / 255.0)), "{roughness}");
+    }
+    assert_eq!(of("'grey.pgm'"), (1.0, Some(f32::from(0x8000u16) / 65_535.0)));
+}
+
+#[test]
+fn one_file_as_colour_and_as_data_is_two_images() {
+    let text = "diffuse = 0.5\ntexture = 'rgba.png'\nmirror = 0.5\nroughness = 'rgba.png'\n\
+                [material.n]\nmirror = 0.5\nroughness = { file = 'rgba.png', scale = [2, 2] }\n";
+    let loaded = data(text).expect("a scene");
+    let [colour, rough] = &loaded.world.textures[..] else { panic!("two images") };
+    assert!(colour.levels()[0].texel(0, 0).y < 0.22 && rough.levels()[0].texel(0, 0).y > 0.5);
+    assert_eq!(loaded.files.len(), 2, "the scene file and the image");
+}
+
+#[test]
+fn roughness_from_what_is_no_image_of_it_is_refused_at_its_place() {
+    for (roughness, expected) in [
+        ("{ file = 'grey.pgm', channel = 'a' }", "no alpha channel"),
+        ("{ file = 'rgba.png', channel = 'luma' }", "luma"),
+        ("{ file = 'gone.png' }", "gone.png"),
+        ("{ channel = 'r' }", "file"),
+        ("1.5", "a number from 0 to 1"),
+        ("-1", "a number from 0 to 1"),
+        ("true", "a number from 0 to 1, a file name or a table"),
+    ] {
+        let error = data(&format!("mirror = 0.5\nroughness = {roughness}\n")).expect_err("refused");
+        assert!(error.to_string().contains(expected), "{roughness}: {error}");
+    }
+    let error = data("diffuse = 0.5\nroughness = 'rgba.png'\n").expect_err("refused");
+    assert!(error.to_string().contains("needs `mirror`"), "{error}");
+}
