@@ -59,6 +59,7 @@ impl EffectPlan {
             cut_outs(scene, &UsedMaterials::of(scene)),
             vertex_colours(scene, &UsedMaterials::of(scene)),
             roughness_maps(&UsedMaterials::of(scene), settings),
+            normal_maps(&UsedMaterials::of(scene)),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -190,9 +191,15 @@ fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
 /// Whether the roughness of mirrors is looked up in images.
 fn roughness_maps(used: &UsedMaterials, settings: &Settings) -> EffectReason {
     let why =
-        format!("{} in use", counted(used.roughness_maps, "rough mirror material with a map"));
+        format!("{} in use", counted(used.roughness_maps, "roughness-mapped mirror material"));
     let runs = used.roughness_maps > 0 && settings.bounces > 0;
     EffectReason { effect: "roughness maps", runs, why }
+}
+
+/// Whether images tilt normals.
+fn normal_maps(used: &UsedMaterials) -> EffectReason {
+    let why = format!("{} in use", counted(used.normal_maps, "normal-mapped material"));
+    EffectReason { effect: "normal maps", runs: used.normal_maps > 0, why }
 }
 
 fn has_roughness_map(material: &Material) -> bool {
@@ -265,6 +272,7 @@ struct UsedMaterials {
     /// With any image but a mask.
     textured: usize,
     roughness_maps: usize,
+    normal_maps: usize,
     vertex_colours: usize,
     cut_out: usize,
 }
@@ -288,6 +296,7 @@ impl UsedMaterials {
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
             counts.textured += usize::from(material.has_image());
+            counts.normal_maps += usize::from(material.normal_map.is_some());
             counts.roughness_maps += usize::from(has_roughness_map(material));
             counts.vertex_colours += usize::from(material.vertex_colours);
             counts.cut_out += usize::from(material.alpha.is_some());

@@ -14,8 +14,8 @@ use moves::{Set, psnr_of};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    CameraPath, Corners, Easing, KeyPose, Material, Policy, Pose, ReuseSettings, Settings, Texture,
-    TextureMap, World,
+    CameraPath, Corners, Easing, KeyPose, Material, NormalMap, Policy, Pose, ReuseSettings,
+    Settings, Texture, TextureMap, World,
 };
 use tweenray::sequence::Made;
 use tweenray::stats::ReuseCounts;
@@ -135,6 +135,24 @@ fn a_roughness_map_is_no_worse_than_traced() {
         let (mirror, roughness_map) = (Rgb::splat(0.3), Some(TextureMap::of(image)));
         let satin = Material::diffuse("satin", Rgb::splat(0.5));
         lay_floor(world, Material { mirror, roughness: 1.0, roughness_map, ..satin });
+    };
+    is_no_worse_than_traced_after("cornell", change, [0.75, 0.05]);
+}
+
+/// The shadowing of a floor of bumps is that of the plain floor; what arrives on the bumps is computed in each frame.
+#[test]
+fn a_normal_map_is_no_worse_than_traced() {
+    let change = |world: &mut World| {
+        let texel = |i: u32| {
+            let tilt = |k: u32| if k % 8 < 4 { 60 } else { 195 };
+            [tilt(i % 16), tilt(i / 16), 210]
+        };
+        let image = world.textures.len() as u32;
+        let texels = (0..256).map(texel).collect();
+        world.textures.push(Texture::from_vectors8("bumps", [16, 16], texels));
+        let normal_map = Some(NormalMap { image: TextureMap::of(image), strength: 1.0 });
+        let bumpy = Material::diffuse("bumpy", Rgb::splat(0.7));
+        lay_floor(world, Material { normal_map, ..bumpy });
     };
     is_no_worse_than_traced_after("cornell", change, [0.75, 0.05]);
 }

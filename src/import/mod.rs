@@ -33,7 +33,8 @@ pub use mesh_file::load_model;
 pub use model::{COLOURED_MATERIAL, DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
-pub use texture::{Channel, ImageUse, MAX_IMAGE_BYTES, load_image, load_texture};
+use texture::doubt;
+pub use texture::{ImageChannel, ImageUse, MAX_IMAGE_BYTES, load_image, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
 use crate::scene::{JobOptions, Settings, Shot, World, limits};

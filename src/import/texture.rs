@@ -24,12 +24,14 @@ pub enum ImageUse {
     /// Reflectances.
     Colour,
     /// A number from 0 to 1 in one channel.
-    Data(Channel),
+    Data(ImageChannel),
+    /// Normals in tangent space: red, green and blue.
+    Normals,
 }
 
 /// A channel of an image. In a grey image red, green and blue are the grey.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Channel {
+pub enum ImageChannel {
     /// Red.
     Red,
     /// Green: where glTF has the roughness.
@@ -79,12 +81,47 @@ pub fn load_image(path: &Path, image_use: ImageUse) -> Result<Texture> {
     match image_use {
         ImageUse::Colour => load_texture(path),
         ImageUse::Data(channel) => load_data(path, channel),
+        ImageUse::Normals => load_normals(path),
     }
 }
 
-fn load_data(path: &Path, channel: Channel) -> Result<Texture> {
+/// Why a texture that was read for `image_use` may be meant for another, if it may.
+pub(super) fn doubt(texture: &Texture, image_use: ImageUse) -> Option<&'static str> {
+    match (image_use, texture.looks_like_normals()) {
+        (ImageUse::Normals, false) => Some(
+            "this does not look like a normal map: few of its texels are unit vectors in tangent space",
+        ),
+        (ImageUse::Colour, true) => Some("this looks like a normal map, and is shown as a colour"),
+        (ImageUse::Normals, true) | (ImageUse::Colour, false) | (ImageUse::Data(_), _) => None,
+    }
+}
+
+fn load_normals(path: &Path) -> Result<Texture> {
     let image = decode(path)?;
-    if channel == Channel::Alpha && !image.color().has_alpha() {
+    let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
+    if image.as_flat_samples_u8().is_some() {
+        let texels = image.into_rgb8().pixels().map(|p| p.0).collect();
+        return Ok(Texture::from_vectors8(name, size, texels));
+    }
+    if image.as_flat_samples_u16().is_some() {
+        let texels = image.into_rgb16().pixels().map(|p| p.0).collect();
+        return Ok(Texture::from_vectors16(name, size, texels));
+    }
+    let code = |value: f32| {
+        let is_value = value.is_finite() && value >= 0.0;
+        is_value.then(|| (value.min(1.0) * 65_535.0).round() as u16)
+    };
+    let vector = |p: &image::Rgb<f32>| {
+        let [r, g, b] = p.0.map(code);
+        Some([r?, g?, b?])
+    };
+    let texels: Option<Vec<[u16; 3]>> = image.into_rgb32f().pixels().map(vector).collect();
+    Ok(Texture::from_vectors16(name, size, texels.ok_or_else(|| bad_pixel(path))?))
+}
+
+fn load_data(path: &Path, channel: ImageChannel) -> Result<Texture> {
+    let image = decode(path)?;
+    if channel == ImageChannel::Alpha && !image.color().has_alpha() {
         return Err(Error::input(path, "the image has no alpha channel"));
     }
     let at = channel as usize;

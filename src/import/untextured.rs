@@ -18,6 +18,7 @@ enum Lacking {
     Texture(String),
     Mask(String),
     Roughness(String),
+    Normals(String),
     Colours,
 }
 
@@ -35,7 +36,11 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
         let roughness = roughness.map(Lacking::Roughness);
-        let lacking = [texture.map(Lacking::Texture), mask.map(Lacking::Mask), roughness, colours];
+        let normals = material.normal_map.filter(|_| is_bare);
+        let normals = normals.map(|map| world.textures[map.image.image as usize].name.clone());
+        let normals = normals.map(Lacking::Normals);
+        let lacking =
+            [texture.map(Lacking::Texture), mask.map(Lacking::Mask), roughness, normals, colours];
         lacking.into_iter().flatten().map(|lacks| Untextured::new(mesh, material, lacks))
     })
 }
@@ -61,6 +66,9 @@ impl Untextured {
                 "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it has one roughness, \
                  that of the lower left corner of {file}"
             ),
+            Lacking::Normals(file) => format!(
+                "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` tilts none of its normals"
+            ),
             Lacking::Colours => format!(
                 "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its `diffuse` as it is"
             ),
@@ -77,6 +85,10 @@ impl Untextured {
             Lacking::Mask(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without `alpha`"
+            }
+            Lacking::Normals(_) => {
+                "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
+                 material without a `normal_map`"
             }
             Lacking::Roughness(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it one `roughness`"

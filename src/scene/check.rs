@@ -19,6 +19,7 @@ impl World {
         self.materials.iter().try_for_each(|material| {
             self.check_image(material, material.texture.as_ref(), "texture")?;
             self.check_image(material, material.roughness_map.as_ref(), "roughness map")?;
+            self.check_normal_map(material)?;
             self.check_mask(material)
         })?;
         self.meshes.iter().try_for_each(check_vertices)?;
@@ -34,6 +35,21 @@ impl World {
             return Err(Error::Usage(message));
         }
         check_map(map, what, name)
+    }
+
+    fn check_normal_map(&self, material: &Material) -> Result<()> {
+        let Some(map) = &material.normal_map else { return Ok(()) };
+        self.check_image(material, Some(&map.image), "normal map")?;
+        let name = &material.name;
+        if !(map.strength >= 0.0 && map.strength.is_finite()) {
+            let message = format!("the normal map of `{name}` has the strength {}", map.strength);
+            return Err(Error::Usage(message));
+        }
+        if material.glass.is_some() {
+            let message = format!("`{name}` is glass with a normal map, which glass has none of");
+            return Err(Error::Usage(message));
+        }
+        Ok(())
     }
 
     fn check_mask(&self, material: &Material) -> Result<()> {

@@ -1,6 +1,6 @@
 //! Images that materials show or take numbers from, with their mip levels.
 
-use crate::math::{DAffine2, DVec3, Rgb, Vec2, bulk, srgb_decode};
+use crate::math::{DAffine2, DVec3, Rgb, Vec2, Vec3, bulk, srgb_decode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -42,6 +42,10 @@ enum Texels {
     Data8(#[serde(with = "bulk")] Vec<u8>),
     /// Shares of 65535, no colour; 2 bytes a texel.
     Data16(#[serde(with = "bulk")] Vec<u16>),
+    /// Three shares of 255 each, no colours; 3 bytes a texel.
+    Vectors8(#[serde(with = "bulk")] Vec<[u8; 3]>),
+    /// Three shares of 65535 each; 6 bytes a texel.
+    Vectors16(#[serde(with = "bulk")] Vec<[u16; 3]>),
 }
 
 /// How a material lays an image on a surface.
@@ -169,6 +173,46 @@ impl Texture {
         Self::with_levels(name.into(), TextureLevel::new(size, Texels::Data16(texels)))
     }
 
+    /// A texture of three numbers from 0 to 1 a texel, no colours, as shares of 255.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_vectors8(name: impl Into<String>, size: [u32; 2], texels: Vec<[u8; 3]>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Vectors8(texels)))
+    }
+
+    /// The same as shares of 65535.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_vectors16(name: impl Into<String>, size: [u32; 2], texels: Vec<[u16; 3]>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Vectors16(texels)))
+    }
+
+    /// Whether nearly all texels, as they stand, are unit vectors on the side of blue, as those of normal maps are.
+    pub fn looks_like_normals(&self) -> bool {
+        let is_normal = |shares: Rgb| {
+            let v = shares * 2.0 - Rgb::ONE;
+            (v.length() - 1.0).abs() < 0.1 && v.z > 0.0
+        };
+        let eight = |c: &[u8; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 255.0);
+        let (normals, all) = match &self.levels[0].texels {
+            Texels::Srgb(codes) | Texels::Vectors8(codes) => {
+                (codes.par_iter().filter(|c| eight(c)).count(), codes.len())
+            }
+            Texels::Vectors16(codes) => {
+                let sixteen =
+                    |c: &[u16; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 65_535.0);
+                (codes.par_iter().filter(|c| sixteen(c)).count(), codes.len())
+            }
+            Texels::Linear(values) => {
+                (values.par_iter().filter(|c| is_normal(**c)).count(), values.len())
+            }
+            Texels::Data8(_) | Texels::Data16(_) => (0, 1),
+        };
+        10 * normals > 9 * all
+    }
+
     fn with_levels(name: String, image: TextureLevel) -> Self {
         let mut levels = vec![image];
         while let Some(next) = levels.last().and_then(TextureLevel::halved) {
@@ -194,6 +238,8 @@ impl Texture {
             Texels::Linear(_) => "linear",
             Texels::Data8(_) => "data of 8 bits",
             Texels::Data16(_) => "data of 16 bits",
+            Texels::Vectors8(_) => "vectors of 8 bits",
+            Texels::Vectors16(_) => "vectors of 16 bits",
         }
     }
 
@@ -210,6 +256,8 @@ impl TextureLevel {
             Texels::Linear(values) => values.len(),
             Texels::Data8(values) => values.len(),
             Texels::Data16(values) => values.len(),
+            Texels::Vectors8(values) => values.len(),
+            Texels::Vectors16(values) => values.len(),
         };
         assert_eq!(count, width as usize * height as usize, "texels of a texture");
         assert!(count > 0, "a texture without texels");
@@ -253,7 +301,7 @@ impl TextureLevel {
                 values[lower + left],
                 values[lower + right],
             ],
-            Texels::Data8(_) | Texels::Data16(_) => {
+            Texels::Data8(_) | Texels::Data16(_) | Texels::Vectors8(_) | Texels::Vectors16(_) => {
                 [upper + left, upper + right, lower + left, lower + right].map(|at| self.datum(at))
             }
         }
@@ -268,6 +316,8 @@ impl TextureLevel {
             Texels::Linear(values) => values[at],
             Texels::Data8(values) => Rgb::splat(f32::from(values[at]) / 255.0),
             Texels::Data16(values) => Rgb::splat(f32::from(values[at]) / 65_535.0),
+            Texels::Vectors8(values) => Rgb::from_array(values[at].map(f32::from)) / 255.0,
+            Texels::Vectors16(values) => Rgb::from_array(values[at].map(f32::from)) / 65_535.0,
         }
     }
 
@@ -277,6 +327,8 @@ impl TextureLevel {
             Texels::Linear(values) => bytemuck::cast_slice(values),
             Texels::Data8(values) => values,
             Texels::Data16(values) => bytemuck::cast_slice(values),
+            Texels::Vectors8(values) => bytemuck::cast_slice(values),
+            Texels::Vectors16(values) => bytemuck::cast_slice(values),
         }
     }
 
@@ -300,6 +352,14 @@ impl TextureLevel {
             Texels::Linear(_) => Texels::Linear(means.collect()),
             Texels::Data8(_) => {
                 Texels::Data8(means.map(|mean| rounded(mean.x, 255.0) as u8).collect())
+            }
+            Texels::Vectors8(_) => {
+                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, 255.0) as u8);
+                Texels::Vectors8(means.map(code).collect())
+            }
+            Texels::Vectors16(_) => {
+                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, 65_535.0) as u16);
+                Texels::Vectors16(means.map(code).collect())
             }
             Texels::Data16(_) => {
                 Texels::Data16(means.map(|mean| rounded(mean.x, 65_535.0) as u16).collect())

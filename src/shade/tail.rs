@@ -31,7 +31,7 @@ struct TailRay<'s> {
 impl SampleSink for TailRay<'_> {
     fn push(&mut self, sample: LightSample) {
         let irradiance = sample.pdf.per_steradian().map_or(self.exact, |density| {
-            sample.radiance * sample.wi.dot(self.point.n).max(0.0) / density
+            sample.radiance * sample.wi.dot(self.point.mapped).max(0.0) / density
         });
         let light = self.source.sampler.emission * (irradiance / self.count) as f32;
         if light != Rgb::ZERO {
@@ -129,7 +129,7 @@ impl Renderer<'_> {
         s.tail.seen.clear();
         for (point, cell) in lit.iter().zip(cells) {
             let tail = selection.of_diffuse(*cell).tail();
-            s.tail.seen.look(&tail, &selection.far, (point.si.p, point.n));
+            s.tail.seen.look(&tail, &selection.far, (point.si.p, point.mapped));
         }
     }
 
@@ -287,7 +287,7 @@ impl Renderer<'_> {
             // A light that was not looked at may show its back.
             let exact = match is_looked_at && source.is_sampled() {
                 true => f64::NAN,
-                false => source.sampler.unshadowed(point.si.p, point.n),
+                false => point.unshadowed(&source.sampler),
             };
             if exact == 0.0 {
                 continue;

@@ -1,7 +1,7 @@
 //! Material libraries. tobj 4.0.5 panics on some of these when it meets them bare.
 
 use super::{Expect, Expect::*, check, load_bytes};
-use tweenray::scene::TextureMap;
+use tweenray::scene::{Material, TextureMap};
 
 const OBJ: &[u8] = b"mtllib bad.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -55,7 +55,13 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nd 0.5\n", Warns(1, "rendered opaque")),
     ("newmtl a\nillum 7\n", Warns(1, "glass without `Ni`")),
     ("newmtl a\nKd 0.8 0.8 0.8\nKs 0.8 0.8 0.8\nillum 3\n", Warns(1, "to 1")),
-    ("newmtl a\nbump bumps.png\n", Warns(2, "`bump`")),
+    ("newmtl a\nbump gone.png\n", Warns(1, "normal map left out")),
+    ("newmtl a\nmap_Bump -bm 0.5 gone.png\n", Warns(1, "normal map left out")),
+    ("newmtl a\nmap_Bump -bm 0.5\n", Line(2, "`map_Bump` without a file name")),
+    ("newmtl a\nmap_Bump -bm x a.png\n", Line(2, "`x` is not a number")),
+    ("newmtl a\nnorm -bm -1 a.png\n", Line(2, "`-bm -1`")),
+    ("newmtl a\nillum 7\nNi 1.5\nnorm gone.png\n", Warns(1, "glass has no normal map")),
+    ("newmtl a\nmap_Bump bad.mtl\n", Warns(1, "normal map left out")),
     ("newmtl a\nPr 0.5\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
     ("newmtl a\nmap_Pr gone.png\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
     ("newmtl a\nPr 1.5\n", Line(2, "`Pr 1.5`: from 0 to 1")),
@@ -149,6 +155,26 @@ fn map_pr_is_one_channel_as_it_stands() {
     });
     let expected = [(1.0, Some(48.0 / 255.0)), (1.0, Some(128.0 / 255.0)), (0.25, None)];
     assert_eq!(rough.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn norm_is_a_normal_map_and_map_bump_only_if_it_looks_like_one() {
+    let mtl = "newmtl a\nnorm grey.ppm\nnewmtl b\nmap_Bump -bm 0.5 blue.ppm\nnewmtl c\nmap_Bump grey.ppm\n\
+               newmtl d\nbump grey.ppm\nnorm blue.ppm\n";
+    let obj = ["a", "b", "c", "d"].map(|name| format!("usemtl {name}\nf 1/1 2/2 3/3\n")).concat();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n{obj}");
+    let (grey, blue): (&[u8], &[u8]) = (b"P6 1 1 255\n\x80\x80\x80", b"P6 1 1 255\n\x80\x80\xff");
+    let others = [("bad.mtl", mtl.as_bytes()), ("grey.ppm", grey), ("blue.ppm", blue)];
+    let model = load_bytes("obj", obj.as_bytes(), &others).expect("a good file");
+    let of = |material: &Material| {
+        let map = material.normal_map?;
+        let texture = &model.world.textures[map.image.image as usize];
+        Some((texture.levels()[0].texel(0, 0).z == 1.0, map.strength))
+    };
+    let found: Vec<_> = model.world.materials.iter().map(of).collect();
+    assert_eq!(found, [Some((false, 1.0)), Some((true, 0.5)), None, Some((true, 1.0))]);
+    let [warning] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
+    assert!(warning.message.contains("grey.ppm of line 6 holds heights"), "{warning}");
 }
 
 #[test]

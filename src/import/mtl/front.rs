@@ -1,11 +1,10 @@
 //! Checks an MTL file line by line and hands tobj a clean copy of it.
 
-use super::meaning;
 use crate::error::{Diagnostic, Result};
 use crate::import::lines::{Line, Lines, Words, check_text, number, show};
 use crate::import::source::Fault;
 use crate::import::source::Notes;
-use crate::import::texture::Channel;
+use crate::import::texture::ImageChannel;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -18,10 +17,23 @@ pub(super) struct Source {
     pub line: usize,
     /// `Tf`: share of light that passes, linear RGB.
     pub filter: Option<[f64; 3]>,
+    /// `norm`, or `map_Bump` and `bump`, which may hold heights instead.
+    pub normal_map: Option<BumpImage>,
     /// `Pr`: roughness.
     pub roughness: Option<f64>,
     /// `map_Pr`: file and channel.
-    pub roughness_map: Option<(String, Channel)>,
+    pub roughness_map: Option<(String, ImageChannel)>,
+}
+
+/// An image of normals or, perhaps, of heights.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct BumpImage {
+    pub name: String,
+    /// `-bm`.
+    pub strength: f64,
+    /// Whether the statement is for normals alone.
+    pub is_normal: bool,
+    pub line: usize,
 }
 
 /// Reads the materials of a library: the data of this front, and tobj's.
@@ -35,21 +47,11 @@ pub(super) fn read(
     while let Some(line) = lines.next_line() {
         front.line(line).map_err(|message| Fault::new(line.number, message).at(file))?;
     }
+    warnings.extend(std::mem::take(&mut front.notes).into_warnings(file));
     let (materials, _) = tobj::load_mtl_buf(&mut front.clean.as_bytes())
         .map_err(|e| crate::error::Error::input(file, format!("tobj: {e}")))?;
-    for (source, material) in front.sources.iter().zip(&materials) {
-        let has_roughness = source.roughness.is_some() || source.roughness_map.is_some();
-        if has_roughness && meaning::mirror(material).is_none() {
-            front.notes.add(ROUGHNESS_ALONE, source.line);
-        }
-    }
-    warnings.extend(std::mem::take(&mut front.notes).into_warnings(file));
     Ok(front.sources.into_iter().zip(materials).collect())
 }
-
-/// The note on a roughness that says nothing of the picture.
-const ROUGHNESS_ALONE: &str =
-    "`Pr` or `map_Pr` of what is no mirror (`illum 3` with `Ks`) is ignored";
 
 #[derive(Default)]
 struct Front {
@@ -92,8 +94,9 @@ impl Front {
                 Ok(())
             }
             "map_Pr" => self.roughness_map(words, line.number),
-            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "map_bump" | "map_Bump" | "bump"
-            | "disp" | "decal" | "refl" | "norm" | "map_Tr" | "map_refl" | "map_Kn" => {
+            "norm" | "map_Bump" | "map_bump" | "bump" => self.bump(&text, words, line.number),
+            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "disp" | "decal" | "refl" | "map_Tr"
+            | "map_refl" | "map_Kn" => {
                 self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
                 Ok(())
             }
@@ -145,9 +148,27 @@ impl Front {
     }
 
     fn roughness_map(&mut self, words: Words<'_>, line: usize) -> std::result::Result<(), String> {
-        let NamedImage { name, channel } = self.image("map_Pr", words, line)?;
+        let NamedImage { name, channel, strength: _ } = self.image("map_Pr", words, line)?;
         if let Some(source) = self.sources.last_mut() {
-            source.roughness_map = Some((name, channel.unwrap_or(Channel::Green)));
+            source.roughness_map = Some((name, channel.unwrap_or(ImageChannel::Green)));
+        }
+        Ok(())
+    }
+
+    fn bump(
+        &mut self,
+        keyword: &str,
+        words: Words<'_>,
+        line: usize,
+    ) -> std::result::Result<(), String> {
+        let NamedImage { name, channel: _, strength } = self.image(keyword, words, line)?;
+        let is_normal = keyword == "norm";
+        if let Some(source) = self.sources.last_mut() {
+            // `norm` wins.
+            if is_normal || !source.normal_map.as_ref().is_some_and(|map| map.is_normal) {
+                let strength = strength.unwrap_or(1.0);
+                source.normal_map = Some(BumpImage { name, strength, is_normal, line });
+            }
         }
         Ok(())
     }
@@ -196,7 +217,7 @@ impl Front {
         mut words: Words<'_>,
         line: usize,
     ) -> std::result::Result<NamedImage, String> {
-        let mut channel = None;
+        let (mut channel, mut strength) = (None, None);
         loop {
             let mut ahead = words;
             let arguments = match ahead.next() {
@@ -215,6 +236,14 @@ impl Front {
                     continue;
                 }
                 return Err(format!("`{keyword}`: `-imfchan` takes r, g, b or m"));
+            }
+            if option == b"-bm" && matches!(keyword, "norm" | "map_Bump" | "map_bump" | "bump") {
+                let value = number(words.next().unwrap_or_default())?;
+                if !(0.0..=1e30).contains(&value) {
+                    return Err(format!("`{keyword}`: `-bm {value}`, from 0 on is possible"));
+                }
+                strength = Some(value);
+                continue;
             }
             self.notes.add(&format!("texture option `{}` is ignored", show(option)), line);
             for used in 0..arguments {
@@ -236,7 +265,7 @@ impl Front {
         if name.is_empty() {
             return Err(format!("`{keyword}` without a file name"));
         }
-        Ok(NamedImage { name, channel })
+        Ok(NamedImage { name, channel, strength })
     }
 
     fn other(&mut self, keyword: &[u8], line: usize) -> std::result::Result<(), String> {
@@ -253,15 +282,17 @@ impl Front {
 struct NamedImage {
     name: String,
     /// Of data, if an option gives it.
-    channel: Option<Channel>,
+    channel: Option<ImageChannel>,
+    /// `-bm` of normals.
+    strength: Option<f64>,
 }
 
-fn channel_of(word: &[u8]) -> Option<Channel> {
+fn channel_of(word: &[u8]) -> Option<ImageChannel> {
     match word {
-        b"r" => Some(Channel::Red),
-        b"g" => Some(Channel::Green),
-        b"b" => Some(Channel::Blue),
-        b"m" => Some(Channel::Alpha),
+        b"r" => Some(ImageChannel::Red),
+        b"g" => Some(ImageChannel::Green),
+        b"b" => Some(ImageChannel::Blue),
+        b"m" => Some(ImageChannel::Alpha),
         _ => None,
     }
 }

@@ -3,6 +3,7 @@
 //! | MTL | ours |
 //! |---|---|
 //! | `Kd`, `map_Kd` | diffuse reflectance, texture |
+//! | `norm`; `map_Bump` and `bump` whose image looks like normals | normal map, `-bm` its strength; nothing on glass |
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
 //! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
 //! | `illum` 3 or 5 with `Ks` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |

@@ -7,13 +7,17 @@ mod meaning;
 
 use super::alpha::{self, MaskCache};
 use super::model::Model;
-use super::source;
+use super::source::{self, Notes};
 use super::texture::{self, ImageUse, TextureCache};
 use crate::error::{Diagnostic, Result};
 use crate::math::Rgb;
-use crate::scene::{MaterialId, TextureMap};
+use crate::scene::{MaterialId, NormalMap, TextureMap};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+/// The note on a roughness that says nothing of the picture.
+const ROUGHNESS_ALONE: &str =
+    "`Pr` or `map_Pr` of what is no mirror (`illum 3` with `Ks`) is ignored";
 
 /// The materials of the libraries of an OBJ file, by name, before use.
 #[derive(Default)]
@@ -60,7 +64,12 @@ impl Libraries {
 
     fn parse(&mut self, file: &Path, bytes: &[u8], model: &mut Model) -> Result<()> {
         model.files.push(file.to_path_buf());
+        let mut notes = Notes::default();
         for (source, parsed) in front::read(file, bytes, &mut model.warnings)? {
+            let has_roughness = source.roughness.is_some() || source.roughness_map.is_some();
+            if has_roughness && meaning::mirror(&parsed).is_none() {
+                notes.add(ROUGHNESS_ALONE, source.line);
+            }
             let name = source.name.clone();
             let entry = Entry { library: file.to_path_buf(), source, parsed };
             if let Some(other) = self.entries.get(&name) {
@@ -75,6 +84,7 @@ impl Libraries {
                 self.entries.insert(name, entry);
             }
         }
+        model.warnings.extend(notes.into_warnings(file));
         Ok(())
     }
 
@@ -88,7 +98,8 @@ impl Libraries {
         (name, coloured): (&str, bool),
         model: &mut Model,
     ) -> Result<MaterialId> {
-        let Some(entry) = self.entries.get(name) else {
+        let Self { entries, textures, masks, .. } = self;
+        let Some(entry) = entries.get(name) else {
             let message = format!("no material `{name}`: plain grey in its place");
             model.warnings.push(Diagnostic::new(obj, message).line(line));
             return Ok(match coloured {
@@ -104,7 +115,7 @@ impl Libraries {
         model.warnings.extend(notes.into_iter().map(place));
         if let Some(image) = &entry.parsed.diffuse_texture {
             let file = source::beside(&entry.library, image);
-            match texture::load_cached(&file, ImageUse::Colour, &mut self.textures, model) {
+            match texture::load_cached(&file, ImageUse::Colour, textures, model) {
                 Ok(id) => {
                     material.texture = Some(TextureMap::of(id));
                     material.diffuse = meaning::textured(&entry.parsed);
@@ -118,7 +129,7 @@ impl Libraries {
         if let Some((image, channel)) = rough {
             let file = source::beside(&entry.library, image);
             let data = ImageUse::Data(*channel);
-            match texture::load_cached(&file, data, &mut self.textures, model) {
+            match texture::load_cached(&file, data, textures, model) {
                 Ok(id) => {
                     material.roughness_map = Some(TextureMap::of(id));
                     material.roughness = 1.0;
@@ -127,6 +138,12 @@ impl Libraries {
                     model.warnings.push(place(format!("roughness map left out: {error}")));
                 }
             }
+        }
+        if let Some(bump) = entry.source.normal_map.as_ref() {
+            let is_glass = material.glass.is_some();
+            let normals = normal_map(&entry.library, bump, is_glass, textures, model);
+            let warn = |message| model.warnings.push(place(message));
+            material.normal_map = normals.map_err(warn).ok();
         }
         if coloured && material.texture.is_some() {
             let message = "the texture is shown, the vertex colours are not";
@@ -142,7 +159,7 @@ impl Libraries {
             let is_glass = material.glass.is_some();
             let mask = match is_glass {
                 true => Err("glass has none, `map_d` is ignored".into()),
-                false => alpha::load_cached(&file, &mut self.masks, model),
+                false => alpha::load_cached(&file, masks, model),
             };
             let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
             material.alpha = mask.map_err(warn).ok().map(TextureMap::of);
@@ -150,4 +167,31 @@ impl Libraries {
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)
     }
+}
+
+/// The normal map of an image; `Err` tells why there is none.
+fn normal_map(
+    library: &Path,
+    bump: &front::BumpImage,
+    is_glass: bool,
+    textures: &mut TextureCache,
+    model: &mut Model,
+) -> std::result::Result<NormalMap, String> {
+    let front::BumpImage { name, strength, is_normal, line } = bump;
+    if is_glass {
+        return Err(format!("glass has no normal map: that of line {line} is ignored"));
+    }
+    let file = source::beside(library, name);
+    let before = model.world.textures.len();
+    let id = texture::load_cached(&file, ImageUse::Normals, textures, model)
+        .map_err(|error| format!("normal map left out: {error}"))?;
+    let looks_like_normals = model.world.textures[id as usize].looks_like_normals();
+    if !(looks_like_normals || *is_normal) {
+        if model.world.textures.len() > before {
+            model.world.textures.pop();
+            textures.remove(&(file, ImageUse::Normals));
+        }
+        return Err(format!("{name} of line {line} holds heights, not normals: it is ignored"));
+    }
+    Ok(NormalMap { image: TextureMap::of(id), strength: *strength })
 }

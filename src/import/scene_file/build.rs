@@ -59,7 +59,8 @@ fn images_of(material: &Material) -> impl Iterator<Item = (At<String>, ImageUse)
     let texture = material.texture.as_ref().map(|texture| (texture.image_file(), ImageUse::Colour));
     let roughness = material.roughness.as_ref().and_then(At::data_file);
     let roughness = roughness.map(|(file, channel)| (file, ImageUse::Data(channel)));
-    [texture, roughness].into_iter().flatten()
+    let normals = material.normal_map.as_ref().map(|map| (map.image_file(), ImageUse::Normals));
+    [texture, roughness, normals].into_iter().flatten()
 }
 
 impl<'a> Builder<'a> {
@@ -101,8 +102,10 @@ impl<'a> Builder<'a> {
         let texture = material.texture.as_ref().map(At::image_file);
         let alpha = material.alpha.as_ref().map(At::image_file);
         let roughness = material.roughness.as_ref().and_then(At::data_file);
+        let normals = material.normal_map.as_ref().map(At::image_file);
         let images = Images {
             texture: texture.map(|file| self.add_image(&file, ImageUse::Colour)).transpose()?,
+            normals: normals.map(|file| self.add_image(&file, ImageUse::Normals)).transpose()?,
             alpha: alpha.map(|file| self.add_mask(&file)).transpose()?,
             roughness: roughness
                 .map(|(file, channel)| self.add_image(&file, ImageUse::Data(channel)))
@@ -124,6 +127,9 @@ impl<'a> Builder<'a> {
         let loaded = loaded.unwrap_or_else(|| import::load_image(&key.0, image_use));
         let texture = loaded.map_err(|e| self.at_key(file, e))?;
         self.note_file(&key.0);
+        if let Some(message) = import::doubt(&texture, image_use) {
+            self.warnings.push(self.source.fault(&file.span, message));
+        }
         let id = self.world.textures.len() as scene::TextureId;
         self.world.textures.push(texture);
         self.textures.insert(key, id);

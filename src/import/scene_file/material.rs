@@ -3,7 +3,7 @@
 use super::at::At;
 use super::number::{Int, Ior};
 use super::report::Source;
-use super::texture::{ImageTable, Named, NamedTexture, Roughness};
+use super::texture::{ImageTable, Named, NamedTexture, NormalTexture, Roughness};
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::scene::{self, MaskId, TextureId};
@@ -21,6 +21,9 @@ pub(super) struct Material {
     /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it
     /// lies on the surface.
     pub texture: Option<At<NamedTexture>>,
+    /// Image file, relative to the scene file, of normals of a finer surface: in tangent space, +Y up, as glTF has them. Or a
+    /// table of the file, the strength and how it lies on the surface. Not on glass.
+    pub normal_map: Option<At<Named<NormalTexture>>>,
     /// Whether `diffuse` is multiplied by the vertex colours of the mesh file. Without a `material` of the scene file
     /// a mesh shows its vertex colours anyway.
     #[serde(default)]
@@ -68,6 +71,7 @@ pub(super) struct Images {
     pub texture: Option<TextureId>,
     pub alpha: Option<MaskId>,
     pub roughness: Option<TextureId>,
+    pub normals: Option<TextureId>,
 }
 
 fn window_glass() -> Ior {
@@ -84,7 +88,7 @@ impl Material {
             absorption: g.absorption.unwrap_or_default().rgb(),
             priority: g.priority.map(|p| p.u32() as u8),
         });
-        let Images { texture, alpha, roughness } = images;
+        let Images { texture, alpha, roughness, normals } = images;
         let (roughness, roughness_map) = match (self.roughness.as_deref(), roughness) {
             (Some(Roughness::Same(share)), _) => (share.0, None),
             (Some(Roughness::Image(Named(table))), Some(id)) => (1.0, Some(table.map(*id))),
@@ -94,6 +98,10 @@ impl Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture: self.texture.as_ref().zip(*texture).map(|(texture, id)| texture.0.map(id)),
+            normal_map: self.normal_map.as_ref().zip(*normals).map(|(table, id)| {
+                let (image, strength) = (table.0.map(id), table.0.strength.0.0);
+                scene::NormalMap { image, strength }
+            }),
             vertex_colours: self.vertex_colours,
             alpha: self.alpha.as_ref().zip(*alpha).map(|(alpha, id)| alpha.0.map(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
@@ -116,6 +124,11 @@ impl Material {
                 let message =
                     "glass has no cut-outs: its body is closed, and a hole would leave it open";
                 return Err(source.fault(&alpha.span, message).into());
+            }
+            if let Some(map) = &self.normal_map {
+                let message =
+                    "glass has no normal map: what it refracts follows the surface that rays meet";
+                return Err(source.fault(&map.span, message).into());
             }
             let paints = self.texture.is_some() || self.vertex_colours;
             let others = self.diffuse.is_some() || paints || self.mirror.is_some();

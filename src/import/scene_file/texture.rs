@@ -1,10 +1,10 @@
 //! Images of a material.
 
 use super::at::At;
-use super::number::{Coordinate, Degrees, Factor, Share};
+use super::number::{Coordinate, Degrees, Factor, NotNegative, Share};
 use super::schema::inline_schema;
 use super::vector::List;
-use crate::import::Channel;
+use crate::import::ImageChannel;
 use crate::math::{DAffine2, DVec2};
 use crate::scene::{TextureId, TextureMap, Wrap};
 use schemars::{JsonSchema, json_schema};
@@ -67,6 +67,25 @@ image_table!(
     }
 );
 
+image_table!(
+    /// An image file of normals in tangent space, and how it lies on the surface.
+    NormalTexture {
+        /// Factor on the normals' parts along the surface: 0 is flat, 1 what the image holds.
+        strength: Strength,
+    }
+);
+
+/// Factor on a normal map.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub(super) struct Strength(pub NotNegative);
+
+impl Default for Strength {
+    fn default() -> Self {
+        Self(NotNegative(1.0))
+    }
+}
+
 /// A channel of an image.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
 pub(super) enum ChannelName {
@@ -87,12 +106,12 @@ pub(super) enum ChannelName {
 
 impl ChannelName {
     /// As the image's reader has it.
-    pub fn channel(self) -> Channel {
+    pub fn channel(self) -> ImageChannel {
         match self {
-            Self::Red => Channel::Red,
-            Self::Green => Channel::Green,
-            Self::Blue => Channel::Blue,
-            Self::Alpha => Channel::Alpha,
+            Self::Red => ImageChannel::Red,
+            Self::Green => ImageChannel::Green,
+            Self::Blue => ImageChannel::Blue,
+            Self::Alpha => ImageChannel::Alpha,
         }
     }
 }
@@ -200,7 +219,7 @@ pub(super) enum Roughness {
 
 impl At<Roughness> {
     /// The image's file at the place of the whole value, and the channel of it.
-    pub fn data_file(&self) -> Option<(At<String>, Channel)> {
+    pub fn data_file(&self) -> Option<(At<String>, ImageChannel)> {
         match &self.value {
             Roughness::Same(_) => None,
             Roughness::Image(Named(table)) => {

@@ -197,13 +197,15 @@ fn glass_with_alpha_is_refused_at_the_key() {
     assert!(fault.message.contains("glass has no cut-outs"), "{fault}");
 }
 
-/// Loads a scene file with `text` beside images of one pixel: `grey.pgm`, 16 bits, and `rgba.tga`.
+/// Loads a scene file with `text` beside images of one pixel: `grey.pgm`, of 16 bits, `rgba.png` and the normal `blue.png`.
 fn data(text: &str) -> Result<Loaded> {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("grey.pgm"), b"P5 1 1 65535\n\x80\x00").expect("written");
     let rgba = image::RgbaImage::from_pixel(1, 1, image::Rgba([10, 128, 30, 40]));
     rgba.save(at("rgba.png")).expect("written");
+    let blue = image::RgbImage::from_pixel(1, 1, image::Rgb([128, 128, 255]));
+    blue.save(at("blue.png")).expect("written");
     let text =
         format!("[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n[material.m]\n{text}");
     std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
@@ -260,4 +262,28 @@ fn roughness_from_what_is_no_image_of_it_is_refused_at_its_place() {
     }
     let error = data("diffuse = 0.5\nroughness = 'rgba.png'\n").expect_err("refused");
     assert!(error.to_string().contains("needs `mirror`"), "{error}");
+}
+
+#[test]
+fn a_normal_map_has_a_strength_and_is_doubted_if_it_holds_no_normals() {
+    let of = |map: &str| {
+        let loaded = data(&format!("diffuse = 0.5\nnormal_map = {map}\n")).expect("a scene");
+        let strength = loaded.world.materials[0].normal_map.expect("a normal map").strength;
+        let warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+        (strength, warnings.join(" "))
+    };
+    assert_eq!(of("'blue.png'"), (1.0, String::new()));
+    assert_eq!(of("{ file = 'blue.png', strength = 0.25, scale = [2, 2] }"), (0.25, String::new()));
+    let (_, warnings) = of("'rgba.png'");
+    assert!(warnings.contains("does not look like a normal map"), "{warnings}");
+    let shown = data("texture = 'blue.png'\n").expect("a scene");
+    assert!(shown.warnings[0].message.contains("looks like a normal map"), "{:?}", shown.warnings);
+    for (text, expected) in [
+        ("diffuse = 0.5\nnormal_map = { file = 'blue.png', strength = -1 }\n", "from 0 to 1e30"),
+        ("diffuse = 0.5\nnormal_map = 3\n", "a file name or a table"),
+        ("glass = {}\nnormal_map = 'blue.png'\n", "glass has no normal map"),
+    ] {
+        let error = data(text).expect_err("refused").to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
 }
