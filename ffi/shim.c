@@ -201,7 +201,7 @@ typedef struct Meeting {
 static int counts(const Meeting* m, unsigned which, double t) {
   const TrQuery* query = m->context->query;
   if (!(t >= m->tnear && t <= m->tfar)) return 0;
-  if (!query->holes) return 1;
+  if (!(query->flags & TR_SPHERE_HOLES)) return 1;
   tr_end_tracing(m->context->saved);
   int there = is_there(query, m->ray, m->geom, m->prim, which);
   tr_begin_tracing();

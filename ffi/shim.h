@@ -27,7 +27,8 @@ typedef struct TrPrim {
   unsigned prim;
 } TrPrim;
 
-enum { TR_COHERENT = 1, TR_EXCLUDE = 2 };
+/* Flags of a query. TR_SPHERE_HOLES: some sphere has holes, so candidates of spheres ask for them, too. */
+enum { TR_COHERENT = 1, TR_EXCLUDE = 2, TR_SPHERE_HOLES = 4 };
 
 /* Decides where surfaces have holes, as `tweenray::embree::Registered` begins: whether `prim` is there
    where `ray` meets it, on a sphere at its first (0) or second (1) root. */

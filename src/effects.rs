@@ -46,20 +46,21 @@ pub struct EffectReason {
 impl EffectPlan {
     /// The plan for `scene` under `settings`.
     pub fn of(scene: &Scene, settings: &Settings) -> Self {
-        Self::with_reasons(scene, settings).0
+        Self::with_reasons(scene, settings, &UsedMaterials::of(scene)).0
     }
 
     /// Why each effect runs or not, what only data decide (normals, the lens) among them.
     pub fn reasons(scene: &Scene, settings: &Settings, lens: &ShotLens) -> Vec<EffectReason> {
-        let mut reasons = Self::with_reasons(scene, settings).1;
+        let used = UsedMaterials::of(scene);
+        let mut reasons = Self::with_reasons(scene, settings, &used).1;
         let smooth = scene.meshes.iter().filter(|m| m.normals.is_some()).count();
         let (blurs, lens) = lens.reason();
         let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
         reasons.extend([
-            cut_outs(scene, &UsedMaterials::of(scene)),
-            vertex_colours(scene, &UsedMaterials::of(scene)),
-            roughness_maps(&UsedMaterials::of(scene), settings),
-            normal_maps(&UsedMaterials::of(scene)),
+            cut_outs(scene, &used),
+            vertex_colours(scene, &used),
+            roughness_maps(&used, settings),
+            normal_maps(&used),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -81,8 +82,11 @@ impl EffectPlan {
         ambient: true,
     };
 
-    fn with_reasons(scene: &Scene, settings: &Settings) -> (Self, Vec<EffectReason>) {
-        let used = UsedMaterials::of(scene);
+    fn with_reasons(
+        scene: &Scene,
+        settings: &Settings,
+        used: &UsedMaterials,
+    ) -> (Self, Vec<EffectReason>) {
         let area = scene.lights.iter().filter(|light| light.is_area()).count();
         let delta = scene.lights.len() - area;
         let bounces = settings.bounces;

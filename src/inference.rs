@@ -84,16 +84,16 @@ const RAYS_PER_CHECK: u32 = 16;
 /// Least number of check rays: two would miss a quarter of the shadows that cover half of a light.
 const FEWEST_CHECKS: u32 = 4;
 
-/// Number of check rays for an answer that saves `rays` shadow rays.
-pub fn check_rays(rays: u32) -> u32 {
-    (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays)
-}
+/// How many times its share of the check rays a light gets. The error that `n` rays to a light of share `s` leave
+/// unfound is at most s·d·√(1-d)ⁿ, for the ratio's error d that makes it largest: with this factor lights of any shares
+/// hide no more together than one that sends as much.
+const SHARED: f32 = 1.5;
 
-/// Number of check rays to one of several lights, which saves `rays` and sends this `share` of what arrives without
-/// shadows. The check is of all lights together, so that weak ones need few.
-pub fn shared_check_rays(rays: u32, share: f32) -> u32 {
-    let all = check_rays(rays);
-    ((2.0 * share * all as f32).ceil() as u32).clamp(all.min(1), all)
+/// Number of check rays to a light for an answer that saves `rays` shadow rays to it. The check is of all lights of a
+/// point together: this one sends the part `share` of what arrives without shadows.
+pub fn check_rays(rays: u32, share: f32) -> u32 {
+    let all = (rays / RAYS_PER_CHECK).max(FEWEST_CHECKS).min(rays);
+    ((SHARED * share * all as f32).ceil() as u32).clamp(all.min(1), all)
 }
 
 /// The result of the check rays for one light at a point.
@@ -338,6 +338,33 @@ mod tests {
     fn at(x: f64, y: f64, n: Vec3) -> SurfacePoint {
         let (p, footprint, cos) = (DVec3::new(x, y, 0.0), 0.5, 0.3);
         SurfacePoint { p, n, geom_id: 0, footprint, cos, direct: true, samples: 1 }
+    }
+
+    /// The largest squared error that `n` rays leave unfound on average, of a light that sends 1.
+    fn hidden(n: u32) -> f64 {
+        let errors = (0..=100).map(|d| f64::from(d) / 100.0);
+        errors.map(|d| d * d * (1.0 - d).powi(n as i32)).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn lights_share_check_rays_and_hide_no_more_than_one() {
+        assert_eq!([0, 1, 3, 16, 64, 100].map(|rays| check_rays(rays, 1.0)), [0, 1, 3, 4, 4, 6]);
+        assert_eq!([0.9, 0.1].map(|share| check_rays(16, share)), [4, 1]);
+        assert_eq!([check_rays(160, 0.5), check_rays(160, 0.0), check_rays(0, 0.5)], [8, 1, 0]);
+        let one = hidden(check_rays(16, 1.0));
+        for lights in 2..30 {
+            for steepness in 0..40 {
+                let sent = |k: i32| (1.0 - 0.025 * f64::from(steepness)).powi(k);
+                let all: f64 = (0..lights).map(sent).sum();
+                let of = |k: i32| {
+                    let share = sent(k) / all;
+                    share * share * hidden(check_rays(16, share as f32))
+                };
+                let together: f64 = (0..lights).map(of).sum();
+                // A fifth more at worst, for a few lights of some kinds.
+                assert!(together < 1.2 * one, "{lights} lights, {steepness}: {}", together / one);
+            }
+        }
     }
 
     #[test]

@@ -2,6 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+#[path = "cut_outs/closed.rs"]
+mod closed;
+#[path = "cut_outs/coincident.rs"]
+mod coincident;
 mod common;
 #[path = "common/leaves.rs"]
 mod leaves;
@@ -231,34 +235,51 @@ fn hits_of(intersector: &dyn Intersector, rays: &[Ray]) -> Vec<Option<Hit>> {
     hits
 }
 
+/// Holds Embree for two instruction sets to the oracle, ray by ray, alone and in a batch. Gives the oracle's hits.
+fn hold_to_oracle(scene: &Scene, rays: &[Ray]) -> Vec<Option<Hit>> {
+    let oracle = Oracle::new(scene);
+    let expected = hits_of(&oracle, rays);
+    let mut blocked = vec![false; rays.len()];
+    let counts = &mut RayCounts::default();
+    oracle.occluded_batch(rays, &mut blocked, counts);
+    for isa in [None, Some("sse2")] {
+        let embree = EmbreeIntersector::new(scene, HitRules::default(), isa, 1).unwrap();
+        let found = hits_of(&embree, rays);
+        let mut occluded = vec![false; rays.len()];
+        embree.occluded_batch(rays, &mut occluded, counts);
+        for (k, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
+            let alone = embree.intersect(ray, counts);
+            for found in [&found[k], &alone] {
+                let same = found.map(|h| h.prim) == expected.map(|h| h.prim);
+                assert!(same, "{isa:?} {k}: {ray:?}: {found:?}, not {expected:?}");
+                if let (Some(found), Some(expected)) = (found, expected) {
+                    let [a, b] =
+                        [found, expected].map(|h| SurfaceInteraction::new(scene, ray, h).p);
+                    assert!(a.distance(b) < 1e-9, "{isa:?} {k}: {ray:?}: {a} and {b}");
+                }
+            }
+            assert_eq!(occluded[k], blocked[k], "{isa:?} {k}: {ray:?}");
+            assert_eq!(embree.occluded(ray, counts), blocked[k], "{isa:?} {k}: {ray:?}");
+        }
+    }
+    expected
+}
+
+/// The rays that leave what `rays` hit, each in a random direction.
+fn leaving(scene: &Scene, rays: &[Ray], hits: &[Option<Hit>], seed: u64) -> Vec<Ray> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let leave = |(ray, hit): (&Ray, &Option<Hit>)| {
+        let si = SurfaceInteraction::new(scene, ray, hit.as_ref()?);
+        Some(si.spawn(leaves::in_ball(&mut rng), true))
+    };
+    rays.iter().zip(hits).filter_map(leave).collect()
+}
+
 #[test]
 fn both_intersectors_see_the_same_holes() {
     let scene = thicket(true);
     let rays = rays(11, 12_000);
-    let oracle = Oracle::new(&scene);
-    let expected = hits_of(&oracle, &rays);
-    let mut blocked = vec![false; rays.len()];
-    let counts = &mut RayCounts::default();
-    oracle.occluded_batch(&rays, &mut blocked, counts);
-    for isa in [None, Some("sse2")] {
-        let embree = EmbreeIntersector::new(&scene, HitRules::default(), isa, 1).unwrap();
-        let found = hits_of(&embree, &rays);
-        let mut occluded = vec![false; rays.len()];
-        embree.occluded_batch(&rays, &mut occluded, counts);
-        assert_eq!(occluded, blocked);
-        for (k, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
-            let alone = embree.intersect(ray, counts);
-            for found in [&found[k], &alone] {
-                assert_eq!(found.map(|h| h.prim), expected.map(|h| h.prim), "{isa:?} {k}: {ray:?}");
-                if let (Some(found), Some(expected)) = (found, expected) {
-                    let [a, b] =
-                        [found, expected].map(|h| SurfaceInteraction::new(&scene, ray, h).p);
-                    assert!(a.distance(b) < 1e-9, "{k}: {a} and {b}");
-                }
-            }
-            assert_eq!(embree.occluded(ray, counts), blocked[k], "{k}");
-        }
-    }
+    let expected = hold_to_oracle(&scene, &rays);
     // Not vacuous: without the holes every other ray hits something else.
     let whole = thicket(false);
     let others = hits_of(&Oracle::new(&whole), &rays);

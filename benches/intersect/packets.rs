@@ -2,7 +2,7 @@
 
 use super::support::camera_rays::BLOCK;
 use super::support::{self, Candidate};
-use tweenray::embree::{CommittedScene, Packet, QueryFlags};
+use tweenray::embree::{CastRays, CommittedScene, Packet, QueryFlags};
 use tweenray::intersect::{
     EmbreeIntersector, Intersector, PlaneError, Ray, RayEnd, SurfaceInteraction,
 };
@@ -67,10 +67,10 @@ fn trace<const W: usize>(scene: &CommittedScene, rays: &[Ray], flags: QueryFlags
             valid[lane] = -1;
         }
         if closest {
-            scene.intersect(&valid, &mut packet, rays, flags);
+            scene.intersect(&valid, &mut packet, CastRays::as_asked(rays), flags);
             found += (0..rays.len()).filter(|lane| packet.hit(*lane).is_some()).count();
         } else {
-            scene.occluded(&valid, &mut packet, rays, flags);
+            scene.occluded(&valid, &mut packet, CastRays::as_asked(rays), flags);
             found += (0..rays.len()).filter(|lane| packet.is_occluded(*lane)).count();
         }
     }

@@ -5,7 +5,8 @@ use std::ffi::c_void;
 
 /// Decides which surfaces have holes, and where.
 pub trait Holes: Send + Sync {
-    /// Whether any primitive of the geometry may have holes, or be hidden in places.
+    /// Whether any primitive of the geometry may have holes, or be hidden in places. Rays pass through those of other
+    /// geometries nowhere.
     fn are_in(&self, geom_id: u32) -> bool;
 
     /// Whether `prim` is there where `ray` meets it: on a sphere at the first (0) or second (1) root.
@@ -18,11 +19,13 @@ pub(super) struct Registered<'g> {
     // Takes itself, untyped: a function of `Self` would not let the lifetime shrink.
     is_there: unsafe extern "C" fn(*const c_void, *const Ray, PrimRef, u32) -> bool,
     holes: Box<dyn Holes + 'g>,
+    /// Whether any of the spheres that were added have holes.
+    pub(super) in_spheres: bool,
 }
 
 impl<'g> Registered<'g> {
     pub(super) fn new(holes: Box<dyn Holes + 'g>) -> Self {
-        Self { is_there, holes }
+        Self { is_there, holes, in_spheres: false }
     }
 
     pub(super) fn are_in(&self, geom_id: u32) -> bool {

@@ -13,12 +13,11 @@ pub use holes::Holes;
 use holes::Registered;
 pub use options::{BuildOptions, Quality};
 use packet::Query;
-pub use packet::{Packet, PacketHit, QueryFlags};
+pub use packet::{CastRays, Packet, PacketHit, QueryFlags};
 pub use yardstick::{BareCamera, BareTally};
 
 use crate::error::{Error, Result};
 use crate::math::Vec3;
-use crate::ray::Ray;
 use embree4_sys as sys;
 use std::ffi::{CStr, CString, c_void};
 use std::marker::PhantomData;
@@ -189,6 +188,9 @@ impl<'g> SceneBuilder<'g> {
     }
 
     /// Takes holes out of the surfaces that are added from now on.
+    ///
+    /// Candidates are asked about where [`Holes::are_in`] says so: those of a mesh in Embree's filter, those of
+    /// spheres, whose test is our own, by a flag of each query, as soon as one geometry of spheres has holes.
     pub fn set_holes(&mut self, holes: Box<dyn Holes + 'g>) {
         self.holes = Some(Box::new(Registered::new(holes)));
     }
@@ -269,6 +271,9 @@ impl<'g> SceneBuilder<'g> {
         let mut spheres = spheres.into_boxed_slice();
         // The shim gives a negative radius no bounds, and Embree leaves it out.
         omit.for_each(|prim| spheres[prim as usize].radius = -1.0);
+        if let Some(holes) = &mut self.holes {
+            holes.in_spheres |= holes.are_in(self.next_id);
+        }
         let id = self.add(sys::RTC_GEOMETRY_TYPE_USER, |geometry| {
             // SAFETY: the boxed slice does not move, and the scene that the geometry is attached
             // to is dropped before the box (field order here and in `CommittedScene`).
@@ -349,34 +354,40 @@ impl CommittedScene<'_> {
         format!("{}.{}.{}", v / 10000, v / 100 % 100, v % 100)
     }
 
-    /// Closest hits of the lanes of `packet` that `valid` marks with -1; lane i stands for
-    /// `rays[i]`, whose excluded primitive is honoured with `flags.exclude`.
+    /// Closest hits of the lanes of `packet` that `valid` marks with -1; lane i stands for ray i of `cast`, whose
+    /// excluded primitive is honoured with `flags.exclude`.
+    ///
+    /// # Panics
+    /// Where `cast` has no ray for a lane that `valid` marks.
     pub fn intersect<const W: usize>(
         &self,
         valid: &[i32; W],
         packet: &mut Packet<W>,
-        rays: &[Ray],
+        cast: CastRays,
         flags: QueryFlags,
     ) {
-        packet.check_lanes(valid, rays);
-        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags, self.holes.as_deref()));
+        packet.check_lanes(valid, cast.rays());
+        let (lanes, query) = (Aligned(*valid), Query::new(cast, flags, self.holes.as_deref()));
         let at = std::ptr::from_mut(packet).cast();
         // SAFETY: `Packet<W>` has the layout and alignment of RTCRayHitW (asserted in packet.rs),
-        // `lanes` is aligned, every valid lane has its ray (checked above), and the slices and holes behind
-        // `query` outlive the call.
+        // `lanes` is aligned, every valid lane has its rays (checked above; `CastRays` has as many of both kinds), and the slices
+        // and holes behind `query` outlive the call.
         unsafe { tr_intersect(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }
     }
 
     /// Marks the lanes that anything blocks: their `tfar` becomes minus infinity.
+    ///
+    /// # Panics
+    /// As [`intersect`](Self::intersect).
     pub fn occluded<const W: usize>(
         &self,
         valid: &[i32; W],
         packet: &mut Packet<W>,
-        rays: &[Ray],
+        cast: CastRays,
         flags: QueryFlags,
     ) {
-        packet.check_lanes(valid, rays);
-        let (lanes, query) = (Aligned(*valid), Query::new(rays, flags, self.holes.as_deref()));
+        packet.check_lanes(valid, cast.rays());
+        let (lanes, query) = (Aligned(*valid), Query::new(cast, flags, self.holes.as_deref()));
         let at = std::ptr::from_mut(packet).cast();
         // SAFETY: as for `intersect`; RTCRayW is the front part of RTCRayHitW.
         unsafe { tr_occluded(self.scene.0, W as u32, lanes.0.as_ptr(), at, &raw const query) }

@@ -68,9 +68,43 @@ pub struct QueryFlags<'p> {
     pub exclude: bool,
     /// Primitives that no ray of the packet may hit.
     pub passed: &'p [PrimRef],
-    /// The rays of the packet before they were moved or turned, by which holes are decided; read in a scene
-    /// with [`Holes`](super::Holes) only.
-    pub asked: &'p [Ray],
+}
+
+/// The rays of a packet, as Embree sees them and as they were asked for, by which [`Holes`](super::Holes) decide.
+#[derive(Debug, Clone, Copy)]
+pub struct CastRays<'r> {
+    rays: &'r [Ray],
+    /// As many.
+    asked: &'r [Ray],
+}
+
+impl<'r> CastRays<'r> {
+    /// Rays that Embree sees as they were asked for.
+    pub fn as_asked(rays: &'r [Ray]) -> Self {
+        Self { rays, asked: rays }
+    }
+
+    /// `rays` that were moved or turned, and `asked`, the same before. Where one slice is shorter, there are as many rays.
+    pub fn moved(rays: &'r [Ray], asked: &'r [Ray]) -> Self {
+        let count = rays.len().min(asked.len());
+        Self { rays: &rays[..count], asked: &asked[..count] }
+    }
+
+    /// The rays as Embree sees them.
+    pub fn rays(self) -> &'r [Ray] {
+        self.rays
+    }
+
+    /// The rays as they were asked for.
+    pub fn asked(self) -> &'r [Ray] {
+        self.asked
+    }
+
+    /// The rays in packets of `width`.
+    pub fn chunks(self, width: usize) -> impl Iterator<Item = Self> {
+        let chunks = self.rays.chunks(width).zip(self.asked.chunks(width));
+        chunks.map(|(rays, asked)| Self { rays, asked })
+    }
 }
 
 /// A query as `ffi/shim.h` lays it out. Its pointers are those of the slices and of the box it was made of.
@@ -85,17 +119,16 @@ pub(super) struct Query {
 }
 
 impl Query {
-    /// Panics where there are `holes` and fewer rays asked for than `rays`: callbacks would read past the slice.
-    pub(super) fn new(rays: &[Ray], flags: QueryFlags, holes: Option<&Registered>) -> Self {
-        assert!(holes.is_none() || flags.asked.len() >= rays.len());
+    pub(super) fn new(cast: CastRays, flags: QueryFlags, holes: Option<&Registered>) -> Self {
         let filter = flags.exclude || !flags.passed.is_empty();
+        let in_spheres = holes.is_some_and(|holes| holes.in_spheres);
         Self {
-            rays: rays.as_ptr(),
-            asked: flags.asked.as_ptr(),
+            rays: cast.rays.as_ptr(),
+            asked: cast.asked.as_ptr(),
             passed: flags.passed.as_ptr(),
             holes: holes.map_or(std::ptr::null(), |holes| std::ptr::from_ref(holes).cast()),
             passed_count: flags.passed.len() as u32,
-            flags: u32::from(flags.coherent) | u32::from(filter) << 1,
+            flags: u32::from(flags.coherent) | u32::from(filter) << 1 | u32::from(in_spheres) << 2,
         }
     }
 }

@@ -4,44 +4,25 @@
 //! grey. Nothing is decoded from sRGB: a half is code 127.5 of 255. Values of more bits are rounded to 8, which
 //! takes none of them across the half.
 
-use super::model::Model;
 use super::texture::{bad_pixel, decode};
 use crate::error::Result;
-use crate::scene::{AlphaMask, MaskId};
+use crate::scene::AlphaMask;
 use image::DynamicImage;
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
-
-/// Masks that a model has already, or the reason why not.
-pub(super) type MaskCache = HashMap<PathBuf, std::result::Result<MaskId, String>>;
-
-/// As [`load_mask`], once per file of a model; adds mask and file to it.
-pub(super) fn load_cached(
-    path: &Path,
-    cache: &mut MaskCache,
-    model: &mut Model,
-) -> std::result::Result<MaskId, String> {
-    if let Some(known) = cache.get(path) {
-        return known.clone();
-    }
-    let loaded = load_mask(path).map_err(|e| e.to_string()).map(|mask| {
-        if !model.files.iter().any(|file| file == path) {
-            model.files.push(path.to_path_buf());
-        }
-        model.world.masks.push(mask);
-        model.world.masks.len() as MaskId - 1
-    });
-    cache.insert(path.to_path_buf(), loaded.clone());
-    loaded
-}
+use std::path::Path;
 
 /// Reads the mask of an image, in the formats of [`super::load_texture`].
 ///
 /// Errors: those of [`super::load_texture`].
 pub fn load_mask(path: &Path) -> Result<AlphaMask> {
-    let image = decode(path)?;
+    mask_of(path, &decode(path)?)
+}
+
+/// The mask of a decoded image.
+///
+/// Errors: a value that is no alpha.
+pub(super) fn mask_of(path: &Path, image: &DynamicImage) -> Result<AlphaMask> {
     let (width, height) = (image.width(), image.height());
-    let texels = texels(&image).ok_or_else(|| bad_pixel(path))?;
+    let texels = texels(image).ok_or_else(|| bad_pixel(path))?;
     Ok(AlphaMask { name: path.display().to_string(), width, height, texels })
 }
 

@@ -10,6 +10,7 @@ mod course;
 mod emission;
 mod framing;
 mod generators;
+mod images;
 mod lamps;
 mod lines;
 mod mesh_file;
@@ -33,8 +34,7 @@ pub use mesh_file::load_model;
 pub use model::{COLOURED_MATERIAL, DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
-use texture::doubt;
-pub use texture::{ImageChannel, ImageUse, MAX_IMAGE_BYTES, load_image, load_texture};
+pub use texture::{MAX_IMAGE_BYTES, load_texture};
 
 use crate::error::{Diagnostic, Error, Result};
 use crate::scene::{JobOptions, Settings, Shot, World, limits};

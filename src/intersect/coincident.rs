@@ -7,9 +7,9 @@
 //! Glass with a priority is left alone: where two such bodies touch, a ray crosses both boundaries. What
 //! lies behind a surface with cut-outs stays as well, since it is seen through the holes.
 
-use super::PrimRef;
+use super::{PrimRef, Ray};
 use crate::math::Vec3;
-use crate::scene::{Scene, Surface};
+use crate::scene::{Scene, Sphere, Surface};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -93,6 +93,22 @@ impl Copies {
             }
         }
     }
+}
+
+/// Whether `ray` starts on the sphere `prim`: leaves it, or another one at the same place, where rounding alone says whether
+/// the start is a hit of this one. Rays cross all boundaries of glass with priorities: those of the other spheres count.
+///
+/// Triangles need no such rule, since the offset of a ray's start holds for all at the same place.
+pub(super) fn starts_on(scene: &Scene, ray: &Ray, prim: PrimRef) -> bool {
+    let left = ray.exclude;
+    if left.geom_id != prim.geom_id || prim.geom_id != scene.sphere_geom_id() {
+        return false;
+    }
+    let sphere = |prim: PrimRef| scene.spheres.get(prim.prim_id as usize);
+    let at_one_place = |(a, b): (&Sphere, &Sphere)| a.centre == b.centre && a.radius == b.radius;
+    left == prim
+        || sphere(left).zip(sphere(prim)).is_some_and(at_one_place)
+            && !(is_ranked_glass(scene, left) && is_ranked_glass(scene, prim))
 }
 
 fn surface_of(scene: &Scene, prim: PrimRef) -> Surface {

@@ -26,7 +26,8 @@ use super::cut_outs::CutOuts;
 use super::facts::MeshFacts;
 use super::{Hit, Intersector, PrimRef, Ray};
 use crate::embree::{
-    BuildOptions, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder, SphereData,
+    BuildOptions, CastRays, CommittedScene, Packet, PacketHit, Quality, QueryFlags, SceneBuilder,
+    SphereData,
 };
 use crate::error::Result;
 use crate::math::{Bounds3, DVec3, orthonormal_basis};
@@ -198,9 +199,9 @@ impl<'s> EmbreeIntersector<'s> {
         let mut packet = Packet::<1>::new();
         packet.set(0, &moved);
         let exclude = moved.exclude != PrimRef::NONE;
-        let asked = std::slice::from_ref(ray);
-        let flags = QueryFlags { coherent: false, exclude, passed, asked };
-        self.committed.intersect(&[-1], &mut packet, std::slice::from_ref(&moved), flags);
+        let cast = CastRays::moved(std::slice::from_ref(&moved), std::slice::from_ref(ray));
+        let flags = QueryFlags { coherent: false, exclude, passed };
+        self.committed.intersect(&[-1], &mut packet, cast, flags);
         packet.hit(0).map(|hit| Candidate { hit, shift })
     }
 
@@ -225,7 +226,8 @@ impl<'s> EmbreeIntersector<'s> {
     }
 
     /// Whether the ray must have met another triangle before: from outside of a closed surface it
-    /// meets a front first, and once it went in, in glass say, a back of the same mesh.
+    /// meets a front first, and once it went in, in glass say, a back of the same mesh. From inside of one with
+    /// cut-outs it may have come out through a hole, so that neither proves anything: both are in doubt.
     fn is_doubtful(&self, ray: &Ray, hit: &PacketHit) -> bool {
         let left = ray.exclude.geom_id;
         let back = self.is_back(ray, hit);
@@ -238,7 +240,8 @@ impl<'s> EmbreeIntersector<'s> {
             let [a, b, c] = mesh.corners(ray.exclude.prim_id as usize);
             (b - a).cross(c - a).dot(ray.dir) * self.meshes[left as usize].sense < 0.0
         });
-        inside != back
+        let perforated = || self.meshes.get(left as usize).is_some_and(|mesh| mesh.perforated);
+        inside != back || (inside && perforated())
     }
 
     /// The first true hit of `ray`, turned by a second try or not.
@@ -276,10 +279,9 @@ impl<'s> EmbreeIntersector<'s> {
     }
 }
 
-/// The facts of a mesh. With holes it is as good as open: backs are seen through them.
 fn facts_of(scene: &Scene, mesh: &Mesh) -> MeshFacts {
     let facts = MeshFacts::of(mesh);
-    MeshFacts { closed: facts.closed && scene.mesh_mask(mesh).is_none(), ..facts }
+    if scene.mesh_mask(mesh).is_some() { facts.with_holes() } else { facts }
 }
 
 /// How far rounding a ray to f32 may move it within `bounds`.

@@ -19,6 +19,8 @@ pub(super) struct MeshFacts {
     pub sense: f64,
     /// Whether it has an inside, as far as its area vectors tell.
     pub closed: bool,
+    /// Whether it would be closed but for its cut-outs, through which rays come out of it and see its backs.
+    pub perforated: bool,
 }
 
 /// Sums over triangles.
@@ -31,7 +33,7 @@ struct Sums {
 }
 
 impl MeshFacts {
-    /// The facts of `mesh`.
+    /// The facts of `mesh`, whatever is cut out of it.
     pub fn of(mesh: &Mesh) -> Self {
         let middle = mesh.bounds.centre();
         let parts = mesh.triangles.par_chunks(TASK).map(|triangles| {
@@ -60,7 +62,13 @@ impl MeshFacts {
             longest_edge: sums.longest2.sqrt() * (1.0 + f64::from(f32::EPSILON)),
             sense: if inwards { -1.0 } else { 1.0 },
             closed,
+            perforated: false,
         }
+    }
+
+    /// The same facts of a mesh with cut-outs: it is as good as open.
+    pub fn with_holes(self) -> Self {
+        Self { closed: false, perforated: self.closed, ..self }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::math::DVec3;
 
 /// The first root in `[tnear, tfar]` where the surface `is_there`, or `None`.
 ///
-/// A ray that leaves this sphere (`leaving`) starts on it: its near root is that start and does not count.
+/// A ray that leaves this sphere (`leaving`) starts on it: the root nearer to zero is that start and does not count.
 pub(super) fn first_root(
     ray: &Ray,
     centre: DVec3,
@@ -13,14 +13,19 @@ pub(super) fn first_root(
     leaving: bool,
     is_there: impl Fn(f64) -> bool,
 ) -> Option<f64> {
-    let [near, far] = roots(ray, centre, radius)?;
-    let counts = |t: f64| (ray.tnear..=ray.tfar).contains(&t) && is_there(t);
+    let roots = roots(ray, centre, radius)?;
+    let counts = |t: &f64| (ray.tnear..=ray.tfar).contains(t) && is_there(*t);
     if leaving {
-        // The start is whichever root is nearer to zero; only the other one is a hit.
-        let other = if near.abs() > far.abs() { near } else { far };
-        return (other > 0.0 && counts(other)).then_some(other);
+        return end_of_leaving(roots).map(|end| roots[end]).filter(counts);
     }
-    [near, far].into_iter().find(|t| counts(*t))
+    roots.into_iter().find(counts)
+}
+
+/// Which of its roots a ray that starts on the sphere can hit. The start is whichever root is nearer to zero, and only
+/// the other one counts, if it lies ahead.
+pub(super) fn end_of_leaving([near, far]: [f64; 2]) -> Option<usize> {
+    let end = usize::from(near.abs() <= far.abs());
+    ([near, far][end] > 0.0).then_some(end)
 }
 
 /// Both roots, ascending, whatever the ray's ends; `None` where the line passes the sphere by.

@@ -4,7 +4,7 @@
 use super::evidence::{Evidence, Finding};
 use crate::effects::EffectPlan;
 use crate::error::counted;
-use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays, shared_check_rays};
+use crate::inference::{Channel, Channels, SAMPLES_TOGETHER, check_rays};
 use crate::scene::{MeanLights, Scene, Settings};
 use crate::stats::{RayCounts, RayKind};
 
@@ -199,12 +199,12 @@ impl PointCost {
             channels.iter().map(|channel| share(channel) * f64::from(of(channel))).sum()
         };
         let traced = |channel| samples.saturating_mul(expected_rays(channel, settings));
-        let checks: &dyn Fn(u32) -> u32 = match channels.slots() {
-            0 => &check_rays,
-            // As if all lights were as bright.
-            _ => &|rays| shared_check_rays(rays, 1.0 / area.max(1.0) as f32),
+        // As if all lights were as bright.
+        let lights = if channels.slots() > 0 { area } else { channels.len() as f64 };
+        let checked = |channel| {
+            let saved = samples.saturating_mul(rays_of(channel, settings));
+            check_rays(saved, 1.0 / lights.max(1.0) as f32)
         };
-        let checked = |channel| checks(samples.saturating_mul(rays_of(channel, settings)));
         Self {
             traced: shadow_ray(scene) * sum(&traced),
             checked: shadow_ray(scene) * CHECK_RAY * sum(&checked),

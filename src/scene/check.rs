@@ -17,8 +17,9 @@ impl World {
             return Err(Error::Usage(message));
         }
         self.materials.iter().try_for_each(|material| {
-            self.check_image(material, material.texture.as_ref(), "texture")?;
-            self.check_image(material, material.roughness_map.as_ref(), "roughness map")?;
+            let of = |map: &TextureMap, what| image_of(map, &self.textures, what, &material.name);
+            material.texture.as_ref().map(|map| of(map, "texture")).transpose()?;
+            material.roughness_map.as_ref().map(|map| of(map, "roughness map")).transpose()?;
             self.check_normal_map(material)?;
             self.check_mask(material)
         })?;
@@ -26,21 +27,10 @@ impl World {
         self.check_finite()
     }
 
-    fn check_image(&self, material: &Material, map: Option<&TextureMap>, what: &str) -> Result<()> {
-        let Some(map) = map else { return Ok(()) };
-        let (name, count) = (&material.name, self.textures.len());
-        if map.image as usize >= count {
-            let message =
-                format!("`{name}` has the {what} {}, counted from 0, of {count}", map.image);
-            return Err(Error::Usage(message));
-        }
-        check_map(map, what, name)
-    }
-
     fn check_normal_map(&self, material: &Material) -> Result<()> {
         let Some(map) = &material.normal_map else { return Ok(()) };
-        self.check_image(material, Some(&map.image), "normal map")?;
         let name = &material.name;
+        image_of(&map.image, &self.textures, "normal map", name)?;
         if !(map.strength >= 0.0 && map.strength.is_finite()) {
             let message = format!("the normal map of `{name}` has the strength {}", map.strength);
             return Err(Error::Usage(message));
@@ -55,13 +45,7 @@ impl World {
     fn check_mask(&self, material: &Material) -> Result<()> {
         let Some(map) = &material.alpha else { return Ok(()) };
         let name = &material.name;
-        check_map(map, "mask", name)?;
-        let Some(mask) = self.masks.get(map.image as usize) else {
-            let count = self.masks.len();
-            let message =
-                format!("`{name}` has the mask {}, counted from 0, of {count}", map.image);
-            return Err(Error::Usage(message));
-        };
+        let mask = image_of(map, &self.masks, "mask", name)?;
         if !mask.is_whole() {
             let AlphaMask { name: mask, width, height, texels } = mask;
             let count = texels.len();
@@ -92,12 +76,17 @@ impl World {
     }
 }
 
-fn check_map(map: &TextureMap, what: &str, material: &str) -> Result<()> {
-    if map.transform.is_finite() {
-        return Ok(());
+/// The image among `images` that a material lays on surfaces; `what` names it: a "texture", a "mask".
+fn image_of<'w, T>(map: &TextureMap, images: &'w [T], what: &str, material: &str) -> Result<&'w T> {
+    let (at, count) = (map.image, images.len());
+    let image = images.get(at as usize).ok_or_else(|| {
+        Error::Usage(format!("`{material}` has the {what} {at}, counted from 0, of {count}"))
+    })?;
+    if !map.transform.is_finite() {
+        let message = format!("the {what} of `{material}` lies by numbers that are not finite");
+        return Err(Error::Usage(message));
     }
-    let message = format!("the {what} of `{material}` lies by numbers that are not finite");
-    Err(Error::Usage(message))
+    Ok(image)
 }
 
 fn check_vertices(mesh: &WorldMesh) -> Result<()> {

@@ -338,7 +338,7 @@ impl TextureLevel {
             return None;
         }
         let (columns, rows) = (Covered::of(self.width), Covered::of(self.height));
-        let size = [columns.len(), rows.len()];
+        let size = [columns.count, rows.count];
         let mean = |place: usize| {
             let (column, row) = (place % size[0], place / size[0]);
             let across = |y: usize| -> DVec3 {
@@ -374,16 +374,15 @@ struct Covered {
     /// Texels of the longer row over those of the shorter one: 2, but for odd numbers.
     ratio: f64,
     from: usize,
+    /// Texels of the shorter row.
+    count: usize,
 }
 
 impl Covered {
     fn of(count: u32) -> Self {
         let to = (count / 2).max(1);
-        Self { ratio: f64::from(count) / f64::from(to), from: count as usize }
-    }
-
-    fn len(&self) -> usize {
-        (self.from as f64 / self.ratio).round() as usize
+        let ratio = f64::from(count) / f64::from(to);
+        Self { ratio, from: count as usize, count: to as usize }
     }
 
     /// The texels that number `at` covers, each with its part of the whole.

@@ -4,7 +4,7 @@
 //! is that of rays near the normal, the same in all directions (Akenine-Möller et al., 2021). Rough mirrors
 //! are taken for smooth ones: their many rays blur what they see by themselves.
 
-use crate::intersect::{SurfaceInteraction, uv_gradients};
+use crate::intersect::{Hit, Ray, SurfaceInteraction, curvature, uv_gradients};
 use crate::math::{DVec2, DVec3};
 use crate::scene::Scene;
 
@@ -29,6 +29,29 @@ impl RayCone {
     #[inline(always)]
     pub fn advanced(self, length: f64) -> Self {
         Self { width: self.width + self.spread * length as f32, ..self }
+    }
+
+    /// The cone at the end of its `ray`: at `hit`, or where the ray starts if it meets nothing.
+    #[inline(always)]
+    pub fn at_end(self, ray: &Ray, hit: Option<&Hit>) -> Self {
+        self.advanced(hit.map_or(0.0, |hit| hit.t * ray.dir.length()))
+    }
+
+    /// The cone after reflection or, by what has an index of refraction `transmitted` times as large, refraction at `si`,
+    /// on which the ray came from `outside` or inside.
+    pub fn scattered(
+        self,
+        scene: &Scene,
+        si: &SurfaceInteraction,
+        outside: bool,
+        transmitted: Option<f64>,
+    ) -> Self {
+        let outward = curvature(scene, si);
+        let curvature = if outside { outward } else { -outward };
+        match transmitted {
+            Some(eta) => self.refracted(curvature, eta),
+            None => self.reflected(curvature),
+        }
     }
 
     /// The cone after reflection by a surface of this curvature (per unit of length, positive where it bulges towards the

@@ -11,7 +11,7 @@ use super::{BLOCK, FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
     Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
-    TracedPoints, channel_of, check_rays, shared_check_rays, tail_light,
+    TracedPoints, channel_of, check_rays, tail_light,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -381,13 +381,9 @@ impl Groups {
         }
         let samples = self.asked.points[point].samples;
         let saved = samples.saturating_mul(rays);
-        let all = if self.slots == 0 {
-            check_rays(saved)
-        } else {
-            let shown = &self.asked.unshadowed[point * channels..][..channels];
-            let sent: f32 = shown[own].iter().sum();
-            shared_check_rays(saved, sent / shown.iter().sum::<f32>())
-        };
+        let shown = &self.asked.unshadowed[point * channels..][..channels];
+        let sent: f32 = shown[own].iter().sum();
+        let all = check_rays(saved, sent / shown.iter().sum::<f32>());
         let until =
             |before: u32| (u64::from(before) * u64::from(all) / u64::from(samples)) as usize;
         // A run of a net's points is spread evenly where it starts at a multiple of a power of two.

@@ -15,7 +15,7 @@ use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::{FrameInput, Left, Renderer, dimensions, medium, normal_map, optics};
 use crate::film::GPixel;
-use crate::intersect::{Hit, Ray, SurfaceInteraction, curvature};
+use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
 use crate::scene::MaterialId;
 use crate::stats::{RayCounts, RayKind};
@@ -180,7 +180,7 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
         renderer.intersector.intersect_batch(rays, hits, counts);
         if renderer.plan.textures {
             let ends = rays.iter().zip(hits.iter()).zip(states.iter_mut());
-            ends.for_each(|((ray, hit), state)| state.widen(ray, hit.as_ref()));
+            ends.for_each(|((ray, hit), state)| state.cone = state.cone.at_end(ray, hit.as_ref()));
         }
         if depth == 0 && pixels.wants_records() {
             record(renderer, input, pixels, rays, hits, states);
@@ -309,7 +309,7 @@ impl Vertex<'_, '_> {
             self.counts[RayKind::Glass] += 1;
             hit = renderer.intersector.intersect(&ray, self.counts);
             if renderer.plan.textures {
-                state.widen(&ray, hit.as_ref());
+                state.cone = state.cone.at_end(&ray, hit.as_ref());
             }
         }
         // Given up, and not silently.
@@ -340,13 +340,13 @@ impl Vertex<'_, '_> {
         let tilted;
         let mut shaped = &si;
         if material.normal_map.is_some() {
-            let ns = normal_map::normal(scene, material, (&si, wo, state.cone));
+            let ns = normal_map::normal(scene, material, &si, wo, state.cone);
             tilted = SurfaceInteraction { ns, ..si };
             shaped = &tilted;
         }
         if lobe::is_diffuse(material) {
-            let seen = (&si, wo, state.cone);
-            let reflectance = state.throughput * lobe::albedo(scene, material, seen);
+            let albedo = lobe::albedo(scene, material, &si, wo, state.cone);
+            let reflectance = state.throughput * albedo;
             let (met, place) = ((&si, ray, hit), state.place());
             self.lit.push(ShadingPoint::new(met, shaped.ns, wo, reflectance, place));
         }
@@ -405,31 +405,15 @@ impl Vertex<'_, '_> {
                 Some(_) => (starts.transmitted, starts.behind),
                 None => (starts.reflected, state.medium),
             };
-            let cone = self.scattered_cone(state.cone, si, outside, transmitted);
+            let cone = match self.renderer.plan.textures {
+                true => state.cone.scattered(self.renderer.scene, si, outside, transmitted),
+                false => state.cone,
+            };
             let throughput = state.throughput * share * tint;
             let branch = dimensions::branch(state.branch, child);
             let next = PathState { throughput, medium, pdf, branch, cell, cone, ..*state };
             let sent = self.push::<NESTED>(start, wi, next);
             self.counts[lobe.ray_kind()] += u64::from(sent);
-        }
-    }
-
-    /// `cone` after reflection or, by what has an index of refraction `transmitted` times as large, refraction at `si`.
-    fn scattered_cone(
-        &self,
-        cone: RayCone,
-        si: &SurfaceInteraction,
-        outside: bool,
-        transmitted: Option<f64>,
-    ) -> RayCone {
-        if !self.renderer.plan.textures {
-            return cone;
-        }
-        let outward = curvature(self.renderer.scene, si);
-        let curvature = if outside { outward } else { -outward };
-        match transmitted {
-            Some(eta) => cone.refracted(curvature, eta),
-            None => cone.reflected(curvature),
         }
     }
 
@@ -467,12 +451,6 @@ struct Starts<'w> {
 }
 
 impl PathState {
-    /// Brings the cone to the end of its ray.
-    fn widen(&mut self, ray: &Ray, hit: Option<&Hit>) {
-        let length = hit.map_or(0.0, |hit| hit.t * ray.dir.length());
-        self.cone = self.cone.advanced(length);
-    }
-
     fn place(&self) -> SamplePlace {
         SamplePlace { pixel: self.pixel, sample: self.sample, branch: self.branch }
     }
@@ -495,8 +473,8 @@ fn record(
         let record = hit.map_or(GPixel::EMPTY, |hit| {
             let si = SurfaceInteraction::new(scene, ray, &hit);
             let material = &scene.materials[si.surface.material as usize];
-            let seen = (&si, -ray.dir.normalize(), state.cone);
-            let ns = normal_map::normal(scene, material, seen);
+            let wo = -ray.dir.normalize();
+            let ns = normal_map::normal(scene, material, &si, wo, state.cone);
             let normal = if si.is_outside(ray.dir) { -ns } else { ns };
             let along = (si.p - input.camera.eye).dot(input.camera.forward);
             let spheres = hit.prim.geom_id == scene.sphere_geom_id();
@@ -505,7 +483,7 @@ fn record(
                 depth: scene.recentring.length_to_world(along) as f32,
                 position: scene.recentring.point_to_world(si.p).as_vec3(),
                 normal: normal.as_vec3(),
-                albedo: lobe::albedo(scene, material, (&si, -ray.dir, state.cone)),
+                albedo: lobe::albedo(scene, material, &si, -ray.dir, state.cone),
                 mesh_id: index + 1,
             }
         });

@@ -57,7 +57,7 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
             0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
             _ => {
                 let n = facing_normal(si, wo);
-                let roughness = glossy::roughness(scene, material, (si, wo, cone));
+                let roughness = glossy::roughness(scene, material, si, wo, cone);
                 Lobe::Glossy(Glossy::new(material.mirror, roughness, n, wo))
             }
         });

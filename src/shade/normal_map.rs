@@ -18,7 +18,9 @@ use crate::scene::{Material, Scene};
 pub(super) fn normal(
     scene: &Scene,
     material: &Material,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
 ) -> DVec3 {
     let Some(map) = &material.normal_map else { return si.ns };
     // Of the image's coordinates, so that an image that lies turned has its normals turned.

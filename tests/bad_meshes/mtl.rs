@@ -1,7 +1,8 @@
 //! Material libraries. tobj 4.0.5 panics on some of these when it meets them bare.
 
 use super::{Expect, Expect::*, check, load_bytes};
-use tweenray::scene::{Material, TextureMap};
+use tweenray::math::DVec2;
+use tweenray::scene::{Material, TextureMap, Wrap};
 
 const OBJ: &[u8] = b"mtllib bad.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -40,12 +41,23 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nillum 11\n", Line(2, "`illum 11`")),
     ("newmtl a\nillum 2.5\n", Line(2, "0 to 10")),
     ("newmtl a\nmap_Kd\n", Line(2, "`map_Kd` without a file name")),
-    ("newmtl a\nmap_Kd -s\n", Line(2, "`-s`")),
     ("newmtl a\nmap_Kd -bm 1\n", Line(2, "`map_Kd` without a file name")),
     ("newmtl a\n\u{1b}[31m\n", Line(2, "MTL")),
     ("newmtl a\nKd 1 1 \0\n", Line(2, "zero byte")),
     ("newmtl a\nmap_Kd gone.png\n", Warns(1, "gone.png")),
-    ("newmtl a\nmap_Kd -o 1 1 -clamp on no image.png\n", Warns(2, "texture option `-clamp`")),
+    ("newmtl a\nmap_Kd -o 1 1 -clamp on no image.png\n", Warns(1, "no image.png")),
+    ("newmtl a\nmap_Kd -o 1 1 -cc on no image.png\n", Warns(2, "texture option `-cc`")),
+    ("newmtl a\nmap_Kd -s\n", Line(2, "option `-s` lacks a value")),
+    ("newmtl a\nmap_Kd -s image.png\n", Line(2, "`-s` … `image.png` is not a number")),
+    ("newmtl a\nmap_Kd -s 0 1 image.png\n", Line(2, "`-s` holds 0.0")),
+    ("newmtl a\nmap_Kd -s 1 -0 image.png\n", Line(2, "`-s` holds -0.0")),
+    ("newmtl a\nmap_d -s 1 1 1e31 image.png\n", Line(2, "`map_d`: … `-s` holds 1e31")),
+    ("newmtl a\nmap_Kd -s 1 nan image.png\n", Line(2, "not a finite number")),
+    ("newmtl a\nmap_Kd -o inf image.png\n", Line(2, "not a finite number")),
+    ("newmtl a\nmap_Kd -o -2e30 image.png\n", Line(2, "`-o` holds -2e30")),
+    ("newmtl a\nmap_Kd -o 1 2 3\n", Line(2, "`map_Kd` without a file name")),
+    ("newmtl a\nmap_Kd -clamp yes image.png\n", Line(2, "`-clamp` is `on` or `off`, not `yes`")),
+    ("newmtl a\nmap_Kd -clamp\n", Line(2, "option `-clamp` lacks a value")),
     ("newmtl a\nmap_Kd bad.mtl\n", Warns(1, "bad.mtl")),
     ("newmtl a\nmap_d\n", Line(2, "`map_d` without a file name")),
     ("newmtl a\nmap_d gone.png\n", Warns(1, "cut-outs left out")),
@@ -59,7 +71,12 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nmap_Bump -bm 0.5 gone.png\n", Warns(1, "normal map left out")),
     ("newmtl a\nmap_Bump -bm 0.5\n", Line(2, "`map_Bump` without a file name")),
     ("newmtl a\nmap_Bump -bm x a.png\n", Line(2, "`x` is not a number")),
-    ("newmtl a\nnorm -bm -1 a.png\n", Line(2, "`-bm -1`")),
+    ("newmtl a\nnorm -bm -1 a.png\n", Line(2, "`norm`: … `-bm` holds -1")),
+    ("newmtl a\nnorm -bm\n", Line(2, "option `-bm` lacks a value")),
+    ("newmtl a\nbump -bm 1e31 a.png\n", Line(2, "`-bm` holds 1e31")),
+    ("newmtl a\nnorm -imfchan r gone.png\n", Warns(2, "texture option `-imfchan`")),
+    ("newmtl a\nnorm -s 0 a.png\n", Line(2, "`norm`: … `-s` holds 0.0")),
+    ("newmtl a\nbump -clamp maybe a.png\n", Line(2, "`-clamp` is `on` or `off`")),
     ("newmtl a\nillum 7\nNi 1.5\nnorm gone.png\n", Warns(1, "glass has no normal map")),
     ("newmtl a\nmap_Bump bad.mtl\n", Warns(1, "normal map left out")),
     ("newmtl a\nPr 0.5\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
@@ -67,7 +84,9 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nPr 1.5\n", Line(2, "`Pr 1.5`: from 0 to 1")),
     ("newmtl a\nPr nan\n", Line(2, "not a finite number")),
     ("newmtl a\nmap_Pr\n", Line(2, "`map_Pr` without a file name")),
-    ("newmtl a\nmap_Pr -imfchan z a.png\n", Line(2, "takes r, g, b or m")),
+    ("newmtl a\nmap_Pr -imfchan z a.png\n", Line(2, "takes r, g, b or m, not `z`")),
+    ("newmtl a\nmap_Pr -imfchan\n", Line(2, "option `-imfchan` lacks a value")),
+    ("newmtl a\nmap_Pr -o 1 inf a.png\n", Line(2, "`map_Pr`: … not a finite number")),
     ("newmtl a\nillum 3\nKs .5 .5 .5\nPr 0.5\nKd 0 0 0\n", Fine),
     ("newmtl a\nillum 3\nKs .5 .5 .5\nmap_Pr gone.png\n", Warns(1, "roughness map left out")),
     (
@@ -200,6 +219,67 @@ fn map_d_cuts_holes_and_is_shared() {
     assert_eq!((model.world.meshes.len(), model.world.lights.len()), (3, 0));
     let [warning] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
     assert!(warning.message.contains("`c` emits and has cut-outs"), "{warning}");
+}
+
+#[test]
+fn options_say_how_images_lie() {
+    let ppm = b"P6 1 1 255\n\x80\x80\xff";
+    let options =
+        ["-s 2", "-s 2 3 -o 0.5", "-o 1 -2 7 -s -2 3 4 -clamp on -clamp off", "-clamp on"];
+    let (mut mtl, mut obj) = (String::new(), "mtllib x.mtl\n".to_owned());
+    obj += "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
+    for (k, options) in options.iter().enumerate() {
+        // Those of the last statement count.
+        mtl += &format!("newmtl {k}\nmap_Kd -s 9 1.ppm\nmap_Kd {options} 1.ppm\nmap_d 1.ppm\n");
+        mtl += &format!("newmtl mask {k}\nKd 0 0 0\nKs 1 1 1\nillum 3\nmap_d {options} 1.ppm\n");
+        mtl += &format!("map_Pr -imfchan r {options} 1.ppm\nbump {options} -bm 0.5 1.ppm\n");
+        obj += &format!("usemtl {k}\nf 1/1 2/2 3/3\nusemtl mask {k}\nf 1/1 3/3 2/2\n");
+    }
+    let others: &[(&str, &[u8])] = &[("x.mtl", mtl.as_bytes()), ("1.ppm", ppm)];
+    let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
+    let expected = [
+        ([2.0, 1.0], [0.0, 0.0], Wrap::Repeat),
+        ([2.0, 3.0], [0.5, 0.0], Wrap::Repeat),
+        ([-2.0, 3.0], [1.0, -2.0], Wrap::Repeat),
+        ([1.0, 1.0], [0.0, 0.0], Wrap::Clamp),
+    ];
+    for (materials, (scale, offset, wrap)) in model.world.materials.chunks(2).zip(expected) {
+        let [shown, masked] = materials else { panic!("two materials") };
+        let map = shown.texture.expect("a texture");
+        assert_eq!((map.image, map.wrap), (0, wrap));
+        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, -0.7)] {
+            let at = map.transform.transform_point2(DVec2::new(x, y));
+            let wanted = DVec2::new(x * scale[0] + offset[0], y * scale[1] + offset[1]);
+            assert!((at - wanted).length() < 1e-15, "{at} {wanted}");
+        }
+        assert_eq!((masked.alpha, shown.alpha), (Some(map), Some(TextureMap::of(0))));
+        assert_eq!(masked.roughness_map, Some(TextureMap { image: 1, ..map }));
+        let normals = masked.normal_map.expect("a normal map");
+        assert_eq!((normals.image, normals.strength), (TextureMap { image: 2, ..map }, 0.5));
+    }
+    assert_eq!((model.world.textures.len(), model.world.masks.len()), (3, 1));
+    assert_eq!(model.files.len(), 3);
+}
+
+#[test]
+fn images_come_in_the_order_in_which_faces_ask_for_them() {
+    let pgm = |texel: u8| [&b"P5 1 1 255\n"[..], &[texel]].concat();
+    let mtl = b"newmtl a\nmap_Kd 1.pgm\nmap_d 2.pgm\nnewmtl b\nmap_Kd 2.pgm\nmap_d gone.pgm\n\
+                newmtl c\nmap_Kd gone.pgm\nmap_d 1.pgm\nnewmtl unused\nmap_Kd gone too.pgm\n";
+    let obj = "mtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
+               usemtl c\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\nusemtl a\nf 2/2 3/3 1/1\n";
+    let (one, two) = (pgm(1), pgm(2));
+    let others: &[(&str, &[u8])] = &[("x.mtl", mtl), ("1.pgm", &one), ("2.pgm", &two)];
+    let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
+    let world = &model.world;
+    assert_eq!(world.masks.iter().map(|mask| mask.texels[0]).collect::<Vec<_>>(), [1, 2]);
+    let codes = world.textures.iter().map(|t| t.image_bytes()[0]);
+    assert_eq!(codes.collect::<Vec<_>>(), [2, 1]);
+    let warnings: Vec<_> = model.warnings.iter().map(|warning| &warning.message[..]).collect();
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings[0].contains("`c`: texture left out") && warnings[0].contains("gone.pgm"));
+    assert!(warnings[1].contains("`b`: cut-outs left out") && warnings[1].contains("gone.pgm"));
 }
 
 #[test]

@@ -11,9 +11,9 @@
 
 mod statements;
 
+use super::images::{ImageUse, Images};
 use super::model::Model;
 use super::source::{self, Notes};
-use super::texture::{self, ImageUse, TextureCache};
 use super::{lamps, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DVec3, Rgb, Vec2};
@@ -29,10 +29,12 @@ use std::path::Path;
 pub(super) fn read(path: &Path, text: &[u8]) -> Result<Model> {
     let mut file = statements::parse(text).map_err(|fault| fault.at(path))?;
     let mut model = Model { files: vec![path.to_path_buf()], ..Model::default() };
-    let mut textures = TextureCache::default();
+    let mut images = Images::default();
     let materials = std::mem::take(&mut file.materials);
+    let named = materials.iter().filter_map(|material| material.texture.as_ref());
+    images.read(named.map(|(_, name)| (source::beside(path, name), ImageUse::Colour)));
     for (number, material) in materials.iter().enumerate() {
-        let converted = convert(path, number, material, &mut textures, &mut model);
+        let converted = convert(path, number, material, &mut images, &mut model);
         model.world.materials.push(converted);
     }
     model.warnings.extend(std::mem::take(&mut file.notes).into_warnings(path));
@@ -50,7 +52,7 @@ fn convert(
     path: &Path,
     number: usize,
     source: &CourseMaterial,
-    textures: &mut TextureCache,
+    images: &mut Images,
     model: &mut Model,
 ) -> Material {
     let mut out = Material::diffuse(format!("material {number}"), source.diffuse);
@@ -59,7 +61,7 @@ fn convert(
     out.emits_back = true;
     if let Some((line, name)) = &source.texture {
         let file = source::beside(path, name);
-        match texture::load_cached(&file, ImageUse::Colour, textures, model) {
+        match images.place(&file, ImageUse::Colour, &mut model.world, &mut model.files) {
             Ok(id) => (out.texture, out.diffuse) = (Some(TextureMap::of(id)), Rgb::ONE),
             Err(error) => {
                 let message = format!("texture left out: {error}");

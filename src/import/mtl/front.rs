@@ -1,10 +1,10 @@
 //! Checks an MTL file line by line and hands tobj a clean copy of it.
 
+use super::image::{MapImage, MapKind};
 use crate::error::{Diagnostic, Result};
 use crate::import::lines::{Line, Lines, Words, check_text, number, show};
 use crate::import::source::Fault;
 use crate::import::source::Notes;
-use crate::import::texture::ImageChannel;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -17,20 +17,22 @@ pub(super) struct Source {
     pub line: usize,
     /// `Tf`: share of light that passes, linear RGB.
     pub filter: Option<[f64; 3]>,
+    /// `map_Kd`.
+    pub texture: Option<MapImage>,
+    /// `map_d`.
+    pub mask: Option<MapImage>,
     /// `norm`, or `map_Bump` and `bump`, which may hold heights instead.
     pub normal_map: Option<BumpImage>,
     /// `Pr`: roughness.
     pub roughness: Option<f64>,
-    /// `map_Pr`: file and channel.
-    pub roughness_map: Option<(String, ImageChannel)>,
+    /// `map_Pr`.
+    pub roughness_map: Option<MapImage>,
 }
 
 /// An image of normals or, perhaps, of heights.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BumpImage {
-    pub name: String,
-    /// `-bm`.
-    pub strength: f64,
+    pub image: MapImage,
     /// Whether the statement is for normals alone.
     pub is_normal: bool,
     pub line: usize,
@@ -88,13 +90,11 @@ impl Front {
             "Tr" => self.transparency(words),
             "illum" => self.illum(words),
             "Pr" => self.roughness(words),
-            "map_Kd" | "map_d" => {
-                let name = self.image(&text, words, line.number)?.name;
-                self.put(format_args!("{text} {name}"));
-                Ok(())
+            "map_Kd" | "map_d" => self.map(&text, MapKind::Image, words, line.number),
+            "map_Pr" => self.map(&text, MapKind::Data, words, line.number),
+            "norm" | "map_Bump" | "map_bump" | "bump" => {
+                self.map(&text, MapKind::Normals, words, line.number)
             }
-            "map_Pr" => self.roughness_map(words, line.number),
-            "norm" | "map_Bump" | "map_bump" | "bump" => self.bump(&text, words, line.number),
             "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "disp" | "decal" | "refl" | "map_Tr"
             | "map_refl" | "map_Kn" => {
                 self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
@@ -147,28 +147,27 @@ impl Front {
         Ok(())
     }
 
-    fn roughness_map(&mut self, words: Words<'_>, line: usize) -> std::result::Result<(), String> {
-        let NamedImage { name, channel, strength: _ } = self.image("map_Pr", words, line)?;
-        if let Some(source) = self.sources.last_mut() {
-            source.roughness_map = Some((name, channel.unwrap_or(ImageChannel::Green)));
-        }
-        Ok(())
-    }
-
-    fn bump(
+    /// `map_Kd [options] file`, or another map.
+    fn map(
         &mut self,
         keyword: &str,
+        kind: MapKind,
         words: Words<'_>,
         line: usize,
     ) -> std::result::Result<(), String> {
-        let NamedImage { name, channel: _, strength } = self.image(keyword, words, line)?;
-        let is_normal = keyword == "norm";
-        if let Some(source) = self.sources.last_mut() {
-            // `norm` wins.
-            if is_normal || !source.normal_map.as_ref().is_some_and(|map| map.is_normal) {
-                let strength = strength.unwrap_or(1.0);
-                source.normal_map = Some(BumpImage { name, strength, is_normal, line });
+        let image = MapImage::read(keyword, kind, words, line, &mut self.notes)?;
+        let Some(source) = self.sources.last_mut() else { return Ok(()) };
+        match kind {
+            MapKind::Data => source.roughness_map = Some(image),
+            MapKind::Normals => {
+                let is_normal = keyword == "norm";
+                // `norm` wins.
+                if is_normal || !source.normal_map.as_ref().is_some_and(|map| map.is_normal) {
+                    source.normal_map = Some(BumpImage { image, is_normal, line });
+                }
             }
+            MapKind::Image if keyword == "map_d" => source.mask = Some(image),
+            MapKind::Image => source.texture = Some(image),
         }
         Ok(())
     }
@@ -210,64 +209,6 @@ impl Front {
         Ok(())
     }
 
-    /// `map_Kd [options] file`, or another map. The file's name may hold blanks.
-    fn image(
-        &mut self,
-        keyword: &str,
-        mut words: Words<'_>,
-        line: usize,
-    ) -> std::result::Result<NamedImage, String> {
-        let (mut channel, mut strength) = (None, None);
-        loop {
-            let mut ahead = words;
-            let arguments = match ahead.next() {
-                Some(b"-s" | b"-o" | b"-t") => 3,
-                Some(b"-mm") => 2,
-                Some(
-                    b"-blendu" | b"-blendv" | b"-cc" | b"-clamp" | b"-bm" | b"-boost" | b"-texres"
-                    | b"-imfchan" | b"-type" | b"-colorspace",
-                ) => 1,
-                _ => break,
-            };
-            let option = words.next().unwrap_or_default();
-            if (keyword, option) == ("map_Pr", b"-imfchan") {
-                channel = channel_of(words.next().unwrap_or_default());
-                if channel.is_some() {
-                    continue;
-                }
-                return Err(format!("`{keyword}`: `-imfchan` takes r, g, b or m"));
-            }
-            if option == b"-bm" && matches!(keyword, "norm" | "map_Bump" | "map_bump" | "bump") {
-                let value = number(words.next().unwrap_or_default())?;
-                if !(0.0..=1e30).contains(&value) {
-                    return Err(format!("`{keyword}`: `-bm {value}`, from 0 on is possible"));
-                }
-                strength = Some(value);
-                continue;
-            }
-            self.notes.add(&format!("texture option `{}` is ignored", show(option)), line);
-            for used in 0..arguments {
-                let mut ahead = words;
-                // The second and third number of -s, -o and -t may be left out.
-                let is_value = ahead.next().is_some_and(|w| arguments == 1 || number(w).is_ok());
-                if !is_value && used == 0 {
-                    return Err(format!(
-                        "`{keyword}`: the option `{}` lacks a value",
-                        show(option)
-                    ));
-                }
-                if is_value {
-                    words = ahead;
-                }
-            }
-        }
-        let name = String::from_utf8_lossy(words.rest()).into_owned();
-        if name.is_empty() {
-            return Err(format!("`{keyword}` without a file name"));
-        }
-        Ok(NamedImage { name, channel, strength })
-    }
-
     fn other(&mut self, keyword: &[u8], line: usize) -> std::result::Result<(), String> {
         let word = |b: &u8| b.is_ascii_alphanumeric() || b"_-.".contains(b);
         if keyword.len() > 32 || !keyword.iter().all(word) || !keyword[0].is_ascii_alphabetic() {
@@ -275,25 +216,6 @@ impl Front {
         }
         self.notes.add(&format!("`{}` is ignored", show(keyword)), line);
         Ok(())
-    }
-}
-
-/// An image as a statement names it.
-struct NamedImage {
-    name: String,
-    /// Of data, if an option gives it.
-    channel: Option<ImageChannel>,
-    /// `-bm` of normals.
-    strength: Option<f64>,
-}
-
-fn channel_of(word: &[u8]) -> Option<ImageChannel> {
-    match word {
-        b"r" => Some(ImageChannel::Red),
-        b"g" => Some(ImageChannel::Green),
-        b"b" => Some(ImageChannel::Blue),
-        b"m" => Some(ImageChannel::Alpha),
-        _ => None,
     }
 }
 

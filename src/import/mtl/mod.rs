@@ -3,17 +3,20 @@
 //! into our materials.
 
 mod front;
+mod image;
 mod meaning;
 
-use super::alpha::{self, MaskCache};
+use super::images::{ImageUse, Images};
 use super::model::Model;
 use super::source::{self, Notes};
-use super::texture::{self, ImageUse, TextureCache};
-use crate::error::{Diagnostic, Result};
+use crate::error::{Diagnostic, Error, Result};
 use crate::math::Rgb;
-use crate::scene::{MaterialId, NormalMap, TextureMap};
+use crate::scene::{Material, MaterialId, NormalMap, TextureMap};
+use front::BumpImage;
+use image::MapImage;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The note on a roughness that says nothing of the picture.
 const ROUGHNESS_ALONE: &str =
@@ -23,8 +26,7 @@ const ROUGHNESS_ALONE: &str =
 #[derive(Default)]
 pub(super) struct Libraries {
     entries: HashMap<String, Entry>,
-    textures: TextureCache,
-    masks: MaskCache,
+    images: Images,
     loaded: Vec<PathBuf>,
 }
 
@@ -32,6 +34,81 @@ struct Entry {
     library: PathBuf,
     source: front::Source,
     parsed: tobj::Material,
+}
+
+/// The images that a material takes.
+struct Taken<'s> {
+    texture: Option<&'s MapImage>,
+    roughness: Option<&'s MapImage>,
+    normals: Option<&'s BumpImage>,
+    mask: Option<&'s MapImage>,
+}
+
+impl Entry {
+    /// The images that count in `material`, as [`meaning::of`] has it: only a mirror is rough, glass has no normal map and no
+    /// cut-outs.
+    fn taken(&self, material: &Material) -> Taken<'_> {
+        let front::Source { texture, roughness_map, normal_map, mask, .. } = &self.source;
+        let is_glass = material.glass.is_some();
+        Taken {
+            texture: texture.as_ref(),
+            roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO),
+            normals: normal_map.as_ref().filter(|_| !is_glass),
+            mask: mask.as_ref().filter(|_| !is_glass),
+        }
+    }
+
+    /// The files of the images that the material takes, with what they serve as.
+    fn images(&self) -> impl Iterator<Item = (PathBuf, ImageUse)> {
+        let Taken { texture, roughness, normals, mask } =
+            self.taken(&meaning::of(&self.source, &self.parsed).0);
+        let images = [
+            texture.map(|image| (image, ImageUse::Colour)),
+            roughness.map(|image| (image, data(image))),
+            normals.map(|bump| (&bump.image, ImageUse::Normals)),
+            mask.map(|image| (image, ImageUse::Mask)),
+        ];
+        images.into_iter().flatten().map(|(image, what)| (self.file(image), what))
+    }
+
+    fn file(&self, image: &MapImage) -> PathBuf {
+        source::beside(&self.library, &image.name)
+    }
+
+    /// The image as it lies on the surface, entered in the model's world.
+    fn lay(
+        &self,
+        image: &MapImage,
+        what: ImageUse,
+        images: &mut Images,
+        model: &mut Model,
+    ) -> std::result::Result<TextureMap, Arc<Error>> {
+        let Model { world, files, .. } = model;
+        images.place(&self.file(image), what, world, files).map(|id| image.options.map(id))
+    }
+
+    /// The normal map of an image; `Err` tells why there is none.
+    fn normal_map(
+        &self,
+        bump: &BumpImage,
+        images: &mut Images,
+        model: &mut Model,
+    ) -> std::result::Result<NormalMap, String> {
+        let BumpImage { image, is_normal, line } = bump;
+        let looks = images.looks_like_normals(&self.file(image), ImageUse::Normals, &model.world);
+        if looks == Some(false) && !is_normal {
+            let name = &image.name;
+            return Err(format!("{name} of line {line} holds heights, not normals: it is ignored"));
+        }
+        let map = self.lay(image, ImageUse::Normals, images, model);
+        let map = map.map_err(|error| format!("normal map left out: {error}"))?;
+        Ok(NormalMap { image: map, strength: image.options.strength })
+    }
+}
+
+/// What the image of a roughness serves as.
+fn data(image: &MapImage) -> ImageUse {
+    ImageUse::Data(image.options.channel)
 }
 
 impl Libraries {
@@ -88,6 +165,12 @@ impl Libraries {
         Ok(())
     }
 
+    /// Decodes the images of the materials of these names, each once and on all threads.
+    pub fn read_images<'n>(&mut self, names: impl Iterator<Item = &'n str>) {
+        let wanted = names.filter_map(|name| self.entries.get(name)).flat_map(Entry::images);
+        self.images.read(wanted);
+    }
+
     /// Adds the material that `usemtl NAME` on `line` of `obj` asks for to the model's world,
     /// and its images. An unknown name is a warning, and the default material. A `coloured` mesh shows its
     /// vertex colours, times `Kd`, unless there is a texture.
@@ -98,7 +181,7 @@ impl Libraries {
         (name, coloured): (&str, bool),
         model: &mut Model,
     ) -> Result<MaterialId> {
-        let Self { entries, textures, masks, .. } = self;
+        let Self { entries, images, .. } = self;
         let Some(entry) = entries.get(name) else {
             let message = format!("no material `{name}`: plain grey in its place");
             model.warnings.push(Diagnostic::new(obj, message).line(line));
@@ -113,25 +196,20 @@ impl Libraries {
         };
         let (mut material, notes) = meaning::of(&entry.source, &entry.parsed);
         model.warnings.extend(notes.into_iter().map(place));
-        if let Some(image) = &entry.parsed.diffuse_texture {
-            let file = source::beside(&entry.library, image);
-            match texture::load_cached(&file, ImageUse::Colour, textures, model) {
-                Ok(id) => {
-                    material.texture = Some(TextureMap::of(id));
+        let Taken { texture, roughness, normals, mask } = entry.taken(&material);
+        if let Some(image) = texture {
+            match entry.lay(image, ImageUse::Colour, images, model) {
+                Ok(map) => {
+                    material.texture = Some(map);
                     material.diffuse = meaning::textured(&entry.parsed);
                 }
-                Err(error) => {
-                    model.warnings.push(place(format!("texture left out: {error}")));
-                }
+                Err(error) => model.warnings.push(place(format!("texture left out: {error}"))),
             }
         }
-        let rough = entry.source.roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO);
-        if let Some((image, channel)) = rough {
-            let file = source::beside(&entry.library, image);
-            let data = ImageUse::Data(*channel);
-            match texture::load_cached(&file, data, textures, model) {
-                Ok(id) => {
-                    material.roughness_map = Some(TextureMap::of(id));
+        if let Some(image) = roughness {
+            match entry.lay(image, data(image), images, model) {
+                Ok(map) => {
+                    material.roughness_map = Some(map);
                     material.roughness = 1.0;
                 }
                 Err(error) => {
@@ -139,9 +217,8 @@ impl Libraries {
                 }
             }
         }
-        if let Some(bump) = entry.source.normal_map.as_ref() {
-            let is_glass = material.glass.is_some();
-            let normals = normal_map(&entry.library, bump, is_glass, textures, model);
+        if let Some(bump) = normals {
+            let normals = entry.normal_map(bump, images, model);
             let warn = |message| model.warnings.push(place(message));
             material.normal_map = normals.map_err(warn).ok();
         }
@@ -154,44 +231,12 @@ impl Libraries {
                 material.diffuse = Rgb::ONE;
             }
         }
-        if let Some(image) = &entry.parsed.dissolve_texture {
-            let file = source::beside(&entry.library, image);
-            let is_glass = material.glass.is_some();
-            let mask = match is_glass {
-                true => Err("glass has none, `map_d` is ignored".into()),
-                false => alpha::load_cached(&file, masks, model),
-            };
+        if let Some(image) = mask {
+            let mask = entry.lay(image, ImageUse::Mask, images, model);
             let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
-            material.alpha = mask.map_err(warn).ok().map(TextureMap::of);
+            material.alpha = mask.map_err(warn).ok();
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)
     }
-}
-
-/// The normal map of an image; `Err` tells why there is none.
-fn normal_map(
-    library: &Path,
-    bump: &front::BumpImage,
-    is_glass: bool,
-    textures: &mut TextureCache,
-    model: &mut Model,
-) -> std::result::Result<NormalMap, String> {
-    let front::BumpImage { name, strength, is_normal, line } = bump;
-    if is_glass {
-        return Err(format!("glass has no normal map: that of line {line} is ignored"));
-    }
-    let file = source::beside(library, name);
-    let before = model.world.textures.len();
-    let id = texture::load_cached(&file, ImageUse::Normals, textures, model)
-        .map_err(|error| format!("normal map left out: {error}"))?;
-    let looks_like_normals = model.world.textures[id as usize].looks_like_normals();
-    if !(looks_like_normals || *is_normal) {
-        if model.world.textures.len() > before {
-            model.world.textures.pop();
-            textures.remove(&(file, ImageUse::Normals));
-        }
-        return Err(format!("{name} of line {line} holds heights, not normals: it is ignored"));
-    }
-    Ok(NormalMap { image: TextureMap::of(id), strength: *strength })
 }

@@ -62,6 +62,7 @@ pub(super) fn assemble(
         .map_err(|fault| fault.at(path))?;
     let triangles = collect(groups.names.len(), pieces, &values);
 
+    libraries.read_images(groups.names.iter().flatten().map(|(_, name)| name.as_str()));
     let mut dropped = 0;
     let mut meshes = Builder::new(values, triangles.len());
     for (triangles, name) in triangles.into_iter().zip(groups.names) {

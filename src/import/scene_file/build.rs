@@ -1,16 +1,16 @@
 //! From the checked tables to a [`World`]: reads meshes and textures, places and merges them.
 
 use super::at::{At, Span};
-use super::material::{Images, Material};
+use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
 use super::report::Source;
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
-use crate::import::{self, ImageUse, Model, emission, untextured};
+use crate::import::images::{ImageUse, Images};
+use crate::import::{self, Model, emission, untextured};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
-use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Triangles that all generators of a scene file may make together: some 5 GB of memory, and as
@@ -24,10 +24,8 @@ pub(super) struct Builder<'a> {
     pub warnings: Vec<Diagnostic>,
     /// Every file read, the scene file first, each once.
     pub files: Vec<PathBuf>,
-    /// Images that no material has asked for yet.
-    images: HashMap<(PathBuf, ImageUse), Result<scene::Texture>>,
-    /// Those in the world.
-    textures: HashMap<(PathBuf, ImageUse), scene::TextureId>,
+    /// The images of all materials.
+    images: Images,
     materials: BTreeMap<&'a str, Named>,
     default_material: Option<MaterialId>,
     generated: u64,
@@ -37,30 +35,6 @@ struct Named {
     id: MaterialId,
     span: Span,
     used: bool,
-}
-
-/// The images of all materials of `file`, each once for each use, read on all threads.
-fn images(
-    source: &Source,
-    file: &SceneFile,
-) -> HashMap<(PathBuf, ImageUse), Result<scene::Texture>> {
-    let named = file.material.values().flat_map(|material| images_of(material));
-    let path = |file: &At<String>| import::source::beside(&source.path, &file.value);
-    let images: BTreeSet<_> = named.map(|(file, image_use)| (path(&file), image_use)).collect();
-    let load = |image: (PathBuf, ImageUse)| {
-        let loaded = import::load_image(&image.0, image.1);
-        (image, loaded)
-    };
-    images.into_par_iter().map(load).collect()
-}
-
-/// The images of a material, but for masks.
-fn images_of(material: &Material) -> impl Iterator<Item = (At<String>, ImageUse)> {
-    let texture = material.texture.as_ref().map(|texture| (texture.image_file(), ImageUse::Colour));
-    let roughness = material.roughness.as_ref().and_then(At::data_file);
-    let roughness = roughness.map(|(file, channel)| (file, ImageUse::Data(channel)));
-    let normals = material.normal_map.as_ref().map(|map| (map.image_file(), ImageUse::Normals));
-    [texture, roughness, normals].into_iter().flatten()
 }
 
 impl<'a> Builder<'a> {
@@ -73,12 +47,12 @@ impl<'a> Builder<'a> {
             world: World::default(),
             warnings: Vec::new(),
             files: vec![source.path.clone()],
-            images: images(source, file),
-            textures: HashMap::new(),
+            images: Images::default(),
             materials: BTreeMap::new(),
             default_material: None,
             generated: 0,
         };
+        this.read_images(file)?;
         for (name, material) in &file.material {
             this.add_material(name, material)?;
         }
@@ -98,19 +72,32 @@ impl<'a> Builder<'a> {
         Ok(this)
     }
 
+    /// Reads the images of all materials on all threads. Those that may be meant for another use are warned of where
+    /// the scene file first names them.
+    ///
+    /// Errors: of those that cannot be read, the one that the scene file names first.
+    fn read_images(&mut self, file: &SceneFile) -> Result<()> {
+        let keys = file.material.values().flat_map(|material| material.images().all());
+        let mut keys: Vec<_> = keys.map(|(key, what)| ((self.beside(&key), what), key)).collect();
+        keys.sort_by_key(|(_, key)| key.span.start);
+        self.images.read(keys.iter().map(|(image, _)| image.clone()));
+        for ((path, what), key) in &keys {
+            if let Some(error) = self.images.refusal(path, *what) {
+                return Err(self.at_key(key, error));
+            }
+        }
+        let mut seen = HashSet::new();
+        keys.retain(|(image, _)| seen.insert(image.clone()));
+        for ((path, what), key) in &keys {
+            if let Some(message) = self.images.doubt(path, *what, &self.world) {
+                self.warnings.push(self.source.fault(&key.span, message));
+            }
+        }
+        Ok(())
+    }
+
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
-        let texture = material.texture.as_ref().map(At::image_file);
-        let alpha = material.alpha.as_ref().map(At::image_file);
-        let roughness = material.roughness.as_ref().and_then(At::data_file);
-        let normals = material.normal_map.as_ref().map(At::image_file);
-        let images = Images {
-            texture: texture.map(|file| self.add_image(&file, ImageUse::Colour)).transpose()?,
-            normals: normals.map(|file| self.add_image(&file, ImageUse::Normals)).transpose()?,
-            alpha: alpha.map(|file| self.add_mask(&file)).transpose()?,
-            roughness: roughness
-                .map(|(file, channel)| self.add_image(&file, ImageUse::Data(channel)))
-                .transpose()?,
-        };
+        let images = material.images().try_map(|(file, what)| self.image(&file, what))?;
         let built = material.build(name, self.source, &images)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
@@ -118,34 +105,11 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn add_image(&mut self, file: &At<String>, image_use: ImageUse) -> Result<scene::TextureId> {
-        let key = (self.beside(file), image_use);
-        if let Some(known) = self.textures.get(&key) {
-            return Ok(*known);
-        }
-        let loaded = self.images.remove(&key);
-        let loaded = loaded.unwrap_or_else(|| import::load_image(&key.0, image_use));
-        let texture = loaded.map_err(|e| self.at_key(file, e))?;
-        self.note_file(&key.0);
-        if let Some(message) = import::doubt(&texture, image_use) {
-            self.warnings.push(self.source.fault(&file.span, message));
-        }
-        let id = self.world.textures.len() as scene::TextureId;
-        self.world.textures.push(texture);
-        self.textures.insert(key, id);
-        Ok(id)
-    }
-
-    fn add_mask(&mut self, file: &At<String>) -> Result<scene::MaskId> {
+    /// The number of the image in the world.
+    fn image(&mut self, file: &At<String>, what: ImageUse) -> Result<u32> {
         let path = self.beside(file);
-        let same = |mask: &scene::AlphaMask| Path::new(&mask.name) == path;
-        if let Some(known) = self.world.masks.iter().position(same) {
-            return Ok(known as scene::MaskId);
-        }
-        let mask = import::load_mask(&path).map_err(|e| self.at_key(file, e))?;
-        self.note_file(&path);
-        self.world.masks.push(mask);
-        Ok(self.world.masks.len() as scene::MaskId - 1)
+        let found = self.images.place(&path, what, &mut self.world, &mut self.files);
+        found.map_err(|error| self.at_key(file, &error))
     }
 
     fn add_mesh(&mut self, mesh: &At<Mesh>) -> Result<()> {
@@ -219,7 +183,7 @@ impl<'a> Builder<'a> {
         let Model { mut world, warnings, files } = import::load_model(&path, mesh.policy())
             .map_err(|e| match e {
                 Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
-                other => self.at_key(file, other),
+                other => self.at_key(file, &other),
             })?;
         files.iter().for_each(|f| self.note_file(f));
         self.warnings.extend(warnings);
@@ -313,11 +277,11 @@ impl<'a> Builder<'a> {
 
     /// `error` about the file that a key names, at the key; with the nearest file's name where
     /// there is none of that name.
-    fn at_key(&self, file: &At<String>, error: Error) -> Error {
-        let missing = matches!(&error, Error::Io { source, .. }
+    fn at_key(&self, file: &At<String>, error: &Error) -> Error {
+        let missing = matches!(error, Error::Io { source, .. }
             if source.kind() == std::io::ErrorKind::NotFound);
         let (message, help) = match error {
-            Error::Input(d) => (format!("{}: {}", d.file.display(), d.message), d.help),
+            Error::Input(d) => (format!("{}: {}", d.file.display(), d.message), d.help.clone()),
             other => (other.to_string(), None),
         };
         let fault = self.source.fault(&file.span, message);

@@ -6,7 +6,8 @@ use super::report::Source;
 use super::texture::{ImageTable, Named, NamedTexture, NormalTexture, Roughness};
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
-use crate::scene::{self, MaskId, TextureId};
+use crate::import::images::ImageUse;
+use crate::scene;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -66,12 +67,30 @@ pub(super) struct Glass {
     priority: Option<Int<0, 255>>,
 }
 
-/// Indices of a material's decoded images.
-pub(super) struct Images {
-    pub texture: Option<TextureId>,
-    pub alpha: Option<MaskId>,
-    pub roughness: Option<TextureId>,
-    pub normals: Option<TextureId>,
+/// Something of each image of a material.
+pub(super) struct ImagesOf<T> {
+    texture: Option<T>,
+    normals: Option<T>,
+    alpha: Option<T>,
+    roughness: Option<T>,
+}
+
+impl<T> ImagesOf<T> {
+    /// What `of` makes of each, in order; the first error, if any.
+    pub fn try_map<U>(self, mut of: impl FnMut(T) -> Result<U>) -> Result<ImagesOf<U>> {
+        Ok(ImagesOf {
+            texture: self.texture.map(&mut of).transpose()?,
+            normals: self.normals.map(&mut of).transpose()?,
+            alpha: self.alpha.map(&mut of).transpose()?,
+            roughness: self.roughness.map(&mut of).transpose()?,
+        })
+    }
+
+    /// All that there are.
+    pub fn all(self) -> impl Iterator<Item = T> {
+        let Self { texture, normals, alpha, roughness } = self;
+        [texture, normals, alpha, roughness].into_iter().flatten()
+    }
 }
 
 fn window_glass() -> Ior {
@@ -79,8 +98,25 @@ fn window_glass() -> Ior {
 }
 
 impl Material {
-    /// As scene data; `images` are the indices of the decoded images.
-    pub fn build(&self, name: &str, source: &Source, images: &Images) -> Result<scene::Material> {
+    /// The files of its images, with what they serve as.
+    pub fn images(&self) -> ImagesOf<(At<String>, ImageUse)> {
+        let roughness = self.roughness.as_ref().and_then(At::data_file);
+        let normal_map = self.normal_map.as_ref();
+        ImagesOf {
+            texture: self.texture.as_ref().map(|key| (key.image_file(), ImageUse::Colour)),
+            normals: normal_map.map(|key| (key.image_file(), ImageUse::Normals)),
+            alpha: self.alpha.as_ref().map(|key| (key.image_file(), ImageUse::Mask)),
+            roughness: roughness.map(|(file, channel)| (file, ImageUse::Data(channel))),
+        }
+    }
+
+    /// As scene data; `images` are the world's numbers of [`images`](Self::images).
+    pub fn build(
+        &self,
+        name: &str,
+        source: &Source,
+        images: &ImagesOf<u32>,
+    ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
             ior: g.ior.0,
@@ -88,7 +124,7 @@ impl Material {
             absorption: g.absorption.unwrap_or_default().rgb(),
             priority: g.priority.map(|p| p.u32() as u8),
         });
-        let Images { texture, alpha, roughness, normals } = images;
+        let ImagesOf { texture, normals, alpha, roughness } = images;
         let (roughness, roughness_map) = match (self.roughness.as_deref(), roughness) {
             (Some(Roughness::Same(share)), _) => (share.0, None),
             (Some(Roughness::Image(Named(table))), Some(id)) => (1.0, Some(table.map(*id))),

@@ -3,8 +3,8 @@
 use super::at::At;
 use super::number::{Coordinate, Degrees, Factor, NotNegative, Share};
 use super::schema::inline_schema;
-use super::vector::List;
-use crate::import::ImageChannel;
+use super::vector::{List, OneOr};
+use crate::import::texture::ImageChannel;
 use crate::math::{DAffine2, DVec2};
 use crate::scene::{TextureId, TextureMap, Wrap};
 use schemars::{JsonSchema, json_schema};
@@ -26,9 +26,9 @@ macro_rules! image_table {
             /// What is seen beyond the image's edges.
             #[serde(default)]
             wrap: Wrapping,
-            /// Factors on the texture coordinates: with `[2, 3]` the image is seen twice side by side and three times one over the other.
+            /// Factors on the texture coordinates, or one for both: with `[2, 3]` the image is seen twice side by side and three times one over the other.
             #[serde(default = "unscaled")]
-            scale: List<Factor, 2>,
+            scale: OneOr<Factor, 2>,
             /// Turn of the texture coordinates about (0, 0), degrees, counter-clockwise; after `scale`.
             #[serde(default = "unturned")]
             rotate: Degrees,
@@ -138,8 +138,8 @@ enum Wrapping {
     Mirror,
 }
 
-fn unscaled() -> List<Factor, 2> {
-    List([Factor(1.0); 2])
+fn unscaled() -> OneOr<Factor, 2> {
+    OneOr([Factor(1.0); 2])
 }
 
 fn unturned() -> Degrees {
@@ -153,7 +153,7 @@ fn at_zero() -> List<Coordinate, 2> {
 fn map(
     image: TextureId,
     wrap: Wrapping,
-    (scale, rotate, offset): (&List<Factor, 2>, Degrees, &List<Coordinate, 2>),
+    (scale, rotate, offset): (&OneOr<Factor, 2>, Degrees, &List<Coordinate, 2>),
 ) -> TextureMap {
     let scale = DVec2::from_array(scale.0.map(|s| s.0));
     let offset = DVec2::from_array(offset.0.map(|o| o.0));

@@ -62,16 +62,16 @@ inline_schema!(for [T: JsonSchema, const N: usize] List<T, N>, |generator| {
     json_schema!({ "type": "array", "items": items, "minItems": N, "maxItems": N })
 });
 
-/// One value for all three, or `[a, b, c]`.
+/// One value for all `N`, or an array of `N`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct OneOrThree<T>(pub [T; 3]);
+pub(super) struct OneOr<T, const N: usize>(pub [T; N]);
 
 /// Radiance, intensity, irradiance: linear RGB, or one number for grey.
-pub(super) type Light = OneOrThree<Amount>;
+pub(super) type Light = OneOr<Amount, 3>;
 /// Reflectance or transmittance: linear RGB, or one number for grey.
-pub(super) type Reflectance = OneOrThree<Share>;
+pub(super) type Reflectance = OneOr<Share, 3>;
 /// Scale factors along x, y, z, or one for all.
-pub(super) type Scale = OneOrThree<Factor>;
+pub(super) type Scale = OneOr<Factor, 3>;
 
 impl Default for Light {
     fn default() -> Self {
@@ -98,47 +98,51 @@ impl Reflectance {
     }
 }
 
-struct OneOrThreeVisitor<T>(PhantomData<T>);
+struct OneOrVisitor<T, const N: usize>(PhantomData<T>);
 
-impl<'de, T: Deserialize<'de> + Copy> Visitor<'de> for OneOrThreeVisitor<T> {
-    type Value = OneOrThree<T>;
+impl<'de, T: Deserialize<'de> + Copy, const N: usize> Visitor<'de> for OneOrVisitor<T, N> {
+    type Value = OneOr<T, N>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number or an array of 3 numbers")
+        write!(f, "a number or an array of {N} numbers")
     }
 
     fn visit_f64<E: Error>(self, x: f64) -> Result<Self::Value, E> {
         let number: F64Deserializer<E> = x.into_deserializer();
-        T::deserialize(number).map(|v| OneOrThree([v; 3]))
+        T::deserialize(number).map(|v| OneOr([v; N]))
     }
 
     fn visit_i64<E: Error>(self, x: i64) -> Result<Self::Value, E> {
         let number: I64Deserializer<E> = x.into_deserializer();
-        T::deserialize(number).map(|v| OneOrThree([v; 3]))
+        T::deserialize(number).map(|v| OneOr([v; N]))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
-        List::<T, 3>::deserialize(SeqAccessDeserializer::new(seq)).map(|list| OneOrThree(list.0))
+        List::<T, N>::deserialize(SeqAccessDeserializer::new(seq)).map(|list| OneOr(list.0))
     }
 }
 
-impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for OneOrThree<T> {
+impl<'de, T: Deserialize<'de> + Copy, const N: usize> Deserialize<'de> for OneOr<T, N> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(OneOrThreeVisitor(PhantomData))
+        deserializer.deserialize_any(OneOrVisitor(PhantomData))
     }
 }
 
-impl<T: Serialize + PartialEq> Serialize for OneOrThree<T> {
+impl<T: Serialize + PartialEq, const N: usize> Serialize for OneOr<T, N> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let [a, b, c] = &self.0;
-        if a == b && b == c { a.serialize(serializer) } else { serializer.collect_seq(&self.0) }
+        match &self.0[..] {
+            [first, others @ ..] if others.iter().all(|other| other == first) => {
+                first.serialize(serializer)
+            }
+            all => serializer.collect_seq(all),
+        }
     }
 }
 
-inline_schema!(for [T: JsonSchema] OneOrThree<T>, |generator| {
+inline_schema!(for [T: JsonSchema, const N: usize] OneOr<T, N>, |generator| {
     let one = generator.subschema_for::<T>();
-    let three = generator.subschema_for::<List<T, 3>>();
-    json_schema!({ "anyOf": [one, three] })
+    let all = generator.subschema_for::<List<T, N>>();
+    json_schema!({ "anyOf": [one, all] })
 });
 
 /// A direction: any vector but zero, or the name of an axis; `"-y"` points down.

@@ -3,7 +3,7 @@
 use super::super::coarse::Bundle;
 use super::super::triangle::{Pairs, STEP};
 use super::{BLOCK, Candidate, EmbreeIntersector, ROUNDING, TURNS, Turn};
-use crate::embree::{Packet, PacketHit, QueryFlags};
+use crate::embree::{CastRays, Packet, PacketHit, QueryFlags};
 use crate::math::Vec3;
 use crate::ray::{Hit, PrimRef, Ray};
 use crate::stats::{RayCounts, RayKind};
@@ -20,15 +20,6 @@ fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
         lanes &= lanes.wrapping_sub(1);
         (lane < BLOCK).then_some(lane)
     })
-}
-
-/// Rays on their way through Embree.
-#[derive(Clone, Copy)]
-struct Cast<'c> {
-    /// As Embree sees them, moved or turned.
-    rays: &'c [Ray],
-    /// As they were asked for: what decides on holes. Without any in the scene they may be the same.
-    asked: &'c [Ray],
 }
 
 /// A block after Embree.
@@ -65,12 +56,12 @@ impl EmbreeIntersector<'_> {
             cast = &moved[..rays.len()];
         }
         let mut found = [NOTHING; BLOCK];
-        let mut hit = self.trace::<W>(Cast { rays: cast, asked: rays }, valid, &mut found);
+        let mut hit = self.trace::<W>(CastRays::moved(cast, rays), valid, &mut found);
         if self.retries() {
             let missed = self.missed_near(cast, valid & !hit);
             let mut doubtful = missed | self.doubtful_lanes(cast, hit, &found);
             for turn in TURNS {
-                let cast = Cast { rays: cast, asked: rays };
+                let cast = CastRays::moved(cast, rays);
                 let nearer = self.try_again::<W>(cast, &shifts, doubtful, turn, &mut found, counts);
                 hit |= nearer;
                 doubtful &= !nearer;
@@ -83,15 +74,20 @@ impl EmbreeIntersector<'_> {
     }
 
     /// Sends the `valid` lanes through Embree in packets; returns those that hit.
-    fn trace<const W: usize>(&self, cast: Cast, valid: Lanes, found: &mut [PacketHit]) -> Lanes {
+    fn trace<const W: usize>(
+        &self,
+        cast: CastRays,
+        valid: Lanes,
+        found: &mut [PacketHit],
+    ) -> Lanes {
         let mut packet = Packet::<W>::new();
         let mut hit = 0;
-        for (k, (rays, asked)) in cast.rays.chunks(W).zip(cast.asked.chunks(W)).enumerate() {
-            let mask = fill(&mut packet, rays, valid >> (k * W));
-            let flags = QueryFlags { coherent: true, exclude: false, passed: &[], asked };
-            self.committed.intersect(&mask, &mut packet, rays, flags);
-            self.trace_past_own(Cast { rays, asked }, &mut packet);
-            for lane in 0..rays.len() {
+        for (k, cast) in cast.chunks(W).enumerate() {
+            let mask = fill(&mut packet, cast.rays(), valid >> (k * W));
+            let flags = QueryFlags { coherent: true, exclude: false, passed: &[] };
+            self.committed.intersect(&mask, &mut packet, cast, flags);
+            self.trace_past_own(cast, &mut packet);
+            for lane in 0..cast.rays().len() {
                 if let Some(candidate) = packet.hit(lane) {
                     found[k * W + lane] = candidate;
                     hit |= 1 << (k * W + lane);
@@ -103,10 +99,9 @@ impl EmbreeIntersector<'_> {
 
     /// Traces those rays again that met the triangle which they leave. Few do, since they start off
     /// it, and a filter on every ray's candidates costs more.
-    fn trace_past_own<const W: usize>(&self, cast: Cast, packet: &mut Packet<W>) {
-        let Cast { rays, asked } = cast;
+    fn trace_past_own<const W: usize>(&self, cast: CastRays, packet: &mut Packet<W>) {
         let mut mask = [0; W];
-        for (lane, ray) in rays.iter().enumerate() {
+        for (lane, ray) in cast.rays().iter().enumerate() {
             let is_triangle = (ray.exclude.geom_id as usize) < self.meshes.len();
             if is_triangle && packet.hit(lane).is_some_and(|hit| hit.prim == ray.exclude) {
                 packet.set(lane, ray);
@@ -114,8 +109,8 @@ impl EmbreeIntersector<'_> {
             }
         }
         if mask != [0; W] {
-            let flags = QueryFlags { coherent: false, exclude: true, passed: &[], asked };
-            self.committed.intersect(&mask, packet, rays, flags);
+            let flags = QueryFlags { coherent: false, exclude: true, passed: &[] };
+            self.committed.intersect(&mask, packet, cast, flags);
         }
     }
 
@@ -154,14 +149,14 @@ impl EmbreeIntersector<'_> {
     /// those that hit.
     fn try_again<const W: usize>(
         &self,
-        cast: Cast,
+        cast: CastRays,
         shifts: &[f64; BLOCK],
         doubtful: Lanes,
         turn: Turn,
         found: &mut [PacketHit; BLOCK],
         counts: &mut RayCounts,
     ) -> Lanes {
-        let rays = cast.rays;
+        let rays = cast.rays();
         counts[RayKind::Retry] += u64::from(doubtful.count_ones());
         let mut hit = 0;
         let mut left = doubtful;
@@ -174,14 +169,14 @@ impl EmbreeIntersector<'_> {
             for (k, lane) in each(left).take(PART).enumerate() {
                 (lanes[k], again[k]) = (lane, self.nudged(&rays[lane], shifts[lane], turn));
                 if let Some(asked) = &mut asked {
-                    asked[k] = cast.asked[lane];
+                    asked[k] = cast.asked()[lane];
                 }
                 left &= !(1 << lane);
                 tried = k + 1;
             }
             let mut found_again = [NOTHING; PART];
-            let asked = &asked.as_ref().unwrap_or(&again)[..tried];
-            let turned = Cast { rays: &again[..tried], asked };
+            // Without holes in the scene nobody looks at what was asked for.
+            let turned = CastRays::moved(&again[..tried], asked.as_ref().unwrap_or(&again));
             let hit_again = self.trace::<W>(turned, Lanes::MAX, &mut found_again);
             for (k, lane) in lanes[..tried].iter().enumerate() {
                 let is_hit = hit_again >> k & 1 == 1;
@@ -217,8 +212,8 @@ impl EmbreeIntersector<'_> {
             counts[RayKind::Invalid] += rays.len() as u64 - u64::from(valid.count_ones());
             let mask = fill(&mut packet, rays, valid);
             let exclude = rays.iter().any(|ray| ray.exclude != PrimRef::NONE);
-            let flags = QueryFlags { coherent: false, exclude, passed: &[], asked: rays };
-            self.committed.occluded(&mask, &mut packet, rays, flags);
+            let flags = QueryFlags { coherent: false, exclude, passed: &[] };
+            self.committed.occluded(&mask, &mut packet, CastRays::as_asked(rays), flags);
             for (lane, out) in occluded.iter_mut().enumerate() {
                 *out = mask[lane] != 0 && packet.is_occluded(lane);
             }

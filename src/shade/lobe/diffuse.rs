@@ -17,19 +17,23 @@ pub(in crate::shade) fn is_diffuse(material: &Material) -> bool {
 pub(in crate::shade) fn albedo(
     scene: &Scene,
     material: &Material,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
 ) -> Rgb {
     if !(material.texture.is_some() | material.vertex_colours) {
         return material.diffuse;
     }
-    painted(scene, material, (si, wo, cone))
+    painted(scene, material, si, wo, cone)
 }
 
 /// [`albedo`] where it differs from place to place.
 fn painted(
     scene: &Scene,
     material: &Material,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
 ) -> Rgb {
     let mut albedo = material.diffuse;
     if let Some(map) = &material.texture {

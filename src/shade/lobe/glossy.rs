@@ -81,7 +81,9 @@ impl Glossy {
 pub(super) fn roughness(
     scene: &Scene,
     material: &Material,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
 ) -> f64 {
     let Some(map) = &material.roughness_map else { return material.roughness };
     let footprint = cone.footprint(scene, si, wo);

@@ -137,6 +137,36 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
     assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");
 }
 
+#[test]
+fn one_number_scales_both_axes() {
+    let scaled = |scale: &str| {
+        let text = format!(
+            "[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             alpha = {{ file = 'leaf.pgm', scale = {scale} }}\nmirror = 0.5\ndiffuse = 0.5\n\
+             roughness = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             normal_map = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n"
+        );
+        let material = cut(&text).expect("a scene").world.materials[0].clone();
+        let normals = material.normal_map.map(|map| map.image);
+        let maps = [material.texture, material.alpha, material.roughness_map, normals];
+        let [first, others @ ..] = maps.map(|map| map.expect("an image").transform);
+        assert_eq!(others, [first; 3]);
+        first
+    };
+    assert_eq!(scaled("2"), scaled("[2, 2]"));
+    assert_eq!(scaled("-0.5"), scaled("[-0.5, -0.5]"));
+    let refused = |scale: &str| {
+        let text = format!("[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n");
+        let Err(Error::Input(fault)) = cut(&text) else { panic!("{scale}") };
+        assert_eq!(fault.line, Some(3));
+        fault.message
+    };
+    assert!(refused("0").contains("found 0"));
+    assert!(refused("[1, 2, 3]").contains("array of 2 values"));
+    assert!(refused("'x'").contains("a number or an array of 2 numbers"));
+}
+
 /// Loads a scene file with `text` beside a mask of two texels, `leaf.pgm`, and a triangle without coordinates.
 fn cut(text: &str) -> Result<Loaded> {
     let folder = tempfile::tempdir().expect("a folder");
@@ -145,6 +175,32 @@ fn cut(text: &str) -> Result<Loaded> {
     std::fs::write(at("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").expect("written");
     std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
     load(&at("scene.toml"), &LoadOptions::default())
+}
+
+#[test]
+fn of_several_images_that_are_not_to_be_had_the_first_in_the_file_is_named() {
+    for (text, name) in [
+        ("[material.z]\nalpha = 'no.png'\n[material.a]\ntexture = 'none.png'\n", "no.png"),
+        ("[material.z]\ntexture = 'none.png'\n[material.a]\nalpha = 'no.png'\n", "none.png"),
+        ("[material.a]\nalpha = 'no.png'\ntexture = 'none.png'\n", "no.png"),
+        ("[material.a]\nalpha = 'scene.toml'\ntexture = 'none.png'\n", "scene.toml"),
+        ("[material.z]\nroughness = 'no.png'\nmirror = 1\ntexture = 'none.png'\n", "no.png"),
+        ("[material.z]\nnormal_map = 'no.png'\n[material.a]\ntexture = 'none.png'\n", "no.png"),
+    ] {
+        let Err(Error::Input(fault)) = cut(text) else { panic!("{text}") };
+        // The first line is the sky's.
+        assert_eq!(fault.line, Some(3), "{text}: {fault}");
+        assert!(fault.message.contains(name), "{text}: {fault}");
+    }
+}
+
+#[test]
+fn one_image_may_be_texture_and_mask() {
+    let loaded = cut("[material.leaf]\ntexture = 'leaf.pgm'\nalpha = 'leaf.pgm'\n\
+         [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n");
+    let loaded = loaded.expect("a scene");
+    assert_eq!((loaded.world.textures.len(), loaded.world.masks.len()), (1, 1));
+    assert_eq!(loaded.files.len(), 2);
 }
 
 const LEAF: &str = "[material.leaf]\ndiffuse = 0.5\nalpha = 'leaf.pgm'\n";
@@ -239,11 +295,21 @@ fn a_roughness_is_a_number_or_a_channel_of_an_image_as_it_stands() {
 #[test]
 fn one_file_as_colour_and_as_data_is_two_images() {
     let text = "diffuse = 0.5\ntexture = 'rgba.png'\nmirror = 0.5\nroughness = 'rgba.png'\n\
-                [material.n]\nmirror = 0.5\nroughness = { file = 'rgba.png', scale = [2, 2] }\n";
+                [material.n]\nmirror = 0.5\nroughness = { file = 'rgba.png', scale = 2 }\n";
     let loaded = data(text).expect("a scene");
     let [colour, rough] = &loaded.world.textures[..] else { panic!("two images") };
     assert!(colour.levels()[0].texel(0, 0).y < 0.22 && rough.levels()[0].texel(0, 0).y > 0.5);
     assert_eq!(loaded.files.len(), 2, "the scene file and the image");
+}
+
+#[test]
+fn an_image_that_two_materials_misuse_is_doubted_once_where_the_file_first_names_it() {
+    let text = "normal_map = 'rgba.png'\n[material.a]\nnormal_map = 'rgba.png'\n";
+    let loaded = data(text).expect("a scene");
+    let doubts =
+        loaded.warnings.iter().filter(|w| w.message.contains("not look like a normal map"));
+    // Lines 1 to 6 are the sky's, the sphere's and the material's name.
+    assert_eq!(doubts.map(|doubt| doubt.line).collect::<Vec<_>>(), [Some(7)]);
 }
 
 #[test]
