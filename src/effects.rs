@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Glass, MeanLights, Scene, Settings, ShotLens};
+use crate::scene::{Glass, Material, MeanLights, Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +58,9 @@ impl EffectPlan {
         let normals = format!("{smooth} of {} meshes have shading normals", scene.meshes.len());
         reasons.extend([
             cut_outs(scene, &used),
+            vertex_colours(scene, &used),
+            roughness_maps(&used, settings),
+            normal_maps(&used),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
             EffectReason { effect: "depth of field", runs: blurs, why: lens },
             light_selection(scene, settings),
@@ -189,6 +192,36 @@ fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
     EffectReason { effect: "alpha cut-outs", runs: cut > 0, why }
 }
 
+/// Whether the roughness of mirrors is looked up in images.
+fn roughness_maps(used: &UsedMaterials, settings: &Settings) -> EffectReason {
+    let why =
+        format!("{} in use", counted(used.roughness_maps, "roughness-mapped mirror material"));
+    let runs = used.roughness_maps > 0 && settings.bounces > 0;
+    EffectReason { effect: "roughness maps", runs, why }
+}
+
+/// Whether images tilt normals.
+fn normal_maps(used: &UsedMaterials) -> EffectReason {
+    let why = format!("{} in use", counted(used.normal_maps, "normal-mapped material"));
+    EffectReason { effect: "normal maps", runs: used.normal_maps > 0, why }
+}
+
+fn has_roughness_map(material: &Material) -> bool {
+    let is_rough = is_something(material.mirror) && material.roughness != 0.0;
+    is_rough && material.roughness_map.is_some()
+}
+
+/// Whether surfaces show colours of vertices, and how many.
+fn vertex_colours(scene: &Scene, used: &UsedMaterials) -> EffectReason {
+    let meshes = scene.meshes.iter().filter(|mesh| mesh.colours.is_some()).count();
+    let materials = counted(used.vertex_colours, "material");
+    let why = match used.vertex_colours {
+        0 => format!("{materials} that shows them in use"),
+        _ => format!("{materials} in use, {meshes} of {} meshes have them", scene.meshes.len()),
+    };
+    EffectReason { effect: "vertex colours", runs: meshes > 0, why }
+}
+
 /// Whether points look at the lights that matter there only, and how many these are.
 fn light_selection(scene: &Scene, settings: &Settings) -> EffectReason {
     let lights = counted(scene.lights.len(), "light");
@@ -220,7 +253,7 @@ fn is_something(colour: Rgb) -> bool {
 
 /// How many meshes have a textured material but no texture coordinates, where any have.
 fn bare(scene: &Scene) -> String {
-    let is_textured = |id: u32| scene.materials[id as usize].texture.is_some();
+    let is_textured = |id: u32| scene.materials[id as usize].has_image();
     let bare = scene.meshes.iter().filter(|m| m.uvs.is_none() && is_textured(m.surface.material));
     match bare.count() {
         0 => String::new(),
@@ -240,7 +273,11 @@ struct UsedMaterials {
     glass: usize,
     ranked: usize,
     absorbing: usize,
+    /// With any image but a mask.
     textured: usize,
+    roughness_maps: usize,
+    normal_maps: usize,
+    vertex_colours: usize,
     cut_out: usize,
 }
 
@@ -262,7 +299,10 @@ impl UsedMaterials {
                 |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
-            counts.textured += usize::from(material.texture.is_some());
+            counts.textured += usize::from(material.has_image());
+            counts.normal_maps += usize::from(material.normal_map.is_some());
+            counts.roughness_maps += usize::from(has_roughness_map(material));
+            counts.vertex_colours += usize::from(material.vertex_colours);
             counts.cut_out += usize::from(material.alpha.is_some());
         }
         counts

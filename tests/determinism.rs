@@ -13,7 +13,7 @@ use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
     BuildQuality, DirectionalLight, DiskLight, Filter, Glass, Lens, Light, Material, QuadLight,
-    Rect, Sky, SphereLight, SpotLight, ThinLens, World, WorldMesh, WorldSphere,
+    Rect, Sky, SphereLight, SpotLight, ThinLens, VertexColours, World, WorldMesh, WorldSphere,
 };
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
@@ -21,7 +21,8 @@ use tweenray::stats::RayKind;
 /// A bumpy floor of 3,200 triangles with spheres on it; `extras` adds lights and materials.
 fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
     let mut world = World::default();
-    world.materials.push(Material::diffuse("floor", Rgb::new(0.6, 0.5, 0.4)));
+    let floor = Material::diffuse("floor", Rgb::new(0.6, 0.5, 0.4));
+    world.materials.push(Material { vertex_colours: true, ..floor });
     world.meshes.push(bumpy_floor(40));
     let mut ball = |material: Material, x: f64| {
         world.materials.push(material);
@@ -92,7 +93,11 @@ fn bumpy_floor(n: u32) -> WorldMesh {
             triangles.extend([[k, k + n + 1, k + 1], [k + 1, k + n + 1, k + n + 2]]);
         }
     }
-    common::mesh(positions, triangles, 0)
+    let share = |i: usize, period: usize| (i % period) as f32 / period as f32;
+    let colours: Vec<_> =
+        (0..positions.len()).map(|i| [share(i, 7), share(i, 11), share(i, 3)]).collect();
+    let colours = Some(VertexColours::from_encoded(&colours));
+    WorldMesh { colours, ..common::mesh(positions, triangles, 0) }
 }
 
 fn busy_job(width: u32, height: u32) -> Job {

@@ -6,10 +6,10 @@ mod common;
 
 use common::{job, pose, quad, render};
 use tweenray::film::Film;
-use tweenray::math::{DMat3, DVec3, Rgb};
+use tweenray::math::{DMat3, DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, DiskLight, Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky,
-    SphereLight, SpotLight, World, WorldSphere,
+    SphereLight, SpotLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -244,4 +244,88 @@ fn a_spot_with_a_radius_is_a_sphere_within_its_cone() {
         mean(&render(&job).0)
     });
     assert!((spot / sphere - 1.0).abs() < 0.01, "{spot} {sphere}");
+}
+
+/// A plate whose roughness lies in an image of `texels`, once over it.
+fn mapped_plate(image: Texture) -> World {
+    let map = Some(TextureMap::of(0));
+    let mut world = plate(Material { roughness_map: map, ..rough(Rgb::splat(0.9), 1.0) });
+    let uv = |p: &DVec3| Vec2::new((p.x / 8.0 + 0.5) as f32, (0.5 - p.z / 8.0) as f32);
+    let values = world.meshes[0].positions.iter().map(uv).collect();
+    let mesh = world.meshes.remove(0);
+    world.meshes.push(WorldMesh { uvs: Some(Corners { values, corners: None }), ..mesh });
+    world.textures.push(image);
+    world
+}
+
+/// An image that is the same all over gives the picture of the number, at 8 and at 16 bits; one with two halves gives each half's
+/// away from the border.
+#[test]
+fn a_roughness_map_is_the_roughness_that_it_holds() {
+    // Pixels with the place that their middles show.
+    let seen = |mut world: World, kind: IntersectorKind| {
+        world.lights.push(lamp());
+        let mut job = job(world, pose((-0.8, 0.9, 0.9), (0.0, 0.0, 0.0)), 32, 24);
+        (job.settings.spp, job.settings.shadow_samples) = (4, 4);
+        job.settings.intersector = kind;
+        let film = render(&job).0;
+        let place = |x, y| common::on_plane_y(&job, x, y, 0.0).x;
+        common::pixels(&film).map(|(x, y, rgb)| (place(x, y), rgb.x)).collect::<Vec<_>>()
+    };
+    // Interpolation between equal texels rounds.
+    let is_near = |a: f32, b: f32| (a - b).abs() < 1e-4 * b + 1e-6;
+    for kind in [IntersectorKind::Embree, IntersectorKind::Oracle] {
+        let number = |code: u8| {
+            let roughness = f64::from(f32::from(code) / 255.0);
+            seen(plate(rough(Rgb::splat(0.9), roughness)), kind)
+        };
+        let row = |texels: Vec<u8>| Texture::from_data8("t", [texels.len() as u32, 1], texels);
+        let sixteen = Texture::from_data16("t", [2, 2], vec![102 * 257; 4]);
+        for image in [row(vec![102; 7]), sixteen] {
+            let found = seen(mapped_plate(image), kind);
+            assert!(found.iter().zip(number(102)).all(|(a, b)| is_near(a.1, b.1)), "{kind:?}");
+        }
+        // 40 texels of each roughness; the border is at x = 0.
+        let halves = seen(mapped_plate(row([vec![51; 40], vec![204; 40]].concat())), kind);
+        let (left, right) = (number(51), number(204));
+        let mut count = [0; 2];
+        for ((x, found), (left, right)) in halves.into_iter().zip(left.into_iter().zip(right)) {
+            if (0.3..3.5).contains(&x.abs()) {
+                let expected = if x < 0.0 { left.1 } else { right.1 };
+                assert!(is_near(found, expected), "{kind:?} at {x}: {found} {expected}");
+                count[usize::from(x > 0.0)] += 1;
+            }
+        }
+        assert!(count[0] > 100 && count[1] > 50, "{count:?}");
+    }
+}
+
+/// From perfect to matte side by side, a furnace shows nothing.
+#[test]
+fn a_roughness_map_in_a_furnace_is_one() {
+    let texels = (0..=255u8).collect();
+    let mut world = mapped_plate(Texture::from_data8("t", [16, 16], texels));
+    world.materials[0].mirror = Rgb::ONE;
+    world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+    let mut job = job(world, pose((-0.8, 0.9, 0.9), (0.0, 0.0, 0.0)), 32, 24);
+    job.settings.spp = 256;
+    let film = render(&job).0;
+    assert!((mean(&film) - 1.0).abs() < 0.002, "{}", mean(&film));
+    assert_eq!(film.bad.total(), 0);
+}
+
+/// Far away a pixel covers many texels, and has their mean roughness.
+#[test]
+fn a_roughness_map_is_filtered_by_what_a_ray_covers() {
+    let checker = (0..256 * 256).map(|i| if (i % 256 + i / 256) % 2 == 0 { 51 } else { 153 });
+    let image = Texture::from_data8("t", [256, 256], checker.collect());
+    let film = |mut world: World| {
+        world.lights.push(lamp());
+        let mut job = job(world, pose((-6.0, 12.0, 6.0), (0.0, 0.0, 0.0)), 16, 12);
+        (job.settings.spp, job.settings.shadow_samples) = (64, 16);
+        mean(&render(&job).0)
+    };
+    let mapped = film(mapped_plate(image));
+    let number = film(plate(rough(Rgb::splat(0.9), 0.4)));
+    assert!((mapped / number - 1.0).abs() < 1e-3, "{mapped} {number}");
 }

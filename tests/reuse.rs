@@ -12,8 +12,11 @@ mod moves;
 
 use moves::{Set, psnr_of};
 use tweenray::film::Film;
-use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{CameraPath, Easing, KeyPose, Policy, Pose, ReuseSettings, Settings};
+use tweenray::math::{DVec3, Rgb, Vec2};
+use tweenray::scene::{
+    CameraPath, Corners, Easing, KeyPose, Material, NormalMap, Policy, Pose, ReuseSettings,
+    Settings, Texture, TextureMap, World,
+};
 use tweenray::sequence::Made;
 use tweenray::stats::ReuseCounts;
 
@@ -50,8 +53,17 @@ fn total(made: &[Made]) -> ReuseCounts {
 
 /// Every inferred frame has at least the PSNR that traces of it have, but for [`WORSE`], or shows no
 /// error, and at least `direct` and `specular` of the points seen directly and in mirror or glass are inferred.
-fn is_no_worse_than_traced(scene: &str, [direct, specular]: [f64; 2]) {
-    let set = Set::load(scene, |_| ());
+fn is_no_worse_than_traced(scene: &str, shares: [f64; 2]) {
+    is_no_worse_than_traced_after(scene, |_| (), shares);
+}
+
+/// The same of a scene after a `change`.
+fn is_no_worse_than_traced_after(
+    scene: &str,
+    change: impl FnOnce(&mut World),
+    [direct, specular]: [f64; 2],
+) {
+    let set = Set::load(scene, change);
     let stage = set.stage(2);
     let shot = set.shot(FRAMES);
     let settings = with_segment(set.settings(SIZE, 1, 16));
@@ -103,6 +115,46 @@ fn demo_is_no_worse_than_traced() {
 #[test]
 fn street_at_night_is_no_worse_than_traced() {
     is_no_worse_than_traced("street_at_night", [0.3, 0.0]);
+}
+
+/// The floor of `world` with coordinates, made of `material`.
+fn lay_floor(world: &mut World, material: Material) {
+    let id = world.add_material(material);
+    let floor = world.meshes.iter_mut().find(|mesh| mesh.name == "floor").expect("a floor");
+    let values = floor.positions.iter().map(|p| Vec2::new(p.x as f32, -p.z as f32)).collect();
+    (floor.material, floor.uvs) = (id, Some(Corners { values, corners: None }));
+}
+
+/// A satin floor whose gloss is traced in every frame, while its diffuse part is inferred.
+#[test]
+fn a_roughness_map_is_no_worse_than_traced() {
+    let change = |world: &mut World| {
+        let texels = (0..64).map(|i| [40, 160][(i / 4 + i / 32) % 2]).collect();
+        let image = world.textures.len() as u32;
+        world.textures.push(Texture::from_data8("tiles", [8, 8], texels));
+        let (mirror, roughness_map) = (Rgb::splat(0.3), Some(TextureMap::of(image)));
+        let satin = Material::diffuse("satin", Rgb::splat(0.5));
+        lay_floor(world, Material { mirror, roughness: 1.0, roughness_map, ..satin });
+    };
+    is_no_worse_than_traced_after("cornell", change, [0.75, 0.05]);
+}
+
+/// The shadowing of a floor of bumps is that of the plain floor; what arrives on the bumps is computed in each frame.
+#[test]
+fn a_normal_map_is_no_worse_than_traced() {
+    let change = |world: &mut World| {
+        let texel = |i: u32| {
+            let tilt = |k: u32| if k % 8 < 4 { 60 } else { 195 };
+            [tilt(i % 16), tilt(i / 16), 210]
+        };
+        let image = world.textures.len() as u32;
+        let texels = (0..256).map(texel).collect();
+        world.textures.push(Texture::from_vectors8("bumps", [16, 16], texels));
+        let normal_map = Some(NormalMap { image: TextureMap::of(image), strength: 1.0 });
+        let bumpy = Material::diffuse("bumpy", Rgb::splat(0.7));
+        lay_floor(world, Material { normal_map, ..bumpy });
+    };
+    is_no_worse_than_traced_after("cornell", change, [0.75, 0.05]);
 }
 
 #[test]

@@ -211,7 +211,8 @@ fn mesh_bytes(mesh: &Mesh) -> u64 {
         + 3 * normals.map_or(0, |n| n.values.len())
         + 2 * uvs.map_or(0, |uv| uv.values.len())
         + 3 * corner_lists;
-    4 * words as u64
+    let colours = mesh.colours.as_ref().map_or(0, |colours| colours.bytes().len());
+    4 * words as u64 + colours as u64
 }
 
 impl Inspection {

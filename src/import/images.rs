@@ -1,60 +1,60 @@
 //! Images of materials: each file is decoded once, whatever it serves as, and many are on all threads.
 
-use super::{alpha, texture};
-use crate::error::Error;
+use super::alpha;
+use super::texture::{self, ImageChannel};
+use crate::error::{Error, Result};
 use crate::scene::{AlphaMask, Texture, World};
+use image::DynamicImage;
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What an image serves as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum ImageUse {
-    /// Colours.
-    Texture,
+    /// Reflectances.
+    Colour,
+    /// A number from 0 to 1 in one channel.
+    Data(ImageChannel),
+    /// Normals in tangent space: red, green and blue.
+    Normals,
     /// Cut-outs.
     Mask,
 }
 
-/// The images of one model or scene file, by path. An image enters the world when a material first asks for it, so the
-/// order in which materials ask decides on indices and on which error comes first, not the order of decoding.
+/// The images of one model or scene file, by path and use. An image enters the world when a material first asks for it, so
+/// the order in which materials ask decides on indices and on which error comes first, not the order of decoding.
 #[derive(Default)]
-pub(super) struct Images {
-    textures: HashMap<PathBuf, Image<Texture>>,
-    masks: HashMap<PathBuf, Image<AlphaMask>>,
-}
+pub(super) struct Images(HashMap<(PathBuf, ImageUse), Image>);
 
 /// An image in one of its uses.
-enum Image<T> {
+enum Image {
     /// Decoded; no material has asked for it yet.
-    Decoded(T),
-    /// Number so many of the world's.
+    Decoded(Texels),
+    /// Number so many of the world's textures or masks.
     Placed(u32),
     /// Not to be had.
     Refused(Arc<Error>),
 }
 
+/// What the world holds of an image.
+enum Texels {
+    Texture(Texture),
+    Mask(AlphaMask),
+}
+
 impl Images {
     /// Decodes what is `wanted` and not yet known, on all threads.
     pub fn read(&mut self, wanted: impl IntoIterator<Item = (PathBuf, ImageUse)>) {
-        let mut uses = BTreeMap::<PathBuf, Uses>::new();
-        for (path, what) in wanted {
-            let uses = uses.entry(path).or_default();
-            match what {
-                ImageUse::Texture => uses.texture = true,
-                ImageUse::Mask => uses.mask = true,
+        let mut files = BTreeMap::<PathBuf, BTreeSet<ImageUse>>::new();
+        for key in wanted {
+            if !self.0.contains_key(&key) {
+                files.entry(key.0).or_default().insert(key.1);
             }
         }
-        for (path, uses) in &mut uses {
-            uses.texture &= !self.textures.contains_key(path);
-            uses.mask &= !self.masks.contains_key(path);
-        }
-        let decoded: Vec<_> = uses.into_par_iter().map(|(path, uses)| uses.decode(path)).collect();
-        for Decoded { path, texture, mask } in decoded {
-            self.textures.extend(texture.map(|texture| (path.clone(), texture)));
-            self.masks.extend(mask.map(|mask| (path, mask)));
-        }
+        let decoded: Vec<_> = files.into_par_iter().flat_map(decode).collect();
+        self.0.extend(decoded);
     }
 
     /// The image's number among the textures or masks of `world`, which takes it when it is first asked for, as `files`
@@ -65,94 +65,103 @@ impl Images {
         what: ImageUse,
         world: &mut World,
         files: &mut Vec<PathBuf>,
-    ) -> Result<u32, Arc<Error>> {
-        self.read([(path.to_path_buf(), what)]);
-        match what {
-            ImageUse::Texture => {
-                place(self.textures.get_mut(path), path, &mut world.textures, files)
-            }
-            ImageUse::Mask => place(self.masks.get_mut(path), path, &mut world.masks, files),
+    ) -> std::result::Result<u32, Arc<Error>> {
+        let key = (path.to_path_buf(), what);
+        self.read([key.clone()]);
+        let number = match self.0.remove(&key) {
+            Some(Image::Decoded(texels)) => Ok(texels.enter(world)),
+            Some(Image::Placed(number)) => Ok(number),
+            Some(Image::Refused(error)) => Err(error),
+            None => Err(Arc::new(Error::input(path, "the image was not read"))),
+        };
+        if number.is_ok() && !files.iter().any(|file| file == path) {
+            files.push(path.to_path_buf());
         }
+        self.0.insert(key, number.clone().map_or_else(Image::Refused, Image::Placed));
+        number
     }
 
     /// Why the image is not to be had, if it was read and is not.
     pub fn refusal(&self, path: &Path, what: ImageUse) -> Option<&Error> {
-        match what {
-            ImageUse::Texture => self.textures.get(path).and_then(Image::refusal),
-            ImageUse::Mask => self.masks.get(path).and_then(Image::refusal),
+        match self.0.get(&(path.to_path_buf(), what)) {
+            Some(Image::Refused(error)) => Some(error),
+            Some(Image::Decoded(_) | Image::Placed(_)) | None => None,
+        }
+    }
+
+    /// Whether the image, which may be one of `world` by now, looks like a normal map; `None` of a mask, of data and of
+    /// what is not to be had. Decoded now where it has not been.
+    pub fn looks_like_normals(
+        &mut self,
+        path: &Path,
+        what: ImageUse,
+        world: &World,
+    ) -> Option<bool> {
+        if !matches!(what, ImageUse::Colour | ImageUse::Normals) {
+            return None;
+        }
+        let key = (path.to_path_buf(), what);
+        self.read([key.clone()]);
+        match self.0.get(&key)? {
+            Image::Decoded(Texels::Texture(texture)) => Some(texture.looks_like_normals()),
+            Image::Placed(number) => {
+                world.textures.get(*number as usize).map(Texture::looks_like_normals)
+            }
+            Image::Decoded(Texels::Mask(_)) | Image::Refused(_) => None,
+        }
+    }
+
+    /// Why the image may be meant for another use, if it may.
+    pub fn doubt(&mut self, path: &Path, what: ImageUse, world: &World) -> Option<&'static str> {
+        match (what, self.looks_like_normals(path, what, world)?) {
+            (ImageUse::Normals, false) => Some(
+                "this does not look like a normal map: few of its texels are unit vectors in tangent space",
+            ),
+            (ImageUse::Colour, true) => {
+                Some("this looks like a normal map, and is shown as a colour")
+            }
+            _ => None,
         }
     }
 }
 
-impl<T> Image<T> {
-    fn of(decoded: Result<T, Arc<Error>>) -> Self {
-        decoded.map_or_else(Self::Refused, Self::Decoded)
-    }
-
-    fn refusal(&self) -> Option<&Error> {
-        match self {
-            Self::Refused(error) => Some(error),
-            Self::Decoded(_) | Self::Placed(_) => None,
-        }
-    }
-}
-
-/// The number of an image in `list`, at the end of which it is put if it is not there yet.
-fn place<T>(
-    image: Option<&mut Image<T>>,
-    path: &Path,
-    list: &mut Vec<T>,
-    files: &mut Vec<PathBuf>,
-) -> Result<u32, Arc<Error>> {
-    let next = Image::Placed(list.len() as u32);
-    let Some(image) = image else {
-        return Err(Arc::new(Error::input(path, "the image was not read")));
-    };
-    match image {
-        Image::Placed(id) => return Ok(*id),
-        Image::Refused(error) => return Err(error.clone()),
-        Image::Decoded(_) => {}
-    }
-    if let Image::Decoded(decoded) = std::mem::replace(image, next) {
-        list.push(decoded);
-    }
-    if !files.iter().any(|file| file == path) {
-        files.push(path.to_path_buf());
-    }
-    Ok(list.len() as u32 - 1)
-}
-
-/// What one image serves as.
-#[derive(Debug, Clone, Copy, Default)]
-struct Uses {
-    texture: bool,
-    mask: bool,
-}
-
-struct Decoded {
-    path: PathBuf,
-    texture: Option<Image<Texture>>,
-    mask: Option<Image<AlphaMask>>,
-}
-
-impl Uses {
-    fn decode(self, path: PathBuf) -> Decoded {
-        if !(self.texture || self.mask) {
-            return Decoded { path, texture: None, mask: None };
-        }
-        let image = match texture::decode(&path) {
-            Ok(image) => image,
-            Err(error) => {
-                let error = Arc::new(error);
-                let texture = self.texture.then(|| Image::Refused(error.clone()));
-                let mask = self.mask.then_some(Image::Refused(error));
-                return Decoded { path, texture, mask };
+impl Texels {
+    /// Puts itself at the end of the world's textures or masks; its number there.
+    fn enter(self, world: &mut World) -> u32 {
+        let count = match self {
+            Self::Texture(texture) => {
+                world.textures.push(texture);
+                world.textures.len()
+            }
+            Self::Mask(mask) => {
+                world.masks.push(mask);
+                world.masks.len()
             }
         };
-        let mask = self.mask.then(|| alpha::mask_of(&path, &image));
-        let texture = self.texture.then(|| texture::texture_of(&path, image));
-        let texture = texture.map(|texture| Image::of(texture.map_err(Arc::new)));
-        Decoded { texture, mask: mask.map(|mask| Image::of(mask.map_err(Arc::new))), path }
+        count as u32 - 1
+    }
+}
+
+/// The image of a file in each of its uses, on all threads.
+fn decode((path, uses): (PathBuf, BTreeSet<ImageUse>)) -> Vec<((PathBuf, ImageUse), Image)> {
+    let decoded = texture::decode(&path).map_err(Arc::new);
+    let image = |what: ImageUse| match &decoded {
+        Ok(image) => what.texels(&path, image).map_err(Arc::new),
+        Err(error) => Err(error.clone()),
+    };
+    let of = |what| ((path.clone(), what), image(what).map_or_else(Image::Refused, Image::Decoded));
+    uses.into_par_iter().map(of).collect()
+}
+
+impl ImageUse {
+    /// What the world holds of `image` in this use.
+    fn texels(self, path: &Path, image: &DynamicImage) -> Result<Texels> {
+        match self {
+            Self::Colour => texture::colours(path, image).map(Texels::Texture),
+            Self::Data(channel) => texture::data(path, image, channel).map(Texels::Texture),
+            Self::Normals => texture::normals(path, image).map(Texels::Texture),
+            Self::Mask => alpha::mask_of(path, image).map(Texels::Mask),
+        }
     }
 }
 
@@ -160,24 +169,27 @@ impl Uses {
 mod tests {
     use super::*;
 
+    const USES: [ImageUse; 4] =
+        [ImageUse::Mask, ImageUse::Colour, ImageUse::Data(ImageChannel::Red), ImageUse::Normals];
+
     #[test]
     fn an_image_is_decoded_once_for_all_that_it_serves_as() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("leaf.pgm");
         std::fs::write(&path, b"P5 2 1 255\n\x00\xff").expect("written");
         let mut images = Images::default();
-        images.read([ImageUse::Mask, ImageUse::Texture].map(|what| (path.clone(), what)));
+        images.read(USES.map(|what| (path.clone(), what)));
         // Nobody can read it again.
         std::fs::remove_file(&path).expect("removed");
         let (mut world, mut files) = (World::default(), Vec::new());
         for _ in 0..2 {
-            assert_eq!(images.place(&path, ImageUse::Mask, &mut world, &mut files).ok(), Some(0));
-            assert_eq!(
-                images.place(&path, ImageUse::Texture, &mut world, &mut files).ok(),
-                Some(0)
-            );
+            for (what, number) in USES.into_iter().zip([0, 0, 1, 2]) {
+                assert_eq!(images.place(&path, what, &mut world, &mut files).ok(), Some(number));
+            }
         }
-        assert_eq!((world.textures.len(), world.masks.len()), (1, 1));
+        assert_eq!((world.textures.len(), world.masks.len()), (3, 1));
+        let kinds: Vec<_> = world.textures.iter().map(Texture::kind).collect();
+        assert_eq!(kinds, ["sRGB codes", "data of 8 bits", "vectors of 8 bits"]);
         assert_eq!(files, [path]);
     }
 
@@ -189,11 +201,47 @@ mod tests {
         let mut refusal = |what| {
             images.place(path, what, &mut world, &mut files).expect_err("no file").to_string()
         };
-        let first = refusal(ImageUse::Texture);
-        let others = [ImageUse::Texture, ImageUse::Mask].map(refusal);
+        let first = refusal(ImageUse::Colour);
         assert!(first.contains("such.png"), "{first}");
-        assert_eq!(others, [first.clone(), first]);
+        assert!(USES.into_iter().all(|what| refusal(what) == first));
+        assert_eq!(refusal(ImageUse::Colour), first);
         assert!(files.is_empty());
-        assert!(images.refusal(path, ImageUse::Mask).is_some());
+        assert!(USES.into_iter().all(|what| images.refusal(path, what).is_some()));
+    }
+
+    #[test]
+    fn a_use_that_an_image_is_not_fit_for_leaves_the_others() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("grey.pgm");
+        std::fs::write(&path, b"P5 1 1 255\n\x80").expect("written");
+        let alpha = ImageUse::Data(ImageChannel::Alpha);
+        let mut images = Images::default();
+        images.read(USES.into_iter().chain([alpha]).map(|what| (path.clone(), what)));
+        let refusal = images.refusal(&path, alpha).expect("no alpha").to_string();
+        assert!(refusal.contains("no alpha channel"), "{refusal}");
+        assert!(USES.into_iter().all(|what| images.refusal(&path, what).is_none()));
+    }
+
+    #[test]
+    fn an_image_is_doubted_in_the_uses_that_it_does_not_look_like_and_before_and_after_it_is_placed()
+     {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [grey, blue] = ["grey.ppm", "blue.ppm"].map(|name| folder.path().join(name));
+        std::fs::write(&grey, b"P6 1 1 255\n\x80\x80\x80").expect("written");
+        std::fs::write(&blue, b"P6 1 1 255\n\x80\x80\xff").expect("written");
+        let (mut world, mut files) = (World::default(), Vec::new());
+        let mut images = Images::default();
+        for path in [&grey, &blue] {
+            images.read(USES.map(|what| (path.clone(), what)));
+        }
+        for _ in 0..2 {
+            for (path, doubted) in [(&grey, ImageUse::Normals), (&blue, ImageUse::Colour)] {
+                for what in USES {
+                    let doubt = images.doubt(path, what, &world);
+                    assert_eq!(doubt.is_some(), what == doubted, "{what:?}: {doubt:?}");
+                    images.place(path, what, &mut world, &mut files).expect("placed");
+                }
+            }
+        }
     }
 }

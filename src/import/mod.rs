@@ -4,6 +4,7 @@
 //! indices are in range and numbers are finite.
 
 mod alpha;
+mod colours;
 mod convert;
 mod course;
 mod emission;
@@ -30,7 +31,7 @@ pub use alpha::load_mask;
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
 pub use mesh_file::load_model;
-pub use model::{DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
+pub use model::{COLOURED_MATERIAL, DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};

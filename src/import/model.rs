@@ -7,7 +7,9 @@ use std::path::PathBuf;
 
 /// Name of the material of faces that have none.
 pub const DEFAULT_MATERIAL: &str = "default";
-/// Diffuse reflectance of that material: a light, slightly warm grey, linear RGB.
+/// Name of the material of faces that have none but vertex colours.
+pub const COLOURED_MATERIAL: &str = "vertex colours";
+/// Diffuse reflectance of the default material: a light, slightly warm grey, linear RGB.
 pub const DEFAULT_ALBEDO: Rgb = Vec3::new(0.72, 0.70, 0.66);
 
 /// The content of a mesh file, in the file's own coordinates.
@@ -23,6 +25,17 @@ pub struct Model {
 }
 
 impl Model {
+    /// The material of faces without one that have vertex colours: these alone.
+    pub(super) fn coloured_material(&mut self) -> MaterialId {
+        let materials = &mut self.world.materials;
+        let at = materials.iter().position(|m| m.name == COLOURED_MATERIAL);
+        at.unwrap_or_else(|| {
+            let white = Material::diffuse(COLOURED_MATERIAL, Rgb::ONE);
+            materials.push(Material { vertex_colours: true, ..white });
+            materials.len() - 1
+        }) as MaterialId
+    }
+
     /// The material of faces without one.
     pub(super) fn default_material(&mut self) -> MaterialId {
         let materials = &mut self.world.materials;

@@ -1,6 +1,7 @@
 //! Image files to textures.
 //!
-//! Integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand. Alpha is dropped.
+//! Colours of integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand; their alpha is
+//! dropped. Data are one channel of an image, as it stands.
 
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{Rgb, srgb_decode};
@@ -12,20 +13,88 @@ use std::path::Path;
 /// The largest image that is decoded, bytes of its own pixel format.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
+/// A channel of an image. In a grey image red, green and blue are the grey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum ImageChannel {
+    /// Red.
+    Red,
+    /// Green: where glTF has the roughness.
+    Green,
+    /// Blue.
+    Blue,
+    /// Alpha.
+    Alpha,
+}
+
 /// Reads an image: bmp, exr, hdr, jpeg, png, pnm, or tga. The content decides, but for tga, which the name tells.
 ///
 /// Errors: `Error::Io`; `Error::Input` for what is no such image or larger than
 /// [`MAX_IMAGE_BYTES`], before memory is asked for.
 pub fn load_texture(path: &Path) -> Result<Texture> {
-    texture_of(path, decode(path)?)
+    colours(path, &decode(path)?)
 }
 
-/// The texture of a decoded image.
+/// The colours of a decoded image, in codes of 8 bits if it has no more.
 ///
 /// Errors: a pixel that is no light.
-pub(super) fn texture_of(path: &Path, image: DynamicImage) -> Result<Texture> {
-    let size = [image.width(), image.height()];
-    texture(path.display().to_string(), size, image).ok_or_else(|| bad_pixel(path))
+pub(super) fn colours(path: &Path, image: &DynamicImage) -> Result<Texture> {
+    let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
+    if let Some(codes) = image.as_flat_samples_u8() {
+        return Ok(Texture::from_srgb(name, size, rgb(codes.samples, image).collect()));
+    }
+    let texels: Vec<Rgb> = match image.as_flat_samples_u16() {
+        Some(codes) => {
+            let decode = |code: usize| srgb_decode(code as f64 / 65_535.0) as f32;
+            let table: Vec<f32> = (0..65_536).map(decode).collect();
+            let light = |codes: [u16; 3]| Rgb::from_array(codes.map(|c| table[c as usize]));
+            rgb(codes.samples, image).map(light).collect()
+        }
+        None => floats(image).into_iter().map(Rgb::from_array).collect(),
+    };
+    let is_light = texels.iter().all(|c| Fault::of(c.to_array()).is_none());
+    is_light.then(|| Texture::from_linear(name, size, texels)).ok_or_else(|| bad_pixel(path))
+}
+
+/// The normals of a decoded image: red, green and blue as they stand.
+///
+/// Errors: a value that is no share.
+pub(super) fn normals(path: &Path, image: &DynamicImage) -> Result<Texture> {
+    let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
+    if let Some(codes) = image.as_flat_samples_u8() {
+        return Ok(Texture::from_vectors8(name, size, rgb(codes.samples, image).collect()));
+    }
+    if let Some(codes) = image.as_flat_samples_u16() {
+        return Ok(Texture::from_vectors16(name, size, rgb(codes.samples, image).collect()));
+    }
+    let vector = |values: [f32; 3]| {
+        let [r, g, b] = values.map(share16);
+        Some([r?, g?, b?])
+    };
+    let texels: Option<Vec<_>> = floats(image).into_iter().map(vector).collect();
+    Ok(Texture::from_vectors16(name, size, texels.ok_or_else(|| bad_pixel(path))?))
+}
+
+/// One channel of a decoded image as it stands.
+///
+/// Errors: an alpha channel that the image does not have; a value that is no share.
+pub(super) fn data(path: &Path, image: &DynamicImage, channel: ImageChannel) -> Result<Texture> {
+    if channel == ImageChannel::Alpha && !image.color().has_alpha() {
+        return Err(Error::input(path, "the image has no alpha channel"));
+    }
+    let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
+    if let Some(codes) = image.as_flat_samples_u8() {
+        let texels = numbers(codes.samples, image, channel).collect();
+        return Ok(Texture::from_data8(name, size, texels));
+    }
+    if let Some(codes) = image.as_flat_samples_u16() {
+        let texels = numbers(codes.samples, image, channel).collect();
+        return Ok(Texture::from_data16(name, size, texels));
+    }
+    let texels: Option<Vec<u16>> = match image.as_flat_samples_f32() {
+        Some(values) => numbers(values.samples, image, channel).map(share16).collect(),
+        None => None,
+    };
+    Ok(Texture::from_data16(name, size, texels.ok_or_else(|| bad_pixel(path))?))
 }
 
 /// The error of an image with a value that is no amount of light.
@@ -66,28 +135,108 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
     decoder.decode().map_err(bad)
 }
 
-/// The image as it is kept: in codes of 8 bits if it has no more. `None` where a pixel is no light.
-fn texture(name: String, size: [u32; 2], image: DynamicImage) -> Option<Texture> {
-    match image {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            let image = image.into_rgb32f();
-            let texels: Vec<Rgb> = image.pixels().map(|p| Rgb::from_array(p.0)).collect();
-            let is_light = texels.iter().all(|c| Fault::of(c.to_array()).is_none());
-            is_light.then(|| Texture::from_linear(name, size, texels))
+/// Red, green and blue of the pixels of `image`, whose samples these are; of a grey image thrice the grey.
+fn rgb<T: Copy>(samples: &[T], image: &DynamicImage) -> impl ExactSizeIterator<Item = [T; 3]> {
+    let channels = usize::from(image.color().channel_count());
+    let [green, blue] = if channels < 3 { [0; 2] } else { [1, 2] };
+    samples.chunks_exact(channels).map(move |pixel| [pixel[0], pixel[green], pixel[blue]])
+}
+
+/// Red, green and blue of an image of floats.
+fn floats(image: &DynamicImage) -> Vec<[f32; 3]> {
+    match image.as_flat_samples_f32() {
+        Some(values) => rgb(values.samples, image).collect(),
+        None => image.to_rgb32f().pixels().map(|pixel| pixel.0).collect(),
+    }
+}
+
+/// One channel of the pixels of `image`, whose samples these are and which has the channel.
+fn numbers<T: Copy>(
+    samples: &[T],
+    image: &DynamicImage,
+    channel: ImageChannel,
+) -> impl Iterator<Item = T> {
+    let channels = usize::from(image.color().channel_count());
+    let at = match channel {
+        ImageChannel::Alpha => channels - 1,
+        _ if channels < 3 => 0,
+        colour => colour as usize,
+    };
+    samples.chunks_exact(channels).map(move |pixel| pixel[at])
+}
+
+/// A share as one of 65535, cut at 1; `None` of what is negative or not finite.
+fn share16(value: f32) -> Option<u16> {
+    let is_share = (0.0..=f32::MAX).contains(&value);
+    is_share.then(|| (value.min(1.0) * 65_535.0).round() as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_of_every_pixel_format_are_taken_as_their_conversions_are() {
+        let path = Path::new("t");
+        let source = image::Rgba32FImage::from_fn(3, 2, |x, y| {
+            image::Rgba([0.1, 0.3, 0.8, 0.5].map(|c: f32| c + 0.05 * (x + y) as f32))
+        });
+        let source = DynamicImage::from(source);
+        let formats: [DynamicImage; 10] = [
+            source.to_luma8().into(),
+            source.to_luma_alpha8().into(),
+            source.to_rgb8().into(),
+            source.to_rgba8().into(),
+            source.to_luma16().into(),
+            source.to_luma_alpha16().into(),
+            source.to_rgb16().into(),
+            source.to_rgba16().into(),
+            source.to_rgb32f().into(),
+            source.to_rgba32f().into(),
+        ];
+        for image in &formats {
+            let colour = image.color();
+            let expected = image.to_rgba32f();
+            // Codes of 8 bits, or floats rounded to 16.
+            let is_near = |a: f32, b: f32| (a - b).abs() < 1e-5;
+            let vectors = normals(path, image).expect("normals");
+            let shown = colours(path, image).expect("colours");
+            for (x, y, pixel) in expected.enumerate_pixels() {
+                let at = |texture: &Texture| {
+                    texture.levels()[0].texel(x as usize, y as usize).to_array()
+                };
+                for c in 0..3 {
+                    assert!(is_near(at(&vectors)[c], pixel.0[c]), "{colour:?}");
+                    let light = match image.as_flat_samples_f32() {
+                        Some(_) => pixel.0[c],
+                        None => srgb_decode(f64::from(pixel.0[c])) as f32,
+                    };
+                    assert!(is_near(at(&shown)[c], light), "{colour:?}");
+                }
+                use ImageChannel::{Alpha, Blue, Green, Red};
+                for channel in [Red, Green, Blue, Alpha] {
+                    match data(path, image, channel) {
+                        Ok(data) => {
+                            assert!(is_near(at(&data)[0], pixel.0[channel as usize]), "{colour:?}");
+                        }
+                        Err(_) => assert!(channel == Alpha && !colour.has_alpha(), "{colour:?}"),
+                    }
+                }
+            }
         }
-        DynamicImage::ImageLuma16(_)
-        | DynamicImage::ImageLumaA16(_)
-        | DynamicImage::ImageRgb16(_)
-        | DynamicImage::ImageRgba16(_) => {
-            let decode = |code: usize| srgb_decode(code as f64 / 65_535.0) as f32;
-            let table: Vec<f32> = (0..65_536).map(decode).collect();
-            let texel = |p: &image::Rgb<u16>| Rgb::from_array(p.0.map(|c| table[c as usize]));
-            let texels = image.into_rgb16().pixels().map(texel).collect();
-            Some(Texture::from_linear(name, size, texels))
-        }
-        _ => {
-            let texels = image.into_rgb8().pixels().map(|p| p.0).collect();
-            Some(Texture::from_srgb(name, size, texels))
-        }
+    }
+
+    #[test]
+    fn data_and_normals_of_floats_are_cut_at_one_and_refused_below_zero() {
+        let path = Path::new("t");
+        let of = |value: f32| {
+            let image = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([value; 3])).into();
+            let texel = |texture: Texture| texture.levels()[0].texel(0, 0).x;
+            let data = data(path, &image, ImageChannel::Red).map(texel).ok();
+            assert_eq!(normals(path, &image).map(texel).ok(), data);
+            data
+        };
+        assert_eq!([of(0.0), of(1.0), of(7.0)], [Some(0.0), Some(1.0), Some(1.0)]);
+        assert_eq!([of(-0.1), of(f32::NAN), of(f32::INFINITY)], [None; 3]);
     }
 }

@@ -1,66 +1,101 @@
-//! Meshes whose material has an image that nothing says how to lay on: of a texture they show one colour, and
-//! a mask cuts nothing out of them.
+//! Meshes that lack what their material shows: texture coordinates, so that of an image they show one colour and a mask
+//! cuts nothing out of them, or vertex colours.
 //!
 //! A warning, not an error: files whose materials name images for faces without coordinates are common,
 //! and the rest of the picture is right.
 
 use crate::scene::{Material, World, WorldMesh};
 
-/// A mesh without texture coordinates and an image of its material's.
+/// A mesh, and what its material shows and it lacks.
 pub(super) struct Untextured {
     mesh: String,
     material: String,
-    image: Image,
+    lacks: Lacking,
 }
 
-/// An image by the name of its file.
-enum Image {
+/// What a mesh lacks: coordinates for an image, by the name of its file, or colours.
+enum Lacking {
     Texture(String),
     Mask(String),
+    Roughness(String),
+    Normals(String),
+    Colours,
 }
 
-/// Images of meshes of `world` from number `first` on that lack texture coordinates.
+/// What meshes of `world` from number `first` on lack.
 pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextured> + '_ {
-    let bare = world.meshes[first..].iter().filter(|mesh| mesh.uvs.is_none());
-    bare.flat_map(|mesh| {
+    world.meshes[first..].iter().flat_map(|mesh| {
         let material = &world.materials[mesh.material as usize];
-        let texture = material.texture.map(|map| world.textures[map.image as usize].name.clone());
-        let mask = material.alpha.map(|map| world.masks[map.image as usize].name.clone());
-        let images = texture.map(Image::Texture).into_iter().chain(mask.map(Image::Mask));
-        images.map(|image| Untextured::new(mesh, material, image))
+        let is_bare = mesh.uvs.is_none();
+        let texture = material.texture.filter(|_| is_bare);
+        let texture = texture.map(|map| world.textures[map.image as usize].name.clone());
+        let mask = material.alpha.filter(|_| is_bare);
+        let mask = mask.map(|map| world.masks[map.image as usize].name.clone());
+        let roughness = material.roughness_map.filter(|_| is_bare);
+        let roughness = roughness.map(|map| world.textures[map.image as usize].name.clone());
+        let colours =
+            (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
+        let roughness = roughness.map(Lacking::Roughness);
+        let normals = material.normal_map.filter(|_| is_bare);
+        let normals = normals.map(|map| world.textures[map.image.image as usize].name.clone());
+        let normals = normals.map(Lacking::Normals);
+        let lacking =
+            [texture.map(Lacking::Texture), mask.map(Lacking::Mask), roughness, normals, colours];
+        lacking.into_iter().flatten().map(|lacks| Untextured::new(mesh, material, lacks))
     })
 }
 
 impl Untextured {
-    fn new(mesh: &WorldMesh, material: &Material, image: Image) -> Self {
-        Self { mesh: mesh.name.clone(), material: material.name.clone(), image }
+    fn new(mesh: &WorldMesh, material: &Material, lacks: Lacking) -> Self {
+        Self { mesh: mesh.name.clone(), material: material.name.clone(), lacks }
     }
 
     /// The text of the warning.
     pub fn message(&self) -> String {
-        let Self { mesh, material, image } = self;
-        match image {
-            Image::Texture(file) => format!(
+        let Self { mesh, material, lacks } = self;
+        match lacks {
+            Lacking::Texture(file) => format!(
                 "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it shows one \
                  colour, that of the lower left corner of {file}"
             ),
-            Image::Mask(file) => format!(
+            Lacking::Mask(file) => format!(
                 "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` cuts \
                  nothing out of it"
+            ),
+            Lacking::Roughness(file) => format!(
+                "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it has one roughness, \
+                 that of the lower left corner of {file}"
+            ),
+            Lacking::Normals(file) => format!(
+                "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` tilts none of its normals"
+            ),
+            Lacking::Colours => format!(
+                "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its `diffuse` as it is"
             ),
         }
     }
 
     /// The help line.
     pub fn help(&self) -> &'static str {
-        match self.image {
-            Image::Texture(_) => {
+        match self.lacks {
+            Lacking::Texture(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without a texture"
             }
-            Image::Mask(_) => {
+            Lacking::Mask(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without `alpha`"
+            }
+            Lacking::Normals(_) => {
+                "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
+                 material without a `normal_map`"
+            }
+            Lacking::Roughness(_) => {
+                "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it one `roughness`"
+            }
+            Lacking::Colours => {
+                "write the mesh with vertex colours (`v x y z r g b` in obj, `red`, `green` and `blue` in ply), or \
+                 give it a material without `vertex_colours`"
             }
         }
     }

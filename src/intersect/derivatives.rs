@@ -32,6 +32,16 @@ pub fn curvature(scene: &Scene, si: &SurfaceInteraction) -> f64 {
     if !mean.is_finite() || outward == 0.0 { 0.0 } else { mean * outward.signum() }
 }
 
+/// The weights of a triangle's corners at the point `p` of it, scene space: each at least 0, and 1 together.
+pub fn corner_weights(corners: [DVec3; 3], p: DVec3) -> [f64; 3] {
+    let [a, b, c] = corners.map(|corner| corner - p);
+    let n = (b - a).cross(c - a);
+    // Of a point beside the edge, as rounding may put it, the nearer weights.
+    let parts = [b.cross(c), c.cross(a), a.cross(b)].map(|part| part.dot(n).max(0.0));
+    let whole: f64 = parts.iter().sum();
+    if whole > 0.0 && whole.is_finite() { parts.map(|part| part / whole) } else { [1.0 / 3.0; 3] }
+}
+
 fn on_triangle(mesh: &Mesh, prim: usize) -> [DVec3; 2] {
     let Some(uvs) = &mesh.uvs else { return [DVec3::ZERO; 2] };
     let [ta, tb, tc] = uvs.get(prim, mesh.triangles[prim]).map(|t| t.as_dvec2());
@@ -102,6 +112,20 @@ mod tests {
         let scene = world.into_scene(false).expect("a scene");
         check(&scene, DVec3::new(0.5, 0.4, 4.0), DVec3::new(0.6, 0.5, 0.0));
         check(&scene, DVec3::new(4.0, 3.0, 6.0), DVec3::new(4.6, 0.4, 1.0));
+    }
+
+    #[test]
+    fn weights_lead_back_to_the_point() {
+        let corners = [DVec3::ZERO, DVec3::new(2.0, 0.1, 0.3), DVec3::new(0.4, 1.8, -0.2)];
+        let point = |w: [f64; 3]| corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+        for w in [[0.2, 0.3, 0.5], [1.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.98, 0.01, 0.01]] {
+            let found = corner_weights(corners, point(w));
+            assert!(found.iter().zip(w).all(|(found, w)| (found - w).abs() < 1e-14), "{found:?}");
+        }
+        // A little outside, as an edge's rounding puts it, and a triangle without area.
+        let outside = corner_weights(corners, point([-1e-9, 0.4, 0.6 + 1e-9]));
+        assert!(outside[0] == 0.0 && (outside.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert_eq!(corner_weights([DVec3::X; 3], DVec3::X), [1.0 / 3.0; 3]);
     }
 
     #[test]

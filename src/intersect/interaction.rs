@@ -16,7 +16,7 @@ pub struct SurfaceInteraction {
     /// Unit shading normal, on the same side as `ng`.
     pub ns: DVec3,
     /// Texture coordinates: the mesh's, or an exact sphere's longitude and latitude; zero without, and
-    /// on spheres without a texture.
+    /// on spheres whose material has no image.
     pub uv: Vec2,
     /// Material of the surface.
     pub surface: Surface,
@@ -273,7 +273,7 @@ pub(super) fn sphere_normal(sphere: &Sphere, ray: &Ray, t: f64) -> DVec3 {
 
 /// Whether anything asks for the texture coordinates of a sphere's point, which cost two arcs.
 fn needs_uv(scene: &Scene, surface: Surface) -> bool {
-    scene.materials[surface.material as usize].texture.is_some()
+    scene.materials[surface.material as usize].has_image()
 }
 
 /// Longitude and latitude of the unit vector `n` as texture coordinates, poles on y: the image's middle

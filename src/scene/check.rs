@@ -17,16 +17,29 @@ impl World {
             return Err(Error::Usage(message));
         }
         self.materials.iter().try_for_each(|material| {
-            self.check_texture(material)?;
+            let of = |map: &TextureMap, what| image_of(map, &self.textures, what, &material.name);
+            material.texture.as_ref().map(|map| of(map, "texture")).transpose()?;
+            material.roughness_map.as_ref().map(|map| of(map, "roughness map")).transpose()?;
+            self.check_normal_map(material)?;
             self.check_mask(material)
         })?;
         self.meshes.iter().try_for_each(check_vertices)?;
         self.check_finite()
     }
 
-    fn check_texture(&self, material: &Material) -> Result<()> {
-        let Some(map) = &material.texture else { return Ok(()) };
-        image_of(map, &self.textures, "texture", &material.name).map(|_| ())
+    fn check_normal_map(&self, material: &Material) -> Result<()> {
+        let Some(map) = &material.normal_map else { return Ok(()) };
+        let name = &material.name;
+        image_of(&map.image, &self.textures, "normal map", name)?;
+        if !(map.strength >= 0.0 && map.strength.is_finite()) {
+            let message = format!("the normal map of `{name}` has the strength {}", map.strength);
+            return Err(Error::Usage(message));
+        }
+        if material.glass.is_some() {
+            let message = format!("`{name}` is glass with a normal map, which glass has none of");
+            return Err(Error::Usage(message));
+        }
+        Ok(())
     }
 
     fn check_mask(&self, material: &Material) -> Result<()> {
@@ -63,7 +76,7 @@ impl World {
     }
 }
 
-/// The image among `images` that a material lays on surfaces, a "texture" or a "mask".
+/// The image among `images` that a material lays on surfaces; `what` names it: a "texture", a "mask".
 fn image_of<'w, T>(map: &TextureMap, images: &'w [T], what: &str, material: &str) -> Result<&'w T> {
     let (at, count) = (map.image, images.len());
     let image = images.get(at as usize).ok_or_else(|| {
@@ -78,6 +91,15 @@ fn image_of<'w, T>(map: &TextureMap, images: &'w [T], what: &str, material: &str
 
 fn check_vertices(mesh: &WorldMesh) -> Result<()> {
     let count = mesh.positions.len();
+    if let Some(colours) = mesh.colours.as_ref().filter(|c| c.count() != count) {
+        let (name, colours) = (&mesh.name, colours.count());
+        let message = format!("`{name}` has {colours} vertex colours for {count} vertices");
+        return Err(Error::Usage(message));
+    }
+    if mesh.colours.as_ref().is_some_and(|colours| !colours.are_reflectances()) {
+        let message = format!("a vertex colour of `{}` lies outside of 0 to 1", mesh.name);
+        return Err(Error::Usage(message));
+    }
     let most = mesh.triangles.iter().flatten().copied().max();
     match most.filter(|most| *most as usize >= count) {
         Some(most) => Err(Error::Usage(format!(
@@ -92,7 +114,7 @@ fn check_vertices(mesh: &WorldMesh) -> Result<()> {
 mod tests {
     use super::*;
     use crate::math::{DVec3, Rgb};
-    use crate::scene::WorldSphere;
+    use crate::scene::{VertexColours, WorldSphere};
 
     #[test]
     fn indices_out_of_range_are_refused_by_name() {
@@ -109,6 +131,24 @@ mod tests {
         bad.meshes = vec![floor(2, 0)];
         bad.spheres = vec![WorldSphere::new("ball", DVec3::ZERO, 1.0, 1)];
         assert!(refusal(bad).contains("`ball` is of material 1"));
+    }
+
+    #[test]
+    fn vertex_colours_that_do_not_fit_are_refused_by_name() {
+        let refusal = |colours: Vec<Rgb>| {
+            let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Z];
+            let mesh = WorldMesh::new("scan", corners, vec![[0, 1, 2]], 0);
+            let colours = Some(VertexColours::from_linear(colours));
+            let meshes = vec![WorldMesh { colours, ..mesh }];
+            let materials = vec![Material::diffuse("white", Rgb::ONE)];
+            let world = World { meshes, materials, ..World::default() };
+            world.into_scene(true).expect_err("no scene").to_string()
+        };
+        assert!(refusal(vec![Rgb::ONE; 2]).contains("`scan` has 2 vertex colours for 3 vertices"));
+        for bad in [f32::NAN, -0.1, 1.5] {
+            let refused = refusal(vec![Rgb::ONE, Rgb::splat(bad), Rgb::ONE]);
+            assert!(refused.contains("vertex colour of `scan`"), "{bad}: {refused}");
+        }
     }
 
     #[test]

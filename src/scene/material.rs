@@ -17,18 +17,34 @@ pub struct Material {
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureMap>,
+    /// Image of normals of a finer surface. None on glass.
+    pub normal_map: Option<NormalMap>,
+    /// Whether the vertex colours of a mesh multiply `diffuse`; what has none counts as white.
+    pub vertex_colours: bool,
     /// Mask of its cut-outs: where it says so, the surface is not there. None on glass.
     pub alpha: Option<TextureMap>,
     /// Reflectance of a mirror, both sides.
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
     pub roughness: f64,
+    /// Image that multiplies `roughness`, of data from 0 to 1.
+    pub roughness_map: Option<TextureMap>,
     /// Glass; then `diffuse` and `mirror` are zero.
     pub glass: Option<Glass>,
     /// Emitted radiance.
     pub emission: Rgb,
     /// Whether the back emits too.
     pub emits_back: bool,
+}
+
+/// How a material takes normals from an image: in tangent space, +Y up. A lookup's red, green and blue, from 0 to 1, are
+/// the normal's parts along u, v and the shading normal, from -1 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NormalMap {
+    /// How it lies on the surface.
+    pub image: TextureMap,
+    /// Factor on the parts along u and v; at least 0.
+    pub strength: f64,
 }
 
 impl Material {
@@ -38,9 +54,12 @@ impl Material {
             name: name.into(),
             diffuse: Rgb::ZERO,
             texture: None,
+            normal_map: None,
+            vertex_colours: false,
             alpha: None,
             mirror: Rgb::ZERO,
             roughness: 0.0,
+            roughness_map: None,
             glass: None,
             emission: Rgb::ZERO,
             emits_back: false,
@@ -55,6 +74,17 @@ impl Material {
     /// A perfect mirror.
     pub fn mirror(name: impl Into<String>, reflectance: Rgb) -> Self {
         Self { mirror: reflectance, ..Self::black(name) }
+    }
+
+    /// Whether its scattering is looked up in an image anywhere; cut-outs do not count.
+    pub fn has_image(&self) -> bool {
+        self.texture.is_some() || self.roughness_map.is_some() || self.normal_map.is_some()
+    }
+
+    /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
+    pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
+        let normals = self.normal_map.as_mut().map(|map| &mut map.image);
+        [self.texture.as_mut(), self.roughness_map.as_mut(), normals].into_iter().flatten()
     }
 
     /// Whether the surface reflects any light; glass does not count.

@@ -1,6 +1,6 @@
 //! Meshes and spheres, before (`World…`) and after recentring.
 
-use super::MaterialId;
+use super::{MaterialId, VertexColours};
 use crate::math::{Bounds3, DVec3, Vec2, Vec3, bulk};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
@@ -68,6 +68,8 @@ pub struct WorldMesh {
     pub normals: Option<Corners<Vec3>>,
     /// Texture coordinates, origin at the image's lower left.
     pub uvs: Option<Corners<Vec2>>,
+    /// A colour for each position, which its material may show.
+    pub colours: Option<VertexColours>,
     /// The material of all its triangles.
     pub material: MaterialId,
     /// Whether its light is traced in every frame, never reused.
@@ -75,7 +77,7 @@ pub struct WorldMesh {
 }
 
 impl WorldMesh {
-    /// A mesh that shades flat, without texture coordinates. `triangles` index `positions`,
+    /// A mesh that shades flat, without texture coordinates and colours. `triangles` index `positions`,
     /// counter-clockwise seen from outside; all numbers must be finite.
     pub fn new(
         name: impl Into<String>,
@@ -83,8 +85,9 @@ impl WorldMesh {
         triangles: Vec<[u32; 3]>,
         material: MaterialId,
     ) -> Self {
-        let (normals, uvs, always_traced) = (None, None, false);
-        Self { name: name.into(), positions, triangles, normals, uvs, material, always_traced }
+        let (normals, uvs, colours, always_traced) = (None, None, None, false);
+        let name = name.into();
+        Self { name, positions, triangles, normals, uvs, colours, material, always_traced }
     }
 
     /// The two triangles between four corners, which run counter-clockwise seen from outside.
@@ -111,6 +114,8 @@ pub struct Mesh {
     pub normals: Option<Corners<Vec3>>,
     /// Texture coordinates.
     pub uvs: Option<Corners<Vec2>>,
+    /// A colour for each vertex; `None` where its material shows none.
+    pub colours: Option<VertexColours>,
     /// Material.
     pub surface: Surface,
     /// Bounds of the f32 positions that triangles use.

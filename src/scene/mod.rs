@@ -29,6 +29,7 @@ mod spline;
 mod texture;
 mod time;
 mod too_small;
+mod vertex_colours;
 mod weld;
 mod winding;
 
@@ -42,7 +43,7 @@ pub use light::{
     SpotLight,
 };
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
-pub use material::{Glass, Material, MaterialId};
+pub use material::{Glass, Material, MaterialId, NormalMap};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentring::Recentring;
@@ -53,6 +54,7 @@ pub use settings::{
 pub use texture::{Texture, TextureId, TextureLevel, TextureMap, Wrap};
 pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
+pub use vertex_colours::VertexColours;
 pub(crate) use weld::weld;
 pub(crate) use winding::{borders, closed_volume};
 

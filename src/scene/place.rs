@@ -85,7 +85,7 @@ impl World {
         let first_texture = self.textures.len() as u32;
         meshes.iter_mut().for_each(|mesh| mesh.material += first_material);
         spheres.iter_mut().for_each(|sphere| sphere.material += first_material);
-        for texture in materials.iter_mut().filter_map(|m| m.texture.as_mut()) {
+        for texture in materials.iter_mut().flat_map(Material::images_mut) {
             texture.image += first_texture;
         }
         let first_mask = self.masks.len() as u32;
@@ -219,6 +219,7 @@ mod tests {
             spheres: vec![WorldSphere::new("ball", DVec3::X, 2.0, 0)],
             materials: vec![Material {
                 texture: Some(crate::scene::TextureMap::of(0)),
+                roughness_map: Some(crate::scene::TextureMap::of(0)),
                 alpha: Some(crate::scene::TextureMap::of(0)),
                 ..Material::black("m")
             }],
@@ -284,6 +285,8 @@ mod tests {
         let image = |material: &Material| material.texture.expect("a texture").image;
         assert_eq!((world.meshes[0].material, world.spheres[1].material), (1, 1));
         assert_eq!(world.materials.iter().map(image).collect::<Vec<_>>(), [0, 1]);
+        let rough = world.materials[1].roughness_map.expect("a roughness map");
+        assert_eq!(rough.image, 1);
         let mask = |material: &Material| material.alpha.expect("a mask").image;
         assert_eq!(world.materials.iter().map(mask).collect::<Vec<_>>(), [0, 2]);
     }

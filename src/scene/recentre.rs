@@ -121,9 +121,19 @@ fn to_scene_sphere(s: WorldSphere, r: &Recentring) -> Sphere {
 
 /// The mesh in scene space, and how many of its triangles rounding took.
 fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Mesh, usize) {
-    let WorldMesh { name, positions, mut triangles, mut normals, mut uvs, material, always_traced } =
-        mesh;
-    if materials[material as usize].glass.is_some() {
+    let WorldMesh {
+        name,
+        positions,
+        mut triangles,
+        mut normals,
+        mut uvs,
+        colours,
+        material,
+        always_traced,
+    } = mesh;
+    let made_of = &materials[material as usize];
+    let colours = colours.filter(|_| made_of.vertex_colours);
+    if made_of.glass.is_some() {
         // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
         // would otherwise refract as a hole in glass.
         let mut volume = winding::closed_volume(&positions, &triangles);
@@ -140,15 +150,14 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
     let rounded: Vec<Vec3> = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
     let lost = too_small::count_collapsed(&positions, &rounded, &triangles);
     let surface = Surface { material, light: None, always_traced };
-    (scene_mesh(name, rounded, triangles, normals, uvs, surface), lost)
+    let mesh = scene_mesh(name, rounded, triangles, surface);
+    (Mesh { normals, uvs, colours, ..mesh }, lost)
 }
 
 fn scene_mesh(
     name: String,
     mut positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
-    normals: Option<Corners<Vec3>>,
-    uvs: Option<Corners<crate::math::Vec2>>,
     surface: Surface,
 ) -> Mesh {
     let mut bounds = Bounds3::EMPTY;
@@ -157,7 +166,8 @@ fn scene_mesh(
     }
     let vertex_count = positions.len();
     positions.push(Vec3::ZERO);
-    Mesh { name, positions, vertex_count, triangles, normals, uvs, surface, bounds }
+    let (normals, uvs, colours) = (None, None, None);
+    Mesh { name, positions, vertex_count, triangles, normals, uvs, colours, surface, bounds }
 }
 
 fn reverse_one(
@@ -206,7 +216,7 @@ fn add_emitting_surface(
     let surface = Surface { material, light: Some(index), always_traced: false };
     match shape {
         EmittingShape::Triangles(corners, triangles) => {
-            meshes.push(scene_mesh(name, corners, triangles, None, None, surface));
+            meshes.push(scene_mesh(name, corners, triangles, surface));
         }
         EmittingShape::Sphere(centre, radius) => {
             spheres.push(Sphere { name, centre, radius, surface });

@@ -1,6 +1,6 @@
-//! Images that materials show, with their mip levels.
+//! Images that materials show or take numbers from, with their mip levels.
 
-use crate::math::{DAffine2, DVec3, Rgb, Vec2, bulk, srgb_decode};
+use crate::math::{DAffine2, DVec3, Rgb, Vec2, Vec3, bulk, srgb_decode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -10,8 +10,8 @@ pub type TextureId = u32;
 
 /// An image and smaller copies of it, down to a single texel (mip levels; Williams, 1983). Row 0 is at the top.
 ///
-/// Each texel of a level is the mean, in linear RGB, of what it covers of the level before. The levels
-/// take a third of the memory of the image.
+/// Each texel of a level is the mean of what it covers of the level before: of colours in linear RGB, of data as they stand.
+/// The levels take a third of the memory of the image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Texture {
     /// The file it came from.
@@ -38,6 +38,14 @@ enum Texels {
     Srgb(#[serde(with = "bulk")] Vec<[u8; 3]>),
     /// Linear RGB, 12 bytes a texel.
     Linear(#[serde(with = "bulk")] Vec<Rgb>),
+    /// Shares of 255, no colour; a byte a texel.
+    Data8(#[serde(with = "bulk")] Vec<u8>),
+    /// Shares of 65535, no colour; 2 bytes a texel.
+    Data16(#[serde(with = "bulk")] Vec<u16>),
+    /// Three shares of 255 each, no colours; 3 bytes a texel.
+    Vectors8(#[serde(with = "bulk")] Vec<[u8; 3]>),
+    /// Three shares of 65535 each; 6 bytes a texel.
+    Vectors16(#[serde(with = "bulk")] Vec<[u16; 3]>),
 }
 
 /// How a material lays an image on a surface.
@@ -125,7 +133,7 @@ fn floor(x: f32) -> f32 {
 }
 
 /// Linear values of the sRGB codes of 8 bits, rounded once.
-static LINEAR: LazyLock<[f32; 256]> =
+pub(super) static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| srgb_decode(code as f64 / 255.0) as f32));
 
 /// The linear values between which a code is the nearest: from `BETWEEN[code - 1]` to `BETWEEN[code]`.
@@ -149,6 +157,63 @@ impl Texture {
         Self::with_levels(name.into(), TextureLevel::new(size, Texels::Linear(texels)))
     }
 
+    /// A texture of numbers from 0 to 1, as shares of 255. A lookup gives a grey of them.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_data8(name: impl Into<String>, size: [u32; 2], texels: Vec<u8>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Data8(texels)))
+    }
+
+    /// The same as shares of 65535.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_data16(name: impl Into<String>, size: [u32; 2], texels: Vec<u16>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Data16(texels)))
+    }
+
+    /// A texture of three numbers from 0 to 1 a texel, no colours, as shares of 255.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_vectors8(name: impl Into<String>, size: [u32; 2], texels: Vec<[u8; 3]>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Vectors8(texels)))
+    }
+
+    /// The same as shares of 65535.
+    ///
+    /// # Panics
+    /// As [`from_srgb`](Self::from_srgb).
+    pub fn from_vectors16(name: impl Into<String>, size: [u32; 2], texels: Vec<[u16; 3]>) -> Self {
+        Self::with_levels(name.into(), TextureLevel::new(size, Texels::Vectors16(texels)))
+    }
+
+    /// Whether nearly all texels, as they stand, are unit vectors on the side of blue, as those of normal maps are.
+    pub fn looks_like_normals(&self) -> bool {
+        let is_normal = |shares: Rgb| {
+            let v = shares * 2.0 - Rgb::ONE;
+            // A grey of such a length, and what is nearly one, is as far along red and green.
+            (v.length() - 1.0).abs() < 0.1 && v.z > v.x.max(v.y) + 0.1
+        };
+        let eight = |c: &[u8; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 255.0);
+        let (normals, all) = match &self.levels[0].texels {
+            Texels::Srgb(codes) | Texels::Vectors8(codes) => {
+                (codes.par_iter().filter(|c| eight(c)).count(), codes.len())
+            }
+            Texels::Vectors16(codes) => {
+                let sixteen =
+                    |c: &[u16; 3]| is_normal(Rgb::from_array(c.map(f32::from)) / 65_535.0);
+                (codes.par_iter().filter(|c| sixteen(c)).count(), codes.len())
+            }
+            Texels::Linear(values) => {
+                (values.par_iter().filter(|c| is_normal(**c)).count(), values.len())
+            }
+            Texels::Data8(_) | Texels::Data16(_) => (0, 1),
+        };
+        10 * normals > 9 * all
+    }
+
     fn with_levels(name: String, image: TextureLevel) -> Self {
         let mut levels = vec![image];
         while let Some(next) = levels.last().and_then(TextureLevel::halved) {
@@ -167,6 +232,18 @@ impl Texture {
         self.levels.iter().map(|level| level.bytes().len() as u64).sum()
     }
 
+    /// What the texels are, in a word.
+    pub fn kind(&self) -> &'static str {
+        match self.levels[0].texels {
+            Texels::Srgb(_) => "sRGB codes",
+            Texels::Linear(_) => "linear",
+            Texels::Data8(_) => "data of 8 bits",
+            Texels::Data16(_) => "data of 16 bits",
+            Texels::Vectors8(_) => "vectors of 8 bits",
+            Texels::Vectors16(_) => "vectors of 16 bits",
+        }
+    }
+
     /// Bytes of the texels of the image itself, from which all else follows; their layout is that of the memory.
     pub fn image_bytes(&self) -> &[u8] {
         self.levels[0].bytes()
@@ -178,13 +255,17 @@ impl TextureLevel {
         let count = match &texels {
             Texels::Srgb(codes) => codes.len(),
             Texels::Linear(values) => values.len(),
+            Texels::Data8(values) => values.len(),
+            Texels::Data16(values) => values.len(),
+            Texels::Vectors8(values) => values.len(),
+            Texels::Vectors16(values) => values.len(),
         };
         assert_eq!(count, width as usize * height as usize, "texels of a texture");
         assert!(count > 0, "a texture without texels");
         Self { width, height, texels }
     }
 
-    /// The texel in `column` and `row`, linear RGB.
+    /// The texel in `column` and `row`, linear RGB or a grey of data.
     ///
     /// # Panics
     /// Outside of the level.
@@ -192,7 +273,7 @@ impl TextureLevel {
         self.four([column; 2], [row; 2])[0]
     }
 
-    /// The texels in two columns and two rows, row by row, linear RGB.
+    /// The texels in two columns and two rows, row by row, linear RGB or greys of data.
     ///
     /// # Panics
     /// Outside of the level.
@@ -221,6 +302,23 @@ impl TextureLevel {
                 values[lower + left],
                 values[lower + right],
             ],
+            Texels::Data8(_) | Texels::Data16(_) | Texels::Vectors8(_) | Texels::Vectors16(_) => {
+                [upper + left, upper + right, lower + left, lower + right].map(|at| self.datum(at))
+            }
+        }
+    }
+
+    /// Texel number `at` of data, as a grey. (Apart from [`four`](Self::four), whose code is there in each place that looks
+    /// something up.)
+    #[inline(never)]
+    fn datum(&self, at: usize) -> Rgb {
+        match &self.texels {
+            Texels::Srgb(codes) => Rgb::from_array(codes[at].map(|c| LINEAR[c as usize])),
+            Texels::Linear(values) => values[at],
+            Texels::Data8(values) => Rgb::splat(f32::from(values[at]) / 255.0),
+            Texels::Data16(values) => Rgb::splat(f32::from(values[at]) / 65_535.0),
+            Texels::Vectors8(values) => Rgb::from_array(values[at].map(f32::from)) / 255.0,
+            Texels::Vectors16(values) => Rgb::from_array(values[at].map(f32::from)) / 65_535.0,
         }
     }
 
@@ -228,6 +326,10 @@ impl TextureLevel {
         match &self.texels {
             Texels::Srgb(codes) => bytemuck::cast_slice(codes),
             Texels::Linear(values) => bytemuck::cast_slice(values),
+            Texels::Data8(values) => values,
+            Texels::Data16(values) => bytemuck::cast_slice(values),
+            Texels::Vectors8(values) => bytemuck::cast_slice(values),
+            Texels::Vectors16(values) => bytemuck::cast_slice(values),
         }
     }
 
@@ -249,6 +351,20 @@ impl TextureLevel {
         let texels = match self.texels {
             Texels::Srgb(_) => Texels::Srgb(means.map(|mean| mean.to_array().map(code)).collect()),
             Texels::Linear(_) => Texels::Linear(means.collect()),
+            Texels::Data8(_) => {
+                Texels::Data8(means.map(|mean| rounded(mean.x, 255.0) as u8).collect())
+            }
+            Texels::Vectors8(_) => {
+                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, 255.0) as u8);
+                Texels::Vectors8(means.map(code).collect())
+            }
+            Texels::Vectors16(_) => {
+                let code = |mean: Vec3| mean.to_array().map(|c| rounded(c, 65_535.0) as u16);
+                Texels::Vectors16(means.map(code).collect())
+            }
+            Texels::Data16(_) => {
+                Texels::Data16(means.map(|mean| rounded(mean.x, 65_535.0) as u16).collect())
+            }
         };
         Some(Self::new(size.map(|n| n as u32), texels))
     }
@@ -284,6 +400,11 @@ impl Covered {
 /// The sRGB code nearest to a linear value.
 fn code(linear: f32) -> u8 {
     BETWEEN.partition_point(|bound| *bound <= linear) as u8
+}
+
+/// A share of `full` as the nearest whole number.
+fn rounded(share: f32, full: f32) -> f32 {
+    (share * full).round().clamp(0.0, full)
 }
 
 #[cfg(test)]
@@ -325,6 +446,16 @@ mod tests {
             let last = texture.levels.last().expect("a level");
             assert_eq!((last.width, last.height), (1, 1));
         }
+    }
+
+    #[test]
+    fn data_are_averaged_as_they_stand() {
+        let texture = Texture::from_data8("t", [2, 1], vec![0, 255]);
+        assert_eq!((texture.levels[0].texel(1, 0), texture.bytes()), (Rgb::ONE, 3));
+        assert_eq!(texture.levels[1].texels, Texels::Data8(vec![128]));
+        let texture = Texture::from_data16("t", [1, 2], vec![100, 65_535]);
+        assert_eq!(texture.levels[0].texel(0, 0), Rgb::splat(100.0 / 65_535.0));
+        assert_eq!(texture.levels[1].texels, Texels::Data16(vec![32_818]));
     }
 
     #[test]

@@ -140,6 +140,7 @@ impl Hash {
             triangles,
             normals,
             uvs,
+            colours,
             material: _,
             always_traced: _,
         } = mesh;
@@ -147,6 +148,10 @@ impl Hash {
         self.array(triangles);
         self.attribute(normals.as_ref());
         self.attribute(uvs.as_ref());
+        if let Some(colours) = colours {
+            self.text(&("colours", colours.codes().is_some()));
+            self.array(colours.bytes());
+        }
     }
 
     fn attribute<T: bytemuck::NoUninit>(&mut self, attribute: Option<&Corners<T>>) {
@@ -161,7 +166,7 @@ impl Hash {
 
     fn texture(&mut self, texture: &Texture) {
         // Names are for people; the smaller levels follow from the image.
-        self.text(&(texture.levels()[0].width, texture.levels()[0].height));
+        self.text(&(texture.levels()[0].width, texture.levels()[0].height, texture.kind()));
         self.array(texture.image_bytes());
     }
 
@@ -190,7 +195,7 @@ mod tests {
     use super::*;
     use crate::math::{Bounds3, DVec3, Rgb, Vec3};
     use crate::scene::{CameraPath, Light, Material, Pose};
-    use crate::scene::{PointLight, TextureMap};
+    use crate::scene::{PointLight, TextureMap, VertexColours};
 
     fn world() -> World {
         World {
@@ -224,10 +229,12 @@ mod tests {
         renamed.masks[0].name = "frond".into();
         assert_eq!(base, fingerprint(&renamed, &shot()));
 
-        let changes: [fn(&mut World); 9] = [
+        let changes: [fn(&mut World); 11] = [
             |w| w.meshes[0].positions[1].x += 1e-15,
             |w| w.meshes[0].triangles[0] = [0, 2, 1],
             |w| w.meshes[0].normals = None,
+            |w| w.meshes[0].colours = Some(VertexColours::from_encoded(&[[1.0; 3]; 3])),
+            |w| w.meshes[0].colours = Some(VertexColours::from_encoded(&[[0.5; 3]; 3])),
             |w| w.materials[0].diffuse.x = 0.5,
             |w| w.materials[0].alpha = Some(TextureMap::of(0)),
             |w| w.masks[0].texels[1] = 254,
@@ -235,10 +242,13 @@ mod tests {
             |w| w.meshes[0].always_traced = true,
             |w| w.traced_regions = vec![Bounds3 { min: DVec3::ZERO, max: DVec3::ONE }],
         ];
+        let mut seen = vec![base.clone()];
         for change in changes {
             let mut changed = world();
             change(&mut changed);
-            assert_ne!(base, fingerprint(&changed, &shot()));
+            let hash = fingerprint(&changed, &shot());
+            assert!(!seen.contains(&hash));
+            seen.push(hash);
         }
         assert_ne!(base, fingerprint(&world(), &Shot { vfov_degrees: 41.0, ..shot() }));
     }

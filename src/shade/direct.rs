@@ -367,7 +367,7 @@ impl Renderer<'_> {
             for LightUser { point: i, slot } in input.reached(at, lit.len(), users).iter() {
                 let Some(slot) = slot else { continue };
                 let point = &lit[i as usize];
-                let exact = source.sampler.unshadowed(point.si.p, point.n);
+                let exact = point.unshadowed(&source.sampler);
                 let shown = luminance(point.weight * source.sampler.emission) * exact as f32;
                 let own = i as usize * channels + usize::from(slot);
                 s.exact[own] = exact;
@@ -394,7 +394,7 @@ impl Renderer<'_> {
             let point = &lit[i as usize];
             let exact = match slot {
                 Some(slot) => s.exact[i as usize * s.channels + usize::from(slot)],
-                None => source.sampler.unshadowed(point.si.p, point.n),
+                None => point.unshadowed(&source.sampler),
             };
             Gathered { exact, ..Gathered::default() }
         }));

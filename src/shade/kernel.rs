@@ -13,7 +13,7 @@ use super::lobe::{self, Lobe, Scattered};
 use super::medium_stack::{self, Body, MediumStack};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
-use super::{FrameInput, Left, Renderer, dimensions, medium, optics};
+use super::{FrameInput, Left, Renderer, dimensions, medium, normal_map, optics};
 use crate::film::GPixel;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
@@ -337,24 +337,34 @@ impl Vertex<'_, '_> {
             }
             self.add(state, state.throughput * le);
         }
+        let tilted;
+        let mut shaped = &si;
+        if material.normal_map.is_some() {
+            let ns = normal_map::normal(scene, material, &si, wo, state.cone);
+            tilted = SurfaceInteraction { ns, ..si };
+            shaped = &tilted;
+        }
         if lobe::is_diffuse(material) {
             let albedo = lobe::albedo(scene, material, &si, wo, state.cone);
             let reflectance = state.throughput * albedo;
-            self.lit.push(ShadingPoint::new((&si, ray, hit), wo, reflectance, state.place()));
+            let (met, place) = ((&si, ray, hit), state.place());
+            self.lit.push(ShadingPoint::new(met, shaped.ns, wo, reflectance, place));
         }
         if !may_bounce {
             return;
         }
-        lobe::for_each_directional::<MIRROR, GLASS>(material, &si, wo, |lobe| {
-            let start = (&si, inside);
+        let si = shaped;
+        let seen = (si, wo, state.cone);
+        lobe::for_each_directional::<MIRROR, GLASS>(scene, material, seen, |lobe| {
+            let start = (si, inside);
             let behind = match lobe {
                 Lobe::Pane(_) => state.medium,
                 _ => si.is_outside(wo).then_some(si.surface.material),
             };
             let starts = Starts { reflected: start, transmitted: start, behind };
-            self.scatter::<NESTED>(&lobe, &si, wo, &starts, state);
+            self.scatter::<NESTED>(&lobe, si, wo, &starts, state);
             if MIRROR && !lobe.is_delta() {
-                self.glossy.push(self.glossy_point(lobe, (&si, ray, hit), wo, state));
+                self.glossy.push(self.glossy_point(lobe, (si, ray, hit), wo, state));
             }
         });
     }
@@ -466,7 +476,9 @@ fn record(
         let record = hit.map_or(GPixel::EMPTY, |hit| {
             let si = SurfaceInteraction::new(scene, ray, &hit);
             let material = &scene.materials[si.surface.material as usize];
-            let normal = if si.is_outside(ray.dir) { -si.ns } else { si.ns };
+            let wo = -ray.dir.normalize();
+            let ns = normal_map::normal(scene, material, &si, wo, state.cone);
+            let normal = if si.is_outside(ray.dir) { -ns } else { ns };
             let along = (si.p - input.camera.eye).dot(input.camera.forward);
             let spheres = hit.prim.geom_id == scene.sphere_geom_id();
             let index = hit.prim.geom_id + if spheres { hit.prim.prim_id } else { 0 };

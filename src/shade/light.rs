@@ -94,6 +94,20 @@ impl LightSampler {
         }
     }
 
+    /// The same for a normal `mapped` by an image, whose cosine to the surface's own normal is `cos`: of the sky, without
+    /// what lies below the surface.
+    pub fn unshadowed_tilted(&self, p: DVec3, mapped: DVec3, cos: f64) -> f64 {
+        match &self.shape {
+            Shape::Sky(sky) => sky.unshadowed() * 0.5 * (1.0 + cos),
+            Shape::Point(_)
+            | Shape::Directional(_)
+            | Shape::Quad(_)
+            | Shape::Sphere(_)
+            | Shape::Disk(_)
+            | Shape::Spot(_) => self.unshadowed(p, mapped),
+        }
+    }
+
     /// Whether rays can end on the light's surface.
     pub fn is_seen(&self) -> bool {
         match &self.shape {

@@ -9,9 +9,10 @@ mod diffuse;
 mod glossy;
 mod mirror;
 
+use super::cone::RayCone;
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb};
-use crate::scene::Material;
+use crate::scene::{Material, Scene};
 use crate::stats::RayKind;
 pub(super) use dielectric::{Dielectric, Pane};
 pub(super) use diffuse::{albedo, is_diffuse};
@@ -43,20 +44,21 @@ pub(super) struct Scattered {
     pub pdf: f64,
 }
 
-/// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving), that depends on the
-/// direction. Lobes that the kernel leaves out, since no material of the scene has them, cost nothing.
+/// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving) by a ray with this cone, that
+/// depends on the direction. Lobes that the kernel leaves out, since no material of the scene has them, cost nothing.
 #[inline(always)]
 pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
+    scene: &Scene,
     material: &Material,
-    si: &SurfaceInteraction,
-    wo: DVec3,
+    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
     mut take: impl FnMut(Lobe),
 ) {
     if MIRROR && material.mirror != Rgb::ZERO {
         take(match material.roughness {
             0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
-            roughness => {
+            _ => {
                 let n = facing_normal(si, wo);
+                let roughness = glossy::roughness(scene, material, si, wo, cone);
                 Lobe::Glossy(Glossy::new(material.mirror, roughness, n, wo))
             }
         });

@@ -20,6 +20,7 @@ mod lobe;
 mod medium;
 mod medium_stack;
 mod motion;
+mod normal_map;
 pub mod optics;
 mod pilots;
 mod pixels;

@@ -31,7 +31,7 @@ struct TailRay<'s> {
 impl SampleSink for TailRay<'_> {
     fn push(&mut self, sample: LightSample) {
         let irradiance = sample.pdf.per_steradian().map_or(self.exact, |density| {
-            sample.radiance * sample.wi.dot(self.point.n).max(0.0) / density
+            sample.radiance * sample.wi.dot(self.point.mapped).max(0.0) / density
         });
         let light = self.source.sampler.emission * (irradiance / self.count) as f32;
         if light != Rgb::ZERO {
@@ -62,7 +62,10 @@ impl<'a> TailChannels<'a> {
     }
 
     /// What arrives at shading point `i` if that is known, as it is where nothing can arrive.
-    fn known(self, s: &ShadowScratch, i: usize) -> Option<Rgb> {
+    fn known(self, s: &ShadowScratch, lit: &[ShadingPoint], i: usize) -> Option<Rgb> {
+        if lit[i].is_mapped() {
+            return None;
+        }
         let mut light = Rgb::ZERO;
         for (channel, (at, tint)) in self.range().zip(self.places(i)) {
             let exact = s.exact(at);
@@ -129,7 +132,7 @@ impl Renderer<'_> {
         s.tail.seen.clear();
         for (point, cell) in lit.iter().zip(cells) {
             let tail = selection.of_diffuse(*cell).tail();
-            s.tail.seen.look(&tail, &selection.far, (point.si.p, point.n));
+            s.tail.seen.look(&tail, &selection.far, (point.si.p, point.mapped));
         }
     }
 
@@ -143,6 +146,11 @@ impl Renderer<'_> {
         let Some(channels) = TailChannels::of(reuse, selection) else { return };
         for (i, (point, cell)) in lit.iter().zip(cells).enumerate() {
             s.groups.note_tail(i, selection.tail_set(*cell), channels.range());
+            // The part that arrives of the tail's lights depends on which of them the normal favours, so that of one mapped
+            // normal says nothing of another one.
+            if point.is_mapped() {
+                continue;
+            }
             let sent = s.tail.seen.of(i).sent();
             for (at, tint) in channels.places(i) {
                 let exact = part(sent, tint);
@@ -199,7 +207,7 @@ impl Renderer<'_> {
         let channels = input.reuse.as_ref().and_then(|reuse| TailChannels::of(reuse, selection));
         if let Some(channels) = channels {
             for (i, point) in lit.iter().enumerate() {
-                if let Some(light) = channels.known(s, i) {
+                if let Some(light) = channels.known(s, lit, i) {
                     if channels.places(i).any(|(at, _)| s.exact(at) != 0.0) {
                         s.groups.note_lit(i);
                     }
@@ -208,7 +216,7 @@ impl Renderer<'_> {
             }
         }
         let wanted = |s: &ShadowScratch, i: usize, tail: &Tail| {
-            let is_known = channels.is_some_and(|channels| channels.known(s, i).is_some());
+            let is_known = channels.is_some_and(|channels| channels.known(s, lit, i).is_some());
             let first = lit[i].place.sample.wrapping_mul(samples_apart(selection));
             (!is_known).then(|| (first, tail.samples(selection.samples) as usize))
         };
@@ -287,7 +295,7 @@ impl Renderer<'_> {
             // A light that was not looked at may show its back.
             let exact = match is_looked_at && source.is_sampled() {
                 true => f64::NAN,
-                false => source.sampler.unshadowed(point.si.p, point.n),
+                false => point.unshadowed(&source.sampler),
             };
             if exact == 0.0 {
                 continue;

@@ -2,7 +2,7 @@
 
 use super::{Expect, Expect::*, check, load_bytes};
 use tweenray::math::DVec2;
-use tweenray::scene::{TextureMap, Wrap};
+use tweenray::scene::{Material, TextureMap, Wrap};
 
 const OBJ: &[u8] = b"mtllib bad.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -67,8 +67,32 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nd 0.5\n", Warns(1, "rendered opaque")),
     ("newmtl a\nillum 7\n", Warns(1, "glass without `Ni`")),
     ("newmtl a\nKd 0.8 0.8 0.8\nKs 0.8 0.8 0.8\nillum 3\n", Warns(1, "to 1")),
-    ("newmtl a\nbump bumps.png\n", Warns(2, "`bump`")),
-    ("newmtl a\nPr 0.5\n", Warns(2, "`Pr` is ignored")),
+    ("newmtl a\nbump gone.png\n", Warns(1, "normal map left out")),
+    ("newmtl a\nmap_Bump -bm 0.5 gone.png\n", Warns(1, "normal map left out")),
+    ("newmtl a\nmap_Bump -bm 0.5\n", Line(2, "`map_Bump` without a file name")),
+    ("newmtl a\nmap_Bump -bm x a.png\n", Line(2, "`x` is not a number")),
+    ("newmtl a\nnorm -bm -1 a.png\n", Line(2, "`norm`: … `-bm` holds -1")),
+    ("newmtl a\nnorm -bm\n", Line(2, "option `-bm` lacks a value")),
+    ("newmtl a\nbump -bm 1e31 a.png\n", Line(2, "`-bm` holds 1e31")),
+    ("newmtl a\nnorm -imfchan r gone.png\n", Warns(2, "texture option `-imfchan`")),
+    ("newmtl a\nnorm -s 0 a.png\n", Line(2, "`norm`: … `-s` holds 0.0")),
+    ("newmtl a\nbump -clamp maybe a.png\n", Line(2, "`-clamp` is `on` or `off`")),
+    ("newmtl a\nillum 7\nNi 1.5\nnorm gone.png\n", Warns(1, "glass has no normal map")),
+    ("newmtl a\nmap_Bump bad.mtl\n", Warns(1, "normal map left out")),
+    ("newmtl a\nPr 0.5\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
+    ("newmtl a\nmap_Pr gone.png\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
+    ("newmtl a\nPr 1.5\n", Line(2, "`Pr 1.5`: from 0 to 1")),
+    ("newmtl a\nPr nan\n", Line(2, "not a finite number")),
+    ("newmtl a\nmap_Pr\n", Line(2, "`map_Pr` without a file name")),
+    ("newmtl a\nmap_Pr -imfchan z a.png\n", Line(2, "takes r, g, b or m, not `z`")),
+    ("newmtl a\nmap_Pr -imfchan\n", Line(2, "option `-imfchan` lacks a value")),
+    ("newmtl a\nmap_Pr -o 1 inf a.png\n", Line(2, "`map_Pr`: … not a finite number")),
+    ("newmtl a\nillum 3\nKs .5 .5 .5\nPr 0.5\nKd 0 0 0\n", Fine),
+    ("newmtl a\nillum 3\nKs .5 .5 .5\nmap_Pr gone.png\n", Warns(1, "roughness map left out")),
+    (
+        "newmtl a\nillum 3\nKs .5 .5 .5\nmap_Pr -imfchan r bad.mtl\n",
+        Warns(1, "roughness map left out"),
+    ),
 ];
 
 #[test]
@@ -135,6 +159,44 @@ fn textures_are_linear_and_shared() {
 }
 
 #[test]
+fn map_pr_is_one_channel_as_it_stands() {
+    let mtl = "newmtl a\nillum 3\nKd 0 0 0\nKs 1 1 1\nPr 0.25\nmap_Pr -imfchan b rough.ppm\n\
+               newmtl b\nillum 3\nKd 0 0 0\nKs 1 1 1\nmap_Pr rough.ppm\nnewmtl c\nillum 5\nKd 0 0 0\n\
+               Ks 1 1 1\nPr 0.25\n";
+    let obj = ["a", "b", "c"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
+    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
+    let others = [("bad.mtl", mtl.as_bytes()), ("rough.ppm", image)];
+    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let rough = world.materials.iter().map(|material| {
+        let texel = |map: TextureMap| world.textures[map.image as usize].levels()[0].texel(0, 0).x;
+        (material.roughness, material.roughness_map.map(texel))
+    });
+    let expected = [(1.0, Some(48.0 / 255.0)), (1.0, Some(128.0 / 255.0)), (0.25, None)];
+    assert_eq!(rough.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn norm_is_a_normal_map_and_map_bump_only_if_it_looks_like_one() {
+    let mtl = "newmtl a\nnorm grey.ppm\nnewmtl b\nmap_Bump -bm 0.5 blue.ppm\nnewmtl c\nmap_Bump grey.ppm\n\
+               newmtl d\nbump grey.ppm\nnorm blue.ppm\n";
+    let obj = ["a", "b", "c", "d"].map(|name| format!("usemtl {name}\nf 1/1 2/2 3/3\n")).concat();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n{obj}");
+    let (grey, blue): (&[u8], &[u8]) = (b"P6 1 1 255\n\x80\x80\x80", b"P6 1 1 255\n\x80\x80\xff");
+    let others = [("bad.mtl", mtl.as_bytes()), ("grey.ppm", grey), ("blue.ppm", blue)];
+    let model = load_bytes("obj", obj.as_bytes(), &others).expect("a good file");
+    let of = |material: &Material| {
+        let map = material.normal_map?;
+        let texture = &model.world.textures[map.image.image as usize];
+        Some((texture.levels()[0].texel(0, 0).z == 1.0, map.strength))
+    };
+    let found: Vec<_> = model.world.materials.iter().map(of).collect();
+    assert_eq!(found, [Some((false, 1.0)), Some((true, 0.5)), None, Some((true, 1.0))]);
+    let [warning] = &model.warnings[..] else { panic!("{:?}", model.warnings) };
+    assert!(warning.message.contains("grey.ppm of line 6 holds heights"), "{warning}");
+}
+
+#[test]
 fn map_d_cuts_holes_and_is_shared() {
     let pgm = b"P5 2 1 255\n\x00\xff";
     let mtl = b"newmtl a\nillum 4\nmap_d leaf.pgm\nnewmtl b\nKd .5 .5 .5\nmap_d leaf.pgm\n\
@@ -161,18 +223,19 @@ fn map_d_cuts_holes_and_is_shared() {
 
 #[test]
 fn options_say_how_images_lie() {
-    let pgm = b"P5 1 1 255\n\xff";
+    let ppm = b"P6 1 1 255\n\x80\x80\xff";
     let options =
         ["-s 2", "-s 2 3 -o 0.5", "-o 1 -2 7 -s -2 3 4 -clamp on -clamp off", "-clamp on"];
     let (mut mtl, mut obj) = (String::new(), "mtllib x.mtl\n".to_owned());
     obj += "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
     for (k, options) in options.iter().enumerate() {
         // Those of the last statement count.
-        mtl += &format!("newmtl {k}\nmap_Kd -s 9 1.pgm\nmap_Kd {options} 1.pgm\nmap_d 1.pgm\n");
-        mtl += &format!("newmtl mask {k}\nmap_d {options} 1.pgm\n");
+        mtl += &format!("newmtl {k}\nmap_Kd -s 9 1.ppm\nmap_Kd {options} 1.ppm\nmap_d 1.ppm\n");
+        mtl += &format!("newmtl mask {k}\nKd 0 0 0\nKs 1 1 1\nillum 3\nmap_d {options} 1.ppm\n");
+        mtl += &format!("map_Pr -imfchan r {options} 1.ppm\nbump {options} -bm 0.5 1.ppm\n");
         obj += &format!("usemtl {k}\nf 1/1 2/2 3/3\nusemtl mask {k}\nf 1/1 3/3 2/2\n");
     }
-    let others: &[(&str, &[u8])] = &[("x.mtl", mtl.as_bytes()), ("1.pgm", pgm)];
+    let others: &[(&str, &[u8])] = &[("x.mtl", mtl.as_bytes()), ("1.ppm", ppm)];
     let model = load_bytes("obj", obj.as_bytes(), others).expect("read");
     assert!(model.warnings.is_empty(), "{:?}", model.warnings);
     let expected = [
@@ -191,7 +254,12 @@ fn options_say_how_images_lie() {
             assert!((at - wanted).length() < 1e-15, "{at} {wanted}");
         }
         assert_eq!((masked.alpha, shown.alpha), (Some(map), Some(TextureMap::of(0))));
+        assert_eq!(masked.roughness_map, Some(TextureMap { image: 1, ..map }));
+        let normals = masked.normal_map.expect("a normal map");
+        assert_eq!((normals.image, normals.strength), (TextureMap { image: 2, ..map }, 0.5));
     }
+    assert_eq!((model.world.textures.len(), model.world.masks.len()), (3, 1));
+    assert_eq!(model.files.len(), 3);
 }
 
 #[test]

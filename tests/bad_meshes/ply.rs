@@ -80,8 +80,18 @@ const ASCII: &[(&str, Expect)] = &[
     (
         "HEADelement vertex 3\nXYZproperty uchar red\nelement face 1\nLISTend_header\n\
          0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n",
-        Warns(3, "vertex colours"),
+        Warns(3, "vertex colours without `green` were ignored"),
     ),
+    ("COLOURED uchar0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n3 0 1 2\n", Fine),
+    (
+        "COLOURED uchar0 0 0 1 2 3\n1 0 0 4 nan 6\n0 1 0 7 8 9\n3 0 1 2\n",
+        Line(14, "the colour of vertex 1 (from 0) is not a finite number"),
+    ),
+    (
+        "COLOURED float0 0 0 1 1 1\n1 0 0 0 0 0\n0 1 0 0 inf 0\n3 0 1 2\n",
+        Line(15, "the colour of vertex 2 (from 0) is not a finite number"),
+    ),
+    ("COLOURED float0 0 0 1 1 1\n1 0 0 0 0 0\n0 1 0 0 0\n3 0 1 2\n", Line(15, "too few values")),
     (
         "HEADelement vertex 3\nXYZelement edge 1\nproperty int a\nelement face 1\nLISTend_header\n\
          POINTS7\n3 0 1 2\n",
@@ -90,7 +100,13 @@ const ASCII: &[(&str, Expect)] = &[
 ];
 
 fn expand(text: &str) -> String {
-    text.replace("TRIANGLE", "HEADelement vertex 3\nXYZelement face 1\nLISTend_header\nPOINTS")
+    let coloured = |t: &str| {
+        let colours = ["red", "green", "blue"].map(|c| format!("property {t} {c}\n")).concat();
+        format!("HEADelement vertex 3\nXYZ{colours}element face 1\nLISTend_header\n")
+    };
+    text.replace("COLOURED uchar", &coloured("uchar"))
+        .replace("COLOURED float", &coloured("float"))
+        .replace("TRIANGLE", "HEADelement vertex 3\nXYZelement face 1\nLISTend_header\nPOINTS")
         .replace("HEAD", "ply\nformat ascii 1.0\n")
         .replace("XYZ", XYZ)
         .replace("LIST", LIST)

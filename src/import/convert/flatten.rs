@@ -1,7 +1,7 @@
 //! One vertex list for a mesh whose attributes have indices of their own.
 
-use crate::math::{DVec3, Vec2, Vec3};
-use crate::scene::WorldMesh;
+use crate::math::{DVec3, Rgb, Vec2, Vec3};
+use crate::scene::{VertexColours, WorldMesh};
 use std::borrow::Cow;
 
 /// A mesh with one index per corner.
@@ -10,6 +10,10 @@ pub(super) struct Flat<'a> {
     /// Normals, one per position; `None` if the mesh has none.
     pub normals: Option<Cow<'a, [Vec3]>>,
     pub uvs: Option<Cow<'a, [Vec2]>>,
+    /// Colours of the mesh's own vertices.
+    colours: Option<&'a VertexColours>,
+    /// Which of these each position was; `None` if all stayed.
+    sources: Option<Vec<u32>>,
     pub triangles: Cow<'a, [[u32; 3]]>,
 }
 
@@ -33,6 +37,8 @@ pub(super) fn flatten(mesh: &WorldMesh) -> Flat<'_> {
             positions: Cow::Borrowed(&mesh.positions),
             normals: mesh.normals.as_ref().map(|n| Cow::Borrowed(&n.values[..])),
             uvs: mesh.uvs.as_ref().map(|uv| Cow::Borrowed(&uv.values[..])),
+            colours: mesh.colours.as_ref(),
+            sources: None,
             triangles: Cow::Borrowed(&mesh.triangles),
         };
     }
@@ -52,8 +58,23 @@ pub(super) fn flatten(mesh: &WorldMesh) -> Flat<'_> {
     Flat {
         positions: all.clone().map(|v| mesh.positions[v.position as usize]).collect(),
         normals: mesh.normals.as_ref().map(|n| all.clone().map(|v| normal(v, &n.values)).collect()),
-        uvs: mesh.uvs.as_ref().map(|t| all.map(|v| uv(v, &t.values)).collect()),
+        uvs: mesh.uvs.as_ref().map(|t| all.clone().map(|v| uv(v, &t.values)).collect()),
+        colours: mesh.colours.as_ref(),
+        sources: Some(all.map(|v| v.position).collect()),
         triangles: Cow::Owned(triangles),
+    }
+}
+
+impl Flat<'_> {
+    /// Whether its vertices have colours, and whether these are sRGB codes of 8 bits.
+    pub fn has_colours(&self) -> Option<bool> {
+        self.colours.map(|colours| colours.codes().is_some())
+    }
+
+    /// The colour of the vertex at position number `at`, linear RGB; white without any.
+    pub fn colour(&self, at: usize) -> Rgb {
+        let vertex = self.sources.as_ref().map_or(at as u32, |sources| sources[at]);
+        self.colours.map_or(Rgb::ONE, |colours| colours.of_vertex(vertex))
     }
 }
 

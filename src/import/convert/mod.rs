@@ -25,7 +25,7 @@ pub struct ConvertReport {
 
 /// Reads the mesh file `input` and writes `output`, whose ending must be `.ply`.
 ///
-/// Normals are the input's, or none: none are computed. Materials, textures and lights have no
+/// Normals and vertex colours are the input's, or none: none are computed. Materials, textures and lights have no
 /// place in a PLY file and are left out with a warning.
 ///
 /// Errors: those of [`super::load_model`], `Error::Usage` for another ending, `Error::Io`.
@@ -38,7 +38,8 @@ pub fn convert(input: &Path, output: &Path) -> Result<ConvertReport> {
     let mut warnings = model.warnings;
     let world = model.world;
     let mut lost = Vec::new();
-    if world.materials.iter().any(|m| m.name != super::DEFAULT_MATERIAL) {
+    let plain = [super::DEFAULT_MATERIAL, super::COLOURED_MATERIAL];
+    if world.materials.iter().any(|m| !plain.contains(&m.name.as_str())) {
         lost.push("materials");
     }
     if !world.textures.is_empty() {

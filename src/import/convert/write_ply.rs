@@ -3,7 +3,7 @@
 use super::flatten::{Flat, flatten};
 use crate::error::{Error, Result};
 use crate::import::uv_sphere;
-use crate::math::{Bounds3, DVec3, Vec2, Vec3};
+use crate::math::{Bounds3, DVec3, Rgb, Vec2, Vec3, srgb_encode};
 use crate::scene::{World, WorldMesh};
 use std::io::Write;
 use std::path::Path;
@@ -27,6 +27,8 @@ pub struct PlyReport {
     pub normals: bool,
     /// Whether the vertices have texture coordinates.
     pub uvs: bool,
+    /// Whether the vertices have colours.
+    pub colours: bool,
     /// Size of the file, bytes.
     pub bytes: u64,
 }
@@ -35,7 +37,8 @@ pub struct PlyReport {
 ///
 /// Positions are floats where that loses nothing or the world is not far from the origin, else
 /// doubles. Vertices where several normals or texture coordinates meet are split. Where only
-/// some meshes have normals, the others' are zero, which reads as flat. Spheres become 80,000
+/// some meshes have normals, the others' are zero, which reads as flat; where only some have colours, the others are
+/// white. Colours are sRGB: bytes, or floats where some would not fit into bytes. Spheres become 80,000
 /// triangles each. Materials, textures, lights and the sky have no place in the format.
 ///
 /// Errors: `Error::Io`; more than 1,431,655,764 triangles or vertices.
@@ -52,13 +55,15 @@ pub fn write_ply(world: &World, out: &mut dyn Write, file: &Path) -> Result<PlyR
         doubles: needs_doubles(&parts),
         normals: parts.iter().any(|p| p.normals.is_some()),
         uvs: parts.iter().any(|p| p.uvs.is_some()),
+        colours: parts.iter().any(|p| p.has_colours().is_some()),
         bytes: 0,
     };
     if report.vertices.max(report.triangles) >= u32::MAX as usize / 3 {
         return Err(Error::Usage("too many triangles for one PLY file".into()));
     }
+    let colours = Colours::of(&parts);
     let mut sink = Sink { out, buffer: Vec::with_capacity(BUFFER + 64), bytes: 0 };
-    let written = sink.all(&parts, &report);
+    let written = sink.all(&parts, &report, colours);
     written.map_err(|e| Error::io("write", file, e))?;
     report.bytes = sink.bytes;
     Ok(report)
@@ -75,7 +80,26 @@ fn needs_doubles(parts: &[Flat<'_>]) -> bool {
     !(fits && reach <= FAR * size || exact())
 }
 
-fn header(report: &PlyReport) -> String {
+/// How colours are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Colours {
+    None,
+    Bytes,
+    Floats,
+}
+
+impl Colours {
+    fn of(parts: &[Flat<'_>]) -> Self {
+        let of_parts = parts.iter().filter_map(Flat::has_colours);
+        of_parts.fold(Self::None, |so_far, are_codes| match so_far {
+            Self::Floats => Self::Floats,
+            Self::None | Self::Bytes if are_codes => Self::Bytes,
+            Self::None | Self::Bytes => Self::Floats,
+        })
+    }
+}
+
+fn header(report: &PlyReport, colours: Colours) -> String {
     let coordinate = if report.doubles { "double" } else { "float" };
     let list = |t: &str, names: &[&str]| -> String {
         names.iter().map(|name| format!("property {t} {name}\n")).collect()
@@ -92,6 +116,11 @@ fn header(report: &PlyReport) -> String {
     if report.uvs {
         text += &list("float", &["u", "v"]);
     }
+    text += &match colours {
+        Colours::None => String::new(),
+        Colours::Bytes => list("uchar", &["red", "green", "blue"]),
+        Colours::Floats => list("float", &["red", "green", "blue"]),
+    };
     text + &format!(
         "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         report.triangles
@@ -105,8 +134,13 @@ struct Sink<'a> {
 }
 
 impl Sink<'_> {
-    fn all(&mut self, parts: &[Flat<'_>], report: &PlyReport) -> std::io::Result<()> {
-        self.buffer.extend_from_slice(header(report).as_bytes());
+    fn all(
+        &mut self,
+        parts: &[Flat<'_>],
+        report: &PlyReport,
+        colours: Colours,
+    ) -> std::io::Result<()> {
+        self.buffer.extend_from_slice(header(report, colours).as_bytes());
         for part in parts {
             for (i, p) in part.positions.iter().enumerate() {
                 self.position(*p, report.doubles);
@@ -118,6 +152,7 @@ impl Sink<'_> {
                     let uv = part.uvs.as_ref().map_or(Vec2::ZERO, |uv| uv[i]);
                     self.floats(&uv.to_array());
                 }
+                self.colour(part.colour(i), colours);
                 self.flush(BUFFER)?;
             }
         }
@@ -139,6 +174,15 @@ impl Sink<'_> {
             p.to_array().iter().for_each(|x| self.buffer.extend_from_slice(&x.to_le_bytes()));
         } else {
             self.floats(&p.as_vec3().to_array());
+        }
+    }
+
+    fn colour(&mut self, colour: Rgb, colours: Colours) {
+        let shares = || colour.to_array().map(|c| srgb_encode(f64::from(c)));
+        match colours {
+            Colours::None => {}
+            Colours::Bytes => self.buffer.extend(shares().map(|c| (255.0 * c).round() as u8)),
+            Colours::Floats => self.floats(&shares().map(|c| c as f32)),
         }
     }
 

@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path, text: &[u8]) -> Result<Model> {
     let mut images = Images::default();
     let materials = std::mem::take(&mut file.materials);
     let named = materials.iter().filter_map(|material| material.texture.as_ref());
-    images.read(named.map(|(_, name)| (source::beside(path, name), ImageUse::Texture)));
+    images.read(named.map(|(_, name)| (source::beside(path, name), ImageUse::Colour)));
     for (number, material) in materials.iter().enumerate() {
         let converted = convert(path, number, material, &mut images, &mut model);
         model.world.materials.push(converted);
@@ -61,7 +61,7 @@ fn convert(
     out.emits_back = true;
     if let Some((line, name)) = &source.texture {
         let file = source::beside(path, name);
-        match images.place(&file, ImageUse::Texture, &mut model.world, &mut model.files) {
+        match images.place(&file, ImageUse::Colour, &mut model.world, &mut model.files) {
             Ok(id) => (out.texture, out.diffuse) = (Some(TextureMap::of(id)), Rgb::ONE),
             Err(error) => {
                 let message = format!("texture left out: {error}");

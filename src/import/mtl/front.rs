@@ -1,6 +1,6 @@
 //! Checks an MTL file line by line and hands tobj a clean copy of it.
 
-use super::image::MapOptions;
+use super::image::{MapImage, MapKind};
 use crate::error::{Diagnostic, Result};
 use crate::import::lines::{Line, Lines, Words, check_text, number, show};
 use crate::import::source::Fault;
@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// Data of a material that tobj does not return.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Source {
     /// Name, trimmed.
     pub name: String,
@@ -17,10 +17,25 @@ pub(super) struct Source {
     pub line: usize,
     /// `Tf`: share of light that passes, linear RGB.
     pub filter: Option<[f64; 3]>,
-    /// How the image of `map_Kd` lies on the surface.
-    pub texture: MapOptions,
-    /// The same of `map_d`.
-    pub mask: MapOptions,
+    /// `map_Kd`.
+    pub texture: Option<MapImage>,
+    /// `map_d`.
+    pub mask: Option<MapImage>,
+    /// `norm`, or `map_Bump` and `bump`, which may hold heights instead.
+    pub normal_map: Option<BumpImage>,
+    /// `Pr`: roughness.
+    pub roughness: Option<f64>,
+    /// `map_Pr`.
+    pub roughness_map: Option<MapImage>,
+}
+
+/// An image of normals or, perhaps, of heights.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct BumpImage {
+    pub image: MapImage,
+    /// Whether the statement is for normals alone.
+    pub is_normal: bool,
+    pub line: usize,
 }
 
 /// Reads the materials of a library: the data of this front, and tobj's.
@@ -74,9 +89,14 @@ impl Front {
             "d" => self.dissolve(words),
             "Tr" => self.transparency(words),
             "illum" => self.illum(words),
-            "map_Kd" | "map_d" => self.image(&text, words, line.number),
-            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "map_bump" | "map_Bump" | "bump"
-            | "disp" | "decal" | "refl" | "norm" | "map_Tr" | "map_refl" | "map_Kn" => {
+            "Pr" => self.roughness(words),
+            "map_Kd" | "map_d" => self.map(&text, MapKind::Image, words, line.number),
+            "map_Pr" => self.map(&text, MapKind::Data, words, line.number),
+            "norm" | "map_Bump" | "map_bump" | "bump" => {
+                self.map(&text, MapKind::Normals, words, line.number)
+            }
+            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "disp" | "decal" | "refl" | "map_Tr"
+            | "map_refl" | "map_Kn" => {
                 self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
                 Ok(())
             }
@@ -91,8 +111,7 @@ impl Front {
         }
         self.put(format_args!("newmtl {}", self.sources.len()));
         self.has_dissolve = false;
-        let (texture, mask) = (MapOptions::default(), MapOptions::default());
-        self.sources.push(Source { name, line, filter: None, texture, mask });
+        self.sources.push(Source { name, line, ..Source::default() });
         Ok(())
     }
 
@@ -116,6 +135,40 @@ impl Front {
         let filter = colour("Tf", words, 1.0)?;
         if let Some(source) = self.sources.last_mut() {
             source.filter = Some(filter);
+        }
+        Ok(())
+    }
+
+    fn roughness(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+        // Some programs write more than 1 for matte.
+        let roughness = number_in("Pr", words, 0.0, f64::MAX)?.min(1.0);
+        if let Some(source) = self.sources.last_mut() {
+            source.roughness = Some(roughness);
+        }
+        Ok(())
+    }
+
+    /// `map_Kd [options] file`, or another map.
+    fn map(
+        &mut self,
+        keyword: &str,
+        kind: MapKind,
+        words: Words<'_>,
+        line: usize,
+    ) -> std::result::Result<(), String> {
+        let image = MapImage::read(keyword, kind, words, line, &mut self.notes)?;
+        let Some(source) = self.sources.last_mut() else { return Ok(()) };
+        match kind {
+            MapKind::Data => source.roughness_map = Some(image),
+            MapKind::Normals => {
+                let is_normal = keyword == "norm";
+                // `norm` wins.
+                if is_normal || !source.normal_map.as_ref().is_some_and(|map| map.is_normal) {
+                    source.normal_map = Some(BumpImage { image, is_normal, line });
+                }
+            }
+            MapKind::Image if keyword == "map_d" => source.mask = Some(image),
+            MapKind::Image => source.texture = Some(image),
         }
         Ok(())
     }
@@ -154,21 +207,6 @@ impl Front {
             return Err(format!("`illum {value}`: a whole number from 0 to 10 is needed"));
         }
         self.put(format_args!("illum {value}"));
-        Ok(())
-    }
-
-    /// `map_Kd [options] file`, or `map_d`.
-    fn image(
-        &mut self,
-        keyword: &str,
-        words: Words<'_>,
-        line: usize,
-    ) -> std::result::Result<(), String> {
-        let (options, name) = MapOptions::read(keyword, words, line, &mut self.notes)?;
-        if let Some(source) = self.sources.last_mut() {
-            *(if keyword == "map_d" { &mut source.mask } else { &mut source.texture }) = options;
-        }
-        self.put(format_args!("{keyword} {name}"));
         Ok(())
     }
 

@@ -1,42 +1,68 @@
-//! `map_Kd` and `map_d`: a file and options of how its image lies on the surface.
+//! `map_Kd`, `map_d` and other maps: a file and options of how its image lies on the surface.
 //!
 //! `-s u v w` multiplies the texture coordinates and `-o u v w` is then added, 1 and 0 where a number is left out; the
-//! third is for solid textures and does nothing. With `-clamp on` the image does not repeat: its edge goes on. Other options are
-//! noted and ignored.
+//! third is for solid textures and does nothing. With `-clamp on` the image does not repeat: its edge goes on. Of
+//! `map_Pr` also the channel `-imfchan` is read, of normals the strength `-bm`. Other options are noted and ignored.
 
 use crate::import::lines::{Words, number, show};
 use crate::import::source::Notes;
+use crate::import::texture::ImageChannel;
 use crate::math::{DAffine2, DVec2};
 use crate::scene::{TextureMap, Wrap, limits};
 
 /// Largest offset, as in a scene file.
 const MOST_OFFSET: f64 = 1e30;
 
-/// How the image of a `map` statement lies on the surface.
+/// What the image of a `map` statement gives, which decides on the options that count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MapKind {
+    /// Colours or cut-outs.
+    Image,
+    /// One channel, `-imfchan`.
+    Data,
+    /// Normals of the strength `-bm`, or heights.
+    Normals,
+}
+
+/// The image of a `map` statement.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MapImage {
+    /// The file, as it is written.
+    pub name: String,
+    pub options: MapOptions,
+}
+
+/// How the image of a `map` statement lies on the surface, and what of it counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MapOptions {
     scale: [f64; 2],
     offset: [f64; 2],
     wrap: Wrap,
+    /// Of data.
+    pub channel: ImageChannel,
+    /// Of normals.
+    pub strength: f64,
 }
 
 impl Default for MapOptions {
     fn default() -> Self {
-        Self { scale: [1.0; 2], offset: [0.0; 2], wrap: Wrap::Repeat }
+        let (channel, strength) = (ImageChannel::Green, 1.0);
+        Self { scale: [1.0; 2], offset: [0.0; 2], wrap: Wrap::Repeat, channel, strength }
     }
 }
 
-impl MapOptions {
+impl MapImage {
     /// The options and the file's name, which may hold blanks, of `[options] file` after `keyword`.
     ///
     /// Errors: an option without a value or with one that is impossible; no file.
     pub fn read(
         keyword: &str,
+        kind: MapKind,
         mut words: Words<'_>,
         line: usize,
         notes: &mut Notes,
-    ) -> Result<(Self, String), String> {
-        let mut options = Self::default();
+    ) -> Result<Self, String> {
+        let mut options = MapOptions::default();
         loop {
             let mut ahead = words;
             let Some(option) = ahead.next() else { break };
@@ -45,6 +71,12 @@ impl MapOptions {
                 b"-s" => options.scale = scale(&mut ahead).map_err(of)?,
                 b"-o" => options.offset = offset(&mut ahead).map_err(of)?,
                 b"-clamp" => options.wrap = clamp(&mut ahead).map_err(of)?,
+                b"-imfchan" if kind == MapKind::Data => {
+                    options.channel = channel(&mut ahead).map_err(of)?;
+                }
+                b"-bm" if kind == MapKind::Normals => {
+                    options.strength = strength(&mut ahead).map_err(of)?;
+                }
                 _ => {
                     let Some(values) = values_of_ignored(option) else { break };
                     notes.add(&format!("texture option `{}` is ignored", show(option)), line);
@@ -57,9 +89,11 @@ impl MapOptions {
         if name.is_empty() {
             return Err(format!("`{keyword}` without a file name"));
         }
-        Ok((options, name))
+        Ok(Self { name, options })
     }
+}
 
+impl MapOptions {
     /// As scene data, with the decoded image's index.
     pub fn map(&self, image: u32) -> TextureMap {
         let ([x, y], offset) = (self.scale, DVec2::from_array(self.offset));
@@ -120,10 +154,36 @@ fn clamp(words: &mut Words<'_>) -> Result<Wrap, String> {
     }
 }
 
+fn channel(words: &mut Words<'_>) -> Result<ImageChannel, String> {
+    match words.next() {
+        Some(b"r") => Ok(ImageChannel::Red),
+        // The luminance of a grey image is its green, and depth is no channel of an image.
+        Some(b"g" | b"l" | b"z") => Ok(ImageChannel::Green),
+        Some(b"b") => Ok(ImageChannel::Blue),
+        Some(b"m") => Ok(ImageChannel::Alpha),
+        Some(other) => Err(format!("takes r, g, b, m, l or z, not `{}`", show(other))),
+        None => Err("lacks a value".into()),
+    }
+}
+
+fn strength(words: &mut Words<'_>) -> Result<f64, String> {
+    let word = words.next().ok_or("lacks a value")?;
+    // A negative one turns heights around, which are not read.
+    let strength = value(word)?.abs();
+    match (0.0..=*limits::FACTOR.end()).contains(&strength) {
+        true => Ok(strength),
+        false => Err(format!("holds {strength:?}: from 0 to 1e30 is possible")),
+    }
+}
+
+fn value(word: &[u8]) -> Result<f64, String> {
+    number(word).map_err(|message| format!("has no such value: {message}"))
+}
+
 /// One to three numbers; those that are left out are `absent`. A later word that is no number begins the file's name.
 fn numbers(words: &mut Words<'_>, absent: f64) -> Result<[f64; 3], String> {
     let mut values = [absent; 3];
-    for (k, value) in values.iter_mut().enumerate() {
+    for (k, each) in values.iter_mut().enumerate() {
         let mut ahead = *words;
         let Some(word) = ahead.next() else {
             if k == 0 {
@@ -136,7 +196,7 @@ fn numbers(words: &mut Words<'_>, absent: f64) -> Result<[f64; 3], String> {
         if k > 0 && !is_number {
             break;
         }
-        *value = number(word).map_err(|message| format!("has no such value: {message}"))?;
+        *each = value(word)?;
         *words = ahead;
     }
     Ok(values)

@@ -3,10 +3,11 @@
 //! | MTL | ours |
 //! |---|---|
 //! | `Kd`, `map_Kd` | diffuse reflectance, texture |
+//! | `norm`; `map_Bump` and `bump` whose image looks like normals | normal map, `-bm` its strength; nothing on glass |
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
-//! | `-s`, `-o`, `-clamp` of these | how the image lies ([`super::image`]) |
+//! | `-s`, `-o`, `-clamp` of images | how the image lies ([`super::image`]) |
 //! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
-//! | `illum` 3 or 5 with `Ks` | perfect mirror of reflectance `Ks` beside the diffuse part |
+//! | `illum` 3 or 5 with `Ks` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
 //! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
 
@@ -18,23 +19,31 @@ use crate::scene::{Glass, Material};
 /// Index of refraction of glass whose file has no `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
 
-/// The material without its texture, and warnings about it.
+/// The material without its images, and warnings about it.
 pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String>) {
     let mut notes = Vec::new();
     let mut out = Material::black(&source.name);
     out.emission = mtl.emissive.map_or(Rgb::ZERO, rgb);
     out.emits_back = true;
-    if is_glass(mtl, &mut notes) {
+    if is_glass(source, mtl, &mut notes) {
         let tint = source.filter.map_or(Rgb::ONE, rgb);
         let ior = mtl.optical_density.unwrap_or_else(|| {
             notes.push(format!("glass without `Ni`: the index of refraction is {DEFAULT_IOR}"));
             DEFAULT_IOR
         });
         out.glass = Some(Glass { tint, ..Glass::clear(ior) });
+        if let Some(bump) = &source.normal_map {
+            let line = bump.line;
+            notes.push(format!("glass has no normal map: that of line {line} is ignored"));
+        }
+        if source.mask.is_some() {
+            notes.push("cut-outs left out: glass has none, `map_d` is ignored".into());
+        }
         return (out, notes);
     }
-    if matches!(mtl.illumination_model, Some(3 | 5)) {
-        out.mirror = mtl.specular.map_or(Rgb::ZERO, rgb);
+    if let Some(mirror) = mirror(mtl) {
+        out.mirror = mirror;
+        out.roughness = source.roughness.unwrap_or(0.0);
     }
     let dark = out.mirror != Rgb::ZERO || out.emission != Rgb::ZERO;
     out.diffuse = match mtl.diffuse {
@@ -60,12 +69,18 @@ pub(super) fn textured(mtl: &tobj::Material) -> Rgb {
     }
 }
 
-fn is_glass(mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {
+/// The reflectance of the mirror that it is, if any.
+pub(super) fn mirror(mtl: &tobj::Material) -> Option<Rgb> {
+    let is_mirror = matches!(mtl.illumination_model, Some(3 | 5));
+    mtl.specular.filter(|_| is_mirror).map(rgb).filter(|mirror| *mirror != Rgb::ZERO)
+}
+
+fn is_glass(source: &Source, mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {
     let clear = mtl.dissolve.is_some_and(|d| d < 1.0);
     match mtl.illumination_model {
         Some(6 | 7) => true,
         // 3ds Max writes `illum 4` with `d 1` for what is plainly opaque. A map says what is transparent.
-        Some(4 | 9) => clear || (mtl.dissolve.is_none() && mtl.dissolve_texture.is_none()),
+        Some(4 | 9) => clear || (mtl.dissolve.is_none() && source.mask.is_none()),
         _ if clear && mtl.optical_density.is_some() => true,
         _ => {
             if clear {

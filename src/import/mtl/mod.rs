@@ -8,11 +8,19 @@ mod meaning;
 
 use super::images::{ImageUse, Images};
 use super::model::Model;
-use super::source;
-use crate::error::{Diagnostic, Result};
-use crate::scene::MaterialId;
+use super::source::{self, Notes};
+use crate::error::{Diagnostic, Error, Result};
+use crate::math::Rgb;
+use crate::scene::{Material, MaterialId, NormalMap, TextureMap};
+use front::BumpImage;
+use image::MapImage;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The note on a roughness that says nothing of the picture.
+const ROUGHNESS_ALONE: &str =
+    "`Pr` or `map_Pr` of what is no mirror (`illum 3` with `Ks`) is ignored";
 
 /// The materials of the libraries of an OBJ file, by name, before use.
 #[derive(Default)]
@@ -28,16 +36,79 @@ struct Entry {
     parsed: tobj::Material,
 }
 
+/// The images that a material takes.
+struct Taken<'s> {
+    texture: Option<&'s MapImage>,
+    roughness: Option<&'s MapImage>,
+    normals: Option<&'s BumpImage>,
+    mask: Option<&'s MapImage>,
+}
+
 impl Entry {
-    /// The images that the material asks for.
-    fn images(&self) -> impl Iterator<Item = (PathBuf, ImageUse)> {
-        let is_glass = meaning::of(&self.source, &self.parsed).0.glass.is_some();
-        let mask = self.parsed.dissolve_texture.as_ref().filter(|_| !is_glass);
-        let texture = self.parsed.diffuse_texture.as_ref();
-        let texture = texture.map(|image| (image, ImageUse::Texture)).into_iter();
-        let images = texture.chain(mask.map(|image| (image, ImageUse::Mask)));
-        images.map(|(image, what)| (source::beside(&self.library, image), what))
+    /// The images that count in `material`, as [`meaning::of`] has it: only a mirror is rough, glass has no normal map and no
+    /// cut-outs.
+    fn taken(&self, material: &Material) -> Taken<'_> {
+        let front::Source { texture, roughness_map, normal_map, mask, .. } = &self.source;
+        let is_glass = material.glass.is_some();
+        Taken {
+            texture: texture.as_ref(),
+            roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO),
+            normals: normal_map.as_ref().filter(|_| !is_glass),
+            mask: mask.as_ref().filter(|_| !is_glass),
+        }
     }
+
+    /// The files of the images that the material takes, with what they serve as.
+    fn images(&self) -> impl Iterator<Item = (PathBuf, ImageUse)> {
+        let Taken { texture, roughness, normals, mask } =
+            self.taken(&meaning::of(&self.source, &self.parsed).0);
+        let images = [
+            texture.map(|image| (image, ImageUse::Colour)),
+            roughness.map(|image| (image, data(image))),
+            normals.map(|bump| (&bump.image, ImageUse::Normals)),
+            mask.map(|image| (image, ImageUse::Mask)),
+        ];
+        images.into_iter().flatten().map(|(image, what)| (self.file(image), what))
+    }
+
+    fn file(&self, image: &MapImage) -> PathBuf {
+        source::beside(&self.library, &image.name)
+    }
+
+    /// The image as it lies on the surface, entered in the model's world.
+    fn lay(
+        &self,
+        image: &MapImage,
+        what: ImageUse,
+        images: &mut Images,
+        model: &mut Model,
+    ) -> std::result::Result<TextureMap, Arc<Error>> {
+        let Model { world, files, .. } = model;
+        images.place(&self.file(image), what, world, files).map(|id| image.options.map(id))
+    }
+
+    /// The normal map of an image; `Err` tells why there is none.
+    fn normal_map(
+        &self,
+        bump: &BumpImage,
+        images: &mut Images,
+        model: &mut Model,
+    ) -> std::result::Result<NormalMap, String> {
+        let BumpImage { image, is_normal, line } = bump;
+        let looks = images.looks_like_normals(&self.file(image), ImageUse::Normals, &model.world);
+        if looks == Some(false) && !is_normal {
+            let name = &image.name;
+            return Err(format!("{name} of line {line} holds heights, not normals: it is ignored"));
+        }
+        let map = self.lay(image, ImageUse::Normals, images, model);
+        let map = map.map_err(|error| format!("normal map left out: {error}"))?;
+        Ok(NormalMap { image: map, strength: image.options.strength })
+    }
+}
+
+/// What the image of a roughness serves as.
+fn data(image: &MapImage) -> ImageUse {
+    ImageUse::Data(image.options.channel)
 }
 
 impl Libraries {
@@ -70,7 +141,12 @@ impl Libraries {
 
     fn parse(&mut self, file: &Path, bytes: &[u8], model: &mut Model) -> Result<()> {
         model.files.push(file.to_path_buf());
+        let mut notes = Notes::default();
         for (source, parsed) in front::read(file, bytes, &mut model.warnings)? {
+            let has_roughness = source.roughness.is_some() || source.roughness_map.is_some();
+            if has_roughness && meaning::mirror(&parsed).is_none() {
+                notes.add(ROUGHNESS_ALONE, source.line);
+            }
             let name = source.name.clone();
             let entry = Entry { library: file.to_path_buf(), source, parsed };
             if let Some(other) = self.entries.get(&name) {
@@ -85,6 +161,7 @@ impl Libraries {
                 self.entries.insert(name, entry);
             }
         }
+        model.warnings.extend(notes.into_warnings(file));
         Ok(())
     }
 
@@ -95,18 +172,23 @@ impl Libraries {
     }
 
     /// Adds the material that `usemtl NAME` on `line` of `obj` asks for to the model's world,
-    /// and its images. An unknown name is a warning, and the default material.
+    /// and its images. An unknown name is a warning, and the default material. A `coloured` mesh shows its
+    /// vertex colours, times `Kd`, unless there is a texture.
     pub fn material(
         &mut self,
         obj: &Path,
         line: usize,
-        name: &str,
+        (name, coloured): (&str, bool),
         model: &mut Model,
     ) -> Result<MaterialId> {
-        let Some(entry) = self.entries.get(name) else {
+        let Self { entries, images, .. } = self;
+        let Some(entry) = entries.get(name) else {
             let message = format!("no material `{name}`: plain grey in its place");
             model.warnings.push(Diagnostic::new(obj, message).line(line));
-            return Ok(model.default_material());
+            return Ok(match coloured {
+                true => model.coloured_material(),
+                false => model.default_material(),
+            });
         };
         let place = |message: String| {
             Diagnostic::new(&entry.library, format!("material `{name}`: {message}"))
@@ -114,30 +196,45 @@ impl Libraries {
         };
         let (mut material, notes) = meaning::of(&entry.source, &entry.parsed);
         model.warnings.extend(notes.into_iter().map(place));
-        if let Some(image) = &entry.parsed.diffuse_texture {
-            let file = source::beside(&entry.library, image);
-            match self.images.place(&file, ImageUse::Texture, &mut model.world, &mut model.files) {
-                Ok(id) => {
-                    material.texture = Some(entry.source.texture.map(id));
+        let Taken { texture, roughness, normals, mask } = entry.taken(&material);
+        if let Some(image) = texture {
+            match entry.lay(image, ImageUse::Colour, images, model) {
+                Ok(map) => {
+                    material.texture = Some(map);
                     material.diffuse = meaning::textured(&entry.parsed);
                 }
+                Err(error) => model.warnings.push(place(format!("texture left out: {error}"))),
+            }
+        }
+        if let Some(image) = roughness {
+            match entry.lay(image, data(image), images, model) {
+                Ok(map) => {
+                    material.roughness_map = Some(map);
+                    material.roughness = 1.0;
+                }
                 Err(error) => {
-                    model.warnings.push(place(format!("texture left out: {error}")));
+                    model.warnings.push(place(format!("roughness map left out: {error}")));
                 }
             }
         }
-        if let Some(image) = &entry.parsed.dissolve_texture {
-            let file = source::beside(&entry.library, image);
-            let mask = match material.glass {
-                Some(_) => Err("glass has none, `map_d` is ignored".into()),
-                None => {
-                    let Model { world, files, .. } = &mut *model;
-                    let mask = self.images.place(&file, ImageUse::Mask, world, files);
-                    mask.map_err(|error| error.to_string())
-                }
-            };
+        if let Some(bump) = normals {
+            let normals = entry.normal_map(bump, images, model);
+            let warn = |message| model.warnings.push(place(message));
+            material.normal_map = normals.map_err(warn).ok();
+        }
+        if coloured && material.texture.is_some() {
+            let message = "the texture is shown, the vertex colours are not";
+            model.warnings.push(place(message.into()));
+        } else if coloured && material.diffuse != Rgb::ZERO {
+            material.vertex_colours = true;
+            if entry.parsed.diffuse.is_none() {
+                material.diffuse = Rgb::ONE;
+            }
+        }
+        if let Some(image) = mask {
+            let mask = entry.lay(image, ImageUse::Mask, images, model);
             let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
-            material.alpha = mask.map_err(warn).ok().map(|id| entry.source.mask.map(id));
+            material.alpha = mask.map_err(warn).ok();
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)

@@ -1,13 +1,13 @@
 //! Assembling checked chunks into one mesh per material.
 
 use super::face::{Faces, MISSING};
-use super::parse::Part;
+use super::parse::{Part, UNCOLOURED};
 use crate::error::{Diagnostic, Result};
 use crate::import::model::Model;
 use crate::import::source::Fault;
 use crate::import::{lamps, mtl, polygon, tidy};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
-use crate::scene::{Corners, WorldMesh};
+use crate::scene::{Corners, VertexColours, WorldMesh};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -17,6 +17,8 @@ use std::path::Path;
 #[derive(Default)]
 struct Values {
     positions: Vec<DVec3>,
+    /// One for each position, or none at all.
+    colours: Vec<[f32; 3]>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
 }
@@ -65,8 +67,10 @@ pub(super) fn assemble(
     let mut meshes = Builder::new(values, triangles.len());
     for (triangles, name) in triangles.into_iter().zip(groups.names) {
         let Some(mut mesh) = meshes.build(triangles, &mut dropped) else { continue };
+        let coloured = mesh.colours.is_some();
         mesh.material = match &name {
-            Some((line, name)) => libraries.material(path, *line, name, model)?,
+            Some((line, name)) => libraries.material(path, *line, (name, coloured), model)?,
+            None if coloured => model.coloured_material(),
             None => model.default_material(),
         };
         mesh.name = match name {
@@ -149,9 +153,16 @@ impl Groups {
 fn take_values(parts: &mut [Part]) -> Values {
     let mut values = Values::default();
     for part in &mut *parts {
+        if !part.colours.is_empty() {
+            values.colours.resize(values.positions.len(), UNCOLOURED);
+            append(&mut values.colours, &mut part.colours);
+        }
         append(&mut values.positions, &mut part.positions);
         append(&mut values.uvs, &mut part.uvs);
         append(&mut values.normals, &mut part.normals);
+    }
+    if !values.colours.is_empty() {
+        values.colours.resize(values.positions.len(), UNCOLOURED);
     }
     values.uvs.push(Vec2::ZERO);
     values.normals.push(Vec3::ZERO);
@@ -264,6 +275,10 @@ impl Builder {
             return None;
         }
         let Self { values, only_one, scratch } = self;
+        let colours = (!values.colours.is_empty()).then(|| {
+            let mut v = v.clone();
+            tidy::compact(&mut values.colours, &mut v, *only_one, scratch)
+        });
         let positions = tidy::compact(&mut values.positions, &mut v, *only_one, scratch);
         let attribute = |corners: Vec<[u32; 3]>| (corners != v).then_some(corners);
         let uvs = vt.and_then(|mut vt| {
@@ -280,6 +295,17 @@ impl Builder {
                 Corners { values, corners: attribute(vn) }
             })
         });
-        Some(WorldMesh { normals, uvs, ..WorldMesh::new("", positions, v, 0) })
+        let colours = colours.and_then(known_colours);
+        Some(WorldMesh { normals, uvs, colours, ..WorldMesh::new("", positions, v, 0) })
     }
+}
+
+/// The colours of a mesh whose vertices have any; those that have none are white.
+fn known_colours(mut shares: Vec<[f32; 3]>) -> Option<VertexColours> {
+    let is_known = |colour: &[f32; 3]| !colour[0].is_nan();
+    if !shares.iter().any(is_known) {
+        return None;
+    }
+    shares.iter_mut().filter(|colour| !is_known(colour)).for_each(|colour| *colour = [1.0; 3]);
+    Some(VertexColours::from_encoded(&shares))
 }

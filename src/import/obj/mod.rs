@@ -5,7 +5,7 @@
 //! `tobj` reads the material libraries ([`super::mtl`]); its geometry reader is the oracle of
 //! our tests, not used here: see `docs/decisions`.
 //!
-//! Not done: curves and surfaces, `l` and `p` elements, vertex colours, smoothing groups. Each
+//! Not done: curves and surfaces, `l` and `p` elements, alpha of vertex colours, smoothing groups. Each
 //! is named in a warning, smoothing groups excepted ([`crate::scene::NormalPolicy`] has a
 //! crease angle instead).
 

@@ -3,6 +3,7 @@
 use super::count::Counts;
 use super::face::Faces;
 use super::{Fault, expected, name_of};
+use crate::import::colours;
 use crate::import::lines::{Lines, Words, number, show};
 use crate::import::source::Notes;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -11,6 +12,9 @@ use crate::math::{DVec3, Vec2, Vec3};
 #[derive(Debug, Default)]
 pub(super) struct Part {
     pub positions: Vec<DVec3>,
+    /// Colours of the positions, shares of the largest sRGB code, up to the last one that has any; [`UNCOLOURED`] of
+    /// others.
+    pub colours: Vec<[f32; 3]>,
     pub uvs: Vec<Vec2>,
     /// Normals: unit, or zero where the file's is zero or not finite.
     pub normals: Vec<Vec3>,
@@ -21,6 +25,9 @@ pub(super) struct Part {
     pub libraries: Vec<(usize, String)>,
     pub notes: Notes,
 }
+
+/// The colour of a position that has none.
+pub(super) const UNCOLOURED: [f32; 3] = [f32::NAN; 3];
 
 /// Statements that are ignored without a warning, since they do not affect polygons.
 const QUIET: [&[u8]; 8] = [b"o", b"g", b"s", b"mg", b"bevel", b"c_interp", b"d_interp", b"lod"];
@@ -82,10 +89,29 @@ impl Part {
                     return Err(format!("`v` with the weight {w:e} lies at infinity"));
                 }
             }
-            6.. => self.notes.add("vertex colours were ignored", line),
+            6 | 7 => {
+                if count == 7 {
+                    self.notes.add("the alpha of vertex colours was ignored", line);
+                }
+                self.colour([fields[3], fields[4], fields[5]].map(|c| c as f32), line)?;
+            }
+            8 => self.notes.add("vertex colours beside a weight were ignored", line),
             _ => return Err(expected("v", "x y z, x y z w or x y z r g b", &all)),
         }
         self.positions.push(p);
+        Ok(())
+    }
+
+    /// Notes the colour of the position that is about to be added.
+    fn colour(&mut self, colour: [f32; 3], line: usize) -> Result<(), String> {
+        if !colour.iter().all(|c| c.is_finite()) {
+            return Err("a vertex colour is too large a number".into());
+        }
+        if colours::strays(&colour) {
+            self.notes.add(colours::STRAYED, line);
+        }
+        self.colours.resize(self.positions.len(), UNCOLOURED);
+        self.colours.push(colour);
         Ok(())
     }
 

@@ -165,3 +165,46 @@ fn smoothing_groups_are_no_spheres() {
         assert!(is_course_dialect(text.as_bytes()), "{text}");
     }
 }
+
+#[test]
+fn meshes_with_and_without_vertex_colours_share_a_file() {
+    let model = read_text(
+        "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nf 1 2 3\nv 5 0 0\nv 6 0 0\nv 5 1 0\nusemtl gone\nf 4 5 6\n",
+    );
+    let [coloured, plain] = &model.world.meshes[..] else { panic!("two meshes") };
+    let codes = coloured.colours.as_ref().and_then(|colours| colours.codes());
+    assert_eq!(codes, Some(&[[255, 0, 0], [0, 255, 0], [255; 3]][..]));
+    assert!(plain.colours.is_none());
+    let of = |mesh: &WorldMesh| &model.world.materials[mesh.material as usize];
+    assert!(of(coloured).vertex_colours && !of(plain).vertex_colours);
+}
+
+#[test]
+fn vertex_colours_multiply_kd_and_give_way_to_a_texture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("dot.ppm"), b"P6 1 1 255\n\x10\x20\x30").expect("written");
+    let materials = "newmtl half\nKd .5 .5 .5\nnewmtl bare\nnewmtl image\nmap_Kd dot.ppm\n\
+                     newmtl chrome\nillum 3\nKs 1 1 1\nKd 0 0 0\nnewmtl pane\nillum 4\nd 0.5\n";
+    std::fs::write(at("m.mtl"), materials).expect("written");
+    let mut text = "mtllib m.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\n".to_string();
+    for name in ["half", "bare", "image", "chrome", "pane"] {
+        text += &format!("usemtl {name}\nf 1 2 3\n");
+    }
+    let model = read(&at("a.obj"), text.as_bytes()).expect("a good file");
+    let shown = model.world.meshes.iter().map(|mesh| {
+        let material = &model.world.materials[mesh.material as usize];
+        assert_eq!(material.vertex_colours, mesh.colours.is_some());
+        (&mesh.name[..], material.vertex_colours, material.diffuse.x)
+    });
+    let expected = [
+        ("half", true, 0.5),
+        ("bare", true, 1.0),
+        ("image", false, 1.0),
+        ("chrome", false, 0.0),
+        ("pane", false, 0.0),
+    ];
+    assert_eq!(shown.collect::<Vec<_>>(), expected);
+    let given_way = |w: &crate::error::Diagnostic| w.message.contains("vertex colours are not");
+    assert_eq!(model.warnings.iter().filter(|w| given_way(w)).count(), 1);
+}

@@ -118,6 +118,9 @@ fn lists(
     if element.name == "face" && element.properties.iter().any(|p| p.name == "texcoord") {
         contents.notes.add("texture coordinates of face corners were ignored", element.line);
     }
+    if element.name == "face" && element.properties.iter().any(|p| p.name == "red") {
+        contents.notes.add("colours of faces were ignored", element.line);
+    }
     contents.faces = Faces::Polygons { indices, ends };
     Ok(())
 }

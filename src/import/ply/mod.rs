@@ -7,7 +7,7 @@
 //! [`header`] reads the header; [`fast`] decodes the usual fixed-size layouts in bulk on all
 //! threads; [`fields`] reads everything else value by value; both give the same mesh.
 //!
-//! Not done: vertex colours, texture coordinates per face corner, `trifans`.
+//! Not done: alpha of vertex colours, colours of faces, texture coordinates per face corner, `trifans`.
 
 mod fast;
 mod fields;
@@ -17,10 +17,10 @@ mod vertex;
 
 use super::model::Model;
 use super::source::Notes;
-use super::{normals, polygon, tidy};
+use super::{colours, normals, polygon, tidy};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Corners, WorldMesh};
+use crate::scene::{Corners, VertexColours, WorldMesh};
 use header::Header;
 use std::path::Path;
 use vertex::Vertices;
@@ -41,8 +41,11 @@ fn read_by(path: &Path, bytes: &[u8], fast: bool) -> Result<Model> {
     let mut model = Model { files: vec![path.to_path_buf()], ..Model::default() };
     let warnings = notes.into_warnings(path);
     if let Some(mesh) = build(path, vertices, faces, &mut model)? {
-        model.world.meshes.push(mesh);
-        model.world.meshes[0].material = model.default_material();
+        let material = match mesh.colours {
+            Some(_) => model.coloured_material(),
+            None => model.default_material(),
+        };
+        model.world.meshes.push(WorldMesh { material, ..mesh });
     }
     model.warnings.extend(warnings);
     Ok(model)
@@ -110,7 +113,7 @@ impl Body<'_> {
         Ok(contents)
     }
 
-    /// Errors: positions or texture coordinates that are not finite, no faces, no vertices.
+    /// Errors: positions, texture coordinates or colours that are not finite, no faces, no vertices.
     fn check(&self, contents: &mut Contents) -> Result<()> {
         let Contents { vertices, faces, notes } = contents;
         let count = vertices.positions.len();
@@ -131,17 +134,18 @@ impl Body<'_> {
         }
         let unusable = vertices.normals.iter().flatten().filter(|n| **n == Vec3::ZERO).count();
         notes.add_many(normals::UNUSABLE, unusable, None);
+        notes.add_many(colours::STRAYED, vertices.strayed_colours(), None);
         Ok(())
     }
 }
 
 fn build(
     path: &Path,
-    vertices: Vertices,
+    mut vertices: Vertices,
     faces: Faces,
     model: &mut Model,
 ) -> Result<Option<WorldMesh>> {
-    let mut positions = vertices.positions;
+    let mut positions = std::mem::take(&mut vertices.positions);
     let mut triangles = match faces {
         Faces::Triangles(triangles) => triangles,
         Faces::Polygons { indices, ends } => triangulate(&positions, &indices, &ends)
@@ -153,17 +157,19 @@ fn build(
         model.warnings.push(Diagnostic::new(path, "no triangle is left: nothing will be seen"));
         return Ok(None);
     }
-    let (mut normals, mut uvs) = (vertices.normals, vertices.uvs);
+    let Vertices { positions: _, mut normals, mut uvs, mut colours } = vertices;
     if let Some(kept) = tidy::used(positions.len(), &triangles) {
         tidy::retain(&mut positions, &kept);
         normals.iter_mut().for_each(|n| tidy::retain(n, &kept));
         uvs.iter_mut().for_each(|uv| tidy::retain(uv, &kept));
+        colours.iter_mut().for_each(|colours| tidy::retain(colours, &kept));
         tidy::renumber(&mut triangles, &kept);
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     Ok(Some(WorldMesh {
         normals: normals.map(|values| Corners { values, corners: None }),
         uvs: uvs.map(|values| Corners { values, corners: None }),
+        colours: colours.map(|shares| VertexColours::from_encoded(&shares)),
         ..WorldMesh::new(name, positions, triangles, 0)
     }))
 }

@@ -169,3 +169,37 @@ fn several_face_elements_join() {
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3]]);
     }
 }
+
+#[test]
+fn colours_of_every_type_read_alike_in_every_format() {
+    let header = |t: &str| {
+        format!(
+            "element vertex 3\nproperty float x\nproperty {t} diffuse_red\nproperty {t} diffuse_green\n\
+             property float y\nproperty float z\nproperty {t} diffuse_blue\n\
+             element face 1\nproperty list uchar int vertex_indices\n"
+        )
+    };
+    for (t, short, full) in [
+        ("uchar", "u1", 255.0),
+        ("ushort", "u2", 65_535.0),
+        ("int", "i4", 255.0),
+        ("double", "f8", 1.0),
+    ] {
+        let record = |p: [u32; 3], c: [f64; 3]| {
+            let [r, g, b] = c.map(|c| format!("{}:{short}", c * full));
+            format!("{}:f4 {r} {g} {}:f4 {}:f4 {b}", p[0], p[1], p[2])
+        };
+        let colours = [[1.0, 0.0, 0.2], [0.4, 1.0, 0.0], [0.6, 0.8, 1.0]];
+        let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]];
+        let records: Vec<String> =
+            corners.iter().zip(colours).map(|(p, c)| record(*p, c)).collect();
+        let mut records: Vec<&str> = records.iter().map(String::as_str).collect();
+        records.push("3:u1 0:i4 1:i4 2:i4");
+        for format in FORMATS {
+            let mesh = read_both(&encode(format, &header(t), &records));
+            let found = mesh.colours.expect("colours");
+            let expected = colours.map(|c| c.map(|c| (c * 255.0).round() as u8));
+            assert_eq!(found.codes(), Some(&expected[..]), "{t} {format}");
+        }
+    }
+}

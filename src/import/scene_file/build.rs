@@ -5,13 +5,12 @@ use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
 use super::report::Source;
-use super::texture::NamedTexture;
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::images::{ImageUse, Images};
 use crate::import::{self, Model, emission, untextured};
 use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Triangles that all generators of a scene file may make together: some 5 GB of memory, and as
@@ -73,34 +72,33 @@ impl<'a> Builder<'a> {
         Ok(this)
     }
 
-    /// Reads the images of all materials on all threads.
+    /// Reads the images of all materials on all threads. Those that may be meant for another use are warned of where
+    /// the scene file first names them.
     ///
     /// Errors: of those that cannot be read, the one that the scene file names first.
     fn read_images(&mut self, file: &SceneFile) -> Result<()> {
-        let keys = file.material.values().flat_map(|material| {
-            let texture = material.texture.iter().map(|key| (key, ImageUse::Texture));
-            texture.chain(material.alpha.iter().map(|key| (key, ImageUse::Mask)))
-        });
-        let mut keys: Vec<_> = keys
-            .map(|(key, what)| (NamedTexture::file(key), what))
-            .map(|(key, what)| (self.beside(&key), what, key))
-            .collect();
-        keys.sort_by_key(|(.., key)| key.span.start);
-        self.images.read(keys.iter().map(|(path, what, _)| (path.clone(), *what)));
-        for (path, what, key) in &keys {
+        let keys = file.material.values().flat_map(|material| material.images().all());
+        let mut keys: Vec<_> = keys.map(|(key, what)| ((self.beside(&key), what), key)).collect();
+        keys.sort_by_key(|(_, key)| key.span.start);
+        self.images.read(keys.iter().map(|(image, _)| image.clone()));
+        for ((path, what), key) in &keys {
             if let Some(error) = self.images.refusal(path, *what) {
                 return Err(self.at_key(key, error));
+            }
+        }
+        let mut seen = HashSet::new();
+        keys.retain(|(image, _)| seen.insert(image.clone()));
+        for ((path, what), key) in &keys {
+            if let Some(message) = self.images.doubt(path, *what, &self.world) {
+                self.warnings.push(self.source.fault(&key.span, message));
             }
         }
         Ok(())
     }
 
     fn add_material(&mut self, name: &'a str, material: &At<Material>) -> Result<()> {
-        let texture = material.texture.as_ref().map(NamedTexture::file);
-        let image = texture.map(|file| self.image(&file, ImageUse::Texture)).transpose()?;
-        let mask = material.alpha.as_ref().map(NamedTexture::file);
-        let mask = mask.map(|file| self.image(&file, ImageUse::Mask)).transpose()?;
-        let built = material.build(name, self.source, image, mask)?;
+        let images = material.images().try_map(|(file, what)| self.image(&file, what))?;
+        let built = material.build(name, self.source, &images)?;
         let id = self.world.materials.len() as MaterialId;
         self.world.materials.push(built);
         self.materials.insert(name, Named { id, span: material.span.clone(), used: false });
@@ -134,6 +132,9 @@ impl<'a> Builder<'a> {
         if let Some(id) = over {
             self.world.meshes[meshes..].iter_mut().for_each(|m| m.material = id);
             self.world.spheres[spheres..].iter_mut().for_each(|s| s.material = id);
+            if !self.world.materials[id as usize].vertex_colours {
+                self.world.meshes[meshes..].iter_mut().for_each(|m| m.colours = None);
+            }
         }
         self.world.meshes[meshes..].iter_mut().for_each(|m| m.always_traced = !mesh.reuse);
         self.world.spheres[spheres..].iter_mut().for_each(|s| s.always_traced = !mesh.reuse);
@@ -148,7 +149,7 @@ impl<'a> Builder<'a> {
     /// Whether the material has an image to lay on.
     fn is_textured(&self, id: MaterialId) -> bool {
         let material = &self.world.materials[id as usize];
-        material.texture.is_some() || material.alpha.is_some()
+        material.has_image() || material.alpha.is_some()
     }
 
     fn add_sphere(&mut self, sphere: &At<Sphere>) -> Result<()> {
@@ -161,6 +162,10 @@ impl<'a> Builder<'a> {
         let (centre, radius) = (sphere.centre.vec(), sphere.radius.0);
         let always_traced = !sphere.reuse;
         self.world.spheres.push(WorldSphere { name, centre, radius, material, always_traced });
+        if self.world.materials[material as usize].vertex_colours {
+            let message = "an exact sphere has no vertex colours: it shows `diffuse` as it is";
+            self.warnings.push(self.source.fault(&sphere.span, message));
+        }
         self.light_up(meshes, spheres, &sphere.span);
         Ok(())
     }

@@ -1,12 +1,13 @@
 //! `[material.NAME]`.
 
 use super::at::At;
-use super::number::{Int, Ior, Share};
+use super::number::{Int, Ior};
 use super::report::Source;
-use super::texture::NamedTexture;
+use super::texture::{ImageTable, Named, NamedTexture, NormalTexture, Roughness};
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
-use crate::scene::{self, MaskId, TextureId};
+use crate::import::images::ImageUse;
+use crate::scene;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -16,19 +17,27 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Material {
     /// Diffuse reflectance (albedo), linear RGB or one number for grey. Absent: 0, or 1 where
-    /// there is a `texture`.
+    /// there is a `texture` or `vertex_colours`.
     pub diffuse: Option<Reflectance>,
     /// Image file, relative to the scene file, that multiplies `diffuse`; or a table of the file and how it
     /// lies on the surface.
     pub texture: Option<At<NamedTexture>>,
+    /// Image file, relative to the scene file, of normals of a finer surface: in tangent space, +Y up, as glTF has them. Or a
+    /// table of the file, the strength and how it lies on the surface. Not on glass.
+    pub normal_map: Option<At<Named<NormalTexture>>>,
+    /// Whether `diffuse` is multiplied by the vertex colours of the mesh file. Without a `material` of the scene file
+    /// a mesh shows its vertex colours anyway.
+    #[serde(default)]
+    pub vertex_colours: bool,
     /// Image file, relative to the scene file, of cut-outs such as leaves and fences: where it is below a half,
     /// the surface is not there. Its alpha channel counts if that is not opaque all over, else the mean of its
     /// colours, as stored. Or a table of the file and how it lies on the surface. Not on glass.
     pub alpha: Option<At<NamedTexture>>,
     /// Reflectance of a mirror, linear RGB or one number for grey. Absent: 0.
     pub mirror: Option<At<Reflectance>>,
-    /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte.
-    roughness: Option<At<Share>>,
+    /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte. Or an image file of it, relative to
+    /// the scene file, whose green counts as it stands; or a table of the file, the channel and how it lies on the surface.
+    pub roughness: Option<At<Roughness>>,
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
@@ -62,18 +71,55 @@ pub(super) struct Glass {
     thin: bool,
 }
 
+/// Something of each image of a material.
+pub(super) struct ImagesOf<T> {
+    texture: Option<T>,
+    normals: Option<T>,
+    alpha: Option<T>,
+    roughness: Option<T>,
+}
+
+impl<T> ImagesOf<T> {
+    /// What `of` makes of each, in order; the first error, if any.
+    pub fn try_map<U>(self, mut of: impl FnMut(T) -> Result<U>) -> Result<ImagesOf<U>> {
+        Ok(ImagesOf {
+            texture: self.texture.map(&mut of).transpose()?,
+            normals: self.normals.map(&mut of).transpose()?,
+            alpha: self.alpha.map(&mut of).transpose()?,
+            roughness: self.roughness.map(&mut of).transpose()?,
+        })
+    }
+
+    /// All that there are.
+    pub fn all(self) -> impl Iterator<Item = T> {
+        let Self { texture, normals, alpha, roughness } = self;
+        [texture, normals, alpha, roughness].into_iter().flatten()
+    }
+}
+
 fn window_glass() -> Ior {
     Ior(1.5)
 }
 
 impl Material {
-    /// As scene data; `image` and `mask` are the indices of the decoded images.
+    /// The files of its images, with what they serve as.
+    pub fn images(&self) -> ImagesOf<(At<String>, ImageUse)> {
+        let roughness = self.roughness.as_ref().and_then(At::data_file);
+        let normal_map = self.normal_map.as_ref();
+        ImagesOf {
+            texture: self.texture.as_ref().map(|key| (key.image_file(), ImageUse::Colour)),
+            normals: normal_map.map(|key| (key.image_file(), ImageUse::Normals)),
+            alpha: self.alpha.as_ref().map(|key| (key.image_file(), ImageUse::Mask)),
+            roughness: roughness.map(|(file, channel)| (file, ImageUse::Data(channel))),
+        }
+    }
+
+    /// As scene data; `images` are the world's numbers of [`images`](Self::images).
     pub fn build(
         &self,
         name: &str,
         source: &Source,
-        image: Option<TextureId>,
-        mask: Option<MaskId>,
+        images: &ImagesOf<u32>,
     ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
@@ -83,13 +129,25 @@ impl Material {
             priority: g.priority.as_ref().map(|p| p.u32() as u8),
             thin: g.thin,
         });
+        let ImagesOf { texture, normals, alpha, roughness } = images;
+        let (roughness, roughness_map) = match (self.roughness.as_deref(), roughness) {
+            (Some(Roughness::Same(share)), _) => (share.0, None),
+            (Some(Roughness::Image(Named(table))), Some(id)) => (1.0, Some(table.map(*id))),
+            (Some(Roughness::Image(_)), None) | (None, _) => (0.0, None),
+        };
         Ok(scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
-            texture: self.texture.as_ref().zip(image).map(|(texture, id)| texture.build(id)),
-            alpha: self.alpha.as_ref().zip(mask).map(|(alpha, id)| alpha.build(id)),
+            texture: self.texture.as_ref().zip(*texture).map(|(texture, id)| texture.0.map(id)),
+            normal_map: self.normal_map.as_ref().zip(*normals).map(|(table, id)| {
+                let (image, strength) = (table.0.map(id), table.0.strength.0.0);
+                scene::NormalMap { image, strength }
+            }),
+            vertex_colours: self.vertex_colours,
+            alpha: self.alpha.as_ref().zip(*alpha).map(|(alpha, id)| alpha.0.map(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
-            roughness: self.roughness.as_ref().map_or(0.0, |r| r.0),
+            roughness,
+            roughness_map,
             glass,
             emission: self.emission.unwrap_or_default().rgb(),
             emits_back: self.emits_back,
@@ -97,7 +155,8 @@ impl Material {
     }
 
     fn albedo(&self) -> Option<Reflectance> {
-        self.diffuse.or_else(|| self.texture.as_ref().map(|_| Reflectance::white()))
+        let paints = self.texture.is_some() || self.vertex_colours;
+        self.diffuse.or_else(|| paints.then(Reflectance::white))
     }
 
     fn check(&self, source: &Source) -> Result<()> {
@@ -113,10 +172,16 @@ impl Material {
                     "glass has no cut-outs: its body is closed, and a hole would leave it open";
                 return Err(source.fault(&alpha.span, message).into());
             }
-            let others = self.diffuse.is_some() || self.texture.is_some() || self.mirror.is_some();
+            if let Some(map) = &self.normal_map {
+                let message =
+                    "glass has no normal map: what it refracts follows the surface that rays meet";
+                return Err(source.fault(&map.span, message).into());
+            }
+            let paints = self.texture.is_some() || self.vertex_colours;
+            let others = self.diffuse.is_some() || paints || self.mirror.is_some();
             if others || self.emission.is_some() {
                 let message = "glass stands alone: a material that has it has neither `diffuse`, \
-                               `texture`, `mirror` nor `emission`";
+                               `texture`, `vertex_colours`, `mirror` nor `emission`";
                 return Err(source.fault(&glass.span, message).into());
             }
         }

@@ -1,35 +1,128 @@
-//! `texture` of a material.
+//! Images of a material.
 
 use super::at::At;
-use super::number::{Coordinate, Degrees, Factor};
+use super::number::{Coordinate, Degrees, Factor, NotNegative, Share};
 use super::schema::inline_schema;
 use super::vector::{List, OneOr};
+use crate::import::texture::ImageChannel;
 use crate::math::{DAffine2, DVec2};
 use crate::scene::{TextureId, TextureMap, Wrap};
 use schemars::{JsonSchema, json_schema};
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Deserializer, Error, MapAccess, Visitor};
+use serde::de::{Deserializer, Error, IntoDeserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::marker::PhantomData;
 
-/// An image file, and how it lies on the surface.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a file name or a table")]
-pub(super) struct Texture {
-    /// Image file, relative to the scene file.
-    file: String,
-    /// What is seen beyond the image's edges.
-    #[serde(default)]
-    wrap: Wrapping,
-    /// Factors on the texture coordinates, or one for both: with `[2, 3]` the image is seen twice side by side and three times one over the other.
-    #[serde(default = "unscaled")]
-    scale: OneOr<Factor, 2>,
-    /// Turn of the texture coordinates about (0, 0), degrees, counter-clockwise; after `scale`.
-    #[serde(default = "unturned")]
-    rotate: Degrees,
-    /// Added to the texture coordinates; after `scale` and `rotate`.
-    #[serde(default = "at_zero")]
-    offset: List<Coordinate, 2>,
+/// A table of an image file and how it lies on the surface, with keys of its own after these.
+macro_rules! image_table {
+    ($(#[$doc:meta])* $name:ident { $($(#[$own_doc:meta])* $own:ident: $type:ty,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields, expecting = "a file name or a table")]
+        pub(super) struct $name {
+            /// Image file, relative to the scene file.
+            file: String,
+            /// What is seen beyond the image's edges.
+            #[serde(default)]
+            wrap: Wrapping,
+            /// Factors on the texture coordinates, or one for both: with `[2, 3]` the image is seen twice side by side and three times one over the other.
+            #[serde(default = "unscaled")]
+            scale: OneOr<Factor, 2>,
+            /// Turn of the texture coordinates about (0, 0), degrees, counter-clockwise; after `scale`.
+            #[serde(default = "unturned")]
+            rotate: Degrees,
+            /// Added to the texture coordinates; after `scale` and `rotate`.
+            #[serde(default = "at_zero")]
+            offset: List<Coordinate, 2>,
+            $($(#[$own_doc])* #[serde(default)] pub $own: $type,)*
+        }
+
+        impl ImageTable for $name {
+            fn of_file(file: String) -> Self {
+                let (wrap, scale, rotate, offset) = (Wrapping::Repeat, unscaled(), unturned(), at_zero());
+                Self { file, wrap, scale, rotate, offset, $($own: Default::default(),)* }
+            }
+
+            fn file(&self) -> &str {
+                &self.file
+            }
+
+            fn map(&self, image: TextureId) -> TextureMap {
+                map(image, self.wrap, (&self.scale, self.rotate, &self.offset))
+            }
+        }
+    };
+}
+
+image_table!(
+    /// An image file, and how it lies on the surface.
+    Texture {}
+);
+image_table!(
+    /// An image file of numbers, and how it lies on the surface.
+    DataTexture {
+        /// Where the numbers are: in red, green, blue or alpha.
+        channel: ChannelName,
+    }
+);
+
+image_table!(
+    /// An image file of normals in tangent space, and how it lies on the surface.
+    NormalTexture {
+        /// Factor on the normals' parts along the surface: 0 is flat, 1 what the image holds.
+        strength: Strength,
+    }
+);
+
+/// Factor on a normal map.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub(super) struct Strength(pub NotNegative);
+
+impl Default for Strength {
+    fn default() -> Self {
+        Self(NotNegative(1.0))
+    }
+}
+
+/// A channel of an image.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
+pub(super) enum ChannelName {
+    /// Red.
+    #[serde(rename = "r")]
+    Red,
+    /// Green, where glTF has the roughness.
+    #[default]
+    #[serde(rename = "g")]
+    Green,
+    /// Blue.
+    #[serde(rename = "b")]
+    Blue,
+    /// Alpha.
+    #[serde(rename = "a")]
+    Alpha,
+}
+
+impl ChannelName {
+    /// As the image's reader has it.
+    pub fn channel(self) -> ImageChannel {
+        match self {
+            Self::Red => ImageChannel::Red,
+            Self::Green => ImageChannel::Green,
+            Self::Blue => ImageChannel::Blue,
+            Self::Alpha => ImageChannel::Alpha,
+        }
+    }
+}
+
+/// What all tables of images have.
+pub(super) trait ImageTable {
+    /// The table with the file alone.
+    fn of_file(file: String) -> Self;
+    fn file(&self) -> &str;
+    /// As scene data, with the decoded image's index.
+    fn map(&self, image: TextureId) -> TextureMap;
 }
 
 /// What is seen beyond the edges of an image.
@@ -57,59 +150,120 @@ fn at_zero() -> List<Coordinate, 2> {
     List([Coordinate(0.0); 2])
 }
 
-/// A [`Texture`], of which the file's name alone may stand for all.
+fn map(
+    image: TextureId,
+    wrap: Wrapping,
+    (scale, rotate, offset): (&OneOr<Factor, 2>, Degrees, &List<Coordinate, 2>),
+) -> TextureMap {
+    let scale = DVec2::from_array(scale.0.map(|s| s.0));
+    let offset = DVec2::from_array(offset.0.map(|o| o.0));
+    let wrap = match wrap {
+        Wrapping::Repeat => Wrap::Repeat,
+        Wrapping::Clamp => Wrap::Clamp,
+        Wrapping::Mirror => Wrap::Mirror,
+    };
+    let angle = rotate.0.to_radians();
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let axes = [DVec2::new(cos, sin) * scale.x, DVec2::new(-sin, cos) * scale.y];
+    TextureMap { image, wrap, transform: DAffine2::from_cols(axes[0], axes[1], offset) }
+}
+
+/// A table, of which the file's name alone may stand for all.
 #[derive(Debug, Clone)]
-pub(super) struct NamedTexture(Texture);
+pub(super) struct Named<T>(pub T);
 
-impl NamedTexture {
+pub(super) type NamedTexture = Named<Texture>;
+
+impl<T: ImageTable> At<Named<T>> {
     /// The image's file at the place of the whole value.
-    pub fn file(this: &At<Self>) -> At<String> {
-        At { value: this.0.file.clone(), span: this.span.clone() }
-    }
-
-    /// As scene data, with the decoded image's index.
-    pub fn build(&self, image: TextureId) -> TextureMap {
-        let Texture { file: _, wrap, scale, rotate, offset } = &self.0;
-        let scale = DVec2::from_array(scale.0.map(|s| s.0));
-        let offset = DVec2::from_array(offset.0.map(|o| o.0));
-        let wrap = match wrap {
-            Wrapping::Repeat => Wrap::Repeat,
-            Wrapping::Clamp => Wrap::Clamp,
-            Wrapping::Mirror => Wrap::Mirror,
-        };
-        let angle = rotate.0.to_radians();
-        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-        let axes = [DVec2::new(cos, sin) * scale.x, DVec2::new(-sin, cos) * scale.y];
-        TextureMap { image, wrap, transform: DAffine2::from_cols(axes[0], axes[1], offset) }
+    pub fn image_file(&self) -> At<String> {
+        At { value: self.value.0.file().to_owned(), span: self.span.clone() }
     }
 }
 
-struct NamedTextureVisitor;
+struct NamedVisitor<T>(PhantomData<T>);
 
-impl<'de> Visitor<'de> for NamedTextureVisitor {
-    type Value = NamedTexture;
+impl<'de, T: ImageTable + Deserialize<'de>> Visitor<'de> for NamedVisitor<T> {
+    type Value = Named<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a file name or a table")
     }
 
-    fn visit_str<E: Error>(self, file: &str) -> Result<NamedTexture, E> {
-        let (wrap, scale, rotate, offset) = (Wrapping::Repeat, unscaled(), unturned(), at_zero());
-        Ok(NamedTexture(Texture { file: file.to_owned(), wrap, scale, rotate, offset }))
+    fn visit_str<E: Error>(self, file: &str) -> Result<Named<T>, E> {
+        Ok(Named(T::of_file(file.to_owned())))
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<NamedTexture, A::Error> {
-        Texture::deserialize(MapAccessDeserializer::new(map)).map(NamedTexture)
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Named<T>, A::Error> {
+        T::deserialize(MapAccessDeserializer::new(map)).map(Named)
     }
 }
 
-impl<'de> Deserialize<'de> for NamedTexture {
+impl<'de, T: ImageTable + Deserialize<'de>> Deserialize<'de> for Named<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(NamedTextureVisitor)
+        deserializer.deserialize_any(NamedVisitor(PhantomData))
     }
 }
 
-inline_schema!(NamedTexture, |generator| {
-    let table = generator.subschema_for::<Texture>();
+inline_schema!(for [T: JsonSchema] Named<T>, |generator| {
+    let table = generator.subschema_for::<T>();
     json_schema!({ "anyOf": [{ "type": "string" }, table] })
+});
+
+/// A roughness: the same everywhere, or from an image.
+#[derive(Debug, Clone)]
+pub(super) enum Roughness {
+    Same(Share),
+    Image(Named<DataTexture>),
+}
+
+impl At<Roughness> {
+    /// The image's file at the place of the whole value, and the channel of it.
+    pub fn data_file(&self) -> Option<(At<String>, ImageChannel)> {
+        match &self.value {
+            Roughness::Same(_) => None,
+            Roughness::Image(Named(table)) => {
+                let file = At { value: table.file().to_owned(), span: self.span.clone() };
+                Some((file, table.channel.channel()))
+            }
+        }
+    }
+}
+
+struct RoughnessVisitor;
+
+impl<'de> Visitor<'de> for RoughnessVisitor {
+    type Value = Roughness;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number from 0 to 1, a file name or a table")
+    }
+
+    fn visit_f64<E: Error>(self, x: f64) -> Result<Roughness, E> {
+        Share::deserialize(x.into_deserializer()).map(Roughness::Same)
+    }
+
+    fn visit_i64<E: Error>(self, x: i64) -> Result<Roughness, E> {
+        Share::deserialize(x.into_deserializer()).map(Roughness::Same)
+    }
+
+    fn visit_str<E: Error>(self, file: &str) -> Result<Roughness, E> {
+        NamedVisitor(PhantomData).visit_str(file).map(Roughness::Image)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Roughness, A::Error> {
+        NamedVisitor(PhantomData).visit_map(map).map(Roughness::Image)
+    }
+}
+
+impl<'de> Deserialize<'de> for Roughness {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(RoughnessVisitor)
+    }
+}
+
+inline_schema!(Roughness, |generator| {
+    let (number, image) =
+        (generator.subschema_for::<Share>(), generator.subschema_for::<DataTexture>());
+    json_schema!({ "anyOf": [number, { "type": "string" }, image] })
 });

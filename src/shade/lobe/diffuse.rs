@@ -1,6 +1,6 @@
 //! Diffuse reflection: light sent out alike in all directions (Lambert, 1760).
 
-use crate::intersect::SurfaceInteraction;
+use crate::intersect::{SurfaceInteraction, corner_weights};
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Material, Scene};
 use crate::shade::cone::RayCone;
@@ -12,7 +12,8 @@ pub(in crate::shade) fn is_diffuse(material: &Material) -> bool {
     material.diffuse != Rgb::ZERO
 }
 
-/// The share of irradiance that is sent out at `si` towards `wo` (unit), the texture's mean over the ray's `cone` included.
+/// The share of irradiance that is sent out at `si` towards `wo` (unit), the texture's mean over the ray's `cone` and
+/// the vertex colours included.
 pub(in crate::shade) fn albedo(
     scene: &Scene,
     material: &Material,
@@ -20,7 +21,31 @@ pub(in crate::shade) fn albedo(
     wo: DVec3,
     cone: RayCone,
 ) -> Rgb {
-    let Some(map) = &material.texture else { return material.diffuse };
-    let footprint = cone.footprint(scene, si, wo);
-    material.diffuse * texture::mapped(scene, map, si.uv, footprint)
+    if !(material.texture.is_some() | material.vertex_colours) {
+        return material.diffuse;
+    }
+    painted(scene, material, si, wo, cone)
+}
+
+/// [`albedo`] where it differs from place to place.
+fn painted(
+    scene: &Scene,
+    material: &Material,
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
+) -> Rgb {
+    let mut albedo = material.diffuse;
+    if let Some(map) = &material.texture {
+        let footprint = cone.footprint(scene, si, wo);
+        albedo *= texture::mapped(scene, map, si.uv, footprint);
+    }
+    // No sphere has any.
+    let mesh = scene.meshes.get(si.prim.geom_id as usize);
+    if let Some((mesh, colours)) = mesh.and_then(|m| m.colours.as_ref().map(|c| (m, c))) {
+        let prim = si.prim.prim_id as usize;
+        let weights = corner_weights(mesh.corners(prim), si.p);
+        albedo *= colours.between(mesh.triangles[prim], weights);
+    }
+    albedo
 }

@@ -1,9 +1,12 @@
 //! Rough mirrors: glossy reflection.
 
 use super::Scattered;
+use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::to_world;
-use crate::shade::optics;
+use crate::scene::{Material, Scene};
+use crate::shade::cone::RayCone;
+use crate::shade::{optics, texture};
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
@@ -72,6 +75,22 @@ impl Glossy {
         let cos_m = ((cos_o + cos_i) / (wo + wi).length()).min(1.0);
         (!(cos_o <= 0.0 || cos_i <= 0.0)).then_some([cos_o, cos_i, cos_m])
     }
+}
+
+/// Roughness of the mirror at `si` as seen towards `wo` (unit), the map's mean over the ray's `cone` included.
+pub(super) fn roughness(
+    scene: &Scene,
+    material: &Material,
+    si: &SurfaceInteraction,
+    wo: DVec3,
+    cone: RayCone,
+) -> f64 {
+    let Some(map) = &material.roughness_map else { return material.roughness };
+    let footprint = cone.footprint(scene, si, wo);
+    let share = f64::from(texture::mapped(scene, map, si.uv, footprint).x);
+    // An image made in code may hold any number. Not `min`, which would hide what is NaN.
+    let share = if share > 1.0 { 1.0 } else { share };
+    material.roughness * share
 }
 
 /// Density of microfacet normals at the cosine `cos` to the surface's, per steradian.

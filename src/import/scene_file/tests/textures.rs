@@ -142,12 +142,17 @@ fn one_number_scales_both_axes() {
     let scaled = |scale: &str| {
         let text = format!(
             "[material.leaf]\ntexture = {{ file = 'leaf.pgm', scale = {scale} }}\n\
-             alpha = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             alpha = {{ file = 'leaf.pgm', scale = {scale} }}\nmirror = 0.5\ndiffuse = 0.5\n\
+             roughness = {{ file = 'leaf.pgm', scale = {scale} }}\n\
+             normal_map = {{ file = 'leaf.pgm', scale = {scale} }}\n\
              [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'leaf'\n"
         );
         let material = cut(&text).expect("a scene").world.materials[0].clone();
-        assert_eq!(material.texture, material.alpha);
-        material.texture.expect("a texture").transform
+        let normals = material.normal_map.map(|map| map.image);
+        let maps = [material.texture, material.alpha, material.roughness_map, normals];
+        let [first, others @ ..] = maps.map(|map| map.expect("an image").transform);
+        assert_eq!(others, [first; 3]);
+        first
     };
     assert_eq!(scaled("2"), scaled("[2, 2]"));
     assert_eq!(scaled("-0.5"), scaled("[-0.5, -0.5]"));
@@ -179,6 +184,8 @@ fn of_several_images_that_are_not_to_be_had_the_first_in_the_file_is_named() {
         ("[material.z]\ntexture = 'none.png'\n[material.a]\nalpha = 'no.png'\n", "none.png"),
         ("[material.a]\nalpha = 'no.png'\ntexture = 'none.png'\n", "no.png"),
         ("[material.a]\nalpha = 'scene.toml'\ntexture = 'none.png'\n", "scene.toml"),
+        ("[material.z]\nroughness = 'no.png'\nmirror = 1\ntexture = 'none.png'\n", "no.png"),
+        ("[material.z]\nnormal_map = 'no.png'\n[material.a]\ntexture = 'none.png'\n", "no.png"),
     ] {
         let Err(Error::Input(fault)) = cut(text) else { panic!("{text}") };
         // The first line is the sky's.
@@ -244,4 +251,105 @@ fn glass_with_alpha_is_refused_at_the_key() {
     let Error::Input(fault) = error else { panic!("{error}") };
     assert_eq!(fault.line, Some(4));
     assert!(fault.message.contains("glass has no cut-outs"), "{fault}");
+}
+
+/// Loads a scene file with `text` beside images of one pixel: `grey.pgm`, of 16 bits, `rgba.png` and the normal `blue.png`.
+fn data(text: &str) -> Result<Loaded> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("grey.pgm"), b"P5 1 1 65535\n\x80\x00").expect("written");
+    let rgba = image::RgbaImage::from_pixel(1, 1, image::Rgba([10, 128, 30, 40]));
+    rgba.save(at("rgba.png")).expect("written");
+    let blue = image::RgbImage::from_pixel(1, 1, image::Rgb([128, 128, 255]));
+    blue.save(at("blue.png")).expect("written");
+    let text =
+        format!("[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n[material.m]\n{text}");
+    std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
+    load(&at("scene.toml"), &LoadOptions::default())
+}
+
+#[test]
+fn a_roughness_is_a_number_or_a_channel_of_an_image_as_it_stands() {
+    let of = |roughness: &str| {
+        let loaded = data(&format!("mirror = 0.5\nroughness = {roughness}\n")).expect("a scene");
+        let material = &loaded.world.materials[0];
+        let map = material.roughness_map;
+        let texel =
+            map.map(|map| loaded.world.textures[map.image as usize].levels()[0].texel(0, 0).x);
+        (material.roughness, texel)
+    };
+    assert_eq!(of("0.25"), (0.25, None));
+    assert_eq!(of("1"), (1.0, None));
+    for (roughness, code) in [
+        ("'rgba.png'", 128.0),
+        ("{ file = 'rgba.png', wrap = 'clamp' }", 128.0),
+        ("{ file = 'rgba.png', channel = 'r' }", 10.0),
+        ("{ file = 'rgba.png', channel = 'b' }", 30.0),
+        ("{ file = 'rgba.png', channel = 'a' }", 40.0),
+    ] {
+        assert_eq!(of(roughness), (1.0, Some(code / 255.0)), "{roughness}");
+    }
+    assert_eq!(of("'grey.pgm'"), (1.0, Some(f32::from(0x8000u16) / 65_535.0)));
+}
+
+#[test]
+fn one_file_as_colour_and_as_data_is_two_images() {
+    let text = "diffuse = 0.5\ntexture = 'rgba.png'\nmirror = 0.5\nroughness = 'rgba.png'\n\
+                [material.n]\nmirror = 0.5\nroughness = { file = 'rgba.png', scale = 2 }\n";
+    let loaded = data(text).expect("a scene");
+    let [colour, rough] = &loaded.world.textures[..] else { panic!("two images") };
+    assert!(colour.levels()[0].texel(0, 0).y < 0.22 && rough.levels()[0].texel(0, 0).y > 0.5);
+    assert_eq!(loaded.files.len(), 2, "the scene file and the image");
+}
+
+#[test]
+fn an_image_that_two_materials_misuse_is_doubted_once_where_the_file_first_names_it() {
+    let text = "normal_map = 'rgba.png'\n[material.a]\nnormal_map = 'rgba.png'\n";
+    let loaded = data(text).expect("a scene");
+    let doubts =
+        loaded.warnings.iter().filter(|w| w.message.contains("not look like a normal map"));
+    // Lines 1 to 6 are the sky's, the sphere's and the material's name.
+    assert_eq!(doubts.map(|doubt| doubt.line).collect::<Vec<_>>(), [Some(7)]);
+}
+
+#[test]
+fn roughness_from_what_is_no_image_of_it_is_refused_at_its_place() {
+    for (roughness, expected) in [
+        ("{ file = 'grey.pgm', channel = 'a' }", "no alpha channel"),
+        ("{ file = 'rgba.png', channel = 'luma' }", "luma"),
+        ("{ file = 'gone.png' }", "gone.png"),
+        ("{ channel = 'r' }", "file"),
+        ("1.5", "a number from 0 to 1"),
+        ("-1", "a number from 0 to 1"),
+        ("true", "a number from 0 to 1, a file name or a table"),
+    ] {
+        let error = data(&format!("mirror = 0.5\nroughness = {roughness}\n")).expect_err("refused");
+        assert!(error.to_string().contains(expected), "{roughness}: {error}");
+    }
+    let error = data("diffuse = 0.5\nroughness = 'rgba.png'\n").expect_err("refused");
+    assert!(error.to_string().contains("needs `mirror`"), "{error}");
+}
+
+#[test]
+fn a_normal_map_has_a_strength_and_is_doubted_if_it_holds_no_normals() {
+    let of = |map: &str| {
+        let loaded = data(&format!("diffuse = 0.5\nnormal_map = {map}\n")).expect("a scene");
+        let strength = loaded.world.materials[0].normal_map.expect("a normal map").strength;
+        let warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+        (strength, warnings.join(" "))
+    };
+    assert_eq!(of("'blue.png'"), (1.0, String::new()));
+    assert_eq!(of("{ file = 'blue.png', strength = 0.25, scale = [2, 2] }"), (0.25, String::new()));
+    let (_, warnings) = of("'rgba.png'");
+    assert!(warnings.contains("does not look like a normal map"), "{warnings}");
+    let shown = data("texture = 'blue.png'\n").expect("a scene");
+    assert!(shown.warnings[0].message.contains("looks like a normal map"), "{:?}", shown.warnings);
+    for (text, expected) in [
+        ("diffuse = 0.5\nnormal_map = { file = 'blue.png', strength = -1 }\n", "from 0 to 1e30"),
+        ("diffuse = 0.5\nnormal_map = 3\n", "a file name or a table"),
+        ("glass = {}\nnormal_map = 'blue.png'\n", "glass has no normal map"),
+    ] {
+        let error = data(text).expect_err("refused").to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
 }
