@@ -115,7 +115,12 @@ impl EffectPlan {
             glass: decide(
                 "glass",
                 used.glass > 0 && bounces > 0,
-                format!("{} in use, {}", counted(used.glass, "glass material"), bounced),
+                format!(
+                    "{} in use{}, {}",
+                    counted(used.glass, "glass material"),
+                    used.panes(),
+                    bounced
+                ),
             ),
             nested_glass: decide(
                 "nested glass",
@@ -271,6 +276,7 @@ struct UsedMaterials {
     mirror: usize,
     glossy: usize,
     glass: usize,
+    thin: usize,
     ranked: usize,
     absorbing: usize,
     /// With any image but a mask.
@@ -282,6 +288,14 @@ struct UsedMaterials {
 }
 
 impl UsedMaterials {
+    /// How many of the glass materials are thin panes, in words; empty if none is.
+    fn panes(&self) -> String {
+        match self.thin {
+            0 => String::new(),
+            thin => format!(" ({thin} thin)"),
+        }
+    }
+
     fn of(scene: &Scene) -> Self {
         let mut used = vec![false; scene.materials.len()];
         let surfaces = scene.meshes.iter().map(|m| m.surface);
@@ -297,6 +311,7 @@ impl UsedMaterials {
             counts.glass += usize::from(material.glass.is_some());
             let glass =
                 |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));
+            counts.thin += glass(|glass| glass.thin);
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
             counts.textured += usize::from(material.has_image());

@@ -10,7 +10,7 @@ use tweenray::film::Film;
 use tweenray::math::{DAffine2, DVec2, DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, DirectionalLight, IntersectorKind, Light, Material, NormalMap, PointLight, QuadLight,
-    Sky, SphereLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
+    Sky, SphereLight, Texture, TextureMap, World, WorldMesh, WorldSphere, Wrap,
 };
 
 const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
@@ -234,6 +234,18 @@ fn strength_and_placement_count() {
         map.image.transform = DAffine2::from_scale(DVec2::new(-3.0, 1.0));
     };
     is_that_of(lit(n, &mirrored), DVec3::new(-0.5, 1.0, 0.0));
+    let within = |place| DAffine2::from_scale_angle_translation(DVec2::splat(0.01), 0.0, place);
+    // The second copy of an image that is mirrored at its edges.
+    let second = |map: &mut NormalMap| {
+        map.image.wrap = Wrap::Mirror;
+        map.image.transform = within(DVec2::new(1.5, 0.5));
+    };
+    is_that_of(lit(n, &second), DVec3::new(-0.5, 1.0, 0.0));
+    let third = |map: &mut NormalMap| {
+        map.image.wrap = Wrap::Mirror;
+        map.image.transform = within(DVec2::new(2.5, -3.5));
+    };
+    is_that_of(lit(n, &third), DVec3::new(0.5, 1.0, 0.0));
 }
 
 /// On an exact sphere u grows with the longitude, v with the latitude.

@@ -1,10 +1,11 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{AlphaMask, Material, TextureMap, World, WorldMesh};
+use super::{AlphaMask, Glass, Material, TextureMap, World, WorldMesh};
 use crate::error::{Error, Result};
+use crate::math::Rgb;
 
 impl World {
-    /// Refuses indices of materials, textures, masks and vertices that there are not, glass with cut-outs, and lights and
+    /// Refuses indices of materials, textures, masks and vertices that there are not, glass with cut-outs, thin glass with an inside, and lights and
     /// spheres whose place is no number: no bounds would hold them. (The numbers of meshes are finite by
     /// invariant.)
     pub(super) fn check(&self) -> Result<()> {
@@ -21,6 +22,7 @@ impl World {
             material.texture.as_ref().map(|map| of(map, "texture")).transpose()?;
             material.roughness_map.as_ref().map(|map| of(map, "roughness map")).transpose()?;
             self.check_normal_map(material)?;
+            check_pane(material)?;
             self.check_mask(material)
         })?;
         self.meshes.iter().try_for_each(check_vertices)?;
@@ -72,6 +74,21 @@ impl World {
         match self.spheres.iter().find(|s| !(s.centre.is_finite() && s.radius.is_finite())) {
             Some(sphere) => what(&format!("`{}`", sphere.name)),
             None => Ok(()),
+        }
+    }
+}
+
+/// A thin pane has no inside that a priority or absorption could be of.
+fn check_pane(material: &Material) -> Result<()> {
+    let is_body = |glass: &&Glass| glass.priority.is_some() || glass.absorption != Rgb::ZERO;
+    match material.glass.as_ref().filter(|glass| glass.thin).filter(is_body) {
+        None => Ok(()),
+        Some(_) => {
+            let message = format!(
+                "`{}` is thin glass with a priority or absorption, which bodies have",
+                material.name
+            );
+            Err(Error::Usage(message))
         }
     }
 }
@@ -165,5 +182,8 @@ mod tests {
         assert!(refusal(leaf, vec![short]).contains("`m` of 2 x 2 texels has 3"));
         let pane = Material { alpha: Some(TextureMap::of(0)), ..Material::glass("pane", 1.5) };
         assert!(refusal(pane, vec![mask]).contains("`pane` is glass with cut-outs"));
+        let pane = Glass { thin: true, priority: Some(1), ..Glass::clear(1.5) };
+        let pane = Material { glass: Some(pane), ..Material::black("pane") };
+        assert!(refusal(pane, vec![]).contains("`pane` is thin glass"));
     }
 }

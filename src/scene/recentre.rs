@@ -133,7 +133,8 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
     } = mesh;
     let made_of = &materials[material as usize];
     let colours = colours.filter(|_| made_of.vertex_colours);
-    if made_of.glass.is_some() {
+    // A thin pane has no inside.
+    if made_of.glass.as_ref().is_some_and(|glass| !glass.thin) {
         // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
         // would otherwise refract as a hole in glass.
         let mut volume = winding::closed_volume(&positions, &triangles);

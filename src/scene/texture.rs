@@ -425,6 +425,19 @@ mod tests {
     }
 
     #[test]
+    fn normals_are_told_from_greys_and_pale_colours() {
+        let looks = |texel: [u8; 3]| {
+            Texture::from_vectors8("t", [2, 2], vec![texel; 4]).looks_like_normals()
+        };
+        // Even, tilted by 45 degrees, and the steepest that count.
+        assert!(looks([128, 128, 255]) && looks([218, 128, 218 + 14]) && looks([128, 60, 235]));
+        for grey in 0..=255 {
+            assert!(!looks([grey; 3]), "{grey}");
+        }
+        assert!(!looks([200, 200, 208]) && !looks([210, 200, 200]) && !looks([0, 128, 128]));
+    }
+
+    #[test]
     fn every_level_has_the_mean_of_the_image() {
         for size in [[1, 1], [4, 4], [5, 3], [1, 7], [64, 10], [33, 17]] {
             let count = size[0] * size[1];

@@ -194,7 +194,8 @@ fn vertex_colours_multiply_kd_and_give_way_to_a_texture() {
     let model = read(&at("a.obj"), text.as_bytes()).expect("a good file");
     let shown = model.world.meshes.iter().map(|mesh| {
         let material = &model.world.materials[mesh.material as usize];
-        assert_eq!(material.vertex_colours, mesh.colours.is_some());
+        // Where they are not shown, a scene file's own material may still ask for them.
+        assert!(mesh.colours.is_some());
         (&mesh.name[..], material.vertex_colours, material.diffuse.x)
     });
     let expected = [
