@@ -59,6 +59,7 @@ impl EffectPlan {
         reasons.extend([
             cut_outs(scene, &used),
             vertex_colours(scene, &used),
+            fresnel(&used),
             roughness_maps(&used, settings),
             normal_maps(&used),
             EffectReason { effect: "smooth normals", runs: smooth > 0, why: normals },
@@ -197,6 +198,16 @@ fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
     EffectReason { effect: "alpha cut-outs", runs: cut > 0, why }
 }
 
+/// Whether reflection grows towards grazing angles.
+fn fresnel(used: &UsedMaterials) -> EffectReason {
+    let why = format!(
+        "{} in use, {} with a clear coat",
+        counted(used.fresnel, "principled material"),
+        used.coated
+    );
+    EffectReason { effect: "Fresnel reflection", runs: used.fresnel > 0, why }
+}
+
 /// Whether the roughness of mirrors is looked up in images.
 fn roughness_maps(used: &UsedMaterials, settings: &Settings) -> EffectReason {
     let why =
@@ -212,8 +223,7 @@ fn normal_maps(used: &UsedMaterials) -> EffectReason {
 }
 
 fn has_roughness_map(material: &Material) -> bool {
-    let is_rough = is_something(material.mirror) && material.roughness != 0.0;
-    is_rough && material.roughness_map.is_some()
+    material.is_mirror() && material.roughness != 0.0 && material.roughness_map.is_some()
 }
 
 /// Whether surfaces show colours of vertices, and how many.
@@ -275,6 +285,8 @@ struct UsedMaterials {
     diffuse: usize,
     mirror: usize,
     glossy: usize,
+    fresnel: usize,
+    coated: usize,
     glass: usize,
     thin: usize,
     ranked: usize,
@@ -304,10 +316,12 @@ impl UsedMaterials {
             .for_each(|s| used[s.material as usize] = true);
         let mut counts = Self::default();
         for (material, _) in scene.materials.iter().zip(&used).filter(|(_, used)| **used) {
-            counts.diffuse += usize::from(is_something(material.diffuse));
-            let mirror = usize::from(is_something(material.mirror));
-            *(if material.roughness == 0.0 { &mut counts.mirror } else { &mut counts.glossy }) +=
-                mirror;
+            counts.diffuse += usize::from(material.is_diffuse());
+            counts.glossy += usize::from(material.is_glossy());
+            counts.mirror += usize::from(material.is_mirror() && !material.is_glossy());
+            counts.fresnel += usize::from(material.fresnel.is_some());
+            let is_coated = material.fresnel.is_some_and(|fresnel| fresnel.clearcoat != 0.0);
+            counts.coated += usize::from(is_coated);
             counts.glass += usize::from(material.glass.is_some());
             let glass =
                 |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));

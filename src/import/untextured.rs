@@ -4,7 +4,7 @@
 //! A warning, not an error: files whose materials name images for faces without coordinates are common,
 //! and the rest of the picture is right.
 
-use crate::scene::{Material, World, WorldMesh};
+use crate::scene::{Material, TextureMap, World, WorldMesh};
 
 /// A mesh, and what its material shows and it lacks.
 pub(super) struct Untextured {
@@ -13,11 +13,11 @@ pub(super) struct Untextured {
     lacks: Lacking,
 }
 
-/// What a mesh lacks: coordinates for an image, by the name of its file, or colours.
+/// What a mesh lacks: coordinates for an image, by the name of its file (of a share, after the key that it is of), or colours.
 enum Lacking {
     Texture(String),
     Mask(String),
-    Roughness(String),
+    Share(&'static str, String),
     Normals(String),
     Colours,
 }
@@ -31,16 +31,19 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
         let texture = texture.map(|map| world.textures[map.image as usize].name.clone());
         let mask = material.alpha.filter(|_| is_bare);
         let mask = mask.map(|map| world.masks[map.image as usize].name.clone());
-        let roughness = material.roughness_map.filter(|_| is_bare);
-        let roughness = roughness.map(|map| world.textures[map.image as usize].name.clone());
+        let share = |what, map: Option<TextureMap>| {
+            let map = map.filter(|_| is_bare)?;
+            Some(Lacking::Share(what, world.textures[map.image as usize].name.clone()))
+        };
+        let roughness = share("roughness", material.roughness_map);
+        let metallic = share("metallic", material.fresnel.and_then(|f| f.metallic_map));
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
-        let roughness = roughness.map(Lacking::Roughness);
         let normals = material.normal_map.filter(|_| is_bare);
         let normals = normals.map(|map| world.textures[map.image.image as usize].name.clone());
         let normals = normals.map(Lacking::Normals);
-        let lacking =
-            [texture.map(Lacking::Texture), mask.map(Lacking::Mask), roughness, normals, colours];
+        let (texture, mask) = (texture.map(Lacking::Texture), mask.map(Lacking::Mask));
+        let lacking = [texture, mask, roughness, metallic, normals, colours];
         lacking.into_iter().flatten().map(|lacks| Untextured::new(mesh, material, lacks))
     })
 }
@@ -62,8 +65,8 @@ impl Untextured {
                 "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` cuts \
                  nothing out of it"
             ),
-            Lacking::Roughness(file) => format!(
-                "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it has one roughness, \
+            Lacking::Share(what, file) => format!(
+                "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it has one `{what}`, \
                  that of the lower left corner of {file}"
             ),
             Lacking::Normals(file) => format!(
@@ -76,8 +79,8 @@ impl Untextured {
     }
 
     /// The help line.
-    pub fn help(&self) -> &'static str {
-        match self.lacks {
+    pub fn help(&self) -> String {
+        let help = match &self.lacks {
             Lacking::Texture(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without a texture"
@@ -90,13 +93,16 @@ impl Untextured {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without a `normal_map`"
             }
-            Lacking::Roughness(_) => {
-                "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it one `roughness`"
+            Lacking::Share(what, _) => {
+                return format!(
+                    "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it one `{what}`"
+                );
             }
             Lacking::Colours => {
                 "write the mesh with vertex colours (`v x y z r g b` in obj, `red`, `green` and `blue` in ply), or \
                  give it a material without `vertex_colours`"
             }
-        }
+        };
+        help.to_owned()
     }
 }

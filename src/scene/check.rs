@@ -21,6 +21,8 @@ impl World {
             let of = |map: &TextureMap, what| image_of(map, &self.textures, what, &material.name);
             material.texture.as_ref().map(|map| of(map, "texture")).transpose()?;
             material.roughness_map.as_ref().map(|map| of(map, "roughness map")).transpose()?;
+            let metal = material.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
+            metal.map(|map| of(map, "metallic map")).transpose()?;
             self.check_normal_map(material)?;
             check_pane(material)?;
             self.check_mask(material)

@@ -29,6 +29,9 @@ pub struct Material {
     pub roughness: f64,
     /// Image that multiplies `roughness`, of data from 0 to 1.
     pub roughness_map: Option<TextureMap>,
+    /// How the mirror's reflectance grows towards grazing angles, and what of the surface is metal. The mirror then takes
+    /// its share from the diffuse part. `None`: `mirror` at every angle, beside the diffuse part.
+    pub fresnel: Option<Fresnel>,
     /// Glass; then `diffuse` and `mirror` are zero.
     pub glass: Option<Glass>,
     /// Emitted radiance.
@@ -47,6 +50,23 @@ pub struct NormalMap {
     pub strength: f64,
 }
 
+/// Reflection that grows towards grazing angles, as of plastic, varnish and metal: over a diffuse part lies a mirror with the
+/// reflectance `mirror` at normal incidence, and over both, if anything, a clear coat. Shares are from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fresnel {
+    /// Reflectance at grazing angles, of what is no metal.
+    pub grazing: f64,
+    /// Share of the surface that is metal: it reflects `diffuse` (with texture and vertex colours) at normal incidence and
+    /// all light at grazing angles, and has no diffuse part.
+    pub metallic: f64,
+    /// Image that multiplies `metallic`, of data from 0 to 1.
+    pub metallic_map: Option<TextureMap>,
+    /// Share of the surface that lies under a clear coat.
+    pub clearcoat: f64,
+    /// Roughness of the clear coat.
+    pub clearcoat_roughness: f64,
+}
+
 impl Material {
     /// A material that reflects and emits nothing.
     pub fn black(name: impl Into<String>) -> Self {
@@ -60,6 +80,7 @@ impl Material {
             mirror: Rgb::ZERO,
             roughness: 0.0,
             roughness_map: None,
+            fresnel: None,
             glass: None,
             emission: Rgb::ZERO,
             emits_back: false,
@@ -78,18 +99,43 @@ impl Material {
 
     /// Whether its scattering is looked up in an image anywhere; cut-outs do not count.
     pub fn has_image(&self) -> bool {
-        self.texture.is_some() || self.roughness_map.is_some() || self.normal_map.is_some()
+        let is_metal_mapped = self.fresnel.is_some_and(|fresnel| fresnel.metallic_map.is_some());
+        let maps = [self.texture, self.roughness_map];
+        is_metal_mapped || self.normal_map.is_some() || maps.iter().any(Option::is_some)
     }
 
     /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
     pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
         let normals = self.normal_map.as_mut().map(|map| &mut map.image);
-        [self.texture.as_mut(), self.roughness_map.as_mut(), normals].into_iter().flatten()
+        let metal = self.fresnel.as_mut().and_then(|fresnel| fresnel.metallic_map.as_mut());
+        let maps = [self.texture.as_mut(), self.roughness_map.as_mut(), metal, normals];
+        maps.into_iter().flatten()
+    }
+
+    /// Whether any of the surface reflects light diffusely. What is NaN or negative goes on, to be counted at its pixel.
+    pub fn is_diffuse(&self) -> bool {
+        let is_metal = |f: &Fresnel| f.metallic == 1.0 && f.metallic_map.is_none();
+        self.diffuse != Rgb::ZERO && !self.fresnel.as_ref().is_some_and(is_metal)
+    }
+
+    /// Whether any of the surface is a mirror, perfect or rough.
+    pub fn is_mirror(&self) -> bool {
+        self.mirror != Rgb::ZERO
+            || self
+                .fresnel
+                .is_some_and(|f| f.grazing != 0.0 || f.metallic != 0.0 || f.clearcoat != 0.0)
+    }
+
+    /// Whether any mirror or coat of it is rough.
+    pub fn is_glossy(&self) -> bool {
+        let is_coat_rough = |f: Fresnel| f.clearcoat != 0.0 && f.clearcoat_roughness != 0.0;
+        self.is_mirror() && self.roughness != 0.0 || self.fresnel.is_some_and(is_coat_rough)
     }
 
     /// Whether the surface reflects any light; glass does not count.
     pub fn reflects(&self) -> bool {
-        self.diffuse.max_element() > 0.0 || self.mirror.max_element() > 0.0
+        let most = self.diffuse.max_element().max(self.mirror.max_element());
+        most > 0.0 || self.fresnel.is_some_and(|f| f.grazing > 0.0 || f.clearcoat > 0.0)
     }
 
     /// Emitted radiance towards the outside or inside.

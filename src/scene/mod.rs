@@ -43,7 +43,7 @@ pub use light::{
     SpotLight,
 };
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
-pub use material::{Glass, Material, MaterialId, NormalMap};
+pub use material::{Fresnel, Glass, Material, MaterialId, NormalMap};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
 pub use recentring::Recentring;

@@ -13,15 +13,16 @@ pub(super) const LENS: u32 = 1;
 /// The branch of a path that a camera ray is.
 pub(super) const ROOT: u32 = 1;
 
-/// The branch that the `child`th direction, 0 or 1, of a lobe leads to from the end of `branch`. The tree is at
+/// The branch that the `child`th direction, 0 or 1, of all lobes leads to from the end of `branch`. The tree is at
 /// most 31 deep before branches share dimensions.
 pub(super) fn branch(branch: u32, child: u32) -> u32 {
     branch.wrapping_mul(2) + child
 }
 
-/// The direction that a lobe at the end of a branch is sampled in: counted from above, where no light's are.
-pub(super) fn of_lobe(branch: u32) -> u32 {
-    u32::MAX - branch
+/// The direction that a lobe at the end of a branch is sampled in, of which the first is the `child`th of all: counted from
+/// above, where no light's are, those of a second lobe from the middle.
+pub(super) fn of_lobe(branch: u32, child: u32) -> u32 {
+    (u32::MAX >> child).wrapping_sub(branch)
 }
 
 /// A light as seen from the end of a branch of a path: `light` is its number among the scene's `lights`, the

@@ -9,7 +9,7 @@ use super::adaptive::Until;
 use super::cone::RayCone;
 use super::direct::{ShadowScratch, ShadowStarts};
 use super::highlight::GlossyPoint;
-use super::lobe::{self, Lobe, Scattered};
+use super::lobe::{self, Layers, Lobe, Scattered};
 use super::medium_stack::{self, Body, MediumStack};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
@@ -298,7 +298,7 @@ impl Vertex<'_, '_> {
                     };
                     let wo = -ray.dir.normalize();
                     let lobe = Lobe::Dielectric(boundary.lobe);
-                    self.scatter::<true>(&lobe, &boundary.surface, wo, &starts, &state);
+                    self.scatter::<true>((&lobe, 0), &boundary.surface, wo, &starts, &state);
                 }
                 return;
             }
@@ -344,8 +344,14 @@ impl Vertex<'_, '_> {
             tilted = SurfaceInteraction { ns, ..si };
             shaped = &tilted;
         }
-        if lobe::is_diffuse(material) {
-            let albedo = lobe::albedo(scene, material, &si, wo, state.cone);
+        let seen = (shaped, wo, state.cone);
+        let layers =
+            material.fresnel.as_ref().map(|fresnel| Layers::at(scene, (material, fresnel), seen));
+        if material.is_diffuse() {
+            let albedo = match &layers {
+                None => lobe::albedo(scene, material, &si, wo, state.cone),
+                Some(layers) => layers.albedo,
+            };
             let reflectance = state.throughput * albedo;
             let (met, place) = ((&si, ray, hit), state.place());
             self.lit.push(ShadingPoint::new(met, shaped.ns, wo, reflectance, place));
@@ -354,15 +360,15 @@ impl Vertex<'_, '_> {
             return;
         }
         let si = shaped;
-        let seen = (si, wo, state.cone);
-        lobe::for_each_directional::<MIRROR, GLASS>(scene, material, seen, |lobe| {
+        let what = (material, layers.as_ref());
+        lobe::for_each_directional::<MIRROR, GLASS>(scene, what, seen, |lobe, first| {
             let start = (si, inside);
             let behind = match lobe {
                 Lobe::Pane(_) => state.medium,
                 _ => si.is_outside(wo).then_some(si.surface.material),
             };
             let starts = Starts { reflected: start, transmitted: start, behind };
-            self.scatter::<NESTED>(&lobe, si, wo, &starts, state);
+            self.scatter::<NESTED>((&lobe, first), si, wo, &starts, state);
             if MIRROR && !lobe.is_delta() {
                 self.glossy.push(self.glossy_point(lobe, (si, ray, hit), wo, state));
             }
@@ -383,10 +389,10 @@ impl Vertex<'_, '_> {
         GlossyPoint { lobe, p, n, ng, wo, starts, throughput: state.throughput, place }
     }
 
-    /// Sends the rays that `lobe` scatters at the surface `si`.
+    /// Sends the rays that `lobe` scatters at the surface `si`, of which the first has the number `first` among all.
     fn scatter<const NESTED: bool>(
         &mut self,
-        lobe: &Lobe,
+        (lobe, first): (&Lobe, u32),
         si: &SurfaceInteraction,
         wo: DVec3,
         starts: &Starts,
@@ -394,10 +400,10 @@ impl Vertex<'_, '_> {
     ) {
         let outside = si.is_outside(wo);
         let sampler = self.pixels.path_sampler(state.pixel);
-        let u = || sampler.get2(state.sample, dimensions::of_lobe(state.branch));
+        let u = || sampler.get2(state.sample, dimensions::of_lobe(state.branch, first));
         let selection = self.input.selection.as_ref().filter(|_| !lobe.is_delta());
         let cell = selection.map_or(0, |selection| selection.cell(si.p));
-        for (child, scattered) in (0..).zip(lobe.sample(wo, si.ns, u)) {
+        for (child, scattered) in (first..).zip(lobe.sample(wo, si.ns, u)) {
             let Some(Scattered { wi: sent, share, tint, transmitted, pdf }) = scattered else {
                 continue;
             };

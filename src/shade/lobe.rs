@@ -6,6 +6,7 @@
 
 mod dielectric;
 mod diffuse;
+mod fresnel;
 mod glossy;
 mod mirror;
 
@@ -15,7 +16,9 @@ use crate::math::{DVec3, Rgb};
 use crate::scene::{Material, Scene};
 use crate::stats::RayKind;
 pub(super) use dielectric::{Dielectric, Pane};
-pub(super) use diffuse::{albedo, is_diffuse};
+pub(super) use diffuse::albedo;
+pub(super) use fresnel::Layers;
+use fresnel::Reflectance;
 use glossy::Glossy;
 use mirror::Mirror;
 
@@ -45,29 +48,52 @@ pub(super) struct Scattered {
 }
 
 /// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving) by a ray with this cone, that
-/// depends on the direction. Lobes that the kernel leaves out, since no material of the scene has them, cost nothing.
+/// depends on the direction, and the number of its first direction among those of all. `layers` are the material's there, if
+/// its reflectance grows towards grazing angles. Lobes that the kernel leaves out, since no material of the scene has them,
+/// cost nothing.
 #[inline(always)]
 pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     scene: &Scene,
-    material: &Material,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
-    mut take: impl FnMut(Lobe),
+    (material, layers): (&Material, Option<&Layers>),
+    seen: (&SurfaceInteraction, DVec3, RayCone),
+    mut take: impl FnMut(Lobe, u32),
 ) {
-    if MIRROR && material.mirror != Rgb::ZERO {
-        take(match material.roughness {
-            0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
-            _ => {
-                let n = facing_normal(si, wo);
-                let roughness = glossy::roughness(scene, material, si, wo, cone);
-                Lobe::Glossy(Glossy::new(material.mirror, roughness, n, wo))
-            }
-        });
+    let (si, wo, _) = seen;
+    if let Some(Layers { mirror, roughness, coat, albedo: _ }) = layers.filter(|_| MIRROR) {
+        let n = facing_normal(si, wo);
+        take(reflecting(*mirror, *roughness, n), 0);
+        if let Some((coat, roughness)) = coat {
+            take(reflecting(*coat, *roughness, n), 1);
+        }
+    } else if MIRROR && material.mirror != Rgb::ZERO {
+        let reflectance = Reflectance::constant(material.mirror);
+        take(
+            match material.roughness {
+                0.0 => Lobe::Mirror(Mirror::new(reflectance)),
+                _ => {
+                    let n = facing_normal(si, wo);
+                    let roughness = glossy::roughness(scene, material, seen);
+                    let reflectance = reflectance.given_back(roughness, wo.dot(n));
+                    Lobe::Glossy(Glossy::new(reflectance, roughness, n))
+                }
+            },
+            0,
+        );
     }
     if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
-        take(match glass.thin {
+        let lobe = match glass.thin {
             true => Lobe::Pane(Pane::new(glass)),
             false => Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))),
-        });
+        };
+        take(lobe, 0);
+    }
+}
+
+/// The lobe of a mirror or coat of this roughness at the unit normal `n` on the viewer's side.
+fn reflecting(reflectance: Reflectance, roughness: f64, n: DVec3) -> Lobe {
+    match roughness {
+        0.0 => Lobe::Mirror(Mirror::new(reflectance)),
+        _ => Lobe::Glossy(Glossy::new(reflectance, roughness, n)),
     }
 }
 

@@ -2,8 +2,9 @@
 
 use super::at::At;
 use super::number::{Int, Ior};
+use super::principled::Principled;
 use super::report::Source;
-use super::texture::{ImageTable, Named, NamedTexture, NormalTexture, Roughness};
+use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::import::images::ImageUse;
@@ -12,7 +13,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// A material. `diffuse` and `mirror` add up, to at most 1 in each channel; `glass` excludes all other
-/// keys.
+/// keys, `principled` those that say how light is reflected.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Material {
@@ -37,7 +38,9 @@ pub(super) struct Material {
     pub mirror: Option<At<Reflectance>>,
     /// Roughness of the mirror: 0 is perfect, 0.2 brushed metal, 1 nearly matte. Or an image file of it, relative to
     /// the scene file, whose green counts as it stands; or a table of the file, the channel and how it lies on the surface.
-    pub roughness: Option<At<Roughness>>,
+    pub roughness: Option<At<MappedShare>>,
+    /// Plastic, varnish, metal: the parameters that glTF and Blender have for most materials.
+    pub principled: Option<At<Principled>>,
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
@@ -77,6 +80,7 @@ pub(super) struct ImagesOf<T> {
     normals: Option<T>,
     alpha: Option<T>,
     roughness: Option<T>,
+    metallic: Option<T>,
 }
 
 impl<T> ImagesOf<T> {
@@ -87,13 +91,14 @@ impl<T> ImagesOf<T> {
             normals: self.normals.map(&mut of).transpose()?,
             alpha: self.alpha.map(&mut of).transpose()?,
             roughness: self.roughness.map(&mut of).transpose()?,
+            metallic: self.metallic.map(&mut of).transpose()?,
         })
     }
 
     /// All that there are.
     pub fn all(self) -> impl Iterator<Item = T> {
-        let Self { texture, normals, alpha, roughness } = self;
-        [texture, normals, alpha, roughness].into_iter().flatten()
+        let Self { texture, normals, alpha, roughness, metallic } = self;
+        [texture, normals, alpha, roughness, metallic].into_iter().flatten()
     }
 }
 
@@ -104,13 +109,18 @@ fn window_glass() -> Ior {
 impl Material {
     /// The files of its images, with what they serve as.
     pub fn images(&self) -> ImagesOf<(At<String>, ImageUse)> {
-        let roughness = self.roughness.as_ref().and_then(At::data_file);
-        let normal_map = self.normal_map.as_ref();
+        let (principled, normal_map) = (self.principled.as_deref(), self.normal_map.as_ref());
+        let texture = principled.map_or(self.texture.as_ref(), |p| p.base_texture.as_ref());
+        let roughness = principled.map_or(self.roughness.as_ref(), |p| p.roughness.as_ref());
+        let roughness = roughness.and_then(|key| key.data_file(ChannelName::Green));
+        let metallic = principled.and_then(|p| p.metallic.as_ref());
+        let metallic = metallic.and_then(|key| key.data_file(ChannelName::Blue));
         ImagesOf {
-            texture: self.texture.as_ref().map(|key| (key.image_file(), ImageUse::Colour)),
+            texture: texture.map(|key| (key.image_file(), ImageUse::Colour)),
             normals: normal_map.map(|key| (key.image_file(), ImageUse::Normals)),
             alpha: self.alpha.as_ref().map(|key| (key.image_file(), ImageUse::Mask)),
             roughness: roughness.map(|(file, channel)| (file, ImageUse::Data(channel))),
+            metallic: metallic.map(|(file, channel)| (file, ImageUse::Data(channel))),
         }
     }
 
@@ -129,13 +139,10 @@ impl Material {
             priority: g.priority.as_ref().map(|p| p.u32() as u8),
             thin: g.thin,
         });
-        let ImagesOf { texture, normals, alpha, roughness } = images;
-        let (roughness, roughness_map) = match (self.roughness.as_deref(), roughness) {
-            (Some(Roughness::Same(share)), _) => (share.0, None),
-            (Some(Roughness::Image(Named(table))), Some(id)) => (1.0, Some(table.map(*id))),
-            (Some(Roughness::Image(_)), None) | (None, _) => (0.0, None),
-        };
-        Ok(scene::Material {
+        let ImagesOf { texture, normals, alpha, roughness, metallic } = images;
+        let own_roughness = self.roughness.as_deref().map(|key| key.parts(*roughness));
+        let (roughness_share, roughness_map) = own_roughness.unwrap_or_default();
+        let built = scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture: self.texture.as_ref().zip(*texture).map(|(texture, id)| texture.0.map(id)),
@@ -146,11 +153,16 @@ impl Material {
             vertex_colours: self.vertex_colours,
             alpha: self.alpha.as_ref().zip(*alpha).map(|(alpha, id)| alpha.0.map(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
-            roughness,
+            roughness: roughness_share,
             roughness_map,
+            fresnel: None,
             glass,
             emission: self.emission.unwrap_or_default().rgb(),
             emits_back: self.emits_back,
+        };
+        Ok(match self.principled.as_deref() {
+            None => built,
+            Some(principled) => principled.build(built, [*texture, *roughness, *metallic]),
         })
     }
 
@@ -160,6 +172,23 @@ impl Material {
     }
 
     fn check(&self, source: &Source) -> Result<()> {
+        if let Some(principled) = &self.principled {
+            let keys = [
+                ("diffuse", self.diffuse.is_some()),
+                ("texture", self.texture.is_some()),
+                ("mirror", self.mirror.is_some()),
+                ("roughness", self.roughness.is_some()),
+                ("glass", self.glass.is_some()),
+            ];
+            if let Some((key, _)) = keys.iter().find(|(_, is_there)| *is_there) {
+                let message = format!(
+                    "`principled` says how light is reflected: `{key}` does not stand beside it"
+                );
+                let help = "its own keys are `base_colour`, `base_texture`, `metallic`, `roughness`, `ior`, \
+                            `specular`, `clearcoat` and `clearcoat_roughness`";
+                return Err(source.fault(&principled.span, message).help(help).into());
+            }
+        }
         if let Some(glass) = &self.glass {
             let absorption = glass.absorption.as_ref().map(|a| (&a.span, "absorption"));
             let of_body = absorption.or(glass.priority.as_ref().map(|p| (&p.span, "priority")));

@@ -15,6 +15,7 @@ mod material;
 mod mesh;
 mod number;
 mod piece;
+mod principled;
 mod quad;
 mod report;
 mod reuse;

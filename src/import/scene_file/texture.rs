@@ -62,8 +62,10 @@ image_table!(
 image_table!(
     /// An image file of numbers, and how it lies on the surface.
     DataTexture {
-        /// Where the numbers are: in red, green, blue or alpha.
-        channel: ChannelName,
+        /// Where the numbers are: in red, green, blue or alpha. Absent: in green, or where glTF has them.
+        channel: Option<ChannelName>,
+        /// Factor on the numbers, from 0 to 1.
+        factor: ShareFactor,
     }
 );
 
@@ -86,17 +88,27 @@ impl Default for Strength {
     }
 }
 
+/// Factor on shares of an image.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub(super) struct ShareFactor(pub Share);
+
+impl Default for ShareFactor {
+    fn default() -> Self {
+        Self(Share(1.0))
+    }
+}
+
 /// A channel of an image.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 pub(super) enum ChannelName {
     /// Red.
     #[serde(rename = "r")]
     Red,
     /// Green, where glTF has the roughness.
-    #[default]
     #[serde(rename = "g")]
     Green,
-    /// Blue.
+    /// Blue, where glTF has the metal.
     #[serde(rename = "b")]
     Blue,
     /// Alpha.
@@ -210,59 +222,69 @@ inline_schema!(for [T: JsonSchema] Named<T>, |generator| {
     json_schema!({ "anyOf": [{ "type": "string" }, table] })
 });
 
-/// A roughness: the same everywhere, or from an image.
+/// A share such as a roughness: the same everywhere, or from an image.
 #[derive(Debug, Clone)]
-pub(super) enum Roughness {
+pub(super) enum MappedShare {
     Same(Share),
     Image(Named<DataTexture>),
 }
 
-impl At<Roughness> {
-    /// The image's file at the place of the whole value, and the channel of it.
-    pub fn data_file(&self) -> Option<(At<String>, ImageChannel)> {
+impl MappedShare {
+    /// The number that is the same everywhere, and the image that multiplies it; `image` is its number in the world.
+    pub fn parts(&self, image: Option<TextureId>) -> (f64, Option<TextureMap>) {
+        match self {
+            Self::Same(share) => (share.0, None),
+            Self::Image(Named(table)) => (table.factor.0.0, image.map(|id| table.map(id))),
+        }
+    }
+}
+
+impl At<MappedShare> {
+    /// The image's file at the place of the whole value, and the channel of it, `usual` where none is named.
+    pub fn data_file(&self, usual: ChannelName) -> Option<(At<String>, ImageChannel)> {
         match &self.value {
-            Roughness::Same(_) => None,
-            Roughness::Image(Named(table)) => {
+            MappedShare::Same(_) => None,
+            MappedShare::Image(Named(table)) => {
                 let file = At { value: table.file().to_owned(), span: self.span.clone() };
-                Some((file, table.channel.channel()))
+                Some((file, table.channel.unwrap_or(usual).channel()))
             }
         }
     }
 }
 
-struct RoughnessVisitor;
+struct MappedShareVisitor;
 
-impl<'de> Visitor<'de> for RoughnessVisitor {
-    type Value = Roughness;
+impl<'de> Visitor<'de> for MappedShareVisitor {
+    type Value = MappedShare;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a number from 0 to 1, a file name or a table")
     }
 
-    fn visit_f64<E: Error>(self, x: f64) -> Result<Roughness, E> {
-        Share::deserialize(x.into_deserializer()).map(Roughness::Same)
+    fn visit_f64<E: Error>(self, x: f64) -> Result<MappedShare, E> {
+        Share::deserialize(x.into_deserializer()).map(MappedShare::Same)
     }
 
-    fn visit_i64<E: Error>(self, x: i64) -> Result<Roughness, E> {
-        Share::deserialize(x.into_deserializer()).map(Roughness::Same)
+    fn visit_i64<E: Error>(self, x: i64) -> Result<MappedShare, E> {
+        Share::deserialize(x.into_deserializer()).map(MappedShare::Same)
     }
 
-    fn visit_str<E: Error>(self, file: &str) -> Result<Roughness, E> {
-        NamedVisitor(PhantomData).visit_str(file).map(Roughness::Image)
+    fn visit_str<E: Error>(self, file: &str) -> Result<MappedShare, E> {
+        NamedVisitor(PhantomData).visit_str(file).map(MappedShare::Image)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Roughness, A::Error> {
-        NamedVisitor(PhantomData).visit_map(map).map(Roughness::Image)
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<MappedShare, A::Error> {
+        NamedVisitor(PhantomData).visit_map(map).map(MappedShare::Image)
     }
 }
 
-impl<'de> Deserialize<'de> for Roughness {
+impl<'de> Deserialize<'de> for MappedShare {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(RoughnessVisitor)
+        deserializer.deserialize_any(MappedShareVisitor)
     }
 }
 
-inline_schema!(Roughness, |generator| {
+inline_schema!(MappedShare, |generator| {
     let (number, image) =
         (generator.subschema_for::<Share>(), generator.subschema_for::<DataTexture>());
     json_schema!({ "anyOf": [number, { "type": "string" }, image] })

@@ -6,14 +6,8 @@ use crate::scene::{Material, Scene};
 use crate::shade::cone::RayCone;
 use crate::shade::texture;
 
-/// Whether `material` reflects any light diffusely. What is NaN or negative goes on, to be counted at its pixel.
-#[inline(always)]
-pub(in crate::shade) fn is_diffuse(material: &Material) -> bool {
-    material.diffuse != Rgb::ZERO
-}
-
 /// The share of irradiance that is sent out at `si` towards `wo` (unit), the texture's mean over the ray's `cone` and
-/// the vertex colours included.
+/// the vertex colours included, where no layer lies above.
 pub(in crate::shade) fn albedo(
     scene: &Scene,
     material: &Material,

@@ -1,12 +1,13 @@
 //! Rough mirrors: glossy reflection.
 
 use super::Scattered;
+use super::fresnel::{Reflectance, schlick, share_of};
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::to_world;
 use crate::scene::{Material, Scene};
 use crate::shade::cone::RayCone;
-use crate::shade::{optics, texture};
+use crate::shade::optics;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
@@ -22,7 +23,7 @@ const SAMPLES: usize = 32;
 /// surfaces is given back (Turquin, 2019), so that a white surface reflects all of a uniform light.
 pub(in crate::shade) struct Glossy {
     /// Share of light that a microfacet reflects, with what single reflection loses.
-    tint: Rgb,
+    reflectance: Reflectance,
     /// Slope of the microfacets: the square of the roughness.
     alpha: f64,
     /// Unit normal on the viewer's side.
@@ -30,14 +31,11 @@ pub(in crate::shade) struct Glossy {
 }
 
 impl Glossy {
-    /// The lobe of a mirror of this `reflectance` and `roughness`, seen along `wo` above the unit normal `n`.
-    pub fn new(reflectance: Rgb, roughness: f64, n: DVec3, wo: DVec3) -> Self {
-        // Not `max`, which would hide what is NaN.
-        let roughness = if roughness < LEAST_ROUGHNESS { LEAST_ROUGHNESS } else { roughness };
-        let reflected = reflected_share(roughness, wo.dot(n)) as f32;
-        let lost = (1.0 - reflected) / reflected;
-        let tint = reflectance * (Rgb::ONE + reflectance * lost);
-        Self { tint, alpha: roughness * roughness, n }
+    /// The lobe of microfacets of this `reflectance`, which includes what single reflection loses, at a surface of this
+    /// `roughness` with the unit normal `n` on the viewer's side.
+    pub fn new(reflectance: Reflectance, roughness: f64, n: DVec3) -> Self {
+        let roughness = at_least(roughness);
+        Self { reflectance, alpha: roughness * roughness, n }
     }
 
     /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving), per steradian.
@@ -45,7 +43,12 @@ impl Glossy {
         let Some(cosines) = self.cosines(wo, wi) else { return Rgb::ZERO };
         let [cos_o, cos_i, cos_m] = cosines;
         let g2 = 1.0 / (1.0 + lambda(self.alpha, cos_o) + lambda(self.alpha, cos_i));
-        self.tint * (density(self.alpha, cos_m) * g2 / (4.0 * cos_o * cos_i)) as f32
+        self.tint(wo, wi) * (density(self.alpha, cos_m) * g2 / (4.0 * cos_o * cos_i)) as f32
+    }
+
+    /// The share of light from `wi` that the microfacet between it and `wo` reflects, with what single reflection loses.
+    fn tint(&self, wo: DVec3, wi: DVec3) -> Rgb {
+        self.reflectance.at(0.5 * (wo + wi).length())
     }
 
     /// The density of [`sample`](Self::sample) at `wi`, per steradian.
@@ -65,7 +68,7 @@ impl Glossy {
         let [cos_o, cos_i, _] = self.cosines(wo, wi)?;
         let share = shadowed(self.alpha, cos_o, cos_i) as f32;
         let pdf = self.pdf(wo, wi);
-        Some(Scattered { wi, share, tint: self.tint, transmitted: None, pdf })
+        Some(Scattered { wi, share, tint: self.tint(wo, wi), transmitted: None, pdf })
     }
 
     /// Cosines between the normal and `wo`, `wi` and the microfacet between them; `None` where one of the
@@ -77,20 +80,20 @@ impl Glossy {
     }
 }
 
-/// Roughness of the mirror at `si` as seen towards `wo` (unit), the map's mean over the ray's `cone` included.
+/// Roughness of the mirror at the point that `seen` says, as seen towards the unit direction there, the map's mean over the
+/// ray's cone included.
 pub(super) fn roughness(
     scene: &Scene,
     material: &Material,
-    si: &SurfaceInteraction,
-    wo: DVec3,
-    cone: RayCone,
+    seen: (&SurfaceInteraction, DVec3, RayCone),
 ) -> f64 {
-    let Some(map) = &material.roughness_map else { return material.roughness };
-    let footprint = cone.footprint(scene, si, wo);
-    let share = f64::from(texture::mapped(scene, map, si.uv, footprint).x);
-    // An image made in code may hold any number. Not `min`, which would hide what is NaN.
-    let share = if share > 1.0 { 1.0 } else { share };
-    material.roughness * share
+    material.roughness * share_of(scene, material.roughness_map.as_ref(), seen)
+}
+
+/// The roughness that it counts as.
+fn at_least(roughness: f64) -> f64 {
+    // Not `max`, which would hide what is NaN.
+    if roughness < LEAST_ROUGHNESS { LEAST_ROUGHNESS } else { roughness }
 }
 
 /// Density of microfacet normals at the cosine `cos` to the surface's, per steradian.
@@ -125,9 +128,11 @@ fn visible_normal(alpha: f64, wo: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     DVec3::new(alpha * half.x, alpha * half.y, half.z.max(0.0)).normalize()
 }
 
-/// The share of light from a direction of cosine `cos` that leaves a white surface after one reflection.
-fn reflected_share(roughness: f64, cos: f64) -> f64 {
-    static TABLE: OnceLock<Vec<f64>> = OnceLock::new();
+/// The share of light from a direction of cosine `cos` that leaves a surface after one reflection: where microfacets reflect
+/// all, and where they reflect as much as [`schlick`] says.
+pub(super) fn reflected_shares(roughness: f64, cos: f64) -> [f64; 2] {
+    static TABLE: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
+    let roughness = at_least(roughness);
     let last = (NODES - 1) as f64;
     let table = TABLE.get_or_init(|| {
         let node = |i: usize| i as f64 / last;
@@ -141,22 +146,24 @@ fn reflected_share(roughness: f64, cos: f64) -> f64 {
     // A smooth surface seen flat loses what depends on the ratio of the two alone.
     let ratio = cos / (cos + roughness) * (1.0 + roughness);
     let ((r, fr), (c, fc)) = (place(roughness), place(ratio));
-    let row = |r: usize| {
-        let at = r * NODES + c;
-        table[at] + (table[at + 1] - table[at]) * fc
-    };
-    row(r) + (row(r + 1) - row(r)) * fr
+    [0, 1].map(|of| {
+        let row = |r: usize| {
+            let at = r * NODES + c;
+            table[at][of] + (table[at + 1][of] - table[at][of]) * fc
+        };
+        row(r) + (row(r + 1) - row(r)) * fr
+    })
 }
 
-/// [`reflected_share`] by stratified samples; `ratio` is of the cosine to its sum with the roughness, 1 at most.
-fn integrate(roughness: f64, ratio: f64) -> f64 {
+/// [`reflected_shares`] by stratified samples; `ratio` is of the cosine to its sum with the roughness, 1 at most.
+fn integrate(roughness: f64, ratio: f64) -> [f64; 2] {
     // The limits at both ends are taken from close by.
     let roughness = roughness.max(1e-3);
     let ratio = ratio.max(1e-4) / (1.0 + roughness);
     let cos = (roughness * ratio / (1.0 - ratio)).min(1.0);
     let alpha = roughness * roughness;
     let wo = DVec3::new(((1.0 - cos) * (1.0 + cos)).sqrt(), 0.0, cos);
-    let (mut sum, mut weights) = (0.0, 0.0);
+    let (mut sums, mut weights) = ([0.0; 2], 0.0);
     for i in 0..SAMPLES * SAMPLES / 2 {
         // Both sides are alike, and steep microfacets, which lose most, are few.
         let u = 0.5 * ((i / SAMPLES) as f64 + 0.5) / (SAMPLES / 2) as f64;
@@ -164,10 +171,12 @@ fn integrate(roughness: f64, ratio: f64) -> f64 {
         let weight = t * t;
         let m = visible_normal(alpha, wo, [u, 1.0 - t * t * t]);
         let cos_i = optics::reflect(wo, m).z;
-        sum += if cos_i > 0.0 { weight * shadowed(alpha, cos, cos_i) } else { 0.0 };
+        let share = if cos_i > 0.0 { weight * shadowed(alpha, cos, cos_i) } else { 0.0 };
+        sums[0] += share;
+        sums[1] += share * schlick(wo.dot(m));
         weights += weight;
     }
-    sum / weights
+    sums.map(|sum| sum / weights)
 }
 
 #[cfg(test)]
@@ -175,7 +184,7 @@ mod tests {
     use super::*;
 
     fn lobe(roughness: f64) -> Glossy {
-        Glossy { tint: Rgb::ONE, alpha: roughness * roughness, n: DVec3::Z }
+        Glossy::new(Reflectance::constant(Rgb::ONE), roughness, DVec3::Z)
     }
 
     fn direction(cos: f64, angle: f64) -> DVec3 {
@@ -197,7 +206,7 @@ mod tests {
                 .map(|scattered| f64::from(scattered.share))
                 .sum();
             let exact = sum / (n * n) as f64;
-            let off = (reflected_share(roughness, cos) - exact).abs();
+            let off = (reflected_shares(roughness, cos)[0] - exact).abs();
             assert!(off < 0.005, "roughness {roughness}, cosine {cos}: {off} of {exact}");
         }
     }

@@ -1,7 +1,7 @@
 //! Texture coordinates of the shapes, in closed form, what is said of meshes without, and cut-outs.
 
 use super::*;
-use crate::math::{DVec2, DVec3, Vec2};
+use crate::math::{DVec2, DVec3, Rgb, Vec2};
 use crate::scene::{TextureMap, WorldMesh, Wrap};
 
 /// A job whose one mesh is `mesh`, of a material with a texture.
@@ -290,6 +290,36 @@ fn a_roughness_is_a_number_or_a_channel_of_an_image_as_it_stands() {
         assert_eq!(of(roughness), (1.0, Some(code / 255.0)), "{roughness}");
     }
     assert_eq!(of("'grey.pgm'"), (1.0, Some(f32::from(0x8000u16) / 65_535.0)));
+}
+
+#[test]
+fn principled_parameters_are_numbers_or_images() {
+    let of = |keys: &str| {
+        let loaded = data(&format!("principled = {{ {keys} }}\n")).expect("a scene");
+        let material = loaded.world.materials[0].clone();
+        let texel = |map: Option<TextureMap>| {
+            map.map(|map| loaded.world.textures[map.image as usize].levels()[0].texel(0, 0).x)
+        };
+        let fresnel = material.fresnel.expect("principled");
+        let maps = [material.texture, material.roughness_map, fresnel.metallic_map].map(texel);
+        (material, fresnel, maps)
+    };
+    let (plain, fresnel, maps) = of("");
+    assert_eq!((plain.diffuse, plain.mirror), (Rgb::splat(0.8), Rgb::splat(0.04)));
+    assert_eq!((plain.roughness, fresnel.grazing, fresnel.metallic), (0.5, 1.0, 0.0));
+    assert_eq!((fresnel.clearcoat, fresnel.clearcoat_roughness, maps), (0.0, 0.03, [None; 3]));
+    let (half, fresnel, _) = of("specular = 0.5, ior = 3, metallic = 0.25, roughness = 0");
+    assert_eq!((half.mirror, half.roughness), (Rgb::splat(0.125), 0.0));
+    assert_eq!((fresnel.grazing, fresnel.metallic), (0.5, 0.25));
+    // Of one image glTF has the roughness in green and the metal in blue.
+    let (mapped, fresnel, [base, roughness, metal]) = of(
+        "base_texture = 'rgba.png', metallic = { file = 'rgba.png', factor = 0.5 }, \
+         roughness = 'rgba.png', clearcoat = 1, clearcoat_roughness = 0.2",
+    );
+    assert_eq!((mapped.diffuse, mapped.roughness, fresnel.metallic), (Rgb::ONE, 1.0, 0.5));
+    assert_eq!((roughness, metal), (Some(128.0 / 255.0), Some(30.0 / 255.0)));
+    assert!(base.is_some_and(|red| (red - 0.003).abs() < 1e-4), "sRGB code 10: {base:?}");
+    assert_eq!((fresnel.clearcoat, fresnel.clearcoat_roughness), (1.0, 0.2));
 }
 
 #[test]

@@ -1,0 +1,95 @@
+//! `principled`: the parameters that glTF and Blender have for most materials.
+
+use super::at::At;
+use super::number::{Ior, Share};
+use super::texture::{ImageTable, MappedShare, NamedTexture};
+use super::vector::{OneOr, Reflectance};
+use crate::math::Rgb;
+use crate::scene::{Fresnel, Material, TextureId};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// What glTF's and Blender's principled materials say of reflection.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct Principled {
+    /// Diffuse reflectance, and what metal reflects at normal incidence; linear RGB or one number for grey. Absent: 0.8,
+    /// or 1 where there is a `base_texture` or `vertex_colours`.
+    base_colour: Option<Reflectance>,
+    /// Image file, relative to the scene file, that multiplies `base_colour`; or a table of the file and how it lies on
+    /// the surface.
+    pub base_texture: Option<At<NamedTexture>>,
+    /// Share that is metal: 0 is plastic or wood, 1 metal. Or an image file of it, whose blue counts as it stands; or a table of
+    /// the file, the channel, a factor and how it lies on the surface. Absent: 0.
+    pub metallic: Option<At<MappedShare>>,
+    /// Roughness of the reflection: 0 is polished, 1 nearly matte. Or an image file of it, whose green counts as it stands; or
+    /// a table. Absent: 0.5.
+    pub roughness: Option<At<MappedShare>>,
+    /// Index of refraction of what is no metal: it reflects ((ior - 1) / (ior + 1))² at normal incidence.
+    #[serde(default = "plastic")]
+    ior: Ior,
+    /// Factor on the reflection of what is no metal: 0 is none, so that it is diffuse alone.
+    #[serde(default = "all")]
+    specular: Share,
+    /// Share that lies under a clear coat, as of car paint.
+    #[serde(default = "none")]
+    clearcoat: Share,
+    /// Roughness of the clear coat.
+    #[serde(default = "nearly_smooth")]
+    clearcoat_roughness: Share,
+}
+
+/// Roughness where none is given.
+const USUAL_ROUGHNESS: f64 = 0.5;
+/// Grey of a surface without a colour.
+const USUAL_GREY: Share = Share(0.8);
+
+fn plastic() -> Ior {
+    Ior(1.5)
+}
+
+fn all() -> Share {
+    Share(1.0)
+}
+
+fn none() -> Share {
+    Share(0.0)
+}
+
+fn nearly_smooth() -> Share {
+    Share(0.03)
+}
+
+impl Principled {
+    /// `material` with this reflection; the images are those of base colour, roughness and metallic.
+    pub fn build(
+        &self,
+        material: Material,
+        [base, roughness, metallic]: [Option<TextureId>; 3],
+    ) -> Material {
+        let own_roughness = self.roughness.as_deref().map(|key| key.parts(roughness));
+        let (roughness, roughness_map) = own_roughness.unwrap_or((USUAL_ROUGHNESS, None));
+        let own_metallic = self.metallic.as_deref().map(|key| key.parts(metallic));
+        let (metallic, metallic_map) = own_metallic.unwrap_or_default();
+        let paints = self.base_texture.is_some() || material.vertex_colours;
+        let usual = if paints { Share(1.0) } else { USUAL_GREY };
+        let base_colour = self.base_colour.unwrap_or(OneOr([usual; 3]));
+        let root = (self.ior.0 - 1.0) / (self.ior.0 + 1.0);
+        let normal = root * root * self.specular.0;
+        Material {
+            diffuse: base_colour.rgb(),
+            texture: self.base_texture.as_ref().zip(base).map(|(table, id)| table.0.map(id)),
+            mirror: Rgb::splat(normal as f32),
+            roughness,
+            roughness_map,
+            fresnel: Some(Fresnel {
+                grazing: self.specular.0,
+                metallic,
+                metallic_map,
+                clearcoat: self.clearcoat.0,
+                clearcoat_roughness: self.clearcoat_roughness.0,
+            }),
+            ..material
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Principled materials, plastic, metal and clear coats, against what physics tells.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{job, pose, quad, render};
+use tweenray::film::Film;
+use tweenray::math::{DVec3, Rgb, Vec2};
+use tweenray::scene::{
+    Corners, Fresnel, IntersectorKind, Light, Material, PointLight, Sky, SphereLight, Texture,
+    TextureMap, World, WorldSphere,
+};
+use tweenray::stats::RayKind;
+
+const PLASTIC: Fresnel = Fresnel {
+    grazing: 1.0,
+    metallic: 0.0,
+    metallic_map: None,
+    clearcoat: 0.0,
+    clearcoat_roughness: 0.0,
+};
+const METAL: Fresnel = Fresnel { metallic: 1.0, ..PLASTIC };
+
+fn principled(base: Rgb, roughness: f64, fresnel: Fresnel) -> Material {
+    let (mirror, fresnel) = (Rgb::splat(0.04), Some(fresnel));
+    Material { mirror, roughness, fresnel, ..Material::diffuse("principled", base) }
+}
+
+fn mean(film: &Film) -> f64 {
+    film.rgb.iter().map(|c| f64::from(c.y)).sum::<f64>() / film.rgb.len() as f64
+}
+
+/// A plate in the plane y = 0.
+fn plate(material: Material) -> World {
+    let mut world = World::default();
+    world.materials.push(material);
+    let corners = [(-4.0, -4.0), (-4.0, 4.0), (4.0, 4.0), (4.0, -4.0)];
+    world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
+    world
+}
+
+/// The mean brightness of a ball in a furnace of radiance 1 all round.
+fn in_furnace(material: Material, intersector: IntersectorKind) -> f64 {
+    let mut world = World::default();
+    world.materials.push(material);
+    world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, 0));
+    world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+    let mut job = job(world, pose((0.0, 0.0, 1.9), (0.0, 0.0, 0.0)), 24, 18);
+    job.settings.intersector = intersector;
+    job.settings.spp = 256;
+    let (film, _) = render(&job);
+    assert_eq!(film.bad.total(), 0);
+    mean(&film)
+}
+
+/// White in a furnace is white, at every roughness, as plastic, as metal, half of both, and under a clear coat.
+#[test]
+fn white_materials_in_a_furnace_are_one() {
+    let half = Fresnel { metallic: 0.5, ..PLASTIC };
+    let coated =
+        |fresnel, roughness| Fresnel { clearcoat: 0.8, clearcoat_roughness: roughness, ..fresnel };
+    for tenth in 0..=10 {
+        let roughness = f64::from(tenth) / 10.0;
+        for fresnel in
+            [PLASTIC, METAL, half, coated(PLASTIC, 0.0), coated(half, 0.4), coated(METAL, 1.0)]
+        {
+            let white = principled(Rgb::ONE, roughness, fresnel);
+            let mean = in_furnace(white, IntersectorKind::Embree);
+            assert!((mean - 1.0).abs() < 0.002, "roughness {tenth}/10, {fresnel:?}: {mean}");
+        }
+    }
+    let rough = principled(Rgb::ONE, 0.3, coated(half, 0.2));
+    let mean = in_furnace(rough, IntersectorKind::Oracle);
+    assert!((mean - 1.0).abs() < 0.002, "{mean}");
+}
+
+/// What is darker than white reflects less than it receives, and a coat over black little.
+#[test]
+fn dark_materials_in_a_furnace_are_darker() {
+    for roughness in [0.0, 0.3, 1.0] {
+        let of = |base, fresnel| {
+            in_furnace(principled(Rgb::splat(base), roughness, fresnel), IntersectorKind::Embree)
+        };
+        let plastic = of(0.0, PLASTIC);
+        assert!((0.012..0.12).contains(&plastic), "{roughness}: {plastic}");
+        let [metal, grey] = [of(0.5, METAL), of(0.5, PLASTIC)];
+        assert!((0.3..0.62).contains(&metal), "{roughness}: {metal}");
+        // Half of what passes the surface comes back.
+        assert!((grey - plastic - 0.5 * (1.0 - plastic)).abs() < 0.003, "{grey} {plastic}");
+    }
+}
+
+/// A polished plate shows the sky by Schlick's formula: black plastic, gold, and a coat over black.
+#[test]
+fn a_polished_plate_reflects_the_sky_by_its_angle() {
+    let gold = Rgb::new(1.0, 0.75, 0.3);
+    let half_coat = Fresnel { grazing: 0.0, clearcoat: 0.5, ..PLASTIC };
+    let bare = Material { mirror: Rgb::ZERO, ..principled(Rgb::ZERO, 0.0, half_coat) };
+    let cases = [
+        (principled(Rgb::ZERO, 0.0, PLASTIC), Rgb::splat(0.04), 1.0),
+        (principled(gold, 0.0, METAL), gold, 1.0),
+        (bare, Rgb::splat(0.04), 0.5),
+    ];
+    for (material, normal, share) in cases {
+        for kind in [IntersectorKind::Embree, IntersectorKind::Oracle] {
+            let mut world = plate(material.clone());
+            world.sky = Sky { radiance: Rgb::ONE, lights: false, ..Sky::default() };
+            let mut job = job(world, pose((-1.5, 0.8, 1.2), (0.0, 0.0, 0.0)), 24, 18);
+            job.settings.intersector = kind;
+            let (film, _) = render(&job);
+            let mut seen = 0;
+            for (x, y, rgb) in common::pixels(&film) {
+                let p = common::on_plane_y(&job, x, y, 0.0);
+                if p.x.abs().max(p.z.abs()) > 3.9 || !(job.camera.eye - p).is_finite() {
+                    continue;
+                }
+                let cos = (job.camera.eye - p).normalize().y;
+                let grown = (1.0 - cos).powi(5) as f32;
+                let expected = (normal + (Rgb::ONE - normal) * grown) * share;
+                let off = (rgb - expected).abs().max_element();
+                assert!(off < 1e-4, "{kind:?} {x},{y}: {rgb} for {expected}");
+                seen += 1;
+            }
+            assert!(seen > 100, "{seen}");
+        }
+    }
+}
+
+/// A rough metal plate under a point light, with the microfacet formula written out anew.
+#[test]
+fn a_rough_metal_reflects_a_point_light_as_the_formula_says() {
+    let (light, roughness) = (DVec3::new(0.9, 0.6, -0.7), 0.4);
+    let base = Rgb::new(0.9, 0.5, 0.1);
+    let mut world = plate(principled(base, roughness, METAL));
+    world.lights.push(Light::Point(PointLight { position: light, intensity: Rgb::ONE }));
+    let job = job(world, pose((-1.0, 1.5, 0.8), (0.0, 0.0, 0.0)), 24, 18);
+    let (film, _) = render(&job);
+    for (x, y, rgb) in common::pixels(&film) {
+        let p = common::on_plane_y(&job, x, y, 0.0);
+        let wo = (job.camera.eye - p).normalize();
+        let wi = (light - p).normalize();
+        // What is given back is more where the surface is seen flat.
+        if wo.y <= 0.4 || p.x.abs().max(p.z.abs()) > 3.9 {
+            continue;
+        }
+        let m = (wi + wo).normalize();
+        let a2 = roughness.powi(4);
+        let d = a2 / (std::f64::consts::PI * (m.y * m.y * (a2 - 1.0) + 1.0).powi(2));
+        let root = |c: f64| (a2 + (1.0 - a2) * c * c).sqrt();
+        let g_over_cosines = 2.0 / (wi.y * root(wo.y) + wo.y * root(wi.y));
+        let single = d * g_over_cosines / 4.0 * wi.y / (light - p).length_squared();
+        let grown = (1.0 - wo.dot(m)).powi(5);
+        for channel in 0..3 {
+            let normal = f64::from(base[channel]);
+            let expected = single * (normal + (1.0 - normal) * grown);
+            // What is given back is a few parts in a hundred at this roughness.
+            let share = f64::from(rgb[channel]) / expected;
+            assert!((0.999..1.08).contains(&share), "{x},{y}: {rgb}, {expected}");
+        }
+    }
+}
+
+/// Light samples joined with the lobes' rays and the lobes' rays alone see the same light, with two rough lobes at one
+/// point.
+#[test]
+fn light_samples_and_lobe_samples_agree() {
+    let coated = Fresnel { clearcoat: 1.0, clearcoat_roughness: 0.25, ..METAL };
+    for (fresnel, roughness) in [(PLASTIC, 0.3), (METAL, 0.5), (coated, 0.6)] {
+        // No diffuse part: that is lit by light samples alone.
+        let mut world = plate(principled(Rgb::splat(0.7), roughness, fresnel));
+        if fresnel == PLASTIC {
+            world.materials[0].diffuse = Rgb::ZERO;
+        }
+        let (centre, radiance) = (DVec3::new(0.1, 1.2, 0.0), Rgb::splat(5.0));
+        world.lights.push(Light::Sphere(SphereLight { centre, radius: 0.3, radiance }));
+        let mut job = job(world, pose((-0.8, 0.9, 0.9), (0.0, 0.0, 0.0)), 16, 12);
+        job.settings.spp = 1024;
+        job.settings.shadow_samples = 2;
+        let (joined, counts) = render(&job);
+        assert!(counts[RayKind::ShadowArea] > 0);
+        job.settings.shadow_samples = 0;
+        let (alone, counts) = render(&job);
+        assert_eq!(counts[RayKind::ShadowArea], 0);
+        let (joined, alone) = (mean(&joined), mean(&alone));
+        assert!((joined / alone - 1.0).abs() < 0.01, "{fresnel:?}: {joined} and {alone}");
+    }
+}
+
+/// An image makes the left half of a plate metal and the right one plastic, seen straight down.
+#[test]
+fn a_metallic_map_tells_metal_from_plastic() {
+    let texels = vec![255, 0];
+    let base = Rgb::new(0.8, 0.4, 0.2);
+    let fresnel = Fresnel { metallic_map: Some(TextureMap::of(0)), ..METAL };
+    let mut world = plate(principled(base, 0.0, fresnel));
+    world.textures.push(Texture::from_data8("halves", [2, 1], texels));
+    let uvs = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)];
+    let values = uvs.map(|(u, v)| Vec2::new(u, v)).to_vec();
+    world.meshes[0].uvs = Some(Corners { values, corners: None });
+    // What is seen in a mirror, and what lights the diffuse part.
+    world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+    let mut job = job(world, pose((0.0, 3.0, 0.01), (0.0, 0.0, 0.0)), 32, 24);
+    job.settings.sky_samples = 4;
+    let (film, _) = render(&job);
+    for (x, y, rgb) in common::pixels(&film) {
+        let p = common::on_plane_y(&job, x, y, 0.0);
+        let grown = (1.0 - (job.camera.eye - p).normalize().y).powi(5) as f32;
+        let by_angle = |normal: Rgb| normal + (Rgb::ONE - normal) * grown;
+        let of_plastic = by_angle(Rgb::splat(0.04));
+        // Texels have their middles at the quarters.
+        let expected = match p.x {
+            x if x < -2.1 => by_angle(base),
+            x if x > 2.1 => of_plastic + base * (Rgb::ONE - of_plastic),
+            _ => continue,
+        };
+        let off = (rgb - expected).abs().max_element();
+        assert!(off < 2e-3, "{x},{y}: {rgb} for {expected}");
+    }
+}
+
+/// The diffuse part of plastic is looked up in other frames, its reflection traced; the kernel that leaves no effect out
+/// makes the same picture.
+#[test]
+fn plastic_is_the_same_by_every_kernel() {
+    let mut world = plate(principled(Rgb::new(0.2, 0.5, 0.7), 0.3, PLASTIC));
+    let coated = Fresnel { clearcoat: 1.0, clearcoat_roughness: 0.1, ..METAL };
+    world.materials.push(principled(Rgb::new(0.9, 0.6, 0.2), 0.4, coated));
+    world.spheres.push(WorldSphere::new("ball", DVec3::new(0.0, 0.7, 0.0), 0.7, 1));
+    let (centre, radiance) = (DVec3::new(1.0, 2.5, 1.0), Rgb::splat(9.0));
+    world.lights.push(Light::Sphere(SphereLight { centre, radius: 0.4, radiance }));
+    world.sky.radiance = Rgb::splat(0.2);
+    let mut job = job(world, pose((-1.5, 1.6, 2.2), (0.0, 0.4, 0.0)), 24, 18);
+    job.settings.spp = 4;
+    let (film, counts) = render(&job);
+    let scene = job.world.clone().into_scene(true).unwrap();
+    let (other, _) = common::render_with_every_effect(&scene, &job);
+    assert!(counts[RayKind::Glossy] > 0);
+    assert_eq!(film.rgb, other.rgb);
+}
