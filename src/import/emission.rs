@@ -1,13 +1,11 @@
 //! Turning emitting surfaces into lights, if a light of that shape exists.
 //!
-//! An analytic sphere becomes a sphere light; a mesh that consists of flat convex quads (pairs of
-//! triangles, at most [`MAX_LIGHTS`]) becomes quad lights. [`World::into_scene`] gives lights their
+//! An analytic sphere becomes a sphere light; the faces of a mesh become quad lights, at most [`MAX_LIGHTS`]. [`World::into_scene`] gives lights their
 //! surface, so the sphere or mesh itself leaves the world. Any other mesh keeps its emission: it
 //! is seen, and casts no light. So does a surface with cut-outs, since lights have no holes.
 
-use super::lamps::{MAX_LIGHTS, joined};
-use crate::math::DVec3;
-use crate::scene::{Light, Material, QuadLight, SphereLight, World, WorldMesh};
+use super::lamps::{MAX_LIGHTS, cover};
+use crate::scene::{Light, Material, QuadLight, SphereLight, World};
 
 /// A note about an emitting surface, for a warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,7 +36,7 @@ impl Note {
     pub fn help(&self) -> String {
         match self {
             Self::CastsNoLight(_) => format!(
-                "a sphere, or a mesh of at most {MAX_LIGHTS} flat quads, lights the scene when it emits"
+                "a sphere, or a mesh of at most {MAX_LIGHTS} triangles or flat quads, lights the scene when it emits"
             ),
             Self::HasHoles(_) => "a light has no holes: take `alpha` from its material".into(),
             Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
@@ -53,7 +51,7 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
     let materials = &world.materials;
     for mesh in world.meshes.split_off(first_mesh) {
         let material = &materials[mesh.material as usize];
-        match quads(&mesh).filter(|_| shines(material)) {
+        match shines(material).then(|| cover(&mesh)).flatten() {
             Some(quads) => {
                 notes.extend(material.reflects().then(|| Note::ReflectsNothing(mesh.name.clone())));
                 let light = |corners| {
@@ -96,27 +94,11 @@ fn dark(material: &Material, name: String) -> Note {
     if material.alpha.is_some() { Note::HasHoles(name) } else { Note::CastsNoLight(name) }
 }
 
-/// The mesh as quads, if each pair of consecutive triangles makes one.
-fn quads(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
-    let count = mesh.triangles.len();
-    if count == 0 || count % 2 != 0 || count > 2 * MAX_LIGHTS {
-        return None;
-    }
-    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
-    let quad = |t: &[[u32; 3]]| {
-        let mut quad = joined(corners(&t[0]), corners(&t[1]))?;
-        // Where its samples lie depends on the first corner.
-        quad.rotate_right(1);
-        Some(quad)
-    };
-    mesh.triangles.chunks_exact(2).map(quad).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rgb;
-    use crate::scene::WorldSphere;
+    use crate::math::{DVec3, Rgb};
+    use crate::scene::{WorldMesh, WorldSphere};
 
     fn lamp(triangles: Vec<[u32; 3]>, raise: f64) -> WorldMesh {
         let positions =
@@ -144,15 +126,33 @@ mod tests {
     }
 
     #[test]
-    fn other_emitting_meshes_stay_with_a_note() {
+    fn other_triangles_are_lights_of_their_own() {
         let apart = lamp(vec![[0, 1, 2], [0, 3, 2]], 0.0);
         let bent = lamp(vec![[0, 1, 2], [0, 2, 3]], 0.1);
-        let odd = lamp(vec![[0, 1, 2]], 0.0);
-        for mesh in [apart, bent, odd] {
+        let odd = lamp(vec![[0, 1, 2], [1, 1, 2]], 0.0);
+        for (mesh, count) in [(apart, 2), (bent, 2), (odd, 1)] {
+            let area: f64 = mesh.triangles.iter().map(|t| area(&mesh, t)).sum();
             let mut world = world(mesh);
-            assert_eq!(adopt(&mut world, 0, 0), [Note::CastsNoLight("lamp".into())]);
-            assert_eq!((world.meshes.len(), world.lights.len()), (1, 0));
+            assert_eq!(adopt(&mut world, 0, 0), []);
+            let areas = world.lights.iter().map(|light| match light {
+                Light::Quad(light) => light.area(),
+                other => panic!("{other:?}"),
+            });
+            assert!((areas.sum::<f64>() - area).abs() < 1e-12);
+            assert_eq!((world.meshes.len(), world.lights.len()), (0, count));
         }
+    }
+
+    #[test]
+    fn a_mesh_of_too_many_faces_stays_with_a_note() {
+        let mut world = world(lamp(vec![[0, 1, 2]; MAX_LIGHTS + 1], 0.0));
+        assert_eq!(adopt(&mut world, 0, 0), [Note::CastsNoLight("lamp".into())]);
+        assert_eq!((world.meshes.len(), world.lights.len()), (1, 0));
+    }
+
+    fn area(mesh: &WorldMesh, triangle: &[u32; 3]) -> f64 {
+        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
+        0.5 * (b - a).cross(c - a).length()
     }
 
     #[test]

@@ -4,15 +4,16 @@ use super::polygon;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Light, QuadLight, WorldMesh};
 
-/// Most lights made of a mesh, since every light costs shadow rays at every pixel. A mesh that needs more is visible
-/// but lights nothing.
-pub(super) const MAX_LIGHTS: usize = 64;
+/// Most lights made of a mesh: each has bounds in the cells of lights, and a surface of its own. A mesh that needs more is
+/// visible but lights nothing.
+pub(super) const MAX_LIGHTS: usize = 4096;
 /// A quad's corners may leave its plane by this share of its size: file coordinates have six digits or so.
 const FLAT: f64 = 1e-5;
 
-/// Lights that replace a mesh whose faces emit `radiance` on both sides; `None` if there would be
-/// more than [`MAX_LIGHTS`]. Neighbouring triangles become one quad where possible.
-pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
+/// Flat convex quads that cover the faces of a mesh, counter-clockwise as these are; `None` if there would be more than
+/// [`MAX_LIGHTS`]. Neighbouring triangles that follow one another become one quad where possible; any other
+/// triangle is a quad of which two corners are the same. Triangles without area are left out.
+pub(super) fn cover(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
     if mesh.triangles.len() > 2 * MAX_LIGHTS {
         return None;
     }
@@ -29,7 +30,12 @@ pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
             rest = after;
         }
     }
-    (quads.len() <= MAX_LIGHTS).then(|| quads.into_iter().map(|q| light(q, radiance)).collect())
+    (quads.len() <= MAX_LIGHTS).then_some(quads)
+}
+
+/// Lights that replace a mesh whose faces emit `radiance` on both sides; `None` as [`cover`].
+pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
+    Some(cover(mesh)?.into_iter().map(|quad| light(quad, radiance)).collect())
 }
 
 /// Lights that replace a face of three or more corners; none if it has no area.
@@ -44,22 +50,16 @@ pub(super) fn of_face(corners: &[DVec3], radiance: Rgb) -> Result<Vec<Light>, St
     let mut triangles = Vec::new();
     polygon::triangulate(corners, &mut triangles)?;
     let corners = triangles.iter().map(|t| t.map(|i| corners[i as usize]));
-    Ok(corners
-        .filter(|[a, b, c]| (*b - *a).cross(*c - *a) != DVec3::ZERO)
-        .flat_map(of_triangle)
-        .map(|quad| light(quad, radiance))
-        .collect())
+    Ok(corners.filter_map(of_triangle).map(|quad| light(quad, radiance)).collect())
 }
 
 fn light(corners: [DVec3; 4], radiance: Rgb) -> Light {
     Light::Quad(QuadLight { corners, radiance, two_sided: true })
 }
 
-/// Three quads that meet at the triangle's centre and at the middles of its sides.
-fn of_triangle([a, b, c]: [DVec3; 3]) -> [[DVec3; 4]; 3] {
-    let centre = (a + b + c) / 3.0;
-    let (ab, bc, ca) = (a.midpoint(b), b.midpoint(c), c.midpoint(a));
-    [[a, ab, centre, ca], [b, bc, centre, ab], [c, ca, centre, bc]]
+/// A triangle as a quad, of which two corners are the same. `None` if it has no area.
+fn of_triangle([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 4]> {
+    ((b - a).cross(c - a) != DVec3::ZERO).then_some([a, b, c, c])
 }
 
 /// The flat convex quad of two triangles of one orientation that share a side.
@@ -88,7 +88,8 @@ mod tests {
     fn areas(lights: &[Light]) -> DVec3 {
         let area = |light: &Light| match light {
             Light::Quad(quad) => {
-                assert!(is_flat_and_convex(&quad.corners));
+                let [.., c, d] = quad.corners;
+                assert!(c == d || is_flat_and_convex(&quad.corners));
                 0.5 * quad.area_vector()
             }
             other => panic!("{other:?}"),
@@ -106,9 +107,9 @@ mod tests {
         let folded = [SQUARE[0], SQUARE[1], SQUARE[2] + DVec3::Z, SQUARE[3]];
         for (face, count, area) in [
             (&SQUARE[..], 1, DVec3::Z),
-            (&SQUARE[..3], 3, 0.5 * DVec3::Z),
-            (&arrow[..], 6, 0.5 * DVec3::Z),
-            (&folded[..], 6, DVec3::new(-0.5, -0.5, 1.0)),
+            (&SQUARE[..3], 1, 0.5 * DVec3::Z),
+            (&arrow[..], 2, 0.5 * DVec3::Z),
+            (&folded[..], 2, DVec3::new(-0.5, -0.5, 1.0)),
             (&[DVec3::X; 4][..], 0, DVec3::ZERO),
         ] {
             let lights = of_face(face, Rgb::ONE).expect("a small face");
@@ -125,7 +126,9 @@ mod tests {
             assert_eq!((lights.len(), areas(&lights)), (1, DVec3::Z));
         }
         let lights = of_mesh(&mesh(vec![[0, 1, 2], [0, 2, 1]]), Rgb::ONE).expect("few");
-        assert_eq!(lights.len(), 6, "front and back are no quad");
-        assert!(of_mesh(&mesh(vec![[0, 1, 2]; 22]), Rgb::ONE).is_none());
+        assert_eq!(lights.len(), 2, "front and back are no quad");
+        let lights = of_mesh(&mesh(vec![[0, 1, 1], [0, 1, 2]]), Rgb::ONE).expect("few");
+        assert_eq!(lights.len(), 1, "one has no area");
+        assert!(of_mesh(&mesh(vec![[0, 1, 2]; MAX_LIGHTS + 1]), Rgb::ONE).is_none());
     }
 }

@@ -3,7 +3,7 @@
 use super::triangle;
 use super::{Hit, PrimRef, Ray};
 use crate::math::{DVec3, Vec2};
-use crate::scene::{Mesh, Scene, Sphere, Surface};
+use crate::scene::{Mesh, QuadLight, Scene, Sphere, Surface};
 use std::f64::consts::{PI, TAU};
 
 /// A hit expanded, scene space, f64.
@@ -104,10 +104,10 @@ impl PlaneError {
         Self { longest, tilt }
     }
 
-    /// The worse of the two triangles that show a quad light.
-    pub fn of_quad(corners: &[DVec3; 4]) -> Self {
-        let [a, b, c, d] = *corners;
-        Self::of(&[a, b, c]).max(Self::of(&[a, c, d]))
+    /// The worse of the triangles that show a quad light.
+    pub fn of_quad(light: &QuadLight) -> Self {
+        let of = |t: &[u32; 3]| Self::of(&t.map(|i| light.corners[i as usize]));
+        light.triangles().iter().map(of).fold(Self::EXACT, Self::max)
     }
 
     /// An error bound of both.

@@ -44,7 +44,7 @@ pub(super) struct Material {
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
-    /// meshes of up to 64 flat quads, then light the scene; other meshes and those with `alpha` only glow.
+    /// meshes of up to 4096 triangles or flat quads, then light the scene; larger ones and those with `alpha` only glow.
     pub emission: Option<Amount>,
     /// Whether the back of a face emits too.
     #[serde(default)]

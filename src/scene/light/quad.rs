@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// A flat convex quad that emits from the side its corners run counter-clockwise on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct QuadLight {
-    /// Corners in order.
+    /// Corners in order. Where the last two are the same, it is a triangle.
     pub corners: [DVec3; 4],
     /// Emitted radiance.
     pub radiance: Rgb,
@@ -26,6 +26,12 @@ impl QuadLight {
     /// Unit normal of the emitting side.
     pub fn normal(&self) -> DVec3 {
         self.area_vector().normalize()
+    }
+
+    /// The triangles that it consists of, by their corners' places.
+    pub fn triangles(&self) -> &'static [[u32; 3]] {
+        let [.., c, d] = &self.corners;
+        if c == d { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] }
     }
 
     /// Area.
@@ -65,7 +71,7 @@ impl LightData for QuadLight {
     fn surface(&self) -> Option<EmittingSurface> {
         let corners = self.corners.iter().map(|c| c.as_vec3()).collect();
         Some(EmittingSurface {
-            shape: EmittingShape::Triangles(corners, vec![[0, 1, 2], [0, 2, 3]]),
+            shape: EmittingShape::Triangles(corners, self.triangles().to_vec()),
             radiance: self.radiance,
             two_sided: self.two_sided,
         })

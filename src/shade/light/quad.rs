@@ -17,7 +17,7 @@ pub(super) struct Quad {
 
 impl Quad {
     pub fn new(light: &QuadLight) -> Self {
-        let plane_error = PlaneError::of_quad(&light.corners);
+        let plane_error = PlaneError::of_quad(light);
         Self {
             warp: QuadWarp::new(light.corners),
             corners: light.corners,

@@ -312,10 +312,9 @@ fn principled_parameters_are_numbers_or_images() {
     assert_eq!((half.mirror, half.roughness), (Rgb::splat(0.125), 0.0));
     assert_eq!((fresnel.grazing, fresnel.metallic), (0.5, 0.25));
     // Of one image glTF has the roughness in green and the metal in blue.
-    let (mapped, fresnel, [base, roughness, metal]) = of(
-        "base_texture = 'rgba.png', metallic = { file = 'rgba.png', factor = 0.5 }, \
-         roughness = 'rgba.png', clearcoat = 1, clearcoat_roughness = 0.2",
-    );
+    let (mapped, fresnel, [base, roughness, metal]) =
+        of("base_texture = 'rgba.png', metallic = { file = 'rgba.png', factor = 0.5 }, \
+         roughness = 'rgba.png', clearcoat = 1, clearcoat_roughness = 0.2");
     assert_eq!((mapped.diffuse, mapped.roughness, fresnel.metallic), (Rgb::ONE, 1.0, 0.5));
     assert_eq!((roughness, metal), (Some(128.0 / 255.0), Some(30.0 / 255.0)));
     assert!(base.is_some_and(|red| (red - 0.003).abs() < 1e-4), "sRGB code 10: {base:?}");
