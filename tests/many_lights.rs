@@ -171,6 +171,36 @@ fn the_backs_of_lights_are_dark_however_many_there_are() {
     assert_unbiased("backs", panels(120));
 }
 
+/// A bulb of a thousand triangles and quads in a scene file lights a floor as the sphere does that it stands for.
+#[test]
+fn a_bulb_of_triangles_lights_as_a_sphere_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let mean = |lamp: &str| {
+        let text = format!(
+            "camera.still = {{ eye = [0, 3, 5], target = [0, 0.4, 0] }}\n\
+             [material.glow]\nemission = 4\n[material.grey]\ndiffuse = 0.7\n\
+             [[mesh]]\nquad = {{ centre = [0, 0, 0], normal = 'y', size = [4, 4] }}\nmaterial = 'grey'\n\
+             {lamp}\nmaterial = 'glow'\n"
+        );
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text).unwrap();
+        let loaded = tweenray::import::load(&file, &Default::default()).unwrap();
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        let count = loaded.world.lights.len();
+        let mut job = job(loaded.world, pose((0.0, 3.0, 5.0), (0.0, 0.0, 0.0)), 48, 36);
+        (job.settings.spp, job.settings.shadow_samples) = (4, 16);
+        let (film, _) = render(&job);
+        // The floor alone: of the lamp's outline a mesh lacks a little.
+        let floor = film.rgb[48 * 18..].iter().map(|c| f64::from(luminance(*c))).sum::<f64>();
+        (count, floor)
+    };
+    let (one, sphere) = mean("[[sphere]]\ncentre = [0, 1.8, 0]\nradius = 0.4");
+    let bulb = "uv_sphere = { centre = [0, 1.8, 0], radius = 0.4, meridians = 48, bands = 25 }";
+    let (many, mesh) = mean(&format!("[[mesh]]\n{bulb}"));
+    assert!(one == 1 && many > 1000, "{many}");
+    assert!((mesh / sphere - 1.0).abs() < 0.01, "{mesh} for {sphere}");
+}
+
 fn on_threads(job: &Job, threads: usize) -> Film {
     let scene = job.world.clone().into_scene(true).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

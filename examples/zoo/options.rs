@@ -38,7 +38,7 @@ pub struct Options {
     /// Gives every camera a random thin lens
     #[arg(long)]
     pub lens: bool,
-    /// Makes mirrors rough, and gives half of what is painted a glossy coat
+    /// Makes mirrors rough, and half of what is painted plastic, some of it coated or partly metal
     #[arg(long)]
     pub gloss: bool,
     /// Only the scene of this index

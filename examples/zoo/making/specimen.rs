@@ -94,20 +94,27 @@ impl Specimen {
         self
     }
 
-    /// With rough mirrors for perfect ones, and a coat of one on about half of what is painted.
+    /// With rough mirrors for perfect ones, and about half of what is painted of plastic, some of it under a clear coat or
+    /// partly metal.
     pub fn with_gloss(mut self, seed: u64) -> Self {
         let mut dice = Dice::new(seed.rotate_left(32), self.index);
         let mut text = String::new();
         let mut lines = self.builder.text.lines().peekable();
         while let Some(line) = lines.next() {
-            let _ = writeln!(text, "{line}");
             let is_mirror = |line: &str| line.starts_with("mirror = ");
             let has_none = lines.peek().is_none_or(|next| !is_mirror(next));
-            let coat = line.starts_with("diffuse = ") && has_none && dice.chance(0.5);
-            if coat {
-                let _ = writeln!(text, "mirror = 0.05");
+            let paint = line.strip_prefix("diffuse = ").filter(|_| has_none && dice.chance(0.5));
+            if let Some(colour) = paint {
+                let roughness = dice.scale(0.05, 0.8);
+                let more = dice.pick(&["", ", clearcoat = 1", ", metallic = 0.5"]);
+                let _ = writeln!(
+                    text,
+                    "principled = {{ base_colour = {colour}, roughness = {roughness:?}{more} }}"
+                );
+                continue;
             }
-            if coat || is_mirror(line) {
+            let _ = writeln!(text, "{line}");
+            if is_mirror(line) {
                 let _ = writeln!(text, "roughness = {:?}", dice.scale(0.05, 0.8));
             }
         }
