@@ -29,7 +29,14 @@ pub(super) enum ImageUse {
 pub(super) struct Images(HashMap<(PathBuf, ImageUse), Image>);
 
 /// An image in one of its uses.
-enum Image {
+struct Image {
+    state: State,
+    /// Whether it looks like a normal map; `None` of a mask, of data and of what is not to be had.
+    looks_like_normals: Option<bool>,
+}
+
+/// Where an image is.
+enum State {
     /// Decoded; no material has asked for it yet.
     Decoded(Texels),
     /// Number so many of the world's textures or masks.
@@ -66,54 +73,48 @@ impl Images {
         world: &mut World,
         files: &mut Vec<PathBuf>,
     ) -> std::result::Result<u32, Arc<Error>> {
-        let key = (path.to_path_buf(), what);
-        self.read([key.clone()]);
-        let number = match self.0.remove(&key) {
-            Some(Image::Decoded(texels)) => Ok(texels.enter(world)),
-            Some(Image::Placed(number)) => Ok(number),
-            Some(Image::Refused(error)) => Err(error),
-            None => Err(Arc::new(Error::input(path, "the image was not read"))),
+        let Some(Image { state, .. }) = self.image(path, what) else {
+            return Err(Arc::new(Error::input(path, "the image was not read")));
+        };
+        // Of what is decoded the texels are taken out.
+        let number = match std::mem::replace(state, State::Placed(0)) {
+            State::Decoded(texels) => Ok(texels.enter(world)),
+            State::Placed(number) => Ok(number),
+            State::Refused(error) => Err(error),
         };
         if number.is_ok() && !files.iter().any(|file| file == path) {
             files.push(path.to_path_buf());
         }
-        self.0.insert(key, number.clone().map_or_else(Image::Refused, Image::Placed));
+        *state = number.clone().map_or_else(State::Refused, State::Placed);
         number
+    }
+
+    /// An image in one use, decoded now where it has not been.
+    fn image(&mut self, path: &Path, what: ImageUse) -> Option<&mut Image> {
+        let key = (path.to_path_buf(), what);
+        if !self.0.contains_key(&key) {
+            self.read([key.clone()]);
+        }
+        self.0.get_mut(&key)
     }
 
     /// Why the image is not to be had, if it was read and is not.
     pub fn refusal(&self, path: &Path, what: ImageUse) -> Option<&Error> {
-        match self.0.get(&(path.to_path_buf(), what)) {
-            Some(Image::Refused(error)) => Some(error),
-            Some(Image::Decoded(_) | Image::Placed(_)) | None => None,
+        match &self.0.get(&(path.to_path_buf(), what))?.state {
+            State::Refused(error) => Some(error),
+            State::Decoded(_) | State::Placed(_) => None,
         }
     }
 
-    /// Whether the image, which may be one of `world` by now, looks like a normal map; `None` of a mask, of data and of
-    /// what is not to be had. Decoded now where it has not been.
-    pub fn looks_like_normals(
-        &mut self,
-        path: &Path,
-        what: ImageUse,
-        world: &World,
-    ) -> Option<bool> {
-        if !matches!(what, ImageUse::Colour | ImageUse::Normals) {
-            return None;
-        }
-        let key = (path.to_path_buf(), what);
-        self.read([key.clone()]);
-        match self.0.get(&key)? {
-            Image::Decoded(Texels::Texture(texture)) => Some(texture.looks_like_normals()),
-            Image::Placed(number) => {
-                world.textures.get(*number as usize).map(Texture::looks_like_normals)
-            }
-            Image::Decoded(Texels::Mask(_)) | Image::Refused(_) => None,
-        }
+    /// Whether the image looks like a normal map; `None` of a mask, of data and of what is not to be had. Decoded now where it
+    /// has not been.
+    pub fn looks_like_normals(&mut self, path: &Path, what: ImageUse) -> Option<bool> {
+        self.image(path, what)?.looks_like_normals
     }
 
     /// Why the image may be meant for another use, if it may.
-    pub fn doubt(&mut self, path: &Path, what: ImageUse, world: &World) -> Option<&'static str> {
-        match (what, self.looks_like_normals(path, what, world)?) {
+    pub fn doubt(&mut self, path: &Path, what: ImageUse) -> Option<&'static str> {
+        match (what, self.looks_like_normals(path, what)?) {
             (ImageUse::Normals, false) => Some(
                 "this does not look like a normal map: few of its texels are unit vectors in tangent space",
             ),
@@ -149,7 +150,16 @@ fn decode((path, uses): (PathBuf, BTreeSet<ImageUse>)) -> Vec<((PathBuf, ImageUs
         Ok(image) => what.texels(&path, image).map_err(Arc::new),
         Err(error) => Err(error.clone()),
     };
-    let of = |what| ((path.clone(), what), image(what).map_or_else(Image::Refused, Image::Decoded));
+    let of = |what| {
+        let state = image(what).map_or_else(State::Refused, State::Decoded);
+        let looks_like_normals = match (what, &state) {
+            (ImageUse::Colour | ImageUse::Normals, State::Decoded(Texels::Texture(texture))) => {
+                Some(texture.looks_like_normals())
+            }
+            _ => None,
+        };
+        ((path.clone(), what), Image { state, looks_like_normals })
+    };
     uses.into_par_iter().map(of).collect()
 }
 
@@ -237,7 +247,7 @@ mod tests {
         for _ in 0..2 {
             for (path, doubted) in [(&grey, ImageUse::Normals), (&blue, ImageUse::Colour)] {
                 for what in USES {
-                    let doubt = images.doubt(path, what, &world);
+                    let doubt = images.doubt(path, what);
                     assert_eq!(doubt.is_some(), what == doubted, "{what:?}: {doubt:?}");
                     images.place(path, what, &mut world, &mut files).expect("placed");
                 }

@@ -95,7 +95,7 @@ impl Entry {
         model: &mut Model,
     ) -> std::result::Result<NormalMap, String> {
         let BumpImage { image, is_normal, line } = bump;
-        let looks = images.looks_like_normals(&self.file(image), ImageUse::Normals, &model.world);
+        let looks = images.looks_like_normals(&self.file(image), ImageUse::Normals);
         if looks == Some(false) && !is_normal {
             let name = &image.name;
             return Err(format!("{name} of line {line} holds heights, not normals: it is ignored"));
@@ -202,6 +202,9 @@ impl Libraries {
                 Ok(map) => {
                     material.texture = Some(map);
                     material.diffuse = meaning::textured(&entry.parsed);
+                    let doubt = images.doubt(&entry.file(image), ImageUse::Colour);
+                    let warn = |doubt| place(format!("`map_Kd` {}: {doubt}", image.name));
+                    model.warnings.extend(doubt.map(warn));
                 }
                 Err(error) => model.warnings.push(place(format!("texture left out: {error}"))),
             }

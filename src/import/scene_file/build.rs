@@ -89,7 +89,7 @@ impl<'a> Builder<'a> {
         let mut seen = HashSet::new();
         keys.retain(|(image, _)| seen.insert(image.clone()));
         for ((path, what), key) in &keys {
-            if let Some(message) = self.images.doubt(path, *what, &self.world) {
+            if let Some(message) = self.images.doubt(path, *what) {
                 self.warnings.push(self.source.fault(&key.span, message));
             }
         }
