@@ -68,6 +68,8 @@ fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
             cos_outer: 0.8,
             radius: 0.1,
         }));
+        let to_light = DVec3::new(-0.5, 0.8, 0.2).normalize();
+        world.lights.push(Light::Sun(SunLight::of_irradiance(to_light, 0.05, Rgb::splat(0.3))));
     }
     world.lights.push(Light::Directional(DirectionalLight {
         to_light: DVec3::new(0.3, 1.0, 0.5).normalize(),

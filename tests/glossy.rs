@@ -9,7 +9,7 @@ use tweenray::film::Film;
 use tweenray::math::{DMat3, DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, DiskLight, Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky,
-    SphereLight, SpotLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
+    SphereLight, SpotLight, SunLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -91,6 +91,7 @@ fn light_samples_and_lobe_samples_agree() {
         Light::Quad(QuadLight { corners, radiance, two_sided: true }),
         Light::Disk(DiskLight { centre, normal, radius: 0.4, radiance, two_sided: false }),
         Light::Sphere(SphereLight { centre, radius: 0.3, radiance }),
+        Light::Sun(SunLight { to_light: -normal, angular_radius: 0.25, radiance }),
     ];
     for light in lights {
         for roughness in [0.15, 0.4, 0.8] {

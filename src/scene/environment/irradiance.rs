@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// Patches at the leaves of the tree: columns and rows.
-const LEAVES: [usize; 2] = [256, 128];
+const LEAVES: [usize; 2] = [128, 64];
 /// Nodes along the edge of a cube's face.
 const NODES: usize = 65;
 /// A patch with more than this share of all light is added by itself.
@@ -42,12 +42,16 @@ struct BrightPatch {
     axis: DVec3,
     /// What it sends to a surface that faces it.
     power: [f32; 4],
+    /// Half of its height ([`risen`]).
+    half: f64,
 }
 
 /// A patch of the sky.
 #[derive(Clone, Copy)]
 struct Patch {
     moments: Moments,
+    /// Of patches at the leaves, half of the height of the light in each ([`risen`]).
+    halves: Sums,
     axis: DVec3,
     /// Sine of the angle from the axis that holds all of it; above 1 where that is no acute angle.
     reach: f64,
@@ -57,10 +61,26 @@ impl IrradianceTable {
     pub(super) fn of(radiance: &RadianceTable) -> Self {
         let mut leaves = leaves(radiance);
         let bright = take_bright(&mut leaves);
-        let tree = Tree::of(leaves);
-        let nodes = (0..6 * NODES * NODES)
+        let tree = Tree::of(leaves, radiance.size());
+        // Opposite normals see the whole sky together: one of them follows from the other.
+        let half = 3 * NODES * NODES;
+        let pairs: Vec<[Sums; 2]> = (0..half)
             .into_par_iter()
-            .map(|node| tree.irradiance(normal_of(node)).map(|x| x as f32))
+            .map(|at| {
+                tree.irradiance_of_both(normal_of(
+                    at % (NODES * NODES) + at / (NODES * NODES) * 2 * NODES * NODES,
+                ))
+            })
+            .collect();
+        let narrow = |sums: Sums| sums.map(|x| x.max(0.0) as f32);
+        let face = |k: usize| &pairs[k / 2 * NODES * NODES..][..NODES * NODES];
+        let nodes = (0..6)
+            .flat_map(|k| {
+                let last = NODES * NODES - 1;
+                // The node opposite of one is as far from the other end.
+                (0..=last).map(move |at| if k % 2 == 0 { (k, at, 0) } else { (k, last - at, 1) })
+            })
+            .map(|(k, at, side)| narrow(face(k)[at][side]))
             .collect();
         Self { nodes, bright }
     }
@@ -85,7 +105,7 @@ impl IrradianceTable {
             sums.iter_mut().zip(&self.nodes[at]).for_each(|(sum, node)| *sum += weight * node);
         }
         for patch in &self.bright {
-            let cos = patch.axis.dot(n).max(0.0) as f32;
+            let cos = risen(patch.axis.dot(n), patch.half) as f32;
             sums.iter_mut().zip(patch.power).for_each(|(sum, power)| *sum += cos * power);
         }
         let [r, g, b, above] = sums;
@@ -125,10 +145,19 @@ fn normal_of(node: usize) -> DVec3 {
     n.normalize()
 }
 
+/// The first of so many `cells` in a row that belongs to leaf `k` of so many.
+fn first_cell(k: usize, cells: usize, leaves: usize) -> usize {
+    (k * cells).div_ceil(leaves)
+}
+
+/// Where leaf `k` begins, as a share of the row.
+fn share(k: usize, cells: usize, leaves: usize) -> f64 {
+    first_cell(k, cells, leaves) as f64 / cells as f64
+}
+
 /// The patches of the lowest level, row by row.
 fn leaves(radiance: &RadianceTable) -> Vec<Patch> {
     let [width, height] = radiance.size();
-    let edge = |k: usize, cells: usize, leaves: usize| (k * cells).div_ceil(leaves);
     // The vector sum of directions over the latitudes of each row, but for longitude, and over the longitudes of each column.
     let rows: Vec<[f64; 2]> = radiance
         .edges()
@@ -151,9 +180,9 @@ fn leaves(radiance: &RadianceTable) -> Vec<Patch> {
     let wide = TAU / width as f64;
     let leaf = |at: usize| {
         let (x, y) = (at % LEAVES[0], at / LEAVES[0]);
-        let [left, right] = [x, x + 1].map(|k| edge(k, width, LEAVES[0]));
-        let [upper, lower] = [y, y + 1].map(|k| edge(k, height, LEAVES[1]));
-        let mut moments = [DVec3::ZERO; 4];
+        let [left, right] = [x, x + 1].map(|k| first_cell(k, width, LEAVES[0]));
+        let [upper, lower] = [y, y + 1].map(|k| first_cell(k, height, LEAVES[1]));
+        let (mut moments, mut powers) = ([DVec3::ZERO; 4], [0.0; 4]);
         for row in upper..lower {
             let [level, up] = rows[row];
             for (column, [east, north]) in (left..right).zip(&columns[left..right]) {
@@ -161,12 +190,16 @@ fn leaves(radiance: &RadianceTable) -> Vec<Patch> {
                 let sum = DVec3::new(level * east, up * wide, level * north);
                 let [r, g, b] = radiance.radiance(cell).to_array().map(f64::from);
                 let above = radiance.above_mean(cell);
-                moments.iter_mut().zip([r, g, b, above]).for_each(|(m, light)| *m += sum * light);
+                let lights = [r, g, b, above];
+                moments.iter_mut().zip(lights).for_each(|(m, light)| *m += sum * light);
+                let solid_angle = radiance.solid_angle(cell);
+                powers.iter_mut().zip(lights).for_each(|(p, light)| *p += light * solid_angle);
             }
         }
-        let at = |k: usize, of: usize| k as f64 / of as f64;
-        let columns = [at(left, width), at(right, width)];
-        patch(moments, columns, [at(upper, height), at(lower, height)])
+        let columns = [x, x + 1].map(|k| share(k, width, LEAVES[0]));
+        let rows = [y, y + 1].map(|k| share(k, height, LEAVES[1]));
+        let halves = std::array::from_fn(|k| half_height(moments[k], powers[k]));
+        Patch { halves, ..patch(moments, columns, rows) }
     };
     (0..LEAVES[0] * LEAVES[1]).into_par_iter().map(leaf).collect()
 }
@@ -179,7 +212,25 @@ fn patch(moments: Moments, columns: [f64; 2], rows: [f64; 2]) -> Patch {
     // Along the meridian, then along the parallel.
     let angle = 0.5 * PI * (rows[1] - rows[0]) + PI * (columns[1] - columns[0]);
     let reach = if angle < 1.5 { libm::sin(angle) } else { 2.0 };
-    Patch { moments, axis: DVec3::new(level * sin, y, -level * cos), reach }
+    Patch { moments, halves: [0.0; 4], axis: DVec3::new(level * sin, y, -level * cos), reach }
+}
+
+/// Half of the height of a small source with this vector sum and this sum of its light: that of an even bar which spreads
+/// as far (by the variance, which shortens the vector sum).
+fn half_height(moment: DVec3, power: f64) -> f64 {
+    let short = 1.0 - moment.length() / power;
+    if short > 0.0 { (3.0 * short).sqrt() } else { 0.0 }
+}
+
+/// The mean of the sines above the horizon over a source whose middle has the sine `sin`, and whose height is twice `half`.
+fn risen(sin: f64, half: f64) -> f64 {
+    if sin >= half {
+        sin
+    } else if sin <= -half {
+        0.0
+    } else {
+        (sin + half) * (sin + half) / (4.0 * half)
+    }
 }
 
 /// Takes the light of patches with much of it out of `leaves`.
@@ -197,7 +248,8 @@ fn take_bright(leaves: &mut [Patch]) -> Vec<BrightPatch> {
         let moments = std::mem::replace(&mut leaves[at].moments, [DVec3::ZERO; 4]);
         let [r, g, b, _] = moments;
         let axis = (r + g + b).normalize_or_zero();
-        BrightPatch { axis, power: moments.map(|m| m.length() as f32) }
+        let half = leaves[at].halves[..3].iter().fold(0.0, |most: f64, half| most.max(*half));
+        BrightPatch { axis, power: moments.map(|m| m.length() as f32), half }
     };
     bright.into_iter().map(take).collect()
 }
@@ -206,7 +258,8 @@ fn take_bright(leaves: &mut [Patch]) -> Vec<BrightPatch> {
 struct Tree(Vec<(usize, Vec<Patch>)>);
 
 impl Tree {
-    fn of(leaves: Vec<Patch>) -> Self {
+    /// The tree over `leaves`, of so many `cells` each way.
+    fn of(leaves: Vec<Patch>, cells: [usize; 2]) -> Self {
         let mut levels = vec![(LEAVES[0], leaves)];
         let [mut width, mut height] = LEAVES;
         while height > 1 {
@@ -217,11 +270,11 @@ impl Tree {
                 let four =
                     [first, first + 1, first + width, first + width + 1].map(|k| finer[k].moments);
                 let moments = std::array::from_fn(|k| four.iter().map(|moments| moments[k]).sum());
-                let share = |k: usize, of: usize| 2.0 * k as f64 / of as f64;
-                // Of as many texels as leaves at least, these are right to a texel: a patch is taken to be so much wider.
-                let slack = 1.0 / LEAVES[1] as f64;
-                let rows = [share(y, height) - slack, share(y + 1, height) + slack];
-                let columns = [share(x, width) - 0.5 * slack, share(x + 1, width) + 0.5 * slack];
+                let of = |k: usize, axis: usize, count: usize| {
+                    share(k * LEAVES[axis] / count, cells[axis], LEAVES[axis])
+                };
+                let columns = [x, x + 1].map(|k| of(k, 0, width / 2));
+                let rows = [y, y + 1].map(|k| of(k, 1, height / 2));
                 patch(moments, columns, rows)
             };
             let coarse = (0..width / 2 * (height / 2)).map(coarser).collect();
@@ -232,22 +285,32 @@ impl Tree {
         Self(levels)
     }
 
-    fn irradiance(&self, n: DVec3) -> Sums {
+    /// Irradiance by the normals `n` and `-n`.
+    fn irradiance_of_both(&self, n: DVec3) -> [Sums; 2] {
         let mut sums = [0.0; 4];
-        (0..self.0[0].1.len()).for_each(|at| self.add(0, at, n, &mut sums));
-        sums
+        let roots = &self.0[0].1;
+        (0..roots.len()).for_each(|at| self.add(0, at, n, &mut sums));
+        // What arrives at one side less what arrives at the other is the whole vector sum along the normal.
+        let whole = |k: usize| roots.iter().map(|root| root.moments[k].dot(n)).sum::<f64>();
+        [sums, std::array::from_fn(|k| sums[k] - whole(k))]
     }
 
     fn add(&self, level: usize, at: usize, n: DVec3, sums: &mut Sums) {
         let (width, patches) = &self.0[level];
-        let Patch { moments, axis, reach } = &patches[at];
+        let Patch { moments, halves, axis, reach } = &patches[at];
         let height = axis.dot(n);
         if height <= -reach {
             return;
         }
-        let is_whole = height >= *reach;
-        if is_whole || level + 1 == self.0.len() {
-            sums.iter_mut().zip(moments).for_each(|(sum, m)| *sum += m.dot(n).max(0.0));
+        if height >= *reach {
+            sums.iter_mut().zip(moments).for_each(|(sum, m)| *sum += m.dot(n));
+            return;
+        }
+        if level + 1 == self.0.len() {
+            for (sum, (m, half)) in sums.iter_mut().zip(moments.iter().zip(halves)) {
+                let power = m.length();
+                *sum += if power > 0.0 { power * risen(m.dot(n) / power, *half) } else { 0.0 };
+            }
             return;
         }
         let (x, y) = (at % width, at / width);

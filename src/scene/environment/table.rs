@@ -127,7 +127,7 @@ impl RadianceTable {
     }
 
     /// Solid angle of a cell.
-    pub(super) fn solid_angle(&self, cell: usize) -> f64 {
+    pub(crate) fn solid_angle(&self, cell: usize) -> f64 {
         let row = cell / self.width;
         TAU / self.width as f64 * (self.edges[row] - self.edges[row + 1])
     }
