@@ -13,7 +13,8 @@ use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
     BuildQuality, DirectionalLight, DiskLight, Filter, Glass, Lens, Light, Material, QuadLight,
-    Rect, Sky, SphereLight, SpotLight, ThinLens, VertexColours, World, WorldMesh, WorldSphere,
+    Rect, Sky, SphereLight, SpotLight, SunLight, ThinLens, VertexColours, World, WorldMesh,
+    WorldSphere,
 };
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
