@@ -157,8 +157,7 @@ impl Environment {
                 0.0
             }
         };
-        // Not `>`, which would let what is NaN pass.
-        if !(brightest * self.strength <= MOST_RADIANCE) {
+        if !(0.0..=MOST_RADIANCE).contains(&(brightest * self.strength)) {
             return refuse("is brighter than 1e30, negative or not finite");
         }
         Ok(())

@@ -183,8 +183,7 @@ fn leaves(radiance: &RadianceTable) -> Vec<Patch> {
         let [left, right] = [x, x + 1].map(|k| first_cell(k, width, LEAVES[0]));
         let [upper, lower] = [y, y + 1].map(|k| first_cell(k, height, LEAVES[1]));
         let (mut moments, mut powers) = ([DVec3::ZERO; 4], [0.0; 4]);
-        for row in upper..lower {
-            let [level, up] = rows[row];
+        for (row, [level, up]) in (upper..lower).zip(&rows[upper..lower]) {
             for (column, [east, north]) in (left..right).zip(&columns[left..right]) {
                 let cell = row * width + column;
                 let sum = DVec3::new(level * east, up * wide, level * north);
