@@ -4,13 +4,13 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse. A delta light has one sample.
 
-use super::environment::EnvironmentScratch;
 use super::groups::{CheckRays, Groups};
 use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
 use super::pilots::Run;
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::selection::{LightUser, LightUsers, Reached, TailSamples};
+use super::sky_samples::EnvironmentScratch;
 use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};

@@ -13,6 +13,7 @@ use super::highlight::GlossyPoint;
 use super::light::{EnvironmentLight, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
+use super::sky_samples::FoundSky;
 use super::{Renderer, Reuse, dimensions, normal_map};
 use crate::math::{DVec3, Rgb, luminance};
 use crate::stats::{RayCounts, RayKind};
@@ -29,34 +30,6 @@ pub(super) struct EnvironmentSource<'a> {
     channels: Range<usize>,
     /// Channels of a point.
     all_channels: usize,
-}
-
-/// Buffers.
-#[derive(Default)]
-pub(super) struct EnvironmentScratch {
-    u: Vec<[f32; 2]>,
-    found: Vec<FoundSky>,
-}
-
-/// What rays from a shading point have found.
-#[derive(Debug, Clone, Copy)]
-struct FoundSky {
-    /// The point's number in the chunk.
-    point: u32,
-    rays: u32,
-    /// Weights of the rays that reached the environment, and of all.
-    open: Rgb,
-    all: Rgb,
-}
-
-impl FoundSky {
-    /// The part of each colour that arrives. Of a colour that no ray has found, as of all together.
-    fn ratio(&self) -> Rgb {
-        let together = self.open.element_sum() / self.all.element_sum();
-        let part = |open: f32, all: f32| if all > 0.0 { open / all } else { together };
-        let (open, all) = (self.open, self.all);
-        Rgb::new(part(open.x, all.x), part(open.y, all.y), part(open.z, all.z))
-    }
 }
 
 /// How much of a colour there is in `light`.

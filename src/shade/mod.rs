@@ -29,6 +29,7 @@ mod pixels;
 mod point;
 mod scattered;
 mod selection;
+mod sky_samples;
 mod source;
 mod tail;
 mod texture;
