@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Glass, Material, MeanLights, Scene, Settings, ShotLens};
+use crate::scene::{Glass, Light, Material, MeanLights, Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +26,10 @@ pub struct EffectPlan {
     pub area_lights: bool,
     /// Diffuse or glossy surfaces are lit by delta lights, with hard shadows.
     pub delta_lights: bool,
-    /// The sky lights diffuse surfaces through sky rays.
+    /// The sky lights diffuse surfaces through sky rays; an environment glossy ones too.
     pub sky_light: bool,
+    /// Rays that leave the scene see more than one colour: an environment, or a sun.
+    pub environment: bool,
     /// A ray-free ambient term is added.
     pub ambient: bool,
 }
@@ -80,6 +82,7 @@ impl EffectPlan {
         area_lights: true,
         delta_lights: true,
         sky_light: true,
+        environment: true,
         ambient: true,
     };
 
@@ -93,7 +96,13 @@ impl EffectPlan {
         let bounces = settings.bounces;
         let bounced = counted(bounces as usize, "bounce");
         let samples = settings.shadow_samples;
-        let sky_bright = is_something(scene.sky.radiance);
+        let environment = scene.environment.as_ref();
+        let sky_bright = match environment {
+            Some(sky) => !sky.radiance.is_black(),
+            None => is_something(scene.sky.radiance),
+        };
+        let shown = seen_outside(scene);
+        let is_image = environment.is_some_and(|sky| sky.is_image());
         let mut reasons = Vec::new();
         let mut decide = |effect, runs: bool, why: String| {
             reasons.push(EffectReason { effect, runs, why });
@@ -135,8 +144,13 @@ impl EffectPlan {
             ),
             textures: decide(
                 "textures",
-                used.textured > 0,
-                format!("{} in use{}", counted(used.textured, "textured material"), bare(scene)),
+                used.textured > 0 || is_image,
+                format!(
+                    "{} in use{}{}",
+                    counted(used.textured, "textured material"),
+                    bare(scene),
+                    if is_image { "; the environment is an image" } else { "" }
+                ),
             ),
             diffuse,
             area_lights: decide(
@@ -159,8 +173,11 @@ impl EffectPlan {
             ),
             sky_light: decide(
                 "sky light",
-                diffuse && sky_bright && scene.sky.lights && settings.sky_samples > 0,
-                if !diffuse {
+                (diffuse || (lit && environment.is_some()))
+                    && sky_bright
+                    && scene.sky.lights
+                    && settings.sky_samples > 0,
+                if !(diffuse || (lit && environment.is_some())) {
                     no_diffuse()
                 } else if !sky_bright {
                     "the sky is black".into()
@@ -171,8 +188,23 @@ impl EffectPlan {
                         Some(_) => format!("{} sky samples", settings.sky_sample_range()),
                         None => counted(settings.sky_samples as usize, "sky sample"),
                     };
-                    format!("constant sky, {samples}")
+                    match environment {
+                        None => format!("constant sky, {samples}"),
+                        Some(sky) => {
+                            let [width, height] = sky.radiance.size();
+                            format!(
+                                "{}, {samples}: importance in {width} x {height} cells and the cosine, {} kept",
+                                sky.environment.describe(&scene.textures),
+                                counted(sky.radiance.tints().len(), "ratio")
+                            )
+                        }
+                    }
                 },
+            ),
+            environment: decide(
+                "environment",
+                shown.is_some(),
+                shown.unwrap_or_else(|| "rays that leave the scene see one colour".into()),
             ),
             ambient: decide(
                 "ambient term",
@@ -181,6 +213,18 @@ impl EffectPlan {
             ),
         };
         (plan, reasons)
+    }
+}
+
+/// What rays see that leave the scene, if it is more than one colour.
+fn seen_outside(scene: &Scene) -> Option<String> {
+    let suns = scene.lights.iter().filter(|light| matches!(light, Light::Sun(_))).count();
+    let sky = scene.environment.as_ref().map(|sky| sky.environment.describe(&scene.textures));
+    match (sky, suns) {
+        (None, 0) => None,
+        (None, suns) => Some(counted(suns, "sun")),
+        (Some(sky), 0) => Some(sky),
+        (Some(sky), suns) => Some(format!("{sky}, {} that lights", counted(suns, "sun"))),
     }
 }
 

@@ -119,7 +119,7 @@ pub struct LookupBatch {
     /// For each point and channel the light's contribution to the pixel without shadows:
     /// luminance, exposure applied; 0 where no light can arrive.
     pub unshadowed: Vec<f32>,
-    /// For each point and channel the number of its light, [`NO_LIGHT`] or [`SKY_LIGHT`]; empty where each
+    /// For each point and channel the number of its light, [`NO_LIGHT`] or that of a part of the sky ([`sky_light`]); empty where each
     /// channel has the same light everywhere.
     pub lights: Vec<u32>,
     /// For each point the ratio in each channel; NaN where it is unknown and must be traced.
@@ -185,12 +185,19 @@ impl TracedPoints {
 
 /// Number of no light, of a channel that is free.
 pub const NO_LIGHT: u32 = u32::MAX;
-/// Number of the sky among the lights of channels.
-pub const SKY_LIGHT: u32 = u32::MAX - 1;
+/// Number of the sky, or the first part of it, among the lights of channels.
+const SKY_LIGHT: u32 = u32::MAX - 1;
+/// Numbers of the other parts.
+const SKY_PARTS: [u32; 2] = [u32::MAX / 2, u32::MAX / 2 + 1];
 /// The largest number of a part of a tail among the lights of channels.
 const TAIL_LIGHT: u32 = u32::MAX - 2;
 /// Most parts of a tail.
 const TAIL_PARTS: u32 = 3;
+
+/// Number among the lights of channels of a `part` of the sky.
+pub fn sky_light(part: usize) -> u32 {
+    if part == 0 { SKY_LIGHT } else { SKY_PARTS[(part - 1) % SKY_PARTS.len()] }
+}
 
 /// Number among the lights of channels of a `part` of the tail with this set of lights
 /// ([`LightCells::tail_set`](crate::scene::LightCells::tail_set)).
@@ -202,7 +209,8 @@ pub fn tail_light(set: u32, part: u32) -> u32 {
 /// ratios are to a stand-in, which may be less than what arrives.
 pub fn most_ratio(light: Option<&u32>) -> f32 {
     // The lights of a scene take the lower half of the numbers.
-    let is_tail = light.is_some_and(|light| (u32::MAX / 2..=TAIL_LIGHT).contains(light));
+    let first = SKY_PARTS[SKY_PARTS.len() - 1] + 1;
+    let is_tail = light.is_some_and(|light| (first..=TAIL_LIGHT).contains(light));
     if is_tail { f32::MAX } else { 1.0 }
 }
 
@@ -243,8 +251,8 @@ pub enum Channel {
     /// The part of this number of the light that samples choose, where lights are selected. The parts differ in
     /// colour.
     Tail(u32),
-    /// The sky.
-    Sky,
+    /// The part of this number of the sky: one, but for an environment of several colours.
+    Sky(u32),
 }
 
 /// The lights whose ratios are kept.
@@ -256,7 +264,7 @@ pub enum Channel {
 pub struct Channels {
     list: Vec<Channel>,
     of_light: Vec<Option<usize>>,
-    sky: Option<usize>,
+    sky: std::ops::Range<usize>,
     slots: usize,
     tail: usize,
 }
@@ -288,10 +296,11 @@ impl Channels {
                 channels.list.push(channel);
             }
         }
-        if is_kept(Channel::Sky) {
-            channels.sky = Some(channels.list.len());
-            channels.list.push(Channel::Sky);
-        }
+        let first = channels.list.len();
+        let colours = scene.environment.as_ref().map_or(1, |sky| sky.radiance.tints().len());
+        let parts = (0..colours as u32).map(Channel::Sky);
+        channels.list.extend(parts.filter(|channel| is_kept(*channel)));
+        channels.sky = first..channels.list.len();
         channels
     }
 
@@ -326,9 +335,9 @@ impl Channels {
         self.slots..self.slots + self.tail
     }
 
-    /// The sky's channel, if its ratio is kept.
-    pub fn sky(&self) -> Option<usize> {
-        self.sky
+    /// The sky's channels, if its ratios are kept: one, but for an environment of several colours.
+    pub fn sky(&self) -> std::ops::Range<usize> {
+        self.sky.clone()
     }
 }
 

@@ -13,7 +13,8 @@ use tweenray::intersect;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
     BuildQuality, DirectionalLight, DiskLight, Filter, Glass, Lens, Light, Material, QuadLight,
-    Rect, Sky, SphereLight, SpotLight, ThinLens, VertexColours, World, WorldMesh, WorldSphere,
+    Rect, Sky, SphereLight, SpotLight, SunLight, ThinLens, VertexColours, World, WorldMesh,
+    WorldSphere,
 };
 use tweenray::shade::Renderer;
 use tweenray::stats::RayKind;
@@ -68,6 +69,8 @@ fn busy_world([mirror, glass, ranked, area, sky]: [bool; 5]) -> World {
             cos_outer: 0.8,
             radius: 0.1,
         }));
+        let to_light = DVec3::new(-0.5, 0.8, 0.2).normalize();
+        world.lights.push(Light::Sun(SunLight::of_irradiance(to_light, 0.05, Rgb::splat(0.3))));
     }
     world.lights.push(Light::Directional(DirectionalLight {
         to_light: DVec3::new(0.3, 1.0, 0.5).normalize(),
@@ -292,7 +295,7 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
                     point.position *= s;
                     point.intensity *= (s * s) as f32;
                 }
-                Light::Directional(_) => {}
+                Light::Directional(_) | Light::Sun(_) => {}
             }
         }
         let glass = w.materials.iter_mut().filter_map(|m| m.glass.as_mut());

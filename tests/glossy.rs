@@ -9,7 +9,7 @@ use tweenray::film::Film;
 use tweenray::math::{DMat3, DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, DiskLight, Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky,
-    SphereLight, SpotLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
+    SphereLight, SpotLight, SunLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -87,10 +87,13 @@ fn light_samples_and_lobe_samples_agree() {
     let corners = [(-0.4, -0.2), (0.5, -0.3), (0.4, 0.4), (-0.3, 0.2)];
     let corners = corners.map(|(x, z)| DVec3::new(x, 1.2, z));
     let (centre, normal) = (DVec3::new(0.1, 1.2, 0.0), DVec3::new(0.3, -1.0, 0.1).normalize());
+    // Where the plate's middle mirrors the eye.
+    let to_light = DVec3::new(0.8, 0.9, -0.9).normalize();
     let lights = [
         Light::Quad(QuadLight { corners, radiance, two_sided: true }),
         Light::Disk(DiskLight { centre, normal, radius: 0.4, radiance, two_sided: false }),
         Light::Sphere(SphereLight { centre, radius: 0.3, radiance }),
+        Light::Sun(SunLight { to_light, angular_radius: 0.25, radiance }),
     ];
     for light in lights {
         for roughness in [0.15, 0.4, 0.8] {

@@ -13,7 +13,7 @@ use tweenray::intersect::{self, Intersector};
 use tweenray::math::{DVec3, Rgb, luminance};
 use tweenray::scene::{
     DirectionalLight, DiskLight, IntersectorKind, Light, Material, PointLight, QuadLight, Rect,
-    Scene, Settings, SphereLight, SpotLight, World, WorldSphere,
+    Scene, Settings, SphereLight, SpotLight, SunLight, World, WorldSphere,
 };
 use tweenray::shade::{FrameJob, Renderer};
 
@@ -280,5 +280,7 @@ fn odd_lights_do_no_harm() {
     check(&|w| w.lights.extend(vec![sphere(Rgb::ZERO); 30]), false);
     let sun = DirectionalLight { to_light: DVec3::Y, irradiance: Rgb::splat(0.1) };
     check(&|w| w.lights.extend(vec![Light::Directional(sun.clone()); 30]), false);
+    let sun = SunLight::of_irradiance(DVec3::new(0.6, 0.8, 0.0), 0.1, Rgb::splat(0.1));
+    check(&|w| w.lights.extend(vec![Light::Sun(sun.clone()); 30]), false);
     check(&|w| w.lights.push(sphere(Rgb::NAN)), true);
 }

@@ -14,8 +14,8 @@ use moves::{Set, psnr_of};
 use tweenray::film::Film;
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    CameraPath, Corners, Easing, KeyPose, Material, NormalMap, Policy, Pose, ReuseSettings,
-    Settings, Texture, TextureMap, World,
+    CameraPath, Corners, Easing, Environment, EnvironmentKind, KeyPose, Material, NormalMap,
+    Policy, Pose, ReuseSettings, Settings, SunSky, Texture, TextureMap, World,
 };
 use tweenray::sequence::Made;
 use tweenray::stats::ReuseCounts;
@@ -115,6 +115,39 @@ fn demo_is_no_worse_than_traced() {
 #[test]
 fn street_at_night_is_no_worse_than_traced() {
     is_no_worse_than_traced("street_at_night", [0.3, 0.0]);
+}
+
+/// Under sun and sky instead of lamp and sky.
+#[test]
+fn a_day_is_no_worse_than_traced() {
+    let under_a_day = |world: &mut World| {
+        let to_sun = DVec3::new(-0.5, 0.7, 0.5).normalize();
+        let day = SunSky { to_sun, turbidity: 3.0, sun_radius: 0.02, ground: Rgb::splat(0.2) };
+        let environment = Environment::new(EnvironmentKind::SunSky(day));
+        world.environment = Some(Environment { strength: 0.3, ..environment });
+        world.sky.radiance = Rgb::ZERO;
+        world.lights.clear();
+    };
+    is_no_worse_than_traced_after("demo", under_a_day, [0.4, 0.0]);
+}
+
+/// An image with a warm window and a cold one, without any other light.
+#[test]
+fn an_image_is_no_worse_than_traced() {
+    let in_a_studio = |world: &mut World| {
+        let texels = (0..64 * 32).map(|i| match (i % 64, i / 64) {
+            (8..=13, 6..=13) => Rgb::new(9.0, 6.0, 3.0),
+            (40..=44, 8..=12) => Rgb::new(3.0, 6.0, 9.0),
+            _ => Rgb::splat(0.15),
+        });
+        world.textures.push(Texture::from_linear("studio", [64, 32], texels.collect()));
+        let image = EnvironmentKind::Image(world.textures.len() as u32 - 1);
+        world.environment = Some(Environment::new(image));
+        world.sky.radiance = Rgb::ZERO;
+        world.sky.lights = true;
+        world.lights.clear();
+    };
+    is_no_worse_than_traced_after("reflective_spheres", in_a_studio, [0.2, 0.0]);
 }
 
 /// The floor of `world` with coordinates, made of `material`.

@@ -44,7 +44,14 @@ fn every_folder_has_a_scene_that_loads_and_has_a_description() {
         cameras_stand_free(&loaded);
         names.push(name);
     }
-    for name in ["spheres_on_terrain", "reflective_spheres", "cornell", "demo", "street_at_night"] {
+    for name in [
+        "spheres_on_terrain",
+        "reflective_spheres",
+        "cornell",
+        "demo",
+        "street_at_night",
+        "courtyard",
+    ] {
         assert!(names.iter().any(|n| n == name), "{name}");
     }
 }

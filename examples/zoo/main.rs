@@ -51,6 +51,10 @@ fn run(options: &Options) -> Result<bool, Failure> {
             true => specimen.with_gloss(options.seed),
             false => specimen,
         };
+        let specimen = match options.sky {
+            true => specimen.with_sky(options.seed),
+            false => specimen,
+        };
         let settings = options.settings.unwrap_or(specimen.settings);
         let place = folder.join(format!("{index:04}"));
         let verdict = judge(&program, &specimen, settings, &options.plan(), &place)?;

@@ -41,6 +41,9 @@ pub struct Options {
     /// Makes mirrors rough, and half of what is painted plastic, some of it coated or partly metal
     #[arg(long)]
     pub gloss: bool,
+    /// Gives every scene a random environment for a sky: an image, a gradient, or sun and sky
+    #[arg(long)]
+    pub sky: bool,
     /// Only the scene of this index
     #[arg(long)]
     only: Option<u64>,

@@ -83,7 +83,7 @@ fn list(frames: &[u32]) -> String {
 /// where nothing at all is bright.)
 fn no_light(scene: &Scene, settings: &Settings) -> Option<String> {
     let sky = &scene.sky;
-    let sky_bright = sky.radiance.max_element() > 0.0;
+    let sky_bright = sky.radiance.max_element() > 0.0 || scene.environment.is_some();
     let sky_lights = sky_bright && sky.lights && settings.sky_samples > 0;
     let has_area_lights = !scene.lights.is_empty();
     if sky_lights

@@ -13,7 +13,7 @@ use crate::import::{AddedStage, Loaded};
 use crate::intersect;
 use crate::math::{Bounds3, DVec3};
 use crate::page::words::short;
-use crate::scene::{Light, Mesh, Scene, Settings, Shot};
+use crate::scene::{Light, Mesh, Scene, SceneEnvironment, Settings, Shot};
 use crate::shade::Renderer;
 use clap::Args;
 use serde::Serialize;
@@ -68,6 +68,9 @@ struct Lights {
     #[serde(flatten)]
     by_kind: BTreeMap<&'static str, usize>,
     sky: bool,
+    /// What the sky shows where it is not one colour.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    environment: Option<String>,
     ambient: bool,
 }
 
@@ -85,7 +88,7 @@ struct CameraView {
 #[derive(Serialize)]
 struct Memory {
     geometry: u64,
-    /// Textures, and masks of cut-outs.
+    /// Textures, masks of cut-outs, and tables of an environment.
     textures: u64,
     intersector: u64,
     frame: u64,
@@ -157,7 +160,12 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
 impl Lights {
     fn of(scene: &Scene) -> Self {
         let mut lights = Self {
-            sky: scene.sky.lights && scene.sky.radiance.max_element() > 0.0,
+            sky: scene.sky.lights
+                && (scene.sky.radiance.max_element() > 0.0 || scene.environment.is_some()),
+            environment: scene
+                .environment
+                .as_ref()
+                .map(|sky| sky.environment.describe(&scene.textures)),
             ambient: scene.sky.ambient.max_element() > 0.0,
             by_kind: Light::KINDS.iter().map(|kind| (*kind, 0)).collect(),
         };
@@ -198,7 +206,8 @@ fn world_bounds(scene: &Scene, meshes: &[&Mesh]) -> Option<[[f64; 3]; 2]> {
 
 fn texture_bytes(scene: &Scene) -> u64 {
     let masks: u64 = scene.masks.iter().map(|mask| mask.texels.len() as u64).sum();
-    masks + scene.textures.iter().map(|t| t.bytes()).sum::<u64>()
+    let environment = scene.environment.as_ref().map_or(0, SceneEnvironment::bytes);
+    masks + environment + scene.textures.iter().map(|t| t.bytes()).sum::<u64>()
 }
 
 fn mesh_bytes(mesh: &Mesh) -> u64 {
@@ -277,7 +286,8 @@ impl Lights {
         let present = Light::KINDS.iter().map(|kind| (kind, self.by_kind[kind]));
         let present = present.filter(|(_, count)| *count > 0);
         let mut parts: Vec<String> = present.map(|(kind, n)| format!("{n} {kind}")).collect();
-        parts.extend(self.sky.then(|| "sky".into()));
+        let sky = self.environment.as_ref().map_or("sky".into(), |what| format!("sky ({what})"));
+        parts.extend(self.sky.then_some(sky));
         parts.extend(self.ambient.then(|| "ambient".into()));
         if parts.is_empty() { "none".into() } else { parts.join(", ") }
     }

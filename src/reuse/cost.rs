@@ -41,7 +41,7 @@ fn is_worth(scene: &Scene, rays: u32) -> bool {
 pub fn rays_of(channel: Channel, settings: &Settings) -> u32 {
     match channel {
         Channel::Area(_) | Channel::Selected(_) | Channel::Tail(_) => settings.shadow_samples,
-        Channel::Sky => settings.sky_samples,
+        Channel::Sky(_) => settings.sky_samples,
     }
 }
 
@@ -58,7 +58,7 @@ fn expected_rays(channel: Channel, settings: &Settings) -> u32 {
             None => all,
         },
         // Hardly any point sees all of the sky or nothing; the tail has no pilots.
-        Channel::Tail(_) | Channel::Sky => all,
+        Channel::Tail(_) | Channel::Sky(_) => all,
     }
 }
 
@@ -69,7 +69,7 @@ pub fn channels(scene: &Scene, settings: &Settings) -> Channels {
     let kept = Channels::of(scene, cells, |channel| {
         let runs = match channel {
             Channel::Area(_) | Channel::Selected(_) | Channel::Tail(_) => plan.area_lights,
-            Channel::Sky => plan.sky_light,
+            Channel::Sky(_) => plan.sky_light,
         };
         // The camera samples of a pixel share one lookup.
         runs && plan.diffuse
@@ -125,8 +125,8 @@ pub fn lookup_reasons(scene: &Scene, settings: &Settings) -> Vec<LookupReason> {
         }
     }
     if sky_light {
-        let looked_up = kept.sky().is_some();
-        let why = why(scene, expected(Channel::Sky), looked_up, diffuse);
+        let looked_up = !kept.sky().is_empty();
+        let why = why(scene, expected(Channel::Sky(0)), looked_up, diffuse);
         reasons.push(LookupReason { light: "sky".into(), looked_up, why });
     }
     reasons
@@ -193,7 +193,8 @@ impl PointCost {
             Channel::Selected(_) => area / channels.slots() as f64,
             // All parts have the same rays.
             Channel::Tail(_) => tail_samples / channels.tail().len() as f64,
-            Channel::Area(_) | Channel::Sky => 1.0,
+            Channel::Sky(_) => 1.0 / channels.sky().len() as f64,
+            Channel::Area(_) => 1.0,
         };
         let sum = |of: &dyn Fn(Channel) -> u32| -> f64 {
             channels.iter().map(|channel| share(channel) * f64::from(of(channel))).sum()

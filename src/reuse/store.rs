@@ -77,7 +77,8 @@ impl Compatibility {
             Channel::Tail(part) => {
                 format!("part {} of the weak lights, exposure {}", part + 1, settings.exposure)
             }
-            Channel::Sky => "sky".into(),
+            Channel::Sky(_) if channels.sky().len() == 1 => "sky".into(),
+            Channel::Sky(part) => format!("part {} of the sky", part + 1),
         };
         let rays = |c| super::rays_of(c, settings).saturating_mul(settings.spp);
         Self {
@@ -348,7 +349,7 @@ fn is_point(point: &SurfacePoint) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inference::{SKY_LIGHT, tail_light};
+    use crate::inference::{sky_light, tail_light};
     use crate::math::DVec3;
     use crate::scene::Pose;
 
@@ -416,7 +417,7 @@ mod tests {
         let light = |i: u32| match i % 2 {
             0 if i < 48 => i / 8,
             0 => tail_light(5, 1),
-            _ => SKY_LIGHT,
+            _ => sky_light(0),
         };
         let lights: Vec<u32> = (0..96).map(light).collect();
         let mut traced = TracedPoints { lights, ..traced() };

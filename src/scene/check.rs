@@ -28,6 +28,8 @@ impl World {
             self.check_mask(material)
         })?;
         self.meshes.iter().try_for_each(check_vertices)?;
+        let sky = self.sky.radiance;
+        self.environment.iter().try_for_each(|own| own.check(&self.textures, sky))?;
         self.check_finite()
     }
 

@@ -12,6 +12,7 @@ mod quad;
 mod sky;
 mod sphere;
 mod spot;
+mod sun;
 
 pub use directional::DirectionalLight;
 pub use disk::DiskLight;
@@ -21,6 +22,7 @@ pub use quad::QuadLight;
 pub use sky::Sky;
 pub use sphere::SphereLight;
 pub use spot::SpotLight;
+pub use sun::SunLight;
 
 use super::{Recentring, place};
 use crate::error::Result;
@@ -75,6 +77,8 @@ kinds! {
     Disk(DiskLight) = "disk",
     /// A cone of light.
     Spot(SpotLight) = "spot",
+    /// A disk at infinity.
+    Sun(SunLight) = "sun",
 }
 
 /// The interface of a kind of light to the scene.

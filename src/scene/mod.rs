@@ -12,6 +12,7 @@ mod alpha;
 mod aovs;
 mod camera;
 mod check;
+mod environment;
 mod job;
 mod lens;
 mod light;
@@ -36,11 +37,16 @@ mod winding;
 pub use alpha::{AlphaMask, LaidMask, MaskId};
 pub use aovs::{Aov, Aovs};
 pub use camera::{Camera, Pose};
+pub(crate) use environment::brightest;
+pub use environment::{
+    Daylight, Environment, EnvironmentKind, EnvironmentRadiance, IrradianceTable, RadianceTable,
+    SceneEnvironment, SkyGradient, SunSky, brightness, image_place,
+};
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
     DirectionalLight, DiskLight, FarField, Light, PointLight, QuadLight, Sky, SphereLight,
-    SpotLight,
+    SpotLight, SunLight,
 };
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
 pub use material::{Fresnel, Glass, Material, MaterialId, NormalMap};
@@ -94,6 +100,8 @@ pub struct World {
     pub lights: Vec<Light>,
     /// The light of rays that hit nothing.
     pub sky: Sky,
+    /// Light from outside that differs by direction, in place of the sky's radiance. The sky says whether it lights surfaces.
+    pub environment: Option<Environment>,
     /// Boxes in which light is traced in every frame, never reused; world space.
     pub traced_regions: Vec<Bounds3>,
 }
@@ -117,6 +125,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// The light of rays that hit nothing.
     pub sky: Sky,
+    /// Light from outside that differs by direction, in place of the sky's radiance.
+    pub environment: Option<SceneEnvironment>,
     /// Boxes in which light is traced in every frame, never reused.
     pub traced_regions: Vec<Bounds3>,
     /// Bounds of all geometry, f64, scene space.

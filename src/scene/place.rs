@@ -41,15 +41,15 @@ impl World {
         self.materials.len() as MaterialId - 1
     }
 
-    /// Moves everything but the sky by `transform`: meshes, spheres, lights and the boxes in which light is
-    /// always traced. The intensity of point and spot lights, the irradiance of directional ones and the
+    /// Moves everything by `transform`: meshes, spheres, lights and the boxes in which light is
+    /// always traced; the environment is turned. The intensity of point and spot lights, the irradiance of directional ones and the
     /// absorption of glass stay; a turned box becomes the upright one around it.
     ///
-    /// Errors: as [`WorldMesh::apply_transform`]; spheres, disk lights and spot lights under a transform that is no
+    /// Errors: as [`WorldMesh::apply_transform`]; spheres, disk lights, spot lights and environments under a transform that is no
     /// similarity, since they would not stay round. The world is then half moved: drop it.
     pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
         let (_, mirrors) = normal_matrix(transform)?;
-        // Materials stay as they are given, and the sky is the same in all directions.
+        // Materials stay as they are given, and the sky's radiance is the same in all directions.
         let World {
             meshes,
             spheres,
@@ -58,6 +58,7 @@ impl World {
             masks: _,
             lights,
             sky: _,
+            environment,
             traced_regions,
         } = self;
         meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;
@@ -65,11 +66,12 @@ impl World {
             move_sphere(&sphere.name, &mut sphere.centre, &mut sphere.radius, transform)?;
         }
         lights.iter_mut().try_for_each(|light| light.transform(transform, mirrors))?;
+        environment.iter_mut().try_for_each(|sky| sky.transform(transform))?;
         traced_regions.iter_mut().for_each(|region| *region = region.transformed(transform));
         Ok(())
     }
 
-    /// Adds all that `other` holds, with its indices shifted. The sky stays this world's.
+    /// Adds all that `other` holds, with its indices shifted. Sky and environment stay this world's.
     pub fn append(&mut self, other: World) {
         let World {
             mut meshes,
@@ -79,6 +81,7 @@ impl World {
             masks,
             lights,
             sky: _,
+            environment: _,
             traced_regions,
         } = other;
         let first_material = self.materials.len() as u32;

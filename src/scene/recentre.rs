@@ -1,8 +1,8 @@
 //! A world, moved to scene space.
 
 use super::{
-    Collapsed, Corners, Light, LightCells, Material, Mesh, Recentring, Scene, Sphere, Surface,
-    World, WorldMesh, WorldSphere,
+    Collapsed, Corners, Light, LightCells, Material, Mesh, Recentring, Scene, SceneEnvironment,
+    Sphere, Surface, World, WorldMesh, WorldSphere, environment,
     light::{EmittingShape, EmittingSurface},
     too_small, winding,
 };
@@ -56,6 +56,7 @@ impl World {
             .into_iter()
             .map(|light| light.into_scene(&recentring))
             .collect();
+        let lights = environment::with_sun(lights, self.environment.as_ref(), self.sky.lights);
         let to_scene_box = |b: &Bounds3| Bounds3 {
             min: recentring.point_to_scene(b.min),
             max: recentring.point_to_scene(b.max),
@@ -100,12 +101,14 @@ impl World {
             masks: self.masks,
             lights,
             sky: self.sky,
+            environment: None,
             traced_regions,
             bounds: scene_bounds,
             collapsed,
             light_cells: None,
         };
         scene.light_cells = LightCells::of(&scene);
+        scene.environment = self.environment.map(|sky| SceneEnvironment::of(sky, &scene.textures));
         Ok(scene)
     }
 }

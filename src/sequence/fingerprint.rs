@@ -34,8 +34,17 @@ pub struct WorldHash {
 impl WorldHash {
     /// Hashes everything in `world` that pixels depend on.
     pub fn of(world: &World) -> Self {
-        let World { meshes, spheres, materials, textures, masks, lights, sky, traced_regions } =
-            world;
+        let World {
+            meshes,
+            spheres,
+            materials,
+            textures,
+            masks,
+            lights,
+            sky,
+            environment,
+            traced_regions,
+        } = world;
         let mut parts = Vec::new();
         // Names are for people.
         for (n, mesh) in (1..).zip(meshes) {
@@ -61,6 +70,9 @@ impl WorldHash {
             parts.push((format!("light {n}"), Hash::of(|hash| hash.text(light))));
         }
         parts.push(("the sky".into(), Hash::of(|hash| hash.text(sky))));
+        if let Some(environment) = environment {
+            parts.push(("the environment".into(), Hash::of(|hash| hash.text(environment))));
+        }
         let wearers = meshes.iter().map(|mesh| mesh.material);
         let wearers: Vec<u32> = wearers.chain(spheres.iter().map(|s| s.material)).collect();
         parts.push(("which material goes where".into(), Hash::of(|hash| hash.array(&wearers))));

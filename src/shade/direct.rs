@@ -10,6 +10,7 @@ use super::pilots::Run;
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
 use super::selection::{LightUser, LightUsers, Reached, TailSamples};
+use super::sky_samples::EnvironmentScratch;
 use super::source::LightSource;
 use super::{FrameInput, Renderer, Reuse, dimensions, optics};
 use crate::intersect::{Hit, Ray, SpawnPoint, SurfaceInteraction, lift_to_smooth};
@@ -107,6 +108,8 @@ pub(super) struct ShadowScratch {
     pub users: LightUsers,
     /// Samples of the tail.
     pub tail: TailSamples,
+    /// Samples of an environment.
+    pub environment: EnvironmentScratch,
     /// Irradiance without shadows, per unit of emission, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
@@ -243,7 +246,7 @@ impl ShadowScratch {
 }
 
 impl Renderer<'_> {
-    /// The lights that shine under the plan, in the scene's order, then the sky.
+    /// The lights that shine under the plan, in the scene's order, then a sky of one colour.
     /// Without `stops_early` every point takes all samples.
     pub(super) fn light_sources(
         &self,
@@ -283,8 +286,8 @@ impl Renderer<'_> {
                 });
             }
         }
-        if plan.sky_light {
-            let channel = channels.and_then(|channels| channels.sky()).map(narrow);
+        if plan.sky_light && self.scene.environment.is_none() {
+            let channel = channels.and_then(|channels| channels.sky().next()).map(narrow);
             sources.push(LightSource {
                 sampler: LightSampler::of_sky(&self.scene.sky),
                 number: self.scene.lights.len() as u32,
@@ -330,6 +333,9 @@ impl Renderer<'_> {
                 let points = (lit, &users.cells[..]);
                 self.tails_without_shadows((selection, reuse), points, scratch);
             }
+            if let Some(source) = &input.environment {
+                self.environment_without_shadows(source, lit, scratch);
+            }
             let asked = (self.scene, reuse);
             scratch.groups.ask(input, asked, lit, &scratch.shown, pixels);
             if scratch.groups.wants_checks() {
@@ -342,6 +348,9 @@ impl Renderer<'_> {
         }
         for at in 0..input.lights.len() {
             self.light_from(input, at, (lit, &users), pixels, scratch, counts);
+        }
+        if let Some(source) = &input.environment {
+            self.light_from_environment(source, lit, pixels, scratch, counts);
         }
         if let Some(selection) = &input.selection {
             let lit = (lit, &users.cells[..]);
@@ -561,6 +570,9 @@ impl Renderer<'_> {
         }
         if let Some(selection) = &input.selection {
             self.check_tails((input, selection, reuse), (lit, &users.cells), pixels, s, counts);
+        }
+        if let Some(source) = &input.environment {
+            self.check_environment(source, lit, pixels, s, counts);
         }
         s.groups.conclude_checks(reuse);
     }

@@ -10,8 +10,8 @@ use super::point::ShadingPoint;
 use super::{BLOCK, FrameInput, Reuse};
 use crate::film::Provenance;
 use crate::inference::{
-    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SKY_LIGHT, SurfacePoint, TracedPoint,
-    TracedPoints, channel_of, check_rays, tail_light,
+    Channels, Checked, Estimate, LookupBatch, NO_LIGHT, SurfacePoint, TracedPoint, TracedPoints,
+    channel_of, check_rays, sky_light, tail_light,
 };
 use crate::scene::Scene;
 use crate::stats::ReuseCounts;
@@ -215,8 +215,9 @@ impl Groups {
         lights.clear();
         if channels.slots() > 0 {
             lights.resize(count * channels.len(), NO_LIGHT);
-            if let Some(sky) = channels.sky() {
-                lights.chunks_exact_mut(channels.len()).for_each(|own| own[sky] = SKY_LIGHT);
+            for (part, sky) in channels.sky().enumerate() {
+                let light = sky_light(part);
+                lights.chunks_exact_mut(channels.len()).for_each(|own| own[sky] = light);
             }
         }
         self.slots = channels.slots();

@@ -105,7 +105,7 @@ impl Renderer<'_> {
         (1.0 - density.unwrap_or(0.0)) as f32
     }
 
-    /// Adds the lights that glossy `points` reflect to their pixels. The sky is seen by the lobes' own rays.
+    /// Adds the lights that glossy `points` reflect to their pixels. A sky of one colour is seen by the lobes' own rays.
     pub(super) fn light_highlights(
         &self,
         input: &FrameInput,
@@ -114,6 +114,9 @@ impl Renderer<'_> {
         s: &mut ShadowScratch,
         counts: &mut RayCounts,
     ) {
+        if let (Some(source), Some(backdrop)) = (&input.environment, &input.backdrop) {
+            self.highlight_environment((source, backdrop), points, pixels, s, counts);
+        }
         let mut users = std::mem::take(&mut s.users);
         if let Some(selection) = &input.selection {
             let places = points.iter().map(|point| point.p);

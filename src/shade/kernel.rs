@@ -6,6 +6,7 @@
 //! then shadow rays light by light. All buffers live in [`Scratch`]; nothing is allocated per pixel.
 
 use super::adaptive::Until;
+use super::backdrop::Escaped;
 use super::cone::RayCone;
 use super::direct::{ShadowScratch, ShadowStarts};
 use super::highlight::GlossyPoint;
@@ -239,8 +240,16 @@ struct Vertex<'v, 'r> {
 
 impl Vertex<'_, '_> {
     fn escape(&mut self, ray: &Ray, state: &PathState) {
-        // A ray that nobody could trace has not seen the sky.
-        let sky = if ray.is_valid() { self.renderer.scene.sky.radiance } else { Rgb::NAN };
+        let sky = match &self.input.backdrop {
+            // A ray that nobody could trace has not seen the sky.
+            _ if !ray.is_valid() => Rgb::NAN,
+            None => self.renderer.scene.sky.radiance,
+            Some(backdrop) => {
+                let PathState { pdf, cell, cone, .. } = *state;
+                let escaped = Escaped { ray, spread: cone.spread, pdf, cell };
+                self.renderer.seen_outside(self.input, backdrop, &escaped)
+            }
+        };
         self.add(state, state.throughput * sky);
     }
 

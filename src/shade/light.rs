@@ -6,6 +6,7 @@
 
 mod directional;
 mod disk;
+mod environment;
 mod flat;
 mod point;
 mod quad;
@@ -13,11 +14,14 @@ mod sample;
 mod sky;
 mod sphere;
 mod spot;
+mod sun;
 
+pub use environment::{EnvironmentLight, EnvironmentSample};
 pub use sample::{AreaPdf, LightSample, Pdf, SampleSink, ShadowTarget};
 
 use super::irradiance;
 use crate::math::{DVec3, Rgb};
+use crate::sampling::SphereCone;
 use crate::scene::{Light, Sky};
 use directional::Directional;
 use disk::Disk;
@@ -26,6 +30,7 @@ use quad::Quad;
 use sky::{SkyDome, SkyView};
 use sphere::{Sphere, SphereView};
 use spot::Spot;
+use sun::Sun;
 
 /// A light that is sampled, with all that its samples need: made once a frame.
 pub struct LightSampler {
@@ -44,6 +49,7 @@ enum Shape {
     Sphere(Sphere),
     Disk(Disk),
     Spot(Spot),
+    Sun(Sun),
     Sky(SkyDome),
 }
 
@@ -56,6 +62,7 @@ enum View<'a> {
     Quad(&'a Quad),
     Sphere(SphereView),
     Disk(&'a Disk),
+    Sun(&'a SphereCone),
     Sky(SkyView),
 }
 
@@ -71,6 +78,7 @@ impl LightSampler {
             Light::Sphere(light) => (light.radiance, Shape::Sphere(Sphere::new(light))),
             Light::Disk(light) => (light.radiance, Shape::Disk(Disk::new(light))),
             Light::Spot(light) => (light.intensity, Shape::Spot(Spot::new(light))),
+            Light::Sun(light) => (light.radiance, Shape::Sun(Sun::new(light))),
         };
         Self { emission, shape }
     }
@@ -90,6 +98,7 @@ impl LightSampler {
             Shape::Sphere(light) => light.unshadowed(p, n),
             Shape::Disk(light) => light.unshadowed(p, n),
             Shape::Spot(light) => light.unshadowed(p, n),
+            Shape::Sun(light) => light.unshadowed(n),
             Shape::Sky(sky) => sky.unshadowed(),
         }
     }
@@ -104,14 +113,15 @@ impl LightSampler {
             | Shape::Quad(_)
             | Shape::Sphere(_)
             | Shape::Disk(_)
-            | Shape::Spot(_) => self.unshadowed(p, mapped),
+            | Shape::Spot(_)
+            | Shape::Sun(_) => self.unshadowed(p, mapped),
         }
     }
 
-    /// Whether rays can end on the light's surface.
+    /// Whether rays can end on the light's surface, or leave the scene towards it.
     pub fn is_seen(&self) -> bool {
         match &self.shape {
-            Shape::Quad(_) | Shape::Sphere(_) | Shape::Disk(_) => true,
+            Shape::Quad(_) | Shape::Sphere(_) | Shape::Disk(_) | Shape::Sun(_) => true,
             Shape::Point(_) | Shape::Directional(_) | Shape::Spot(_) | Shape::Sky(_) => false,
         }
     }
@@ -125,6 +135,7 @@ impl LightSampler {
             Shape::Sphere(light) => View::Sphere(light.seen_from(p, 1.0)?),
             Shape::Disk(light) => View::Disk(light),
             Shape::Spot(light) => light.seen_from(p)?,
+            Shape::Sun(light) => View::Sun(light.seen()?),
             Shape::Sky(_) => View::Sky(SkyView::above(n)),
         }))
     }
@@ -141,6 +152,7 @@ impl LightView<'_> {
             View::Quad(light) => u.for_each(|u| sink.push(light.sample_li(p, u))),
             View::Sphere(light) => u.for_each(|u| sink.push(light.sample_li(p, u))),
             View::Disk(light) => u.for_each(|u| sink.push(light.sample_li(p, u))),
+            View::Sun(cone) => u.for_each(|u| sink.push(sun::sample_li(cone, u))),
             View::Sky(sky) => u.for_each(|u| sink.push(sky.sample_li(u))),
         }
     }
@@ -152,6 +164,7 @@ impl LightView<'_> {
             View::Quad(light) => Some(light.pdf_li(p, point)),
             View::Sphere(light) => Some(light.pdf_li()),
             View::Disk(light) => Some(light.pdf_li(p, point)),
+            View::Sun(cone) => Some(sun::pdf_li(cone)),
             View::Point(_) | View::Directional(_) | View::Sky(_) => None,
         }
     }
@@ -163,6 +176,7 @@ impl LightView<'_> {
             View::Quad(light) => light.above(p, n),
             View::Sphere(light) => light.above(p, n),
             View::Disk(light) => light.above(p, n),
+            View::Sun(cone) => sun::above(cone, n),
             // Each sample of these lies above.
             View::Point(_) | View::Directional(_) | View::Sky(_) => None,
         }

@@ -7,9 +7,11 @@
 //! Not done: light through glass (its shadow is opaque), diffuse interreflection.
 
 mod adaptive;
+mod backdrop;
 mod cone;
 mod dimensions;
 mod direct;
+mod environment;
 mod far_lights;
 mod groups;
 mod highlight;
@@ -27,6 +29,7 @@ mod pixels;
 mod point;
 mod scattered;
 mod selection;
+mod sky_samples;
 mod source;
 mod tail;
 mod texture;
@@ -41,7 +44,9 @@ use crate::scene::{Camera, Filter, Material, Rect, Scene, Settings};
 use crate::stats::{BadSamples, RayCounts, ReuseCounts};
 pub use adaptive::SampleSpread;
 use adaptive::Until;
+use backdrop::Backdrop;
 pub(crate) use direct::ShadowStarts;
+use environment::EnvironmentSource;
 use kernel::Scratch;
 use medium_stack::MediumStack;
 use pilots::LightFindings;
@@ -219,6 +224,10 @@ struct FrameInput<'a> {
     lights: Vec<LightSource>,
     /// Which of them are looked at where; `None` if all are everywhere.
     selection: Option<LightSelection<'a>>,
+    /// An environment that shines, in place of the sky.
+    environment: Option<EnvironmentSource<'a>>,
+    /// What rays see that leave the scene, if it is more than the sky's colour.
+    backdrop: Option<Backdrop<'a>>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: MediumStack,
     has_ranked_glass: bool,
@@ -459,6 +468,8 @@ impl Renderer<'_> {
             selection: self.light_selection(&lights),
             has_pilots: lights.iter().any(|light| light.pilots < light.samples),
             lights,
+            environment: self.environment_source(reuse),
+            backdrop: if self.plan.environment { Backdrop::of(self.scene) } else { None },
             around_eye,
             has_ranked_glass,
             reuse,

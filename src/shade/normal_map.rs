@@ -9,7 +9,7 @@ use super::cone::RayCone;
 use super::light::LightSampler;
 use super::texture;
 use crate::intersect::{SurfaceInteraction, uv_gradients};
-use crate::math::DVec3;
+use crate::math::{DVec3, Rgb};
 use crate::scene::{Material, Scene, Wrap};
 
 /// The mapped unit normal at `si`, on the side of `ng`, as seen towards `wo` (unit) by a ray with this `cone`; the shading normal where the
@@ -76,7 +76,21 @@ pub(super) fn unshadowed(sampler: &LightSampler, p: DVec3, n: DVec3, mapped: DVe
         return 0.0;
     }
     let cos = n.dot(mapped);
-    let tilted = sampler.unshadowed_tilted(p, mapped, cos);
+    dimmed(own, sampler.unshadowed_tilted(p, mapped, cos), cos)
+}
+
+/// The same of a light that comes from all around, whose irradiance on the surface itself is `own` and on one with the mapped
+/// normal, of cosine `cos` to its own, `tilted`: less the part of a sky that the tilted surface sees below the other's horizon.
+pub(super) fn unshadowed_colour(own: Rgb, tilted: Rgb, cos: f64) -> Rgb {
+    let of = |own: f32, tilted: f32| match own {
+        0.0 => 0.0,
+        _ => dimmed(own.into(), f64::from(tilted) * 0.5 * (1.0 + cos), cos) as f32,
+    };
+    Rgb::new(of(own.x, tilted.x), of(own.y, tilted.y), of(own.z, tilted.z))
+}
+
+/// The irradiance `tilted` by the mapped normal, of cosine `cos` to the surface's, as far as the surface's own is not small beside it.
+fn dimmed(own: f64, tilted: f64, cos: f64) -> f64 {
     if tilted == 0.0 {
         return 0.0;
     }
@@ -88,7 +102,7 @@ pub(super) fn unshadowed(sampler: &LightSampler, p: DVec3, n: DVec3, mapped: DVe
 mod tests {
     use super::*;
     use crate::intersect::PrimRef;
-    use crate::math::{Rgb, Vec2};
+    use crate::math::Vec2;
     use crate::scene::{DirectionalLight, Light, Sky, SphereLight, Surface};
 
     fn flat(ns: DVec3) -> SurfaceInteraction {

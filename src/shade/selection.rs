@@ -244,7 +244,7 @@ mod tests {
     use crate::sampling::mix;
     use crate::scene::{
         DirectionalLight, DiskLight, Light, Material, PointLight, QuadLight, Scene, SphereLight,
-        SpotLight, World, WorldSphere,
+        SpotLight, SunLight, World, WorldSphere,
     };
     use crate::shade::light::LightSampler;
 
@@ -295,6 +295,10 @@ mod tests {
             5 => {
                 let irradiance = radiance * 0.001;
                 Light::Directional(DirectionalLight { to_light: normal, irradiance })
+            }
+            6 => {
+                let irradiance = radiance * 0.001;
+                Light::Sun(SunLight::of_irradiance(normal, 0.3 * size.min(4.0), irradiance))
             }
             kind => panic!("{} lights are not drawn", Light::KINDS[kind]),
         }

@@ -16,12 +16,13 @@ pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec
     let TextureMap { image, wrap, transform } = map;
     let uv = map.place(uv);
     let footprint = footprint.map(|axis| transform.transform_vector2(axis));
-    filtered(&scene.textures[*image as usize], *wrap, uv, footprint)
+    filtered(&scene.textures[*image as usize], [*wrap; 2], uv, footprint)
 }
 
 /// The mean of `texture` over the ellipse around `uv` with the conjugate diameters `footprint`, both in the image's
-/// coordinates, of which `(0, 0)` is the lower left corner.
-fn filtered(texture: &Texture, wrap: Wrap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
+/// coordinates, of which `(0, 0)` is the lower left corner. Beyond its sides and beyond its upper and lower edges the image
+/// goes on as the two of `wrap` say.
+pub(super) fn filtered(texture: &Texture, wrap: [Wrap; 2], uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
     let levels = texture.levels();
     let size = DVec2::new(f64::from(levels[0].width), f64::from(levels[0].height));
     let ellipse = Ellipse::of(footprint.map(|axis| axis * size));
@@ -68,7 +69,7 @@ impl Ellipse {
 }
 
 /// Lookup between two of `levels`; `level` is at least 0.
-fn trilinear(levels: &[TextureLevel], wrap: Wrap, uv: Vec2, level: f64) -> Rgb {
+fn trilinear(levels: &[TextureLevel], wrap: [Wrap; 2], uv: Vec2, level: f64) -> Rgb {
     let last = levels.len() - 1;
     let whole = level as usize;
     if whole >= last {
@@ -84,9 +85,9 @@ fn trilinear(levels: &[TextureLevel], wrap: Wrap, uv: Vec2, level: f64) -> Rgb {
 
 /// Bilinear lookup in one level.
 #[inline(always)]
-fn bilinear(level: &TextureLevel, wrap: Wrap, uv: Vec2) -> Rgb {
-    let (x0, x1, fx) = wrap.two_texels(uv.x, level.width);
-    let (y0, y1, fy) = wrap.two_texels(1.0 - uv.y, level.height);
+fn bilinear(level: &TextureLevel, wrap: [Wrap; 2], uv: Vec2) -> Rgb {
+    let (x0, x1, fx) = wrap[0].two_texels(uv.x, level.width);
+    let (y0, y1, fy) = wrap[1].two_texels(1.0 - uv.y, level.height);
     let [a, b, c, d] = level.four([x0, x1], [y0, y1]);
     a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
 }
@@ -107,7 +108,7 @@ mod tests {
     #[test]
     fn texel_middles_are_exact_and_v_points_up() {
         // Upper row: black, white.
-        let at = |u, v| filtered(&checker(2), Wrap::Repeat, Vec2::new(u, v), POINT);
+        let at = |u, v| filtered(&checker(2), [Wrap::Repeat; 2], Vec2::new(u, v), POINT);
         assert_eq!(at(0.25, 0.75), Rgb::ZERO);
         assert_eq!(at(0.75, 0.75), Rgb::ONE);
         assert_eq!(at(0.25, 0.25), Rgb::ONE);
@@ -122,12 +123,12 @@ mod tests {
         for uv in [(1.25, 0.75), (-0.75, -0.25), (1e30, 0.0), (f32::NAN, f32::INFINITY)] {
             for footprint in [POINT, tiny, unknown, wide, huge] {
                 for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-                    let c = filtered(&checker(2), wrap, Vec2::new(uv.0, uv.1), footprint);
+                    let c = filtered(&checker(2), [wrap; 2], Vec2::new(uv.0, uv.1), footprint);
                     assert!(c.is_finite(), "{uv:?} {footprint:?} {wrap:?}");
                 }
             }
         }
-        let once_more = filtered(&checker(2), Wrap::Repeat, Vec2::new(1.25, 0.75), POINT);
+        let once_more = filtered(&checker(2), [Wrap::Repeat; 2], Vec2::new(1.25, 0.75), POINT);
         assert_eq!(once_more, Rgb::ZERO);
     }
 
@@ -135,7 +136,7 @@ mod tests {
     fn beyond_its_edges_an_image_goes_on_as_it_is_told() {
         let ramp = (0..4).map(|i| Rgb::splat(i as f32)).collect();
         let texture = Texture::from_linear("ramp", [4, 1], ramp);
-        let at = |wrap, u| filtered(&texture, wrap, Vec2::new(u, 0.5), POINT).x;
+        let at = |wrap, u| filtered(&texture, [wrap; 2], Vec2::new(u, 0.5), POINT).x;
         let middles = [-0.375, -0.125, 0.125, 0.875, 1.125, 1.375, 1.875, 2.125];
         for (wrap, expected) in [
             (Wrap::Repeat, [2.0, 3.0, 0.0, 3.0, 0.0, 1.0, 3.0, 0.0]),
@@ -170,7 +171,7 @@ mod tests {
         let texture = checker(64);
         for (u, v) in [(0.1, 0.2), (0.77, 0.5)] {
             let far = [DVec2::new(0.5, 0.1), DVec2::new(0.0, 0.06)];
-            let seen = filtered(&texture, Wrap::Repeat, Vec2::new(u, v), far);
+            let seen = filtered(&texture, [Wrap::Repeat; 2], Vec2::new(u, v), far);
             assert!((seen - Rgb::splat(0.5)).abs().max_element() < 1e-6, "{seen}");
         }
     }
@@ -183,7 +184,7 @@ mod tests {
         let seen = |texels: f64| {
             let long = [DVec2::new(8.0 / 64.0, 0.0), DVec2::new(0.0, 1.0 / 64.0)];
             let u = (32.5 + texels) / 64.0;
-            filtered(&texture, Wrap::Repeat, Vec2::new(u as f32, 0.5), long).x
+            filtered(&texture, [Wrap::Repeat; 2], Vec2::new(u as f32, 0.5), long).x
         };
         assert!(seen(0.0) > 0.12 && seen(3.4) > 0.12, "{} {}", seen(0.0), seen(3.4));
         assert!(seen(4.6) == 0.0);
@@ -214,7 +215,7 @@ mod tests {
         let stripe = |i: u32| Rgb::splat(((i % 64 / 4) % 2) as f32);
         let texture = Texture::from_linear("stripes", [64, 64], (0..4096).map(stripe).collect());
         let (long, short) = (DVec2::splat(0.25), DVec2::splat(1.0 / 64.0));
-        let at = |axes| filtered(&texture, Wrap::Repeat, Vec2::new(6.0 / 64.0, 0.4), axes);
+        let at = |axes| filtered(&texture, [Wrap::Repeat; 2], Vec2::new(6.0 / 64.0, 0.4), axes);
         assert_eq!(at([long * DVec2::Y, short * DVec2::X]), Rgb::ONE);
         assert!((at([long * DVec2::X, short * DVec2::Y]) - Rgb::splat(0.5)).abs().x < 0.05);
     }

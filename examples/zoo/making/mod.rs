@@ -7,6 +7,7 @@ mod builder;
 mod cameras;
 mod dice;
 mod families;
+mod hdr;
 mod lamps;
 mod obj;
 mod props;

@@ -4,6 +4,7 @@ use super::builder::{Builder, triple};
 use super::cameras::{Move, Pose};
 use super::dice::Dice;
 use super::families::{FAMILIES, Family};
+use super::hdr;
 use super::props;
 use glam::DVec3;
 use std::fmt::Write;
@@ -37,7 +38,7 @@ pub struct Specimen {
     /// The seed of its zoo and its number there: what it is a function of.
     pub index: u64,
     /// The family's name, `forest`, with a `+` where things of other kinds were added
-    /// a `~` where a lens blurs, and a `^` where mirrors are rough.
+    /// a `~` where a lens blurs, a `^` where mirrors are rough, and a `*` where the sky is an environment.
     pub name: String,
     /// Which of [`FAMILIES`].
     pub family: usize,
@@ -120,6 +121,50 @@ impl Specimen {
         }
         self.builder.text = text;
         self.name.push('^');
+        self
+    }
+
+    /// With a random environment in place of the sky.
+    pub fn with_sky(mut self, seed: u64) -> Self {
+        let mut dice = Dice::new(seed.rotate_left(16), self.index);
+        let mut colour =
+            |most: f64| DVec3::from_array([(); 3].map(|()| dice.scale(0.1, 1.0))) * most;
+        let colours = [colour(1.5), colour(1.0), colour(0.4), colour(20.0)];
+        let to_sun =
+            DVec3::new(dice.within(-1.0, 1.0), dice.within(0.1, 1.0), dice.within(-1.0, 1.0));
+        let (turbidity, turn) = (dice.within(2.0, 8.0), dice.within(0.0, 360.0));
+        let (strength, width) = (dice.scale(0.1, 0.4), dice.scale(0.005, 0.6));
+        let keys = match dice.count(0, 2) {
+            0 => {
+                let [zenith, horizon, ground, _] = colours.map(triple);
+                format!(
+                    "gradient = {{ zenith = {zenith}, horizon = {horizon}, ground = {ground} }}"
+                )
+            }
+            1 => {
+                let sun = triple(to_sun);
+                format!(
+                    "sun_sky = {{ to_sun = {sun}, turbidity = {turbidity:.3} }}\nstrength = {strength:.4}\n\
+                     rotate = {turn:.2}"
+                )
+            }
+            _ => {
+                let image = hdr::sky(colours, to_sun.normalize(), width);
+                self.builder.files.push(("sky.hdr".into(), image));
+                format!("image = \"sky.hdr\"\nrotate = {turn:.2}")
+            }
+        };
+        // The old sky's table ends where the next one begins.
+        let mut text = String::new();
+        let mut is_sky = false;
+        for line in self.builder.text.lines() {
+            is_sky = if line.starts_with('[') { line == "[sky]" } else { is_sky };
+            if !is_sky {
+                let _ = writeln!(text, "{line}");
+            }
+        }
+        self.builder.text = format!("{text}[sky]\n{keys}\n");
+        self.name.push('*');
         self
     }
 

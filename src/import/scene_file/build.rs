@@ -5,11 +5,12 @@ use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
 use super::report::Source;
+use super::sky::{Shown, Sky};
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::images::{ImageUse, Images};
 use crate::import::{self, Model, emission, untextured};
-use crate::scene::{self, MaterialId, World, WorldMesh, WorldSphere};
+use crate::scene::{self, EnvironmentKind, MaterialId, World, WorldMesh, WorldSphere};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -66,7 +67,9 @@ impl<'a> Builder<'a> {
             this.world.lights.push(light.build(source)?);
         }
         this.world.traced_regions = file.reuse.regions(source)?;
-        this.world.sky = file.sky.as_ref().map_or_else(Default::default, |sky| sky.build());
+        if let Some(sky) = &file.sky {
+            this.add_sky(sky)?;
+        }
         this.warn_of_unused_materials();
         this.warn_of_darkness();
         Ok(this)
@@ -110,6 +113,32 @@ impl<'a> Builder<'a> {
         let path = self.beside(file);
         let found = self.images.place(&path, what, &mut self.world, &mut self.files);
         found.map_err(|error| self.at_key(file, &error))
+    }
+
+    fn add_sky(&mut self, sky: &At<Sky>) -> Result<()> {
+        self.world.sky = sky.build();
+        let shown = sky.shown(self.source, &sky.span)?;
+        let kind = match &shown {
+            Shown::Radiance => return Ok(()),
+            Shown::Image(file) => EnvironmentKind::Image(self.image(file, ImageUse::Colour)?),
+            Shown::Gradient(gradient) => gradient.build(self.source)?,
+            Shown::SunSky(day) => day.build(self.source)?,
+        };
+        let environment = sky.environment(kind);
+        if let (Shown::Image(file), EnvironmentKind::Image(image)) = (&shown, &environment.kind) {
+            let brightest = scene::brightest(&self.world.textures[*image as usize]);
+            let seen = f64::from(brightest) * f64::from(environment.strength);
+            if seen == 0.0 {
+                return Err(self.at_span(&file.span, "the image is black, so it sends no light"));
+            }
+            if seen > 1e30 {
+                let message =
+                    format!("the image is too bright: {seen:e} with `strength`, 1e30 at most");
+                return Err(self.at_span(&file.span, message));
+            }
+        }
+        self.world.environment = Some(environment);
+        Ok(())
     }
 
     fn add_mesh(&mut self, mesh: &At<Mesh>) -> Result<()> {
@@ -300,12 +329,14 @@ impl<'a> Builder<'a> {
     }
 
     fn warn_of_darkness(&mut self) {
-        let World { lights, sky, materials, .. } = &self.world;
+        let World { lights, sky, environment, materials, .. } = &self.world;
         let glows = materials.iter().any(|m| m.emission.max_element() > 0.0);
-        let bright = sky.radiance.max_element() > 0.0 || sky.ambient.max_element() > 0.0;
+        let bright = environment.is_some()
+            || sky.radiance.max_element() > 0.0
+            || sky.ambient.max_element() > 0.0;
         if lights.is_empty() && !glows && !bright {
             let warning = Diagnostic::new(&self.source.path, "nothing lights the scene")
-                .help("add a [[light]] or give the [sky] a radiance");
+                .help("add a [[light]] or give the [sky] a radiance or an image");
             self.warnings.push(warning);
         }
     }

@@ -1,7 +1,7 @@
-//! `[[light]]` and `[sky]`.
+//! `[[light]]`.
 
 use super::at::{At, Span};
-use super::number::{Crease, Positive};
+use super::number::{Crease, Positive, SunAngle};
 use super::quad::{self, QuadShape};
 use super::report::Source;
 use super::vector::{Direction, Light as Amount, List, Point, Size2};
@@ -26,6 +26,8 @@ pub(super) enum Light {
     Disk(DiskLight),
     /// A cone of light with a smooth edge; its shadows are hard, or soft where it has a radius.
     Spot(SpotLight),
+    /// A disk of the sky, such as the sun's; its shadows are soft.
+    Sun(SunLight),
 }
 
 /// A point that emits alike in all directions.
@@ -126,6 +128,24 @@ pub(super) struct SpotLight {
     radius: Option<Positive>,
 }
 
+/// A disk of the sky.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct SunLight {
+    /// Vector from the scene towards its middle; its length does not matter.
+    to_light: Direction,
+    /// Irradiance on a surface that faces it, W/m².
+    irradiance: Amount,
+    /// Angle under which it is seen, degrees.
+    #[serde(default = "sun_angle")]
+    angle: SunAngle,
+}
+
+/// The sun's mean angle.
+pub(super) fn sun_angle() -> SunAngle {
+    SunAngle(0.533)
+}
+
 fn outer_angle() -> Crease {
     Crease(45.0)
 }
@@ -167,27 +187,6 @@ impl SpotLight {
     }
 }
 
-/// A constant sky: the light of rays that hit nothing.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a table")]
-pub(super) struct Sky {
-    /// Radiance of the sky, W/(m² sr).
-    #[serde(default)]
-    radiance: Amount,
-    /// Whether the sky lights diffuse surfaces, by rays that geometry can block; otherwise it is
-    /// only a backdrop.
-    #[serde(default = "yes")]
-    lights: bool,
-    /// Light that reaches every diffuse surface, corners included, without any ray: it adds
-    /// `diffuse` times `ambient` to what is seen.
-    #[serde(default)]
-    ambient: Amount,
-}
-
-fn yes() -> bool {
-    true
-}
-
 impl At<Light> {
     /// As scene data.
     pub fn build(&self, source: &Source) -> Result<scene::Light> {
@@ -218,6 +217,11 @@ impl At<Light> {
                 two_sided: d.two_sided,
             }),
             Light::Spot(s) => scene::Light::Spot(s.build(source, &self.span)?),
+            Light::Sun(s) => scene::Light::Sun(scene::SunLight::of_irradiance(
+                s.to_light.unit(),
+                s.angle.radius(),
+                s.irradiance.rgb(),
+            )),
         })
     }
 }
@@ -230,17 +234,6 @@ impl QuadLightTable {
             centre: self.centre.as_ref(),
             normal: self.normal.as_ref(),
             size: self.size.as_ref(),
-        }
-    }
-}
-
-impl Sky {
-    /// As scene data.
-    pub fn build(&self) -> scene::Sky {
-        scene::Sky {
-            radiance: self.radiance.rgb(),
-            lights: self.lights,
-            ambient: self.ambient.rgb(),
         }
     }
 }

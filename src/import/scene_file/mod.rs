@@ -22,6 +22,7 @@ mod reuse;
 mod schema;
 mod settings;
 mod shapes;
+mod sky;
 #[cfg(test)]
 mod tests;
 mod texture;
@@ -37,7 +38,7 @@ use crate::error::Result;
 use at::At;
 use build::Builder;
 use camera::Camera;
-use light::{Light, Sky};
+use light::Light;
 use material::Material;
 use mesh::{Mesh, Sphere};
 use report::Source;
@@ -45,6 +46,7 @@ use reuse::Reuse;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use settings::Settings;
+use sky::Sky;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -59,7 +61,7 @@ struct SceneFile {
     /// Lights.
     light: Vec<At<Light>>,
     /// The light of rays that hit nothing. Absent: black.
-    sky: Option<Sky>,
+    sky: Option<At<Sky>>,
     /// Materials by name.
     material: BTreeMap<String, At<Material>>,
     /// Meshes, from files or generated.

@@ -110,6 +110,16 @@ number!(
     { "type": "number", "minimum": 0, "maximum": 180 }
 );
 number!(
+    /// The angle under which a sun is seen, degrees.
+    SunAngle: "an angle in degrees from 0.02 to 90", |x| (0.02..=90.0).contains(&x),
+    { "type": "number", "minimum": 0.02, "maximum": 90 }
+);
+number!(
+    /// How hazy air is.
+    Turbidity: "a turbidity from 1.7 to 10", |x| (1.7..=10.0).contains(&x),
+    { "type": "number", "minimum": 1.7, "maximum": 10 }
+);
+number!(
     /// An index of refraction.
     Ior: "an index of refraction from 0.1 to 10", |x| (0.1..=10.0).contains(&x),
     { "type": "number", "minimum": 0.1, "maximum": 10 }
@@ -120,6 +130,13 @@ number!(
     |x| (1e-30..=1e30).contains(&x.abs()),
     { "type": "number", "minimum": -1e30, "maximum": 1e30, "not": { "const": 0 } }
 );
+
+impl SunAngle {
+    /// Half of it, radians.
+    pub fn radius(self) -> f64 {
+        0.5 * self.0.to_radians()
+    }
+}
 
 /// A whole number from `MIN` to `MAX`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

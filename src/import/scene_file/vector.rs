@@ -89,7 +89,12 @@ impl Light {
 impl Reflectance {
     /// All of the light.
     pub fn white() -> Self {
-        Self([Share(1.0); 3])
+        Self::grey(1.0)
+    }
+
+    /// The same share of each colour.
+    pub fn grey(share: f64) -> Self {
+        Self([Share(share); 3])
     }
 
     /// As a colour.

@@ -58,6 +58,11 @@ impl FarField {
         Self { centre: to_light, is_near: 0.0, everywhere: 1.0, ..Self::DARK }
     }
 
+    /// A disk at infinity whose radius is seen under an angle with this sine, per unit of radiance.
+    pub(super) fn distant_disk(to_light: DVec3, sin: f64) -> Self {
+        Self { reach: sin, everywhere: PI * sin * sin, ..Self::parallel(to_light) }
+    }
+
     /// A ball, or with `reach` 0 a point, of this intensity per unit of emission.
     pub(super) fn everywhere(centre: DVec3, reach: f64, intensity: f64) -> Self {
         Self { centre, reach, everywhere: intensity, ..Self::DARK }

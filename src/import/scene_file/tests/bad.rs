@@ -310,6 +310,32 @@ const TOGETHER: &[Case] = &[
     ("[settings]\noutput = ¦''\n", "empty", ""),
 ];
 
+const SKIES: &[Case] = &[
+    ("[sky]\nradiance = 1\ngradient = ¦{ zenith = 1, horizon = 1, ground = 1 }\n", "one of", ""),
+    (
+        "[sky]\nsun_sky = { to_sun = 'y' }\nimage = ¦'none.exr'\n",
+        "one of `radiance`, `image`, `gradient` and `sun_sky`",
+        "",
+    ),
+    ("[sky]\nradiance = 1\nrotate = ¦90\n", "`rotate` belongs to", "`radiance`"),
+    ("[sky]\nstrength = ¦2\n", "`strength` belongs to", ""),
+    ("[sky]\nimage = 'none.exr'\nstrength = ¦0\n", "found 0", ""),
+    ("[sky]\nimage = 'none.exr'\nrotate = ¦1e9\n", "from -1e6 to 1e6", ""),
+    ("[sky]\nimage = ¦'none.exr'\n", "none.exr", ""),
+    ("[sky]\nimage = ¦'scene.toml'\n", "not a readable image", ""),
+    ("[sky]\n¦img = 'none.exr'\n", "unknown key `img`", "`image`"),
+    ("[sky]\ngradient = ¦{ zenith = 1, horizon = 1 }\n", "the key `ground` is missing", ""),
+    ("[sky]\ngradient = ¦{ zenith = 0, horizon = 0, ground = 0 }\n", "black", ""),
+    ("[sky]\ngradient = { zenith = ¦-1, horizon = 0, ground = 0 }\n", "found -1", ""),
+    ("[sky]\nsun_sky = ¦{ to_sun = [1, -0.1, 0] }\n", "below the horizon", ""),
+    ("[sky]\nsun_sky = { to_sun = 'y', turbidity = ¦1 }\n", "from 1.7 to 10", ""),
+    ("[sky]\nsun_sky = { to_sun = 'y', angle = ¦0 }\n", "from 0.02 to 90", ""),
+    ("[sky]\nsun_sky = { to_sun = ¦[0, 0, 0] }\n", "", ""),
+    ("[sky]\nsun_sky = { to_sun = 'y', ground = ¦2 }\n", "found 2", ""),
+    ("[sky]\nsun_sky = ¦{ turbidity = 3 }\n", "the key `to_sun` is missing", ""),
+    ("light = [{ sun = { to_light = 'y', irradiance = 1, angle = ¦91 } }]\n", "found 91", ""),
+];
+
 const SYNTAX: &[Case] = &[
     ("[camera]\nfov = 40\n¦fov = 41\n", "duplicate key", ""),
     ("[camera\nfov = 40\n", "", ""),
@@ -362,6 +388,40 @@ fn values_out_of_range_are_shown_where_they_stand() {
 #[test]
 fn values_that_do_not_go_together_are_shown() {
     check(TOGETHER);
+}
+
+#[test]
+fn skies_that_are_none_are_shown_where_they_stand() {
+    check(SKIES);
+}
+
+#[test]
+fn images_that_send_no_light_are_refused_at_their_key() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    let refusal = |strength: &str, texels: [f32; 3]| {
+        let image = image::Rgb32FImage::from_pixel(4, 2, image::Rgb(texels));
+        image.save(folder.path().join("sky.exr")).expect("written");
+        std::fs::write(&path, format!("[sky]\nimage = 'sky.exr'\n{strength}\n")).expect("written");
+        match load(&path, &LoadOptions::default()) {
+            Err(Error::Input(d)) => {
+                assert_eq!((d.line, d.column), (Some(2), Some(9)), "{d}");
+                Some(d.message)
+            }
+            Err(error) => panic!("{error}"),
+            Ok(_) => None,
+        }
+    };
+    let says = |strength, texels, what| {
+        let message = refusal(strength, texels).expect("an error");
+        assert!(message.contains(what), "{message}");
+    };
+    says("", [0.0; 3], "black");
+    says("", [1.0, f32::NAN, 0.0], "not a finite number");
+    says("", [1.0, f32::INFINITY, 0.0], "not a finite number");
+    says("", [1.0, -1.0, 0.0], "negative");
+    says("strength = 1e20", [1e20; 3], "too bright");
+    assert_eq!(refusal("strength = 1e20", [1.0; 3]), None);
 }
 
 #[test]

@@ -4,8 +4,9 @@ use super::*;
 use crate::import::terrain_height;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{
-    BuildQuality, CameraPath, DirectionalLight, Focus, Lens, Light as SceneLight, PointLight,
-    Policy, ReuseSettings, Settings as SceneSettings, ShotLens, SphereLight,
+    BuildQuality, CameraPath, DirectionalLight, Environment, EnvironmentKind, Focus, Lens,
+    Light as SceneLight, PointLight, Policy, ReuseSettings, Settings as SceneSettings, ShotLens,
+    SkyGradient, SphereLight,
 };
 use std::time::Duration;
 
@@ -119,11 +120,18 @@ fn lights_come_in_kinds_and_quads_and_spots_in_two_forms() {
          [[light]]\ndisk = { centre = [0, 9, 0], normal = '-y', radius = 0.5, radiance = 3 }\n\
          [[light]]\nspot = { position = [0, 9, 0], target = [0, 3, 0], intensity = 3 }\n\
          [[light]]\n[light.spot]\nposition = [0, 9, 0]\ndirection = '-y'\nintensity = 3\n\
-         outer_angle = 60\ninner_angle = 60\nradius = 0.1\n",
+         outer_angle = 60\ninner_angle = 60\nradius = 0.1\n\
+         [[light]]\nsun = { to_light = [0, 2, 0], irradiance = 3, angle = 1 }\n",
     );
-    let [point, sun, lamp, window, bulb, disk, torch, lantern] = &loaded.world.lights[..] else {
-        panic!("8 lights")
+    let [point, sun, lamp, window, bulb, disk, torch, lantern, noon] = &loaded.world.lights[..]
+    else {
+        panic!("9 lights")
     };
+    let SceneLight::Sun(noon) = noon else { panic!("a sun") };
+    assert_eq!(noon.to_light, DVec3::Y);
+    assert!((noon.angular_radius.to_degrees() - 0.5).abs() < 1e-12);
+    let sent = f64::from(noon.radiance.x) * std::f64::consts::PI * noon.sin().powi(2);
+    assert!((sent - 3.0).abs() < 1e-6);
     assert_eq!(
         *point,
         SceneLight::Point(PointLight {
@@ -149,7 +157,31 @@ fn lights_come_in_kinds_and_quads_and_spots_in_two_forms() {
     assert_eq!((lantern.direction, lantern.radius), (DVec3::NEG_Y, 0.1));
     assert!((lantern.cos_outer - 0.5).abs() < 1e-15 && lantern.cos_inner == lantern.cos_outer);
     let soft: Vec<bool> = loaded.world.lights.iter().map(SceneLight::is_area).collect();
-    assert_eq!(soft, [false, false, true, true, true, true, false, true]);
+    assert_eq!(soft, [false, false, true, true, true, true, false, true, true]);
+}
+
+#[test]
+fn skies_come_in_kinds() {
+    let sky = |keys: &str| {
+        let world = good(&format!("[sky]\n{keys}\n")).world;
+        assert_eq!(world.sky.radiance, Rgb::ZERO);
+        world.environment.expect("an environment")
+    };
+    let gradient = sky("gradient = { zenith = 1, horizon = [2, 3, 4], ground = 0 }\nstrength = 2");
+    let [zenith, horizon, ground] = [Rgb::ONE, Rgb::new(2.0, 3.0, 4.0), Rgb::ZERO];
+    let kind = EnvironmentKind::Gradient(SkyGradient { zenith, horizon, ground });
+    assert_eq!(gradient, Environment { strength: 2.0, ..Environment::new(kind) });
+    let day = sky("sun_sky = { to_sun = [0, 3, 4] }\nrotate = 90");
+    // A quarter turn, counter-clockwise seen from above, takes +z to +x.
+    assert!((day.orientation * DVec3::Z - DVec3::X).length() < 1e-15);
+    assert!((day.orientation * DVec3::NEG_Z - DVec3::NEG_X).length() < 1e-15);
+    let sun = day.sun().expect("a sun");
+    assert!((sun.to_light - DVec3::new(0.8, 0.6, 0.0)).length() < 1e-12);
+    let EnvironmentKind::SunSky(day) = day.kind else { panic!("a day") };
+    assert_eq!((day.turbidity, day.ground), (3.0, Rgb::splat(0.2)));
+    assert!((day.sun_radius.to_degrees() - 0.2665).abs() < 1e-12);
+    let plain = good("[sky]\nradiance = 1\n").world;
+    assert_eq!((plain.sky.radiance, plain.environment), (Rgb::ONE, None));
 }
 
 #[test]
