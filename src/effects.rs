@@ -185,8 +185,11 @@ impl EffectPlan {
                     "the sky is only a backdrop".into()
                 } else {
                     let samples = match settings.least_sky_samples {
-                        Some(_) => format!("{} sky samples", settings.sky_sample_range()),
-                        None => counted(settings.sky_samples as usize, "sky sample"),
+                        // An environment has no pilot rays.
+                        Some(_) if environment.is_none() => {
+                            format!("{} sky samples", settings.sky_sample_range())
+                        }
+                        _ => counted(settings.sky_samples as usize, "sky sample"),
                     };
                     match environment {
                         None => format!("constant sky, {samples}"),

@@ -419,6 +419,28 @@ fn rough_plate(roughness: f64) -> World {
     world
 }
 
+/// A rough ball of a few pixels, whose curvature widens what a ray stands for, is as bright in few samples as in many.
+#[test]
+fn a_small_rough_ball_is_as_bright_in_few_samples_as_in_many() {
+    let mut world = World::default();
+    let rough = Material { roughness: 0.3, ..Material::mirror("rough", Rgb::splat(0.9)) };
+    world.materials.push(rough);
+    world.spheres.push(WorldSphere::new("ball", DVec3::ZERO, 1.0, 0));
+    let world = with_image(world, sunny());
+    let seen = |size: u32, spp: u32, seed: u64| {
+        let mut job = job(world.clone(), pose((0.0, 0.0, 4.0), (0.0, 0.0, 0.0)), size, size);
+        (job.settings.spp, job.settings.seed) = (spp, seed);
+        f64::from(mean(&render(&job).0).0.x as f32)
+    };
+    let few: Vec<f64> = (0..40).map(|seed| seen(16, 2, seed)).collect();
+    let many = seen(48, 64, 99);
+    let n = few.len() as f64;
+    let average = few.iter().sum::<f64>() / n;
+    let variance = few.iter().map(|x| (x - average).powi(2)).sum::<f64>() / (n - 1.0);
+    let z = (average - many) / (variance / n).sqrt();
+    assert!(z.abs() < 4.0, "{average} for {many}: {z} deviations");
+}
+
 /// Samples by importance joined with the lobe's rays see what the lobe's rays see alone.
 #[test]
 fn light_samples_and_lobe_samples_agree() {
@@ -567,6 +589,13 @@ fn environments_that_are_no_light_are_refused() {
     assert!(refusal(with(floor(), EnvironmentKind::Gradient(bad))).contains("negative"));
     let bad = SunSky { turbidity: f64::NAN, ..day() };
     assert!(refusal(with(floor(), EnvironmentKind::SunSky(bad))).contains("out of range"));
+    // Wherever the bad texel is.
+    for bad in [0, 3, 7] {
+        let mut texels = vec![Rgb::ONE; 8];
+        texels[bad] = Rgb::new(1.0, f32::NAN, 1.0);
+        let image = Texture::from_linear("bad", [4, 2], texels);
+        assert!(refusal(with_image(floor(), image)).contains("not finite"), "{bad}");
+    }
     // A black one is seen, and costs no ray.
     let black = Texture::from_linear("black", [4, 2], vec![Rgb::ZERO; 8]);
     let (film, counts) =
@@ -574,7 +603,7 @@ fn environments_that_are_no_light_are_refused() {
     assert!(film.rgb.iter().all(|c| *c == Rgb::ZERO) && counts[RayKind::ShadowSky] == 0);
 }
 
-/// The same environment at every size of the world.
+/// Tables are whole, whatever the size of the image.
 #[test]
 fn images_of_any_size_make_tables() {
     for size in [[1, 1], [1, 7], [3, 1], [17, 9], [300, 131], [2500, 40], [5000, 2500]] {

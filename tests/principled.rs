@@ -60,19 +60,39 @@ fn white_materials_in_a_furnace_are_one() {
     let half = Fresnel { metallic: 0.5, ..PLASTIC };
     let coated =
         |fresnel, roughness| Fresnel { clearcoat: 0.8, clearcoat_roughness: roughness, ..fresnel };
-    for tenth in 0..=10 {
-        let roughness = f64::from(tenth) / 10.0;
+    let tenths = (0..=10).map(|tenth| f64::from(tenth) / 10.0);
+    for roughness in tenths.chain([0.005, 0.01, 0.02, 0.03, 0.05]) {
         for fresnel in
-            [PLASTIC, METAL, half, coated(PLASTIC, 0.0), coated(half, 0.4), coated(METAL, 1.0)]
+            [PLASTIC, METAL, half, coated(PLASTIC, 0.0), coated(half, 0.03), coated(METAL, 1.0)]
         {
             let white = principled(Rgb::ONE, roughness, fresnel);
             let mean = in_furnace(white, IntersectorKind::Embree);
-            assert!((mean - 1.0).abs() < 0.002, "roughness {tenth}/10, {fresnel:?}: {mean}");
+            assert!((mean - 1.0).abs() < 0.002, "roughness {roughness}, {fresnel:?}: {mean}");
         }
     }
     let rough = principled(Rgb::ONE, 0.3, coated(half, 0.2));
     let mean = in_furnace(rough, IntersectorKind::Oracle);
     assert!((mean - 1.0).abs() < 0.002, "{mean}");
+}
+
+/// Nor does anything reflect more than it receives where interpolated normals face away from the viewer.
+#[test]
+fn white_meshes_with_smooth_normals_are_not_brighter_than_the_furnace() {
+    let coat = Fresnel { clearcoat: 1.0, ..PLASTIC };
+    for fresnel in [PLASTIC, METAL, coat] {
+        let mut world = World::default();
+        world.materials.push(principled(Rgb::ONE, 0.0, fresnel));
+        let mut ball = common::uv_sphere(6, 4);
+        let values = ball.positions.iter().map(|p| p.as_vec3().normalize()).collect();
+        ball.normals = Some(Corners { values, corners: None });
+        world.meshes.push(ball);
+        world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+        let mut job = job(world, pose((0.4, 0.7, 3.4), (0.0, 0.0, 0.0)), 64, 48);
+        job.settings.spp = 4;
+        let (film, _) = render(&job);
+        let most = film.rgb.iter().map(|c| c.max_element()).fold(0.0, f32::max);
+        assert!(most < 1.002, "{fresnel:?}: {most}");
+    }
 }
 
 /// What is darker than white reflects less than it receives, and a coat over black little.

@@ -1,23 +1,29 @@
 //! Emitting faces as area lights: flat convex quads that cover them exactly.
 
 use super::polygon;
-use crate::math::{DVec3, Rgb};
+use crate::math::{Bounds3, DVec3, Rgb};
 use crate::scene::{Light, QuadLight, WorldMesh};
 
 /// Most lights made of a mesh: each has bounds in the cells of lights, and a surface of its own. A mesh that needs more is
 /// visible but lights nothing.
 pub(super) const MAX_LIGHTS: usize = 4096;
+/// Narrower faces, in widths of their mesh, are left out: together they send next to nothing, and f32 may not hold them beside
+/// the rest of the scene.
+const LEAST_WIDTH: f64 = 1e-4;
 /// A quad's corners may leave its plane by this share of its size: file coordinates have six digits or so.
 const FLAT: f64 = 1e-5;
 
 /// Flat convex quads that cover the faces of a mesh, counter-clockwise as these are; `None` if there would be more than
 /// [`MAX_LIGHTS`]. Neighbouring triangles that follow one another become one quad where possible; any other
-/// triangle is a quad of which two corners are the same. Triangles without area are left out.
+/// triangle is a quad of which two corners are the same. Triangles without area, and faces narrower than
+/// [`LEAST_WIDTH`], are left out.
 pub(super) fn cover(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
     if mesh.triangles.len() > 2 * MAX_LIGHTS {
         return None;
     }
     let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
+    let wide = |quad: &[DVec3; 4]| bounds(quad).extent().max_element();
+    let least = LEAST_WIDTH * bounds(&mesh.positions).extent().max_element();
     let mut quads = Vec::new();
     let mut rest = &mesh.triangles[..];
     while let [first, after @ ..] = rest {
@@ -30,7 +36,15 @@ pub(super) fn cover(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
             rest = after;
         }
     }
+    quads.retain(|quad| wide(quad) >= least);
     (quads.len() <= MAX_LIGHTS).then_some(quads)
+}
+
+fn bounds(points: &[DVec3]) -> Bounds3 {
+    points.iter().fold(Bounds3::EMPTY, |mut bounds, p| {
+        bounds.include(*p);
+        bounds
+    })
 }
 
 /// Lights that replace a mesh whose faces emit `radiance` on both sides; `None` as [`cover`].

@@ -73,7 +73,7 @@ impl Untextured {
                 "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` tilts none of its normals"
             ),
             Lacking::Colours => format!(
-                "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its `diffuse` as it is"
+                "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its own colour as it is"
             ),
         }
     }

@@ -164,14 +164,15 @@ impl Environment {
     }
 }
 
-/// The largest number in an image.
+/// The largest number in an image; NaN where one is negative or not finite.
 pub(crate) fn brightest(texture: &Texture) -> f32 {
     let level = &texture.levels()[0];
     let rows = 0..level.height as usize;
     let texels = rows.flat_map(|y| (0..level.width as usize).map(move |x| (x, y)));
-    texels.map(|(x, y)| level.texel(x, y)).fold(0.0, |most, c| {
-        if c.is_finite() && c.min_element() >= 0.0 { c.max_element().max(most) } else { f32::NAN }
-    })
+    let is_light = |c: &Rgb| c.is_finite() && c.min_element() >= 0.0;
+    let mut most =
+        texels.map(|(x, y)| level.texel(x, y)).map(|c| is_light(&c).then(|| c.max_element()));
+    most.try_fold(0.0, |most, own| Some(own?.max(most))).unwrap_or(f32::NAN)
 }
 
 impl SceneEnvironment {

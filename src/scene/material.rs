@@ -135,7 +135,8 @@ impl Material {
     /// Whether the surface reflects any light; glass does not count.
     pub fn reflects(&self) -> bool {
         let most = self.diffuse.max_element().max(self.mirror.max_element());
-        most > 0.0 || self.fresnel.is_some_and(|f| f.grazing > 0.0 || f.clearcoat > 0.0)
+        let any = |f: Fresnel| f.grazing > 0.0 || f.clearcoat > 0.0 || f.metallic > 0.0;
+        most > 0.0 || self.fresnel.is_some_and(any)
     }
 
     /// Emitted radiance towards the outside or inside.

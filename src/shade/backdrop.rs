@@ -101,8 +101,9 @@ impl<'a> Seen<'a> {
                 let [u, v] = image_place(own);
                 let level = (own.x * own.x + own.z * own.z).sqrt();
                 let spread = f64::from(spread.abs());
-                // Towards the poles a cone covers more of the longitudes, at most all.
-                let across = (0.5 * FRAC_1_PI * spread / level.max(spread * FRAC_1_PI)).min(1.0);
+                // Towards the poles a cone covers more of the longitudes, and counts as covering half at most: more would blur
+                // the heights too.
+                let across = (0.5 * FRAC_1_PI * spread / level.max(spread * FRAC_1_PI)).min(0.5);
                 let along = (spread / PI).min(1.0);
                 let covered = [DVec2::new(across, 0.0), DVec2::new(0.0, along)];
                 let place = Vec2::new(u as f32, (1.0 - v) as f32);
@@ -132,6 +133,8 @@ impl Renderer<'_> {
         let Escaped { ray, spread, pdf, cell } = *escaped;
         let dir = ray.dir.normalize();
         let lobe = f64::from(pdf);
+        // Light samples see what is there, so that what shares the light with them must not blur it.
+        let spread = if lobe > 0.0 { 0.0 } else { spread };
         let mut seen = backdrop.radiance(dir, spread);
         if let Some(source) = input.environment.as_ref().filter(|_| lobe > 0.0) {
             seen *= source.share_of_lobe(dir, lobe);

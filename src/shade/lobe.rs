@@ -6,9 +6,10 @@
 
 mod dielectric;
 mod diffuse;
-mod fresnel;
 mod glossy;
+mod layers;
 mod mirror;
+mod reflectance;
 
 use super::cone::RayCone;
 use crate::intersect::SurfaceInteraction;
@@ -17,10 +18,10 @@ use crate::scene::{Material, Scene};
 use crate::stats::RayKind;
 pub(super) use dielectric::{Dielectric, Pane};
 pub(super) use diffuse::albedo;
-pub(super) use fresnel::Layers;
-use fresnel::Reflectance;
 use glossy::Glossy;
+pub(super) use layers::Layers;
 use mirror::Mirror;
+use reflectance::Reflectance;
 
 /// One of the ways in which a surface scatters light that depend on the direction, at one of its points. Diffuse
 /// reflection does not: light is multiplied by its [`albedo`].
@@ -61,18 +62,21 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     let (si, wo, _) = seen;
     if let Some(Layers { mirror, roughness, coat, albedo: _ }) = layers.filter(|_| MIRROR) {
         let n = facing_normal(si, wo);
-        take(reflecting(*mirror, *roughness, n), 0);
-        if let Some((coat, roughness)) = coat {
-            take(reflecting(*coat, *roughness, n), 1);
+        let over = [Some((*mirror, *roughness)), *coat];
+        for (first, (reflectance, roughness)) in (0..).zip(over).filter_map(|(i, l)| Some((i, l?)))
+        {
+            if reflectance != Reflectance::constant(Rgb::ZERO) {
+                take(reflecting(reflectance, roughness, n, wo), first);
+            }
         }
     } else if MIRROR && material.mirror != Rgb::ZERO {
-        let reflectance = Reflectance::constant(material.mirror);
         take(
             match material.roughness {
-                0.0 => Lobe::Mirror(Mirror::new(reflectance)),
+                0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
                 _ => {
                     let n = facing_normal(si, wo);
                     let roughness = glossy::roughness(scene, material, seen);
+                    let reflectance = Reflectance::constant(material.mirror);
                     let reflectance = reflectance.given_back(roughness, wo.dot(n));
                     Lobe::Glossy(Glossy::new(reflectance, roughness, n))
                 }
@@ -89,10 +93,10 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     }
 }
 
-/// The lobe of a mirror or coat of this roughness at the unit normal `n` on the viewer's side.
-fn reflecting(reflectance: Reflectance, roughness: f64, n: DVec3) -> Lobe {
+/// The lobe of a mirror or coat of this roughness at the unit normal `n` on the viewer's side, seen along `wo`.
+fn reflecting(reflectance: Reflectance, roughness: f64, n: DVec3, wo: DVec3) -> Lobe {
     match roughness {
-        0.0 => Lobe::Mirror(Mirror::new(reflectance)),
+        0.0 => Lobe::Mirror(Mirror::new(reflectance.at(wo.dot(n)))),
         _ => Lobe::Glossy(Glossy::new(reflectance, roughness, n)),
     }
 }

@@ -4,7 +4,9 @@
 //! along its longer axis (McCormack, Perry, Farkas and Jouppi, 1999), and each is looked up in the two mip levels whose
 //! texels are about as large (Williams, 1983).
 
-use crate::math::{DVec2, Rgb, Vec2};
+use super::cone::RayCone;
+use crate::intersect::SurfaceInteraction;
+use crate::math::{DVec2, DVec3, Rgb, Vec2};
 use crate::scene::{Scene, Texture, TextureLevel, TextureMap, Wrap};
 
 /// Most pieces of an ellipse. A longer one is taken to be wider.
@@ -17,6 +19,20 @@ pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec
     let uv = map.place(uv);
     let footprint = footprint.map(|axis| transform.transform_vector2(axis));
     filtered(&scene.textures[*image as usize], [*wrap; 2], uv, footprint)
+}
+
+/// What an image of shares says at a point, its mean over what the ray covers; 1 without an image. An image that was made
+/// in code may hold any number.
+pub(super) fn share(
+    scene: &Scene,
+    map: Option<&TextureMap>,
+    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+) -> f64 {
+    let Some(map) = map else { return 1.0 };
+    let footprint = cone.footprint(scene, si, wo);
+    let share = f64::from(mapped(scene, map, si.uv, footprint).x);
+    // Not `min`, which would hide what is NaN.
+    if share > 1.0 { 1.0 } else { share }
 }
 
 /// The mean of `texture` over the ellipse around `uv` with the conjugate diameters `footprint`, both in the image's

@@ -192,7 +192,8 @@ impl<'a> Builder<'a> {
         let always_traced = !sphere.reuse;
         self.world.spheres.push(WorldSphere { name, centre, radius, material, always_traced });
         if self.world.materials[material as usize].vertex_colours {
-            let message = "an exact sphere has no vertex colours: it shows `diffuse` as it is";
+            let message =
+                "an exact sphere has no vertex colours: it shows its material's own colour";
             self.warnings.push(self.source.fault(&sphere.span, message));
         }
         self.light_up(meshes, spheres, &sphere.span);

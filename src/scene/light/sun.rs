@@ -38,7 +38,9 @@ impl LightData for SunLight {
     }
 
     fn is_finite(&self) -> bool {
-        self.to_light.is_finite() && self.angular_radius.is_finite()
+        // What is no unit vector, and a disk of no size, have no place either.
+        let is_unit = (self.to_light.length_squared() - 1.0).abs() < 1e-6;
+        is_unit && self.angular_radius > 0.0 && self.angular_radius < 0.5 * PI
     }
 
     fn bounds(&self) -> Bounds3 {

@@ -1,0 +1,64 @@
+//! Layers over a diffuse part, whose reflection grows towards grazing angles, and what each leaves to those below.
+
+use super::reflectance::Reflectance;
+use super::{diffuse, facing_normal, glossy};
+use crate::intersect::SurfaceInteraction;
+use crate::math::{DVec3, Rgb};
+use crate::scene::{Fresnel, Material, Scene};
+use crate::shade::cone::RayCone;
+use crate::shade::texture;
+
+/// Reflectance of a clear coat at normal incidence: of an index of refraction of 1.5.
+const COAT: f64 = 0.04;
+
+/// The layers of a surface at one of its points as one viewer sees them, images looked up. Of each light what a layer
+/// reflects is taken from those below, by the share that it reflects towards the viewer: in a furnace all add up to
+/// one, but light that comes in flat is not weakened more than other light is.
+pub(in crate::shade) struct Layers {
+    /// The share of irradiance that the diffuse layer sends out.
+    pub albedo: Rgb,
+    /// The mirror over it.
+    pub mirror: Reflectance,
+    pub roughness: f64,
+    /// The clear coat over both.
+    pub coat: Option<(Reflectance, f64)>,
+}
+
+impl Layers {
+    /// The layers of `material`, whose reflectance grows as `fresnel` says, at the point `si`, seen along `wo` (unit,
+    /// leaving) by a ray with this `cone`.
+    pub fn at(
+        scene: &Scene,
+        (material, fresnel): (&Material, &Fresnel),
+        (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    ) -> Self {
+        let seen = (si, wo, cone);
+        let base = diffuse::albedo(scene, material, si, wo, cone);
+        let roughness = glossy::roughness(scene, material, seen);
+        let metal = fresnel.metallic * texture::share(scene, fresnel.metallic_map.as_ref(), seen);
+        let cos = facing_normal(si, wo).dot(wo);
+        let (metal, other) = (metal as f32, (1.0 - metal) as f32);
+        let shine = Reflectance::growing(material.mirror, Rgb::splat(fresnel.grazing as f32));
+        let shine = shine.given_back(roughness, cos);
+        let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(roughness, cos);
+        let coat = (fresnel.clearcoat != 0.0).then(|| {
+            let [normal, all] =
+                [COAT, 1.0].map(|share| Rgb::splat((fresnel.clearcoat * share) as f32));
+            let roughness = fresnel.clearcoat_roughness;
+            (Reflectance::growing(normal, all).given_back(roughness, cos), roughness)
+        });
+        let passed = coat.map_or(1.0, |(coat, roughness)| 1.0 - coat.single(roughness, cos).x);
+        let mirror = Reflectance {
+            normal: shine.normal * other + of_metal.normal * metal,
+            rise: shine.rise * other + of_metal.rise * metal,
+        };
+        // By the channel that most is reflected of, so that the rest is not tinted.
+        let reflected = shine.single(roughness, cos).max_element();
+        Self {
+            albedo: base * (other * (1.0 - reflected) * passed),
+            mirror: mirror.scaled(Rgb::splat(passed)),
+            roughness,
+            coat,
+        }
+    }
+}
