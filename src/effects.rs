@@ -111,6 +111,8 @@ impl EffectPlan {
         let diffuse = used.diffuse > 0;
         let no_diffuse = || "no diffuse surface to light".to_string();
         let lit = diffuse || (used.glossy > 0 && bounces > 0);
+        // Glossy surfaces see a sky of one colour by their own rays.
+        let lit_by_sky = diffuse || (lit && environment.is_some());
         let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
@@ -173,11 +175,8 @@ impl EffectPlan {
             ),
             sky_light: decide(
                 "sky light",
-                (diffuse || (lit && environment.is_some()))
-                    && sky_bright
-                    && scene.sky.lights
-                    && settings.sky_samples > 0,
-                if !(diffuse || (lit && environment.is_some())) {
+                lit_by_sky && sky_bright && scene.sky.lights && settings.sky_samples > 0,
+                if !lit_by_sky {
                     no_diffuse()
                 } else if !sky_bright {
                     "the sky is black".into()

@@ -471,7 +471,7 @@ impl Renderer<'_> {
                 if let Some(seen) = &seen {
                     if source.is_sampled() {
                         let first = run.first(point.place.sample);
-                        self.fill(&point.place, source, first, pixels, &mut u);
+                        self.fill(&point.place, source.number, first, pixels, &mut u);
                     }
                     self.rays_to(seen, (lit, i), &u, s);
                     if s.is_open() && n == source.samples as usize {
@@ -547,7 +547,7 @@ impl Renderer<'_> {
                         let samples = source.samples.next_power_of_two();
                         let traced = self.settings.most_camera_samples().wrapping_mul(samples);
                         let first = wanted.first.wrapping_add(traced);
-                        self.fill(&point.place, source, first, pixels, u);
+                        self.fill(&point.place, source.number, first, pixels, u);
                     });
                     if let Some(seen) = source.sampler.seen_from(point.si.p, point.n) {
                         self.rays_to(&seen, (lit, i), own, s);
@@ -618,16 +618,16 @@ impl Renderer<'_> {
         wanted
     }
 
-    /// Stratified points of one light and one place, from sample number `first` on.
+    /// Stratified points of the light of this number and one place, from sample number `first` on.
     pub(super) fn fill(
         &self,
         place: &SamplePlace,
-        source: &LightSource,
+        light: u32,
         first: u32,
         pixels: &BlockPixels,
         u: &mut [[f32; 2]],
     ) {
-        let dimension = dimensions::of_light(place.branch, source.number, self.light_dimensions());
+        let dimension = dimensions::of_light(place.branch, light, self.light_dimensions());
         pixels.sampler(place.pixel).fill2(first, dimension, u);
     }
 

@@ -12,9 +12,9 @@ use super::direct::{BATCH, ShadowScratch};
 use super::highlight::GlossyPoint;
 use super::light::{EnvironmentLight, ShadowTarget};
 use super::pixels::BlockPixels;
-use super::point::{SamplePlace, ShadingPoint};
+use super::point::ShadingPoint;
 use super::sky_samples::FoundSky;
-use super::{Renderer, Reuse, dimensions, normal_map};
+use super::{Renderer, Reuse, normal_map};
 use crate::math::{DVec3, Rgb, luminance};
 use crate::stats::{RayCounts, RayKind};
 use std::ops::Range;
@@ -211,7 +211,7 @@ impl Renderer<'_> {
             let is_lit = || source.light.unshadowed(point.n) != Rgb::ZERO;
             if let Some((first, count)) = wanted.filter(|_| is_lit()) {
                 own.u.resize(count, [0.0; 2]);
-                self.fill_sky(&point.place, source, first, pixels, &mut own.u);
+                self.fill(&point.place, source.number, first, pixels, &mut own.u);
                 let before = s.ray_count();
                 let all = self.rays_to_environment(source, (lit, i), &own.u, s);
                 let rays = (s.ray_count() - before) as u32;
@@ -263,19 +263,6 @@ impl Renderer<'_> {
         all
     }
 
-    /// Stratified points of the environment for one place, from sample number `first` on.
-    fn fill_sky(
-        &self,
-        place: &SamplePlace,
-        source: &EnvironmentSource,
-        first: u32,
-        pixels: &BlockPixels,
-        u: &mut [[f32; 2]],
-    ) {
-        let dimension = dimensions::of_light(place.branch, source.number, self.light_dimensions());
-        pixels.sampler(place.pixel).fill2(first, dimension, u);
-    }
-
     /// Adds what glossy `points` reflect of the environment along samples by importance. The rest is seen by the lobes' rays.
     pub(super) fn highlight_environment(
         &self,
@@ -291,7 +278,7 @@ impl Renderer<'_> {
             s.clear();
             for point in group {
                 let first = point.place.sample.wrapping_mul(source.samples);
-                self.fill_sky(&point.place, source, first, pixels, &mut u);
+                self.fill(&point.place, source.number, first, pixels, &mut u);
                 for u in u.iter().map(|u| u.map(f64::from)) {
                     let Some(sample) = source.light.sample_li(u) else { break };
                     let GlossyPoint { lobe, n, ng, wo, starts, .. } = point;

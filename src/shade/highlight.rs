@@ -138,7 +138,7 @@ impl Renderer<'_> {
                 for point in group() {
                     let draw = |u: &mut [[f32; 2]]| {
                         let first = point.place.sample.wrapping_mul(source.samples);
-                        self.fill(&point.place, source, first, pixels, u);
+                        self.fill(&point.place, source.number, first, pixels, u);
                     };
                     self.highlight_rays(source, point, n as f64, &mut u, draw, s);
                     s.close();
