@@ -126,10 +126,13 @@ impl Material {
                 .is_some_and(|f| f.grazing != 0.0 || f.metallic != 0.0 || f.clearcoat != 0.0)
     }
 
-    /// Whether any mirror or coat of it is rough.
+    /// Whether any mirror or coat of it, or its glass, is rough.
     pub fn is_glossy(&self) -> bool {
         let is_coat_rough = |f: Fresnel| f.clearcoat != 0.0 && f.clearcoat_roughness != 0.0;
-        self.is_mirror() && self.roughness != 0.0 || self.fresnel.is_some_and(is_coat_rough)
+        let is_glass_rough = self.glass.as_ref().is_some_and(Glass::is_rough);
+        is_glass_rough
+            || self.is_mirror() && self.roughness != 0.0
+            || self.fresnel.is_some_and(is_coat_rough)
     }
 
     /// Whether the surface reflects any light; glass does not count.
@@ -150,13 +153,15 @@ impl Material {
     }
 }
 
-/// A smooth dielectric boundary; the mesh's outward normals point to the outside medium. Or a thin pane: both its faces
+/// A dielectric boundary, smooth or rough; the mesh's outward normals point to the outside medium. Or a thin pane: both its faces
 /// are the one surface.
 ///
 /// With a `priority` the body that it bounds may overlap others: where several are, the one of
 /// the highest priority is, and the rest are not (Schmidt and Budge, 2002).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Glass {
+    /// Roughness in `[0, 1]`; 0 is polished, 1 as ground as glass gets. Rough glass has no `priority`.
+    pub roughness: f64,
     /// Index of refraction inside; positive. Relative to outside, whatever that is; with a
     /// `priority`, relative to air.
     pub ior: f64,
@@ -176,6 +181,12 @@ pub struct Glass {
 impl Glass {
     /// Glass with the index of refraction `ior` that takes nothing from light and overlaps nothing.
     pub fn clear(ior: f64) -> Self {
-        Self { ior, tint: Rgb::ONE, absorption: Rgb::ZERO, priority: None, thin: false }
+        let (tint, absorption) = (Rgb::ONE, Rgb::ZERO);
+        Self { roughness: 0.0, ior, tint, absorption, priority: None, thin: false }
+    }
+
+    /// Whether it scatters light to many directions. A body whose index is that of what is around it bends none.
+    pub fn is_rough(&self) -> bool {
+        self.roughness != 0.0 && (self.thin || self.ior != 1.0)
     }
 }

@@ -22,9 +22,9 @@ pub(super) struct GlossyPoint {
     pub lobe: Lobe,
     /// Scene space.
     pub p: DVec3,
-    /// The lobe's normal, unit.
+    /// The lobe's normal, unit, on the side that light comes from: the viewer's, but for light through the surface.
     pub n: DVec3,
-    /// Unit geometric normal on the viewer's side.
+    /// Unit geometric normal on the same side.
     pub ng: DVec3,
     /// Unit direction to the viewer.
     pub wo: DVec3,

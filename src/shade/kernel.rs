@@ -372,9 +372,9 @@ impl Vertex<'_, '_> {
         let what = (material, layers.as_ref());
         lobe::for_each_directional::<MIRROR, GLASS>(scene, what, seen, |lobe, first| {
             let start = (si, inside);
-            let behind = match lobe {
-                Lobe::Pane(_) => state.medium,
-                _ => si.is_outside(wo).then_some(si.surface.material),
+            let behind = match lobe.is_pane() {
+                true => state.medium,
+                false => si.is_outside(wo).then_some(si.surface.material),
             };
             let starts = Starts { reflected: start, transmitted: start, behind };
             self.scatter::<NESTED>((&lobe, first), si, wo, &starts, state);
@@ -392,9 +392,11 @@ impl Vertex<'_, '_> {
         state: &PathState,
     ) -> GlossyPoint {
         let Renderer { scene, settings, .. } = self.renderer;
-        let ng = if si.is_outside(wo) { si.ng } else { -si.ng };
+        // Light comes from this side.
+        let side = if lobe.is_transmission() { -1.0 } else { 1.0 };
+        let ng = si.ng * if si.is_outside(wo) { side } else { -side };
         let starts = ShadowStarts::of(scene, settings, (si, ray, hit), ng);
-        let (p, n, place) = (si.p, lobe::facing_normal(si, wo), state.place());
+        let (p, n, place) = (si.p, lobe::facing_normal(si, wo) * side, state.place());
         GlossyPoint { lobe, p, n, ng, wo, starts, throughput: state.throughput, place }
     }
 

@@ -4,24 +4,29 @@
 //! each sends to the viewer, and the directions that it passes radiance on from. One file for each kind;
 //! nothing else in `shade` asks for the kind.
 
+mod boundary;
 mod dielectric;
 mod diffuse;
 mod glossy;
 mod layers;
+mod microfacet;
 mod mirror;
 mod reflectance;
+mod rough_glass;
 
 use super::cone::RayCone;
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb};
-use crate::scene::{Material, Scene};
+use crate::scene::{Glass, Material, Scene};
 use crate::stats::RayKind;
+use boundary::Boundary;
 pub(super) use dielectric::{Dielectric, Pane};
 pub(super) use diffuse::albedo;
 use glossy::Glossy;
 pub(super) use layers::Layers;
 use mirror::Mirror;
 use reflectance::Reflectance;
+use rough_glass::RoughGlass;
 
 /// One of the ways in which a surface scatters light that depend on the direction, at one of its points. Diffuse
 /// reflection does not: light is multiplied by its [`albedo`].
@@ -30,6 +35,7 @@ pub(super) enum Lobe {
     Glossy(Glossy),
     Dielectric(Dielectric),
     Pane(Pane),
+    RoughGlass(RoughGlass),
 }
 
 /// A direction that a lobe passes radiance on from.
@@ -85,12 +91,26 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
         );
     }
     if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
-        let lobe = match glass.thin {
-            true => Lobe::Pane(Pane::new(glass)),
-            false => Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))),
-        };
-        take(lobe, 0);
+        match (glass.thin, glass.is_rough()) {
+            (true, false) => take(Lobe::Pane(Pane::new(glass)), 0),
+            (false, false) => take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))), 0),
+            (_, true) => {
+                let [reflected, through] = rough_glass(glass, si, wo);
+                take(reflected, 0);
+                take(through, 1);
+            }
+        }
     }
+}
+
+/// What a rough boundary of `glass` reflects, and what it lets through.
+fn rough_glass(glass: &Glass, si: &SurfaceInteraction, wo: DVec3) -> [Lobe; 2] {
+    let n = facing_normal(si, wo);
+    let boundary = Boundary::new(glass, si.is_outside(wo));
+    let back = 1.0 / boundary.passed(glass.roughness, wo.dot(n));
+    let through = RoughGlass::new(boundary, glass.tint * back as f32, glass.roughness, n);
+    let reflected = Glossy::of_glass(boundary, back, glass.roughness, n);
+    [Lobe::Glossy(reflected), Lobe::RoughGlass(through)]
 }
 
 /// The lobe of a mirror or coat of this roughness at the unit normal `n` on the viewer's side, seen along `wo`.
@@ -113,8 +133,22 @@ impl Lobe {
     #[inline(always)]
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Glossy(_) => false,
+            Self::Glossy(_) | Self::RoughGlass(_) => false,
             Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => true,
+        }
+    }
+
+    /// Whether light goes through the surface, so that it comes from behind it.
+    pub fn is_transmission(&self) -> bool {
+        matches!(self, Self::RoughGlass(_))
+    }
+
+    /// Whether the surface has the same medium on both sides.
+    pub fn is_pane(&self) -> bool {
+        match self {
+            Self::Pane(_) => true,
+            Self::RoughGlass(through) => through.is_pane(),
+            Self::Mirror(_) | Self::Glossy(_) | Self::Dielectric(_) => false,
         }
     }
 
@@ -123,6 +157,7 @@ impl Lobe {
     pub fn f(&self, wo: DVec3, wi: DVec3) -> Rgb {
         match self {
             Self::Glossy(glossy) => glossy.f(wo, wi),
+            Self::RoughGlass(through) => through.f(wo, wi),
             Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => Rgb::ZERO,
         }
     }
@@ -131,6 +166,7 @@ impl Lobe {
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
         match self {
             Self::Glossy(glossy) => glossy.pdf(wo, wi),
+            Self::RoughGlass(through) => through.pdf(wo, wi),
             Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => 0.0,
         }
     }
@@ -148,6 +184,7 @@ impl Lobe {
         match self {
             Self::Mirror(mirror) => [Some(mirror.sample(wo, n)), None],
             Self::Glossy(glossy) => [glossy.sample(wo, u().map(f64::from)), None],
+            Self::RoughGlass(through) => [through.sample(wo, u().map(f64::from)), None],
             Self::Dielectric(dielectric) => dielectric.sample(wo, n),
             Self::Pane(pane) => pane.sample(wo, n),
         }
@@ -159,7 +196,7 @@ impl Lobe {
         match self {
             Self::Mirror(_) => RayKind::Mirror,
             Self::Glossy(_) => RayKind::Glossy,
-            Self::Dielectric(_) | Self::Pane(_) => RayKind::Glass,
+            Self::Dielectric(_) | Self::Pane(_) | Self::RoughGlass(_) => RayKind::Glass,
         }
     }
 }

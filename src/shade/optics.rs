@@ -27,21 +27,35 @@ pub fn split(wo: DVec3, n: DVec3, eta: f64) -> Split {
     let cos = wo.dot(n);
     let (n, cos) = if cos < 0.0 { (-n, -cos) } else { (n, cos) };
     let cos = cos.min(1.0);
-    // (eta cos_t)², in a form that is exactly cos² where the indices are equal.
-    let scaled = cos * cos + (eta - 1.0) * (eta + 1.0);
-    if scaled <= 0.0 {
+    let Some(cos_t) = refracted_cosine(cos, eta) else {
         return Split { reflectance: 1.0, refracted: None };
-    }
-    let cos_t = scaled.sqrt() / eta;
+    };
     let refracted = ((n * cos - wo) / eta - n * cos_t).normalize();
     Split { reflectance: fresnel(cos, cos_t, eta), refracted: Some(refracted) }
 }
 
-/// Share that a thin pane with unit normal `n` on either side reflects of light along `wo`, where `ior` is the index of
+/// The reflectance alone, of light at the cosine `cos` to the normal, at most 1; on either side.
+pub fn reflectance(cos: f64, eta: f64) -> f64 {
+    if !(eta > 0.0 && eta < f64::INFINITY) {
+        return f64::NAN;
+    }
+    let cos = cos.abs().min(1.0);
+    refracted_cosine(cos, eta).map_or(1.0, |cos_t| fresnel(cos, cos_t, eta))
+}
+
+/// The cosine on the far side, of light at the cosine `cos` on the near one; `None` at total internal reflection.
+fn refracted_cosine(cos: f64, eta: f64) -> Option<f64> {
+    // (eta cos_t)², in a form that is exactly cos² where the indices are equal.
+    let scaled = cos * cos + (eta - 1.0) * (eta + 1.0);
+    // What is NaN goes on.
+    if scaled <= 0.0 { None } else { Some(scaled.sqrt() / eta) }
+}
+
+/// Share that a thin pane reflects of light at the cosine `cos` to its normal, where `ior` is the index of
 /// refraction of the pane over that around it: with R for one face, R + (1-R)² R (1 + R² + R⁴ + ...) by all
 /// reflections between both faces (Stokes, 1862), of unpolarised light at each.
-pub fn pane_reflectance(wo: DVec3, n: DVec3, ior: f64) -> f64 {
-    let of_face = split(wo, n, ior).reflectance;
+pub fn pane_reflectance(cos: f64, ior: f64) -> f64 {
+    let of_face = reflectance(cos, ior);
     2.0 * of_face / (1.0 + of_face)
 }
 

@@ -1,7 +1,7 @@
 //! `[material.NAME]`.
 
 use super::at::At;
-use super::number::{Int, Ior};
+use super::number::{Int, Ior, Share};
 use super::principled::Principled;
 use super::report::Source;
 use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
@@ -51,13 +51,16 @@ pub(super) struct Material {
     pub emits_back: bool,
 }
 
-/// A smooth boundary between glass and air, or a thin pane.
+/// A boundary between glass and air, smooth or rough, or a thin pane.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct Glass {
     /// Index of refraction of the inside relative to the outside.
     #[serde(default = "window_glass")]
     ior: Ior,
+    /// Roughness: 0 is polished, 0.3 frosted, 1 as ground as glass gets. Rough glass has no `priority`.
+    #[serde(default = "polished")]
+    roughness: Share,
     /// Share of light that each crossing of the surface lets through: twice of a body, once of a thin pane.
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
@@ -102,6 +105,10 @@ impl<T> ImagesOf<T> {
     }
 }
 
+fn polished() -> Share {
+    Share(0.0)
+}
+
 fn window_glass() -> Ior {
     Ior(1.5)
 }
@@ -133,6 +140,7 @@ impl Material {
     ) -> Result<scene::Material> {
         self.check(source)?;
         let glass = self.glass.as_ref().map(|g| scene::Glass {
+            roughness: g.roughness.0,
             ior: g.ior.0,
             tint: g.tint.rgb(),
             absorption: g.absorption.as_ref().map_or_else(Default::default, |a| a.rgb()),
@@ -195,6 +203,10 @@ impl Material {
             if let Some((span, key)) = of_body.filter(|_| glass.thin) {
                 let message = format!("`{key}` is of a body, and a thin pane has no inside");
                 return Err(source.fault(span, message).into());
+            }
+            if let Some(priority) = glass.priority.as_ref().filter(|_| glass.roughness.0 != 0.0) {
+                let message = "glass with a `priority` is polished: it has no `roughness`";
+                return Err(source.fault(&priority.span, message).into());
             }
             if let Some(alpha) = &self.alpha {
                 let message =

@@ -29,7 +29,7 @@ impl Pane {
 
     /// What is reflected at a surface with the unit normal `n` on either side, and what goes straight through.
     pub fn sample(&self, wo: DVec3, n: DVec3) -> [Option<Scattered>; 2] {
-        let reflectance = optics::pane_reflectance(wo, n, self.ior);
+        let reflectance = optics::pane_reflectance(wo.dot(n), self.ior);
         let delta = |wi, share: f64, tint, transmitted| {
             Some(Scattered { wi, share: share as f32, tint, transmitted, pdf: 0.0 })
         };

@@ -1,6 +1,8 @@
 //! Rough mirrors: glossy reflection.
 
 use super::Scattered;
+use super::boundary::Boundary;
+use super::microfacet::{at_least, density, lambda, shadowed, visible_normal};
 use super::reflectance::{Reflectance, schlick};
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
@@ -8,11 +10,8 @@ use crate::sampling::to_world;
 use crate::scene::{Material, Scene};
 use crate::shade::cone::RayCone;
 use crate::shade::{optics, texture};
-use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
-/// A smoother surface counts as one of this roughness: its peak would be narrower than f64 can tell of cosines.
-const LEAST_ROUGHNESS: f64 = 3e-3;
 /// Nodes of the table of reflected shares along each axis.
 const NODES: usize = 33;
 /// Samples along each axis for one node.
@@ -23,18 +22,33 @@ const SAMPLES: usize = 32;
 /// surfaces is given back (Turquin, 2019), so that a white surface reflects all of a uniform light.
 pub(in crate::shade) struct Glossy {
     /// Share of light that a microfacet reflects, with what single reflection loses.
-    reflectance: Reflectance,
+    reflectance: FacetReflectance,
     /// Slope of the microfacets: the square of the roughness.
     alpha: f64,
     /// Unit normal on the viewer's side.
     n: DVec3,
 }
 
+/// What a microfacet reflects by angle.
+enum FacetReflectance {
+    /// As a mirror.
+    Mirror(Reflectance),
+    /// As a boundary of glass, times a factor.
+    Glass(Boundary, f64),
+}
+
 impl Glossy {
+    /// What a boundary of glass of this roughness reflects, times `factor`, at the unit normal `n` on the viewer's side.
+    pub(super) fn of_glass(boundary: Boundary, factor: f64, roughness: f64, n: DVec3) -> Self {
+        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, n);
+        Self { reflectance: FacetReflectance::Glass(boundary, factor), ..mirror }
+    }
+
     /// The lobe of microfacets of this `reflectance`, which includes what single reflection loses, at a surface of this
     /// `roughness` with the unit normal `n` on the viewer's side.
     pub fn new(reflectance: Reflectance, roughness: f64, n: DVec3) -> Self {
         let roughness = at_least(roughness);
+        let reflectance = FacetReflectance::Mirror(reflectance);
         Self { reflectance, alpha: roughness * roughness, n }
     }
 
@@ -48,7 +62,13 @@ impl Glossy {
 
     /// The share of light from `wi` that the microfacet between it and `wo` reflects, with what single reflection loses.
     fn tint(&self, wo: DVec3, wi: DVec3) -> Rgb {
-        self.reflectance.at(0.5 * (wo + wi).length())
+        let cos = 0.5 * (wo + wi).length();
+        match &self.reflectance {
+            FacetReflectance::Mirror(reflectance) => reflectance.at(cos),
+            FacetReflectance::Glass(boundary, factor) => {
+                Rgb::splat((boundary.reflectance(cos) * factor) as f32)
+            }
+        }
     }
 
     /// The density of [`sample`](Self::sample) at `wi`, per steradian.
@@ -116,47 +136,9 @@ fn shares(roughness: f64, cos: f64) -> [f32; 2] {
     }
 }
 
-/// The roughness that it counts as.
-fn at_least(roughness: f64) -> f64 {
-    // Not `max`, which would hide what is NaN.
-    if roughness < LEAST_ROUGHNESS { LEAST_ROUGHNESS } else { roughness }
-}
-
-/// Density of microfacet normals at the cosine `cos` to the surface's, per steradian.
-fn density(alpha: f64, cos: f64) -> f64 {
-    // 1 − (1 − α²) cos², which would lose its digits near the peak of a smooth surface.
-    let a2 = alpha * alpha;
-    let scaled = (1.0 - cos) * (1.0 + cos) + a2 * cos * cos;
-    a2 / (PI * scaled * scaled)
-}
-
-/// Smith's function: hidden over visible area of the microfacets along a direction of cosine `cos`.
-fn lambda(alpha: f64, cos: f64) -> f64 {
-    let slope2 = (1.0 - cos) * (1.0 + cos) / (cos * cos);
-    0.5 * ((1.0 + alpha * alpha * slope2.max(0.0)).sqrt() - 1.0)
-}
-
-/// The share of light from microfacets seen along `cos_o` that leaves along `cos_i`.
-fn shadowed(alpha: f64, cos_o: f64, cos_i: f64) -> f64 {
-    let seen = 1.0 + lambda(alpha, cos_o);
-    seen / (seen + lambda(alpha, cos_i))
-}
-
-/// The normal of a microfacet seen along `wo`, in the surface's frame.
-fn visible_normal(alpha: f64, wo: DVec3, [u, v]: [f64; 2]) -> DVec3 {
-    // As of a half sphere, stretched.
-    let stretched = DVec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize();
-    let z = (1.0 - v) * (1.0 + stretched.z) - stretched.z;
-    let radius = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
-    let angle = TAU * u;
-    let cap = DVec3::new(radius * libm::cos(angle), radius * libm::sin(angle), z);
-    let half = cap + stretched;
-    DVec3::new(alpha * half.x, alpha * half.y, half.z.max(0.0)).normalize()
-}
-
 /// The share of light from a direction of cosine `cos` that leaves a surface after one reflection: where microfacets reflect
 /// all, and where they reflect as much as [`schlick`] says.
-fn reflected_shares(roughness: f64, cos: f64) -> [f64; 2] {
+pub(super) fn reflected_shares(roughness: f64, cos: f64) -> [f64; 2] {
     static TABLE: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
     let roughness = at_least(roughness);
     let last = (NODES - 1) as f64;
@@ -211,6 +193,7 @@ fn integrate(roughness: f64, ratio: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     fn lobe(roughness: f64) -> Glossy {
         Glossy::new(Reflectance::constant(Rgb::ONE), roughness, DVec3::Z)
