@@ -122,7 +122,11 @@ impl EffectPlan {
             ) | decide(
                 "glossy reflection",
                 used.glossy > 0 && bounces > 0,
-                format!("{} in use, {}", counted(used.glossy, "rough mirror or glass material"), bounced),
+                format!(
+                    "{} in use, {}",
+                    counted(used.glossy, "rough mirror or glass material"),
+                    bounced
+                ),
             ),
             glass: decide(
                 "glass",

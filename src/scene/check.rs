@@ -24,7 +24,7 @@ impl World {
             let metal = material.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
             metal.map(|map| of(map, "metallic map")).transpose()?;
             self.check_normal_map(material)?;
-            check_pane(material)?;
+            check_glass(material)?;
             self.check_mask(material)
         })?;
         self.meshes.iter().try_for_each(check_vertices)?;
@@ -82,19 +82,20 @@ impl World {
     }
 }
 
-/// A thin pane has no inside that a priority or absorption could be of.
-fn check_pane(material: &Material) -> Result<()> {
-    let is_body = |glass: &&Glass| glass.priority.is_some() || glass.absorption != Rgb::ZERO;
-    match material.glass.as_ref().filter(|glass| glass.thin).filter(is_body) {
-        None => Ok(()),
-        Some(_) => {
-            let message = format!(
-                "`{}` is thin glass with a priority or absorption, which bodies have",
-                material.name
-            );
-            Err(Error::Usage(message))
+/// A thin pane has no inside that a priority or absorption could be of, and only polished glass has a priority.
+fn check_glass(material: &Material) -> Result<()> {
+    let Some(glass) = &material.glass else { return Ok(()) };
+    let is_ranked = glass.priority.is_some();
+    let what = match glass {
+        Glass { thin: true, absorption, .. } if is_ranked || *absorption != Rgb::ZERO => {
+            "thin glass with a priority or absorption, which bodies have"
         }
-    }
+        Glass { roughness, .. } if is_ranked && *roughness != 0.0 => {
+            "rough glass with a priority, which polished glass has"
+        }
+        _ => return Ok(()),
+    };
+    Err(Error::Usage(format!("`{}` is {what}", material.name)))
 }
 
 /// The image among `images` that a material lays on surfaces; `what` names it: a "texture", a "mask".
@@ -186,8 +187,11 @@ mod tests {
         assert!(refusal(leaf, vec![short]).contains("`m` of 2 x 2 texels has 3"));
         let pane = Material { alpha: Some(TextureMap::of(0)), ..Material::glass("pane", 1.5) };
         assert!(refusal(pane, vec![mask]).contains("`pane` is glass with cut-outs"));
-        let pane = Glass { thin: true, priority: Some(1), ..Glass::clear(1.5) };
-        let pane = Material { glass: Some(pane), ..Material::black("pane") };
-        assert!(refusal(pane, vec![]).contains("`pane` is thin glass"));
+        let ranked = Glass { priority: Some(1), ..Glass::clear(1.5) };
+        let of = |glass| Material { glass: Some(glass), ..Material::black("pane") };
+        let pane = Glass { thin: true, ..ranked };
+        assert!(refusal(of(pane), vec![]).contains("`pane` is thin glass"));
+        let frosted = Glass { roughness: 0.3, ..ranked };
+        assert!(refusal(of(frosted), vec![]).contains("`pane` is rough glass"));
     }
 }

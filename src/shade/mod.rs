@@ -1,7 +1,7 @@
 //! Whitted radiance (Whitted, 1980) along camera rays, by kernels that [`EffectPlan`] selects.
 //!
 //! Takes a scene, an intersector and a camera; gives a film. Direct light from area, point and
-//! directional lights and the sky, perfect and rough mirrors and glass, clear or absorbing, by recursion to a set depth.
+//! directional lights and the sky, mirrors and glass, polished or rough, clear or absorbing, by recursion to a set depth.
 //! Never looks at other frames.
 //!
 //! Not done: light through glass (its shadow is opaque), diffuse interreflection.
