@@ -107,7 +107,12 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
 fn rough_glass(glass: &Glass, si: &SurfaceInteraction, wo: DVec3) -> [Lobe; 2] {
     let n = facing_normal(si, wo);
     let boundary = Boundary::new(glass, si.is_outside(wo));
-    let back = 1.0 / boundary.passed(glass.roughness, wo.dot(n));
+    let passed = match glass.thin {
+        // Light that goes through leaves as what is reflected does, but on the other side.
+        true => glossy::reflected_shares(glass.roughness, wo.dot(n))[0],
+        false => boundary.passed(glass.roughness, wo.dot(n)),
+    };
+    let back = 1.0 / passed;
     let through = RoughGlass::new(boundary, glass.tint * back as f32, glass.roughness, n);
     let reflected = Glossy::of_glass(boundary, back, glass.roughness, n);
     [Lobe::Glossy(reflected), Lobe::RoughGlass(through)]

@@ -1,6 +1,5 @@
 //! What a boundary of glass reflects by angle, and what rough boundaries pass on in all.
 
-use super::glossy::reflected_shares;
 use super::microfacet::{lambda, shadowed, visible_normal};
 use crate::math::DVec3;
 use crate::scene::Glass;
@@ -36,14 +35,10 @@ impl Boundary {
         }
     }
 
-    /// The share of light from a direction of cosine `cos` that a boundary of this roughness reflects or lets through
+    /// The share of light from a direction of cosine `cos` that a body's boundary of this roughness reflects or lets through
     /// where it meets one microfacet; the rest, which meets several, is to be given back (as Turquin, 2019, does for mirrors).
     pub fn passed(&self, roughness: f64, cos: f64) -> f64 {
-        match self.is_pane {
-            // Light that goes through leaves as what is reflected does, but on the other side.
-            true => reflected_shares(roughness, cos)[0],
-            false => 1.0 - lost(self.eta, roughness, cos),
-        }
+        1.0 - lost(self.eta, roughness, cos)
     }
 }
 
