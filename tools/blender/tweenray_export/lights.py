@@ -43,7 +43,7 @@ def export(ob, matrix, materials, report):
     intensity = [p / (4.0 * math.pi) if light.normalize else p * radius * radius for p in power]
     if light.type == "SPOT":
         return [spot(light, matrix, abs(radius), intensity, report, name)], None
-    return [point(where, abs(radius), intensity)], None
+    return [point(where, abs(radius), intensity, ob.visible_camera)], None
 
 
 def colour(light):
@@ -73,9 +73,10 @@ def note(ob, light, report, name):
         report.add(name, "no shadows", "it casts shadows")
     if getattr(light, "use_soft_falloff", False) and light.type in ("POINT", "SPOT") and light.shadow_soft_size > 0.0:
         report.add(name, "soft falloff", "the falloff of a sphere, brighter nearby by 1 + (radius / distance)^2")
-    seen = light.type in ("AREA", "SUN") or (light.type == "POINT" and light.shadow_soft_size > 0.0)
-    if seen and not ob.visible_camera:
-        report.add(name, "invisible to the camera", "it is seen")
+    if light.type in ("AREA", "SUN") and not ob.visible_camera:
+        report.add(name, "invisible to the camera", "it is seen where the camera looks at its front")
+    if light.type == "POINT" and light.shadow_soft_size > 0.0 and not ob.visible_camera and ob.visible_glossy:
+        report.add(name, "invisible to the camera alone", "perfect mirrors and glass do not show it either")
 
 
 def area(light, matrix, power, report, name):
@@ -100,11 +101,12 @@ def area(light, matrix, power, report, name):
         disk = {"centre": axes.vector(middle), "normal": axes.vector(normal), "radius": 0.5 * u.length}
         return [{"disk": disk | {"radiance": radiance}}], None
     report.add(name, "an ellipse", f"{STRIP} quads of its area")
-    return [], (ellipse(middle, u, v, not turned), radiance)
+    return [], (ellipse(middle, u, v, turned), radiance)
 
 
-def ellipse(middle, u, v, flip):
-    """Corners of a strip of quads with the ellipse's area."""
+def ellipse(middle, u, v, is_turned):
+    """Corners of a strip of quads with the ellipse's area, that faces against the cross product of `u` and `v`, or along it
+    where `is_turned`."""
     steps = 2 * STRIP + 2
     # The polygon's area is steps / 2 sin(2 pi / steps) for the radius 1.
     grow = math.sqrt(math.pi / (0.5 * steps * math.sin(2.0 * math.pi / steps)))
@@ -116,14 +118,17 @@ def ellipse(middle, u, v, flip):
     quads = []
     for k in range(STRIP):
         quad = [rim(k), rim(k + 1), rim(steps - 2 - k), rim(steps - 1 - k)]
-        quads.append(quad if flip else quad[::-1])
+        quads.append(quad if is_turned else quad[::-1])
     return quads
 
 
-def point(where, radius, intensity):
-    """A point, or a sphere where it has a radius."""
+def point(where, radius, intensity, is_seen):
+    """A point, or a sphere where it has a radius; a sphere that is not seen is a spot that shines all around."""
     if radius == 0.0:
         return {"point": {"position": axes.vector(where), "intensity": intensity}}
+    if not is_seen:
+        around = {"direction": [0.0, -1.0, 0.0], "outer_angle": 180.0, "inner_angle": 180.0}
+        return {"spot": {"position": axes.vector(where), "intensity": intensity, "radius": radius} | around}
     radiance = [i / (math.pi * radius * radius) for i in intensity]
     return {"sphere": {"centre": axes.vector(where), "radius": radius, "radiance": radiance}}
 

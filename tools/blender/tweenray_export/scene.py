@@ -53,7 +53,7 @@ def write(scene, folder):
     export = Export(scene, folder)
     render = scene.render
     kept = render.engine, render.use_compositing, render.use_sequencer, scene.frame_current, scene.frame_subframe
-    if not hasattr(bpy.types, Engine.bl_idname):
+    if not Engine.is_registered:
         bpy.utils.register_class(Engine)
     try:
         export.sky = export.world.prepare(scene)
