@@ -18,7 +18,9 @@ fn python() -> Option<String> {
     if !works {
         #[allow(clippy::print_stderr)]
         {
-            eprintln!("skipped: {python} has no module `bpy` (TWEENRAY_BLENDER_PYTHON names another)");
+            eprintln!(
+                "skipped: {python} has no module `bpy` (TWEENRAY_BLENDER_PYTHON names another)"
+            );
         }
     }
     works.then_some(python)
@@ -76,8 +78,11 @@ fn exported_scenes_have_the_right_numbers_and_are_read_and_rendered() {
 fn the_script_names_what_is_wrong() {
     let Some(python) = python() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/blender/export_tweenray.py");
-    for (arguments, wanted) in [(vec![], "blender -b"), (vec!["absent.blend", "out"], "absent.blend")] {
-        let output = Command::new(&python).arg(&script).args(&arguments).output().expect("it starts");
+    for (arguments, wanted) in
+        [(vec![], "blender -b"), (vec!["absent.blend", "out"], "absent.blend")]
+    {
+        let output =
+            Command::new(&python).arg(&script).args(&arguments).output().expect("it starts");
         assert_eq!(output.status.code(), Some(2));
         let text = String::from_utf8_lossy(&output.stderr);
         assert!(text.contains(wanted), "{text}");
