@@ -70,6 +70,7 @@ fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<AddedStage>) {
         easing: Easing::Linear,
         frames: FRAMES,
         vfov_degrees: VFOV_DEGREES,
+        projections: Vec::new(),
         lens: ShotLens::Pinhole,
     };
     (shot, stage)

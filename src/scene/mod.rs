@@ -22,6 +22,7 @@ mod material;
 mod mesh;
 mod path;
 mod place;
+mod projection;
 mod recentre;
 mod recentring;
 mod reuse;
@@ -52,6 +53,7 @@ pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
 pub use material::{Fresnel, Glass, Material, MaterialId, NormalMap};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
 pub use path::{CameraPath, Easing, KeyPose, Shot};
+pub use projection::{Projection, ProjectionKey};
 pub use recentring::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{

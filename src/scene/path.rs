@@ -10,7 +10,7 @@ mod level;
 mod tests;
 
 use super::spline::{self, Timed, catmull_rom};
-use super::{Camera, Pose, ShotLens};
+use super::{Camera, Pose, Projection, ProjectionKey, ShotLens};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,9 @@ pub struct Shot {
     pub frames: u32,
     /// Vertical field of view, degrees.
     pub vfov_degrees: f64,
+    /// The projection at moments of the path, joined as key poses are, but never beyond the values of the two keys
+    /// around a moment. Empty: `vfov_degrees` in every frame, centred, with square pixels.
+    pub projections: Vec<ProjectionKey>,
     /// The lens and its focus.
     pub lens: ShotLens,
 }
@@ -136,7 +139,8 @@ impl Easing {
 impl Shot {
     /// A move of `frames` frames along `path`, evenly spread, through a pinhole.
     pub fn new(path: CameraPath, frames: u32, vfov_degrees: f64) -> Self {
-        Self { path, easing: Easing::Linear, frames, vfov_degrees, lens: ShotLens::Pinhole }
+        let (easing, projections, lens) = (Easing::Linear, Vec::new(), ShotLens::Pinhole);
+        Self { path, easing, frames, vfov_degrees, projections, lens }
     }
 
     /// Checks the whole shot: path, lens, and a camera for every frame.
@@ -145,7 +149,7 @@ impl Shot {
     pub fn validate(&self) -> Result<()> {
         // The lens first: a wrong one is no single frame's fault.
         check::shot(self)?;
-        (1..=self.frames).try_for_each(|frame| self.camera(frame, 1, 1).map(drop))
+        (1..=self.frames).try_for_each(|frame| self.camera_of_checked(frame, 1, 1).map(drop))
     }
 
     /// The pose at `frame`, from 1 to `frames`.
@@ -154,6 +158,11 @@ impl Shot {
     /// before: then it is chosen so that the image moves without a jump.
     pub fn pose(&self, frame: u32) -> Result<Pose> {
         check::shot(self)?;
+        self.pose_of_checked(frame)
+    }
+
+    /// The pose at `frame` of a shot whose path was checked: that takes a while for each of many key poses.
+    fn pose_of_checked(&self, frame: u32) -> Result<Pose> {
         if !(1..=self.frames).contains(&frame) {
             let last = self.frames;
             return Err(Error::Usage(format!(
@@ -175,8 +184,22 @@ impl Shot {
 
     /// The camera at `frame`, world space, for an image of `width` by `height` pixels.
     pub fn camera(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
-        let pose = self.pose(frame)?;
-        let camera = Camera::new(&pose, self.vfov_degrees, width, height);
+        check::shot(self)?;
+        self.camera_of_checked(frame, width, height)
+    }
+
+    /// The projection at `progress` in `[0, 1]` of the path.
+    fn projection(&self, progress: f64) -> Projection {
+        match self.projections.as_slice() {
+            [] => Projection::centred(self.vfov_degrees),
+            keys => Projection::at(keys, progress),
+        }
+    }
+
+    fn camera_of_checked(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
+        let pose = self.pose_of_checked(frame)?;
+        let projection = self.projection(self.progress(frame));
+        let camera = Camera::with_projection(&pose, &projection, width, height);
         let camera = camera.map_err(|error| match error {
             Error::Usage(what) => Error::Usage(format!("frame {frame} of {}: {what}", self.frames)),
             other => other,

@@ -4,8 +4,8 @@ mod lens;
 mod path;
 
 use super::at::At;
-use super::number::{Degrees, FieldOfView, Int, Share};
-use super::vector::{Direction, Point};
+use super::number::{Degrees, FieldOfView, Int, PixelAspect, Share, Shift};
+use super::vector::{Direction, List, Point};
 use crate::math::DVec3;
 use crate::scene::Easing;
 use lens::{KeyLens, Lens};
@@ -39,6 +39,12 @@ pub(super) struct Camera {
     /// Turn about the view axis, degrees; positive tilts the camera clockwise.
     #[serde(default = "no_roll")]
     roll: Degrees,
+    /// By how much of its width to the right, and of its height upwards, the picture lies off the view axis.
+    #[serde(default = "no_shift")]
+    shift: List<Shift, 2>,
+    /// Width of a pixel over its height.
+    #[serde(default = "square")]
+    pixel_aspect: PixelAspect,
     /// A thin lens, with depth of field. Absent: everything is sharp.
     lens: Option<At<Lens>>,
     /// A camera that does not move.
@@ -105,6 +111,10 @@ pub(super) struct Key {
     up: Option<Direction>,
     /// Turn about the view axis, degrees. Absent: the camera's `roll`.
     roll: Option<Degrees>,
+    /// Vertical field of view here, degrees. Absent: the camera's `fov`.
+    fov: Option<FieldOfView>,
+    /// Shift of the picture here. Absent: the camera's `shift`.
+    shift: Option<List<Shift, 2>>,
     /// The lens here. Absent: the camera's `lens`.
     lens: Option<At<KeyLens>>,
 }
@@ -136,6 +146,14 @@ fn no_roll() -> Degrees {
     Degrees(0.0)
 }
 
+fn no_shift() -> List<Shift, 2> {
+    List([Shift(0.0); 2])
+}
+
+fn square() -> PixelAspect {
+    PixelAspect(1.0)
+}
+
 fn full_turn() -> Degrees {
     Degrees(360.0)
 }
@@ -148,6 +166,8 @@ impl Default for Camera {
             easing: linear(),
             up: y_up(),
             roll: no_roll(),
+            shift: no_shift(),
+            pixel_aspect: square(),
             lens: None,
             still: None,
             pan: None,

@@ -1,7 +1,7 @@
 //! Errors of a shot that do not depend on the frame.
 
 use super::level::unit;
-use super::{CameraPath, KeyPose, Shot};
+use super::{CameraPath, KeyPose, ProjectionKey, Shot};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::scene::{Camera, Pose};
@@ -22,6 +22,7 @@ pub fn shot(shot: &Shot) -> Result<()> {
         return fault(format!("the shot has {} frames; 1 to {MOST_FRAMES} can be", shot.frames));
     }
     Camera::check_vfov(shot.vfov_degrees)?;
+    projections(&shot.projections)?;
     shot.lens.check()?;
     match &shot.path {
         CameraPath::Still(p) => pose(p, "the camera"),
@@ -45,6 +46,13 @@ pub fn shot(shot: &Shot) -> Result<()> {
             fixed(points[0], *target, *up, *roll_degrees, "the B-spline")
         }
     }
+}
+
+fn projections(keys: &[ProjectionKey]) -> Result<()> {
+    if !keys.windows(2).all(|pair| pair[0].at < pair[1].at) {
+        return fault("the projection needs keys whose times increase");
+    }
+    keys.iter().try_for_each(|key| key.projection.check())
 }
 
 fn finite(p: DVec3, name: &str) -> Result<()> {
