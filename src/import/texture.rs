@@ -106,14 +106,18 @@ pub(super) fn bad_pixel(path: &Path) -> Error {
 ///
 /// Errors: those of [`load_texture`] but for its pixels' values.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
-    let bytes = super::source::read(path)?;
+    decode_bytes(path, &super::source::read(path)?)
+}
+
+/// The image whose file holds `bytes`, as [`decode`]; `path` names it.
+pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let bad = |e: image::ImageError| Error::input(path, format!("not a readable image: {e}"));
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_IMAGE_BYTES);
     limits.max_image_width = Some(1 << 16);
     limits.max_image_height = Some(1 << 16);
     let reader = || {
-        let mut reader = ImageReader::new(std::io::Cursor::new(&bytes))
+        let mut reader = ImageReader::new(std::io::Cursor::new(bytes))
             .with_guessed_format()
             .map_err(|e| Error::io("read", path, e))?;
         // A tga file does not begin with anything of its own.

@@ -79,6 +79,9 @@ pub enum CameraPath {
     /// Key poses joined by Catmull–Rom splines (Catmull and Rom, 1974) whose knots are the keys'
     /// times; passes through each, and rests before the first key and after the last.
     Keys(Vec<KeyPose>),
+    /// A pose and a field of view for each frame of the shot, as another program's animation gives them. Frames are taken
+    /// as they stand: nothing is smoothed, `easing` does nothing, and images may turn as the poses do.
+    Frames(Vec<FramePose>),
     /// A uniform cubic B-spline through four or more control points (de Boor, 1972), with a
     /// fixed point of interest; starts and ends at the first and last of them, approximates the
     /// others, and stays in their convex hull.
@@ -101,6 +104,15 @@ pub struct KeyPose {
     pub at: f64,
     /// The pose there.
     pub pose: Pose,
+}
+
+/// The camera of one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FramePose {
+    /// The pose.
+    pub pose: Pose,
+    /// Vertical field of view, degrees; in place of the shot's.
+    pub vfov_degrees: f64,
 }
 
 /// How progress along the path depends on time.
@@ -160,6 +172,10 @@ impl Shot {
                 "frame {frame} is not one of the shot's 1 to {last}"
             )));
         }
+        if let CameraPath::Frames(frames) = &self.path {
+            let pose = frames[frame as usize - 1].pose;
+            return check::frame_pose(&pose, frame).map(|()| pose);
+        }
         let progress = self.progress(frame);
         let mut pose = self.path.pose(progress);
         if pose.up.abs().max_element() < 1e-6 && matches!(self.path, CameraPath::Keys(_)) {
@@ -176,7 +192,7 @@ impl Shot {
     /// The camera at `frame`, world space, for an image of `width` by `height` pixels.
     pub fn camera(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
         let pose = self.pose(frame)?;
-        let camera = Camera::new(&pose, self.vfov_degrees, width, height);
+        let camera = Camera::new(&pose, self.vfov_degrees_at(frame), width, height);
         let camera = camera.map_err(|error| match error {
             Error::Usage(what) => Error::Usage(format!("frame {frame} of {}: {what}", self.frames)),
             other => other,
@@ -190,6 +206,14 @@ impl Shot {
             )));
         }
         Ok(camera.with_lens(lens))
+    }
+
+    /// The vertical field of view at `frame`, one of the shot's; degrees.
+    pub fn vfov_degrees_at(&self, frame: u32) -> f64 {
+        match &self.path {
+            CameraPath::Frames(frames) => frames[frame as usize - 1].vfov_degrees,
+            _ => self.vfov_degrees,
+        }
     }
 
     /// Eased progress along the path at `frame`.
@@ -216,6 +240,9 @@ impl CameraPath {
                 Pose { eye, target: *target, up: *axis, roll_degrees: *roll_degrees }
             }
             Self::Keys(keys) => key_pose(keys, progress),
+            Self::Frames(frames) => {
+                frames[(progress * (frames.len() - 1) as f64).round() as usize].pose
+            }
             Self::BSpline { points, target, up, roll_degrees } => {
                 let eye = spline::b_spline(points, progress);
                 Pose { eye, target: *target, up: *up, roll_degrees: *roll_degrees }
