@@ -79,9 +79,6 @@ pub enum CameraPath {
     /// Key poses joined by Catmull–Rom splines (Catmull and Rom, 1974) whose knots are the keys'
     /// times; passes through each, and rests before the first key and after the last.
     Keys(Vec<KeyPose>),
-    /// A pose and a field of view for each frame of the shot, as another program's animation gives them. Frames are taken
-    /// as they stand: nothing is smoothed, `easing` does nothing, and images may turn as the poses do.
-    Frames(Vec<FramePose>),
     /// A uniform cubic B-spline through four or more control points (de Boor, 1972), with a
     /// fixed point of interest; starts and ends at the first and last of them, approximates the
     /// others, and stays in their convex hull.
@@ -95,6 +92,9 @@ pub enum CameraPath {
         /// Roll, degrees.
         roll_degrees: f64,
     },
+    /// A pose and a field of view for each frame of the shot, as another program's animation gives them. Frames are taken
+    /// as they stand: nothing is smoothed, `easing` does nothing, and images may turn as the poses do.
+    Frames(Vec<FramePose>),
 }
 
 /// A pose at a moment of the path.
