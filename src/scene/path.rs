@@ -12,7 +12,7 @@ mod tests;
 use super::spline::{self, Timed, catmull_rom};
 use super::{Camera, Pose, ShotLens};
 use crate::error::{Error, Result};
-use crate::math::DVec3;
+use crate::math::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A camera move: path, timing and lens.
@@ -206,6 +206,23 @@ impl Shot {
             )));
         }
         Ok(camera.with_lens(lens))
+    }
+
+    /// Moves every pose of a still camera, or of a path that has one for each frame, by `transform`, a similarity. Other
+    /// paths stay.
+    pub fn apply_transform(&mut self, transform: &DAffine3) {
+        let moved = |pose: &mut Pose| {
+            pose.eye = transform.transform_point3(pose.eye);
+            pose.target = transform.transform_point3(pose.target);
+            pose.up = transform.transform_vector3(pose.up).normalize_or(pose.up);
+        };
+        match &mut self.path {
+            CameraPath::Still(pose) => moved(pose),
+            CameraPath::Frames(frames) => {
+                frames.iter_mut().for_each(|frame| moved(&mut frame.pose))
+            }
+            _ => {}
+        }
     }
 
     /// The vertical field of view at `frame`, one of the shot's; degrees.

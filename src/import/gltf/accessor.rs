@@ -74,7 +74,8 @@ impl Component {
     /// The component in the first of `bytes`, as many as its size, at least. Normalised integers are shares.
     #[inline(always)]
     fn float(self, bytes: &[u8], normalised: bool) -> f32 {
-        let share = |value: f32, most: f32| if normalised { (value / most).max(-1.0) } else { value };
+        let share =
+            |value: f32, most: f32| if normalised { (value / most).max(-1.0) } else { value };
         match self {
             Self::I8 => share(f32::from(bytes[0] as i8), 127.0),
             Self::U8 => share(f32::from(bytes[0]), 255.0),
@@ -229,7 +230,9 @@ impl<'d> Accessor<'d> {
         self.check_width(N)?;
         self.check_whole()?;
         let component = self.component;
-        self.read(move |bytes| std::array::from_fn(|k| component.whole(&bytes[k * component.size()..])))
+        self.read(move |bytes| {
+            std::array::from_fn(|k| component.whole(&bytes[k * component.size()..]))
+        })
     }
 
     /// Triples of its whole numbers, of one component each; what is left over at the end is dropped.
@@ -241,7 +244,8 @@ impl<'d> Accessor<'d> {
             Some(elements) if packed(elements) && self.sparse.is_none() && self.width == 1 => {
                 self.check_whole()?;
                 let (component, size) = (self.component, self.component.size());
-                let triple = |bytes: &[u8]| std::array::from_fn(|k| component.whole(&bytes[k * size..]));
+                let triple =
+                    |bytes: &[u8]| std::array::from_fn(|k| component.whole(&bytes[k * size..]));
                 Ok(elements.bytes.par_chunks_exact(3 * size).map(triple).collect())
             }
             _ => {
@@ -254,18 +258,25 @@ impl<'d> Accessor<'d> {
     fn check_width(&self, wanted: usize) -> Result<()> {
         match self.width {
             width if width == wanted => Ok(()),
-            width => Err(self.fault(format!("elements of {width} components where {wanted} are needed")).into()),
+            width => Err(self
+                .fault(format!("elements of {width} components where {wanted} are needed"))
+                .into()),
         }
     }
 
     fn check_whole(&self) -> Result<()> {
         match self.component {
             Component::U8 | Component::U16 | Component::U32 => Ok(()),
-            _ => Err(self.fault("numbers that may be negative or fractions, where indices are needed").into()),
+            _ => Err(self
+                .fault("numbers that may be negative or fractions, where indices are needed")
+                .into()),
         }
     }
 
-    fn read<T: Copy + Default + Send>(&self, of: impl Fn(&[u8]) -> T + Sync + Send) -> Result<Vec<T>> {
+    fn read<T: Copy + Default + Send>(
+        &self,
+        of: impl Fn(&[u8]) -> T + Sync + Send,
+    ) -> Result<Vec<T>> {
         let mut all: Vec<T> = match &self.dense {
             Some(elements) => {
                 (0..self.count).into_par_iter().map(|at| of(elements.get(at))).collect()
@@ -303,7 +314,9 @@ impl<'d> Sparse<'d> {
         let (indices, values) = (json.required("indices")?, json.required("values")?);
         let index = Component::of(&indices)?;
         if !matches!(index, Component::U8 | Component::U16 | Component::U32) {
-            return Err(indices.fault("sparse indices are whole numbers that are not negative").into());
+            return Err(indices
+                .fault("sparse indices are whole numbers that are not negative")
+                .into());
         }
         let no_view = |json: &Json<'_>| json.fault("`bufferView` is missing");
         let of = |json: &Json<'_>, size| {

@@ -57,7 +57,8 @@ impl Animations {
                 let target = channel.required("target")?;
                 let Some(property) = property(document, &target, notes)? else { continue };
                 if all.0.contains_key(&property) {
-                    let note = "several animations move the same node or lens: the first one counts";
+                    let note =
+                        "several animations move the same node or lens: the first one counts";
                     notes.add(note, None);
                     continue;
                 }
@@ -197,7 +198,9 @@ impl Curve {
         let (next, next_slope) = (3.0 * s2 - 2.0 * s3, (s3 - s2) * width);
         let here = self.key(left).zip(self.part(left, 2));
         let there = self.key(right).zip(self.part(right, 0));
-        here.zip(there).map(|((p, m), (q, n))| p * value + m * slope + q * next + n * next_slope).collect()
+        here.zip(there)
+            .map(|((p, m), (q, n))| p * value + m * slope + q * next + n * next_slope)
+            .collect()
     }
 
     /// The vector at `time`.

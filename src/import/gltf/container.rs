@@ -28,8 +28,11 @@ pub(super) struct Container<'a> {
 /// Errors: a `.glb` of another version than 2, lengths that lie, a first chunk that is no JSON, more JSON than
 /// [`MAX_JSON`].
 pub(super) fn open<'a>(file: &Path, bytes: &'a [u8]) -> Result<Container<'a>> {
-    let container =
-        if bytes.starts_with(MAGIC) { glb(file, bytes)? } else { Container { json: bytes, bin: None } };
+    let container = if bytes.starts_with(MAGIC) {
+        glb(file, bytes)?
+    } else {
+        Container { json: bytes, bin: None }
+    };
     let length = container.json.len();
     if length > MAX_JSON {
         let message = format!("{length} bytes of JSON; {MAX_JSON} can be read");
@@ -50,7 +53,9 @@ fn glb<'a>(file: &Path, bytes: &'a [u8]) -> Result<Container<'a>> {
     }
     let Some(bytes) = bytes.get(..length).filter(|all| all.len() >= HEADER) else {
         let is = bytes.len();
-        return fault(format!("the header says {length} bytes, the file has {is}: it is cut off or damaged"));
+        return fault(format!(
+            "the header says {length} bytes, the file has {is}: it is cut off or damaged"
+        ));
     };
     let (mut json, mut bin, mut at) = (None, None, HEADER);
     while at < bytes.len() {

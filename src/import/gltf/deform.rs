@@ -34,7 +34,12 @@ impl Shape {
     }
 
     /// Adds the morph targets of `json`, a primitive, by their weights. A target without a weight is not read.
-    pub fn morph(&mut self, document: &Document<'_>, json: &Json<'_>, weights: &[f64]) -> Result<()> {
+    pub fn morph(
+        &mut self,
+        document: &Document<'_>,
+        json: &Json<'_>,
+        weights: &[f64],
+    ) -> Result<()> {
         for (target, weight) in json.list("targets")?.iter().zip(weights) {
             if *weight == 0.0 {
                 continue;
@@ -55,13 +60,20 @@ impl Shape {
     /// Moves each vertex with its joints, by their weights made to add up to 1. The result is in the world.
     ///
     /// Errors: a joint that the skin does not have.
-    pub fn skin(&mut self, primitive: &Primitive, json: &Json<'_>, joints: &JointMatrices) -> Result<()> {
+    pub fn skin(
+        &mut self,
+        primitive: &Primitive,
+        json: &Json<'_>,
+        joints: &JointMatrices,
+    ) -> Result<()> {
         let stray = primitive.joints.iter().find_map(|(numbers, _)| {
             numbers.par_iter().flatten_iter().find_first(|at| **at as usize >= joints.len())
         });
         if let Some(stray) = stray {
             let count = joints.len();
-            return Err(json.fault(format!("there is no joint {stray} (from 0): the skin has {count}")).into());
+            return Err(json
+                .fault(format!("there is no joint {stray} (from 0): the skin has {count}"))
+                .into());
         }
         let matrix = |vertex: usize| {
             let mut sum = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
@@ -77,7 +89,8 @@ impl Shape {
             let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
             DAffine3 { matrix3: sum.matrix3 * scale, translation: sum.translation * scale }
         };
-        let matrices: Vec<DAffine3> = (0..self.positions.len()).into_par_iter().map(matrix).collect();
+        let matrices: Vec<DAffine3> =
+            (0..self.positions.len()).into_par_iter().map(matrix).collect();
         let moved = self.positions.par_iter_mut().zip(&matrices);
         moved.for_each(|(p, matrix)| *p = matrix.transform_point3(*p));
         if let Some(normals) = &mut self.normals {
@@ -140,7 +153,10 @@ pub(super) fn joint_matrices(
     let of = |(at, joint): (usize, &usize)| {
         let inverse = inverse.get(at).map_or(DAffine3::IDENTITY, |m| {
             let column = |c: usize| DVec3::new(m[c].into(), m[c + 1].into(), m[c + 2].into());
-            DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) }
+            DAffine3 {
+                matrix3: DMat3::from_cols(column(0), column(4), column(8)),
+                translation: column(12),
+            }
         });
         worlds[*joint] * inverse
     };

@@ -35,10 +35,22 @@ const READ: [&str; 17] = [
 
 /// Extensions without which a file can usually be written, and what to do about them.
 const AVOIDABLE: [(&str, &str); 6] = [
-    ("KHR_draco_mesh_compression", "export it again without Draco: untick Compression in the exporter"),
-    ("EXT_meshopt_compression", "export it again without meshopt compression (gltfpack: without -c)"),
-    ("KHR_meshopt_compression", "export it again without meshopt compression (gltfpack: without -c)"),
-    ("KHR_texture_basisu", "export it again with png or jpeg images, not KTX2 (gltfpack: without -tc)"),
+    (
+        "KHR_draco_mesh_compression",
+        "export it again without Draco: untick Compression in the exporter",
+    ),
+    (
+        "EXT_meshopt_compression",
+        "export it again without meshopt compression (gltfpack: without -c)",
+    ),
+    (
+        "KHR_meshopt_compression",
+        "export it again without meshopt compression (gltfpack: without -c)",
+    ),
+    (
+        "KHR_texture_basisu",
+        "export it again with png or jpeg images, not KTX2 (gltfpack: without -tc)",
+    ),
     ("EXT_texture_webp", "export it again with png or jpeg images: untick WebP in the exporter"),
     ("EXT_texture_avif", "export it again with png or jpeg images, not AVIF"),
 ];
@@ -128,7 +140,8 @@ impl<'a> Document<'a> {
         let bytes = buffer.get(offset..).and_then(|rest| rest.get(..length));
         let Some(bytes) = bytes else {
             let has = buffer.len();
-            let message = format!("{length} bytes from byte {offset} on, of a buffer of {has} bytes");
+            let message =
+                format!("{length} bytes from byte {offset} on, of a buffer of {has} bytes");
             return Err(view.fault(message).into());
         };
         Ok(Some((bytes, view.whole("byteStride")?)))
@@ -140,7 +153,10 @@ impl<'a> Document<'a> {
             let name = json.as_text()?;
             if !READ.contains(&name) {
                 let name = uri::shortened(name);
-                notes.add(&format!("the extension `{name}` is not read: the picture may differ"), None);
+                notes.add(
+                    &format!("the extension `{name}` is not read: the picture may differ"),
+                    None,
+                );
             }
         }
         Ok(())
@@ -153,7 +169,8 @@ fn check_version(top: &Json<'_>) -> Result<()> {
     match least.split('.').next() {
         Some("2") => Ok(()),
         _ => {
-            let message = format!("glTF of version `{}`; version 2 can be read", uri::shortened(least));
+            let message =
+                format!("glTF of version `{}`; version 2 can be read", uri::shortened(least));
             Err(asset.fault(message).into())
         }
     }
@@ -167,7 +184,10 @@ fn check_required(top: &Json<'_>) -> Result<()> {
         if avoidable.is_none() && READ.contains(&name) {
             continue;
         }
-        let message = format!("the file requires the extension `{}`, which is not read", uri::shortened(name));
+        let message = format!(
+            "the file requires the extension `{}`, which is not read",
+            uri::shortened(name)
+        );
         let help = avoidable.map_or("export it again without this extension", |(_, help)| help);
         return Err(json.fault(message).help(help).into());
     }
@@ -192,7 +212,11 @@ fn read_buffer<'a>(
         },
         None => match bin {
             Some(bin) => bin.into(),
-            None => return Err(json.fault("the buffer has no `uri`, and the file no binary chunk").into()),
+            None => {
+                return Err(json
+                    .fault("the buffer has no `uri`, and the file no binary chunk")
+                    .into());
+            }
         },
     };
     if bytes.len() < length {

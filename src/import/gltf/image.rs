@@ -50,7 +50,9 @@ impl ImageStore {
             let (name, bytes) = read(document, json, files)?;
             pixels += texture::pixels(&name, &bytes)?;
             if pixels > MOST_PIXELS {
-                let message = format!("the images up to this one have {pixels} pixels; {MOST_PIXELS} can be decoded");
+                let message = format!(
+                    "the images up to this one have {pixels} pixels; {MOST_PIXELS} can be decoded"
+                );
                 return Err(json.fault(message).help("make the images smaller").into());
             }
             encoded.push((*at, name, bytes));
@@ -132,9 +134,13 @@ fn alpha(image: &DynamicImage) -> Box<dyn Iterator<Item = f64> + '_> {
     let channels = usize::from(image.color().channel_count());
     let last = channels - 1;
     if let Some(flat) = image.as_flat_samples_u8() {
-        Box::new(flat.samples.chunks_exact(channels).map(move |pixel| f64::from(pixel[last]) / 255.0))
+        Box::new(
+            flat.samples.chunks_exact(channels).map(move |pixel| f64::from(pixel[last]) / 255.0),
+        )
     } else if let Some(flat) = image.as_flat_samples_u16() {
-        Box::new(flat.samples.chunks_exact(channels).map(move |pixel| f64::from(pixel[last]) / 65_535.0))
+        Box::new(
+            flat.samples.chunks_exact(channels).map(move |pixel| f64::from(pixel[last]) / 65_535.0),
+        )
     } else {
         Box::new(image.to_rgba32f().into_raw().into_iter().skip(3).step_by(4).map(f64::from))
     }
@@ -152,7 +158,12 @@ fn mask(name: &Path, image: &DynamicImage, cutoff: f64) -> Option<AlphaMask> {
         // Every texel is there, or none is.
         let (width, height) = (1, 1);
         let texels = vec![0];
-        return (cutoff > 1.0).then(|| AlphaMask { name: name.display().to_string(), width, height, texels });
+        return (cutoff > 1.0).then(|| AlphaMask {
+            name: name.display().to_string(),
+            width,
+            height,
+            texels,
+        });
     }
     if alpha(image).all(is_there) {
         return None;

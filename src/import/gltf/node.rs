@@ -110,7 +110,9 @@ fn scene_roots(document: &Document<'_>, parents: &[Option<usize>]) -> Result<Opt
     for json in scene.list("nodes")? {
         let root = json.as_index(parents.len(), "node")?;
         if let Some(parent) = parents[root] {
-            return Err(json.fault(format!("node {root} is no root: its parent is node {parent}")).into());
+            return Err(json
+                .fault(format!("node {root} is no root: its parent is node {parent}"))
+                .into());
         }
         if std::mem::replace(&mut is_root[root], true) {
             return Err(json.fault(format!("node {root} is there twice")).into());
@@ -138,7 +140,9 @@ impl Place {
         if let Some(m) = node.numbers::<16>("matrix")? {
             let bottom = [m[3], m[7], m[11], m[15]];
             if bottom != [0.0, 0.0, 0.0, 1.0] {
-                return Err(node.fault("the matrix is not affine: its last row is not 0 0 0 1").into());
+                return Err(node
+                    .fault("the matrix is not affine: its last row is not 0 0 0 1")
+                    .into());
             }
             let column = |at: usize| DVec3::new(m[4 * at], m[4 * at + 1], m[4 * at + 2]);
             let linear = DMat3::from_cols(column(0), column(1), column(2));

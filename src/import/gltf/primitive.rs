@@ -92,7 +92,10 @@ pub(super) fn read(
     Ok(Some(Primitive {
         positions: reader.required(&position)?.finite()?,
         normals: reader.accessor(&attributes, "NORMAL")?.map(|n| n.floats()).transpose()?,
-        uvs: reader.accessor(&attributes, &format!("TEXCOORD_{uv_set}"))?.map(|uv| uv.finite()).transpose()?,
+        uvs: reader
+            .accessor(&attributes, &format!("TEXCOORD_{uv_set}"))?
+            .map(|uv| uv.finite())
+            .transpose()?,
         colours,
         triangles: reader.triangles(json, mode)?,
         joints: reader.joints(&attributes)?,
@@ -102,7 +105,11 @@ pub(super) fn read(
 /// The morph target `json` of a primitive of `count` vertices.
 ///
 /// Errors: attributes of another length, numbers that are not finite.
-pub(super) fn target(document: &Document<'_>, json: &Json<'_>, count: usize) -> Result<MorphTarget> {
+pub(super) fn target(
+    document: &Document<'_>,
+    json: &Json<'_>,
+    count: usize,
+) -> Result<MorphTarget> {
     let reader = Reader { document, count };
     let of = |name| reader.accessor(json, name)?.map(|accessor| accessor.finite()).transpose();
     Ok(MorphTarget { positions: of("POSITION")?, normals: of("NORMAL")? })
@@ -179,9 +186,9 @@ impl<'d> Reader<'d> {
             Mode::Fan => fan(&accessor.wholes::<1>()?.into_flattened()),
         };
         match triangles.par_iter().flatten_iter().find_first(|index| **index >= count) {
-            Some(index) => {
-                Err(indices.fault(format!("there is no vertex {index} (from 0), of {count}")).into())
-            }
+            Some(index) => Err(indices
+                .fault(format!("there is no vertex {index} (from 0), of {count}"))
+                .into()),
             None => Ok(triangles),
         }
     }

@@ -27,12 +27,15 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 /// Errors: a data URI that is not base64; an address on a network.
 pub(super) fn resolve(json: &Json<'_>, uri: &str, file: &Path) -> Result<Resource> {
     if let Some(data) = uri.strip_prefix("data:") {
-        let Some((kind, data)) = data.split_once(',').filter(|(kind, _)| kind.ends_with(";base64")) else {
+        let Some((kind, data)) = data.split_once(',').filter(|(kind, _)| kind.ends_with(";base64"))
+        else {
             return Err(json.fault("a data URI that is not base64").into());
         };
         return match BASE64.decode(data) {
             Ok(bytes) => Ok(Resource::Data(bytes)),
-            Err(error) => Err(json.fault(format!("the data URI of `{kind}` is damaged: {error}")).into()),
+            Err(error) => {
+                Err(json.fault(format!("the data URI of `{kind}` is damaged: {error}")).into())
+            }
         };
     }
     if let Some((scheme, _)) = uri.split_once("://") {
