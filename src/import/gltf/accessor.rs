@@ -19,6 +19,9 @@ enum Component {
     F32,
 }
 
+/// Bytes of the largest element.
+const MOST_SIZE: usize = 16 * 4;
+
 /// An opened accessor: all of its elements are there.
 pub(super) struct Accessor<'d> {
     json: Json<'d>,
@@ -273,15 +276,13 @@ impl<'d> Accessor<'d> {
         }
     }
 
-    fn read<T: Copy + Default + Send>(
-        &self,
-        of: impl Fn(&[u8]) -> T + Sync + Send,
-    ) -> Result<Vec<T>> {
+    fn read<T: Copy + Send>(&self, of: impl Fn(&[u8]) -> T + Sync + Send) -> Result<Vec<T>> {
         let mut all: Vec<T> = match &self.dense {
             Some(elements) => {
                 (0..self.count).into_par_iter().map(|at| of(elements.get(at))).collect()
             }
-            None => vec![T::default(); self.count],
+            // The bytes of the number zero, of every type.
+            None => vec![of(&[0; MOST_SIZE]); self.count],
         };
         if let Some(sparse) = &self.sparse {
             for change in 0..sparse.count {
@@ -319,7 +320,7 @@ impl<'d> Sparse<'d> {
                 .into());
         }
         let no_view = |json: &Json<'_>| json.fault("`bufferView` is missing");
-        let of = |json: &Json<'_>, size| {
+        let of = |json: &Json<'_>, size| -> Result<Elements<'d>> {
             Elements::of(document, json, count, size)?.ok_or_else(|| no_view(json).into())
         };
         let (at, changed) = (of(&indices, index.size())?, of(&values, size)?);

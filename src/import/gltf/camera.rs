@@ -100,7 +100,9 @@ fn choose<'p, 'd>(
         }
         return Ok(first);
     };
-    let by = |name: fn(&Placed<'_>) -> &str| all.iter().find(|camera| name(camera) == wanted);
+    let by = |name: for<'c> fn(&'c Placed<'d>) -> &'c str| {
+        all.iter().find(|camera| name(camera) == wanted)
+    };
     let by_number = || wanted.parse::<usize>().ok().and_then(|at| all.get(at));
     let found = by(|c| &c.node_name).or_else(|| by(|c| &c.camera_name)).or_else(by_number);
     if found.is_some() {

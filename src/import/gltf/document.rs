@@ -1,6 +1,6 @@
 //! The file as a whole: its JSON, its buffers, and the extensions that it asks for.
 
-use super::container::{self, Container};
+use super::container::Container;
 use super::json::Json;
 use super::uri::{self, Resource};
 use crate::error::{Diagnostic, Error, Result};

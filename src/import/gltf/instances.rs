@@ -31,14 +31,17 @@ pub(super) fn places(document: &Document<'_>, node: &Json<'_>) -> Result<Option<
     let (Some(attributes), Some(count)) = (attributes(node)?, count(document, node)?) else {
         return Ok(None);
     };
-    let open = |key| attributes.get(key).map(|json| Accessor::open(document, &json)).transpose();
-    let vectors = |key| open(key)?.map(|accessor: Accessor<'_>| accessor.finite::<3>()).transpose();
-    let (translations, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
-    let rotations = open("ROTATION")?.map(|accessor| accessor.finite::<4>()).transpose()?;
+    let open = |key| -> Result<Option<Accessor<'_>>> {
+        attributes.get(key).map(|json| Accessor::open(document, &json)).transpose()
+    };
+    let translations = open("TRANSLATION")?.map(|all| all.finite::<3>()).transpose()?;
+    let rotations: Option<Vec<[f32; 4]>> =
+        open("ROTATION")?.map(|all| all.finite::<4>()).transpose()?;
+    let scales = open("SCALE")?.map(|all| all.finite::<3>()).transpose()?;
     let vector = |list: &Option<Vec<[f32; 3]>>, at: usize, default: DVec3| {
         list.as_ref().map_or(default, |list| DVec3::from_array(list[at].map(f64::from)))
     };
-    let place = |at| {
+    let place = |at: usize| {
         let rotation = rotations
             .as_ref()
             .map_or(DQuat::IDENTITY, |list| unit_rotation(list[at].map(f64::from)));

@@ -69,11 +69,6 @@ impl<'a> Json<'a> {
         Ok(values.iter().enumerate().map(element).collect())
     }
 
-    /// The keys of this object, in alphabetical order; none of other values.
-    pub fn keys(&self) -> impl Iterator<Item = &'a str> {
-        self.value.as_object().into_iter().flatten().map(|(key, _)| key.as_str())
-    }
-
     /// The text `key`.
     pub fn text(&self, key: &str) -> Result<Option<&'a str>> {
         self.get(key).map(|value| value.as_text()).transpose()

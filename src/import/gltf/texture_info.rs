@@ -78,12 +78,14 @@ fn wraps(sampler: &Json<'_>, notes: &mut Notes) -> Result<[Wrap; 2]> {
     {
         notes.add("the filter NEAREST of a texture is read as LINEAR", None);
     }
-    let wrap = |key| match sampler.whole(key)? {
-        None | Some(10_497) => Ok(Wrap::Repeat),
-        Some(33_071) => Ok(Wrap::Clamp),
-        Some(33_648) => Ok(Wrap::Mirror),
-        Some(other) => {
-            Err(sampler.fault(format!("`{key}` is {other}, which is no wrap mode")).into())
+    let wrap = |key| -> Result<Wrap> {
+        match sampler.whole(key)? {
+            None | Some(10_497) => Ok(Wrap::Repeat),
+            Some(33_071) => Ok(Wrap::Clamp),
+            Some(33_648) => Ok(Wrap::Mirror),
+            Some(other) => {
+                Err(sampler.fault(format!("`{key}` is {other}, which is no wrap mode")).into())
+            }
         }
     };
     Ok([wrap("wrapS")?, wrap("wrapT")?])
