@@ -35,6 +35,11 @@ pub fn shot(shot: &Shot) -> Result<()> {
             orbit(*eye - *target, *axis, *degrees)
         }
         CameraPath::Keys(all) => keys(all),
+        // Each pose is checked where it is asked for: there may be as many as frames.
+        CameraPath::Frames(all) if all.len() == shot.frames as usize => Ok(()),
+        CameraPath::Frames(all) => {
+            fault(format!("the path has {} poses for {} frames", all.len(), shot.frames))
+        }
         CameraPath::BSpline { points, target, up, roll_degrees } => {
             if points.len() < 4 {
                 return fault(format!(
@@ -53,6 +58,11 @@ fn projections(keys: &[ProjectionKey]) -> Result<()> {
         return fault("the projection needs keys whose times increase");
     }
     keys.iter().try_for_each(|key| key.projection.check())
+}
+
+/// The pose of one frame of a path that has one for each.
+pub fn frame_pose(of: &Pose, frame: u32) -> Result<()> {
+    pose(of, &format!("frame {frame}"))
 }
 
 fn finite(p: DVec3, name: &str) -> Result<()> {
