@@ -268,10 +268,12 @@ impl Parts<'_, '_> {
             self.notes.add("KHR_materials_transmission by an image or of less than a half is ignored: the surface is opaque", None);
             return Ok(None);
         }
-        let has_images = pbr.is_some_and(|pbr| pbr.get("baseColorTexture").is_some());
-        let rough = self.share(pbr, "roughnessFactor", 1.0)?;
-        if transmission < 1.0 || has_images || rough > 0.0 || self.laid.normal.is_some() {
-            self.notes.add("KHR_materials_transmission is read as clear glass: roughness, images and what is not transmitted are left out", None);
+        let images = ["baseColorTexture", "metallicRoughnessTexture"];
+        let has_images =
+            pbr.is_some_and(|pbr| images.iter().any(|image| pbr.get(image).is_some()));
+        let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
+        if transmission < 1.0 || has_images || self.laid.normal.is_some() {
+            self.notes.add("KHR_materials_transmission is read as glass: images and what is not transmitted are left out", None);
         }
         let ior = self.ior()?;
         let ior = if ior == 0.0 { 1.5 } else { ior.clamp(0.1, 10.0) };
@@ -279,14 +281,15 @@ impl Parts<'_, '_> {
         let volume =
             volume.filter(|json| json.number("thicknessFactor").is_ok_and(|t| t > Some(0.0)));
         let Some(volume) = volume else {
-            return Ok(Some(Glass { tint, thin: true, ..Glass::clear(ior) }));
+            return Ok(Some(Glass { roughness, tint, thin: true, ..Glass::clear(ior) }));
         };
         let distance = volume.number_within("attenuationDistance", [1e-30, f64::MAX], f64::MAX)?;
         let colour = volume.numbers::<3>("attenuationColor")?.unwrap_or([1.0; 3]);
         // Of black a millionth is left after the distance.
         let absorption =
             colour.map(|c| (-libm::log(c.clamp(1e-6, 1.0)) / distance).min(1e30) as f32);
-        Ok(Some(Glass { tint, absorption: Rgb::from_array(absorption), ..Glass::clear(ior) }))
+        let absorption = Rgb::from_array(absorption);
+        Ok(Some(Glass { roughness, tint, absorption, ..Glass::clear(ior) }))
     }
 
     /// A colour from 0 to 1; what lies outside is cut.

@@ -85,13 +85,14 @@ def reflection(index, level):
 
 
 def glass(writer, fed, transmission, index):
-    """Smooth clear glass. A surface lets the root of the base colour through, as in Cycles."""
+    """Clear glass. A surface lets the root of the base colour through, as in Cycles."""
     if transmission < 1.0:
         writer.note(f"transmission {transmission:.3g}", "1")
     roughness = writer.constant(fed, "Roughness").grey()
-    if roughness > 0.0:
-        writer.note(f"glass of roughness {roughness:.3g}", "smooth glass")
     if fed.input("Normal").fed() is not None:
         writer.note("a normal map on glass", "none")
     tint = [math.sqrt(c) for c in share(writer.constant(fed, "Base Color").rgb())]
-    return Made({"glass": {"ior": ior(index), "tint": tint}})
+    made = {"ior": ior(index), "tint": tint}
+    if roughness > 0.0:
+        made["roughness"] = min(roughness, 1.0)
+    return Made({"glass": made})

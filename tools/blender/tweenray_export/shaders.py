@@ -84,12 +84,14 @@ class Writer:
     _bsdf_anisotropic = _bsdf_glossy
 
     def _bsdf_glass(self, fed):
-        if self.constant(fed, "Roughness").grey() > 0.0:
-            self.note("rough glass", "smooth glass")
+        roughness = self.constant(fed, "Roughness").grey()
         if fed.input("Normal").fed() is not None:
             self.note("a normal map on glass", "none")
         tint = self.constant(fed, "Color").rgb()
-        return Made({"glass": {"ior": ior(self.constant(fed, "IOR").grey()), "tint": share(tint)}})
+        glass = {"ior": ior(self.constant(fed, "IOR").grey()), "tint": share(tint)}
+        if roughness > 0.0:
+            glass["roughness"] = min(roughness, 1.0)
+        return Made({"glass": glass})
 
     def _bsdf_refraction(self, fed):
         self.note("refraction without reflection", "glass")
