@@ -57,6 +57,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     if let Some(camera) = &mut camera {
         camera.shot.apply_transform(&transform);
     }
+    // What glows is no reason to leave out the lamp.
+    let own_lights = !world.lights.is_empty();
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
     }
@@ -78,14 +80,15 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
             warnings.extend(light_up(&mut world, path));
             (shot, None)
         }
-        None => put_on_stage(&mut world, aspect),
+        None => put_on_stage(&mut world, own_lights, aspect),
     };
     Ok(Loaded { warnings, files, stage, repeats, ..Loaded::new(world, shot, settings) })
 }
 
 /// Lights a scene that has a camera and nothing that shines, and says so.
 fn light_up(world: &mut World, path: &Path) -> Option<Diagnostic> {
-    let glows = world.materials.iter().any(|m| m.emission.max_element() > 0.0);
+    let emission = |mesh: &WorldMesh| world.materials[mesh.material as usize].emission;
+    let glows = world.meshes.iter().any(|mesh| emission(mesh).max_element() > 0.0);
     if glows || !world.lights.is_empty() {
         return None;
     }
@@ -97,9 +100,8 @@ fn light_up(world: &mut World, path: &Path) -> Option<Diagnostic> {
     Some(Diagnostic::new(path, message).help("export the lights of the scene with it"))
 }
 
-/// Adds floor and lights to `world`, where it has no lights, and gives the camera's orbit.
-fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<AddedStage>) {
-    let own_lights = !world.lights.is_empty();
+/// Adds floor and lights to `world`, where the file has no lights of its own, and gives the camera's orbit.
+fn put_on_stage(world: &mut World, own_lights: bool, aspect: f64) -> (Shot, Option<AddedStage>) {
     let lens = Lens { vfov_degrees: VFOV_DEGREES, aspect };
     let (target, eye) = if own_lights && !world.spheres.is_empty() {
         frame_spheres(world, &lens)

@@ -140,15 +140,15 @@ impl<'a, 'd> Assembly<'a, 'd> {
             return;
         };
         self.notes.add(
-            "emission by an image: the triangles on which it is bright emit its mean there",
+            "emission by an image: triangles on which it is brighter than half of white emit its mean there, others nothing",
             None,
         );
         let image = &self.model.world.textures[map.image as usize];
-        let (dark, bright) = glow::split(mesh, image, &map);
         let material = &self.model.world.materials[made.id as usize];
         let emission = material.emission;
-        if let Some((bright, colour)) = bright {
-            let glowing = Material { emission: emission * colour, ..material.clone() };
+        let (dark, bright) = glow::split(mesh, image, (&map, emission));
+        if let Some((bright, emission)) = bright {
+            let glowing = Material { emission, ..material.clone() };
             self.model.world.materials.push(glowing);
             let material = self.model.world.materials.len() as MaterialId - 1;
             self.model.world.meshes.push(WorldMesh { material, ..bright });

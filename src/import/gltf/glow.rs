@@ -1,34 +1,37 @@
 //! Emission by an image: the triangles on which the image is bright become a mesh that emits its mean there.
 //!
 //! The renderer has no images of emission, and a mean over all of a mesh would make a whole model glow of which only lamps do.
+//! A surface that emits reflects nothing, so what would emit little emits nothing.
 
 use crate::import::tidy;
 use crate::math::{Rgb, Vec2};
 use crate::scene::{Corners, Texture, TextureMap, VertexColours, WorldMesh};
 use rayon::prelude::*;
 
-/// Triangles glow that are brighter than this share of the brightest one.
+/// Triangles glow that are brighter than this share of the brightest one, and than this radiance.
 const BRIGHT: f32 = 0.1;
+const LEAST: f32 = 0.5;
 
-/// The triangles of `mesh` on which the image is bright, apart from the others, and the mean colour of the image there.
+/// The triangles of `mesh` on which `factor` times the image is bright, apart from the others, and the mean of that there.
 /// Either part may have no triangles.
 pub(super) fn split(
     mesh: WorldMesh,
     image: &Texture,
-    map: &TextureMap,
+    (map, factor): (&TextureMap, Rgb),
 ) -> (WorldMesh, Option<(WorldMesh, Rgb)>) {
     let Some(uvs) = &mesh.uvs else { return (mesh, None) };
     let colour = |triangle: &[u32; 3]| {
         let corners =
             triangle.map(|i| map.transform.transform_point2(uvs.values[i as usize].as_dvec2()));
-        mean(image, map, corners.map(|uv| uv.as_vec2()))
+        factor * mean(image, map, corners.map(|uv| uv.as_vec2()))
     };
     let colours: Vec<Rgb> = mesh.triangles.par_iter().map(colour).collect();
     let most = colours.par_iter().map(|c| c.max_element()).reduce(|| 0.0, f32::max);
-    if most == 0.0 {
+    let least = LEAST.max(BRIGHT * most);
+    if most < least {
         return (mesh, None);
     }
-    let glows: Vec<bool> = colours.par_iter().map(|c| c.max_element() >= BRIGHT * most).collect();
+    let glows: Vec<bool> = colours.par_iter().map(|c| c.max_element() >= least).collect();
     let (mut sum, mut weight) = (Rgb::ZERO, 0.0);
     for (at, colour) in colours.iter().enumerate().filter(|(at, _)| glows[*at]) {
         let [a, b, c] = mesh.triangles[at].map(|i| mesh.positions[i as usize]);
