@@ -7,12 +7,10 @@ use crate::scene::Glass;
 use crate::shade::optics;
 use std::sync::OnceLock;
 
-/// Nodes of the table of passed shares along its axes: index of refraction, roughness, angle.
-const NODES: [usize; 3] = [17, 33, 17];
+/// Nodes of a table of lost shares along each axis.
+const NODES: usize = 33;
 /// Samples along each axis for one node.
 const SAMPLES: usize = 32;
-/// The table reaches from the reciprocal of this index of refraction to it.
-const LARGEST_INDEX: f64 = 3.0;
 
 /// A boundary of glass, seen from one of its sides.
 #[derive(Debug, Clone, Copy)]
@@ -49,49 +47,61 @@ impl Boundary {
     }
 }
 
-/// The share of light from a direction of cosine `cos` that one microfacet does not pass on: linear between the nodes of a
-/// table over index of refraction, roughness and angle.
+/// The share of light from a direction of cosine `cos` that one microfacet does not pass on, for an index of refraction `eta`.
 fn lost(eta: f64, roughness: f64, cos: f64) -> f64 {
-    static TABLE: OnceLock<Vec<f64>> = OnceLock::new();
-    let [_, rows, columns] = NODES;
-    let table = TABLE.get_or_init(|| {
-        let all = 0..NODES.iter().product::<usize>();
-        let places = all.map(|i| [i / (rows * columns), i / columns % rows, i % columns]);
-        let node = |at: usize, axis: usize| at as f64 / (NODES[axis] - 1) as f64;
-        places.map(|[e, r, c]| integrate(node(e, 0), node(r, 1), node(c, 2))).collect()
-    });
-    let most = contrast(LARGEST_INDEX);
-    let axes = [
-        0.5 + 0.5 * contrast(eta) / most,
-        roughness,
-        // As in the table of mirrors.
-        cos / (cos + roughness) * (1.0 + roughness),
-    ];
-    let places = [0, 1, 2].map(|axis| {
-        let x = axes[axis].clamp(0.0, 1.0) * (NODES[axis] - 1) as f64;
-        let at = (x as usize).min(NODES[axis] - 2);
+    if !(eta > 0.0 && eta < f64::INFINITY) {
+        return f64::NAN;
+    }
+    let last = (NODES - 1) as f64;
+    let place = |x: f64| {
+        let x = x.clamp(0.0, 1.0) * last;
+        let at = (x as usize).min(NODES - 2);
         (at, x - at as f64)
-    });
-    (0..8).fold(0.0, |sum, corner| {
-        let (mut at, mut weight) = (0, 1.0);
-        for (axis, (first, share)) in places.iter().enumerate() {
-            let beyond = corner >> axis & 1;
-            at = at * NODES[axis] + first + beyond;
-            weight *= if beyond == 1 { *share } else { 1.0 - share };
+    };
+    // As in the table of mirrors.
+    let ratio = cos / (cos + roughness) * (1.0 + roughness);
+    let ((r, fr), (c, fc)) = (place(roughness), place(ratio));
+    let lost = &Table::of(eta).lost;
+    let row = |r: usize| {
+        let at = r * NODES + c;
+        lost[at] + (lost[at + 1] - lost[at]) * fc
+    };
+    row(r) + (row(r + 1) - row(r)) * fr
+}
+
+/// [`lost`] by roughness and angle, for one index of refraction. Those that are in use form a chain, to which no thread waits to
+/// add: a scene has few.
+struct Table {
+    eta: f64,
+    lost: Vec<f64>,
+    next: Chain,
+}
+
+type Chain = OnceLock<Box<Table>>;
+
+impl Table {
+    /// The table for `eta`, a positive number, which is made the first time.
+    fn of(eta: f64) -> &'static Self {
+        static FIRST: Chain = OnceLock::new();
+        let mut link = &FIRST;
+        loop {
+            let table = link.get_or_init(|| Box::new(Self::new(eta)));
+            if table.eta == eta {
+                return table;
+            }
+            link = &table.next;
         }
-        sum + weight * table[at]
-    })
+    }
+
+    fn new(eta: f64) -> Self {
+        let node = |i: usize| i as f64 / (NODES - 1) as f64;
+        let lost = (0..NODES * NODES).map(|i| integrate(eta, node(i / NODES), node(i % NODES)));
+        Self { eta, lost: lost.collect(), next: Chain::new() }
+    }
 }
 
-/// An index of refraction as a number between -1 and 1, odd in its logarithm.
-fn contrast(eta: f64) -> f64 {
-    (eta - 1.0) / (eta + 1.0)
-}
-
-/// [`lost`] by stratified samples at a node, whose place on each axis is from 0 to 1.
-fn integrate(contrast_place: f64, roughness: f64, ratio: f64) -> f64 {
-    let contrast = (2.0 * contrast_place - 1.0) * contrast(LARGEST_INDEX);
-    let eta = (1.0 + contrast) / (1.0 - contrast);
+/// [`lost`] by stratified samples. `ratio` is of the cosine to its sum with the roughness, 1 at most.
+fn integrate(eta: f64, roughness: f64, ratio: f64) -> f64 {
     // The limits at both ends are taken from close by.
     let roughness = roughness.max(1e-3);
     let ratio = ratio.max(1e-4) / (1.0 + roughness);
@@ -130,13 +140,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_is_made_in_time() {
-        let start = std::time::Instant::now();
-        lost(1.5, 0.5, 0.5);
-        println!("table {:?}", start.elapsed());
-    }
-
-    #[test]
     fn shares_between_the_nodes_of_the_table_are_those_of_an_integral() {
         let mut worst: f64 = 0.0;
         for i in 0..400usize {
@@ -149,8 +152,9 @@ mod tests {
             let wo = DVec3::new(((1.0 - cos) * (1.0 + cos)).sqrt(), 0.0, cos);
             let n = 128;
             let at = |k: usize| (k as f64 + 0.5) / n as f64;
-            let passed =
-                |k| passed_by(visible_normal(alpha, wo, [at(k / n), at(k % n)]), alpha, wo, eta);
+            let passed = |k: usize| {
+                passed_by(visible_normal(alpha, wo, [at(k / n), at(k % n)]), alpha, wo, eta)
+            };
             let exact = (0..n * n).map(passed).sum::<f64>() / (n * n) as f64;
             let found = Boundary { eta, is_pane: false }.passed(roughness, cos);
             let off = (found / exact - 1.0).abs();
