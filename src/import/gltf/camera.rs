@@ -62,6 +62,7 @@ pub(super) fn read(
         easing: Easing::Linear,
         frames: frames.count,
         vfov_degrees: vfov.to_degrees(),
+        projections: Vec::new(),
         lens: ShotLens::Pinhole,
     };
     Ok(Some(FileCamera { shot, aspect }))
