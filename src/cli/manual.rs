@@ -55,8 +55,9 @@ fn page(command: &Command, name: &str, folder: &Path) -> Result<()> {
     let path = folder.join(format!("{name}.1"));
     let mut text = Vec::new();
     // The version names the Embree of this machine, so pages leave it out.
-    let command = command.clone().name(name.to_owned()).version(env!("CARGO_PKG_VERSION"));
-    Man::new(command).render(&mut text).map_err(|e| Error::io("write", &path, e))?;
+    let command = command.clone().version(env!("CARGO_PKG_VERSION"));
+    let page = Man::new(command).title(name);
+    page.render(&mut text).map_err(|e| Error::io("write", &path, e))?;
     write(&path, &text)
 }
 

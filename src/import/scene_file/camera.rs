@@ -1,7 +1,12 @@
 //! `[camera]`: lens, timing and path.
 
+mod colmap;
 mod lens;
+mod nerf;
 mod path;
+mod poses;
+#[cfg(test)]
+mod tests;
 
 use super::at::At;
 use super::number::{Degrees, FieldOfView, Int, PixelAspect, Share, Shift};
@@ -9,10 +14,11 @@ use super::vector::{Direction, List, Point};
 use crate::math::DVec3;
 use crate::scene::Easing;
 use lens::{KeyLens, Lens};
+use poses::Poses;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The camera and its move: at most one of `still`, `pan`, `orbit`, `keys` and `bspline`. With
+/// The camera and its move: at most one of `still`, `pan`, `orbit`, `keys`, `bspline` and `poses`. With
 /// none of them the camera orbits the scene once.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -21,7 +27,9 @@ use serde::Deserialize;
     {"required": ["still", "keys"]}, {"required": ["still", "bspline"]},
     {"required": ["pan", "orbit"]}, {"required": ["pan", "keys"]},
     {"required": ["pan", "bspline"]}, {"required": ["orbit", "keys"]},
-    {"required": ["orbit", "bspline"]}, {"required": ["keys", "bspline"]}
+    {"required": ["orbit", "bspline"]}, {"required": ["keys", "bspline"]},
+    {"required": ["still", "poses"]}, {"required": ["pan", "poses"]}, {"required": ["orbit", "poses"]},
+    {"required": ["keys", "poses"]}, {"required": ["bspline", "poses"]}
 ]}))]
 pub(super) struct Camera {
     /// Vertical field of view, degrees.
@@ -57,6 +65,9 @@ pub(super) struct Camera {
     keys: Option<At<Vec<At<Key>>>>,
     /// A uniform cubic B-spline: from the first to the last of its points, close to the others.
     bspline: Option<At<BSpline>>,
+    /// One pose a frame from a file, relative to the scene file: `transforms.json` of a NeRF data set, or COLMAP's
+    /// `images.txt` with its `cameras.txt`. Or a table of the file and the axis that points up in it.
+    poses: Option<At<Poses>>,
 }
 
 /// A camera that does not move.
@@ -174,6 +185,7 @@ impl Default for Camera {
             orbit: None,
             keys: None,
             bspline: None,
+            poses: None,
         }
     }
 }

@@ -133,7 +133,7 @@ impl Camera {
             self.lens_key((at, key.fov.unwrap_or(self.fov)), &given, source, span)
         };
         let keys = match path {
-            CameraPath::Keys(poses) => {
+            CameraPath::Keys(poses) if self.keys.is_some() => {
                 keys.iter().zip(poses).map(|(key, pose)| at_key(key, pose.at)).collect()
             }
             _ => self.lens_key((0.0, self.fov), &own, source, first).map(|key| vec![key]),
@@ -215,6 +215,11 @@ impl Camera {
 }
 
 impl Lens {
+    /// Whether it depends neither on a field of view nor on a target.
+    pub(super) fn stands_alone(&self) -> bool {
+        self.f_number.is_none() && matches!(self.focus, Some(Sharp::Distance(_)))
+    }
+
     fn given(&self) -> Given<'_> {
         let Self { radius, f_number, focus, .. } = self;
         Given { radius: radius.as_ref(), f_number: f_number.as_ref(), focus: *focus }

@@ -27,12 +27,22 @@ impl Camera {
         aspect: f64,
     ) -> Result<Shot> {
         let span = self.only_path(source)?;
-        let path = self.path(source, world, aspect)?;
-        let moves = !matches!(path, CameraPath::Still(_));
+        let (path, projections) = match &self.poses {
+            Some(poses) => self.posed(poses, source, aspect)?,
+            None => {
+                let path = self.path(source, world, aspect)?;
+                let projections = self.projections(&path);
+                (path, projections)
+            }
+        };
         let lens = self.lens(&path, source)?;
-        let projections = self.projections(&path);
+        let usual_frames = match (&path, &self.poses) {
+            (CameraPath::Keys(poses), Some(_)) => poses.len() as u32,
+            (CameraPath::Still(_), _) => 1,
+            _ => 48,
+        };
         let shot = Shot {
-            frames: self.frames.map_or(if moves { 48 } else { 1 }, Int::u32),
+            frames: self.frames.map_or(usual_frames, Int::u32),
             path,
             projections,
             easing: self.easing,
@@ -54,6 +64,7 @@ impl Camera {
             self.orbit.as_ref().map(|p| (p.span.clone(), "orbit")),
             self.keys.as_ref().map(|p| (p.span.clone(), "keys")),
             self.bspline.as_ref().map(|p| (p.span.clone(), "bspline")),
+            self.poses.as_ref().map(|p| (p.span.clone(), "poses")),
         ]
         .into_iter()
         .flatten()
