@@ -448,3 +448,30 @@ fn lights_materials_and_skins_that_make_no_sense_are_refused() {
         "skins[0].joints[0]: there is no node 5 (from 0): the file has 1"
     );
 }
+
+#[test]
+fn what_takes_time_again_and_again_is_counted_too() {
+    let mut file = File::triangle();
+    let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
+    file.json["meshes"][0]["primitives"] = (0..2_001).map(|_| points.clone()).collect();
+    file.json["nodes"] = (0..2_000).map(|_| json!({"mesh": 0})).collect();
+    let refused = refusal("test.glb", &file.glb());
+    let start = "nodes[1999]: with this node the scene has 4002000 primitives and morph targets; 4000000 can be placed";
+    assert!(refused.starts_with(start), "{refused}");
+    // Many samplers of the same bytes.
+    let mut file = File::triangle();
+    let (times, values) = (file.floats("SCALAR", &[0.; 100]), file.floats("VEC3", &[1.; 300]));
+    let count = 40;
+    file.json["nodes"] = (0..count).map(|_| json!({})).collect();
+    let channel = |at: usize| json!({"sampler": at, "target": {"node": at, "path": "translation"}});
+    file.json["animations"] = json!([{
+        "channels": (0..count).map(channel).collect::<Vec<_>>(),
+        "samplers": (0..count).map(|_| json!({"input": times, "output": values})).collect::<Vec<_>>(),
+    }]);
+    let refused = refusal("test.glb", &file.glb());
+    assert!(
+        refused
+            .starts_with("animations[0].samplers[16]: animations of 6800 numbers, of buffers of "),
+        "{refused}"
+    );
+}

@@ -281,3 +281,13 @@ fn indices_of_every_size_are_read() {
         assert_eq!(only(&file.model()).triangles, [[2, 0, 1]]);
     }
 }
+
+#[test]
+fn a_scene_file_takes_a_gltf_file_as_a_mesh() {
+    use super::build::Written;
+    let scene = "[[mesh]]\nfile = 'part.glb'\ntransform = [{ translate = [0, 3, 0] }]\n[sky]\nradiance = 1\n";
+    let written = Written::of("scene.toml", scene.as_bytes());
+    written.beside("part.glb", &File::triangle().glb());
+    let world = written.load(&LoadOptions::default()).expect("a scene").world;
+    assert_eq!(world.meshes[0].positions[0], DVec3::Y * 3.0);
+}

@@ -18,6 +18,7 @@ fn everything() -> File {
         (file.floats("VEC3", &[0., 0., 0., 5., 0., 0.]), file.floats("SCALAR", &[0., 1.]));
     let (turns, cubic) =
         (file.floats("VEC4", &[0., 0., 0., 1., 0., 1., 0., 0.]), file.floats("VEC3", &[1.; 18]));
+    let fields = file.floats("SCALAR", &[0.5, 1.]);
     let (sparse_at, sparse) = (file.view(&[2]), file.view(&bytes_of(&[0., 7., 1.])));
     file.json["accessors"][0]["sparse"] = json!({
         "count": 1, "indices": {"bufferView": sparse_at, "componentType": U8}, "values": {"bufferView": sparse},
@@ -53,7 +54,7 @@ fn everything() -> File {
             {"sampler": 0, "target": {"node": 1, "path": "rotation"}}, {"sampler": 1, "target": {"node": 2, "path": "translation"}},
             {"sampler": 2, "target": {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/cameras/0/perspective/yfov"}}}},
         ],
-        "samplers": [{"input": times, "output": turns}, {"input": times, "output": cubic, "interpolation": "CUBICSPLINE"}, {"input": times, "output": times}],
+        "samplers": [{"input": times, "output": turns}, {"input": times, "output": cubic, "interpolation": "CUBICSPLINE"}, {"input": times, "output": fields}],
     }]);
     file
 }

@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::import::source::Notes;
 use crate::math::{DQuat, DVec3};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A property that can be animated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -43,7 +44,7 @@ pub(super) struct Curve {
 
 /// All curves of a file, by what they move.
 #[derive(Debug, Default)]
-pub(super) struct Animations(HashMap<Property, Curve>);
+pub(super) struct Animations(HashMap<Property, Arc<Curve>>);
 
 impl Animations {
     /// The curves of all animations. Of two that move the same property the first counts.
@@ -51,8 +52,10 @@ impl Animations {
     /// Errors: samplers that are not whole, times that are not in order.
     pub fn read(document: &Document<'_>, notes: &mut Notes) -> Result<Self> {
         let mut all = Self::default();
+        let mut numbers = 0;
         for animation in document.top.list("animations")? {
             let samplers = animation.list("samplers")?;
+            let mut curves = HashMap::<(usize, Option<usize>), Arc<Curve>>::new();
             for channel in animation.list("channels")? {
                 let target = channel.required("target")?;
                 let Some(property) = property(document, &target, notes)? else { continue };
@@ -69,7 +72,23 @@ impl Animations {
                     Property::Yfov(_) => Some(1),
                     Property::Weights(_) => None,
                 };
-                all.0.insert(property, Curve::read(document, &samplers[sampler], width)?);
+                let curve = match curves.get(&(sampler, width)) {
+                    Some(curve) => curve.clone(),
+                    None => {
+                        let curve = Arc::new(Curve::read(document, &samplers[sampler], width)?);
+                        numbers += curve.values.len() + curve.times.len();
+                        curves.insert((sampler, width), curve.clone());
+                        curve
+                    }
+                };
+                // Samplers that all read the same bytes multiply them.
+                if numbers / 4 > document.bytes() {
+                    let has = document.bytes();
+                    let message =
+                        format!("animations of {numbers} numbers, of buffers of {has} bytes");
+                    return Err(samplers[sampler].fault(message).into());
+                }
+                all.0.insert(property, curve);
             }
         }
         Ok(all)
@@ -77,7 +96,7 @@ impl Animations {
 
     /// The curve of a property.
     pub fn get(&self, property: Property) -> Option<&Curve> {
-        self.0.get(&property)
+        self.0.get(&property).map(Arc::as_ref)
     }
 
     /// Whether the place of a node is animated.

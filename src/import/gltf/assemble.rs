@@ -1,13 +1,14 @@
 //! The scene's nodes as meshes, materials and lights.
 
 use super::animation::Animations;
-use super::deform::{self, Shape};
+use super::deform::{self, JointMatrices, Shape};
 use super::document::Document;
 use super::image::ImageStore;
 use super::json::Json;
 use super::material::{MaterialReader, Surfaced};
 use super::node::{Nodes, name_of};
-use super::primitive::{self, MOST_PLACED};
+use super::primitive::{self, MOST_PIECES, MOST_PLACED, Size};
+use super::uri::shortened;
 use super::{glow, instances, light, place};
 use crate::error::Result;
 use crate::import::model::Model;
@@ -26,6 +27,8 @@ pub(super) struct Assembly<'a, 'd> {
     images: ImageStore,
     /// Materials that were made, by their number in the file, and whether vertices have colours.
     made: HashMap<(Option<usize>, bool), Made>,
+    /// Joint matrices by skin.
+    joints: HashMap<usize, JointMatrices>,
     model: Model,
     notes: &'a mut Notes,
 }
@@ -53,8 +56,19 @@ impl<'a, 'd> Assembly<'a, 'd> {
         let materials = MaterialReader::of(document)?;
         let images = ImageStore::decode(document, &materials.images(&used)?, &mut model.files)?;
         let worlds = nodes.worlds(animations.0, animations.1);
-        let made = HashMap::new();
-        Ok(Self { document, nodes, animations, worlds, materials, images, made, model, notes })
+        let (made, joints) = (HashMap::new(), HashMap::new());
+        Ok(Self {
+            document,
+            nodes,
+            animations,
+            worlds,
+            materials,
+            images,
+            made,
+            joints,
+            model,
+            notes,
+        })
     }
 
     /// The model, with all that the scene's nodes show.
@@ -83,19 +97,24 @@ impl<'a, 'd> Assembly<'a, 'd> {
         seen: &mut HashMap<usize, usize>,
     ) -> Result<()> {
         let (node, json) = (&self.document.nodes[number], &self.document.meshes[mesh]);
-        let joints = deform::joint_matrices(self.document, node, &self.worlds)?;
-        let weights = deform::morph_weights(node, number, json, self.animations)?;
+        let primitives = json.list("primitives")?;
+        let mut targets = 0;
+        for json in &primitives {
+            targets = targets.max(json.list("targets")?.len());
+        }
+        let joints = self.joints(node)?;
+        let weights = deform::morph_weights(node, (number, targets), json, self.animations)?;
         let world = self.worlds[number];
         let places = match instances::places(self.document, node)? {
             Some(places) => places.into_iter().map(|place| world * place).collect(),
             None => vec![world],
         };
         let name = match node.text("name")?.or(json.text("name")?) {
-            Some(name) => name.to_owned(),
+            Some(name) => shortened(name),
             None => name_of(json, "mesh", mesh)?,
         };
         let before = self.model.world.meshes.len();
-        for json in json.list("primitives")? {
+        for json in primitives {
             let material = json.index("material", self.document.materials.len(), "material")?;
             let uv_set = material.map_or(Ok(0), |at| self.materials.uv_set(at))?;
             let Some(primitive) = primitive::read(self.document, &json, uv_set, self.notes)? else {
@@ -111,6 +130,10 @@ impl<'a, 'd> Assembly<'a, 'd> {
             let skin = joints.as_ref().filter(|_| !primitive.joints.is_empty());
             if let Some(joints) = skin {
                 shape.skin(&primitive, &json, joints)?;
+            }
+            if shape.positions.iter().any(|p| !p.is_finite()) {
+                let message = "a morph target or skin moves a vertex beyond the largest number";
+                return Err(json.fault(message).into());
             }
             let Some(mesh) = place::mesh(primitive, shape, &name, self.notes) else { continue };
             // A skin's joints say where it is, its node does not.
@@ -131,6 +154,17 @@ impl<'a, 'd> Assembly<'a, 'd> {
         }
         *earlier += usize::from(is_copy) * places.len();
         Ok(())
+    }
+
+    /// The joint matrices of the skin of `node`; `None` without a skin.
+    fn joints(&mut self, node: &Json<'_>) -> Result<Option<JointMatrices>> {
+        let skins = &self.document.skins;
+        let Some(at) = node.index("skin", skins.len(), "skin")? else { return Ok(None) };
+        if let Some(known) = self.joints.get(&at) {
+            return Ok(Some(known.clone()));
+        }
+        let joints = deform::joint_matrices(self.document, &skins[at], &self.worlds)?;
+        Ok(Some(self.joints.entry(at).or_insert(joints).clone()))
     }
 
     /// Adds a mesh; of one that emits by an image the parts where that is bright, and the rest, apart.
@@ -196,8 +230,8 @@ impl<'a, 'd> Assembly<'a, 'd> {
 /// Counts what the scene places; gives the materials that it shows.
 fn count(document: &Document<'_>, nodes: &Nodes) -> Result<BTreeSet<usize>> {
     let mut used = BTreeSet::new();
-    let mut sizes: HashMap<usize, [usize; 2]> = HashMap::new();
-    let mut placed = [0usize; 2];
+    let mut sizes: HashMap<usize, Size> = HashMap::new();
+    let mut placed = Size::default();
     for number in &nodes.shown {
         let node = &document.nodes[*number];
         let Some(mesh) = node.index("mesh", document.meshes.len(), "mesh")? else { continue };
@@ -206,35 +240,35 @@ fn count(document: &Document<'_>, nodes: &Nodes) -> Result<BTreeSet<usize>> {
             None => mesh_size(document, &document.meshes[mesh], &mut used)?,
         };
         sizes.insert(mesh, size);
-        let times = instances::count(document, node)?.unwrap_or(1);
-        for (all, own) in placed.iter_mut().zip(size) {
-            *all = all.saturating_add(own.saturating_mul(times));
+        placed = placed.plus(size.times(instances::count(document, node)?.unwrap_or(1)));
+        let Size { vertices, triangles, pieces } = placed;
+        if vertices > MOST_PLACED || triangles > MOST_PLACED {
+            let message = format!(
+                "with this node the scene has {vertices} vertices and {triangles} triangles; {MOST_PLACED} of each can be placed"
+            );
+            return Err(too_many(node, &message).into());
         }
-        if placed.iter().any(|all| *all > MOST_PLACED) {
-            return Err(too_many(node, placed).into());
+        if pieces > MOST_PIECES {
+            let message = format!(
+                "with this node the scene has {pieces} primitives and morph targets; {MOST_PIECES} can be placed"
+            );
+            return Err(too_many(node, &message).into());
         }
     }
     Ok(used)
 }
 
-fn too_many(node: &Json<'_>, [vertices, triangles]: [usize; 2]) -> crate::error::Diagnostic {
-    let message = format!(
-        "with this node the scene has {vertices} vertices and {triangles} triangles; {MOST_PLACED} of each can be placed"
-    );
+fn too_many(node: &Json<'_>, message: &str) -> crate::error::Diagnostic {
     node.fault(message).help("each copy of a mesh takes memory of its own: leave some out")
 }
 
-/// Vertices and triangles of a mesh; the materials of its primitives are added to `used`.
-fn mesh_size(
-    document: &Document<'_>,
-    mesh: &Json<'_>,
-    used: &mut BTreeSet<usize>,
-) -> Result<[usize; 2]> {
-    let mut sum = [0usize; 2];
+/// The size of a mesh; the materials of its primitives are added to `used`.
+fn mesh_size(document: &Document<'_>, mesh: &Json<'_>, used: &mut BTreeSet<usize>) -> Result<Size> {
+    let mut sum = Size::default();
     for json in mesh.list("primitives")? {
-        let Some(size) = primitive::size(document, &json)? else { continue };
+        sum = sum.plus(primitive::size(document, &json)?);
         used.extend(json.index("material", document.materials.len(), "material")?);
-        sum = [sum[0].saturating_add(size[0]), sum[1].saturating_add(size[1])];
     }
-    Ok(sum)
+    // A mesh without any takes some time too.
+    Ok(Size { pieces: sum.pieces.max(1), ..sum })
 }

@@ -4,6 +4,7 @@ use super::animation::{Animations, Curve, Property};
 use super::document::Document;
 use super::json::Json;
 use super::node::{Nodes, name_of};
+use super::uri::shortened;
 use crate::error::{Diagnostic, Result, counted};
 use crate::import::model::{FileCamera, ModelOptions};
 use crate::import::source::Notes;
@@ -13,6 +14,10 @@ use std::f64::consts::PI;
 
 /// Most frames that are made of an animation: over an hour at 24 a second.
 const MOST_FRAMES: f64 = 100_000.0;
+/// Most frames times moving nodes between the camera and the scene.
+const MOST_STEPS: f64 = 1e7;
+/// Most cameras that an error lists.
+const MOST_NAMES: usize = 30;
 /// A key this share of a frame after the last one still gets a frame: times are rounded to f32.
 const SLACK: f64 = 0.01;
 
@@ -109,13 +114,14 @@ fn choose<'p, 'd>(
     if found.is_some() {
         return Ok(found);
     }
-    let message = format!("the scene has no camera `{wanted}`");
+    let message = format!("the scene has no camera `{}`", shortened(wanted));
     let name = |(at, camera): (usize, &Placed<'_>)| {
         format!("{at}: `{}` on node `{}`", camera.camera_name, camera.node_name)
     };
-    let names: Vec<String> = all.iter().enumerate().map(name).collect();
+    let names: Vec<String> = all.iter().enumerate().take(MOST_NAMES).map(name).collect();
     let help = match all.len() {
         0 => "it has none: leave out --camera, and the camera orbits the model".into(),
+        more if more > MOST_NAMES => format!("its first cameras are {}", names.join(", ")),
         _ => format!("its cameras are {}", names.join(", ")),
     };
     Err(Diagnostic::new(document.file, message).help(help).into())
@@ -174,7 +180,7 @@ impl<'a> Rig<'a> {
             return Ok(FrameTimes { start: options.time, fps, count: 1 });
         };
         let count = ((end - start) * fps + SLACK).floor() + 1.0;
-        if count > MOST_FRAMES {
+        if count > MOST_FRAMES || count * self.links.len() as f64 > MOST_STEPS {
             let message = format!(
                 "the camera's animation has {count:.0} frames at {fps} a second; {MOST_FRAMES} can be rendered"
             );
@@ -247,6 +253,11 @@ pub(super) fn note_moving(
 ) -> Result<()> {
     let mut is_moved = vec![false; document.nodes.len()];
     let mut moving = 0;
+    let mut bends = Vec::with_capacity(document.skins.len());
+    for skin in &document.skins {
+        let mut joints = skin.list("joints")?.into_iter();
+        bends.push(joints.any(|joint| joint.as_whole().is_ok_and(|node| animations.moves(node))));
+    }
     // Parents come first.
     for at in &nodes.shown {
         let json = &document.nodes[*at];
@@ -254,7 +265,8 @@ pub(super) fn note_moving(
         is_moved[*at] = above || animations.moves(*at);
         let morphs = animations.get(Property::Weights(*at)).is_some();
         let shows = json.get("mesh").is_some() || json.extension("KHR_lights_punctual").is_some();
-        let bends = json.get("skin").is_some() && has_moving_joint(document, json, animations)?;
+        let skin = json.index("skin", bends.len(), "skin")?;
+        let bends = skin.is_some_and(|at| bends[at]);
         moving += usize::from(shows && (is_moved[*at] || morphs || bends));
     }
     if moving > 0 {
@@ -262,15 +274,4 @@ pub(super) fn note_moving(
         notes.add(&format!("the scene is static: meshes and lights of {nodes} are animated, and stay as they are at {time} s (--time)"), None);
     }
     Ok(())
-}
-
-fn has_moving_joint(
-    document: &Document<'_>,
-    node: &Json<'_>,
-    animations: &Animations,
-) -> Result<bool> {
-    let skins = document.top.list("skins")?;
-    let Some(at) = node.index("skin", skins.len(), "skin")? else { return Ok(false) };
-    let mut joints = skins[at].list("joints")?.into_iter();
-    Ok(joints.any(|joint| joint.as_whole().is_ok_and(|node| animations.moves(node))))
 }

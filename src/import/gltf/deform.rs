@@ -19,7 +19,7 @@ pub(super) struct Shape {
 }
 
 /// Matrices that move the joints of a skin from where they were when it was put on.
-pub(super) type JointMatrices = Vec<DAffine3>;
+pub(super) type JointMatrices = std::sync::Arc<[DAffine3]>;
 
 impl Shape {
     /// The shape as the file has it.
@@ -113,39 +113,43 @@ fn cofactors(m: &DMat3) -> DMat3 {
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }
 
-/// The weights of morph targets of a node's mesh at `time`: animated, the node's own, or the mesh's.
+/// The weights of at most `most` morph targets of a node's mesh at `time`: animated, the node's own, or the mesh's.
 pub(super) fn morph_weights(
     node: &Json<'_>,
-    number: usize,
+    (number, most): (usize, usize),
     mesh: &Json<'_>,
     (animations, time): (&Animations, f64),
 ) -> Result<Vec<f64>> {
+    if most == 0 {
+        return Ok(Vec::new());
+    }
     if let Some(curve) = animations.get(Property::Weights(number)) {
         return Ok(curve.at(time));
     }
-    let own = node.all_numbers("weights")?;
-    Ok(own.map_or_else(|| mesh.all_numbers("weights"), |own| Ok(Some(own)))?.unwrap_or_default())
+    let own = node.first_numbers("weights", most)?;
+    let weights = own.map_or_else(|| mesh.first_numbers("weights", most), |own| Ok(Some(own)))?;
+    Ok(weights.unwrap_or_default())
 }
 
-/// The joint matrices of the skin number `key` of `node`, with all nodes where `worlds` has them; `None` without a skin.
+/// The joint matrices of a skin, with all nodes where `worlds` has them.
+///
+/// Errors: nodes that there are not, fewer matrices than joints.
 pub(super) fn joint_matrices(
     document: &Document<'_>,
-    node: &Json<'_>,
+    skin: &Json<'_>,
     worlds: &[DAffine3],
-) -> Result<Option<JointMatrices>> {
-    let skins = document.top.list("skins")?;
-    let Some(at) = node.index("skin", skins.len(), "skin")? else { return Ok(None) };
-    let skin = &skins[at];
+) -> Result<JointMatrices> {
     let joints = skin.required("joints")?.elements()?;
     let joints: Vec<usize> =
         joints.iter().map(|json| json.as_index(worlds.len(), "node")).collect::<Result<_>>()?;
     let inverse = match skin.get("inverseBindMatrices") {
         Some(json) => {
-            let accessor = Accessor::open(document, &json)?;
+            let mut accessor = Accessor::open(document, &json)?;
             if accessor.count < joints.len() {
                 let (is, wanted) = (accessor.count, joints.len());
                 return Err(json.fault(format!("{is} matrices for {wanted} joints")).into());
             }
+            accessor.count = joints.len();
             accessor.finite::<16>()?
         }
         None => Vec::new(),
@@ -160,5 +164,5 @@ pub(super) fn joint_matrices(
         });
         worlds[*joint] * inverse
     };
-    Ok(Some(joints.iter().enumerate().map(of).collect()))
+    Ok(joints.iter().enumerate().map(of).collect())
 }

@@ -6,8 +6,9 @@ use super::uri::{self, Resource};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::source::{self, Notes};
 use serde_json::Value;
-use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Extensions that are read.
 const READ: [&str; 17] = [
@@ -67,7 +68,19 @@ pub(super) struct Document<'a> {
     pub materials: Vec<Json<'a>>,
     pub cameras: Vec<Json<'a>>,
     pub nodes: Vec<Json<'a>>,
-    buffers: Vec<Cow<'a, [u8]>>,
+    pub skins: Vec<Json<'a>>,
+    /// Of KHR_lights_punctual.
+    pub lights: Vec<Json<'a>>,
+    buffers: Vec<Buffer<'a>>,
+    /// Bytes of all buffers, those of one file counted once.
+    bytes: usize,
+}
+
+/// The bytes of a buffer, which are as many as it says.
+enum Buffer<'a> {
+    Inside(&'a [u8]),
+    /// Data, or a file, which several buffers may name; and how many bytes of it count.
+    Beside(Arc<Vec<u8>>, usize),
 }
 
 /// The JSON of a file.
@@ -112,19 +125,33 @@ impl<'a> Document<'a> {
             materials: top.list("materials")?,
             cameras: top.list("cameras")?,
             nodes: top.list("nodes")?,
+            skins: top.list("skins")?,
+            lights: match top.extension("KHR_lights_punctual") {
+                Some(json) => json.list("lights")?,
+                None => Vec::new(),
+            },
             buffers: Vec::new(),
+            bytes: 0,
             top,
         };
+        let mut known = HashMap::new();
         for (at, json) in document.top.list("buffers")?.iter().enumerate() {
-            let buffer = read_buffer(file, json, bin.filter(|_| at == 0), files)?;
+            let buffer = read_buffer(file, json, bin.filter(|_| at == 0), &mut known)?;
+            document.bytes += match &buffer {
+                Buffer::Beside(bytes, _) if Arc::strong_count(bytes) > 2 => 0,
+                buffer => buffer.bytes().len(),
+            };
             document.buffers.push(buffer);
         }
+        let mut names: Vec<PathBuf> = known.into_keys().collect();
+        names.sort();
+        files.extend(names);
         Ok(document)
     }
 
     /// Bytes of all buffers. No list of the file has more elements than these, or it would be made up.
     pub fn bytes(&self) -> usize {
-        self.buffers.iter().fold(0, |sum, buffer| sum.saturating_add(buffer.len()))
+        self.bytes
     }
 
     /// The bytes of the buffer view that `key` of `json` names, and its stride.
@@ -134,7 +161,7 @@ impl<'a> Document<'a> {
         let Some(at) = json.index(key, self.views.len(), "buffer view")? else { return Ok(None) };
         let view = &self.views[at];
         let buffer = view.required("buffer")?.as_index(self.buffers.len(), "buffer")?;
-        let buffer = &self.buffers[buffer];
+        let buffer = self.buffers[buffer].bytes();
         let offset = view.whole("byteOffset")?.unwrap_or(0);
         let length = view.whole("byteLength")?.unwrap_or(0);
         let bytes = buffer.get(offset..).and_then(|rest| rest.get(..length));
@@ -194,41 +221,52 @@ fn check_required(top: &Json<'_>) -> Result<()> {
     Ok(())
 }
 
+impl Buffer<'_> {
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Inside(bytes) => bytes,
+            Self::Beside(bytes, length) => &bytes[..*length],
+        }
+    }
+}
+
+/// Reads a buffer; files that are `known` are not read again.
 fn read_buffer<'a>(
     file: &Path,
     json: &Json<'_>,
     bin: Option<&'a [u8]>,
-    files: &mut Vec<PathBuf>,
-) -> Result<Cow<'a, [u8]>> {
+    known: &mut HashMap<PathBuf, Arc<Vec<u8>>>,
+) -> Result<Buffer<'a>> {
     let length = json.required("byteLength")?.as_whole()?;
-    let mut bytes: Cow<'a, [u8]> = match json.text("uri")? {
-        Some(uri) => match uri::resolve(json, uri, file)? {
-            Resource::Data(bytes) => bytes.into(),
-            Resource::File(path) => {
-                let bytes = read_beside(json, &path)?;
-                files.push(path);
-                bytes.into()
-            }
-        },
-        None => match bin {
-            Some(bin) => bin.into(),
-            None => {
-                return Err(json
-                    .fault("the buffer has no `uri`, and the file no binary chunk")
-                    .into());
-            }
-        },
+    let (bytes, has): (Option<Arc<Vec<u8>>>, usize) = match json.text("uri")? {
+        Some(uri) => {
+            let bytes = match uri::resolve(json, uri, file)? {
+                Resource::Data(bytes) => Arc::new(bytes),
+                Resource::File(path) => match known.get(&path) {
+                    Some(bytes) => bytes.clone(),
+                    None => {
+                        let bytes = Arc::new(read_beside(json, &path)?);
+                        known.entry(path).or_insert(bytes).clone()
+                    }
+                },
+            };
+            let has = bytes.len();
+            (Some(bytes), has)
+        }
+        None => (None, bin.map_or(0, <[u8]>::len)),
     };
-    if bytes.len() < length {
-        let has = bytes.len();
+    if bytes.is_none() && bin.is_none() {
+        let message = "the buffer has no `uri`, and the file no binary chunk";
+        return Err(json.fault(message).into());
+    }
+    if has < length {
         return Err(json.fault(format!("the buffer says {length} bytes and has {has}")).into());
     }
     // A chunk is padded.
-    match &mut bytes {
-        Cow::Borrowed(bytes) => *bytes = &bytes[..length],
-        Cow::Owned(bytes) => bytes.truncate(length),
-    }
-    Ok(bytes)
+    Ok(match bytes {
+        Some(bytes) => Buffer::Beside(bytes, length),
+        None => Buffer::Inside(&bin.unwrap_or_default()[..length]),
+    })
 }
 
 /// Reads a file that `json` names.

@@ -61,7 +61,9 @@ impl ImageStore {
             let image = texture::decode_bytes(&name, &bytes)?;
             Ok((at, (name, image)))
         };
-        let decoded = encoded.into_par_iter().map(decode).collect::<Result<HashMap<_, _>>>()?;
+        // Of several that cannot be read the first one is the error, whatever the threads.
+        let decoded: Vec<Result<_>> = encoded.into_par_iter().map(decode).collect();
+        let decoded = decoded.into_iter().collect::<Result<HashMap<_, _>>>()?;
         Ok(Self { decoded, placed: HashMap::new() })
     }
 

@@ -91,10 +91,12 @@ impl<'a> Json<'a> {
         if (least..=most).contains(&number) {
             return Ok(number);
         }
+        let show = |x: f64| if x.abs() < 1e6 { x.to_string() } else { format!("{x:e}") };
         let range = match most {
-            f64::MAX => format!("{least} or more"),
-            most => format!("from {least} to {most}"),
+            f64::MAX => format!("{} or more", show(least)),
+            most => format!("from {} to {}", show(least), show(most)),
         };
+        let number = show(number);
         Err(value.fault(format!("{number} is out of range; it is {range}")).into())
     }
 
@@ -115,11 +117,13 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// The numbers of the array `key`, as many as there are.
-    pub fn all_numbers(&self, key: &str) -> Result<Option<Vec<f64>>> {
+    /// The first numbers of the array `key`, at most `most`.
+    pub fn first_numbers(&self, key: &str, most: usize) -> Result<Option<Vec<f64>>> {
         let Some(list) = self.get(key) else { return Ok(None) };
-        let elements = list.elements()?;
-        elements.iter().map(Self::as_number).collect::<Result<_>>().map(Some)
+        let wrong = || list.wrong("an array of numbers");
+        let Value::Array(values) = list.value else { return wrong() };
+        let numbers: Option<Vec<f64>> = values.iter().take(most).map(Value::as_f64).collect();
+        numbers.map_or_else(wrong, |numbers| Ok(Some(numbers)))
     }
 
     /// The whole number `key`, not negative. Some programs write such numbers with a point.

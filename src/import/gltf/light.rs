@@ -20,8 +20,7 @@ pub(super) fn read(
     world: &DAffine3,
 ) -> Result<Option<Light>> {
     let Some(of_node) = node.extension("KHR_lights_punctual") else { return Ok(None) };
-    let lights = document.top.extension("KHR_lights_punctual");
-    let lights = lights.map(|json| json.list("lights")).transpose()?.unwrap_or_default();
+    let lights = &document.lights;
     let json = &lights[of_node.required("light")?.as_index(lights.len(), "light")?];
     let colour = json.numbers::<3>("color")?.unwrap_or([1.0; 3]);
     let amount = json.number_within("intensity", [0.0, 1e30], 1.0)? / LUMENS_PER_WATT;

@@ -3,6 +3,7 @@
 use super::animation::{Animations, Property, unit_rotation};
 use super::document::Document;
 use super::json::Json;
+use super::uri::shortened;
 use crate::error::Result;
 use crate::math::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -159,7 +160,7 @@ impl Place {
     }
 }
 
-/// The name of a thing, or what it is with its number.
+/// The name of a thing, if need be shortened, or what it is with its number.
 pub(super) fn name_of(json: &Json<'_>, what: &str, number: usize) -> Result<String> {
-    Ok(json.text("name")?.map_or_else(|| format!("{what} {number}"), str::to_owned))
+    Ok(json.text("name")?.map_or_else(|| format!("{what} {number}"), shortened))
 }

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 
 /// Most vertices, and most triangles, of all that a file places in its scene: some 8 GB of memory.
 pub(super) const MOST_PLACED: usize = 100_000_000;
+/// Most primitives and morph targets of all that a file places, for they take time even where they are empty.
+pub(super) const MOST_PIECES: usize = 4_000_000;
 
 /// Triangles with what their vertices have, as the file has it.
 pub(super) struct Primitive {
@@ -43,10 +45,41 @@ enum Mode {
     Fan,
 }
 
-/// Vertices and triangles of a primitive, before it is read; `None` of points and lines.
-pub(super) fn size(document: &Document<'_>, json: &Json<'_>) -> Result<Option<[usize; 2]>> {
-    let Some(mode) = mode(json)? else { return Ok(None) };
-    let Some(position) = json.required("attributes")?.get("POSITION") else { return Ok(None) };
+/// What a primitive takes before it is read.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Size {
+    /// Vertices; each morph target has its own.
+    pub vertices: usize,
+    pub triangles: usize,
+    /// Primitives and morph targets.
+    pub pieces: usize,
+}
+
+impl Size {
+    /// Both sizes.
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            vertices: self.vertices.saturating_add(other.vertices),
+            triangles: self.triangles.saturating_add(other.triangles),
+            pieces: self.pieces.saturating_add(other.pieces),
+        }
+    }
+
+    /// So many times this size.
+    pub fn times(self, times: usize) -> Self {
+        Self {
+            vertices: self.vertices.saturating_mul(times),
+            triangles: self.triangles.saturating_mul(times),
+            pieces: self.pieces.saturating_mul(times),
+        }
+    }
+}
+
+/// The size of a primitive; points and lines count as a piece without vertices.
+pub(super) fn size(document: &Document<'_>, json: &Json<'_>) -> Result<Size> {
+    let empty = Size { pieces: 1, ..Size::default() };
+    let Some(mode) = mode(json)? else { return Ok(empty) };
+    let Some(position) = json.required("attributes")?.get("POSITION") else { return Ok(empty) };
     let vertices = Accessor::open(document, &position)?.count;
     let indices = match json.get("indices") {
         Some(indices) => Accessor::open(document, &indices)?.count,
@@ -56,7 +89,8 @@ pub(super) fn size(document: &Document<'_>, json: &Json<'_>) -> Result<Option<[u
         Mode::Triangles => indices / 3,
         Mode::Strip | Mode::Fan => indices.saturating_sub(2),
     };
-    Ok(Some([vertices, triangles]))
+    let pieces = 1 + json.list("targets")?.len();
+    Ok(Size { vertices: vertices.saturating_mul(pieces), triangles, pieces })
 }
 
 fn mode(json: &Json<'_>) -> Result<Option<Mode>> {
