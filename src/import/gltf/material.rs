@@ -269,8 +269,7 @@ impl Parts<'_, '_> {
             return Ok(None);
         }
         let images = ["baseColorTexture", "metallicRoughnessTexture"];
-        let has_images =
-            pbr.is_some_and(|pbr| images.iter().any(|image| pbr.get(image).is_some()));
+        let has_images = pbr.is_some_and(|pbr| images.iter().any(|image| pbr.get(image).is_some()));
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
         if transmission < 1.0 || has_images || self.laid.normal.is_some() {
             self.notes.add("KHR_materials_transmission is read as glass: images and what is not transmitted are left out", None);
