@@ -122,7 +122,11 @@ pub(super) fn read(
         return Ok(None);
     };
     let reader = Reader { document, count: Accessor::open(document, &position)?.count };
-    let colours = reader.colours(&attributes, notes)?;
+    let material = json.index("material", document.materials.len(), "material")?;
+    let mode_of_alpha = material.map(|at| document.materials[at].text("alphaMode")).transpose()?;
+    // In glTF alpha does nothing to what is opaque.
+    let has_alpha = mode_of_alpha.flatten().is_some_and(|mode| mode != "OPAQUE");
+    let colours = reader.colours(&attributes, has_alpha, notes)?;
     Ok(Some(Primitive {
         positions: reader.required(&position)?.finite()?,
         normals: reader.accessor(&attributes, "NORMAL")?.map(|n| n.floats()).transpose()?,
@@ -171,11 +175,16 @@ impl<'d> Reader<'d> {
     }
 
     /// Vertex colours without their alpha, cut to 0 to 1.
-    fn colours(&self, attributes: &Json<'_>, notes: &mut Notes) -> Result<Option<Vec<[f32; 3]>>> {
+    fn colours(
+        &self,
+        attributes: &Json<'_>,
+        has_alpha: bool,
+        notes: &mut Notes,
+    ) -> Result<Option<Vec<[f32; 3]>>> {
         let Some(accessor) = self.accessor(attributes, "COLOR_0")? else { return Ok(None) };
         let colours = if accessor.width == 4 {
             let colours = accessor.finite::<4>()?;
-            if colours.par_iter().any(|[.., alpha]| *alpha < 1.0) {
+            if has_alpha && colours.par_iter().any(|[.., alpha]| *alpha < 1.0) {
                 notes.add("the alpha of vertex colours is ignored", None);
             }
             colours.into_par_iter().map(|[r, g, b, _]| [r, g, b]).collect()

@@ -72,10 +72,8 @@ impl<'d> TextureTable<'d> {
 
 /// What is seen beyond an image's sides, and above and below.
 fn wraps(sampler: &Json<'_>, notes: &mut Notes) -> Result<[Wrap; 2]> {
-    // 9728, 9984 and 9986 take the nearest texel of a level.
-    if let (Some(9728), _) | (_, Some(9728 | 9984 | 9986)) =
-        (sampler.whole("magFilter")?, sampler.whole("minFilter")?)
-    {
+    // What far away is the nearest texel is a mean here: magnification shows it.
+    if sampler.whole("magFilter")? == Some(9728) {
         notes.add("the filter NEAREST of a texture is read as LINEAR", None);
     }
     let wrap = |key| -> Result<Wrap> {
