@@ -47,7 +47,8 @@ fn read_only(file: &Path, step: &str) -> Vec<String> {
 
 /// Writes the mesh of the PLY file `from` as a `.glb`.
 fn write_glb(from: &Path, to: &Path) -> io::Result<()> {
-    let mesh = import::load_model(from, NormalPolicy::Flat).expect("a good file").world.meshes.remove(0);
+    let mesh =
+        import::load_model(from, NormalPolicy::Flat).expect("a good file").world.meshes.remove(0);
     let (vertices, indices) = (mesh.positions.len(), 3 * mesh.triangles.len());
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{}}}],"bufferViews":[{{"buffer":0,"byteLength":{}}},{{"buffer":0,"byteOffset":{},"byteLength":{}}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3"}},{{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],"nodes":[{{"mesh":0}}]}}"#,
