@@ -475,3 +475,15 @@ fn what_takes_time_again_and_again_is_counted_too() {
         "{refused}"
     );
 }
+
+#[test]
+fn places_beyond_what_can_be_rendered_are_refused() {
+    for place in [1e31, 1e300] {
+        let refused = changed("/nodes/0/translation", json!([place, 0, 0]));
+        assert_eq!(
+            refused,
+            "meshes[0].primitives[0]: a vertex lies beyond 1e30 in the world, or nowhere"
+        );
+    }
+    assert!(changed("/nodes/0/scale", json!([1e300, 1e300, 1e300])).starts_with("meshes[0]"));
+}

@@ -188,7 +188,7 @@ fn run(seed: u64, runs: usize) {
         if let Ok(loaded) = load(&written.path, &LoadOptions::default()) {
             accepted += 1;
             let model = Model { world: loaded.world, ..Model::default() };
-            sound(&model);
+            sound(&model, &format!("run {run} of seed {seed}"));
             let _ = loaded.shot.camera(loaded.shot.frames, 64, 48);
             drop(model.world.into_scene(true));
         }
@@ -199,28 +199,30 @@ fn run(seed: u64, runs: usize) {
 }
 
 /// The promise of `WorldMesh`: indices in range, numbers finite, lists of one length.
-pub fn sound(model: &Model) {
+pub fn sound(model: &Model, what: &str) {
     let world = &model.world;
     for mesh in &world.meshes {
         let count = mesh.positions.len();
-        assert!((mesh.material as usize) < world.materials.len());
-        assert!(mesh.positions.iter().all(|p| p.is_finite()));
-        assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < count));
+        assert!((mesh.material as usize) < world.materials.len(), "{what}");
+        assert!(mesh.positions.iter().all(|p| p.is_finite()), "{what}");
+        assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < count), "{what}");
         assert!(
-            mesh.normals.as_ref().is_none_or(|n| n.corners.is_some() || n.values.len() == count)
+            mesh.normals.as_ref().is_none_or(|n| n.corners.is_some() || n.values.len() == count),
+            "{what}"
         );
         let good = |n: f32| n == 0.0 || (n - 1.0).abs() < 1e-5;
-        assert!(mesh.normals.iter().flat_map(|n| &n.values).all(|n| good(n.length())));
+        assert!(mesh.normals.iter().flat_map(|n| &n.values).all(|n| good(n.length())), "{what}");
         assert!(
-            mesh.uvs.as_ref().is_none_or(|uv| uv.corners.is_some() || uv.values.len() == count)
+            mesh.uvs.as_ref().is_none_or(|uv| uv.corners.is_some() || uv.values.len() == count),
+            "{what}"
         );
-        assert!(mesh.uvs.iter().flat_map(|uv| &uv.values).all(|uv| uv.is_finite()));
-        assert!(mesh.colours.as_ref().is_none_or(|colours| colours.count() == count));
+        assert!(mesh.uvs.iter().flat_map(|uv| &uv.values).all(|uv| uv.is_finite()), "{what}");
+        assert!(mesh.colours.as_ref().is_none_or(|colours| colours.count() == count), "{what}");
     }
     let textures = world.materials.iter().filter_map(|m| m.texture);
-    assert!(textures.into_iter().all(|t| (t.image as usize) < world.textures.len()));
+    assert!(textures.into_iter().all(|t| (t.image as usize) < world.textures.len()), "{what}");
     let masks = world.materials.iter().filter_map(|m| m.alpha);
-    assert!(masks.into_iter().all(|t| (t.image as usize) < world.masks.len()));
+    assert!(masks.into_iter().all(|t| (t.image as usize) < world.masks.len()), "{what}");
 }
 
 #[test]
@@ -228,7 +230,7 @@ fn the_undamaged_file_is_good() {
     let loaded = everything().loaded();
     assert_eq!(loaded.shot.frames, 25);
     assert!(loaded.world.meshes.len() > 2);
-    sound(&Model { world: loaded.world, ..Model::default() });
+    sound(&Model { world: loaded.world, ..Model::default() }, "the file");
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn every_file_is_read_or_refused_with_its_place() {
     for path in found {
         match model(&path) {
             Ok(model) => {
-                super::mutations::sound(&model);
+                super::mutations::sound(&model, &path.display().to_string());
                 assert!(model.world.into_scene(true).is_ok(), "{}", path.display());
             }
             // A folder without the buffers that its file names.

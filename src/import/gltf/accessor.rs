@@ -5,7 +5,8 @@
 
 use super::document::Document;
 use super::json::Json;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::math::DVec3;
 use rayon::prelude::*;
 
 /// The type of a component.
@@ -179,15 +180,25 @@ impl<'d> Accessor<'d> {
     ///
     /// Errors: elements of another width.
     pub fn floats<const N: usize>(&self) -> Result<Vec<[f32; N]>> {
+        self.converted(|element| element)
+    }
+
+    /// What `make` makes of its elements, of `N` components each; numbers may be not finite.
+    ///
+    /// Errors: elements of another width.
+    fn converted<const N: usize, T: Copy + Send>(
+        &self,
+        make: impl Fn([f32; N]) -> T + Sync + Send,
+    ) -> Result<Vec<T>> {
         self.check_width(N)?;
         let (component, normalised) = (self.component, self.normalised);
         // Each type has a loop of its own.
         macro_rules! all {
             ($component:path) => {
                 self.read(|bytes| {
-                    std::array::from_fn(|k| {
+                    make(std::array::from_fn(|k| {
                         $component.float(&bytes[k * $component.size()..], normalised)
-                    })
+                    }))
                 })
             };
         }
@@ -206,13 +217,27 @@ impl<'d> Accessor<'d> {
     /// Errors: a number that is not finite.
     pub fn finite<const N: usize>(&self) -> Result<Vec<[f32; N]>> {
         let floats = self.floats::<N>()?;
-        let is_bad = |element: &[f32; N]| element.iter().any(|x| !x.is_finite());
-        match floats.par_iter().position_first(is_bad) {
-            Some(at) => {
-                Err(self.fault(format!("element {at} (from 0) is not a finite number")).into())
-            }
-            None => Ok(floats),
+        let is_good = |element: &[f32; N]| element.iter().all(|x| x.is_finite());
+        match floats.par_iter().all(is_good) {
+            true => Ok(floats),
+            false => Err(self.not_finite(floats.iter().position(|element| !is_good(element)))),
         }
+    }
+
+    /// Its elements as finite vectors.
+    ///
+    /// Errors: as [`finite`](Self::finite).
+    pub fn vectors(&self) -> Result<Vec<DVec3>> {
+        let vectors = self.converted(|v: [f32; 3]| DVec3::from_array(v.map(f64::from)))?;
+        match vectors.par_iter().all(|v| v.is_finite()) {
+            true => Ok(vectors),
+            false => Err(self.not_finite(vectors.iter().position(|v| !v.is_finite()))),
+        }
+    }
+
+    fn not_finite(&self, at: Option<usize>) -> Error {
+        let at = at.unwrap_or_default();
+        self.fault(format!("element {at} (from 0) is not a finite number")).into()
     }
 
     /// Its numbers one by one, finite; any width.
@@ -242,20 +267,25 @@ impl<'d> Accessor<'d> {
     ///
     /// Errors: as [`wholes`](Self::wholes).
     pub fn triples(&self) -> Result<Vec<[u32; 3]>> {
-        let packed = |elements: &Elements<'d>| elements.stride == elements.size;
-        match &self.dense {
-            Some(elements) if packed(elements) && self.sparse.is_none() && self.width == 1 => {
-                self.check_whole()?;
-                let (component, size) = (self.component, self.component.size());
+        let dense = self.dense.filter(|all| all.stride == all.size && self.sparse.is_none());
+        let (Some(elements), 1) = (dense, self.width) else {
+            let all = self.wholes::<1>()?.into_flattened();
+            return Ok(all.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect());
+        };
+        self.check_whole()?;
+        macro_rules! all {
+            ($component:path) => {{
+                let size = $component.size();
                 let triple =
-                    |bytes: &[u8]| std::array::from_fn(|k| component.whole(&bytes[k * size..]));
-                Ok(elements.bytes.par_chunks_exact(3 * size).map(triple).collect())
-            }
-            _ => {
-                let all = self.wholes::<1>()?.into_flattened();
-                Ok(all.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect())
-            }
+                    |bytes: &[u8]| std::array::from_fn(|k| $component.whole(&bytes[k * size..]));
+                elements.bytes.par_chunks_exact(3 * size).map(triple).collect()
+            }};
         }
+        Ok(match self.component {
+            Component::U8 => all!(Component::U8),
+            Component::U16 => all!(Component::U16),
+            _ => all!(Component::U32),
+        })
     }
 
     fn check_width(&self, wanted: usize) -> Result<()> {
@@ -277,7 +307,12 @@ impl<'d> Accessor<'d> {
     }
 
     fn read<T: Copy + Send>(&self, of: impl Fn(&[u8]) -> T + Sync + Send) -> Result<Vec<T>> {
+        let of = &of;
         let mut all: Vec<T> = match &self.dense {
+            Some(elements) if elements.stride == elements.size => {
+                let packed = &elements.bytes[..self.count * elements.size];
+                packed.par_chunks_exact(elements.size).map(of).collect()
+            }
             Some(elements) => {
                 (0..self.count).into_par_iter().map(|at| of(elements.get(at))).collect()
             }

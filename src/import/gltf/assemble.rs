@@ -117,7 +117,8 @@ impl<'a, 'd> Assembly<'a, 'd> {
         for json in primitives {
             let material = json.index("material", self.document.materials.len(), "material")?;
             let uv_set = material.map_or(Ok(0), |at| self.materials.uv_set(at))?;
-            let Some(primitive) = primitive::read(self.document, &json, uv_set, self.notes)? else {
+            let Some(mut primitive) = primitive::read(self.document, &json, uv_set, self.notes)?
+            else {
                 continue;
             };
             let made = self.material(material, primitive.colours.is_some())?;
@@ -125,15 +126,11 @@ impl<'a, 'd> Assembly<'a, 'd> {
                 self.notes.add("a surface whose alpha is below its cutoff was left out", None);
                 continue;
             }
-            let mut shape = Shape::of(&primitive);
+            let mut shape = Shape::of(&mut primitive);
             shape.morph(self.document, &json, &weights)?;
             let skin = joints.as_ref().filter(|_| !primitive.joints.is_empty());
             if let Some(joints) = skin {
                 shape.skin(&primitive, &json, joints)?;
-            }
-            if shape.positions.iter().any(|p| !p.is_finite()) {
-                let message = "a morph target or skin moves a vertex beyond the largest number";
-                return Err(json.fault(message).into());
             }
             let Some(mesh) = place::mesh(primitive, shape, &name, self.notes) else { continue };
             // A skin's joints say where it is, its node does not.

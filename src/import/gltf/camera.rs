@@ -4,6 +4,7 @@ use super::animation::{Animations, Curve, Property};
 use super::document::Document;
 use super::json::Json;
 use super::node::{Nodes, name_of};
+use super::place::LARGEST;
 use super::uri::shortened;
 use crate::error::{Diagnostic, Result, counted};
 use crate::import::model::{FileCamera, ModelOptions};
@@ -231,7 +232,8 @@ impl<'a> Rig<'a> {
 fn pose(camera: &Placed<'_>, world: &DAffine3) -> Result<Pose> {
     let (eye, up) = (world.translation, world.matrix3.y_axis.normalize_or_zero());
     let forward = (-world.matrix3.z_axis).normalize_or_zero();
-    if !eye.is_finite() || forward == DVec3::ZERO || up.cross(forward).length() < 1e-9 {
+    let is_there = eye.is_finite() && eye.abs().max_element() <= LARGEST;
+    if !is_there || forward == DVec3::ZERO || up.cross(forward).length() < 1e-9 {
         let name = &camera.node_name;
         return Err(camera
             .json

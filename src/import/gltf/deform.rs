@@ -22,13 +22,13 @@ pub(super) struct Shape {
 pub(super) type JointMatrices = std::sync::Arc<[DAffine3]>;
 
 impl Shape {
-    /// The shape as the file has it.
-    pub fn of(primitive: &Primitive) -> Self {
+    /// The shape as the file has it; the positions are taken out of the primitive.
+    pub fn of(primitive: &mut Primitive) -> Self {
         let wide = |v: &[f32; 3]| DVec3::from_array(v.map(f64::from));
-        let all = |list: &Vec<[f32; 3]>| list.par_iter().map(wide).collect();
+        let normals = primitive.normals.take();
         Self {
-            positions: all(&primitive.positions),
-            normals: primitive.normals.as_ref().map(all),
+            positions: std::mem::take(&mut primitive.positions),
+            normals: normals.map(|all| all.par_iter().map(wide).collect()),
             mirrored: false,
         }
     }

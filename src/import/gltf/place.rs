@@ -10,6 +10,9 @@ use crate::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 use crate::scene::{Corners, VertexColours, WorldMesh};
 use rayon::prelude::*;
 
+/// Largest coordinate, as in scene files.
+pub(super) const LARGEST: f64 = 1e30;
+
 /// A mesh of a primitive in the coordinates of its `shape`, counter-clockwise seen from outside. `None` where no triangle
 /// has an area, as far as that is noted.
 pub(super) fn mesh(
@@ -58,7 +61,7 @@ fn unit_normals(all: Vec<DVec3>, notes: &mut Notes) -> Vec<Vec3> {
 
 /// `mesh` at each of `places`, as one mesh.
 ///
-/// Errors, at `json`: places that are not finite, or move the mesh beyond the largest number.
+/// Errors, at `json`: places that are not finite, or move a vertex beyond [`LARGEST`].
 pub(super) fn at_all(
     mut mesh: WorldMesh,
     places: &[DAffine3],
@@ -67,6 +70,7 @@ pub(super) fn at_all(
 ) -> Result<Option<WorldMesh>> {
     if let [place] = places {
         move_to(&mut mesh, place, json, notes)?;
+        check_size(&mesh, json)?;
         return Ok((!mesh.triangles.is_empty()).then_some(mesh));
     }
     let mut all: Option<WorldMesh> = None;
@@ -77,6 +81,7 @@ pub(super) fn at_all(
     for place in places {
         let mut copy = mesh.clone();
         move_to(&mut copy, place, json, notes)?;
+        check_size(&copy, json)?;
         count += 1;
         match &mut all {
             Some(all) => append(all, copy),
@@ -85,6 +90,15 @@ pub(super) fn at_all(
     }
     let colours = colours.map(|colours| VertexColours::from_linear(colours.repeat(count)));
     Ok(all.map(|all| WorldMesh { colours, ..all }).filter(|all| !all.triangles.is_empty()))
+}
+
+/// Refuses vertices that lie far beyond what can be rendered, or nowhere.
+fn check_size(mesh: &WorldMesh, json: &Json<'_>) -> Result<()> {
+    // What is no number is not within.
+    if mesh.positions.par_iter().all(|p| p.abs().max_element() <= LARGEST && p.is_finite()) {
+        return Ok(());
+    }
+    Err(json.fault(format!("a vertex lies beyond {LARGEST:e} in the world, or nowhere")).into())
 }
 
 /// Moves a mesh. Where a place flattens it, what is left of it has the normals of its planes.
@@ -105,9 +119,6 @@ fn move_to(
         return mesh.apply_transform(place).map_err(at);
     }
     mesh.positions.par_iter_mut().for_each(|p| *p = place.transform_point3(*p));
-    if mesh.positions.iter().any(|p| !p.is_finite()) {
-        return Err(json.fault("the node is moved beyond the largest number").into());
-    }
     // Normals of one length have no direction: those of the planes count, with or without a file's.
     if let Some(normals) = &mut mesh.normals {
         normals.values.fill(Vec3::ZERO);

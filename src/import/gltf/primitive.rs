@@ -5,6 +5,7 @@ use super::document::Document;
 use super::json::Json;
 use crate::error::Result;
 use crate::import::source::Notes;
+use crate::math::DVec3;
 use rayon::prelude::*;
 
 /// Most vertices, and most triangles, of all that a file places in its scene: some 8 GB of memory.
@@ -14,7 +15,7 @@ pub(super) const MOST_PIECES: usize = 4_000_000;
 
 /// Triangles with what their vertices have, as the file has it.
 pub(super) struct Primitive {
-    pub positions: Vec<[f32; 3]>,
+    pub positions: Vec<DVec3>,
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates, (0, 0) at the upper left corner.
     pub uvs: Option<Vec<[f32; 2]>>,
@@ -128,7 +129,7 @@ pub(super) fn read(
     let has_alpha = mode_of_alpha.flatten().is_some_and(|mode| mode != "OPAQUE");
     let colours = reader.colours(&attributes, has_alpha, notes)?;
     Ok(Some(Primitive {
-        positions: reader.required(&position)?.finite()?,
+        positions: reader.required(&position)?.vectors()?,
         normals: reader.accessor(&attributes, "NORMAL")?.map(|n| n.floats()).transpose()?,
         uvs: reader
             .accessor(&attributes, &format!("TEXCOORD_{uv_set}"))?
@@ -228,12 +229,12 @@ impl<'d> Reader<'d> {
             Mode::Strip => strip(&accessor.wholes::<1>()?.into_flattened()),
             Mode::Fan => fan(&accessor.wholes::<1>()?.into_flattened()),
         };
-        match triangles.par_iter().flatten_iter().find_first(|index| **index >= count) {
-            Some(index) => Err(indices
-                .fault(format!("there is no vertex {index} (from 0), of {count}"))
-                .into()),
-            None => Ok(triangles),
+        let most = triangles.par_iter().map(|t| t[0].max(t[1]).max(t[2])).max();
+        if most.is_none_or(|most| most < count) {
+            return Ok(triangles);
         }
+        let stray = triangles.iter().flatten().find(|index| **index >= count).unwrap_or(&count);
+        Err(indices.fault(format!("there is no vertex {stray} (from 0), of {count}")).into())
     }
 }
 
