@@ -2,6 +2,7 @@
 
 use super::build::{F32, File, I8, I16, U8, U16, U32, Written, bytes_of, warns};
 use serde_json::json;
+use std::f64::consts::FRAC_1_SQRT_2;
 use tweenray::import::{LoadOptions, Model};
 use tweenray::math::{DVec3, Rgb, Vec2, Vec3};
 use tweenray::scene::WorldMesh;
@@ -20,7 +21,7 @@ fn normal(mesh: &WorldMesh, triangle: usize) -> DVec3 {
 fn nodes_add_up_from_the_root_by_parts_and_by_matrices() {
     let mut file = File::triangle();
     file.json["nodes"] = json!([
-        {"children": [1], "translation": [10, 0, 0], "rotation": [0, 0, 0.7071067811865476, 0.7071067811865476]},
+        {"children": [1], "translation": [10, 0, 0], "rotation": [0, 0, FRAC_1_SQRT_2, FRAC_1_SQRT_2]},
         {"children": [2], "matrix": [2, 0, 0, 0,  0, 2, 0, 0,  0, 0, 2, 0,  0, 5, 0, 1]},
         {"mesh": 0, "scale": [1, 3, 1], "name": "leaf"},
     ]);
