@@ -33,6 +33,14 @@ pub(super) struct Assembly<'a, 'd> {
     notes: &'a mut Notes,
 }
 
+/// A mesh at its places.
+struct Piece {
+    name: String,
+    places: Vec<DAffine3>,
+    joints: Option<JointMatrices>,
+    weights: Vec<f64>,
+}
+
 /// A material in the model.
 #[derive(Clone, Copy)]
 struct Made {
@@ -113,44 +121,56 @@ impl<'a, 'd> Assembly<'a, 'd> {
             Some(name) => shortened(name),
             None => name_of(json, "mesh", mesh)?,
         };
+        let bends = joints.is_some() || !weights.is_empty();
+        let piece = Piece { name, places, joints, weights };
         let before = self.model.world.meshes.len();
         for json in primitives {
-            let material = json.index("material", self.document.materials.len(), "material")?;
-            let uv_set = material.map_or(Ok(0), |at| self.materials.uv_set(at))?;
-            let Some(mut primitive) = primitive::read(self.document, &json, uv_set, self.notes)?
-            else {
-                continue;
-            };
-            let made = self.material(material, primitive.colours.is_some())?;
-            if made.is_invisible {
-                self.notes.add("a surface whose alpha is below its cutoff was left out", None);
-                continue;
-            }
-            let mut shape = Shape::of(&mut primitive);
-            shape.morph(self.document, &json, &weights)?;
-            let skin = joints.as_ref().filter(|_| !primitive.joints.is_empty());
-            if let Some(joints) = skin {
-                shape.skin(&primitive, &json, joints)?;
-            }
-            let Some(mesh) = place::mesh(primitive, shape, &name, self.notes) else { continue };
-            // A skin's joints say where it is, its node does not.
-            let still = [DAffine3::IDENTITY];
-            let places = if skin.is_some() { &still[..] } else { &places };
-            if let Some(mesh) = place::at_all(mesh, places, &json, self.notes)? {
-                self.add(WorldMesh { material: made.id, ..mesh }, made);
-            }
+            self.add_primitive(&json, &piece)?;
         }
         // Copies that instances would not need: of a mesh that bends none.
-        let is_copy = joints.is_none() && weights.is_empty();
-        let earlier = seen.entry(mesh).or_insert(0);
-        let bytes: u64 = self.model.world.meshes[before..].iter().map(place::bytes).sum();
-        let copies = places.len() - usize::from(*earlier == 0).min(places.len());
-        if is_copy && copies > 0 {
-            self.model.repeats.copies += copies;
-            self.model.repeats.bytes += bytes / places.len() as u64 * copies as u64;
+        if !bends {
+            let bytes = self.model.world.meshes[before..].iter().map(place::bytes).sum();
+            self.count_copies(seen.entry(mesh).or_insert(0), piece.places.len(), bytes);
         }
-        *earlier += usize::from(is_copy) * places.len();
         Ok(())
+    }
+
+    /// Adds a primitive at the places of a piece.
+    fn add_primitive(&mut self, json: &Json<'_>, piece: &Piece) -> Result<()> {
+        let material = json.index("material", self.document.materials.len(), "material")?;
+        let uv_set = material.map_or(Ok(0), |at| self.materials.uv_set(at))?;
+        let read = primitive::read(self.document, json, uv_set, self.notes)?;
+        let Some(mut primitive) = read else { return Ok(()) };
+        let made = self.material(material, primitive.colours.is_some())?;
+        if made.is_invisible {
+            self.notes.add("a surface whose alpha is below its cutoff was left out", None);
+            return Ok(());
+        }
+        let mut shape = Shape::of(&mut primitive);
+        shape.morph(self.document, json, &piece.weights)?;
+        let skin = piece.joints.as_ref().filter(|_| !primitive.joints.is_empty());
+        if let Some(joints) = skin {
+            shape.skin(&primitive, json, joints)?;
+        }
+        let mesh = place::mesh(primitive, shape, &piece.name, self.notes);
+        let Some(mesh) = mesh else { return Ok(()) };
+        // A skin's joints say where it is, its node does not.
+        let still = [DAffine3::IDENTITY];
+        let places = if skin.is_some() { &still[..] } else { &piece.places };
+        if let Some(mesh) = place::at_all(mesh, places, json, self.notes)? {
+            self.add(WorldMesh { material: made.id, ..mesh }, made);
+        }
+        Ok(())
+    }
+
+    /// Counts the copies among `places` of a mesh that was placed `earlier` so often; all of these places take `bytes`.
+    fn count_copies(&mut self, earlier: &mut usize, places: usize, bytes: u64) {
+        let copies = places - usize::from(*earlier == 0).min(places);
+        *earlier += places;
+        if copies > 0 {
+            self.model.repeats.copies += copies;
+            self.model.repeats.bytes += bytes / places as u64 * copies as u64;
+        }
     }
 
     /// The joint matrices of the skin of `node`; `None` without a skin.

@@ -13,6 +13,7 @@ mod accessor;
 mod animation;
 mod assemble;
 mod camera;
+mod component;
 mod container;
 mod deform;
 mod document;
