@@ -76,8 +76,11 @@ fn a_data_set_has_depth_normals_and_ids_for_each_pose() {
     write("cameras.txt", "1 PINHOLE 32 16 30 30 15 9\n");
     // Half a turn about the diagonal of y and z swaps these axes and reverses x: the camera looks straight down.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let image = |id: u32, height: f64| format!("{id} 0 {half} {half} 0 0 0 {height} 1 {id}.png\n\n");
-    let turned = |id: u32, height: f64| image(id, height).replacen(&format!("0 {half} {half} 0"), &format!("{half} {half} 0 0"), 1);
+    let image =
+        |id: u32, height: f64| format!("{id} 0 {half} {half} 0 0 0 {height} 1 {id}.png\n\n");
+    let turned = |id: u32, height: f64| {
+        image(id, height).replacen(&format!("0 {half} {half} 0"), &format!("{half} {half} 0 0"), 1)
+    };
     write("images.txt", &(turned(1, 3.0) + &turned(2, 5.0)));
     write(
         "scene.toml",
@@ -92,7 +95,11 @@ fn a_data_set_has_depth_normals_and_ids_for_each_pose() {
         let image = exr_channels(file);
         assert!(image["Z"].iter().all(|z| (z - height).abs() < 1e-4), "{:?}", image["Z"][0]);
         assert!(image["N.Y"].iter().all(|y| (y - 1.0).abs() < 1e-6));
-        assert!(image.keys().any(|name| name.to_lowercase().contains("mesh")), "{:?}", image.keys());
+        assert!(
+            image.keys().any(|name| name.to_lowercase().contains("mesh")),
+            "{:?}",
+            image.keys()
+        );
     }
 }
 

@@ -112,7 +112,7 @@ class Export:
             if name not in before:
                 self.report.add(name, "it appears during the shot", f"it is absent, as at frame {frame}")
             elif any(abs(a - b) > 1e-5 * max(1.0, abs(a)) for a, b in zip(before[name], matrix)):
-                self.report.add(name, "it moves during the shot", f"it stands as at frame {frame}")
+                self.report.add(name, "it moves or changes during the shot", f"it stays as at frame {frame}")
 
     def geometry(self, depsgraph):
         for instance in depsgraph.object_instances:
@@ -129,6 +129,9 @@ class Export:
                 self.report.add(ob.name, "hair", "not exported")
 
     def light(self, ob, matrix):
+        linking = ob.light_linking
+        if linking.receiver_collection is not None or linking.blocker_collection is not None:
+            self.report.add(ob.name, "light linking", "it lights everything")
         entries, quads = lights.export(ob, matrix, self.materials, self.report)
         self.lamps.extend(entries)
         if quads is not None:
@@ -247,9 +250,17 @@ def size(scene):
 
 
 def places(depsgraph):
-    """{name: numbers of the placement} of what is seen, but for instances."""
+    """{name: numbers of its placement and form} of what is seen, but for instances."""
     found = {}
     for instance in depsgraph.object_instances:
         if not instance.is_instance and instance.object.type in SURFACES | {"LIGHT"}:
-            found[instance.object.name] = [x for row in instance.matrix_world for x in row]
+            found[instance.object.name] = numbers(instance.object, instance.matrix_world)
     return found
+
+
+def numbers(ob, matrix):
+    """What changes where an object moves, or is bent, or where a light gets brighter."""
+    found = [x for row in matrix for x in row]
+    if ob.type == "LIGHT":
+        return found + [ob.data.energy, *ob.data.color]
+    return found + [x for corner in ob.bound_box for x in corner]
