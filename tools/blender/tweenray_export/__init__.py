@@ -55,7 +55,6 @@ def entry(menu, context):
 
 def register():
     """Called by Blender when the add-on is switched on."""
-    bpy.utils.register_class(scene_export.Engine)
     bpy.utils.register_class(ExportTweenray)
     bpy.types.TOPBAR_MT_file_export.append(entry)
 
@@ -64,4 +63,3 @@ def unregister():
     """Called by Blender when the add-on is switched off."""
     bpy.types.TOPBAR_MT_file_export.remove(entry)
     bpy.utils.unregister_class(ExportTweenray)
-    bpy.utils.unregister_class(scene_export.Engine)

@@ -53,8 +53,7 @@ def write(scene, folder):
     export = Export(scene, folder)
     render = scene.render
     kept = render.engine, render.use_compositing, render.use_sequencer, scene.frame_current, scene.frame_subframe
-    if not Engine.is_registered:
-        bpy.utils.register_class(Engine)
+    bpy.utils.register_class(Engine)
     try:
         export.sky = export.world.prepare(scene)
         render.engine, render.use_compositing, render.use_sequencer = Engine.bl_idname, False, False
@@ -64,6 +63,7 @@ def write(scene, folder):
         Engine.export = None
         render.engine, render.use_compositing, render.use_sequencer = kept[:3]
         scene.frame_set(kept[3], subframe=kept[4])
+        bpy.utils.unregister_class(Engine)
     if export.error is not None:
         raise export.error
     if not export.records:
