@@ -61,7 +61,7 @@ fn exported_scenes_have_the_right_numbers_and_are_read_and_rendered() {
     let CameraPath::Still(pose) = loaded.shot.path else { panic!("a camera that does not move") };
     assert!(pose.eye.distance(DVec3::new(0.0, 3.0, 8.0)) < 1e-6);
     let kinds: Vec<&str> = loaded.world.lights.iter().map(Light::name).collect();
-    assert_eq!(kinds, ["quad", "spot", "spot", "sun"]);
+    assert_eq!(kinds, ["quad", "point", "spot", "sun"]);
     let picture = everything.join("picture.png");
     let mut render = Command::new(env!("CARGO_BIN_EXE_tweenray"));
     render.args(["render".as_ref(), everything.join("scene.toml").as_os_str(), "-o".as_ref()]);

@@ -15,7 +15,10 @@ fn every_listed_command_has_a_page_and_every_shell_a_completion() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let help = String::from_utf8(tweenray(&[Path::new("--help")]).stdout).expect("text");
     let listed = help.split("Commands:\n").nth(1).expect("a list").split("\n\n").next();
-    let names = listed.expect("a list").lines().filter_map(|line| line.split_whitespace().next());
+    // Further lines of a description are indented more.
+    let names = listed.expect("a list").lines().filter_map(|line| line.strip_prefix("  "));
+    let names =
+        names.filter(|line| !line.starts_with(' ')).filter_map(|line| line.split(' ').next());
     let names: Vec<&str> = names.filter(|name| *name != "help").collect();
     assert!(names.contains(&"render") && !names.contains(&"manual"), "{names:?}");
     let share = prefix.path().join("share");

@@ -63,10 +63,6 @@ pub struct Camera {
     pub lens: Lens,
 }
 
-/// Narrowest field of view, degrees, and distance of the widest from 180: below it the directions
-/// of neighbouring pixels would be the same numbers.
-const LEAST_VFOV: f64 = 1e-6;
-
 /// Sines of the angle between view and up below this are mostly rounding error.
 const POLE: f64 = 1e-9;
 
@@ -122,17 +118,6 @@ impl Camera {
     /// The same camera with another lens.
     pub fn with_lens(self, lens: Lens) -> Self {
         Self { lens, ..self }
-    }
-
-    /// Whether a vertical field of view, degrees, is one that [`Camera::new`] takes.
-    pub(super) fn check_vfov(vfov_degrees: f64) -> Result<()> {
-        if (LEAST_VFOV..=180.0 - LEAST_VFOV).contains(&vfov_degrees) {
-            return Ok(());
-        }
-        Err(Error::Usage(format!(
-            "the vertical field of view is {vfov_degrees} degrees; it must lie between 0 and 180, \
-             and at least {LEAST_VFOV} from either"
-        )))
     }
 
     /// Direction (unit), from the eye, of the image point `(x, y)` in pixels; `(0, 0)` is the upper left

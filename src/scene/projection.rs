@@ -2,7 +2,6 @@
 //!
 //! Takes nothing of the pose. The lens and its focus are [`ShotLens`](super::ShotLens).
 
-use super::Camera;
 use super::spline::{Timed, around, catmull_rom};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -28,6 +27,9 @@ pub struct ProjectionKey {
     pub projection: Projection,
 }
 
+/// Narrowest field of view, degrees, and distance of the widest from 180: below it the directions
+/// of neighbouring pixels would be the same numbers.
+const LEAST_VFOV: f64 = 1e-6;
 /// Most widths or heights of the picture by which it may lie off the view axis.
 const FARTHEST: f64 = 1e3;
 /// Longest pixel, and one over the widest.
@@ -39,12 +41,23 @@ impl Projection {
         Self { vfov_degrees, shift: [0.0; 2], pixel_aspect: 1.0 }
     }
 
-    /// Whether it is one that [`Camera::with_projection`] takes.
+    /// Whether a vertical field of view, degrees, is one that [`Camera::new`](super::Camera::new) takes.
+    pub(super) fn check_vfov(vfov_degrees: f64) -> Result<()> {
+        if (LEAST_VFOV..=180.0 - LEAST_VFOV).contains(&vfov_degrees) {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "the vertical field of view is {vfov_degrees} degrees; it must lie between 0 and 180, \
+             and at least {LEAST_VFOV} from either"
+        )))
+    }
+
+    /// Whether it is one that [`Camera::with_projection`](super::Camera::with_projection) takes.
     ///
     /// Errors: [`Error::Usage`] with what is out of range.
     pub(super) fn check(&self) -> Result<()> {
         let Self { vfov_degrees, shift, pixel_aspect } = *self;
-        Camera::check_vfov(vfov_degrees)?;
+        Self::check_vfov(vfov_degrees)?;
         if !shift.iter().all(|x| x.abs() <= FARTHEST) {
             return Err(Error::Usage(format!(
                 "the picture is shifted by {shift:?} of its size; at most {FARTHEST} can be"

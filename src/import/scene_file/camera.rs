@@ -4,6 +4,7 @@ mod colmap;
 mod lens;
 mod nerf;
 mod path;
+mod posed;
 mod poses;
 #[cfg(test)]
 mod tests;

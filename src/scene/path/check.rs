@@ -4,7 +4,7 @@ use super::level::unit;
 use super::{CameraPath, KeyPose, ProjectionKey, Shot};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
-use crate::scene::{Camera, Pose};
+use crate::scene::{Pose, Projection};
 
 /// More frames than this are taken for a slip: nine hours of video.
 const MOST_FRAMES: u32 = 1_000_000;
@@ -21,7 +21,7 @@ pub fn shot(shot: &Shot) -> Result<()> {
     if !(1..=MOST_FRAMES).contains(&shot.frames) {
         return fault(format!("the shot has {} frames; 1 to {MOST_FRAMES} can be", shot.frames));
     }
-    Camera::check_vfov(shot.vfov_degrees)?;
+    Projection::check_vfov(shot.vfov_degrees)?;
     projections(&shot.projections)?;
     shot.lens.check()?;
     match &shot.path {

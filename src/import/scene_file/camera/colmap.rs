@@ -3,7 +3,7 @@
 //! An image's quaternion (w, x, y, z) and translation lead from the world to the camera, which looks along its z with y
 //! down, as in OpenCV. Models without distortion are read, SIMPLE_PINHOLE and PINHOLE; others are refused by name.
 
-use super::poses::{Intrinsics, Posed, read};
+use super::posed::{Intrinsics, Posed, read};
 use crate::error::{Diagnostic, Result};
 use crate::math::{DMat3, DQuat, DVec3};
 use std::collections::HashMap;

@@ -4,7 +4,7 @@
 //! Intrinsics stand at the top or in a frame, which wins: `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_angle_x`,
 //! `camera_angle_y`. Other keys are not looked at, but for those of distortion, which are refused.
 
-use super::poses::{Intrinsics, Posed, read, rotation};
+use super::posed::{Intrinsics, Posed, read, rotation};
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DMat3, DVec3};
 use serde::Deserialize;
