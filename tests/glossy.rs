@@ -4,8 +4,7 @@
 
 mod common;
 
-use common::{job, pose, quad, render};
-use tweenray::film::Film;
+use common::{job, mean, pose, render};
 use tweenray::math::{DMat3, DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, DiskLight, Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky,
@@ -19,15 +18,7 @@ fn rough(reflectance: Rgb, roughness: f64) -> Material {
 
 /// A plate in the plane y = 0.
 fn plate(material: Material) -> World {
-    let mut world = World::default();
-    world.materials.push(material);
-    let corners = [(-4.0, -4.0), (-4.0, 4.0), (4.0, 4.0), (4.0, -4.0)];
-    world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
-    world
-}
-
-fn mean(film: &Film) -> f64 {
-    film.rgb.iter().map(|c| f64::from(c.y)).sum::<f64>() / film.rgb.len() as f64
+    common::plate(material, 4.0)
 }
 
 /// A white rough ball in a furnace is white, at every roughness: what single reflection loses is given back.

@@ -4,8 +4,7 @@
 
 mod common;
 
-use common::{job, pose, quad, render};
-use tweenray::film::Film;
+use common::{job, mean, pose, render};
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
     Corners, Fresnel, IntersectorKind, Light, Material, PointLight, Sky, SphereLight, Texture,
@@ -27,17 +26,9 @@ fn principled(base: Rgb, roughness: f64, fresnel: Fresnel) -> Material {
     Material { mirror, roughness, fresnel, ..Material::diffuse("principled", base) }
 }
 
-fn mean(film: &Film) -> f64 {
-    film.rgb.iter().map(|c| f64::from(c.y)).sum::<f64>() / film.rgb.len() as f64
-}
-
 /// A plate in the plane y = 0.
 fn plate(material: Material) -> World {
-    let mut world = World::default();
-    world.materials.push(material);
-    let corners = [(-4.0, -4.0), (-4.0, 4.0), (4.0, 4.0), (4.0, -4.0)];
-    world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
-    world
+    common::plate(material, 4.0)
 }
 
 /// The mean brightness of a ball in a furnace of radiance 1 all round.

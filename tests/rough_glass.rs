@@ -4,8 +4,7 @@
 
 mod common;
 
-use common::{job, pose, quad, render};
-use tweenray::film::Film;
+use common::{job, mean, pose, render};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
     Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky, World, WorldSphere,
@@ -19,17 +18,9 @@ fn glass(roughness: f64, thin: bool) -> Material {
     Material { glass: Some(glass), ..Material::black("glass") }
 }
 
-/// A plate in the plane y = 0, which faces up.
+/// A plate in the plane y = 0.
 fn plate(material: Material) -> World {
-    let mut world = World::default();
-    world.materials.push(material);
-    let corners = [(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)];
-    world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
-    world
-}
-
-fn mean(film: &Film) -> f64 {
-    film.rgb.iter().map(|c| f64::from(c.y)).sum::<f64>() / film.rgb.len() as f64
+    common::plate(material, 9.0)
 }
 
 /// Clear glass in a furnace is not seen: one crossing from outside and from inside, steep and flat, at every roughness.

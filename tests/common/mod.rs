@@ -72,6 +72,20 @@ pub fn quad(corners: [DVec3; 4], material: u32) -> WorldMesh {
     WorldMesh::quad("test", corners, material)
 }
 
+/// A plate in the plane y = 0 of half edge `half`, which faces up.
+pub fn plate(material: Material, half: f64) -> World {
+    let mut world = World::default();
+    world.materials.push(material);
+    let corners = [(-half, -half), (-half, half), (half, half), (half, -half)];
+    world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
+    world
+}
+
+/// The mean of the film's green.
+pub fn mean(film: &Film) -> f64 {
+    film.rgb.iter().map(|c| f64::from(c.y)).sum::<f64>() / film.rgb.len() as f64
+}
+
 /// A cube of half edge `half`, faces outwards.
 pub fn cube(centre: DVec3, half: f64, material: u32) -> WorldMesh {
     let corner = |i: u32| {
