@@ -13,6 +13,7 @@ mod microfacet;
 mod mirror;
 mod reflectance;
 mod rough_glass;
+mod share_table;
 
 use super::cone::RayCone;
 use crate::intersect::SurfaceInteraction;

@@ -1,15 +1,14 @@
 //! What a boundary of glass reflects by angle, and what rough boundaries pass on in all.
 
-use super::microfacet::{lambda, shadowed, visible_normal};
+use super::microfacet::{shadowed, unmasked};
+use super::share_table::{self, ShareTable};
 use crate::math::DVec3;
 use crate::scene::Glass;
 use crate::shade::optics;
 use std::sync::OnceLock;
 
-/// Nodes of a table of lost shares along each axis.
-const NODES: usize = 33;
-/// Samples along each axis for one node.
-const SAMPLES: usize = 32;
+/// Samples for a node of the table of lost shares.
+const SAMPLES: u32 = 4096;
 
 /// A boundary of glass, seen from one of its sides.
 #[derive(Debug, Clone, Copy)]
@@ -47,28 +46,14 @@ fn lost(eta: f64, roughness: f64, cos: f64) -> f64 {
     if !(eta > 0.0 && eta < f64::INFINITY) {
         return f64::NAN;
     }
-    let last = (NODES - 1) as f64;
-    let place = |x: f64| {
-        let x = x.clamp(0.0, 1.0) * last;
-        let at = (x as usize).min(NODES - 2);
-        (at, x - at as f64)
-    };
-    // As in the table of mirrors.
-    let ratio = cos / (cos + roughness) * (1.0 + roughness);
-    let ((r, fr), (c, fc)) = (place(roughness), place(ratio));
-    let lost = &Table::of(eta).lost;
-    let row = |r: usize| {
-        let at = r * NODES + c;
-        lost[at] + (lost[at + 1] - lost[at]) * fc
-    };
-    row(r) + (row(r + 1) - row(r)) * fr
+    Table::of(eta).lost.at(roughness, cos)[0]
 }
 
 /// [`lost`] by roughness and angle, for one index of refraction. Those that are in use form a chain, to which no thread waits to
 /// add: a scene has few.
 struct Table {
     eta: f64,
-    lost: Vec<f64>,
+    lost: ShareTable<1>,
     next: Chain,
 }
 
@@ -89,30 +74,20 @@ impl Table {
     }
 
     fn new(eta: f64) -> Self {
-        let node = |i: usize| i as f64 / (NODES - 1) as f64;
-        let lost = (0..NODES * NODES).map(|i| integrate(eta, node(i / NODES), node(i % NODES)));
-        Self { eta, lost: lost.collect(), next: Chain::new() }
+        let lost = ShareTable::new(|alpha, wo| {
+            let passed = |m, weight: f64| [weight * passed_by(m, alpha, wo, eta)];
+            share_table::mean(places(), (alpha, wo), passed).map(|passed| 1.0 - passed)
+        });
+        Self { eta, lost, next: Chain::new() }
     }
 }
 
-/// [`lost`] by stratified samples. `ratio` is of the cosine to its sum with the roughness, 1 at most.
-fn integrate(eta: f64, roughness: f64, ratio: f64) -> f64 {
-    // The limits at both ends are taken from close by.
-    let roughness = roughness.max(1e-3);
-    let ratio = ratio.max(1e-4) / (1.0 + roughness);
-    let cos = (roughness * ratio / (1.0 - ratio)).min(1.0);
-    let alpha = roughness * roughness;
-    let wo = DVec3::new(((1.0 - cos) * (1.0 + cos)).sqrt(), 0.0, cos);
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for i in 0..SAMPLES * SAMPLES / 2 {
-        // Both sides are alike, and steep microfacets, which lose most, are few.
-        let u = 0.5 * ((i / SAMPLES) as f64 + 0.5) / (SAMPLES / 2) as f64;
-        let t = ((i % SAMPLES) as f64 + 0.5) / SAMPLES as f64;
-        let weight = t * t;
-        sum += weight * passed_by(visible_normal(alpha, wo, [u, 1.0 - t * t * t]), alpha, wo, eta);
-        weights += weight;
-    }
-    1.0 - sum / weights
+/// Hammersley's points. Towards total reflection the share changes so fast that as many in rows miss it.
+fn places() -> impl Iterator<Item = [f64; 2]> {
+    (0..SAMPLES).map(|i| {
+        let reversed = f64::from(i.reverse_bits()) / (f64::from(u32::MAX) + 1.0);
+        [reversed + 0.5 / f64::from(SAMPLES), (f64::from(i) + 0.5) / f64::from(SAMPLES)]
+    })
 }
 
 /// The share of light along `wo` that the microfacet `m` passes on, where the surface's normal is +z.
@@ -120,18 +95,13 @@ fn passed_by(m: DVec3, alpha: f64, wo: DVec3, eta: f64) -> f64 {
     let split = optics::split(wo, m, eta);
     let back = optics::reflect(wo, m).z;
     let reflected = if back > 0.0 { shadowed(alpha, wo.z, back) } else { 0.0 };
-    let through = split.refracted.filter(|wi| wi.z < 0.0).map_or(0.0, |wi| leaving(alpha, -wi.z));
+    let through = split.refracted.filter(|wi| wi.z < 0.0).map_or(0.0, |wi| unmasked(alpha, -wi.z));
     split.reflectance * reflected + (1.0 - split.reflectance) * through
-}
-
-/// The share of light that leaves a rough boundary on its far side, at the cosine `cos` to the normal there, where that side hides
-/// none of it from where it came.
-pub(super) fn leaving(alpha: f64, cos: f64) -> f64 {
-    1.0 / (1.0 + lambda(alpha, cos))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::microfacet::{direction, visible_normal};
     use super::*;
 
     #[test]
@@ -144,7 +114,7 @@ mod tests {
             let root = 0.05 + 0.95 * along(17, 71);
             let cos = root * root;
             let alpha = roughness * roughness;
-            let wo = DVec3::new(((1.0 - cos) * (1.0 + cos)).sqrt(), 0.0, cos);
+            let wo = direction(cos, 0.0);
             let n = 128;
             let at = |k: usize| (k as f64 + 0.5) / n as f64;
             let passed = |k: usize| {
@@ -155,8 +125,13 @@ mod tests {
             let off = (found / exact - 1.0).abs();
             worst = worst.max(off);
             let told = format!("index {eta}, roughness {roughness}, cosine {cos}");
-            assert!(off < 0.02, "{told}: {found} for {exact}");
+            // Flat above the surface little is passed on, and it changes fast.
+            let most = if cos > 0.04 { 0.003 } else { 0.015 };
+            assert!(off < most, "{told}: {found} for {exact}");
         }
         println!("worst share {worst}");
+        let start = std::time::Instant::now();
+        Table::new(1.37);
+        println!("table in {:?}", start.elapsed());
     }
 }

@@ -2,8 +2,9 @@
 
 use super::Scattered;
 use super::boundary::Boundary;
-use super::microfacet::{at_least, density, lambda, shadowed, visible_normal};
+use super::microfacet::{at_least, density, lambda, shadowed, unmasked, visible_normal};
 use super::reflectance::{Reflectance, schlick};
+use super::share_table::{self, ShareTable};
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::to_world;
@@ -12,9 +13,7 @@ use crate::shade::cone::RayCone;
 use crate::shade::{optics, texture};
 use std::sync::OnceLock;
 
-/// Nodes of the table of reflected shares along each axis.
-const NODES: usize = 33;
-/// Samples along each axis for one node.
+/// Samples along one axis for a node of the table of reflected shares, half as many along the other.
 const SAMPLES: usize = 32;
 
 /// Microfacets that are perfect mirrors, with the distribution GGX and Smith's masking of both directions
@@ -74,8 +73,7 @@ impl Glossy {
     /// The density of [`sample`](Self::sample) at `wi`, per steradian.
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
         let Some([cos_o, _, cos_m]) = self.cosines(wo, wi) else { return 0.0 };
-        let g1 = 1.0 / (1.0 + lambda(self.alpha, cos_o));
-        density(self.alpha, cos_m) * g1 / (4.0 * cos_o)
+        density(self.alpha, cos_m) * unmasked(self.alpha, cos_o) / (4.0 * cos_o)
     }
 
     /// A direction for `u` in the unit square, by the microfacets that are seen along `wo` (Dupuy and Benyoub,
@@ -139,69 +137,33 @@ fn shares(roughness: f64, cos: f64) -> [f32; 2] {
 /// The share of light from a direction of cosine `cos` that leaves a surface after one reflection: where microfacets reflect
 /// all, and where they reflect as much as [`schlick`] says.
 pub(super) fn reflected_shares(roughness: f64, cos: f64) -> [f64; 2] {
-    static TABLE: OnceLock<Vec<[f64; 2]>> = OnceLock::new();
-    let roughness = at_least(roughness);
-    let last = (NODES - 1) as f64;
-    let table = TABLE.get_or_init(|| {
-        let node = |i: usize| i as f64 / last;
-        (0..NODES * NODES).map(|i| integrate(node(i / NODES), node(i % NODES))).collect()
-    });
-    let place = |x: f64| {
-        let x = x.clamp(0.0, 1.0) * last;
-        let at = (x as usize).min(NODES - 2);
-        (at, x - at as f64)
-    };
-    // A smooth surface seen flat loses what depends on the ratio of the two alone.
-    let ratio = cos / (cos + roughness) * (1.0 + roughness);
-    let ((r, fr), (c, fc)) = (place(roughness), place(ratio));
-    let [all, grown] = [0, 1].map(|of| {
-        let row = |r: usize| {
-            let at = r * NODES + c;
-            table[at][of] + (table[at + 1][of] - table[at][of]) * fc
-        };
-        row(r) + (row(r + 1) - row(r)) * fr
-    });
+    static TABLE: OnceLock<ShareTable<2>> = OnceLock::new();
+    let [all, grown] = TABLE.get_or_init(|| ShareTable::new(integrate)).at(roughness, cos);
     [all, grown + schlick(cos) * all]
 }
 
-/// [`reflected_shares`] by stratified samples, the second less what it would be if all microfacets were seen at the angle of the
-/// surface: that changes too fast between the nodes. `ratio` is of the cosine to its sum with the roughness, 1 at most.
-fn integrate(roughness: f64, ratio: f64) -> [f64; 2] {
-    // The limits at both ends are taken from close by.
-    let roughness = roughness.max(1e-3);
-    let ratio = ratio.max(1e-4) / (1.0 + roughness);
-    let cos = (roughness * ratio / (1.0 - ratio)).min(1.0);
-    let alpha = roughness * roughness;
-    let wo = DVec3::new(((1.0 - cos) * (1.0 + cos)).sqrt(), 0.0, cos);
-    let (mut sums, mut weights) = ([0.0; 2], 0.0);
-    for i in 0..SAMPLES * SAMPLES / 2 {
-        // Both sides are alike, and steep microfacets, which lose most, are few.
-        let u = 0.5 * ((i / SAMPLES) as f64 + 0.5) / (SAMPLES / 2) as f64;
-        let t = ((i % SAMPLES) as f64 + 0.5) / SAMPLES as f64;
-        let weight = t * t;
-        let m = visible_normal(alpha, wo, [u, 1.0 - t * t * t]);
+/// [`reflected_shares`] of light along `wo`, the second less what it would be if all microfacets were seen at the angle of the
+/// surface: that changes too fast between the nodes.
+fn integrate(alpha: f64, wo: DVec3) -> [f64; 2] {
+    let place = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+    let places = (0..SAMPLES * SAMPLES / 2)
+        .map(|i| [place(i / SAMPLES, SAMPLES / 2), place(i % SAMPLES, SAMPLES)]);
+    let [all, grown] = share_table::mean(places, (alpha, wo), |m, weight| {
         let cos_i = optics::reflect(wo, m).z;
-        let share = if cos_i > 0.0 { weight * shadowed(alpha, cos, cos_i) } else { 0.0 };
-        sums[0] += share;
-        sums[1] += share * schlick(wo.dot(m));
-        weights += weight;
-    }
-    let [all, grown] = sums.map(|sum| sum / weights);
-    [all, grown - schlick(cos) * all]
+        let share = if cos_i > 0.0 { weight * shadowed(alpha, wo.z, cos_i) } else { 0.0 };
+        [share, share * schlick(wo.dot(m))]
+    });
+    [all, grown - schlick(wo.z) * all]
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::microfacet::direction;
     use super::*;
     use std::f64::consts::TAU;
 
     fn lobe(roughness: f64) -> Glossy {
         Glossy::new(Reflectance::constant(Rgb::ONE), roughness, DVec3::Z)
-    }
-
-    fn direction(cos: f64, angle: f64) -> DVec3 {
-        let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
-        DVec3::new(sin * libm::cos(angle), sin * libm::sin(angle), cos)
     }
 
     #[test]

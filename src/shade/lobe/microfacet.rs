@@ -26,6 +26,11 @@ pub(super) fn lambda(alpha: f64, cos: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * slope2.max(0.0)).sqrt() - 1.0)
 }
 
+/// The share of the microfacets towards a direction of cosine `cos` that others do not hide.
+pub(super) fn unmasked(alpha: f64, cos: f64) -> f64 {
+    1.0 / (1.0 + lambda(alpha, cos))
+}
+
 /// The share of light from microfacets seen along `cos_o` that leaves along `cos_i`.
 pub(super) fn shadowed(alpha: f64, cos_o: f64, cos_i: f64) -> f64 {
     let seen = 1.0 + lambda(alpha, cos_o);
@@ -42,4 +47,11 @@ pub(super) fn visible_normal(alpha: f64, wo: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     let cap = DVec3::new(radius * libm::cos(angle), radius * libm::sin(angle), z);
     let half = cap + stretched;
     DVec3::new(alpha * half.x, alpha * half.y, half.z.max(0.0)).normalize()
+}
+
+/// The unit direction at the cosine `cos` to +z, turned by `angle` about it.
+#[cfg(test)]
+pub(super) fn direction(cos: f64, angle: f64) -> DVec3 {
+    let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
+    DVec3::new(sin * libm::cos(angle), sin * libm::sin(angle), cos)
 }

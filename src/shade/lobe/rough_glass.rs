@@ -1,8 +1,8 @@
 //! Light through rough glass: frosted windows and ground surfaces.
 
 use super::Scattered;
-use super::boundary::{Boundary, leaving};
-use super::microfacet::{at_least, density, lambda, shadowed, visible_normal};
+use super::boundary::Boundary;
+use super::microfacet::{at_least, density, shadowed, unmasked, visible_normal};
 use crate::math::{DVec3, Rgb, orthonormal_basis};
 use crate::sampling::to_world;
 use crate::shade::optics;
@@ -75,7 +75,7 @@ impl RoughGlass {
 
     /// Density of the microfacet among those that are seen, per steradian of normals.
     fn visible(&self, facet: &Facet) -> f64 {
-        let seen = 1.0 / (1.0 + lambda(self.alpha, facet.cos_o));
+        let seen = unmasked(self.alpha, facet.cos_o);
         density(self.alpha, facet.cos_m) * seen * facet.towards / facet.cos_o
     }
 
@@ -83,7 +83,7 @@ impl RoughGlass {
     fn share(&self, cos_o: f64, cos_i: f64) -> f64 {
         match self.boundary.is_pane {
             true => shadowed(self.alpha, cos_o, cos_i),
-            false => leaving(self.alpha, cos_i),
+            false => unmasked(self.alpha, cos_i),
         }
     }
 
@@ -120,13 +120,9 @@ impl RoughGlass {
 
 #[cfg(test)]
 mod tests {
+    use super::super::microfacet::direction;
     use super::*;
     use std::f64::consts::TAU;
-
-    fn direction(cos: f64, angle: f64) -> DVec3 {
-        let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
-        DVec3::new(sin * libm::cos(angle), sin * libm::sin(angle), cos)
-    }
 
     #[test]
     fn samples_have_the_density_and_the_weight_of_f_and_pdf() {

@@ -65,6 +65,8 @@ const NAMES: &[Case] = &[
     ),
     ("[material.a]\nglass = { thin = true, absorption = ¦0.5 }\n", "`absorption`", ""),
     ("[material.a]\nglass = { priority = ¦1, thin = true }\n", "`priority`", ""),
+    ("[material.a]\nglass = { priority = ¦1, roughness = 0.2 }\n", "`priority`", ""),
+    ("[material.a]\nglass = { roughness = ¦1.5 }\n", "1.5", ""),
     (
         "[camera]\nlens = { radius = 1, f_number = ¦2 }\n\
          keys = [{ eye = [0, 0, 1], target = [0, 0, 0], lens = { radius = 1 } }]\n",
