@@ -19,6 +19,8 @@ fn main() {
     if !is_system(Path::new(&lib)) {
         // Only the package that makes the binaries can hand them an rpath.
         println!("cargo::rustc-link-arg=-Wl,-rpath,{lib}");
+        // Where `./x install` puts the library, seen from the program.
+        println!("cargo::rustc-link-arg-bins=-Wl,-rpath,$ORIGIN/../lib/tweenray");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Seconds and memory from a binary PLY of ten million triangles to a scene that can be traced.
+//! Seconds and memory from a binary PLY of ten million triangles to a scene that can be traced, and to read the same mesh as glTF.
 #![allow(clippy::print_stdout, reason = "a bench prints its figures")]
 
 mod support;
@@ -25,21 +25,51 @@ fn main() {
     let bytes = std::fs::metadata(&file).map_or(0, |m| m.len());
     println!("file: {:.0} MB, made in {writing:.1} s", bytes as f64 * 1e-6);
     println!("memory before: {}", support::peak_memory());
-    let mut rows = read_only(&file);
+    let glb = folder.path().join("terrain.glb");
+    write_glb(&file, &glb).expect("the temporary folder has 200 MB more");
+    // In turns, so that what else the machine does falls on both.
+    let mut rows = Vec::new();
+    for turn in 1..=TURNS {
+        rows.push(read_only(&file, &format!("read the mesh ({turn})")));
+        rows.push(read_only(&glb, &format!("read the mesh as glTF ({turn})")));
+    }
     rows.extend(whole_way(&file));
     support::table(&["step", "seconds", "Mtriangles/s", "peak memory after"], &rows);
     println!("\nload average at the end {}", support::load_average());
 }
 
 /// Reading alone, the second and later times from the system's cache.
-fn read_only(file: &Path) -> Vec<Vec<String>> {
-    (1..=TURNS)
-        .map(|turn| {
-            let read = || import::load_model(file, NormalPolicy::Flat).expect("a good file");
-            let (model, seconds) = timed(read);
-            row(&format!("read the mesh ({turn})"), seconds, model.world.meshes[0].triangles.len())
-        })
-        .collect()
+fn read_only(file: &Path, step: &str) -> Vec<String> {
+    let read = || import::load_model(file, NormalPolicy::Flat).expect("a good file");
+    let (model, seconds) = timed(read);
+    row(step, seconds, model.world.meshes[0].triangles.len())
+}
+
+/// Writes the mesh of the PLY file `from` as a `.glb`.
+fn write_glb(from: &Path, to: &Path) -> io::Result<()> {
+    let mesh =
+        import::load_model(from, NormalPolicy::Flat).expect("a good file").world.meshes.remove(0);
+    let (vertices, indices) = (mesh.positions.len(), 3 * mesh.triangles.len());
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{}}}],"bufferViews":[{{"buffer":0,"byteLength":{}}},{{"buffer":0,"byteOffset":{},"byteLength":{}}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3"}},{{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],"nodes":[{{"mesh":0}}]}}"#,
+        12 * vertices + 4 * indices,
+        12 * vertices,
+        12 * vertices,
+        4 * indices,
+    );
+    let padding = json.len().next_multiple_of(4) - json.len();
+    let (head, body) = ((json.len() + padding) as u32, (12 * vertices + 4 * indices) as u32);
+    let mut out = BufWriter::with_capacity(1 << 20, File::create(to)?);
+    let word = |x: u32| x.to_le_bytes();
+    out.write_all(&[*b"glTF", word(2), word(28 + head + body), word(head), *b"JSON"].concat())?;
+    out.write_all(json.as_bytes())?;
+    out.write_all(&b"   "[..padding])?;
+    out.write_all(&[word(body), *b"BIN\0"].concat())?;
+    for p in &mesh.positions {
+        p.to_array().iter().try_for_each(|x| out.write_all(&(*x as f32).to_le_bytes()))?;
+    }
+    mesh.triangles.iter().flatten().try_for_each(|i| out.write_all(&word(*i)))?;
+    out.flush()
 }
 
 /// What `tweenray render terrain.ply` does before the first ray.

@@ -3,6 +3,9 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 #[allow(dead_code)]
+#[path = "../examples/4_data_set.rs"]
+mod data_set;
+#[allow(dead_code)]
 #[path = "../examples/3_sequence_with_reuse.rs"]
 mod sequence_with_reuse;
 #[allow(dead_code)]
@@ -63,4 +66,46 @@ fn a_sequence_infers_most_shadowing_and_its_audit_has_an_interval() {
     }
     // No less true than frames traced whole, by more than can be seen.
     assert!(audit.shown.low < audit.traced.high + 0.25, "{audit:?}");
+}
+
+/// Two poses of a COLMAP model above the origin of a floor: the depth is the height above it, the normal is up.
+#[test]
+fn a_data_set_has_depth_normals_and_ids_for_each_pose() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("cameras.txt", "1 PINHOLE 32 16 30 30 15 9\n");
+    // A quarter turn about x: the camera looks straight down, from as high as the translation says.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let image =
+        |id: u32, height: f64| format!("{id} {half} -{half} 0 0 0 0 {height} 1 {id}.png\n\n");
+    write("images.txt", &(image(1, 3.0) + &image(2, 5.0)));
+    write(
+        "scene.toml",
+        "camera = { poses = 'images.txt' }\nsky = { radiance = 1 }\n\
+         mesh = [{ quad = { centre = [0, 0, 0], normal = 'y', size = [90, 90] } }]\n\
+         settings = { size = [32, 16], spp = 1, sky_samples = 1 }\n",
+    );
+    let out = folder.path().join("out");
+    assert_eq!(data_set::render(&folder.path().join("scene.toml"), &out).unwrap(), 2);
+    for (frame, height) in [(1, 3.0f32), (2, 5.0)] {
+        let file = std::fs::File::open(out.join(format!("frame_{frame:04}.exr"))).unwrap();
+        let image = exr_channels(file);
+        assert!(image["Z"].iter().all(|z| (z - height).abs() < 1e-4), "{:?}", image["Z"][0]);
+        assert!(image["N.Y"].iter().all(|y| (y - 1.0).abs() < 1e-6));
+        assert!(
+            image.keys().any(|name| name.to_lowercase().contains("mesh")),
+            "{:?}",
+            image.keys()
+        );
+    }
+}
+
+/// The samples of each channel of an exr file.
+fn exr_channels(file: std::fs::File) -> std::collections::BTreeMap<String, Vec<f32>> {
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+    let reader = read().no_deep_data().largest_resolution_level().all_channels();
+    let reader = reader.first_valid_layer().all_attributes();
+    let image = reader.from_buffered(std::io::BufReader::new(file)).unwrap();
+    let channels = image.layer_data.channel_data.list;
+    channels.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect())).collect()
 }

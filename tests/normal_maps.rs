@@ -237,12 +237,12 @@ fn strength_and_placement_count() {
     let within = |place| DAffine2::from_scale_angle_translation(DVec2::splat(0.01), 0.0, place);
     // The second copy of an image that is mirrored at its edges.
     let second = |map: &mut NormalMap| {
-        map.image.wrap = Wrap::Mirror;
+        map.image.wrap = [Wrap::Mirror; 2];
         map.image.transform = within(DVec2::new(1.5, 0.5));
     };
     is_that_of(lit(n, &second), DVec3::new(-0.5, 1.0, 0.0));
     let third = |map: &mut NormalMap| {
-        map.image.wrap = Wrap::Mirror;
+        map.image.wrap = [Wrap::Mirror; 2];
         map.image.transform = within(DVec2::new(2.5, -3.5));
     };
     is_that_of(lit(n, &third), DVec3::new(0.5, 1.0, 0.0));

@@ -16,7 +16,8 @@ use std::path::PathBuf;
 /// The scene and how to read it.
 #[derive(Debug, Args)]
 pub struct SceneArgs {
-    /// Scene file (.toml), or a bare mesh (.obj, .ply), which the camera then orbits once
+    /// Scene file (.toml), or a bare mesh (.obj, .ply, .glb, .gltf), which the camera then orbits once; a glTF
+    /// file with a camera is seen by that
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Which axis of a bare mesh points up [default: y]
@@ -25,6 +26,15 @@ pub struct SceneArgs {
     /// Factor on the coordinates of a bare mesh [default: 1]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = values::within(limits::FACTOR))]
     pub scale: Option<f64>,
+    /// Camera of a glTF file: the name of a node or camera, or a number from 0 [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Time at which animated meshes of a glTF file stand, seconds: the scene is static [default: 0]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::within(limits::TIME))]
+    pub time: Option<f64>,
+    /// Frames per second of the video, and of the camera's move in a glTF file [default: 24]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
+    pub fps: Option<f64>,
 }
 
 impl SceneArgs {
@@ -35,6 +45,9 @@ impl SceneArgs {
             up: self.up.unwrap_or(default.up),
             scale: self.scale.unwrap_or(default.scale),
             size,
+            camera: self.camera.clone(),
+            time: self.time,
+            fps: self.fps.unwrap_or(default.fps),
         }
     }
 }

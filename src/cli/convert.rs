@@ -13,7 +13,7 @@ use std::path::PathBuf;
 Examples:
   tweenray convert bunny.obj bunny.ply")]
 pub struct ConvertArgs {
-    /// The mesh to read (.obj, .ply)
+    /// The mesh to read (.obj, .ply, .glb, .gltf)
     #[arg(value_name = "FROM")]
     from: PathBuf,
     /// The file to write (.ply); replaced where it exists

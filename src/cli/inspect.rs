@@ -57,6 +57,9 @@ struct Inspection {
     camera_start: CameraView,
     camera_end: CameraView,
     memory: Memory,
+    /// Copies of meshes that a glTF file places more than once; absent without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    copies: Option<Copies>,
     reuse: reuse::ReusePlan,
     effects: Vec<Effect>,
     warnings: Vec<String>,
@@ -94,6 +97,15 @@ struct Memory {
     frame: u64,
 }
 
+/// What instances would save.
+#[derive(Serialize)]
+struct Copies {
+    /// Copies beyond the first of each mesh.
+    meshes: usize,
+    /// Bytes of geometry that they take.
+    geometry: u64,
+}
+
 #[derive(Serialize)]
 struct Effect {
     effect: &'static str,
@@ -114,7 +126,7 @@ pub fn run(args: &InspectArgs) -> Result<Exit> {
 
 fn inspect(args: &InspectArgs) -> Result<Inspection> {
     let loaded = job::load(&args.scene, &args.settings)?;
-    let Loaded { world, shot, settings, warnings, stage, .. } = loaded;
+    let Loaded { world, shot, settings, warnings, stage, repeats, .. } = loaded;
     let scene = world.into_scene(settings.rules.recentre)?;
     let intersector = intersect::build(&scene, &settings, cluster::default_threads())?;
     let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
@@ -148,6 +160,8 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
             intersector: intersector.memory(),
             frame: job::frame_bytes(&settings),
         },
+        copies: (repeats.copies > 0)
+            .then_some(Copies { meshes: repeats.copies, geometry: repeats.bytes }),
         reuse: reuse::ReusePlan::of(&renderer, &shot)?,
         effects: reasons
             .into_iter()
@@ -270,6 +284,14 @@ impl Inspection {
             bytes(m.intersector),
             bytes(m.frame)
         ));
+        if let Some(Copies { meshes, geometry }) = &self.copies {
+            let copies = match meshes {
+                1 => "1 copy of a mesh".into(),
+                n => format!("{n} copies of meshes"),
+            };
+            let saved = bytes(*geometry);
+            lines.push(format!("copies     {copies}; instances would save {saved} of geometry"));
+        }
         lines.extend(self.reuse.to_text());
         lines.push("effects".into());
         for e in &self.effects {

@@ -34,12 +34,13 @@ fn refuse_folder(path: &Path) -> Result<()> {
     // Scene files before bare meshes, then by name.
     let rank = |p: &PathBuf| {
         let ending = p.extension()?.to_str()?.to_ascii_lowercase();
-        ["toml", "obj", "ply"].iter().position(|known| *known == ending)
+        ["toml", "glb", "gltf", "obj", "ply"].iter().position(|known| *known == ending)
     };
     let meant = files.filter_map(|p| Some((rank(&p)?, p))).min();
-    let help = meant.map_or("a scene is a .toml, .obj or .ply file".into(), |(_, file)| {
-        format!("give a file in it: {}", file.display())
-    });
+    let help = meant
+        .map_or("a scene is a .toml, .obj, .ply, .glb or .gltf file".into(), |(_, file)| {
+            format!("give a file in it: {}", file.display())
+        });
     Err(Error::input(path, format!("is a folder, not a scene file\n  help: {help}")))
 }
 

@@ -13,6 +13,7 @@ mod findings;
 mod inspect;
 mod job;
 mod machine;
+mod manual;
 mod progress;
 mod references;
 mod render;
@@ -30,7 +31,7 @@ mod verify;
 
 use crate::cluster;
 use crate::error::{Error, Result};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use exit::Exit;
 use std::process::ExitCode;
 
@@ -66,6 +67,8 @@ enum Command {
     Accuracy(Box<accuracy::AccuracyArgs>),
     Report(report::ReportArgs),
     Schema(schema::SchemaArgs),
+    #[command(hide = true)]
+    Manual(manual::ManualArgs),
 }
 
 const VERSION: &str = concat!(
@@ -117,6 +120,7 @@ fn dispatch(command: &Command) -> Exit {
         Command::Accuracy(args) => accuracy::run(args),
         Command::Report(args) => report::run(args),
         Command::Schema(args) => schema::run(args),
+        Command::Manual(args) => manual::run(args, Arguments::command()),
     };
     ended(result)
 }
@@ -128,6 +132,7 @@ impl Command {
             Self::Accuracy(_) => Some("accuracy"),
             Self::Report(_) => Some("report"),
             Self::Convert(_) => Some("convert"),
+            Self::Manual(_) => Some("manual"),
             _ => None,
         }
     }

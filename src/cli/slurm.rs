@@ -40,7 +40,7 @@ Examples:
   tweenray slurm scene.toml --nodes 4 --time 30m --setup 'module load openmpi' -- --spp 64 | sbatch
   tweenray slurm scene.toml --nodes 2 --cpus 16 --time 4h --sbatch partition=long | sbatch")]
 pub struct SlurmArgs {
-    /// Scene file (.toml), or a bare mesh (.obj, .ply)
+    /// Scene file (.toml), or a bare mesh (.obj, .ply, .glb, .gltf)
     #[arg(value_name = "SCENE")]
     scene: String,
     /// Nodes

@@ -10,6 +10,7 @@ mod course;
 mod emission;
 mod framing;
 mod generators;
+mod gltf;
 mod images;
 mod lamps;
 mod lines;
@@ -30,8 +31,10 @@ mod untextured;
 pub use alpha::load_mask;
 pub use convert::{ConvertReport, PlyReport, convert, write_ply};
 pub use generators::{MAX_TRIANGLES, bench_terrain, terrain_height, uv_sphere};
-pub use mesh_file::load_model;
-pub use model::{COLOURED_MATERIAL, DEFAULT_ALBEDO, DEFAULT_MATERIAL, Model};
+pub use mesh_file::{load_model, load_model_with};
+pub use model::{
+    COLOURED_MATERIAL, DEFAULT_ALBEDO, DEFAULT_MATERIAL, FileCamera, Model, ModelOptions, Repeats,
+};
 pub use normals::apply as apply_normals;
 pub use scene_file::schema;
 pub use texture::{MAX_IMAGE_BYTES, load_texture};
@@ -44,7 +47,7 @@ use std::path::{Path, PathBuf};
 pub const DEFAULT_CREASE_DEGREES: f64 = 30.0;
 
 /// Options of the command line for reading.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LoadOptions {
     /// Which axis of a bare mesh is up.
     pub up: UpAxis,
@@ -53,11 +56,18 @@ pub struct LoadOptions {
     /// Image width and height where the command line overrides them: an orbit that frames the
     /// scene by itself depends on their ratio.
     pub size: Option<(u32, u32)>,
+    /// Name or number of the camera of a glTF file; `None`: the first with a perspective.
+    pub camera: Option<String>,
+    /// Time at which animated meshes and lights of a glTF file stand, seconds; `None`: 0.
+    pub time: Option<f64>,
+    /// Frames a second of a glTF file's camera move.
+    pub fps: f64,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { up: UpAxis::Y, scale: 1.0, size: None }
+        let ModelOptions { camera, fps, .. } = ModelOptions::default();
+        Self { up: UpAxis::Y, scale: 1.0, size: None, camera, time: None, fps }
     }
 }
 
@@ -93,6 +103,8 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
     /// Floor and lamp that were added to a bare mesh.
     pub stage: Option<AddedStage>,
+    /// Meshes that a bare file places more than once.
+    pub repeats: Repeats,
 }
 
 /// Indices of the floor and the lamp that are added to a bare mesh.
@@ -116,6 +128,7 @@ impl Loaded {
             warnings: Vec::new(),
             files: Vec::new(),
             stage: None,
+            repeats: Repeats::default(),
         }
     }
 }
@@ -128,6 +141,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     let scale = options.scale;
     if !limits::FACTOR.contains(&scale) {
         return Err(Error::Usage(format!("the scale is {scale}; it lies between 1e-30 and 1e30")));
+    }
+    let is_of_gltf = options.camera.is_some() || options.time.is_some();
+    if is_of_gltf && !gltf::is_named(path) {
+        let message = "`--camera` and `--time` are for glTF files, .glb and .gltf";
+        return Err(Error::Usage(message.into()));
     }
     let is_scene_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     if !is_scene_file {

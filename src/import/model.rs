@@ -2,7 +2,7 @@
 
 use crate::error::Diagnostic;
 use crate::math::{Rgb, Vec3};
-use crate::scene::{Material, MaterialId, World};
+use crate::scene::{Material, MaterialId, Shot, World};
 use std::path::PathBuf;
 
 /// Name of the material of faces that have none.
@@ -22,6 +22,45 @@ pub struct Model {
     pub warnings: Vec<Diagnostic>,
     /// Every file read.
     pub files: Vec<PathBuf>,
+    /// The file's own camera, of formats that have one.
+    pub camera: Option<FileCamera>,
+    /// Meshes that the file places more than once.
+    pub repeats: Repeats,
+}
+
+/// A camera that a mesh file has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileCamera {
+    /// Its move.
+    pub shot: Shot,
+    /// Width of its image over the height, where the file says so.
+    pub aspect: Option<f64>,
+}
+
+/// What copies of meshes take that instances would share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Repeats {
+    /// Copies beyond the first of each mesh.
+    pub copies: usize,
+    /// Bytes of these copies, ready to be traced.
+    pub bytes: u64,
+}
+
+/// What of a mesh file is wanted that holds more than one camera or moment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelOptions {
+    /// Name or number of the camera; `None`: the first with a perspective.
+    pub camera: Option<String>,
+    /// Time at which animated meshes and lights stand, seconds.
+    pub time: f64,
+    /// Frames a second of the camera's move.
+    pub fps: f64,
+}
+
+impl Default for ModelOptions {
+    fn default() -> Self {
+        Self { camera: None, time: 0.0, fps: 24.0 }
+    }
 }
 
 impl Model {

@@ -8,6 +8,7 @@ use crate::math::{Rgb, srgb_decode};
 use crate::scene::Texture;
 use crate::stats::Fault;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use std::io::Cursor;
 use std::path::Path;
 
 /// The largest image that is decoded, bytes of its own pixel format.
@@ -106,33 +107,50 @@ pub(super) fn bad_pixel(path: &Path) -> Error {
 ///
 /// Errors: those of [`load_texture`] but for its pixels' values.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
-    let bytes = super::source::read(path)?;
-    let bad = |e: image::ImageError| Error::input(path, format!("not a readable image: {e}"));
+    decode_bytes(path, &super::source::read(path)?)
+}
+
+/// The image whose file holds `bytes`, as [`decode`]; `path` names it.
+pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_IMAGE_BYTES);
     limits.max_image_width = Some(1 << 16);
     limits.max_image_height = Some(1 << 16);
-    let reader = || {
-        let mut reader = ImageReader::new(std::io::Cursor::new(&bytes))
-            .with_guessed_format()
-            .map_err(|e| Error::io("read", path, e))?;
-        // A tga file does not begin with anything of its own.
-        if let (None, Ok(named)) = (reader.format(), ImageFormat::from_path(path)) {
-            reader.set_format(named);
-        }
-        Ok::<_, Error>(reader)
-    };
     // Some decoders ask for memory before they look at the limits: the size comes first.
-    let (width, height) = reader()?.into_dimensions().map_err(bad)?;
+    pixels(path, bytes)?;
+    let mut decoder = reader(path, bytes)?;
+    decoder.limits(limits);
+    decoder.decode().map_err(|error| unreadable(path, &error))
+}
+
+/// How many pixels the image has whose file holds `bytes`, by its header.
+///
+/// Errors: what is no image, no pixels, or more than [`MAX_IMAGE_BYTES`].
+pub(super) fn pixels(path: &Path, bytes: &[u8]) -> Result<u64> {
+    let dimensions = reader(path, bytes)?.into_dimensions();
+    let (width, height) = dimensions.map_err(|error| unreadable(path, &error))?;
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels * 3 > MAX_IMAGE_BYTES {
         return Err(Diagnostic::new(path, format!("an image of {width} x {height} pixels"))
             .help(format!("at most {} bytes can be decoded", MAX_IMAGE_BYTES))
             .into());
     }
-    let mut decoder = reader()?;
-    decoder.limits(limits);
-    decoder.decode().map_err(bad)
+    Ok(pixels)
+}
+
+fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>> {
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| Error::io("read", path, e))?;
+    // A tga file does not begin with anything of its own.
+    if let (None, Ok(named)) = (reader.format(), ImageFormat::from_path(path)) {
+        reader.set_format(named);
+    }
+    Ok(reader)
+}
+
+fn unreadable(path: &Path, error: &image::ImageError) -> Error {
+    Error::input(path, format!("not a readable image: {error}"))
 }
 
 /// Red, green and blue of the pixels of `image`, whose samples these are; of a grey image thrice the grey.

@@ -2,16 +2,19 @@
 //!
 //! The mesh stands on a neutral floor that fills the image behind it, lit by a bright sky and a
 //! soft key light from the upper left of where the camera starts. A file with lights of its own
-//! (the course's dialect) keeps them and gets a plain backdrop instead of floor, sky light and key.
+//! (the course's dialect, glTF) keeps them and gets a plain backdrop instead of floor, sky light and key. A file with a
+//! camera of its own (glTF) is seen by that, and nothing is added but light where it has none.
 
 use super::framing::{self, Lens};
 use super::scene_file::to_y_up;
-use super::{AddedStage, LoadOptions, Loaded, Model, emission, untextured};
+use super::{
+    AddedStage, FileCamera, LoadOptions, Loaded, Model, ModelOptions, emission, untextured,
+};
 use crate::error::{Diagnostic, Result};
 use crate::math::{DAffine3, DVec3, Rgb};
 use crate::scene::{
-    CameraPath, Easing, Light, Material, NormalPolicy, QuadLight, Settings, Shot, ShotLens, Sky,
-    World, WorldMesh,
+    CameraPath, DirectionalLight, Easing, Light, Material, NormalPolicy, QuadLight, Settings, Shot,
+    ShotLens, Sky, World, WorldMesh, limits,
 };
 use std::path::Path;
 
@@ -24,16 +27,38 @@ const ELEVATION_DEGREES: f64 = 22.0;
 /// Sky of the course's scenes, as the source paper rendered them.
 const BACKDROP: Rgb = Rgb::new(0.5, 0.6, 0.9);
 
+/// Sky over a mesh without lights.
+const STUDIO_SKY: Sky =
+    Sky { radiance: Rgb::new(0.42, 0.45, 0.50), lights: true, ambient: Rgb::ZERO };
+/// Irradiance of the key light at the middle, whatever the size, on a surface that faces it.
+const KEY_IRRADIANCE: f64 = 2.4;
+/// Its warm white.
+const KEY_COLOUR: Rgb = Rgb::new(1.0, 0.96, 0.9);
+
+/// Towards the key light: to the upper left of a camera that looks along -z.
+fn key_direction() -> DVec3 {
+    DVec3::new(-0.45, 0.75, 0.5).normalize()
+}
+
 /// Reads a mesh file and puts it on the turntable.
 ///
 /// Errors: as [`super::load_model`]; a scale that moves the mesh out of range.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
-    let crease_degrees = super::DEFAULT_CREASE_DEGREES;
-    let Model { mut world, mut warnings, files } =
-        super::load_model(path, NormalPolicy::Auto { crease_degrees })?;
-    world.apply_transform(
-        &(DAffine3::from_scale(DVec3::splat(options.scale)) * to_y_up(options.up)),
-    )?;
+    let policy = NormalPolicy::Auto { crease_degrees: super::DEFAULT_CREASE_DEGREES };
+    let of_file = ModelOptions {
+        camera: options.camera.clone(),
+        time: options.time.unwrap_or(0.0),
+        fps: options.fps,
+    };
+    let Model { mut world, mut warnings, files, mut camera, repeats } =
+        super::load_model_with(path, policy, &of_file)?;
+    let transform = DAffine3::from_scale(DVec3::splat(options.scale)) * to_y_up(options.up);
+    world.apply_transform(&transform)?;
+    if let Some(camera) = &mut camera {
+        camera.shot.apply_transform(&transform);
+    }
+    // What glows is no reason to leave out the lamp.
+    let own_lights = !world.lights.is_empty();
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
     }
@@ -41,17 +66,42 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
         warnings.push(Diagnostic::new(path, found.message()).help(found.help()));
     }
     let mut settings = Settings::for_files();
+    let aspect = camera.as_ref().and_then(|camera| camera.aspect);
     if let Some((width, height)) = options.size {
         (settings.width, settings.height) = (width, height);
+    } else if let Some(aspect) = aspect {
+        settings.width = (aspect * f64::from(settings.height))
+            .round()
+            .clamp(1.0, f64::from(limits::MAX_EDGE)) as u32;
     }
     let aspect = f64::from(settings.width.max(1)) / f64::from(settings.height.max(1));
-    let (shot, stage) = put_on_stage(&mut world, aspect);
-    Ok(Loaded { warnings, files, stage, ..Loaded::new(world, shot, settings) })
+    let (shot, stage) = match camera {
+        Some(FileCamera { shot, .. }) => {
+            warnings.extend(light_up(&mut world, path));
+            (shot, None)
+        }
+        None => put_on_stage(&mut world, own_lights, aspect),
+    };
+    Ok(Loaded { warnings, files, stage, repeats, ..Loaded::new(world, shot, settings) })
 }
 
-/// Adds floor and lights to `world`, where it has no lights, and gives the camera's orbit.
-fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<AddedStage>) {
-    let own_lights = !world.lights.is_empty();
+/// Lights a scene that has a camera and nothing that shines, and says so.
+fn light_up(world: &mut World, path: &Path) -> Option<Diagnostic> {
+    let emission = |mesh: &WorldMesh| world.materials[mesh.material as usize].emission;
+    let glows = world.meshes.iter().any(|mesh| emission(mesh).max_element() > 0.0);
+    if glows || !world.lights.is_empty() {
+        return None;
+    }
+    world.sky = STUDIO_SKY;
+    let irradiance = KEY_COLOUR * KEY_IRRADIANCE as f32;
+    let to_light = key_direction();
+    world.lights.push(Light::Directional(DirectionalLight { to_light, irradiance }));
+    let message = "the file has a camera but no light: a bright sky and a light from the upper left were added";
+    Some(Diagnostic::new(path, message).help("export the lights of the scene with it"))
+}
+
+/// Adds floor and lights to `world`, where the file has no lights of its own, and gives the camera's orbit.
+fn put_on_stage(world: &mut World, own_lights: bool, aspect: f64) -> (Shot, Option<AddedStage>) {
     let lens = Lens { vfov_degrees: VFOV_DEGREES, aspect };
     let (target, eye) = if own_lights && !world.spheres.is_empty() {
         frame_spheres(world, &lens)
@@ -70,6 +120,7 @@ fn put_on_stage(world: &mut World, aspect: f64) -> (Shot, Option<AddedStage>) {
         easing: Easing::Linear,
         frames: FRAMES,
         vfov_degrees: VFOV_DEGREES,
+        projections: Vec::new(),
         lens: ShotLens::Pinhole,
     };
     (shot, stage)
@@ -112,7 +163,7 @@ impl Studio {
         world.materials.push(Material::diffuse("floor", Rgb::splat(0.6)));
         world.meshes.push(floor);
         world.lights.push(self.key_light());
-        world.sky = Sky { radiance: Rgb::new(0.42, 0.45, 0.50), lights: true, ambient: Rgb::ZERO };
+        world.sky = STUDIO_SKY;
         stage
     }
 
@@ -127,7 +178,7 @@ impl Studio {
     /// A square lamp that faces the middle from the upper left of the first frame's camera, which
     /// stands towards +z.
     fn key_light(&self) -> Light {
-        let to_light = DVec3::new(-0.45, 0.75, 0.5).normalize();
+        let to_light = key_direction();
         let (distance, side) = (self.lamp_distance, 0.48 * self.lamp_distance);
         let right = DVec3::Y.cross(to_light).normalize() * (0.5 * side);
         let up = to_light.cross(right.normalize()) * (0.5 * side);
@@ -135,11 +186,8 @@ impl Studio {
         // Counter-clockwise seen from the middle.
         let corners =
             [centre - right - up, centre - right + up, centre + right + up, centre + right - up];
-        // Irradiance at the middle, whatever the size, on a surface that faces the light.
-        let irradiance = 2.4;
-        let radiance = irradiance * (distance / side).powi(2);
-        let warm = Rgb::new(1.0, 0.96, 0.9);
-        Light::Quad(QuadLight { corners, radiance: warm * radiance as f32, two_sided: false })
+        let radiance = KEY_COLOUR * (KEY_IRRADIANCE * (distance / side).powi(2)) as f32;
+        Light::Quad(QuadLight { corners, radiance, two_sided: false })
     }
 }
 

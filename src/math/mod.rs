@@ -3,7 +3,7 @@
 //! Geometry is computed in f64 ([`DVec3`]) and stored in f32 where Embree needs it; colour is
 //! linear f32 ([`Rgb`]). Nothing here knows what a scene is.
 
-pub use glam::{DAffine2, DAffine3, DMat3, DQuat, DVec2, DVec3, Vec2, Vec3};
+pub use glam::{DAffine2, DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3, Vec2, Vec3};
 
 mod bounds;
 pub mod bulk;

@@ -149,7 +149,10 @@ impl View {
             forward: camera.forward,
             right: by_pixels(camera.half_right, half[0]),
             up: by_pixels(camera.half_up, half[1]),
-            middle: half.map(|half| half - 0.5),
+            middle: [
+                half[0] - half[0] * camera.middle[0] - 0.5,
+                half[1] + half[1] * camera.middle[1] - 0.5,
+            ],
             size: size.map(|size| size as i32),
             pixel_size: camera.pixel_size(),
         }

@@ -23,7 +23,7 @@ use std::path::Path;
 /// Name of the attribute of an exr file that holds the record.
 pub const ATTRIBUTE: &str = "tweenrayReference";
 /// First bytes of a record; the last letter is the layout's version.
-const MAGIC: &[u8; 8] = b"twrayrf4";
+const MAGIC: &[u8; 8] = b"twrayrf5";
 /// Number of 32-bit words of a point, without its ratios and the numbers of their lights.
 const WORDS: usize = 12;
 /// Bytes of a finding.

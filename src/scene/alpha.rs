@@ -30,9 +30,9 @@ pub struct AlphaMask {
 impl AlphaMask {
     /// Whether the surface is there at `uv`, of which (0, 0) is the lower left corner of the image: whether the alpha
     /// between the middles of the four texels around it, bilinear, is at least a half.
-    pub fn is_there(&self, wrap: Wrap, uv: Vec2) -> bool {
-        let (x0, x1, fx) = wrap.two_texels(uv.x, self.width);
-        let (y0, y1, fy) = wrap.two_texels(1.0 - uv.y, self.height);
+    pub fn is_there(&self, wrap: [Wrap; 2], uv: Vec2) -> bool {
+        let (x0, x1, fx) = wrap[0].two_texels(uv.x, self.width);
+        let (y0, y1, fy) = wrap[1].two_texels(1.0 - uv.y, self.height);
         let at = |x: usize, y: usize| f32::from(self.texels[y * self.width as usize + x]);
         let between = |a: f32, b: f32, share: f32| a + (b - a) * share;
         let upper = between(at(x0, y0), at(x1, y0), fx);
@@ -75,7 +75,7 @@ mod tests {
     fn below_a_half_is_a_hole() {
         for (texel, there) in [(0, false), (127, false), (128, true), (255, true)] {
             assert_eq!(
-                mask(1, &[texel]).is_there(Wrap::Repeat, Vec2::new(0.3, 0.6)),
+                mask(1, &[texel]).is_there([Wrap::Repeat; 2], Vec2::new(0.3, 0.6)),
                 there,
                 "{texel}"
             );
@@ -90,7 +90,7 @@ mod tests {
             for j in 0..100 {
                 let (u, v) = ((i as f32 + 0.5) / 100.0, (j as f32 + 0.5) / 100.0);
                 let there = (u < 0.5) == (v < 0.5);
-                assert_eq!(checker.is_there(Wrap::Repeat, Vec2::new(u, v)), there, "{u} {v}");
+                assert_eq!(checker.is_there([Wrap::Repeat; 2], Vec2::new(u, v)), there, "{u} {v}");
             }
         }
     }
@@ -100,20 +100,20 @@ mod tests {
         // Texel middles at 0.25 and 0.75: 100 and 200, so a half is reached at 0.25 + 0.5 · 27.5 / 100.
         let slope = mask(2, &[100, 200]);
         let edge = 0.25 + 0.5 * 0.275;
-        assert!(!slope.is_there(Wrap::Repeat, Vec2::new(edge - 1e-5, 0.5)));
-        assert!(slope.is_there(Wrap::Repeat, Vec2::new(edge + 1e-5, 0.5)));
+        assert!(!slope.is_there([Wrap::Repeat; 2], Vec2::new(edge - 1e-5, 0.5)));
+        assert!(slope.is_there([Wrap::Repeat; 2], Vec2::new(edge + 1e-5, 0.5)));
     }
 
     #[test]
     fn coordinates_repeat_and_never_leave_the_image() {
         let checker = mask(2, &[0, 255, 255, 0]);
         for whole in [-3.0, -1.0, 0.0, 1.0, 7.0] {
-            assert!(checker.is_there(Wrap::Repeat, Vec2::new(whole + 0.25, 0.25 - whole)));
-            assert!(!checker.is_there(Wrap::Repeat, Vec2::new(whole + 0.25, 0.75 - whole)));
+            assert!(checker.is_there([Wrap::Repeat; 2], Vec2::new(whole + 0.25, 0.25 - whole)));
+            assert!(!checker.is_there([Wrap::Repeat; 2], Vec2::new(whole + 0.25, 0.75 - whole)));
         }
         for bad in [1e30, -1e30, 8_388_607.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e-30] {
             // No panic is what counts.
-            let _ = checker.is_there(Wrap::Repeat, Vec2::new(bad, bad));
+            let _ = checker.is_there([Wrap::Repeat; 2], Vec2::new(bad, bad));
         }
     }
 
@@ -127,7 +127,7 @@ mod tests {
         for (u, there) in [(0.06, true), (0.19, false), (0.31, true), (0.94, false)] {
             assert_eq!(laid.is_there(Vec2::new(u, 0.25)), there, "{u}");
         }
-        let clamped = TextureMap { wrap: Wrap::Clamp, ..map };
+        let clamped = TextureMap { wrap: [Wrap::Clamp; 2], ..map };
         let laid = LaidMask { mask: &checker, map: &clamped };
         assert!(!laid.is_there(Vec2::new(0.31, 0.25)));
     }

@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::{Lens, Recentring, limits};
+use super::{Lens, Projection, Recentring, limits};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::ray::Ray;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct Pose {
     /// Eye point.
     pub eye: DVec3,
-    /// Point of interest; it projects to the image's centre.
+    /// Point of interest; it projects to the image's centre, unless the picture is shifted.
     pub target: DVec3,
     /// Direction that is up in the image; need not be perpendicular to the view.
     pub up: DVec3,
@@ -52,6 +52,9 @@ pub struct Camera {
     pub half_right: DVec3,
     /// Image-plane vector of half the image's height at distance 1, upwards.
     pub half_up: DVec3,
+    /// Where the middle of the image lies on the image plane, seen from the view axis: in half widths to the right,
+    /// and in half heights upwards.
+    pub middle: [f64; 2],
     /// Image columns.
     pub width: u32,
     /// Image rows.
@@ -60,16 +63,12 @@ pub struct Camera {
     pub lens: Lens,
 }
 
-/// Narrowest field of view, degrees, and distance of the widest from 180: below it the directions
-/// of neighbouring pixels would be the same numbers.
-const LEAST_VFOV: f64 = 1e-6;
-
 /// Sines of the angle between view and up below this are mostly rounding error.
 const POLE: f64 = 1e-9;
 
 impl Camera {
     /// Bytes of its [`encode`](Self::encode).
-    pub const BYTES: usize = 8 * (12 + Lens::NUMBERS) + 2 * 4;
+    pub const BYTES: usize = 8 * (14 + Lens::NUMBERS) + 2 * 4;
 
     /// A pinhole camera at `pose` with the vertical field of view `vfov_degrees` (1e-6 to 180 − 1e-6).
     ///
@@ -79,7 +78,19 @@ impl Camera {
     /// Errors ([`Error::Usage`]): eye equal to target or so near that rounding decides the view,
     /// numbers that are not finite, a field of view out of range, an image without pixels.
     pub fn new(pose: &Pose, vfov_degrees: f64, width: u32, height: u32) -> Result<Self> {
-        Self::check_vfov(vfov_degrees)?;
+        Self::with_projection(pose, &Projection::centred(vfov_degrees), width, height)
+    }
+
+    /// As [`new`](Self::new), with another projection than the centred one.
+    ///
+    /// Errors ([`Error::Usage`]): those of `new`; a shift or a shape of pixels out of range.
+    pub fn with_projection(
+        pose: &Pose,
+        projection: &Projection,
+        width: u32,
+        height: u32,
+    ) -> Result<Self> {
+        projection.check()?;
         if width == 0 || height == 0 {
             return Err(Error::Usage(format!("the image size {width}x{height} has no pixels")));
         }
@@ -89,13 +100,15 @@ impl Camera {
         let roll = (pose.roll_degrees % 360.0).to_radians();
         let (sin, cos) = (libm::sin(roll), libm::cos(roll));
         let (right, up) = (right * cos - up * sin, up * cos + right * sin);
-        let half_height = libm::tan(0.5 * vfov_degrees.to_radians());
-        let half_width = half_height * f64::from(width) / f64::from(height);
+        let half_height = libm::tan(0.5 * projection.vfov_degrees.to_radians());
+        let half_width =
+            half_height * f64::from(width) / f64::from(height) * projection.pixel_aspect;
         Ok(Self {
             eye: pose.eye,
             forward,
             half_right: right * half_width,
             half_up: up * half_height,
+            middle: projection.shift.map(|shift| 2.0 * shift),
             width,
             height,
             lens: Lens::Pinhole,
@@ -105,17 +118,6 @@ impl Camera {
     /// The same camera with another lens.
     pub fn with_lens(self, lens: Lens) -> Self {
         Self { lens, ..self }
-    }
-
-    /// Whether a vertical field of view, degrees, is one that [`Camera::new`] takes.
-    pub(super) fn check_vfov(vfov_degrees: f64) -> Result<()> {
-        if (LEAST_VFOV..=180.0 - LEAST_VFOV).contains(&vfov_degrees) {
-            return Ok(());
-        }
-        Err(Error::Usage(format!(
-            "the vertical field of view is {vfov_degrees} degrees; it must lie between 0 and 180, \
-             and at least {LEAST_VFOV} from either"
-        )))
     }
 
     /// Direction (unit), from the eye, of the image point `(x, y)` in pixels; `(0, 0)` is the upper left
@@ -128,8 +130,8 @@ impl Camera {
     /// The same direction, 1 long along the view axis.
     #[inline(always)] // Once for each camera ray, as what calls it: a call costs a thirtieth of tracing the ray.
     fn toward(&self, x: f64, y: f64) -> DVec3 {
-        let sx = 2.0 * x / f64::from(self.width) - 1.0;
-        let sy = 1.0 - 2.0 * y / f64::from(self.height);
+        let sx = 2.0 * x / f64::from(self.width) - 1.0 + self.middle[0];
+        let sy = 1.0 - 2.0 * y / f64::from(self.height) + self.middle[1];
         self.forward + self.half_right * sx + self.half_up * sy
     }
 
@@ -172,8 +174,8 @@ impl Camera {
         let depth = to.dot(self.forward);
         let sx = to.dot(self.half_right) / (depth * self.half_right.length_squared());
         let sy = to.dot(self.half_up) / (depth * self.half_up.length_squared());
-        let x = 0.5 * (sx + 1.0) * f64::from(self.width);
-        let y = 0.5 * (1.0 - sy) * f64::from(self.height);
+        let x = 0.5 * (sx - self.middle[0] + 1.0) * f64::from(self.width);
+        let y = 0.5 * (1.0 - (sy - self.middle[1])) * f64::from(self.height);
         (depth > 0.0 && x.is_finite() && y.is_finite()).then_some((x, y, depth))
     }
 
@@ -190,9 +192,9 @@ impl Camera {
 
     /// The camera as bytes, little endian: equal for equal cameras, bit for bit, and for no others.
     pub fn encode(&self) -> [u8; Self::BYTES] {
-        let Self { eye, forward, half_right, half_up, width, height, lens } = self;
+        let Self { eye, forward, half_right, half_up, middle, width, height, lens } = self;
         let vectors = [eye, forward, half_right, half_up].into_iter().flat_map(|v| v.to_array());
-        let numbers = vectors.chain(lens.numbers()).flat_map(f64::to_le_bytes);
+        let numbers = vectors.chain(*middle).chain(lens.numbers()).flat_map(f64::to_le_bytes);
         let mut bytes = [0; Self::BYTES];
         let edges = [width, height].into_iter().flat_map(|n| n.to_le_bytes());
         bytes.iter_mut().zip(numbers.chain(edges)).for_each(|(to, byte)| *to = byte);
@@ -209,13 +211,14 @@ impl Camera {
             |i: usize| Some(DVec3::new(number(3 * i)?, number(3 * i + 1)?, number(3 * i + 2)?));
         let mut lens = [0.0; Lens::NUMBERS];
         for (i, of_lens) in lens.iter_mut().enumerate() {
-            *of_lens = number(12 + i)?;
+            *of_lens = number(14 + i)?;
         }
         let camera = Self {
             eye: vector(0)?,
             forward: vector(1)?,
             half_right: vector(2)?,
             half_up: vector(3)?,
+            middle: [number(12)?, number(13)?],
             width: edge(0)?,
             height: edge(1)?,
             lens: Lens::from_numbers(lens)?,
@@ -233,6 +236,7 @@ impl Camera {
             && (self.forward.length() - 1.0).abs() < 1e-6
             && is_length(self.half_right)
             && is_length(self.half_up)
+            && self.middle.iter().all(|x| x.is_finite())
     }
 }
 

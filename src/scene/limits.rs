@@ -26,5 +26,7 @@ pub const STEPS: RangeInclusive<f64> = 0.0..=255.0;
 pub const AMOUNT: RangeInclusive<f64> = 0.0..=1e30;
 /// Instruction sets that Embree has kernels for, narrow to wide.
 pub const ISAS: [&str; 5] = ["sse2", "sse4.2", "avx", "avx2", "avx512"];
+/// Moments of an animation, seconds.
+pub const TIME: RangeInclusive<f64> = -1e9..=1e9;
 /// Frames per second of a video.
 pub const FPS: RangeInclusive<f64> = 1.0..=1000.0;

@@ -22,6 +22,7 @@ mod material;
 mod mesh;
 mod path;
 mod place;
+mod projection;
 mod recentre;
 mod recentring;
 mod reuse;
@@ -51,7 +52,8 @@ pub use light::{
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
 pub use material::{Fresnel, Glass, Material, MaterialId, NormalMap};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
-pub use path::{CameraPath, Easing, KeyPose, Shot};
+pub use path::{CameraPath, Easing, FramePose, KeyPose, Shot};
+pub use projection::{Projection, ProjectionKey};
 pub use recentring::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{

@@ -10,9 +10,9 @@ mod level;
 mod tests;
 
 use super::spline::{self, Timed, catmull_rom};
-use super::{Camera, Pose, ShotLens};
+use super::{Camera, Pose, Projection, ProjectionKey, ShotLens};
 use crate::error::{Error, Result};
-use crate::math::DVec3;
+use crate::math::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A camera move: path, timing and lens.
@@ -39,6 +39,9 @@ pub struct Shot {
     pub frames: u32,
     /// Vertical field of view, degrees.
     pub vfov_degrees: f64,
+    /// The projection at moments of the path, joined as key poses are, but never beyond the values of the two keys
+    /// around a moment. Empty: `vfov_degrees` in every frame, centred, with square pixels.
+    pub projections: Vec<ProjectionKey>,
     /// The lens and its focus.
     pub lens: ShotLens,
 }
@@ -92,6 +95,9 @@ pub enum CameraPath {
         /// Roll, degrees.
         roll_degrees: f64,
     },
+    /// A pose and a field of view for each frame of the shot, as another program's animation gives them. Frames are taken
+    /// as they stand: nothing is smoothed, `easing` does nothing, and images may turn as the poses do.
+    Frames(Vec<FramePose>),
 }
 
 /// A pose at a moment of the path.
@@ -101,6 +107,15 @@ pub struct KeyPose {
     pub at: f64,
     /// The pose there.
     pub pose: Pose,
+}
+
+/// The camera of one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FramePose {
+    /// The pose.
+    pub pose: Pose,
+    /// Vertical field of view, degrees; in place of the shot's.
+    pub vfov_degrees: f64,
 }
 
 /// How progress along the path depends on time.
@@ -136,7 +151,8 @@ impl Easing {
 impl Shot {
     /// A move of `frames` frames along `path`, evenly spread, through a pinhole.
     pub fn new(path: CameraPath, frames: u32, vfov_degrees: f64) -> Self {
-        Self { path, easing: Easing::Linear, frames, vfov_degrees, lens: ShotLens::Pinhole }
+        let (easing, projections, lens) = (Easing::Linear, Vec::new(), ShotLens::Pinhole);
+        Self { path, easing, frames, vfov_degrees, projections, lens }
     }
 
     /// Checks the whole shot: path, lens, and a camera for every frame.
@@ -145,7 +161,7 @@ impl Shot {
     pub fn validate(&self) -> Result<()> {
         // The lens first: a wrong one is no single frame's fault.
         check::shot(self)?;
-        (1..=self.frames).try_for_each(|frame| self.camera(frame, 1, 1).map(drop))
+        (1..=self.frames).try_for_each(|frame| self.camera_of_checked(frame, 1, 1).map(drop))
     }
 
     /// The pose at `frame`, from 1 to `frames`.
@@ -154,11 +170,20 @@ impl Shot {
     /// before: then it is chosen so that the image moves without a jump.
     pub fn pose(&self, frame: u32) -> Result<Pose> {
         check::shot(self)?;
+        self.pose_of_checked(frame)
+    }
+
+    /// The pose at `frame` of a shot whose path was checked: that takes a while for each of many key poses.
+    fn pose_of_checked(&self, frame: u32) -> Result<Pose> {
         if !(1..=self.frames).contains(&frame) {
             let last = self.frames;
             return Err(Error::Usage(format!(
                 "frame {frame} is not one of the shot's 1 to {last}"
             )));
+        }
+        if let CameraPath::Frames(frames) = &self.path {
+            let pose = frames[frame as usize - 1].pose;
+            return check::frame_pose(&pose, frame).map(|()| pose);
         }
         let progress = self.progress(frame);
         let mut pose = self.path.pose(progress);
@@ -175,8 +200,22 @@ impl Shot {
 
     /// The camera at `frame`, world space, for an image of `width` by `height` pixels.
     pub fn camera(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
-        let pose = self.pose(frame)?;
-        let camera = Camera::new(&pose, self.vfov_degrees, width, height);
+        check::shot(self)?;
+        self.camera_of_checked(frame, width, height)
+    }
+
+    /// The projection at `frame`, one of the shot's.
+    fn projection(&self, frame: u32) -> Projection {
+        match self.projections.as_slice() {
+            [] => Projection::centred(self.vfov_degrees_at(frame)),
+            keys => Projection::at(keys, self.progress(frame)),
+        }
+    }
+
+    fn camera_of_checked(&self, frame: u32, width: u32, height: u32) -> Result<Camera> {
+        let pose = self.pose_of_checked(frame)?;
+        let projection = self.projection(frame);
+        let camera = Camera::with_projection(&pose, &projection, width, height);
         let camera = camera.map_err(|error| match error {
             Error::Usage(what) => Error::Usage(format!("frame {frame} of {}: {what}", self.frames)),
             other => other,
@@ -190,6 +229,31 @@ impl Shot {
             )));
         }
         Ok(camera.with_lens(lens))
+    }
+
+    /// Moves every pose of a still camera, or of a path that has one for each frame, by `transform`, a similarity. Other
+    /// paths stay.
+    pub fn apply_transform(&mut self, transform: &DAffine3) {
+        let moved = |pose: &mut Pose| {
+            pose.eye = transform.transform_point3(pose.eye);
+            pose.target = transform.transform_point3(pose.target);
+            pose.up = transform.transform_vector3(pose.up).normalize_or(pose.up);
+        };
+        match &mut self.path {
+            CameraPath::Still(pose) => moved(pose),
+            CameraPath::Frames(frames) => {
+                frames.iter_mut().for_each(|frame| moved(&mut frame.pose))
+            }
+            _ => {}
+        }
+    }
+
+    /// The vertical field of view at `frame`, one of the shot's; degrees.
+    pub fn vfov_degrees_at(&self, frame: u32) -> f64 {
+        match &self.path {
+            CameraPath::Frames(frames) => frames[frame as usize - 1].vfov_degrees,
+            _ => self.vfov_degrees,
+        }
     }
 
     /// Eased progress along the path at `frame`.
@@ -216,6 +280,9 @@ impl CameraPath {
                 Pose { eye, target: *target, up: *axis, roll_degrees: *roll_degrees }
             }
             Self::Keys(keys) => key_pose(keys, progress),
+            Self::Frames(frames) => {
+                frames[(progress * (frames.len() - 1) as f64).round() as usize].pose
+            }
             Self::BSpline { points, target, up, roll_degrees } => {
                 let eye = spline::b_spline(points, progress);
                 Pose { eye, target: *target, up: *up, roll_degrees: *roll_degrees }

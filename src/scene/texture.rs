@@ -53,8 +53,8 @@ enum Texels {
 pub struct TextureMap {
     /// The image: index into `Scene::textures`, or into `Scene::masks` where it is a mask.
     pub image: u32,
-    /// What is seen beyond the image's edges.
-    pub wrap: Wrap,
+    /// What is seen beyond the image's edges at its sides, and above and below.
+    pub wrap: [Wrap; 2],
     /// From the surface's texture coordinates to the image's, of which `(0, 0)` is the lower left corner and
     /// `(1, 1)` the upper right one.
     pub transform: DAffine2,
@@ -74,19 +74,19 @@ pub enum Wrap {
 impl TextureMap {
     /// The image where the texture coordinates put it, repeated.
     pub fn of(image: u32) -> Self {
-        Self { image, wrap: Wrap::Repeat, transform: DAffine2::IDENTITY }
+        Self { image, wrap: [Wrap::Repeat; 2], transform: DAffine2::IDENTITY }
     }
 
     /// The image's coordinates at the surface's texture coordinates `uv`; where the image repeats, less whole
     /// repetitions, lest f32 rounds the rest away.
     pub fn place(&self, uv: Vec2) -> Vec2 {
-        let near = |x: f64| match self.wrap {
+        let near = |x: f64, wrap: Wrap| match wrap {
             Wrap::Repeat if x.abs() > 1.0 => x - x.floor(),
             Wrap::Mirror if x.abs() > 1.0 => x - 2.0 * (0.5 * x).floor(),
             Wrap::Repeat | Wrap::Mirror | Wrap::Clamp => x,
         };
         let uv = self.transform.transform_point2(uv.as_dvec2());
-        Vec2::new(near(uv.x) as f32, near(uv.y) as f32)
+        Vec2::new(near(uv.x, self.wrap[0]) as f32, near(uv.y, self.wrap[1]) as f32)
     }
 }
 

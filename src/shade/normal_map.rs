@@ -30,11 +30,14 @@ pub(super) fn normal(
     let footprint = cone.footprint(scene, si, wo);
     let shares = texture::mapped(scene, &map.image, si.uv, footprint).as_dvec3();
     let mut local = (shares * 2.0 - DVec3::ONE) * DVec3::new(map.strength, map.strength, 1.0);
-    if map.image.wrap == Wrap::Mirror {
+    if map.image.wrap.contains(&Wrap::Mirror) {
         // Every other copy of the image lies the other way round, and so do its normals.
         let place = map.image.place(si.uv);
-        local.x *= side_of_copy(f64::from(place.x));
-        local.y *= side_of_copy(f64::from(place.y));
+        let side = |at: f32, wrap| {
+            if wrap == Wrap::Mirror { side_of_copy(f64::from(at)) } else { 1.0 }
+        };
+        local.x *= side(place.x, map.image.wrap[0]);
+        local.y *= side(place.y, map.image.wrap[1]);
     }
     let n = tangent * local.x + bitangent * local.y + si.ns * local.z;
     // The mean of opposite normals has no direction. A normal below the facet is no surface's: level with it, at most.

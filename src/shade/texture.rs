@@ -18,7 +18,7 @@ pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec
     let TextureMap { image, wrap, transform } = map;
     let uv = map.place(uv);
     let footprint = footprint.map(|axis| transform.transform_vector2(axis));
-    filtered(&scene.textures[*image as usize], [*wrap; 2], uv, footprint)
+    filtered(&scene.textures[*image as usize], *wrap, uv, footprint)
 }
 
 /// What an image of shares says at a point, its mean over what the ray covers; 1 without an image. An image that was made
@@ -216,7 +216,7 @@ mod tests {
         let scene = scene(Texture::from_linear("ramp", [64, 1], ramp));
         let transform = DAffine2::from_scale(DVec2::splat(100.0));
         for (wrap, expected) in [(Wrap::Repeat, 12.3), (Wrap::Mirror, 12.3)] {
-            let map = TextureMap { image: 0, wrap, transform };
+            let map = TextureMap { image: 0, wrap: [wrap; 2], transform };
             // 100 · 1.25 = 125 is odd, so what is mirrored runs backwards: at 1.24 it does not.
             let u = (124.0 + (12.3 + 0.5) / 64.0) / 100.0;
             let seen = mapped(&scene, &map, Vec2::new(u as f32, 0.5), POINT).x;

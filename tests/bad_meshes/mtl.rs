@@ -254,7 +254,7 @@ fn options_say_how_images_lie() {
     for (materials, (scale, offset, wrap)) in model.world.materials.chunks(2).zip(expected) {
         let [shown, masked] = materials else { panic!("two materials") };
         let map = shown.texture.expect("a texture");
-        assert_eq!((map.image, map.wrap), (0, wrap));
+        assert_eq!((map.image, map.wrap), (0, [wrap; 2]));
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.3, -0.7)] {
             let at = map.transform.transform_point2(DVec2::new(x, y));
             let wanted = DVec2::new(x * scale[0] + offset[0], y * scale[1] + offset[1]);

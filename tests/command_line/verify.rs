@@ -104,7 +104,7 @@ fn a_folder_and_an_empty_scene_are_refused() {
     job.refused("verify .", "./scene.toml");
     job.refused("render .", "folder");
     fs::create_dir(job.path("bare")).expect("a folder");
-    job.refused("verify bare", ".toml, .obj or .ply");
+    job.refused("verify bare", ".toml, .obj, .ply, .glb or .gltf");
     job.refused("verify scene.toml", "no geometry");
 }
 

@@ -31,9 +31,6 @@ pub struct JobArgs {
     /// Make a video even where the scene file says not to
     #[arg(long)]
     pub video: bool,
-    /// Frames per second of the video [default: 24]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::within(limits::FPS))]
-    pub fps: Option<f64>,
     /// Write maps of where each frame's light comes from (traced or inferred, from which frame, at what
     /// distance), of its audited errors, and with --spp MIN..MAX of the numbers of camera samples; as pictures
     /// beside png and ppm frames, as channels of exr frames
@@ -92,7 +89,6 @@ impl JobArgs {
         o.overwrite |= self.overwrite;
         o.strict |= self.strict;
         o.video = self.video || (o.video && !self.no_video);
-        put(&mut o.fps, self.fps);
         o.maps |= self.maps;
         o.references.extend_from_slice(&self.references);
         o.uploads.extend_from_slice(&self.upload);

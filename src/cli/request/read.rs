@@ -72,6 +72,9 @@ pub fn place(
 ) -> Result<(FrameRange, FramePattern)> {
     let count = loaded.shot.frames;
     job.apply(&mut loaded.options, count)?;
+    if let Some(fps) = scene.fps {
+        loaded.options.fps = fps;
+    }
     let frames = loaded.options.frames.unwrap_or(FrameRange { first: 1, last: count });
     let default = || default_output(&scene.scene);
     let name = loaded.options.output.clone().unwrap_or_else(default);

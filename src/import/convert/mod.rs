@@ -8,6 +8,7 @@ mod write_ply;
 
 pub use write_ply::{PlyReport, write_ply};
 
+use super::ModelOptions;
 use super::mesh_file::read_model;
 use crate::error::{Diagnostic, Error, Result};
 use std::fs;
@@ -34,7 +35,7 @@ pub fn convert(input: &Path, output: &Path) -> Result<ConvertReport> {
         let name = output.display();
         return Err(Error::Usage(format!("cannot write {name}: meshes are written as .ply only")));
     }
-    let model = read_model(input)?;
+    let model = read_model(input, &ModelOptions::default())?;
     let mut warnings = model.warnings;
     let world = model.world;
     let mut lost = Vec::new();

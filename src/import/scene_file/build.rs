@@ -210,7 +210,7 @@ impl<'a> Builder<'a> {
 
     fn read_model(&mut self, file: &At<String>, mesh: &Mesh, bare: bool) -> Result<World> {
         let path = self.beside(file);
-        let Model { mut world, warnings, files } = import::load_model(&path, mesh.policy())
+        let Model { mut world, warnings, files, .. } = import::load_model(&path, mesh.policy())
             .map_err(|e| match e {
                 Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
                 other => self.at_key(file, &other),

@@ -1,18 +1,25 @@
 //! `[camera]`: lens, timing and path.
 
+mod colmap;
 mod lens;
+mod nerf;
 mod path;
+mod posed;
+mod poses;
+#[cfg(test)]
+mod tests;
 
 use super::at::At;
-use super::number::{Degrees, FieldOfView, Int, Share};
-use super::vector::{Direction, Point};
+use super::number::{Degrees, FieldOfView, Int, PixelAspect, Share, Shift};
+use super::vector::{Direction, List, Point};
 use crate::math::DVec3;
 use crate::scene::Easing;
 use lens::{KeyLens, Lens};
+use poses::Poses;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The camera and its move: at most one of `still`, `pan`, `orbit`, `keys` and `bspline`. With
+/// The camera and its move: at most one of `still`, `pan`, `orbit`, `keys`, `bspline` and `poses`. With
 /// none of them the camera orbits the scene once.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -21,7 +28,9 @@ use serde::Deserialize;
     {"required": ["still", "keys"]}, {"required": ["still", "bspline"]},
     {"required": ["pan", "orbit"]}, {"required": ["pan", "keys"]},
     {"required": ["pan", "bspline"]}, {"required": ["orbit", "keys"]},
-    {"required": ["orbit", "bspline"]}, {"required": ["keys", "bspline"]}
+    {"required": ["orbit", "bspline"]}, {"required": ["keys", "bspline"]},
+    {"required": ["still", "poses"]}, {"required": ["pan", "poses"]}, {"required": ["orbit", "poses"]},
+    {"required": ["keys", "poses"]}, {"required": ["bspline", "poses"]}
 ]}))]
 pub(super) struct Camera {
     /// Vertical field of view, degrees.
@@ -39,6 +48,12 @@ pub(super) struct Camera {
     /// Turn about the view axis, degrees; positive tilts the camera clockwise.
     #[serde(default = "no_roll")]
     roll: Degrees,
+    /// By how much of its width to the right, and of its height upwards, the picture lies off the view axis.
+    #[serde(default = "no_shift")]
+    shift: List<Shift, 2>,
+    /// Width of a pixel over its height.
+    #[serde(default = "square")]
+    pixel_aspect: PixelAspect,
     /// A thin lens, with depth of field. Absent: everything is sharp.
     lens: Option<At<Lens>>,
     /// A camera that does not move.
@@ -51,6 +66,9 @@ pub(super) struct Camera {
     keys: Option<At<Vec<At<Key>>>>,
     /// A uniform cubic B-spline: from the first to the last of its points, close to the others.
     bspline: Option<At<BSpline>>,
+    /// One pose a frame from a file, relative to the scene file: `transforms.json` of a NeRF data set, or COLMAP's
+    /// `images.txt` with its `cameras.txt`. Or a table of the file and the axis that points up in it.
+    poses: Option<At<Poses>>,
 }
 
 /// A camera that does not move.
@@ -105,6 +123,10 @@ pub(super) struct Key {
     up: Option<Direction>,
     /// Turn about the view axis, degrees. Absent: the camera's `roll`.
     roll: Option<Degrees>,
+    /// Vertical field of view here, degrees. Absent: the camera's `fov`.
+    fov: Option<FieldOfView>,
+    /// Shift of the picture here. Absent: the camera's `shift`.
+    shift: Option<List<Shift, 2>>,
     /// The lens here. Absent: the camera's `lens`.
     lens: Option<At<KeyLens>>,
 }
@@ -136,6 +158,14 @@ fn no_roll() -> Degrees {
     Degrees(0.0)
 }
 
+fn no_shift() -> List<Shift, 2> {
+    List([Shift(0.0); 2])
+}
+
+fn square() -> PixelAspect {
+    PixelAspect(1.0)
+}
+
 fn full_turn() -> Degrees {
     Degrees(360.0)
 }
@@ -148,12 +178,15 @@ impl Default for Camera {
             easing: linear(),
             up: y_up(),
             roll: no_roll(),
+            shift: no_shift(),
+            pixel_aspect: square(),
             lens: None,
             still: None,
             pan: None,
             orbit: None,
             keys: None,
             bspline: None,
+            poses: None,
         }
     }
 }

@@ -22,7 +22,7 @@ use serde::Deserialize;
 pub(super) struct Mesh {
     /// Name in messages. Absent: the file's name or the kind.
     pub name: Option<String>,
-    /// Mesh file, relative to the scene file: .obj (with .mtl) or .ply.
+    /// Mesh file, relative to the scene file: .obj (with .mtl), .ply, .glb or .gltf.
     pub file: Option<At<String>>,
     /// A box with faces along the axes.
     #[serde(rename = "box")]
@@ -35,7 +35,7 @@ pub(super) struct Mesh {
     pub terrain: Option<At<Terrain>>,
     /// Name of a `[material.NAME]`. Absent: what the file says, else a light grey.
     pub material: Option<At<String>>,
-    /// Shading normals. "auto": the file's own where it has them, else as "smooth"; generated meshes keep
+    /// Shading normals. "auto": the file's own where it has them, else as "smooth" (of glTF: "flat"); generated meshes keep
     /// their own. "flat": the normal of each triangle's plane. "smooth": averaged at each vertex.
     #[serde(default = "auto")]
     pub normals: Normals,

@@ -94,12 +94,13 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     if let Some((width, height)) = options.size {
         (settings.width, settings.height) = (width, height);
     }
-    let Builder { world, warnings, files, .. } = Builder::build(&source, &file)?;
+    let Builder { world, warnings, mut files, .. } = Builder::build(&source, &file)?;
     let aspect = f64::from(settings.width.max(1)) / f64::from(settings.height.max(1));
     let shot = match &file.camera {
         Some(camera) => camera.build(&source, &world, aspect)?,
         None => Camera::default().build(&source, &world, aspect)?,
     };
+    files.extend(file.camera.iter().flat_map(|camera| camera.pose_files(&source)));
     let options = file.settings.job(&source, shot.frames)?;
     let output_place = file.settings.output_place(&source);
     Ok(Loaded { options, output_place, warnings, files, ..Loaded::new(world, shot, settings) })

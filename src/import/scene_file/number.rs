@@ -105,6 +105,16 @@ number!(
     { "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 180 }
 );
 number!(
+    /// How far the picture lies off the view axis, as a share of its width or height.
+    Shift: "a number from -1000 to 1000", |x| x.abs() <= 1e3,
+    { "type": "number", "minimum": -1e3, "maximum": 1e3 }
+);
+number!(
+    /// Width of a pixel over its height.
+    PixelAspect: "a number from 0.001 to 1000", |x| (1e-3..=1e3).contains(&x),
+    { "type": "number", "minimum": 1e-3, "maximum": 1e3 }
+);
+number!(
     /// An angle between faces, degrees.
     Crease: "an angle in degrees from 0 to 180", |x| (0.0..=180.0).contains(&x),
     { "type": "number", "minimum": 0, "maximum": 180 }

@@ -177,7 +177,7 @@ fn map(
     let angle = rotate.0.to_radians();
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     let axes = [DVec2::new(cos, sin) * scale.x, DVec2::new(-sin, cos) * scale.y];
-    TextureMap { image, wrap, transform: DAffine2::from_cols(axes[0], axes[1], offset) }
+    TextureMap { image, wrap: [wrap; 2], transform: DAffine2::from_cols(axes[0], axes[1], offset) }
 }
 
 /// A table, of which the file's name alone may stand for all.

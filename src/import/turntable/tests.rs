@@ -78,7 +78,7 @@ fn the_lamp_shines_on_the_mesh_from_the_upper_left_at_any_size() {
 
 #[test]
 fn up_and_scale_turn_the_mesh_upright() {
-    let options = LoadOptions { up: UpAxis::Z, scale: 2.0, size: None };
+    let options = LoadOptions { up: UpAxis::Z, scale: 2.0, ..LoadOptions::default() };
     let loaded = turntable(CUBE, &options);
     let mut only_mesh = loaded.world.clone();
     only_mesh.meshes.truncate(1);

@@ -114,10 +114,13 @@ proptest! {
         (roll, vfov) in (-400.0f64..400.0, 0.1f64..170.0),
         (w, h) in (1u32..5000, 1u32..5000),
         (u, v, distance) in (0.0f64..1.0, 0.0f64..1.0, 1e-3f64..1e3),
+        (right, upwards, pixel_aspect) in (-1.0f64..1.0, -1.0f64..1.0, 0.5f64..2.0),
     ) {
         prop_assume!(eye.distance(target) > 1e-3);
         let pose = Pose { eye, target, up, roll_degrees: roll };
-        let c = Camera::new(&pose, vfov, w, h).expect("an ordinary camera");
+        let projection = Projection { vfov_degrees: vfov, shift: [right, upwards], pixel_aspect };
+        let c = Camera::with_projection(&pose, &projection, w, h).expect("an ordinary camera");
+        prop_assert_eq!(Camera::decode(&c.encode()), Some(c));
         let (x, y) = (u * f64::from(w), v * f64::from(h));
         let direction = c.direction(x, y);
         prop_assert!((direction.length() - 1.0).abs() < 1e-15);

@@ -1,10 +1,10 @@
 //! Errors of a shot that do not depend on the frame.
 
 use super::level::unit;
-use super::{CameraPath, KeyPose, Shot};
+use super::{CameraPath, KeyPose, ProjectionKey, Shot};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
-use crate::scene::{Camera, Pose};
+use crate::scene::{Pose, Projection};
 
 /// More frames than this are taken for a slip: nine hours of video.
 const MOST_FRAMES: u32 = 1_000_000;
@@ -21,7 +21,8 @@ pub fn shot(shot: &Shot) -> Result<()> {
     if !(1..=MOST_FRAMES).contains(&shot.frames) {
         return fault(format!("the shot has {} frames; 1 to {MOST_FRAMES} can be", shot.frames));
     }
-    Camera::check_vfov(shot.vfov_degrees)?;
+    Projection::check_vfov(shot.vfov_degrees)?;
+    projections(&shot.projections)?;
     shot.lens.check()?;
     match &shot.path {
         CameraPath::Still(p) => pose(p, "the camera"),
@@ -34,6 +35,11 @@ pub fn shot(shot: &Shot) -> Result<()> {
             orbit(*eye - *target, *axis, *degrees)
         }
         CameraPath::Keys(all) => keys(all),
+        // Each pose is checked where it is asked for: there may be as many as frames.
+        CameraPath::Frames(all) if all.len() == shot.frames as usize => Ok(()),
+        CameraPath::Frames(all) => {
+            fault(format!("the path has {} poses for {} frames", all.len(), shot.frames))
+        }
         CameraPath::BSpline { points, target, up, roll_degrees } => {
             if points.len() < 4 {
                 return fault(format!(
@@ -45,6 +51,18 @@ pub fn shot(shot: &Shot) -> Result<()> {
             fixed(points[0], *target, *up, *roll_degrees, "the B-spline")
         }
     }
+}
+
+fn projections(keys: &[ProjectionKey]) -> Result<()> {
+    if !keys.windows(2).all(|pair| pair[0].at < pair[1].at) {
+        return fault("the projection needs keys whose times increase");
+    }
+    keys.iter().try_for_each(|key| key.projection.check())
+}
+
+/// The pose of one frame of a path that has one for each.
+pub fn frame_pose(of: &Pose, frame: u32) -> Result<()> {
+    pose(of, &format!("frame {frame}"))
 }
 
 fn finite(p: DVec3, name: &str) -> Result<()> {

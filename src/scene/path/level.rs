@@ -86,6 +86,6 @@ fn eyes_and_targets(path: &CameraPath) -> Option<(Vec<(DVec3, DVec3)>, DVec3)> {
             let same = keys.iter().all(|k| k.pose.up == up);
             same.then(|| (keys.iter().map(|k| (k.pose.eye, k.pose.target)).collect(), up))
         }
-        CameraPath::Still(_) | CameraPath::Orbit { .. } => None,
+        CameraPath::Still(_) | CameraPath::Orbit { .. } | CameraPath::Frames(_) => None,
     }
 }

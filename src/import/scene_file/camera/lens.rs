@@ -3,7 +3,7 @@
 use super::{Camera, Key};
 use crate::error;
 use crate::import::scene_file::at::{At, Span};
-use crate::import::scene_file::number::{Degrees, Int, NotNegative, Positive};
+use crate::import::scene_file::number::{Degrees, FieldOfView, Int, NotNegative, Positive};
 use crate::import::scene_file::report::Source;
 use crate::import::scene_file::schema::inline_schema;
 use crate::scene::{CameraPath, Focus, LensKey, ShotLens, ThinLensPath};
@@ -129,13 +129,14 @@ impl Camera {
         let at_key = |key: &At<Key>, at: f64| {
             let lens = key.lens.as_ref();
             let span = lens.map_or(&key.span, |lens| &lens.span);
-            self.lens_key(at, &lens.map_or(own, |lens| lens.given().or(own)), source, span)
+            let given = lens.map_or(own, |lens| lens.given().or(own));
+            self.lens_key((at, key.fov.unwrap_or(self.fov)), &given, source, span)
         };
         let keys = match path {
-            CameraPath::Keys(poses) => {
+            CameraPath::Keys(poses) if self.keys.is_some() => {
                 keys.iter().zip(poses).map(|(key, pose)| at_key(key, pose.at)).collect()
             }
-            _ => self.lens_key(0.0, &own, source, first).map(|key| vec![key]),
+            _ => self.lens_key((0.0, self.fov), &own, source, first).map(|key| vec![key]),
         }?;
         let own = self.lens.as_ref();
         let blades = own.and_then(|lens| lens.blades).map_or(0, Int::u32);
@@ -143,10 +144,10 @@ impl Camera {
         Ok(ShotLens::Thin(ThinLensPath { keys, blades, blade_rotation_degrees: turn }))
     }
 
-    /// The lens at a moment, as it is `given`.
+    /// The lens at a moment with its field of view, as it is `given`.
     fn lens_key(
         &self,
-        at: f64,
+        (at, fov): (f64, FieldOfView),
         given: &Given,
         source: &Source,
         span: &Span,
@@ -160,7 +161,7 @@ impl Camera {
             (None, Some(f_number)) => {
                 let sensor = self.lens.as_ref().and_then(|lens| lens.sensor_height.as_ref());
                 let height = sensor.map_or(FULL_FRAME, |height| height.0);
-                let focal_length = 0.5 * height / libm::tan(0.5 * self.fov.0.to_radians());
+                let focal_length = 0.5 * height / libm::tan(0.5 * fov.0.to_radians());
                 0.5 * focal_length / f_number.0
             }
             (Some(_), Some(f_number)) => {
@@ -214,6 +215,11 @@ impl Camera {
 }
 
 impl Lens {
+    /// Whether it depends neither on a field of view nor on a target.
+    pub(super) fn stands_alone(&self) -> bool {
+        self.f_number.is_none() && matches!(self.focus, Some(Sharp::Distance(_)))
+    }
+
     fn given(&self) -> Given<'_> {
         let Self { radius, f_number, focus, .. } = self;
         Given { radius: radius.as_ref(), f_number: f_number.as_ref(), focus: *focus }

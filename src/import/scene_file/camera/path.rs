@@ -8,7 +8,7 @@ use crate::import::scene_file::number::{Degrees, Int};
 use crate::import::scene_file::report::Source;
 use crate::import::scene_file::vector::Point;
 use crate::math::DVec3;
-use crate::scene::{CameraPath, KeyPose, Pose, Shot, World};
+use crate::scene::{CameraPath, KeyPose, Pose, Projection, ProjectionKey, Shot, World};
 
 /// The pose that all keys of a camera table agree on.
 struct Common {
@@ -27,12 +27,24 @@ impl Camera {
         aspect: f64,
     ) -> Result<Shot> {
         let span = self.only_path(source)?;
-        let path = self.path(source, world, aspect)?;
-        let moves = !matches!(path, CameraPath::Still(_));
+        let (path, projections) = match &self.poses {
+            Some(poses) => self.posed(poses, source, aspect)?,
+            None => {
+                let path = self.path(source, world, aspect)?;
+                let projections = self.projections(&path);
+                (path, projections)
+            }
+        };
         let lens = self.lens(&path, source)?;
+        let usual_frames = match (&path, &self.poses) {
+            (CameraPath::Keys(poses), Some(_)) => poses.len() as u32,
+            (CameraPath::Still(_), _) => 1,
+            _ => 48,
+        };
         let shot = Shot {
-            frames: self.frames.map_or(if moves { 48 } else { 1 }, Int::u32),
+            frames: self.frames.map_or(usual_frames, Int::u32),
             path,
+            projections,
             easing: self.easing,
             vfov_degrees: self.fov.0,
             lens,
@@ -52,6 +64,7 @@ impl Camera {
             self.orbit.as_ref().map(|p| (p.span.clone(), "orbit")),
             self.keys.as_ref().map(|p| (p.span.clone(), "keys")),
             self.bspline.as_ref().map(|p| (p.span.clone(), "bspline")),
+            self.poses.as_ref().map(|p| (p.span.clone(), "poses")),
         ]
         .into_iter()
         .flatten()
@@ -82,8 +95,32 @@ impl Camera {
             return Ok(spline.path(&common));
         }
         let around = self.orbit.as_ref().map_or(&Orbit::WHOLE, |o| &o.value);
-        let lens = Lens { vfov_degrees: self.fov.0, aspect };
+        let lens = Lens { vfov_degrees: self.fov.0, aspect: aspect * self.pixel_aspect.0 };
         Ok(around.path(&common, world, &lens))
+    }
+}
+
+impl Camera {
+    /// The projections along `path`; none where it is the centred one of square pixels throughout.
+    fn projections(&self, path: &CameraPath) -> Vec<ProjectionKey> {
+        let own = Projection {
+            vfov_degrees: self.fov.0,
+            shift: self.shift.0.map(|shift| shift.0),
+            pixel_aspect: self.pixel_aspect.0,
+        };
+        let at_key = |key: &At<Key>, at: f64| {
+            let vfov_degrees = key.fov.map_or(own.vfov_degrees, |fov| fov.0);
+            let shift = key.shift.map_or(own.shift, |shift| shift.0.map(|x| x.0));
+            ProjectionKey { at, projection: Projection { vfov_degrees, shift, ..own } }
+        };
+        let keys: Vec<_> = match (&self.keys, path) {
+            (Some(keys), CameraPath::Keys(poses)) => {
+                keys.iter().zip(poses).map(|(key, pose)| at_key(key, pose.at)).collect()
+            }
+            _ => vec![ProjectionKey { at: 0.0, projection: own }],
+        };
+        let centred = Projection::centred(self.fov.0);
+        if keys.iter().all(|key| key.projection == centred) { Vec::new() } else { keys }
     }
 }
 

@@ -160,6 +160,14 @@ const RANGES: &[Case] = &[
     ("[camera]\nfov = ¦180\n", "expected an angle in degrees above 0 and below 180, found 180", ""),
     ("[camera]\nfov = ¦0.0\n", "found 0.0", ""),
     ("[camera]\nfov = ¦nan\n", "found NaN", ""),
+    ("[camera]\nshift = [0, ¦2000]\n", "expected a number from -1000 to 1000, found 2000", ""),
+    ("[camera]\nshift = ¦[0]\n", "expected an array of 2 values", ""),
+    ("[camera]\npixel_aspect = ¦0\n", "expected a number from 0.001 to 1000, found 0", ""),
+    (
+        "[camera]\nkeys = [{ eye = [0, 0, 1], target = [0, 0, 0], fov = ¦0 }]\n",
+        "above 0 and below 180",
+        "",
+    ),
     ("[camera]\nframes = ¦0\n", "expected a whole number from 1 to 1000000, found 0", ""),
     ("[camera]\nup = ¦[0, 0, 0]\n", "a direction cannot be [0, 0, 0]", ""),
     (

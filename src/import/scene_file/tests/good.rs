@@ -356,3 +356,26 @@ fn keys_change_the_lens_and_keep_what_they_leave_out() {
         shot.camera(2, 8, 8).expect("two").encode()
     );
 }
+
+#[test]
+fn keys_zoom_and_shift_and_keep_what_they_leave_out() {
+    let keys = "keys = [{ eye = [0, 0, 4], target = [0, 0, 0], fov = 20 },\n\
+                { eye = [0, 0, 4], target = [0, 0, 0], shift = [0.25, -0.5] }]";
+    let shot = good(&format!("[camera]\nfov = 40\nframes = 2\npixel_aspect = 2\n{keys}\n")).shot;
+    let camera = |frame| shot.camera(frame, 100, 50).expect("a camera");
+    let half_height = |degrees: f64| (0.5 * degrees.to_radians()).tan();
+    assert!((camera(1).half_up.length() - half_height(20.0)).abs() < 1e-15);
+    assert!((camera(1).half_right.length() - 4.0 * half_height(20.0)).abs() < 1e-14);
+    assert!((camera(2).half_up.length() - half_height(40.0)).abs() < 1e-15);
+    // The picture lies a quarter of its width to the right: the target is seen that much further left.
+    let (x, y, _) = camera(2).project(DVec3::ZERO).expect("in front");
+    assert!((x - 25.0).abs() < 1e-9 && (y - 0.0).abs() < 1e-9, "{x} {y}");
+    assert!(camera(2).direction(25.0, 0.0).distance(-DVec3::Z) < 1e-12);
+    // An f-number follows the key's own field of view.
+    let text = format!("[camera]\nfov = 40\nlens = {{ f_number = 2, focus = 1 }}\n{keys}\n");
+    let ShotLens::Thin(lens) = good(&text).shot.lens else { panic!("a thin lens") };
+    let radius = |degrees: f64| 0.5 * 0.5 * 0.024 / half_height(degrees) / 2.0;
+    assert!((lens.keys[0].radius - radius(20.0)).abs() < 1e-15);
+    assert!((lens.keys[1].radius - radius(40.0)).abs() < 1e-15);
+    assert!(good("[camera]\nfov = 30\n").shot.projections.is_empty());
+}

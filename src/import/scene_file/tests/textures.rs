@@ -131,7 +131,7 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
         material.texture.expect("a texture")
     };
     assert_eq!(map("a"), TextureMap::of(0));
-    assert_eq!((map("b").image, map("b").wrap), (0, Wrap::Mirror));
+    assert_eq!((map("b").image, map("b").wrap), (0, [Wrap::Mirror; 2]));
     // Scaled to (2, 6), turned to (-6, 2), moved.
     let moved = map("b").transform.transform_point2(DVec2::new(1.0, 2.0));
     assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");

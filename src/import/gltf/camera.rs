@@ -1,0 +1,279 @@
+//! Cameras: the file's own, moved by the animations of its node, of the nodes above, and of its lens.
+
+use super::animation::{Animations, Curve, Property};
+use super::document::Document;
+use super::json::Json;
+use super::node::{Nodes, name_of};
+use super::place::LARGEST;
+use super::uri::shortened;
+use crate::error::{Diagnostic, Result, counted};
+use crate::import::model::{FileCamera, ModelOptions};
+use crate::import::source::Notes;
+use crate::math::{DAffine3, DVec3};
+use crate::scene::{CameraPath, Easing, FramePose, Pose, Shot, ShotLens};
+use std::f64::consts::PI;
+
+/// Most frames that are made of an animation: over an hour at 24 a second.
+const MOST_FRAMES: f64 = 100_000.0;
+/// Most frames times moving nodes between the camera and the scene.
+const MOST_STEPS: f64 = 1e7;
+/// Most cameras that an error lists.
+const MOST_NAMES: usize = 30;
+/// A key this share of a frame after the last one still gets a frame: times are rounded to f32.
+const SLACK: f64 = 0.01;
+
+/// A camera that a node of the scene carries.
+struct Placed<'d> {
+    node: usize,
+    /// Number of the camera in the file.
+    camera: usize,
+    json: Json<'d>,
+    node_name: String,
+    camera_name: String,
+}
+
+/// The camera that `options` name, or the first one with a perspective, and its move. `None` where there is none.
+///
+/// Errors: a name that is not there, an orthographic camera that is named, a move of too many frames, lenses out of range.
+pub(super) fn read(
+    document: &Document<'_>,
+    nodes: &Nodes,
+    animations: &Animations,
+    options: &ModelOptions,
+    notes: &mut Notes,
+) -> Result<Option<FileCamera>> {
+    let all = placed(document, nodes)?;
+    let Some(camera) = choose(document, &all, options, notes)? else { return Ok(None) };
+    let Some(lens) = camera.json.get("perspective") else {
+        let message = format!(
+            "the camera `{}` is orthographic, which cannot be rendered",
+            camera.camera_name
+        );
+        let help = "give it a perspective in the program that wrote the file, or choose another by --camera";
+        return Err(camera.json.fault(message).help(help).into());
+    };
+    let vfov = lens.required("yfov")?;
+    let vfov = lens
+        .number("yfov")?
+        .filter(|angle| (1e-6..PI).contains(angle))
+        .ok_or_else(|| vfov.fault("a vertical field of view lies between 0 and pi, radians"))?;
+    let aspect = match lens.get("aspectRatio") {
+        Some(_) => Some(lens.number_within("aspectRatio", [1e-3, 1e3], 1.0)?),
+        None => None,
+    };
+    let rig = Rig::of(camera, nodes, animations);
+    let frames = rig.frames(document, options)?;
+    let shot = Shot {
+        path: rig.path(camera, frames, vfov, options)?,
+        easing: Easing::Linear,
+        frames: frames.count,
+        vfov_degrees: vfov.to_degrees(),
+        projections: Vec::new(),
+        lens: ShotLens::Pinhole,
+    };
+    Ok(Some(FileCamera { shot, aspect }))
+}
+
+/// All cameras of the scene, in the order of its nodes.
+fn placed<'d>(document: &Document<'d>, nodes: &Nodes) -> Result<Vec<Placed<'d>>> {
+    let mut all = Vec::new();
+    for node in &nodes.shown {
+        let json = &document.nodes[*node];
+        let Some(camera) = json.index("camera", document.cameras.len(), "camera")? else {
+            continue;
+        };
+        all.push(Placed {
+            node: *node,
+            camera,
+            json: document.cameras[camera].clone(),
+            node_name: name_of(json, "node", *node)?,
+            camera_name: name_of(&document.cameras[camera], "camera", camera)?,
+        });
+    }
+    Ok(all)
+}
+
+fn choose<'p, 'd>(
+    document: &Document<'_>,
+    all: &'p [Placed<'d>],
+    options: &ModelOptions,
+    notes: &mut Notes,
+) -> Result<Option<&'p Placed<'d>>> {
+    let Some(wanted) = &options.camera else {
+        let first = all.iter().find(|camera| camera.json.get("perspective").is_some());
+        if let (None, Some(other)) = (first, all.first()) {
+            let name = &other.camera_name;
+            notes.add(&format!("the camera `{name}` is orthographic, which cannot be rendered: the model is shown on a turntable"), None);
+        }
+        return Ok(first);
+    };
+    let by = |name: for<'c> fn(&'c Placed<'d>) -> &'c str| {
+        all.iter().find(|camera| name(camera) == wanted)
+    };
+    let by_number = || wanted.parse::<usize>().ok().and_then(|at| all.get(at));
+    let found = by(|c| &c.node_name).or_else(|| by(|c| &c.camera_name)).or_else(by_number);
+    if found.is_some() {
+        return Ok(found);
+    }
+    let message = format!("the scene has no camera `{}`", shortened(wanted));
+    let name = |(at, camera): (usize, &Placed<'_>)| {
+        format!("{at}: `{}` on node `{}`", camera.camera_name, camera.node_name)
+    };
+    let names: Vec<String> = all.iter().enumerate().take(MOST_NAMES).map(name).collect();
+    let help = match all.len() {
+        0 => "it has none: leave out --camera, and the camera orbits the model".into(),
+        more if more > MOST_NAMES => format!("its first cameras are {}", names.join(", ")),
+        _ => format!("its cameras are {}", names.join(", ")),
+    };
+    Err(Diagnostic::new(document.file, message).help(help).into())
+}
+
+/// What moves a camera.
+struct Rig<'a> {
+    /// Nodes from the camera's own up: animated ones, and what still ones between them add up to.
+    links: Vec<Link>,
+    nodes: &'a Nodes,
+    animations: &'a Animations,
+    lens: Option<&'a Curve>,
+    /// Times of the first and the last key, seconds; `None` of a still camera.
+    span: Option<[f64; 2]>,
+}
+
+enum Link {
+    Still(DAffine3),
+    Animated(usize),
+}
+
+/// The frames of a move.
+#[derive(Debug, Clone, Copy)]
+struct FrameTimes {
+    start: f64,
+    fps: f64,
+    count: u32,
+}
+
+impl<'a> Rig<'a> {
+    fn of(camera: &Placed<'_>, nodes: &'a Nodes, animations: &'a Animations) -> Self {
+        let lens = animations.get(Property::Yfov(camera.camera));
+        let mut links = Vec::new();
+        let mut span: Option<[f64; 2]> = lens.map(Curve::span);
+        for node in nodes.chain(camera.node) {
+            if animations.moves(node) {
+                links.push(Link::Animated(node));
+                for [first, last] in animations.of_node(node).map(Curve::span) {
+                    span = Some(span.map_or([first, last], |[a, b]| [a.min(first), b.max(last)]));
+                }
+                continue;
+            }
+            let local = nodes.local(node, animations, 0.0);
+            match links.last_mut() {
+                Some(Link::Still(below)) => *below = local * *below,
+                _ => links.push(Link::Still(local)),
+            }
+        }
+        Self { links, nodes, animations, lens, span }
+    }
+
+    /// The frames from the first key to the last.
+    fn frames(&self, document: &Document<'_>, options: &ModelOptions) -> Result<FrameTimes> {
+        let fps = options.fps;
+        let Some([start, end]) = self.span else {
+            return Ok(FrameTimes { start: options.time, fps, count: 1 });
+        };
+        let count = ((end - start) * fps + SLACK).floor() + 1.0;
+        if count > MOST_FRAMES || count * self.links.len() as f64 > MOST_STEPS {
+            let message = format!(
+                "the camera's animation has {count:.0} frames at {fps} a second; {MOST_FRAMES} can be rendered"
+            );
+            let help = "choose fewer frames a second with --fps, or shorten the animation";
+            return Err(Diagnostic::new(document.file, message).help(help).into());
+        }
+        Ok(FrameTimes { start, fps, count: count as u32 })
+    }
+
+    /// The path of the camera.
+    ///
+    /// Errors: a place that is not a finite number, a view without a direction, a lens out of range.
+    fn path(
+        &self,
+        camera: &Placed<'_>,
+        frames: FrameTimes,
+        vfov: f64,
+        options: &ModelOptions,
+    ) -> Result<CameraPath> {
+        if self.span.is_none() {
+            return Ok(CameraPath::Still(pose(camera, &self.world(options.time))?));
+        }
+        let frame = |number: u32| {
+            let time = frames.start + f64::from(number) / frames.fps;
+            let vfov = self.lens.map_or(vfov, |lens| lens.at(time)[0]);
+            if !(1e-6..PI - 1e-6).contains(&vfov) {
+                let number = number + 1;
+                return Err(camera.json.fault(format!("in frame {number} the vertical field of view is {vfov}; it lies between 0 and pi, radians")).into());
+            }
+            Ok(FramePose {
+                pose: pose(camera, &self.world(time))?,
+                vfov_degrees: vfov.to_degrees(),
+            })
+        };
+        (0..frames.count).map(frame).collect::<Result<_>>().map(CameraPath::Frames)
+    }
+
+    /// The camera's place in the world.
+    fn world(&self, time: f64) -> DAffine3 {
+        self.links.iter().fold(DAffine3::IDENTITY, |below, link| match link {
+            Link::Still(place) => *place * below,
+            Link::Animated(node) => self.nodes.local(*node, self.animations, time) * below,
+        })
+    }
+}
+
+/// The pose of a camera, which looks along -z with y up.
+fn pose(camera: &Placed<'_>, world: &DAffine3) -> Result<Pose> {
+    let (eye, up) = (world.translation, world.matrix3.y_axis.normalize_or_zero());
+    let forward = (-world.matrix3.z_axis).normalize_or_zero();
+    let is_there = eye.is_finite() && eye.abs().max_element() <= LARGEST;
+    if !is_there || forward == DVec3::ZERO || up.cross(forward).length() < 1e-9 {
+        let name = &camera.node_name;
+        return Err(camera
+            .json
+            .fault(format!("on node `{name}` the camera has no place or direction"))
+            .into());
+    }
+    // Far from the origin a target nearby would be rounded into another direction.
+    let reach = eye.abs().max_element().max(1.0);
+    Ok(Pose { eye, target: eye + forward * reach, up, roll_degrees: 0.0 })
+}
+
+/// What the scene says of nodes that move and are not the camera's.
+pub(super) fn note_moving(
+    document: &Document<'_>,
+    nodes: &Nodes,
+    animations: &Animations,
+    time: f64,
+    notes: &mut Notes,
+) -> Result<()> {
+    let mut is_moved = vec![false; document.nodes.len()];
+    let mut moving = 0;
+    let mut bends = Vec::with_capacity(document.skins.len());
+    for skin in &document.skins {
+        let mut joints = skin.list("joints")?.into_iter();
+        bends.push(joints.any(|joint| joint.as_whole().is_ok_and(|node| animations.moves(node))));
+    }
+    // Parents come first.
+    for at in &nodes.shown {
+        let json = &document.nodes[*at];
+        let above = nodes.chain(*at).nth(1).is_some_and(|parent| is_moved[parent]);
+        is_moved[*at] = above || animations.moves(*at);
+        let morphs = animations.get(Property::Weights(*at)).is_some();
+        let shows = json.get("mesh").is_some() || json.extension("KHR_lights_punctual").is_some();
+        let skin = json.index("skin", bends.len(), "skin")?;
+        let bends = skin.is_some_and(|at| bends[at]);
+        moving += usize::from(shows && (is_moved[*at] || morphs || bends));
+    }
+    if moving > 0 {
+        let nodes = counted(moving, "node");
+        notes.add(&format!("the scene is static: meshes and lights of {nodes} are animated, and stay as they are at {time} s (--time)"), None);
+    }
+    Ok(())
+}

@@ -1,0 +1,316 @@
+//! Materials: what glTF says of a surface as the parameters of a [`Material`].
+
+use super::document::Document;
+use super::image::{ImageStore, Role};
+use super::json::Json;
+use super::node::name_of;
+use super::texture_info::{LaidImage, TextureTable};
+use crate::error::Result;
+use crate::import::source::Notes;
+use crate::import::texture::ImageChannel;
+use crate::math::Rgb;
+use crate::scene::{Fresnel, Glass, Material, NormalMap, TextureMap, World};
+use std::collections::BTreeSet;
+
+/// A material, with what no single [`Material`] says.
+pub(super) struct Surfaced {
+    pub material: Material,
+    /// An image that multiplies the emission; its number is among the world's textures.
+    pub glow: Option<TextureMap>,
+    /// Nothing of the surface is there.
+    pub is_invisible: bool,
+}
+
+/// The images of a material, by key.
+#[derive(Default)]
+struct Laid {
+    base: Option<LaidImage>,
+    metal_rough: Option<LaidImage>,
+    normal: Option<LaidImage>,
+    emissive: Option<LaidImage>,
+}
+
+/// How opaque a surface is.
+enum AlphaMode {
+    Opaque,
+    /// There where alpha is this or more.
+    Mask(f64),
+}
+
+/// Reads materials.
+pub(super) struct MaterialReader<'d> {
+    document: &'d Document<'d>,
+    textures: TextureTable<'d>,
+}
+
+impl<'d> MaterialReader<'d> {
+    pub fn of(document: &'d Document<'d>) -> Result<Self> {
+        Ok(Self { document, textures: TextureTable::of(document)? })
+    }
+
+    /// The numbers of the images that the materials `used` show.
+    ///
+    /// Errors: those of [`TextureTable::laid`].
+    pub fn images(&self, used: &BTreeSet<usize>) -> Result<BTreeSet<usize>> {
+        let mut images = BTreeSet::new();
+        for at in used {
+            let laid = self.laid(&self.document.materials[*at], &mut Notes::default())?;
+            let all = [laid.base, laid.metal_rough, laid.normal, laid.emissive];
+            images.extend(all.into_iter().flatten().map(|laid| laid.image));
+        }
+        Ok(images)
+    }
+
+    /// The set of texture coordinates of a material's meshes: that of its first image. Images of other sets are left out.
+    pub fn uv_set(&self, material: usize) -> Result<usize> {
+        let laid = self.laid(&self.document.materials[material], &mut Notes::default())?;
+        let first = laid.base.or(laid.normal).or(laid.metal_rough).or(laid.emissive);
+        Ok(first.map_or(0, |laid| laid.set))
+    }
+
+    fn laid(&self, json: &Json<'_>, notes: &mut Notes) -> Result<Laid> {
+        let pbr = json.get("pbrMetallicRoughness");
+        let mut of = |json: Option<&Json<'_>>, key| match json {
+            Some(json) => self.textures.laid(json, key, notes),
+            None => Ok(None),
+        };
+        let base = of(pbr.as_ref(), "baseColorTexture")?;
+        let metal_rough = of(pbr.as_ref(), "metallicRoughnessTexture")?;
+        let normal = of(Some(json), "normalTexture")?;
+        // An image times nothing is nothing.
+        let glows = json.numbers::<3>("emissiveFactor")?.is_some_and(|factor| factor != [0.0; 3]);
+        let emissive = if glows { of(Some(json), "emissiveTexture")? } else { None };
+        // The ambient occlusion of an image is left out: rays find it.
+        Ok(Laid { base, metal_rough, normal, emissive })
+    }
+
+    /// Material number `at`, for meshes that are `coloured` by their vertices or not. Images enter `world`.
+    ///
+    /// Errors: values of the wrong kind, images that cannot be read.
+    pub fn read(
+        &self,
+        at: usize,
+        coloured: bool,
+        images: &mut ImageStore,
+        world: &mut World,
+        notes: &mut Notes,
+    ) -> Result<Surfaced> {
+        let json = &self.document.materials[at];
+        let mut laid = self.laid(json, notes)?;
+        let set = self.uv_set(at)?;
+        for map in [&mut laid.base, &mut laid.metal_rough, &mut laid.normal, &mut laid.emissive] {
+            if map.as_ref().is_some_and(|map| map.set != set) {
+                notes.add("a material has images on several sets of texture coordinates: those on others than its first image's were left out", None);
+                *map = None;
+            }
+        }
+        let mut parts = Parts { json, laid, images, world, notes };
+        let mut surfaced = parts.read(coloured)?;
+        surfaced.material.name = name_of(json, "material", at)?;
+        Ok(surfaced)
+    }
+}
+
+/// One material as it is read.
+struct Parts<'p, 'd> {
+    json: &'p Json<'d>,
+    laid: Laid,
+    images: &'p mut ImageStore,
+    world: &'p mut World,
+    notes: &'p mut Notes,
+}
+
+impl Parts<'_, '_> {
+    fn read(&mut self, coloured: bool) -> Result<Surfaced> {
+        let pbr = self.json.get("pbrMetallicRoughness");
+        let [r, g, b, alpha] = pbr
+            .as_ref()
+            .map(|pbr| pbr.numbers("baseColorFactor"))
+            .transpose()?
+            .flatten()
+            .unwrap_or([1.0; 4]);
+        let base = self.colour([r, g, b]);
+        let material = Material { vertex_colours: coloured, ..Material::diffuse("", base) };
+        let mut material = match self.json.extension("KHR_materials_unlit") {
+            Some(_) => self.unlit(material)?,
+            None => self.principled(material, pbr.as_ref())?,
+        };
+        let (emission, glow) = self.emission()?;
+        material.emission = emission;
+        material.emits_back = self.json.truth("doubleSided")?.unwrap_or(false);
+        let mut is_invisible = false;
+        if let AlphaMode::Mask(cutoff) = self.alpha_mode()? {
+            is_invisible = self.laid.base.is_none() && alpha < cutoff;
+            material.alpha = self.mask(alpha, cutoff)?;
+        }
+        if let Some(glass) = self.glass(base, pbr.as_ref())? {
+            let name = std::mem::take(&mut material.name);
+            material = Material { glass: Some(glass), ..Material::black(name) };
+        }
+        Ok(Surfaced { material, glow, is_invisible })
+    }
+
+    /// A surface that is shown as bright as its colour is, whatever the light: matte, the nearest that there is.
+    fn unlit(&mut self, material: Material) -> Result<Material> {
+        self.notes.add("KHR_materials_unlit: such surfaces are matte, and lit as all others", None);
+        let texture = self.map(self.laid.base, Role::Colour)?;
+        Ok(Material { texture, ..material })
+    }
+
+    fn principled(&mut self, material: Material, pbr: Option<&Json<'_>>) -> Result<Material> {
+        let texture = self.map(self.laid.base, Role::Colour)?;
+        let roughness_map = self.map(self.laid.metal_rough, Role::Share(ImageChannel::Green))?;
+        let metallic_map = self.map(self.laid.metal_rough, Role::Share(ImageChannel::Blue))?;
+        let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
+        let metallic = self.share(pbr, "metallicFactor", 1.0)?;
+        let normal_map = self.normal_map()?;
+        let (mirror, grazing) = self.reflectance()?;
+        let (clearcoat, clearcoat_roughness) = self.clearcoat()?;
+        let fresnel = Fresnel { grazing, metallic, metallic_map, clearcoat, clearcoat_roughness };
+        let fresnel = Some(fresnel);
+        Ok(Material { texture, mirror, roughness, roughness_map, fresnel, normal_map, ..material })
+    }
+
+    fn normal_map(&mut self) -> Result<Option<NormalMap>> {
+        let Some(image) = self.map(self.laid.normal, Role::Normals)? else { return Ok(None) };
+        let info = self.json.required("normalTexture")?;
+        let strength = info.number("scale")?.unwrap_or(1.0);
+        if strength < 0.0 {
+            self.notes.add("a normal map's negative scale is read as a positive one", None);
+        }
+        Ok(Some(NormalMap { image, strength: strength.abs().min(1e30) }))
+    }
+
+    /// Reflectance of what is no metal, at normal incidence and at grazing angles: KHR_materials_ior and
+    /// KHR_materials_specular.
+    fn reflectance(&mut self) -> Result<(Rgb, f64)> {
+        let ior = self.ior()?;
+        // 0 stands for reflectance 1, whatever the angle.
+        let root = if ior == 0.0 { 1.0 } else { (ior - 1.0) / (ior + 1.0) };
+        let Some(json) = self.json.extension("KHR_materials_specular") else {
+            return Ok((Rgb::splat((root * root) as f32), 1.0));
+        };
+        if json.get("specularTexture").or(json.get("specularColorTexture")).is_some() {
+            self.notes
+                .add("images of KHR_materials_specular are ignored: their factors count", None);
+        }
+        let specular = self.share(Some(&json), "specularFactor", 1.0)?;
+        let tint = json.numbers::<3>("specularColorFactor")?.unwrap_or([1.0; 3]);
+        let normal = tint.map(|tint| ((root * root * tint.max(0.0)).min(1.0) * specular) as f32);
+        Ok((Rgb::from_array(normal), specular))
+    }
+
+    fn ior(&self) -> Result<f64> {
+        match self.json.extension("KHR_materials_ior") {
+            Some(json) => json.number_within("ior", [0.0, 1e3], 1.5),
+            None => Ok(1.5),
+        }
+    }
+
+    fn clearcoat(&mut self) -> Result<(f64, f64)> {
+        let Some(json) = self.json.extension("KHR_materials_clearcoat") else {
+            return Ok((0.0, 0.0));
+        };
+        let images = ["clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"];
+        if images.iter().any(|key| json.get(key).is_some()) {
+            self.notes
+                .add("images of KHR_materials_clearcoat are ignored: its factors count", None);
+        }
+        let coat = self.share(Some(&json), "clearcoatFactor", 0.0)?;
+        Ok((coat, self.share(Some(&json), "clearcoatRoughnessFactor", 0.0)?))
+    }
+
+    /// Emitted radiance, and the image that multiplies it. A unit of emission is a unit of radiance: white.
+    fn emission(&mut self) -> Result<(Rgb, Option<TextureMap>)> {
+        let factor = self.json.numbers::<3>("emissiveFactor")?.unwrap_or_default();
+        let strength = match self.json.extension("KHR_materials_emissive_strength") {
+            Some(json) => json.number_within("emissiveStrength", [0.0, 1e30], 1.0)?,
+            None => 1.0,
+        };
+        let emission = factor.map(|x| (x.max(0.0) * strength).min(1e30) as f32);
+        Ok((Rgb::from_array(emission), self.map(self.laid.emissive, Role::Colour)?))
+    }
+
+    fn alpha_mode(&mut self) -> Result<AlphaMode> {
+        Ok(match self.json.text("alphaMode")? {
+            Some("MASK") => {
+                AlphaMode::Mask(self.json.number_within("alphaCutoff", [0.0, f64::MAX], 0.5)?)
+            }
+            Some("BLEND") => {
+                let image = self.laid.base.is_some_and(|base| self.images.has_alpha(base.image));
+                if image {
+                    self.notes.add("alphaMode BLEND is read as cut-outs: a surface is there where its alpha is a half or more", None);
+                }
+                AlphaMode::Mask(0.5)
+            }
+            None | Some("OPAQUE") => AlphaMode::Opaque,
+            Some(_) => return Err(self.json.fault("`alphaMode` is OPAQUE, MASK or BLEND").into()),
+        })
+    }
+
+    /// The mask of the base image's alpha times `factor`, cut at `cutoff`; `None` where it cuts nothing.
+    fn mask(&mut self, factor: f64, cutoff: f64) -> Result<Option<TextureMap>> {
+        if cutoff == 0.0 {
+            return Ok(None);
+        }
+        let cutoff = if factor > 0.0 { cutoff / factor } else { f64::INFINITY };
+        self.map(self.laid.base, Role::Mask(cutoff.to_bits()))
+    }
+
+    /// The glass of KHR_materials_transmission and KHR_materials_volume, where most of the light passes.
+    fn glass(&mut self, tint: Rgb, pbr: Option<&Json<'_>>) -> Result<Option<Glass>> {
+        let Some(json) = self.json.extension("KHR_materials_transmission") else { return Ok(None) };
+        let transmission = self.share(Some(&json), "transmissionFactor", 0.0)?;
+        if transmission == 0.0 {
+            return Ok(None);
+        }
+        if json.get("transmissionTexture").is_some() || transmission < 0.5 {
+            self.notes.add("KHR_materials_transmission by an image or of less than a half is ignored: the surface is opaque", None);
+            return Ok(None);
+        }
+        let images = ["baseColorTexture", "metallicRoughnessTexture"];
+        let has_images = pbr.is_some_and(|pbr| images.iter().any(|image| pbr.get(image).is_some()));
+        let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
+        if transmission < 1.0 || has_images || self.laid.normal.is_some() {
+            self.notes.add("KHR_materials_transmission is read as glass: images and what is not transmitted are left out", None);
+        }
+        let ior = self.ior()?;
+        let ior = if ior == 0.0 { 1.5 } else { ior.clamp(0.1, 10.0) };
+        let volume = self.json.extension("KHR_materials_volume");
+        let volume =
+            volume.filter(|json| json.number("thicknessFactor").is_ok_and(|t| t > Some(0.0)));
+        let Some(volume) = volume else {
+            return Ok(Some(Glass { roughness, tint, thin: true, ..Glass::clear(ior) }));
+        };
+        let distance = volume.number_within("attenuationDistance", [1e-30, f64::MAX], f64::MAX)?;
+        let colour = volume.numbers::<3>("attenuationColor")?.unwrap_or([1.0; 3]);
+        // Of black a millionth is left after the distance.
+        let absorption =
+            colour.map(|c| (-libm::log(c.clamp(1e-6, 1.0)) / distance).min(1e30) as f32);
+        let absorption = Rgb::from_array(absorption);
+        Ok(Some(Glass { roughness, tint, absorption, ..Glass::clear(ior) }))
+    }
+
+    /// A colour from 0 to 1; what lies outside is cut.
+    fn colour(&mut self, colour: [f64; 3]) -> Rgb {
+        if colour.iter().any(|c| !(0.0..=1.0).contains(c)) {
+            self.notes.add("numbers of a material outside of 0 to 1 were cut to that", None);
+        }
+        Rgb::from_array(colour.map(|c| c.clamp(0.0, 1.0) as f32))
+    }
+
+    /// A number from 0 to 1; what lies outside is cut.
+    fn share(&mut self, json: Option<&Json<'_>>, key: &str, default: f64) -> Result<f64> {
+        let share = json.map(|json| json.number(key)).transpose()?.flatten().unwrap_or(default);
+        if !(0.0..=1.0).contains(&share) {
+            self.notes.add("numbers of a material outside of 0 to 1 were cut to that", None);
+        }
+        Ok(share.clamp(0.0, 1.0))
+    }
+
+    fn map(&mut self, laid: Option<LaidImage>, role: Role) -> Result<Option<TextureMap>> {
+        let Some(laid) = laid else { return Ok(None) };
+        let number = self.images.place(laid.image, role, self.world)?;
+        Ok(number.map(|number| laid.map(number)))
+    }
+}

@@ -1,0 +1,138 @@
+"""Meshes, instances, what is hidden, and the settings of a scene."""
+
+import math
+import os
+
+import bpy
+import numpy as np
+
+from common import FOLDER, Case, export, meshes, ply
+
+import stage
+
+
+class Geometry(Case):
+    def test_placement_normals_and_coordinates(self):
+        stage.fresh()
+        stage.place("floor", stage.plane(half=1.0), (1.0, 2.0, 3.0), (90.0, 0.0, 0.0), (2.0, 1.0, 1.0))
+        found, _, folder = export("placed")
+        columns, rows, triangles = ply(os.path.join(folder, found["mesh"][0]["file"]))
+        self.assertEqual(columns, ["x", "y", "z", "nx", "ny", "nz", "s", "t"])
+        self.assertEqual((len(rows), len(triangles)), (4, 2))
+        self.near(rows[:, 3:6], [[0.0, 0.0, 1.0]] * 4)
+        self.near(rows[:, 6:], 0.5 * (rows[:, :2] + 1.0))
+        matrix = np.array(found["mesh"][0]["transform"][0]["matrix"])
+        # (1, 1, 0) of the mesh is (3, 2, 4) in Blender, (3, 4, -2) in tweenray.
+        self.near(matrix @ [1.0, 1.0, 0.0, 1.0], [3.0, 4.0, -2.0])
+
+    def test_modifiers_and_split_normals(self):
+        scene = stage.fresh()
+        block = stage.place("block", stage.cube(), (0.0, 0.0, 1.0))
+        subdivision = block.modifiers.new("smooth", "SUBSURF")
+        subdivision.levels, subdivision.render_levels = 0, 2
+        found, _, folder = export("modified")
+        self.assertEqual(len(ply(os.path.join(folder, found["mesh"][0]["file"]))[2]), 6 * 16 * 2)
+        block.modifiers.clear()
+        found, _, folder = export("sharp")
+        _, rows, triangles = ply(os.path.join(folder, found["mesh"][0]["file"]))
+        self.assertEqual((len(rows), len(triangles)), (24, 12))
+
+    def test_linked_duplicates_collections_particles_and_nodes_share_a_file(self):
+        scene = stage.fresh()
+        data = stage.cube(half=0.1)
+        for i in range(5):
+            stage.place(f"copy {i}", data, (i, 0.0, 0.0))
+        kept = bpy.data.collections.new("kept")
+        member = bpy.data.objects.new("member", data)
+        kept.objects.link(member)
+        empty = stage.place("collection", None, (0.0, 5.0, 0.0))
+        empty.instance_type, empty.instance_collection = "COLLECTION", kept
+        ground = stage.place("ground", stage.plane(half=2.0))
+        ground.modifiers.new("seeds", "PARTICLE_SYSTEM")
+        settings = ground.particle_systems[0].settings
+        settings.count, settings.frame_start, settings.frame_end, settings.lifetime = 7, 0, 0, 100
+        settings.render_type, settings.instance_object, settings.physics_type = "OBJECT", member, "NO"
+        found, _, folder = export("instances")
+        files = [mesh["file"] for mesh in found["mesh"]]
+        self.assertEqual(sorted(files.count(f) for f in set(files)), [1, 13])
+        self.assertEqual(len(os.listdir(os.path.join(folder, "meshes"))), 2)
+        self.near(meshes(found, "member")[0]["transform"][0]["matrix"][2][3], -5.0)
+
+    def test_what_no_render_shows_is_left_out(self):
+        scene = stage.fresh()
+        stage.place("hidden", stage.cube()).hide_render = True
+        stage.place("view", stage.cube()).hide_viewport = True
+        stage.place("seen", stage.cube(material=stage.shader("clear", "ShaderNodeBsdfTransparent")))
+        stage.place("flat", stage.cube(), scale=(1.0, 0.0, 1.0))
+        found, lines, _ = export("hidden")
+        self.assertEqual(meshes(found, "hidden") + meshes(found, "seen"), [])
+        self.noted(lines, "flat", "scale of 0")
+
+    def test_a_material_a_file_and_what_moves_is_noted(self):
+        scene = stage.fresh(frames=3)
+        data = stage.mesh("two", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)], stage.diffuse("a", (1, 0, 0)))
+        data.materials.append(stage.diffuse("b", (0, 1, 0)))
+        data.polygons[1].material_index = 1
+        mover = stage.place("two", data)
+        for frame in (1, 3):
+            mover.location.x = frame
+            mover.keyframe_insert("location", frame=frame)
+        scene.frame_set(2)
+        found, lines, folder = export("two")
+        self.assertEqual([m["material"] for m in found["mesh"]], ["a", "b"])
+        self.assertEqual({len(ply(os.path.join(folder, m["file"]))[2]) for m in found["mesh"]}, {1})
+        self.near(found["mesh"][0]["transform"][0]["matrix"][0][3], 1.0)
+        self.noted(lines, "two", "moves or changes during the shot")
+        self.assertEqual(scene.frame_current, 2)
+
+    def test_text_and_curves_are_meshes_and_other_kinds_are_noted(self):
+        stage.fresh()
+        curve = bpy.data.curves.new("letter", "FONT")
+        curve.body, curve.extrude = "T", 0.1
+        stage.place("letter", curve)
+        stage.place("fog", bpy.data.volumes.new("fog"))
+        found, lines, folder = export("kinds")
+        self.assertTrue(len(ply(os.path.join(folder, meshes(found, "letter")[0]["file"]))[2]) > 10)
+        self.noted(lines, "fog", "VOLUME", "not exported")
+
+
+class Settings(Case):
+    def test_size_frames_rate_exposure_and_tone(self):
+        scene = stage.fresh(400, 200, frames=1)
+        scene.frame_start, scene.frame_end, scene.render.resolution_percentage = 10, 12, 50
+        scene.render.fps, scene.render.fps_base = 30, 1.001
+        scene.cycles.film_exposure, scene.view_settings.exposure = 2.0, 1.0
+        found, _, _ = export("settings")
+        self.assertEqual((found["settings"]["size"], found["camera"]["frames"]), ([200, 100], 3))
+        self.near([found["settings"]["fps"], found["settings"]["exposure"]], [30.0 / 1.001, 4.0])
+        self.assertEqual((found["settings"]["tone"], found["settings"]["bounces"]), ("srgb", 8))
+        scene.view_settings.view_transform = "AgX"
+        self.noted(export("settings")[1], "AgX", "filmic")
+
+    def test_everything_at_once(self):
+        import round_trip
+
+        scene = round_trip.every_material()
+        for i, kind in enumerate(("POINT", "SPOT", "SUN")):
+            stage.light(kind, kind, (i - 1.0, -1.0, 4.0), energy=2.0)
+        scene.camera.data.dof.use_dof = True
+        found, _, _ = export("everything")
+        self.assertEqual(len(found["light"]), 4)
+        self.assertEqual(len(found["mesh"]), 11)
+
+
+class AddOn(Case):
+    def test_the_operator_writes_the_folder_of_its_file_and_reports(self):
+        import tweenray_export
+
+        stage.fresh()
+        stage.place("floor", stage.plane(material=stage.principled("p", Sheen_Weight=0.5)))
+        tweenray_export.register()
+        try:
+            folder = os.path.join(FOLDER, "operator")
+            done = bpy.ops.export_scene.tweenray(filepath=os.path.join(folder, "scene.toml"))
+        finally:
+            tweenray_export.unregister()
+        self.assertEqual(done, {"FINISHED"})
+        with open(os.path.join(folder, "report.txt"), encoding="utf-8") as file:
+            self.assertIn("p: sheen: none", file.read())

@@ -1,0 +1,95 @@
+"""Lights and worlds."""
+
+import math
+import os
+
+import bpy
+import numpy as np
+
+from common import FOLDER, Case, export, ply
+
+import stage
+
+
+class Lights(Case):
+    def one(self, kind, **values):
+        stage.fresh()
+        stage.light("lamp", kind, (1.0, 2.0, 3.0), **values)
+        found, lines, folder = export(f"light-{kind}")
+        return found, lines
+
+    def test_area_lights_of_each_shape(self):
+        found, _ = self.one("AREA", energy=50.0, shape="RECTANGLE", size=2.0, size_y=0.5)
+        quad = found["light"][0]["quad"]
+        self.near(np.cross(*quad["edges"]), [0.0, -1.0, 0.0])
+        self.near(np.array(quad["corner"]) + 0.5 * np.sum(quad["edges"], axis=0), [1.0, 3.0, -2.0])
+        self.near(quad["radiance"], [50.0 / math.pi] * 3)
+        found, _ = self.one("AREA", energy=50.0, shape="DISK", size=2.0, color=(1.0, 0.5, 0.0))
+        disk = found["light"][0]["disk"]
+        self.near(disk["normal"], [0.0, -1.0, 0.0])
+        self.near([disk["radius"], *disk["radiance"]], [1.0, *(50.0 / math.pi**2 * c for c in (1.0, 0.5, 0.0))])
+        found, lines = self.one("AREA", energy=50.0, shape="ELLIPSE", size=2.0, size_y=1.0)
+        self.noted(lines, "lamp", "ellipse", "16 quads")
+        _, vertices, triangles = ply(os.path.join(FOLDER, "light-AREA", found["mesh"][0]["file"]))
+        a, b, c = (vertices[triangles[:, k], :3].astype(float) for k in range(3))
+        areas = 0.5 * np.cross(b - a, c - a)
+        self.near(areas.sum(axis=0), [0.0, 0.0, -0.5 * math.pi], 1e-4)
+        self.near(found["material"]["lamp_light"]["emission"], [50.0 / math.pi / (0.5 * math.pi)] * 3)
+        _, lines = self.one("AREA", energy=50.0, spread=1.0)
+        self.noted(lines, "lamp", "spread 57 degrees")
+
+    def test_points_spots_and_suns(self):
+        found, _ = self.one("POINT", energy=40.0, shadow_soft_size=0.0)
+        point = found["light"][0]["point"]
+        self.near([*point["position"], *point["intensity"]], [1.0, 3.0, -2.0] + [10.0 / math.pi] * 3)
+        found, _ = self.one("POINT", energy=40.0, shadow_soft_size=0.5)
+        ball = found["light"][0]["spot"]
+        self.near([ball["radius"], ball["outer_angle"], ball["inner_angle"]], [0.5, 180.0, 180.0])
+        stage.fresh()
+        stage.light("lamp", "POINT", (0.0, 0.0, 3.0), energy=40.0, shadow_soft_size=0.5).visible_camera = True
+        found = export("light-seen")[0]["light"][0]["sphere"]
+        self.near(found["radiance"], [40.0 / (4.0 * math.pi**2 * 0.25)] * 3)
+        found, lines = self.one("SPOT", energy=40.0, spot_size=1.2, spot_blend=1.0, shadow_soft_size=0.2)
+        spot = found["light"][0]["spot"]
+        self.near([spot["outer_angle"], spot["inner_angle"]], [math.degrees(0.6), 0.0], 1e-4)
+        self.near(spot["direction"], [0.0, -1.0, 0.0])
+        self.noted(lines, "lamp", "soft falloff")
+        found, _ = self.one("SUN", energy=3.0, angle=0.1)
+        sun = found["light"][0]["sun"]
+        self.near([*sun["to_light"], *sun["irradiance"], sun["angle"]], [0.0, 1.0, 0.0, 3.0, 3.0, 3.0, math.degrees(0.1)])
+        found, _ = self.one("SUN", energy=3.0, angle=0.0)
+        self.assertIn("directional", found["light"][0])
+        found, _ = self.one("POINT", energy=0.0)
+        self.assertNotIn("light", found)
+
+    def test_a_background_and_images_of_the_sky(self):
+        scene = stage.fresh()
+        stage.background(scene, (0.1, 0.2, 0.4), 2.0)
+        self.near(export("background")[0]["sky"]["radiance"], [0.2, 0.4, 0.8])
+        import round_trip
+
+        round_trip.sky(scene, 40.0)
+        sky, lines, folder = export("sky")
+        self.near([sky["sky"]["rotate"], sky["sky"]["strength"]], [230.0, 2.0], 1e-4)
+        self.assertTrue(os.path.getsize(os.path.join(folder, sky["sky"]["image"])) > 1000)
+
+    def test_other_worlds_are_rendered_into_an_image(self):
+        from tweenray_export import world
+
+        size, world.SIZE = world.SIZE, (64, 32)
+        try:
+            scene = stage.fresh()
+            tree = scene.world.node_tree
+            gradient, ramp = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeSeparateXYZ")
+            tree.links.new(gradient.outputs["Generated"], ramp.inputs[0])
+            tree.links.new(ramp.outputs["X"], tree.nodes["Background"].inputs["Color"])
+            found, lines, folder = export("nodes-sky")
+        finally:
+            world.SIZE = size
+        self.noted(lines, "World", "rendered")
+        image = bpy.data.images.load(os.path.join(folder, found["sky"]["image"]))
+        pixels = np.array(image.pixels[:]).reshape(32, 64, 4)
+        # Towards +x, which is right of the middle, the radiance is x; on the other side it is 0.
+        self.near(pixels[16, 48, :3], [1.0] * 3, 0.02)
+        self.near(pixels[16, 40, 0], math.sin(2.0 * math.pi * 8.5 / 64.0), 0.02)
+        self.near(pixels[16, 16, :3], [0.0] * 3, 1e-3)

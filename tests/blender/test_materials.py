@@ -1,0 +1,154 @@
+"""Materials and their images."""
+
+import math
+import os
+
+import bpy
+import numpy as np
+
+from common import Case, export, ply
+
+import stage
+
+
+class Materials(Case):
+    def of(self, material):
+        stage.fresh()
+        made = material()
+        stage.place("floor", stage.plane(material=made))
+        found, lines, folder = export("material")
+        self.folder = folder
+        self.assertEqual(found["mesh"][0]["material"], list(found["material"])[0])
+        return found["material"][made.name], lines
+
+    def test_principled_inputs(self):
+        table, lines = self.of(lambda: stage.principled("p", Base_Color=(0.2, 0.3, 0.4), Metallic=0.5, Roughness=0.25, IOR=1.6, Coat_Weight=0.5, Coat_Roughness=0.1))
+        p = table["principled"]
+        self.near(p["base_colour"], [0.2, 0.3, 0.4])
+        self.near([p[k] for k in ("metallic", "roughness", "ior", "clearcoat", "clearcoat_roughness")], [0.5, 0.25, 1.6, 0.5, 0.1])
+        self.assertEqual(lines, [])
+        table, _ = self.of(lambda: stage.principled("p", Specular_IOR_Level=0.0))
+        self.assertEqual(table["principled"]["specular"], 0)
+        table, _ = self.of(lambda: stage.principled("p", Specular_IOR_Level=1.0, IOR=1.5))
+        self.near(table["principled"]["ior"], (1.0 + math.sqrt(0.08)) / (1.0 - math.sqrt(0.08)))
+        table, lines = self.of(lambda: stage.principled("p", Subsurface_Weight=0.5, Sheen_Weight=0.1, Alpha=0.5))
+        for word in ("subsurface", "sheen", "alpha 0.5"):
+            self.noted(lines, "p", word)
+        table, lines = self.of(lambda: stage.principled("p", Transmission_Weight=1.0, Base_Color=(0.25, 1.0, 1.0), IOR=1.3, Roughness=0.3))
+        self.near([table["glass"]["ior"], *table["glass"]["tint"]], [1.3, 0.5, 1.0, 1.0])
+        self.noted(lines, "p", "glass of roughness 0.3")
+        table, lines = self.of(lambda: stage.principled("p", Emission_Color=(1.0, 0.5, 0.25), Emission_Strength=4.0))
+        self.near(table["emission"], [4.0, 2.0, 1.0])
+        self.assertTrue(table["emits_back"])
+
+    def test_simple_shaders_and_mixes(self):
+        import round_trip
+
+        self.near(self.of(lambda: stage.diffuse("d", (0.1, 0.2, 0.3)))[0]["diffuse"], [0.1, 0.2, 0.3])
+        table, _ = self.of(lambda: stage.shader("g", "ShaderNodeBsdfGlossy", Color=(0.5, 0.6, 0.7), Roughness=0.3))
+        self.near([*table["mirror"], table["roughness"]], [0.5, 0.6, 0.7, 0.3])
+        table, _ = self.of(lambda: stage.shader("g", "ShaderNodeBsdfGlass", Color=(0.5, 0.6, 0.7), Roughness=0.0, IOR=1.4))
+        self.near([*table["glass"]["tint"], table["glass"]["ior"]], [0.5, 0.6, 0.7, 1.4])
+        table, _ = self.of(lambda: stage.shader("e", "ShaderNodeEmission", Color=(0.5, 0.6, 0.7), Strength=2.0))
+        self.near(table["emission"], [1.0, 1.2, 1.4])
+        table, lines = self.of(lambda: round_trip.mixed("m", 0.25))
+        self.near([*table["diffuse"], *table["mirror"]], [0.525, 0.225, 0.075] + [0.225] * 3)
+        self.assertEqual(lines, [])
+        table, lines = self.of(lambda: stage.shader("s", "ShaderNodeBsdfToon"))
+        self.noted(lines, "s", "BSDF_TOON", "diffuse grey")
+
+    def mapped(self, name, colour_space, wanted, link):
+        """A principled material with a picture; `link(tree, image node, shader)` connects them."""
+        material = stage.principled(name)
+        tree = material.node_tree
+        shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = stage.picture(f"{name}-image", wanted, colour_space)
+        link(tree, node, shader)
+        return material
+
+    def test_images_with_mapping_keep_their_codes(self):
+        pixels = np.ones((2, 2, 4), dtype=np.float32)
+        pixels[0, 0], pixels[1, 1] = (1.0, 0.2, 0.0, 1.0), (0.0, 0.4, 0.6, 1.0)
+
+        def link(tree, node, shader):
+            mapping = tree.nodes.new("ShaderNodeMapping")
+            mapping.inputs["Scale"].default_value = (2.0, 3.0, 1.0)
+            mapping.inputs["Rotation"].default_value = (0.0, 0.0, 0.5)
+            mapping.inputs["Location"].default_value = (0.25, 0.0, 0.0)
+            place = tree.nodes.new("ShaderNodeTexCoord")
+            tree.links.new(place.outputs["UV"], mapping.inputs["Vector"])
+            tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+            tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+            node.extension = "EXTEND"
+
+        table, lines = self.of(lambda: self.mapped("t", "sRGB", pixels, link))
+        texture = table["principled"]["base_texture"]
+        self.near([*texture["scale"], texture["rotate"], *texture["offset"]], [2.0, 3.0, math.degrees(0.5), 0.25, 0.0])
+        self.assertEqual((texture["wrap"], lines), ("clamp", []))
+        copy = bpy.data.images.load(os.path.join(self.folder, texture["file"]))
+        self.near(np.array(copy.pixels[:]).reshape(2, 2, 4), pixels, 1.0 / 255.0)
+
+    def test_roughness_normals_and_cut_outs_from_images(self):
+        grey = np.ones((4, 4, 4), dtype=np.float32) * 0.5
+        grey[..., 3] = np.arange(4) / 3.0
+
+        def link(tree, node, shader):
+            tree.links.new(node.outputs["Color"], shader.inputs["Roughness"])
+            tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+            normal = tree.nodes.new("ShaderNodeNormalMap")
+            normal.inputs["Strength"].default_value = 0.5
+            tree.links.new(node.outputs["Color"], normal.inputs["Color"])
+            tree.links.new(normal.outputs["Normal"], shader.inputs["Normal"])
+            channels = tree.nodes.new("ShaderNodeSeparateColor")
+            tree.links.new(node.outputs["Color"], channels.inputs[0])
+            tree.links.new(channels.outputs["Blue"], shader.inputs["Metallic"])
+
+        table, lines = self.of(lambda: self.mapped("t", "Non-Color", grey, link))
+        self.assertEqual(table["principled"]["roughness"]["channel"], "g")
+        self.assertEqual(table["principled"]["metallic"]["channel"], "b")
+        self.assertEqual(table["normal_map"]["strength"], 0.5)
+        files = {table["alpha"], table["normal_map"]["file"], table["principled"]["roughness"]["file"]}
+        self.assertEqual(len(files), 1)
+        self.noted(lines, "t", "cut-outs")
+
+    def test_roughness_of_a_coloured_image_is_blenders_grey(self):
+        colours = np.ones((2, 2, 4), dtype=np.float32)
+        colours[..., :3] = (1.0, 0.0, 0.0)
+        link = lambda tree, node, shader: tree.links.new(node.outputs["Color"], shader.inputs["Roughness"])
+        table, _ = self.of(lambda: self.mapped("t", "Non-Color", colours, link))
+        grey = bpy.data.images.load(os.path.join(self.folder, table["principled"]["roughness"]["file"]))
+        grey.colorspace_settings.name = "Non-Color"
+        self.near(grey.pixels[:3], [0.2126] * 3, 2e-4)
+
+    def test_vertex_colours_and_groups(self):
+        def make():
+            material = stage.principled("v")
+            tree = material.node_tree
+            shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+            node = tree.nodes.new("ShaderNodeVertexColor")
+            node.layer_name = "paint"
+            tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+            group = bpy.data.node_groups.new("number", "ShaderNodeTree")
+            group.interface.new_socket("Result", in_out="OUTPUT", socket_type="NodeSocketFloat")
+            value, out = group.nodes.new("ShaderNodeValue"), group.nodes.new("NodeGroupOutput")
+            value.outputs[0].default_value = 0.125
+            group.links.new(value.outputs[0], out.inputs[0])
+            outer = tree.nodes.new("ShaderNodeGroup")
+            outer.node_tree = group
+            tree.links.new(outer.outputs[0], shader.inputs["Roughness"])
+            return material
+
+        stage.fresh()
+        data = stage.plane(material=make())
+        layer = data.color_attributes.new("paint", "FLOAT_COLOR", "POINT")
+        for item, red in zip(layer.data, (0.0, 0.5, 1.0, 0.25)):
+            item.color = (red, 0.0, 1.0, 1.0)
+        stage.place("floor", data)
+        found, lines, folder = export("colours")
+        table = found["material"]["v"]
+        self.assertTrue(table["vertex_colours"])
+        self.near(table["principled"]["roughness"], 0.125)
+        columns, rows, _ = ply(os.path.join(folder, found["mesh"][0]["file"]))
+        red = rows[:, columns.index("red")]
+        self.near(sorted(red), [0.0, 0.537099, 0.735357, 1.0], 1e-4)

@@ -1,0 +1,253 @@
+//! What glTF says of surfaces, as the numbers of materials.
+
+use super::build::{File, warns};
+use serde_json::{Value, json};
+use tweenray::import::Model;
+use tweenray::math::{DAffine2, DVec2, Rgb};
+use tweenray::scene::{Fresnel, Glass, Light, Material, TextureMap, Wrap};
+
+fn material(value: Value) -> (Material, Model) {
+    let model = File::triangle().with_uvs().with_material(value).model();
+    let id = model.world.meshes[0].material;
+    (model.world.materials[id as usize].clone(), model)
+}
+
+#[test]
+fn factors_and_their_defaults_are_those_of_the_format() {
+    let (white, model) = material(json!({}));
+    let plain = Fresnel {
+        grazing: 1.0,
+        metallic: 1.0,
+        metallic_map: None,
+        clearcoat: 0.0,
+        clearcoat_roughness: 0.0,
+    };
+    assert_eq!((white.diffuse, white.roughness, white.fresnel), (Rgb::ONE, 1.0, Some(plain)));
+    assert_eq!(white.mirror, Rgb::splat(0.04));
+    assert!(!white.emits_back && white.emission == Rgb::ZERO && model.warnings.is_empty());
+    let (plastic, _) = material(json!({
+        "name": "plastic",
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0, 1], "metallicFactor": 0, "roughnessFactor": 0.3},
+        "extensions": {
+            "KHR_materials_ior": {"ior": 2},
+            "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1, 0.5, 20]},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.75, "clearcoatRoughnessFactor": 0.125},
+        },
+    }));
+    assert_eq!((plastic.name.as_str(), plastic.roughness), ("plastic", 0.3));
+    assert_eq!(plastic.diffuse, Rgb::new(0.5, 0.25, 0.0));
+    // ((2 - 1) / (2 + 1))² by colour, at most 1, by the factor.
+    let expected = [1.0 / 9.0, 0.5 / 9.0, 1.0].map(|r: f64| (0.5 * r) as f32);
+    assert!((plastic.mirror - Rgb::from_array(expected)).abs().max_element() < 1e-7);
+    let fresnel = plastic.fresnel.expect("layers");
+    assert_eq!((fresnel.grazing, fresnel.metallic), (0.5, 0.0));
+    assert_eq!((fresnel.clearcoat, fresnel.clearcoat_roughness), (0.75, 0.125));
+}
+
+#[test]
+fn images_serve_as_colour_roughness_metal_and_normals() {
+    let mut file = File::triangle().with_uvs();
+    let sampler = json!({"wrapS": 33071, "wrapT": 33648, "magFilter": 9728});
+    let texture = file.image(2, &[[255, 10, 20, 255], [128, 51, 204, 255]], sampler);
+    let info = json!({"index": texture});
+    let file = file.with_material(json!({
+        "pbrMetallicRoughness": {
+            "baseColorTexture": info, "metallicRoughnessTexture": info, "roughnessFactor": 0.5,
+        },
+        "normalTexture": {"index": texture, "scale": 0.25},
+    }));
+    let model = file.model();
+    let material = &model.world.materials[0];
+    let texel = |map: &TextureMap| model.world.textures[map.image as usize].levels()[0].texel(1, 0);
+    assert_eq!(texel(&material.roughness_map.expect("roughness")).x, 0.2);
+    let metal = material.fresnel.and_then(|f| f.metallic_map).expect("metal");
+    assert_eq!(texel(&metal).x, 0.8);
+    // Colours are sRGB codes, normals as they stand.
+    let colour = texel(&material.texture.expect("colour")).x;
+    assert!((colour - 0.215_86).abs() < 1e-4, "{colour}");
+    let normals = material.normal_map.expect("normals");
+    assert_eq!((texel(&normals.image).x, normals.strength), (128.0 / 255.0, 0.25));
+    assert_eq!(metal.wrap, [Wrap::Clamp, Wrap::Mirror]);
+    assert!(warns(&model.warnings, "the filter NEAREST of a texture is read as LINEAR"));
+    assert_eq!(model.world.textures.len(), 4);
+}
+
+/// Where the coordinates of the file, with v downwards, lead in an image with v downwards.
+fn leads(transform: &DAffine2, uv: [f64; 2]) -> [f64; 2] {
+    let to = transform.transform_point2(DVec2::new(uv[0], 1.0 - uv[1]));
+    [to.x, 1.0 - to.y]
+}
+
+#[test]
+fn images_are_moved_turned_and_scaled_as_the_extension_has_it() {
+    let mut file = File::triangle().with_uvs();
+    let texture = file.image(1, &[[9; 4]], json!({}));
+    let file = file.with_material(json!({"pbrMetallicRoughness": {"baseColorTexture": {
+        "index": texture, "texCoord": 3, "extensions": {"KHR_texture_transform": {
+            "offset": [0.25, 0.5], "rotation": 0.5, "scale": [2, 3], "texCoord": 0,
+        }},
+    }}}));
+    let map = file.model().world.materials[0].texture.expect("a texture");
+    let (sin, cos) = (0.5f64.sin(), 0.5f64.cos());
+    for uv in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.3, 0.7]] {
+        let [u, v] = [2.0 * uv[0], 3.0 * uv[1]];
+        let expected = [u * cos + v * sin + 0.25, v * cos - u * sin + 0.5];
+        let found = leads(&map.transform, uv);
+        assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{found:?} {expected:?}");
+    }
+}
+
+#[test]
+fn images_of_other_sets_are_left_out_by_name() {
+    let mut file = File::triangle().with_uvs();
+    let texture = file.image(1, &[[9; 4]], json!({}));
+    let file = file.with_material(json!({
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}},
+        "normalTexture": {"index": texture, "texCoord": 1},
+        "occlusionTexture": {"index": texture, "texCoord": 1},
+    }));
+    let model = file.model();
+    let material = &model.world.materials[0];
+    assert!(material.texture.is_some() && material.normal_map.is_none());
+    assert!(warns(&model.warnings, "several sets of texture coordinates"));
+}
+
+#[test]
+fn alpha_is_cut_at_the_cutoff() {
+    let masked = |alpha: Value, texels: [u8; 3]| {
+        let mut file = File::triangle().with_uvs();
+        let texels = texels.map(|a| [200, 200, 200, a]);
+        let texture = file.image(3, &texels, json!({}));
+        let mut value = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": texture}}});
+        for (key, part) in alpha.as_object().expect("keys") {
+            match key.as_str() {
+                "factor" => {
+                    value["pbrMetallicRoughness"]["baseColorFactor"] = json!([1, 1, 1, part])
+                }
+                key => value[key] = part.clone(),
+            }
+        }
+        file.with_material(value).model()
+    };
+    let there = |model: &Model| -> Option<Vec<bool>> {
+        model.world.materials[0].alpha.map(|map| {
+            let mask = &model.world.masks[map.image as usize];
+            mask.texels.iter().map(|t| *t >= 128).collect()
+        })
+    };
+    // 0.2 and 0.8 are codes 51 and 204.
+    let at = |cutoff: f64| {
+        there(&masked(json!({"alphaMode": "MASK", "alphaCutoff": cutoff}), [50, 51, 204]))
+    };
+    assert_eq!(at(0.5), Some(vec![false, false, true]));
+    assert_eq!(at(0.2), Some(vec![false, true, true]));
+    assert_eq!(at(0.801), Some(vec![false; 3]));
+    assert_eq!((at(0.0), at(0.19)), (None, None));
+    let half = json!({"alphaMode": "MASK", "alphaCutoff": 0.4, "factor": 0.5});
+    assert_eq!(there(&masked(half, [50, 203, 204])), Some(vec![false, false, true]));
+    let blend = masked(json!({"alphaMode": "BLEND"}), [0, 127, 128]);
+    assert_eq!(there(&blend), Some(vec![false, false, true]));
+    assert!(warns(&blend.warnings, "alphaMode BLEND is read as cut-outs"));
+    let opaque = masked(json!({}), [0, 0, 0]);
+    assert!(there(&opaque).is_none() && opaque.warnings.is_empty());
+}
+
+#[test]
+fn what_is_transparent_all_over_is_left_out() {
+    let clear =
+        json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.3]}, "alphaMode": "BLEND"});
+    let model = File::triangle().with_material(clear).model();
+    assert!(model.world.meshes.is_empty());
+    assert!(warns(&model.warnings, "alpha is below its cutoff"));
+}
+
+#[test]
+fn transmission_is_a_pane_or_with_a_thickness_a_body_that_absorbs() {
+    let glass = |extensions: Value| {
+        let base = json!({"baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0});
+        material(json!({"pbrMetallicRoughness": base, "extensions": extensions}))
+    };
+    let full = json!({"transmissionFactor": 1});
+    let (pane, model) = glass(json!({"KHR_materials_transmission": full}));
+    let tint = Rgb::new(0.5, 1.0, 1.0);
+    assert_eq!(pane.glass, Some(Glass { tint, thin: true, ..Glass::clear(1.5) }));
+    assert!(model.warnings.is_empty() && model.world.into_scene(true).is_ok());
+    let (body, _) = glass(json!({
+        "KHR_materials_transmission": full, "KHR_materials_ior": {"ior": 1.33},
+        "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0.5, 0.25]},
+    }));
+    let glass_body = body.glass.expect("glass");
+    assert!(!glass_body.thin && glass_body.ior == 1.33);
+    // A half is left after 2, a quarter too: twice as fast.
+    let expected = Rgb::new(0.0, 0.5 * 2f32.ln(), 2f32.ln());
+    assert!((glass_body.absorption - expected).abs().max_element() < 1e-6);
+    let (opaque, model) =
+        glass(json!({"KHR_materials_transmission": {"transmissionFactor": 0.25}}));
+    assert!(opaque.glass.is_none());
+    assert!(warns(&model.warnings, "of less than a half is ignored"));
+}
+
+#[test]
+fn emission_is_radiance_and_lights_the_scene() {
+    let (lamp, _) = material(json!({
+        "emissiveFactor": [1, 0.5, 0], "doubleSided": true,
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}},
+    }));
+    assert_eq!((lamp.emission, lamp.emits_back), (Rgb::new(4.0, 2.0, 0.0), true));
+    let file = File::triangle().with_material(json!({"emissiveFactor": [1, 1, 1]}));
+    let lights = file.loaded().world.lights;
+    // The other one is the studio's.
+    assert_eq!(lights.iter().filter(|light| matches!(light, Light::Quad(_))).count(), 2);
+}
+
+#[test]
+fn an_image_of_emission_makes_triangles_glow_on_which_it_is_bright() {
+    // The left half of the image is black, the right one green.
+    let mut file = File::new();
+    let positions = [0., 0., 0., 1., 0., 0., 1., 1., 0., 2., 0., 0., 3., 0., 0., 3., 1., 0.];
+    let positions = file.floats("VEC3", &positions);
+    let uvs = [0.05, 0.1, 0.4, 0.1, 0.4, 0.9, 0.55, 0.1, 0.9, 0.1, 0.9, 0.9];
+    let uvs = file.floats("VEC2", &uvs);
+    let attributes = json!({"POSITION": positions, "TEXCOORD_0": uvs});
+    file.add("meshes", json!({"primitives": [{"attributes": attributes}]}));
+    file.add("nodes", json!({"mesh": 0}));
+    let (black, green) = ([0, 0, 0, 255], [0, 255, 0, 255]);
+    let texels: Vec<[u8; 4]> = (0..64).map(|at| if at % 8 < 4 { black } else { green }).collect();
+    let texture = file.image(8, &texels, json!({}));
+    let emissive = |factor: f64| {
+        let lit = json!({"emissiveFactor": [factor, factor, factor], "emissiveTexture": {"index": texture}});
+        file.clone().with_material(lit).model()
+    };
+    let model = emissive(1.0);
+    let [bright, dark] = &model.world.meshes[..] else { panic!("{:?}", model.world.meshes) };
+    let emission =
+        |mesh: &tweenray::scene::WorldMesh| model.world.materials[mesh.material as usize].emission;
+    assert_eq!((emission(bright), emission(dark)), (Rgb::Y, Rgb::ZERO));
+    assert_eq!((bright.positions[0].x, dark.positions[0].x), (2.0, 0.0));
+    assert!(warns(&model.warnings, "emission by an image"));
+    let dim = emissive(0.25);
+    assert_eq!(dim.world.meshes.len(), 1);
+    assert_eq!(dim.world.materials[dim.world.meshes[0].material as usize].emission, Rgb::ZERO);
+}
+
+#[test]
+fn unlit_surfaces_are_matte_by_name() {
+    let (matte, model) = material(json!({
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0, 0, 1]}, "extensions": {"KHR_materials_unlit": {}},
+    }));
+    assert_eq!((matte.diffuse, matte.fresnel), (Rgb::X * 0.5, None));
+    assert!(warns(&model.warnings, "KHR_materials_unlit"));
+}
+
+#[test]
+fn extensions_that_are_not_read_are_named_once_each() {
+    let mut file = File::triangle();
+    file.json["extensionsUsed"] =
+        json!(["KHR_materials_sheen", "KHR_materials_ior", "KHR_xmp_json_ld"]);
+    let warnings = file.model().warnings;
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    assert_eq!(
+        warning.message,
+        "the extension `KHR_materials_sheen` is not read: the picture may differ"
+    );
+}

@@ -1,0 +1,92 @@
+"""The camera, baked frame by frame.
+
+A frame's record has eye, target and up (tweenray's axes, world units), the vertical field of view (degrees), the shift as
+shares of the picture, the shape of pixels, and the lens. All but pose and depth of field follow from Blender's own
+projection matrix, so that sensor fit, shift and the shape of pixels are what Blender renders.
+"""
+
+import math
+
+from . import axes
+
+
+def record(camera, depsgraph, size, report):
+    """The camera object's record at the depsgraph's frame. `size` is (width, height), pixels.
+
+    Raises ValueError for a camera without perspective.
+    """
+    data, name = camera.data, camera.name
+    if data.type != "PERSP":
+        raise ValueError(f"{name}: the camera's type is {data.type}; tweenray has perspective cameras: set Lens, Type")
+    width, height = size
+    render = depsgraph.scene.render
+    scales = {"scale_x": render.pixel_aspect_x, "scale_y": render.pixel_aspect_y}
+    projection = camera.calc_matrix_camera(depsgraph, x=width, y=height, **scales)
+    place = camera.matrix_world.normalized()
+    eye, right = place.translation, place.col[0].xyz
+    up, forward = place.col[1].xyz, -place.col[2].xyz
+    if right.cross(up).dot(-forward) < 0.0:
+        report.add(name, "the camera is mirrored by its scale", "it is not mirrored")
+    lens = thin_lens(data, eye, forward, depsgraph, report, name)
+    reach = lens["focus"] if lens else 10.0
+    half_width, half_height = 1.0 / projection[0][0], 1.0 / projection[1][1]
+    return {
+        "eye": axes.vector(eye),
+        "target": axes.vector(eye + forward * reach),
+        "up": axes.vector(up),
+        "fov": 2.0 * math.degrees(math.atan(half_height)),
+        "shift": [0.5 * projection[0][2], 0.5 * projection[1][2]],
+        "pixel_aspect": half_width / half_height * height / width,
+        "lens": lens,
+    }
+
+
+def thin_lens(data, eye, forward, depsgraph, report, name):
+    """The depth of field, or None where all is sharp."""
+    dof = data.dof
+    if not dof.use_dof:
+        return None
+    focus = dof.focus_distance
+    if dof.focus_object is not None:
+        at = dof.focus_object.evaluated_get(depsgraph).matrix_world.translation
+        focus = abs((at - eye).dot(forward))
+        if dof.focus_subtarget:
+            report.add(name, "focus on a bone", "focus on the armature's origin")
+    if dof.aperture_ratio != 1.0:
+        report.add(name, f"aperture ratio {dof.aperture_ratio:g}", "the aperture is not squeezed")
+    lens = {"radius": 0.5e-3 * data.lens / dof.aperture_fstop, "focus": max(focus, 1e-6)}
+    if dof.aperture_blades >= 3:
+        blades = min(dof.aperture_blades, 64)
+        # Cycles has a corner half a side beyond the x axis; tweenray has one on the y axis.
+        turn = math.degrees(dof.aperture_rotation) + 180.0 / blades - 90.0
+        lens |= {"blades": blades, "blade_rotation": turn % (360.0 / blades)}
+    return lens
+
+
+def table(records):
+    """The scene file's `[camera]` of one record a frame."""
+    first = records[0]
+    entries = {"frames": len(records), "fov": first["fov"], "up": first["up"]}
+    if any(first["shift"]):
+        entries["shift"] = first["shift"]
+    if abs(first["pixel_aspect"] - 1.0) > 1e-6:
+        entries["pixel_aspect"] = first["pixel_aspect"]
+    lenses = [r["lens"] for r in records]
+    own = next((lens for lens in lenses if lens), None)
+    if own:
+        entries["lens"] = dict(own)
+    if all(r == first for r in records):
+        entries["still"] = {"eye": first["eye"], "target": first["target"]}
+        return entries
+    entries["keys"] = [key(r, first, own) for r in records]
+    return entries
+
+
+def key(record, first, own):
+    """The key pose of one frame: what differs from the camera's own."""
+    entries = {name: record[name] for name in ("eye", "target", "up")}
+    entries |= {name: record[name] for name in ("fov", "shift") if record[name] != first[name]}
+    if own:
+        lens = record["lens"] or {"radius": 0.0, "focus": own["focus"]}
+        entries["lens"] = {"radius": lens["radius"], "focus": lens["focus"]}
+    return entries

@@ -1,0 +1,183 @@
+"""Image files beside the scene file: copies where tweenray reads them as Blender does, else written anew."""
+
+import os
+import shutil
+import struct
+import zlib
+
+import bpy
+import numpy as np
+
+from .meshes import free_name
+
+# Formats that tweenray reads, by the first bytes of a file.
+KNOWN = {b"\x89PNG": ".png", b"\xff\xd8\xff": ".jpg", b"BM": ".bmp", b"#?RA": ".hdr", b"v/1\x01": ".exr"}
+
+
+class Images:
+    """The images of an export, in the folder `textures` of `folder`."""
+
+    def __init__(self, folder, report):
+        self.folder, self.report = folder, report
+        self._files, self._names = {}, set()
+
+    def colour(self, image):
+        """The file of an image of colours, or None where it has no pixels."""
+        space = image.colorspace_settings.name
+        as_codes = space == "sRGB" and not image.is_float
+        as_light = image.is_float and (space.startswith("Linear") or space == "Non-Color")
+        if as_codes or as_light:
+            return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
+        if space not in ("Non-Color", "Raw") and not space.startswith("Linear"):
+            self.report.add(image.name, f"colour space {space}", "taken as linear light")
+        return self._once(image, "light", lambda: self._light(image))
+
+    def data(self, image):
+        """The file of an image of numbers (roughness, normals), or None; grey is that of Rec. 709 where it is coloured."""
+        space = image.colorspace_settings.name
+        if space in ("Non-Color", "Raw") or space.startswith("Linear"):
+            return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
+        return self._once(image, "grey", lambda: self._linear_codes(image))
+
+    def alpha(self, image):
+        """The file of an image whose alpha, or else colour, counts."""
+        return self._once(image, "colour", lambda: self._copy(image) or self._codes(image))
+
+    def luminance(self, image):
+        """The file of the grey that Blender makes of a coloured image's linear numbers, or None."""
+        return self._once(image, "luminance", lambda: self._luminance(image))
+
+    def mean(self, image):
+        """The mean linear colour."""
+        pixels = self._pixels(image)
+        if pixels is None:
+            return [0.0, 0.0, 0.0]
+        if not image.is_float and image.colorspace_settings.name == "sRGB":
+            pixels = from_srgb(pixels)
+        return [float(x) for x in pixels[..., :3].mean(axis=(0, 1), dtype=np.float64)]
+
+    def is_grey(self, image):
+        """Whether red, green and blue are the same everywhere."""
+        pixels = self._pixels(image)
+        return pixels is None or float(np.abs(pixels[..., :3] - pixels[..., :1]).max()) < 1e-6
+
+    def add(self, name, pixels):
+        """The file of an array of linear radiance, (rows, columns, 3), row 0 at the bottom."""
+        return self._exr(name, np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2))
+
+    def _once(self, image, kind, make):
+        key = (image.name_full, kind)
+        if key not in self._files:
+            self._files[key] = make()
+            if self._files[key] is None:
+                self.report.add(image.name, "the image has no pixels", "one colour")
+        return self._files[key]
+
+    def _copy(self, image):
+        """A copy of its file as it stands, or None where that cannot be read by tweenray or was changed in Blender."""
+        if image.source != "FILE" or image.is_dirty:
+            return None
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        if image.packed_file is not None:
+            return self._keep(image.name, image.packed_file.data)
+        if not os.path.isfile(path):
+            return None
+        with open(path, "rb") as file:
+            ending = ending_of(file.read(8))
+        if ending is None:
+            return None
+        file = self._place(image.name, ending)
+        shutil.copyfile(path, os.path.join(self.folder, file))
+        return file
+
+    def _keep(self, name, data):
+        ending = ending_of(data[:8])
+        return ending and self._write(name, ending, data)
+
+    def _codes(self, image):
+        """Its own numbers: 8 bits, or floats."""
+        pixels = self._pixels(image)
+        if pixels is None:
+            return None
+        if image.is_float:
+            return self._exr(image.name, pixels)
+        return self._write(image.name, ".png", png(np.rint(255.0 * np.clip(pixels, 0.0, 1.0)).astype(np.uint8)))
+
+    def _light(self, image):
+        pixels = self._pixels(image)
+        return None if pixels is None else self._exr(image.name, pixels)
+
+    def _linear_codes(self, image):
+        pixels = self._pixels(image)
+        if pixels is None:
+            return None
+        if not image.is_float:
+            pixels = np.concatenate([from_srgb(pixels[..., :3]), pixels[..., 3:]], axis=2)
+        return self._write(image.name, ".png", png(np.rint(65535.0 * np.clip(pixels, 0.0, 1.0)).astype(">u2")))
+
+    def _luminance(self, image):
+        pixels = self._pixels(image)
+        if pixels is None:
+            return None
+        if not image.is_float and image.colorspace_settings.name == "sRGB":
+            pixels = from_srgb(pixels)
+        grey = np.clip(pixels[..., :3] @ np.array([0.2126, 0.7152, 0.0722], dtype=pixels.dtype), 0.0, 1.0)
+        grey = np.rint(65535.0 * grey).astype(">u2")[..., None]
+        return self._write(image.name, ".png", png(np.repeat(grey, 3, axis=2)))
+
+    def _pixels(self, image):
+        """(rows, columns, 4), row 0 at the bottom, or None where there are none."""
+        width, height = image.size
+        if width == 0 or height == 0 or len(image.pixels) != 4 * width * height:
+            return None
+        pixels = np.empty(4 * width * height, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(height, width, 4)
+
+    def _exr(self, name, pixels):
+        file = self._place(name, ".exr")
+        height, width = pixels.shape[:2]
+        image = bpy.data.images.new("tweenray", width, height, alpha=True, float_buffer=True)
+        try:
+            image.colorspace_settings.name = "Non-Color"
+            image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).reshape(-1))
+            image.filepath_raw, image.file_format = os.path.join(self.folder, file), "OPEN_EXR"
+            image.save()
+        finally:
+            bpy.data.images.remove(image)
+        return file
+
+    def _write(self, name, ending, data):
+        file = self._place(name, ending)
+        with open(os.path.join(self.folder, file), "wb") as out:
+            out.write(data)
+        return file
+
+    def _place(self, name, ending):
+        os.makedirs(os.path.join(self.folder, "textures"), exist_ok=True)
+        return "textures/" + free_name(os.path.splitext(name)[0], self._names) + ending
+
+
+def ending_of(head):
+    """The ending of a file that opens with these bytes, or None where tweenray cannot read it."""
+    return next((ending for magic, ending in KNOWN.items() if head.startswith(magic)), None)
+
+
+def from_srgb(codes):
+    """Linear light of codes from 0 to 1 (IEC 61966-2-1)."""
+    return np.where(codes <= 0.04045, codes / 12.92, np.power((codes + 0.055) / 1.055, 2.4)).astype(np.float32)
+
+
+def png(pixels):
+    """A PNG file of (rows, columns, 3 or 4) whole numbers, row 0 at the bottom."""
+    height, width, channels = pixels.shape
+    bits = 8 * pixels.dtype.itemsize
+    rows = pixels[::-1].reshape(height, -1).view(np.uint8)
+    filtered = np.concatenate([np.zeros((height, 1), dtype=np.uint8), rows], axis=1)
+    head = struct.pack(">IIBBBBB", width, height, bits, 6 if channels == 4 else 2, 0, 0, 0)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    body = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + body

@@ -1,0 +1,98 @@
+"""The Principled BSDF."""
+
+import math
+
+from .shaders import Made, ior, share
+
+# Inputs that tweenray has not, with the value at which they do nothing.
+ABSENT = {
+    "Subsurface Weight": ("subsurface scattering", "a diffuse surface"),
+    "Anisotropic": ("anisotropy", "an isotropic reflection"),
+    "Sheen Weight": ("sheen", "none"),
+    "Diffuse Roughness": ("rough diffuse (Oren-Nayar)", "Lambert"),
+    "Thin Film Thickness": ("a thin film", "none"),
+}
+
+
+def write(writer, fed):
+    """The material of a Principled BSDF."""
+    for name, (what, instead) in ABSENT.items():
+        value = writer.read(fed, name)
+        if not value.is_constant() or value.grey() != 0.0:
+            writer.note(what, instead)
+    for name in ("Specular Tint", "Coat Tint"):
+        value = writer.read(fed, name)
+        weight = writer.read(fed, "Coat Weight")
+        counts = name == "Specular Tint" or not weight.is_constant() or weight.grey() > 0.0
+        if counts and (not value.is_constant() or any(abs(c - 1.0) > 1e-6 for c in value.rgb())):
+            writer.note(name.lower(), "white")
+    alpha = writer.read(fed, "Alpha")
+    if alpha.is_constant() and alpha.grey() <= 0.0:
+        return Made({}, is_seen=False)
+    made = body(writer, fed)
+    writer.emit(made, fed, "Emission Color", "Emission Strength") if "glass" not in made.table else glows(writer, fed)
+    if alpha.image is not None:
+        writer.cut(made, alpha)
+    elif alpha.grey() < 1.0:
+        writer.note(f"alpha {alpha.grey():.3g}", "opaque")
+    return made
+
+
+def glows(writer, fed):
+    """Notes emission of what is glass."""
+    if writer.constant(fed, "Emission Strength").grey() > 0.0 and max(writer.constant(fed, "Emission Color").rgb()) > 0.0:
+        writer.note("emission of glass", "none")
+
+
+def body(writer, fed):
+    """Glass, or all that reflects."""
+    transmission = writer.constant(fed, "Transmission Weight").grey()
+    metallic = writer.read(fed, "Metallic")
+    index = writer.constant(fed, "IOR").grey()
+    is_metal = metallic.image is not None or metallic.grey() > 0.0
+    if transmission >= 0.5 and not is_metal:
+        return glass(writer, fed, transmission, index)
+    if transmission > 0.0:
+        writer.note(f"transmission {transmission:.3g}", "opaque")
+    made, table = Made({}), {}
+    made.table["principled"] = table
+    writer.coloured(made, "base_colour", "base_texture", fed, "Base Color", table)
+    writer.number(table, "metallic", fed, "Metallic")
+    writer.number(table, "roughness", fed, "Roughness")
+    table |= reflection(index, writer.constant(fed, "Specular IOR Level").grey())
+    coat = min(max(writer.constant(fed, "Coat Weight").grey(), 0.0), 1.0)
+    if coat > 0.0:
+        roughness = min(max(writer.constant(fed, "Coat Roughness").grey(), 0.0), 1.0)
+        table |= {"clearcoat": coat, "clearcoat_roughness": roughness}
+        coat_ior = writer.constant(fed, "Coat IOR").grey()
+        if abs(coat_ior - 1.5) > 1e-3:
+            writer.note(f"coat of index {coat_ior:.3g}", "1.5")
+        if fed.input("Coat Normal").fed() is not None:
+            writer.note("a normal of the coat", "the surface's")
+    writer.normal(made, fed)
+    return made
+
+
+def reflection(index, level):
+    """`ior` and `specular` of an index of refraction and Blender's Specular IOR Level, which is a factor of twice
+    itself on the reflectance at normal incidence."""
+    root = (index - 1.0) / (index + 1.0)
+    normal = root * root * 2.0 * max(level, 0.0)
+    if normal <= 0.0:
+        return {"specular": 0.0}
+    root = math.sqrt(min(normal, 0.66))
+    return {"ior": ior((1.0 + root) / (1.0 - root))}
+
+
+def glass(writer, fed, transmission, index):
+    """Clear glass. A surface lets the root of the base colour through, as in Cycles."""
+    if transmission < 1.0:
+        writer.note(f"transmission {transmission:.3g}", "1")
+    roughness = writer.constant(fed, "Roughness").grey()
+    if fed.input("Normal").fed() is not None:
+        writer.note("a normal map on glass", "none")
+    tint = [math.sqrt(c) for c in share(writer.constant(fed, "Base Color").rgb())]
+    made = {"ior": ior(index), "tint": tint}
+    if roughness > 0.0:
+        made["roughness"] = min(roughness, 1.0)
+    return Made({"glass": made})

@@ -1,0 +1,266 @@
+"""The export of a scene: evaluated as for a render, written as scene.toml, meshes, textures and report.txt.
+
+A depsgraph for rendering (render levels of modifiers, render visibility, all particles) is given by Blender to a render
+engine alone. So the export is one, `Engine`, which renders no pixel.
+"""
+
+import math
+import os
+
+import bpy
+
+from . import axes, camera, lights, toml
+from .images import Images
+from .materials import DEFAULT, Materials
+from .meshes import Meshes, free_name
+from .report import Report
+from .world import World
+
+# Object types without a surface, which are left out without a word.
+SILENT = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
+SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+MOST_BYTES = 16 << 20
+
+
+class Engine(bpy.types.RenderEngine):
+    """Lends its depsgraph to the export that is under way."""
+
+    bl_idname = "TWEENRAY_EXPORT"
+    bl_label = "tweenray export"
+    bl_use_eevee_viewport = False
+
+    export = None
+
+    def render(self, depsgraph):
+        """Takes the scene frame by frame; a failure is kept for `write`."""
+        export = Engine.export
+        if export is None or export.error is not None:
+            return
+        try:
+            export.take(self, depsgraph)
+        except Exception as error:
+            export.error = error
+
+
+def write(scene, folder):
+    """Exports `scene` to `folder`. Gives the report's lines.
+
+    Raises ValueError for what cannot be exported, OSError for what cannot be written.
+    """
+    if scene.camera is None:
+        raise ValueError(f"{scene.name}: no camera; add one and make it active (Ctrl-0)")
+    os.makedirs(folder, exist_ok=True)
+    export = Export(scene, folder)
+    render = scene.render
+    kept = render.engine, render.use_compositing, render.use_sequencer, scene.frame_current, scene.frame_subframe
+    bpy.utils.register_class(Engine)
+    try:
+        export.sky = export.world.prepare(scene)
+        render.engine, render.use_compositing, render.use_sequencer = Engine.bl_idname, False, False
+        Engine.export = export
+        bpy.ops.render.render(scene=scene.name)
+    finally:
+        Engine.export = None
+        render.engine, render.use_compositing, render.use_sequencer = kept[:3]
+        scene.frame_set(kept[3], subframe=kept[4])
+        bpy.utils.unregister_class(Engine)
+    if export.error is not None:
+        raise export.error
+    if not export.records:
+        raise ValueError(f"{scene.name}: Blender evaluated no view layer; enable one for rendering")
+    return export.finish()
+
+
+class Export:
+    """What was gathered of a scene."""
+
+    def __init__(self, scene, folder):
+        self.scene, self.folder, self.report = scene, folder, Report()
+        images = Images(folder, self.report)
+        self.materials = Materials(images, self.report)
+        self.meshes = Meshes(folder, self.materials, self.report)
+        self.world = World(images, self.report)
+        self.sky, self.error = None, None
+        self.records, self.placed, self.lamps = [], [], []
+        self.names, self.used = {}, set()
+
+    def take(self, engine, depsgraph):
+        """The scene at its first frame, and the camera at every frame."""
+        if self.records:
+            self.report.add(depsgraph.view_layer.name, "a further view layer", "the first alone")
+            return
+        scene = self.scene
+        frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
+        for frame in frames:
+            engine.frame_set(frame, 0.0)
+            if frame == frames[0]:
+                self.geometry(depsgraph)
+                before = places(depsgraph)
+            if frame in (frames[len(frames) // 2], frames[-1]) and frame != frames[0]:
+                self.note_moves(before, places(depsgraph), frames[0])
+            self.camera(depsgraph)
+
+    def camera(self, depsgraph):
+        ob = depsgraph.scene.camera
+        if ob is None:
+            raise ValueError(f"{self.scene.name}: no camera at frame {depsgraph.scene.frame_current}")
+        ob = ob.evaluated_get(depsgraph)
+        self.records.append(camera.record(ob, depsgraph, size(self.scene), self.report))
+
+    def note_moves(self, before, now, frame):
+        for name, matrix in now.items():
+            if name not in before:
+                self.report.add(name, "it appears during the shot", f"it is absent, as at frame {frame}")
+            elif any(abs(a - b) > 1e-5 * max(1.0, abs(a)) for a, b in zip(before[name], matrix)):
+                self.report.add(name, "it moves or changes during the shot", f"it stays as at frame {frame}")
+
+    def geometry(self, depsgraph):
+        for instance in depsgraph.object_instances:
+            if not instance.show_self:
+                continue
+            ob = instance.object
+            if ob.type == "LIGHT":
+                self.light(ob, instance.matrix_world.copy())
+            elif ob.type in SURFACES:
+                self.surface(instance, depsgraph)
+            elif ob.type not in SILENT:
+                self.report.add(ob.name, f"an object of the type {ob.type}", "not exported")
+            if instance.show_particles and any(s.settings.render_type == "PATH" for s in ob.particle_systems):
+                self.report.add(ob.name, "hair", "not exported")
+
+    def light(self, ob, matrix):
+        linking = ob.light_linking
+        if linking.receiver_collection is not None or linking.blocker_collection is not None:
+            self.report.add(ob.name, "light linking", "it lights everything")
+        entries, quads = lights.export(ob, matrix, self.materials, self.report)
+        self.lamps.extend(entries)
+        if quads is not None:
+            corners, radiance = quads
+            name = f"ellipse {ob.name}"
+            file = self.meshes.quads(name, corners)
+            identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
+            self.placed.append((ob.name, file, {"emission": radiance}, axes.matrix(identity)))
+
+    def surface(self, instance, depsgraph):
+        ob, matrix = instance.object, instance.matrix_world
+        if abs(matrix.to_3x3().determinant()) < 1e-30:
+            self.report.add(ob.name, "a scale of 0 flattens it", "not exported")
+            return
+        self.note_visibility(ob)
+        for file, material in self.meshes.parts(instance, depsgraph):
+            made = self.materials.made(material)
+            if not made.is_seen:
+                continue
+            name = material.name if material else DEFAULT
+            self.used.add(name)
+            if made.table.get("emission") and set(made.table) - {"emission", "emits_back", "normal_map"}:
+                self.report.add(name, "emission of what also reflects", "meshes of up to 4096 faces become lights, which reflect nothing")
+            self.placed.append((ob.name, file, name, axes.matrix(matrix)))
+
+    def note_visibility(self, ob):
+        for ray in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+            if not getattr(ob, f"visible_{ray}"):
+                self.report.add(ob.name, f"invisible to {ray} rays", "seen by all rays")
+        if ob.is_holdout or ob.is_shadow_catcher:
+            self.report.add(ob.name, "holdout or shadow catcher", "an ordinary surface")
+
+    # ---- the scene file ----------------------------------------------------------------------------
+
+    def finish(self):
+        """Writes scene file and report; gives the report's lines."""
+        text = self.text()
+        if len(text.encode()) > MOST_BYTES:
+            raise ValueError(
+                f"{self.scene.name}: {len(self.placed)} placed meshes make a scene file over {MOST_BYTES >> 20} MB; "
+                "join objects that stand still (Ctrl-J) or realize instances"
+            )
+        for name, content in (("scene.toml", text), ("report.txt", self.report.text())):
+            with open(os.path.join(self.folder, name), "w", encoding="utf-8", newline="\n") as out:
+                out.write(content)
+        return self.report.lines()
+
+    def text(self):
+        """The scene file."""
+        frames = f"frames {self.scene.frame_start} to {self.scene.frame_end}"
+        parts = [f"# {toml.value(self.scene.name)} from Blender {bpy.app.version_string}, {frames}\n"]
+        parts += [toml.table("[settings]", self.settings()), camera_text(self.records)]
+        if self.sky:
+            parts.append(toml.table("[sky]", self.sky))
+        parts += [toml.table("[[light]]", lamp) for lamp in self.lamps]
+        tables = self.materials.tables(self.used)
+        for name, file, material, matrix in self.placed:
+            if isinstance(material, dict):
+                tables[name + " light"] = material
+        taken = set()
+        names = {name: free_name(name, taken) for name in tables}
+        parts += [toml.table(f"[material.{toml.key(names[name])}]", table) for name, table in tables.items()]
+        for name, file, material, matrix in self.placed:
+            material = names[name + " light" if isinstance(material, dict) else material]
+            entries = {"name": name, "file": file, "material": material, "transform": [{"matrix": matrix}]}
+            parts.append(toml.table("[[mesh]]", entries))
+        return "\n".join(parts)
+
+    def settings(self):
+        """Image size, frame rate, exposure, tone curve, bounces, and the pixel filter of Cycles."""
+        scene, render = self.scene, self.scene.render
+        if render.use_motion_blur:
+            self.report.add(scene.name, "motion blur", "none")
+        if render.use_border:
+            self.report.add(scene.name, "a render region", "the whole picture")
+        if scene.frame_step != 1:
+            self.report.add(scene.name, f"frame step {scene.frame_step}", "each rendered frame is one of the shot")
+        cycles, view = scene.cycles, scene.view_settings
+        exposure = cycles.film_exposure * 2.0 ** view.exposure
+        filters = {"BOX": "box", "GAUSSIAN": "gaussian", "BLACKMAN_HARRIS": "blackman-harris"}
+        bounces = min(cycles.max_bounces, max(cycles.glossy_bounces, cycles.transmission_bounces))
+        entries = {
+            "size": list(size(scene)),
+            "fps": render.fps / render.fps_base,
+            "filter": filters.get(cycles.pixel_filter_type, "box"),
+            "bounces": min(bounces, 1024),
+            "tone": self.tone(view),
+        }
+        return entries | ({} if math.isclose(exposure, 1.0) else {"exposure": exposure})
+
+    def tone(self, view):
+        """The tone curve that comes nearest to the view transform."""
+        exact = {"Standard": "srgb", "Raw": "linear"}
+        if view.view_transform not in exact:
+            self.report.add(self.scene.name, f"the view transform {view.view_transform}", "the tone curve filmic, which looks otherwise; exr files stay linear")
+        if view.look not in ("None", "") or view.gamma != 1.0 or view.use_curve_mapping:
+            self.report.add(self.scene.name, "look, gamma or curves of the view", "none")
+        return exact.get(view.view_transform, "filmic")
+
+
+def camera_text(records):
+    """The `[camera]` table, with the keys a line each."""
+    entries = camera.table(records)
+    keys = entries.pop("keys", None)
+    text = toml.table("[camera]", entries)
+    if keys:
+        text += "keys = [\n" + "".join(f"    {toml.value(key)},\n" for key in keys) + "]\n"
+    return text
+
+
+def size(scene):
+    """(width, height) of the picture, pixels."""
+    render = scene.render
+    share = 0.01 * render.resolution_percentage
+    return max(int(render.resolution_x * share), 1), max(int(render.resolution_y * share), 1)
+
+
+def places(depsgraph):
+    """{name: numbers of its placement and form} of what is seen, but for instances."""
+    found = {}
+    for instance in depsgraph.object_instances:
+        if not instance.is_instance and instance.object.type in SURFACES | {"LIGHT"}:
+            found[instance.object.name] = numbers(instance.object, instance.matrix_world)
+    return found
+
+
+def numbers(ob, matrix):
+    """What changes where an object moves, or is bent, or where a light gets brighter."""
+    found = [x for row in matrix for x in row]
+    if ob.type == "LIGHT":
+        return found + [ob.data.energy, *ob.data.color]
+    return found + [x for corner in ob.bound_box for x in corner]
