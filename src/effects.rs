@@ -5,7 +5,7 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Glass, Light, Material, MeanLights, Scene, Settings, ShotLens};
+use crate::scene::{Fog, Glass, Light, Material, MeanLights, Scene, Settings, ShotLens};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub struct EffectPlan {
     pub sky_light: bool,
     /// Rays that leave the scene see more than one colour: an environment, or a sun.
     pub environment: bool,
+    /// A medium between the surfaces takes light from rays and scatters some towards them.
+    pub fog: bool,
     /// A ray-free ambient term is added.
     pub ambient: bool,
 }
@@ -83,6 +85,7 @@ impl EffectPlan {
         delta_lights: true,
         sky_light: true,
         environment: true,
+        fog: true,
         ambient: true,
     };
 
@@ -109,10 +112,14 @@ impl EffectPlan {
             runs
         };
         let diffuse = used.diffuse > 0;
+        let fog = scene.fog.as_ref().filter(|fog| fog.extinction > 0.0);
+        let scatters = fog.is_some_and(|fog| is_something(fog.albedo)) && settings.fog_samples > 0;
+        // Light from outside the scene goes an endless way through fog that is everywhere.
+        let is_hidden = fog.is_some_and(|fog| fog.bounds.is_none());
         let no_diffuse = || "no diffuse surface to light".to_string();
-        let lit = diffuse || (used.glossy > 0 && bounces > 0);
+        let lit = diffuse || (used.glossy > 0 && bounces > 0) || scatters;
         // Glossy surfaces see a sky of one colour by their own rays.
-        let lit_by_sky = diffuse || (lit && environment.is_some());
+        let lit_by_sky = diffuse || (lit && environment.is_some()) || scatters;
         let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
@@ -179,13 +186,19 @@ impl EffectPlan {
             ),
             sky_light: decide(
                 "sky light",
-                lit_by_sky && sky_bright && scene.sky.lights && settings.sky_samples > 0,
+                lit_by_sky
+                    && sky_bright
+                    && scene.sky.lights
+                    && settings.sky_samples > 0
+                    && !is_hidden,
                 if !lit_by_sky {
                     no_diffuse()
                 } else if !sky_bright {
                     "the sky is black".into()
                 } else if !scene.sky.lights {
                     "the sky is only a backdrop".into()
+                } else if is_hidden {
+                    "fog hides the sky".into()
                 } else {
                     let samples = match settings.least_sky_samples {
                         // An environment has no pilot rays.
@@ -212,14 +225,38 @@ impl EffectPlan {
                 shown.is_some(),
                 shown.unwrap_or_else(|| "rays that leave the scene see one colour".into()),
             ),
+            fog: decide(
+                "fog",
+                fog.is_some(),
+                fog.map_or("none".into(), |f| described(f, scene, settings)),
+            ),
             ambient: decide(
                 "ambient term",
-                diffuse && is_something(scene.sky.ambient),
-                if diffuse { format!("ambient {}", scene.sky.ambient) } else { no_diffuse() },
+                (diffuse || scatters) && is_something(scene.sky.ambient),
+                if diffuse || scatters {
+                    format!("ambient {}", scene.sky.ambient)
+                } else {
+                    no_diffuse()
+                },
             ),
         };
         (plan, reasons)
     }
+}
+
+/// The fog of a scene in words.
+fn described(fog: &Fog, scene: &Scene, settings: &Settings) -> String {
+    let recentring = &scene.recentring;
+    let extinction = fog.extinction * recentring.scale();
+    let place = fog.bounds.map_or("everywhere".into(), |bounds| {
+        let [x, y, z] = bounds.extent().to_array().map(|edge| recentring.length_to_world(edge));
+        format!("in a box of {x} x {y} x {z}")
+    });
+    let samples = match settings.fog_samples {
+        0 => "unlit".into(),
+        n => format!("{} of each light on a ray", counted(n as usize, "sample")),
+    };
+    format!("extinction {extinction} {place}, {samples}")
 }
 
 /// What rays see that leave the scene, if it is more than one colour.

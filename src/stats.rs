@@ -25,6 +25,8 @@ pub enum RayKind {
     ShadowDelta,
     /// Shadow rays to the sky.
     ShadowSky,
+    /// Shadow rays from fog to lights and sky.
+    ShadowFog,
     /// Second tries after a miss inside the bounds; their first tries count as what they are.
     Retry,
     /// Rays refused before tracing (NaN, infinite, zero direction); they also count as what they are.
@@ -35,7 +37,7 @@ const _: () = assert!(RayKind::Invalid as usize + 1 == RayKind::ALL.len(), "the 
 
 impl RayKind {
     /// All kinds, in the order in which they are stored and shown.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Camera,
         Self::Mirror,
         Self::Glossy,
@@ -43,6 +45,7 @@ impl RayKind {
         Self::ShadowArea,
         Self::ShadowDelta,
         Self::ShadowSky,
+        Self::ShadowFog,
         Self::Retry,
         Self::Invalid,
     ];
@@ -62,6 +65,7 @@ impl RayKind {
             Self::ShadowArea => "shadow of area lights",
             Self::ShadowDelta => "shadow of other lights",
             Self::ShadowSky => "shadow of the sky",
+            Self::ShadowFog => "shadow in fog",
             Self::Retry => "second tries",
             Self::Invalid => "invalid",
         }
@@ -77,6 +81,7 @@ impl RayKind {
             Self::ShadowArea => "shadow_area",
             Self::ShadowDelta => "shadow_delta",
             Self::ShadowSky => "shadow_sky",
+            Self::ShadowFog => "shadow_fog",
             Self::Retry => "retry",
             Self::Invalid => "invalid",
         }

@@ -105,6 +105,10 @@ pub struct SettingArgs {
     #[arg(long, value_name = "N|MIN..MAX", help_heading = "Light",
         allow_negative_numbers = true, value_parser = values::light_samples)]
     pub sky_samples: Option<SampleNumber>,
+    /// Points on each ray through fog at which a light's scattered light is estimated [default: 4]
+    #[arg(long, value_name = "N", help_heading = "Light",
+        allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
+    pub fog_samples: Option<u32>,
     /// Whether every point looks at every light in scenes of more than 8, not only at those that matter there
     /// [default: off]
     #[arg(long, value_name = "on|off", help_heading = "Light", value_parser = values::switch())]
@@ -228,6 +232,7 @@ impl SettingArgs {
         if let Some(samples) = self.sky_samples {
             (s.sky_samples, s.least_sky_samples) = samples.of_light();
         }
+        put(&mut s.fog_samples, self.fog_samples);
         put(&mut s.all_lights, self.all_lights);
         put(&mut s.bounces, self.bounces);
         put(&mut s.cutoff, self.cutoff);

@@ -132,6 +132,11 @@ pub struct SpawnPoint {
 }
 
 impl SpawnPoint {
+    /// A point between surfaces.
+    pub fn in_space(p: DVec3, offset: bool) -> Self {
+        Self { p, org: p, front: DVec3::ZERO, prim: PrimRef::NONE, offset }
+    }
+
     /// The ray along `dir`.
     pub fn along(&self, dir: DVec3) -> Ray {
         Ray { exclude: self.excluded(dir), ..Ray::new(self.org, dir) }

@@ -165,7 +165,9 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
     let of_kind = |kind| match kind {
         RayKind::Camera => CAMERA_RAY,
         RayKind::Mirror | RayKind::Glossy | RayKind::Glass => SPECULAR_RAY,
-        RayKind::ShadowArea | RayKind::ShadowDelta | RayKind::ShadowSky => SHADOW_RAY,
+        RayKind::ShadowArea | RayKind::ShadowDelta | RayKind::ShadowSky | RayKind::ShadowFog => {
+            SHADOW_RAY
+        }
         // Second tries are few, and part of what their first ones cost.
         RayKind::Retry | RayKind::Invalid => 0.0,
     };

@@ -1,6 +1,6 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{AlphaMask, Glass, Material, TextureMap, World, WorldMesh};
+use super::{AlphaMask, Fog, Glass, Material, TextureMap, World, WorldMesh};
 use crate::error::{Error, Result};
 use crate::math::Rgb;
 
@@ -30,6 +30,7 @@ impl World {
         self.meshes.iter().try_for_each(check_vertices)?;
         let sky = self.sky.radiance;
         self.environment.iter().try_for_each(|own| own.check(&self.textures, sky))?;
+        self.fog.iter().try_for_each(Fog::check)?;
         self.check_finite()
     }
 

@@ -13,6 +13,7 @@ mod aovs;
 mod camera;
 mod check;
 mod environment;
+mod fog;
 mod job;
 mod lens;
 mod light;
@@ -43,12 +44,14 @@ pub use environment::{
     Daylight, Environment, EnvironmentKind, EnvironmentRadiance, IrradianceTable, RadianceTable,
     SceneEnvironment, SkyGradient, SunSky, brightness, image_place,
 };
+pub use fog::Fog;
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
     DirectionalLight, DiskLight, FarField, Light, PointLight, QuadLight, Sky, SphereLight,
     SpotLight, SunLight,
 };
+pub(crate) use light_cells::FEW_LIGHTS;
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
 pub use material::{Fresnel, Glass, Material, MaterialId, NormalMap};
 pub use mesh::{Corners, Mesh, NormalPolicy, Sphere, Surface, WorldMesh, WorldSphere};
@@ -104,6 +107,8 @@ pub struct World {
     pub sky: Sky,
     /// Light from outside that differs by direction, in place of the sky's radiance. The sky says whether it lights surfaces.
     pub environment: Option<Environment>,
+    /// What fills the space between surfaces, world space.
+    pub fog: Option<Fog>,
     /// Boxes in which light is traced in every frame, never reused; world space.
     pub traced_regions: Vec<Bounds3>,
 }
@@ -129,6 +134,8 @@ pub struct Scene {
     pub sky: Sky,
     /// Light from outside that differs by direction, in place of the sky's radiance.
     pub environment: Option<SceneEnvironment>,
+    /// What fills the space between surfaces.
+    pub fog: Option<Fog>,
     /// Boxes in which light is traced in every frame, never reused.
     pub traced_regions: Vec<Bounds3>,
     /// Bounds of all geometry, f64, scene space.

@@ -41,12 +41,12 @@ impl World {
         self.materials.len() as MaterialId - 1
     }
 
-    /// Moves everything by `transform`: meshes, spheres, lights and the boxes in which light is
+    /// Moves everything by `transform`: meshes, spheres, lights, the box of fog and the boxes in which light is
     /// always traced; the environment is turned. The intensity of point and spot lights, the irradiance of directional ones and the
-    /// absorption of glass stay; a turned box becomes the upright one around it.
+    /// absorption of glass and the extinction of fog stay; a turned box in which light is traced becomes the upright one around it.
     ///
     /// Errors: as [`WorldMesh::apply_transform`]; spheres, disk lights, spot lights and environments under a transform that is no
-    /// similarity, since they would not stay round. The world is then half moved: drop it.
+    /// similarity, since they would not stay round; fog in a box under a transform that turns. The world is then half moved: drop it.
     pub fn apply_transform(&mut self, transform: &DAffine3) -> Result<()> {
         let (_, mirrors) = normal_matrix(transform)?;
         // Materials stay as they are given, and the sky's radiance is the same in all directions.
@@ -59,6 +59,7 @@ impl World {
             lights,
             sky: _,
             environment,
+            fog,
             traced_regions,
         } = self;
         meshes.iter_mut().try_for_each(|mesh| mesh.apply_transform(transform))?;
@@ -67,11 +68,12 @@ impl World {
         }
         lights.iter_mut().try_for_each(|light| light.transform(transform, mirrors))?;
         environment.iter_mut().try_for_each(|sky| sky.transform(transform))?;
+        fog.iter_mut().try_for_each(|fog| fog.transform(transform))?;
         traced_regions.iter_mut().for_each(|region| *region = region.transformed(transform));
         Ok(())
     }
 
-    /// Adds all that `other` holds, with its indices shifted. Sky and environment stay this world's.
+    /// Adds all that `other` holds, with its indices shifted. Sky, environment and fog stay this world's.
     pub fn append(&mut self, other: World) {
         let World {
             mut meshes,
@@ -82,6 +84,7 @@ impl World {
             lights,
             sky: _,
             environment: _,
+            fog: _,
             traced_regions,
         } = other;
         let first_material = self.materials.len() as u32;

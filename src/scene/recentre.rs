@@ -102,6 +102,7 @@ impl World {
             lights,
             sky: self.sky,
             environment: None,
+            fog: self.fog.map(|fog| fog.into_scene(&recentring)),
             traced_regions,
             bounds: scene_bounds,
             collapsed,

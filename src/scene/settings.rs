@@ -41,6 +41,10 @@ pub struct Settings {
     /// The least sky rays, as [`least_shadow_samples`](Self::least_shadow_samples).
     #[serde(default)]
     pub least_sky_samples: Option<u32>,
+    /// Points on each ray through fog at which a light's scattered light is estimated. In scenes of more than 8 lights that
+    /// are selected, as many as for 8.
+    #[serde(default)]
+    pub fog_samples: u32,
     /// Look at every light at every point, however little it can send there, in scenes of many lights too.
     #[serde(default)]
     pub all_lights: bool,
@@ -151,6 +155,7 @@ impl Default for Settings {
             least_shadow_samples: None,
             sky_samples: 16,
             least_sky_samples: None,
+            fog_samples: 4,
             all_lights: false,
             smooth_terminator: true,
             bounces: 4,

@@ -43,6 +43,7 @@ impl WorldHash {
             lights,
             sky,
             environment,
+            fog,
             traced_regions,
         } = world;
         let mut parts = Vec::new();
@@ -72,6 +73,9 @@ impl WorldHash {
         parts.push(("the sky".into(), Hash::of(|hash| hash.text(sky))));
         if let Some(environment) = environment {
             parts.push(("the environment".into(), Hash::of(|hash| hash.text(environment))));
+        }
+        if let Some(fog) = fog {
+            parts.push(("the fog".into(), Hash::of(|hash| hash.text(fog))));
         }
         let wearers = meshes.iter().map(|mesh| mesh.material);
         let wearers: Vec<u32> = wearers.chain(spheres.iter().map(|s| s.material)).collect();

@@ -35,8 +35,14 @@ pub(super) fn of_light(branch: u32, light: u32, lights: usize) -> u32 {
 /// selected: as further `lights` of [`of_light`].
 pub(super) const TAIL: usize = 2;
 
-/// The light that a sample chooses, and the place on it, of `lights` that are [`TAIL`] more than the scene's.
+/// In fog, where light is scattered along the ray of a branch and where samples lie on each of so many `lights` and the sky
+/// are drawn: so many further `lights` of [`of_light`].
+pub(super) fn of_fog(lights: usize) -> usize {
+    2 * (lights + 1)
+}
+
+/// The light that a sample chooses, and the place on it, of `lights`, the last two of which are the [`TAIL`].
 pub(super) fn of_tail(branch: u32, lights: usize) -> [u32; 2] {
-    // The sky's number is that of the scene's lights.
+    // The sky's number, and those of fog, come before.
     [lights as u32 - 1, lights as u32].map(|number| of_light(branch, number, lights))
 }

@@ -4,6 +4,7 @@
 //! unshadowed irradiance times the unshadowed irradiance in closed form. Where nothing is in the
 //! way there is no noise at all, and the ratio is what later frames can reuse. A delta light has one sample.
 
+use super::fog::{self, FogSamples};
 use super::groups::{CheckRays, Groups};
 use super::light::{LightSample, LightSampler, LightView, SampleSink, ShadowTarget};
 use super::pilots::Run;
@@ -92,6 +93,8 @@ pub(super) struct ShadowScratch {
     /// In place of weights what a glossy point reflects along each ray, per unit of emission.
     seen: Vec<Rgb>,
     occluded: Vec<bool>,
+    /// The part of light that fog leaves along each ray; empty without fog.
+    left: Vec<f64>,
     /// Where the rays of each point of the batch end.
     ends: Vec<usize>,
     u: Vec<[f32; 2]>,
@@ -110,6 +113,8 @@ pub(super) struct ShadowScratch {
     pub tail: TailSamples,
     /// Samples of an environment.
     pub environment: EnvironmentScratch,
+    /// Samples in fog.
+    pub fog: FogSamples,
     /// Irradiance without shadows, per unit of emission, for each shading point and kept channel.
     exact: Vec<f64>,
     /// What of it the pixel would show.
@@ -168,6 +173,7 @@ impl ShadowScratch {
         self.rays.clear();
         self.weights.clear();
         self.seen.clear();
+        self.left.clear();
         self.ends.clear();
     }
 
@@ -382,6 +388,17 @@ impl Renderer<'_> {
                 s.exact[own] = exact;
                 s.shown[own] = shown * self.settings.exposure;
             }
+            if let Some(fog) = self.fog().filter(|_| !source.is_sky()) {
+                for LightUser { point: i, slot } in input.reached(at, lit.len(), users).iter() {
+                    let Some(slot) = slot else { continue };
+                    let own = i as usize * channels + usize::from(slot);
+                    if s.exact[own] != 0.0 {
+                        let left = fog::dimmed(fog, source, &lit[i as usize]);
+                        s.exact[own] *= left;
+                        s.shown[own] *= left as f32;
+                    }
+                }
+            }
         }
     }
 
@@ -407,6 +424,13 @@ impl Renderer<'_> {
             };
             Gathered { exact, ..Gathered::default() }
         }));
+        if let Some(fog) = self.fog().filter(|_| !source.is_sky()) {
+            let unknown =
+                wanted.iter().zip(&mut s.gathered).filter(|(user, _)| user.slot.is_none());
+            for (user, gathered) in unknown.filter(|(_, gathered)| gathered.exact != 0.0) {
+                gathered.exact *= fog::dimmed(fog, source, &lit[user.point as usize]);
+            }
+        }
         let mut going = std::mem::take(&mut s.going);
         going.clear();
         going.extend(0..wanted.len() as u32);
@@ -488,7 +512,7 @@ impl Renderer<'_> {
             self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
             for (&at, &end) in group.iter().zip(&s.ends) {
-                let (open, all) = opened(&s.weights, &s.occluded, start..end);
+                let (open, all) = opened(source, s, start..end);
                 let gathered = &mut s.gathered[at as usize];
                 gathered.open += open;
                 gathered.all += all;
@@ -559,7 +583,7 @@ impl Renderer<'_> {
             self.trace_shadow_rays(source, s, counts);
             let mut start = 0;
             for (LightUser { point: i, slot }, &end) in reached.iter().zip(&s.ends) {
-                let (open, weight) = opened(&s.weights, &s.occluded, start..end);
+                let (open, weight) = opened(source, s, start..end);
                 let rays = end - start;
                 start = end;
                 if let (Some(slot), true) = (slot, rays > 0) {
@@ -634,10 +658,8 @@ impl Renderer<'_> {
     /// Random dimensions of a branch's lights.
     pub(super) fn light_dimensions(&self) -> usize {
         let lights = self.scene.lights.len();
-        match self.scene.selected_lights(self.settings) {
-            None => lights,
-            Some(_) => lights + dimensions::TAIL,
-        }
+        let tail = self.scene.selected_lights(self.settings).map_or(0, |_| dimensions::TAIL);
+        lights + tail + self.fog().map_or(0, |_| dimensions::of_fog(lights))
     }
 
     /// Traces the batch's rays, to a light.
@@ -656,15 +678,34 @@ impl Renderer<'_> {
         s.occluded.clear();
         s.occluded.resize(s.rays.len(), false);
         self.intersector.occluded_batch(&s.rays, &mut s.occluded, counts);
+        if let Some(fog) = self.fog() {
+            s.left.extend(s.rays.iter().map(|ray| fog.transmittance(ray)));
+            for (left, seen) in s.left.iter().zip(&mut s.seen) {
+                *seen *= *left as f32;
+            }
+        }
     }
 }
 
-/// Sums of the weights of those of `rays` that are not occluded, and of all.
-fn opened(weights: &[f64], occluded: &[bool], rays: std::ops::Range<usize>) -> (f64, f64) {
+/// Sums of the weights of those of the batch's `rays` to `source` that are not occluded, and of all.
+fn opened(source: &LightSource, s: &ShadowScratch, rays: std::ops::Range<usize>) -> (f64, f64) {
     let (mut open, mut all) = (0.0, 0.0);
-    for k in rays {
-        all += weights[k];
-        open += if occluded[k] { 0.0 } else { weights[k] };
+    for k in rays.clone() {
+        all += s.weights[k];
+        open += if s.occluded[k] { 0.0 } else { s.weights[k] };
     }
-    (open, all)
+    if s.left.is_empty() {
+        return (open, all);
+    }
+    let sum = |is_counted: &dyn Fn(usize) -> bool| -> f64 {
+        rays.clone().filter(|k| is_counted(*k)).map(|k| s.weights[k] * s.left[k]).sum()
+    };
+    let through = sum(&|k| !s.occluded[k]);
+    // What fog lets through of a light where nothing is in the way is part of its irradiance without shadows; of a sky,
+    // whose light goes very different ways, it is part of the ratio.
+    match source.is_sky() {
+        true => (through, all),
+        // The same to the last bit where all of them reach the light.
+        false => (through, sum(&|_| true)),
+    }
 }

@@ -9,6 +9,7 @@
 
 use super::backdrop::{Backdrop, environment_light};
 use super::direct::{BATCH, ShadowScratch};
+use super::fog::phase;
 use super::highlight::GlossyPoint;
 use super::light::{EnvironmentLight, ShadowTarget};
 use super::pixels::BlockPixels;
@@ -38,6 +39,22 @@ fn part(light: Rgb, tint: Rgb) -> f64 {
 }
 
 impl EnvironmentSource<'_> {
+    /// A direction from which fog of anisotropy `g` scatters light to a ray along `dir`, and the light from there times
+    /// phase function over density: half of the directions go by the phase function, half by importance (balance
+    /// heuristic).
+    pub fn scattered(&self, (g, dir): (f64, DVec3), strategy: f64, u: [f64; 2]) -> (DVec3, Rgb) {
+        let by_importance = match strategy < 0.5 {
+            true => self.light.sample_li(u).map(|sample| sample.wi),
+            false => None,
+        };
+        let wi = by_importance.unwrap_or_else(|| phase::sample(g, dir, u));
+        let (radiance, importance) = self.light.towards(wi);
+        let phase = phase::density(g, wi.dot(dir));
+        // A sky that is the same all round has no importance.
+        let density = importance.map_or(phase, |density| 0.5 * (density + phase));
+        (wi, radiance * (phase / density) as f32)
+    }
+
     /// The part of what a lobe's ray of density `lobe` sees along `dir` that light samples do not.
     pub fn share_of_lobe(&self, dir: DVec3, lobe: f64) -> f32 {
         (lobe / (lobe + f64::from(self.samples) * self.light.pdf_li(dir))) as f32

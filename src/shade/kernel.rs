@@ -9,6 +9,7 @@ use super::adaptive::Until;
 use super::backdrop::Escaped;
 use super::cone::RayCone;
 use super::direct::{ShadowScratch, ShadowStarts};
+use super::fog::{self, FogSegment};
 use super::highlight::GlossyPoint;
 use super::lobe::{self, Layers, Lobe, Scattered};
 use super::medium_stack::{self, Body, MediumStack};
@@ -63,6 +64,7 @@ pub(super) struct Scratch {
     order: Vec<(u32, u32)>,
     lit: Vec<ShadingPoint>,
     glossy: Vec<GlossyPoint>,
+    foggy: Vec<FogSegment>,
     shadow: ShadowScratch,
 }
 
@@ -123,10 +125,13 @@ pub(super) fn block<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
             scratch.start_interiors(renderer, input, &mut counts);
         }
         trace_paths::<MIRROR, GLASS, NESTED>(renderer, input, pixels, scratch, &mut counts);
-        let Scratch { lit, glossy, shadow, .. } = scratch;
+        let Scratch { lit, glossy, foggy, shadow, .. } = scratch;
         renderer.light_points(input, lit, pixels, shadow, &mut counts);
         if MIRROR && !glossy.is_empty() {
             renderer.light_highlights(input, glossy, pixels, shadow, &mut counts);
+        }
+        if !foggy.is_empty() {
+            renderer.light_fog(input, foggy, pixels, shadow, &mut counts);
         }
         if let Some(reuse) = &input.reuse {
             shadow.groups.finish(reuse, pixels, &mut left.sources, &mut left.reuse);
@@ -173,8 +178,9 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
 ) {
     scratch.lit.clear();
     scratch.glossy.clear();
+    scratch.foggy.clear();
     for depth in 0..=renderer.settings.bounces {
-        let Scratch { rays, states, interiors, hits, lit, glossy, .. } = scratch;
+        let Scratch { rays, states, interiors, hits, lit, glossy, foggy, .. } = scratch;
         let Scratch { next_rays, next_states, next_interiors, .. } = scratch;
         hits.clear();
         hits.resize(rays.len(), None);
@@ -186,12 +192,20 @@ fn trace_paths<const MIRROR: bool, const GLASS: bool, const NESTED: bool>(
         if depth == 0 && pixels.wants_records() {
             record(renderer, input, pixels, rays, hits, states);
         }
+        if let (Some(fog), false) = (renderer.fog(), NESTED) {
+            let ends = rays.iter().zip(hits.iter()).zip(states.iter_mut());
+            for ((ray, hit), state) in ends.filter(|(_, state)| state.medium.is_none()) {
+                let place = state.place();
+                fog::enter(fog, (ray, hit.as_ref()), &mut state.throughput, place, foggy);
+            }
+        }
         let mut vertex = Vertex {
             renderer,
             input,
             pixels,
             lit,
             glossy,
+            foggy,
             next_rays,
             next_states,
             next_interiors,
@@ -232,6 +246,7 @@ struct Vertex<'v, 'r> {
     pixels: &'v mut BlockPixels,
     lit: &'v mut Vec<ShadingPoint>,
     glossy: &'v mut Vec<GlossyPoint>,
+    foggy: &'v mut Vec<FogSegment>,
     next_rays: &'v mut Vec<Ray>,
     next_states: &'v mut Vec<PathState>,
     next_interiors: &'v mut Vec<MediumStack>,
@@ -290,6 +305,10 @@ impl Vertex<'_, '_> {
             if renderer.plan.absorption {
                 let medium = inside.material().or(state.medium);
                 state = self.travel(&ray, hit.as_ref(), &state, medium);
+            }
+            if let (Some(fog), None) = (renderer.fog(), inside.material().or(state.medium)) {
+                let place = state.place();
+                fog::enter(fog, (&ray, hit.as_ref()), &mut state.throughput, place, self.foggy);
             }
             let Some(met) = &hit else { return self.escape(&ray, &state) };
             let si = SurfaceInteraction::new(renderer.scene, &ray, met);

@@ -118,6 +118,20 @@ impl LightSampler {
         }
     }
 
+    /// Whether it may send anything towards `p`: flat lights emit on one side, or on both.
+    pub fn reaches(&self, p: DVec3) -> bool {
+        match &self.shape {
+            Shape::Quad(light) => light.reaches(p),
+            Shape::Disk(light) => light.reaches(p),
+            Shape::Point(_)
+            | Shape::Directional(_)
+            | Shape::Sphere(_)
+            | Shape::Spot(_)
+            | Shape::Sun(_)
+            | Shape::Sky(_) => true,
+        }
+    }
+
     /// Whether rays can end on the light's surface, or leave the scene towards it.
     pub fn is_seen(&self) -> bool {
         match &self.shape {

@@ -13,6 +13,7 @@ mod dimensions;
 mod direct;
 mod environment;
 mod far_lights;
+mod fog;
 mod groups;
 mod highlight;
 mod irradiance;
@@ -47,6 +48,7 @@ use adaptive::Until;
 use backdrop::Backdrop;
 pub(crate) use direct::ShadowStarts;
 use environment::EnvironmentSource;
+use fog::FogInput;
 use kernel::Scratch;
 use medium_stack::MediumStack;
 use pilots::LightFindings;
@@ -228,6 +230,8 @@ struct FrameInput<'a> {
     environment: Option<EnvironmentSource<'a>>,
     /// What rays see that leave the scene, if it is more than the sky's colour.
     backdrop: Option<Backdrop<'a>>,
+    /// The fog, if there is any.
+    fog: Option<FogInput<'a>>,
     /// Bodies of ranked glass that the camera is in.
     around_eye: MediumStack,
     has_ranked_glass: bool,
@@ -466,6 +470,7 @@ impl Renderer<'_> {
             least: self.settings.spp,
             filter: pixel_filter(self.settings.filter),
             selection: self.light_selection(&lights),
+            fog: self.fog().map(|fog| FogInput::of(fog, self.scene, &lights)),
             has_pilots: lights.iter().any(|light| light.pilots < light.samples),
             lights,
             environment: self.environment_source(reuse),

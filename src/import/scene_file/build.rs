@@ -1,6 +1,7 @@
 //! From the checked tables to a [`World`]: reads meshes and textures, places and merges them.
 
 use super::at::{At, Span};
+use super::fog::Fog;
 use super::material::Material;
 use super::mesh::{Mesh, Normals, Shape, Sphere};
 use super::piece::{name_meshes, nearest_file, place, uv_sphere};
@@ -69,6 +70,10 @@ impl<'a> Builder<'a> {
         this.world.traced_regions = file.reuse.regions(source)?;
         if let Some(sky) = &file.sky {
             this.add_sky(sky)?;
+        }
+        if let Some(fog) = &file.fog {
+            this.world.fog = Some(fog.build(source)?);
+            this.warn_of_hidden_light(fog);
         }
         this.warn_of_unused_materials();
         this.warn_of_darkness();
@@ -326,6 +331,17 @@ impl<'a> Builder<'a> {
         for (name, named) in self.materials.iter().filter(|(_, named)| !named.used) {
             let message = format!("no mesh or sphere uses the material `{name}`");
             self.warnings.push(self.source.fault(&named.span, message));
+        }
+    }
+
+    fn warn_of_hidden_light(&mut self, fog: &At<Fog>) {
+        let World { fog: built, lights, sky, environment, .. } = &self.world;
+        let is_everywhere = built.as_ref().is_some_and(|fog| fog.bounds.is_none());
+        let is_outside = |light: &scene::Light| light.far_field().place().is_none();
+        let is_bright = sky.radiance.max_element() > 0.0 || environment.is_some();
+        if is_everywhere && (is_bright || lights.iter().any(is_outside)) {
+            let message = "fog that is everywhere hides the sky, suns and directional lights";
+            self.warnings.push(self.source.fault(&fog.span, message).help("give it a `box`"));
         }
     }
 

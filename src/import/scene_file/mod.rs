@@ -8,6 +8,7 @@
 mod at;
 mod build;
 mod camera;
+mod fog;
 mod generated;
 mod light;
 mod mapping;
@@ -17,6 +18,7 @@ mod number;
 mod piece;
 mod principled;
 mod quad;
+mod region;
 mod report;
 mod reuse;
 mod schema;
@@ -38,6 +40,7 @@ use crate::error::Result;
 use at::At;
 use build::Builder;
 use camera::Camera;
+use fog::Fog;
 use light::Light;
 use material::Material;
 use mesh::{Mesh, Sphere};
@@ -62,6 +65,8 @@ struct SceneFile {
     light: Vec<At<Light>>,
     /// The light of rays that hit nothing. Absent: black.
     sky: Option<At<Sky>>,
+    /// What fills the space between the surfaces. Absent: nothing.
+    fog: Option<At<Fog>>,
     /// Materials by name.
     material: BTreeMap<String, At<Material>>,
     /// Meshes, from files or generated.

@@ -125,6 +125,11 @@ number!(
     { "type": "number", "minimum": 0.02, "maximum": 90 }
 );
 number!(
+    /// Mean cosine of a scattering angle.
+    Anisotropy: "a number from -0.99 to 0.99", |x| (-0.99..=0.99).contains(&x),
+    { "type": "number", "minimum": -0.99, "maximum": 0.99 }
+);
+number!(
     /// How hazy air is.
     Turbidity: "a turbidity from 1.7 to 10", |x| (1.7..=10.0).contains(&x),
     { "type": "number", "minimum": 1.7, "maximum": 10 }

@@ -2,9 +2,9 @@
 
 use super::at::At;
 use super::number::{Amount, Int, Share, Steps};
+use super::region::Region;
 use super::report::Source;
 use super::settings::shortest;
-use super::vector::Point;
 use crate::error::Result;
 use crate::math::Bounds3;
 use crate::scene::{Policy, ReuseSettings, limits};
@@ -34,16 +34,6 @@ pub(super) struct Reuse {
     traced: Vec<At<Region>>,
 }
 
-/// A box in which light is traced in every frame.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a table")]
-struct Region {
-    /// Corner with the smallest coordinates, world units.
-    min: Point,
-    /// Corner with the largest coordinates, world units.
-    max: Point,
-}
-
 impl Default for Reuse {
     fn default() -> Self {
         let r = ReuseSettings::default();
@@ -64,15 +54,7 @@ impl Reuse {
     ///
     /// Errors: `min` not below `max` on an axis.
     pub fn regions(&self, source: &Source) -> Result<Vec<Bounds3>> {
-        let region = |region: &At<Region>| {
-            let (min, max) = (region.min.vec(), region.max.vec());
-            if min.cmplt(max).all() {
-                return Ok(Bounds3 { min, max });
-            }
-            let message = "`min` must be smaller than `max` in x, y and z";
-            Err(source.fault(&region.span, message).into())
-        };
-        self.traced.iter().map(region).collect()
+        self.traced.iter().map(|region| region.bounds(source)).collect()
     }
 
     /// As scene data.

@@ -40,6 +40,8 @@ pub(super) struct Settings {
     shadow_samples: Samples<0>,
     /// Sky rays per camera sample where the sky lights the scene: a number, or `[least, most]` as for shadow samples.
     sky_samples: Samples<0>,
+    /// Points on each ray through fog at which a light's scattered light is estimated; 0 leaves fog unlit.
+    fog_samples: Int<0, { limits::MAX_SAMPLES as i64 }>,
     /// In scenes of more than 8 lights, look at every light at every point, not only at those that matter there.
     all_lights: bool,
     /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
@@ -119,6 +121,7 @@ impl Default for Settings {
             filter: s.filter,
             shadow_samples: Samples::of_light(s.shadow_samples, s.least_shadow_samples),
             sky_samples: Samples::of_light(s.sky_samples, s.least_sky_samples),
+            fog_samples: Int::clamped(s.fog_samples.into()),
             all_lights: s.all_lights,
             smooth_terminator: s.smooth_terminator,
             bounces: Int::clamped(s.bounces.into()),
@@ -173,6 +176,7 @@ impl Settings {
             least_shadow_samples,
             sky_samples,
             least_sky_samples,
+            fog_samples: self.fog_samples.u32(),
             all_lights: self.all_lights,
             smooth_terminator: self.smooth_terminator,
             bounces: self.bounces.u32(),

@@ -90,6 +90,16 @@ impl FarField {
         Self { centre, reach, axis, cone: 1.0, cos_outer, sharpness, ..Self::DARK }
     }
 
+    /// Its middle and the radius around it, scene space; `None` of parallel light.
+    pub fn place(&self) -> Option<(DVec3, f64)> {
+        (self.is_near > 0.0).then_some((self.centre, self.reach))
+    }
+
+    /// The most that it sends in any direction, per unit of emission: intensity, of parallel light irradiance.
+    pub fn intensity(&self) -> f64 {
+        self.flat + self.everywhere + self.cone
+    }
+
     /// Whether the light is so near to `p`, or so large, that the distance to its middle says little.
     pub fn is_close(&self, p: DVec3) -> bool {
         let close = CLOSE * self.reach;

@@ -35,6 +35,11 @@ impl Disk {
         }
     }
 
+    /// Whether it emits towards `p`.
+    pub fn reaches(&self, p: DVec3) -> bool {
+        self.two_sided || self.plane.normal.dot(p - self.centre) > 0.0
+    }
+
     /// Irradiance at `p` with unit normal `n` from the part above the horizon, in closed form: Lambert's contour
     /// integral (Lambert, 1760; Arvo, 1994) along the circle and, where the horizon cuts it, the chord.
     pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {

@@ -64,6 +64,14 @@ impl<'a> EnvironmentLight<'a> {
         Some(EnvironmentSample { wi, radiance: table.radiance(cell), density: table.pdf(cell) })
     }
 
+    /// What comes from the unit direction `wi`, the mean of its cell, and the density of [`sample_li`](Self::sample_li)
+    /// there; `None` of a sky that is the same all round.
+    pub fn towards(&self, wi: DVec3) -> (Rgb, Option<f64>) {
+        let table = &self.tables.radiance;
+        let cell = table.cell(self.to_own * wi);
+        (table.radiance(cell), table.has_contrast().then(|| table.pdf(cell)))
+    }
+
     /// Density of [`sample_li`](Self::sample_li) along the unit direction `wi`, per steradian.
     pub fn pdf_li(&self, wi: DVec3) -> f64 {
         self.tables.radiance.pdf(self.tables.radiance.cell(self.to_own * wi))

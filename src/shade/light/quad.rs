@@ -27,10 +27,15 @@ impl Quad {
     }
 
     pub fn unshadowed(&self, p: DVec3, n: DVec3) -> f64 {
-        if !self.two_sided && self.plane.normal.dot(p - self.corners[0]) <= 0.0 {
+        if !self.reaches(p) {
             return 0.0;
         }
         irradiance::polygon(p, n, &self.corners)
+    }
+
+    /// Whether it emits towards `p`.
+    pub fn reaches(&self, p: DVec3) -> bool {
+        self.two_sided || self.plane.normal.dot(p - self.corners[0]) > 0.0
     }
 
     /// Uniform over the area.
