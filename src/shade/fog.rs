@@ -4,13 +4,12 @@
 //! shadow rays of a point count by what fog lets through of each, and the irradiance of a light without shadows is
 //! that of clear air times the mean that fog lets through (`Fog::mean_transmittance`). Where nothing blocks a
 //! light there is no noise. A sky's rays go very different ways, so that the mean of a few would be off: what fog lets
-//! through of them is part of their ratio. What fog scatters (`fog/scatter.rs`) depends on the view and is traced in every frame.
+//! through of them is part of their ratio. What fog scatters (`in_scattering.rs`) depends on the view and is traced in every frame.
 
 mod distance;
 pub(super) mod phase;
-mod scatter;
 
-pub(super) use scatter::{FogInput, FogSamples, FogSegment};
+pub(super) use distance::Distances;
 
 use super::Renderer;
 use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
@@ -77,6 +76,36 @@ impl Fog {
             }
             ShadowTarget::Direction(_) | ShadowTarget::Sky(_) => self.along(p, wi, f64::INFINITY),
         }
+    }
+}
+
+/// A stretch of a path in fog.
+pub(super) struct FogSegment {
+    /// Where it begins, scene space.
+    pub start: DVec3,
+    /// Unit direction away from the camera.
+    pub dir: DVec3,
+    /// Scene units; infinite where nothing ends it.
+    pub length: f64,
+    /// Radiance that reaches the camera per unit that leaves its start towards the camera.
+    pub throughput: Rgb,
+    pub place: SamplePlace,
+}
+
+/// Buffers of the samples along one stretch.
+#[derive(Default)]
+pub(super) struct FogSamples {
+    pub distances: Vec<[f32; 2]>,
+    pub places: Vec<[f32; 2]>,
+    pub choices: Vec<[f32; 2]>,
+    /// For each light the distances, and a sum of what those up to it may scatter.
+    pub lights: Vec<(Distances, f64)>,
+}
+
+impl FogSegment {
+    /// Scene space.
+    pub fn at(&self, distance: f64) -> DVec3 {
+        self.start + self.dir * distance
     }
 }
 

@@ -1,37 +1,22 @@
 //! What fog scatters towards the camera: light that is scattered once.
 //!
-//! Along each stretch of a path in fog, points are drawn for each light (`distance.rs`), and a sample of the light from
+//! Along each stretch of a path in fog, points are drawn for each light (`fog/distance.rs`), and a sample of the light from
 //! there. In a scene whose lights are selected, samples choose lights by what each would scatter if nothing were in the
 //! way and fog took nothing.
 
-use super::super::direct::{BATCH, ShadowScratch};
-use super::super::light::{LightSample, SampleSink, ShadowTarget};
-use super::super::pixels::BlockPixels;
-use super::super::point::SamplePlace;
-use super::super::source::LightSource;
-use super::super::{FrameInput, Renderer};
-use super::distance::Distances;
-use super::phase;
+use super::direct::{BATCH, ShadowScratch};
+use super::fog::{Distances, FogSamples, FogSegment, phase};
+use super::light::{LightSample, SampleSink, ShadowTarget};
+use super::pixels::BlockPixels;
+use super::source::LightSource;
+use super::{FrameInput, Renderer};
 use crate::intersect::SpawnPoint;
 use crate::math::{DVec3, Rgb};
 use crate::scene::{FEW_LIGHTS, FarField, Fog, Scene};
 use crate::stats::{RayCounts, RayKind};
 
-/// A stretch of a path in fog.
-pub struct FogSegment {
-    /// Where it begins, scene space.
-    pub start: DVec3,
-    /// Unit direction away from the camera.
-    pub dir: DVec3,
-    /// Scene units; infinite where nothing ends it.
-    pub length: f64,
-    /// Radiance that reaches the camera per unit that leaves its start towards the camera.
-    pub throughput: Rgb,
-    pub place: SamplePlace,
-}
-
 /// The fog of a frame.
-pub struct FogInput<'a> {
+pub(super) struct FogInput<'a> {
     fog: &'a Fog,
     /// The frame's lights as they are seen from afar, without the sky.
     lights: Vec<FarLight>,
@@ -73,16 +58,6 @@ impl FarLight {
     }
 }
 
-/// Buffers of the samples along one stretch.
-#[derive(Default)]
-pub struct FogSamples {
-    distances: Vec<[f32; 2]>,
-    places: Vec<[f32; 2]>,
-    choices: Vec<[f32; 2]>,
-    /// For each light the distances, and a sum of what those up to it may scatter.
-    lights: Vec<(Distances, f64)>,
-}
-
 /// The ray of one sample.
 struct ScatterRay<'s> {
     renderer: &'s Renderer<'s>,
@@ -110,15 +85,9 @@ impl SampleSink for ScatterRay<'_> {
     }
 }
 
-impl FogSegment {
-    fn at(&self, distance: f64) -> DVec3 {
-        self.start + self.dir * distance
-    }
-}
-
 impl Renderer<'_> {
     /// Adds what fog scatters along `segments` to their pixels.
-    pub(in super::super) fn light_fog(
+    pub(super) fn light_fog(
         &self,
         input: &FrameInput,
         segments: &[FogSegment],
