@@ -21,6 +21,7 @@ fn factors_and_their_defaults_are_those_of_the_format() {
         metallic_map: None,
         clearcoat: 0.0,
         clearcoat_roughness: 0.0,
+        transmission: 0.0,
     };
     assert_eq!((white.diffuse, white.roughness, white.fresnel), (Rgb::ONE, 1.0, Some(plain)));
     assert_eq!(white.mirror, Rgb::splat(0.04));

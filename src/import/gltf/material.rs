@@ -166,7 +166,14 @@ impl Parts<'_, '_> {
         let normal_map = self.normal_map()?;
         let (mirror, grazing) = self.reflectance()?;
         let (clearcoat, clearcoat_roughness) = self.clearcoat()?;
-        let fresnel = Fresnel { grazing, metallic, metallic_map, clearcoat, clearcoat_roughness };
+        let fresnel = Fresnel {
+            grazing,
+            metallic,
+            metallic_map,
+            clearcoat,
+            clearcoat_roughness,
+            transmission: 0.0,
+        };
         let fresnel = Some(fresnel);
         Ok(Material { texture, mirror, roughness, roughness_map, fresnel, normal_map, ..material })
     }
