@@ -105,7 +105,7 @@ impl Principled {
             && metallic == 0.0
             && self.clearcoat.0 == 0.0
             && roughness_map.is_none();
-        if is_bare && is_alone {
+        if is_bare && is_alone && material.emission == Rgb::ZERO {
             return Material { glass, ..material };
         }
         Material {
