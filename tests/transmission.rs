@@ -168,7 +168,7 @@ fn an_image_tints_the_glass_of_a_surface() {
         let grey = Rgb::splat(0.25);
         let mut world = World::default();
         if textured {
-            world.textures.push(Texture::new("grey", 1, 1, vec![grey]));
+            world.textures.push(Texture::from_linear("grey", [1, 1], vec![grey]));
             material.texture = Some(TextureMap::of(0));
         } else {
             material.glass.as_mut().unwrap().tint = grey;
