@@ -5,7 +5,9 @@
 
 use crate::error::counted;
 use crate::math::Rgb;
-use crate::scene::{Fog, Glass, Light, Material, MeanLights, Scene, Settings, ShotLens};
+use crate::scene::{
+    Fog, Glass, GlassShadows, Light, Material, MeanLights, Scene, Settings, ShotLens,
+};
 
 /// Which effects run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +32,8 @@ pub struct EffectPlan {
     pub sky_light: bool,
     /// Rays that leave the scene see more than one colour: an environment, or a sun.
     pub environment: bool,
+    /// Light goes straight through glass, to diffuse surfaces and fog.
+    pub glass_shadows: bool,
     /// A medium between the surfaces takes light from rays and scatters some towards them.
     pub fog: bool,
     /// A ray-free ambient term is added.
@@ -85,6 +89,7 @@ impl EffectPlan {
         delta_lights: true,
         sky_light: true,
         environment: true,
+        glass_shadows: true,
         fog: true,
         ambient: true,
     };
@@ -120,6 +125,7 @@ impl EffectPlan {
         let lit = diffuse || (used.glossy > 0 && bounces > 0) || scatters;
         // Glossy surfaces see a sky of one colour by their own rays.
         let lit_by_sky = diffuse || (lit && environment.is_some()) || scatters;
+        let is_straight = settings.glass_shadows == GlassShadows::Straight;
         let none_lit = || "no diffuse or glossy surface to light".to_string();
         let plan = Self {
             mirror: decide(
@@ -224,6 +230,15 @@ impl EffectPlan {
                 "environment",
                 shown.is_some(),
                 shown.unwrap_or_else(|| "rays that leave the scene see one colour".into()),
+            ),
+            glass_shadows: decide(
+                "light through glass",
+                used.glass > 0 && is_straight && (lit || lit_by_sky),
+                format!(
+                    "{} in use, glass shadows are {}",
+                    counted(used.glass, "glass material"),
+                    if is_straight { "straight" } else { "opaque" }
+                ),
             ),
             fog: decide(
                 "fog",

@@ -27,6 +27,8 @@ pub enum RayKind {
     ShadowSky,
     /// Shadow rays from fog to lights and sky.
     ShadowFog,
+    /// Shadow rays straight on from a surface that they met, where glass lets them through.
+    ThroughGlass,
     /// Second tries after a miss inside the bounds; their first tries count as what they are.
     Retry,
     /// Rays refused before tracing (NaN, infinite, zero direction); they also count as what they are.
@@ -37,7 +39,7 @@ const _: () = assert!(RayKind::Invalid as usize + 1 == RayKind::ALL.len(), "the 
 
 impl RayKind {
     /// All kinds, in the order in which they are stored and shown.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Camera,
         Self::Mirror,
         Self::Glossy,
@@ -46,6 +48,7 @@ impl RayKind {
         Self::ShadowDelta,
         Self::ShadowSky,
         Self::ShadowFog,
+        Self::ThroughGlass,
         Self::Retry,
         Self::Invalid,
     ];
@@ -66,6 +69,7 @@ impl RayKind {
             Self::ShadowDelta => "shadow of other lights",
             Self::ShadowSky => "shadow of the sky",
             Self::ShadowFog => "shadow in fog",
+            Self::ThroughGlass => "shadow through glass",
             Self::Retry => "second tries",
             Self::Invalid => "invalid",
         }
@@ -82,6 +86,7 @@ impl RayKind {
             Self::ShadowDelta => "shadow_delta",
             Self::ShadowSky => "shadow_sky",
             Self::ShadowFog => "shadow_fog",
+            Self::ThroughGlass => "shadow_glass",
             Self::Retry => "retry",
             Self::Invalid => "invalid",
         }

@@ -7,8 +7,8 @@ pub use job::JobArgs;
 use super::values::{self, Clamp, SampleNumber};
 use crate::import::{LoadOptions, UpAxis};
 use crate::scene::{
-    Aovs, BuildQuality, Filter, IntersectorKind, Policy, Recheck, Rect, ReuseSettings, Settings,
-    ToneCurve, limits,
+    Aovs, BuildQuality, Filter, GlassShadows, IntersectorKind, Policy, Recheck, Rect,
+    ReuseSettings, Settings, ToneCurve, limits,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -109,6 +109,9 @@ pub struct SettingArgs {
     #[arg(long, value_name = "N", help_heading = "Light",
         allow_negative_numbers = true, value_parser = whole(0, limits::MAX_SAMPLES))]
     pub fog_samples: Option<u32>,
+    /// What light does that meets glass on its way to a diffuse surface: it is blocked, or goes straight through [default: opaque]
+    #[arg(long, value_name = "KIND", help_heading = "Light", value_parser = values::choice::<GlassShadows>(&["opaque", "straight"]))]
+    pub glass_shadows: Option<GlassShadows>,
     /// Whether every point looks at every light in scenes of more than 8, not only at those that matter there
     /// [default: off]
     #[arg(long, value_name = "on|off", help_heading = "Light", value_parser = values::switch())]
@@ -234,6 +237,7 @@ impl SettingArgs {
         }
         put(&mut s.fog_samples, self.fog_samples);
         put(&mut s.all_lights, self.all_lights);
+        put(&mut s.glass_shadows, self.glass_shadows);
         put(&mut s.bounces, self.bounces);
         put(&mut s.cutoff, self.cutoff);
         put(&mut s.seed, self.seed);

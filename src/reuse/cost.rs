@@ -168,6 +168,7 @@ pub fn of_frame(rays: &RayCounts, lookups: u64) -> f64 {
         RayKind::ShadowArea | RayKind::ShadowDelta | RayKind::ShadowSky | RayKind::ShadowFog => {
             SHADOW_RAY
         }
+        RayKind::ThroughGlass => SPECULAR_RAY,
         // Second tries are few, and part of what their first ones cost.
         RayKind::Retry | RayKind::Invalid => 0.0,
     };

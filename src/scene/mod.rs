@@ -60,7 +60,8 @@ pub use projection::{Projection, ProjectionKey};
 pub use recentring::Recentring;
 pub use reuse::{Policy, ReuseSettings};
 pub use settings::{
-    BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, Recheck, Rect, Settings, ToneCurve,
+    BuildQuality, Filter, FrameRange, GlassShadows, HitRules, IntersectorKind, Recheck, Rect,
+    Settings, ToneCurve,
 };
 pub use texture::{Texture, TextureId, TextureLevel, TextureMap, Wrap};
 pub use time::{SaveInterval, parse_time, parse_time_limit};

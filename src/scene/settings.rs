@@ -48,6 +48,9 @@ pub struct Settings {
     /// Look at every light at every point, however little it can send there, in scenes of many lights too.
     #[serde(default)]
     pub all_lights: bool,
+    /// What light does that meets glass on its way to a diffuse surface.
+    #[serde(default)]
+    pub glass_shadows: GlassShadows,
     /// Start shadow rays of smooth meshes on the smooth surface, not on its facets.
     pub smooth_terminator: bool,
     /// Specular bounces after the camera ray.
@@ -157,6 +160,7 @@ impl Default for Settings {
             least_sky_samples: None,
             fog_samples: 4,
             all_lights: false,
+            glass_shadows: GlassShadows::Opaque,
             smooth_terminator: true,
             bounces: 4,
             cutoff: 1e-3,
@@ -176,6 +180,19 @@ impl Default for Settings {
             flag_bad: false,
         }
     }
+}
+
+/// What light does that meets glass on its way to a diffuse surface.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum GlassShadows {
+    /// It is blocked.
+    #[default]
+    Opaque,
+    /// It goes straight through, less what the glass reflects, tints and absorbs.
+    Straight,
 }
 
 /// Pixel filter. All are non-negative and importance-sampled, so a pixel uses its own samples only.

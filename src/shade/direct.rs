@@ -93,6 +93,8 @@ pub(super) struct ShadowScratch {
     /// In place of weights what a glossy point reflects along each ray, per unit of emission.
     seen: Vec<Rgb>,
     occluded: Vec<bool>,
+    /// The part of light that glass lets through along each ray; empty where none was found behind glass.
+    tints: Vec<Rgb>,
     /// The part of light that fog leaves along each ray; empty without fog.
     left: Vec<f64>,
     /// Where the rays of each point of the batch end.
@@ -161,6 +163,16 @@ struct Gathered {
     open: f64,
     all: f64,
     rays: u32,
+    /// In colours the weights of the rays that reached the light; 0 where none went through glass.
+    tinted: Rgb,
+}
+
+impl Gathered {
+    /// Colour of what arrives, of mean 1.
+    fn tint(&self) -> Rgb {
+        let sum = self.tinted.element_sum();
+        if sum > 0.0 { self.tinted * (3.0 / sum) } else { Rgb::ONE }
+    }
 }
 
 impl ShadowScratch {
@@ -174,6 +186,7 @@ impl ShadowScratch {
         self.weights.clear();
         self.seen.clear();
         self.left.clear();
+        self.tints.clear();
         self.ends.clear();
     }
 
@@ -240,6 +253,16 @@ impl ShadowScratch {
     /// Ends a point's rays.
     pub fn close(&mut self) {
         self.ends.push(self.rays.len());
+    }
+
+    /// The weights of those of `rays` that reached the light, in colours; 0 if none of the batch went through glass.
+    fn tinted(&self, rays: std::ops::Range<usize>) -> Rgb {
+        if self.tints.is_empty() {
+            return Rgb::ZERO;
+        }
+        let left = |k: usize| self.left.get(k).map_or(1.0, |left| *left as f32);
+        let reached = rays.filter(|k| !self.occluded[*k]);
+        reached.map(|k| self.tints[k] * (self.weights[k] as f32 * left(k))).sum()
     }
 
     pub fn starts(&mut self, renderer: &Renderer, lit: &[ShadingPoint], i: u32) -> ShadowStarts {
@@ -456,13 +479,16 @@ impl Renderer<'_> {
         self.cast((source, &Run::whole(source)), (lit, &wanted, &going), pixels, s, counts);
         for (&LightUser { point: i, slot }, gathered) in wanted.iter().zip(&s.gathered) {
             let point = &lit[i as usize];
-            let Gathered { exact, open, all, rays } = *gathered;
+            let Gathered { exact, open, all, rays, tinted: _ } = *gathered;
+            let tint = gathered.tint();
             if let (Some(slot), true) = (slot, rays > 0) {
-                s.groups.add(i as usize, usize::from(slot), s.channels, open, all);
+                // One ratio says nothing of a light that comes in another colour.
+                let kept = if is_grey(tint) { open } else { f64::NAN };
+                s.groups.add(i as usize, usize::from(slot), s.channels, kept, all);
             }
             if open > 0.0 {
                 let unshadowed = source.sampler.emission * exact as f32;
-                let light = point.weight * unshadowed * (open / all) as f32;
+                let light = point.weight * unshadowed * tint * (open / all) as f32;
                 pixels.add(point.place.pixel, point.place.sample, light);
             }
         }
@@ -509,11 +535,13 @@ impl Renderer<'_> {
                 }
                 s.close();
             }
-            self.trace_shadow_rays(source, s, counts);
+            self.trace_light(source, s, counts);
             let mut start = 0;
             for (&at, &end) in group.iter().zip(&s.ends) {
                 let (open, all) = opened(source, s, start..end);
+                let tinted = s.tinted(start..end);
                 let gathered = &mut s.gathered[at as usize];
+                gathered.tinted += tinted;
                 gathered.open += open;
                 gathered.all += all;
                 gathered.rays += (end - start) as u32;
@@ -580,7 +608,7 @@ impl Renderer<'_> {
                 s.close();
             }
             s.runs = runs;
-            self.trace_shadow_rays(source, s, counts);
+            self.trace_light(source, s, counts);
             let mut start = 0;
             for (LightUser { point: i, slot }, &end) in reached.iter().zip(&s.ends) {
                 let (open, weight) = opened(source, s, start..end);
@@ -673,6 +701,35 @@ impl Renderer<'_> {
         self.trace_rays(s, counts);
     }
 
+    /// Traces the batch's rays, to a light that may lie behind glass.
+    fn trace_light(&self, source: &LightSource, s: &mut ShadowScratch, counts: &mut RayCounts) {
+        counts[source.rays] += s.rays.len() as u64;
+        self.trace_through(s, counts);
+    }
+
+    /// Traces the batch's rays, which are counted already, straight through glass where the scene wants that.
+    pub(super) fn trace_through(&self, s: &mut ShadowScratch, counts: &mut RayCounts) {
+        self.trace_rays(s, counts);
+        if !self.plan.glass_shadows {
+            return;
+        }
+        let ShadowScratch { rays, seen, occluded, tints, .. } = s;
+        for (k, occluded) in occluded.iter_mut().enumerate().filter(|(_, occluded)| **occluded) {
+            let left = self.through_glass(&rays[k], counts);
+            if left == Rgb::ZERO {
+                continue;
+            }
+            *occluded = false;
+            match seen.get_mut(k) {
+                Some(seen) => *seen *= left,
+                None => {
+                    tints.resize(rays.len(), Rgb::ONE);
+                    tints[k] = left;
+                }
+            }
+        }
+    }
+
     /// Traces the batch's rays, which are counted already.
     pub(super) fn trace_rays(&self, s: &mut ShadowScratch, counts: &mut RayCounts) {
         s.occluded.clear();
@@ -687,6 +744,11 @@ impl Renderer<'_> {
     }
 }
 
+/// Whether a colour of mean 1 is no other than white, as far as a display shows.
+fn is_grey(tint: Rgb) -> bool {
+    (tint - Rgb::ONE).abs().max_element() < 1e-3
+}
+
 /// Sums of the weights of those of the batch's `rays` to `source` that are not occluded, and of all.
 fn opened(source: &LightSource, s: &ShadowScratch, rays: std::ops::Range<usize>) -> (f64, f64) {
     let (mut open, mut all) = (0.0, 0.0);
@@ -694,18 +756,18 @@ fn opened(source: &LightSource, s: &ShadowScratch, rays: std::ops::Range<usize>)
         all += s.weights[k];
         open += if s.occluded[k] { 0.0 } else { s.weights[k] };
     }
-    if s.left.is_empty() {
+    if s.left.is_empty() && s.tints.is_empty() {
         return (open, all);
     }
-    let sum = |is_counted: &dyn Fn(usize) -> bool| -> f64 {
-        rays.clone().filter(|k| is_counted(*k)).map(|k| s.weights[k] * s.left[k]).sum()
-    };
-    let through = sum(&|k| !s.occluded[k]);
+    let left = |k: usize| s.weights[k] * s.left.get(k).copied().unwrap_or(1.0);
+    let tint = |k: usize| s.tints.get(k).map_or(1.0, |tint| f64::from(tint.element_sum()) / 3.0);
+    let reached = rays.clone().filter(|k| !s.occluded[*k]);
+    let through = reached.map(|k| left(k) * tint(k)).sum();
     // What fog lets through of a light where nothing is in the way is part of its irradiance without shadows; of a sky,
     // whose light goes very different ways, it is part of the ratio.
     match source.is_sky() {
         true => (through, all),
         // The same to the last bit where all of them reach the light.
-        false => (through, sum(&|_| true)),
+        false => (through, rays.map(left).sum()),
     }
 }

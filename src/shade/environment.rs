@@ -60,6 +60,11 @@ impl EnvironmentSource<'_> {
         (lobe / (lobe + f64::from(self.samples) * self.light.pdf_li(dir))) as f32
     }
 
+    /// The colours that its ratios are kept of; none where none is kept.
+    fn tints(&self) -> &[Rgb] {
+        &self.light.tints()[..self.channels.len()]
+    }
+
     /// What arrives at a point where nothing is in the way.
     fn unshadowed(&self, point: &ShadingPoint) -> Rgb {
         match point.is_mapped() {
@@ -199,6 +204,11 @@ impl Renderer<'_> {
             pixels.add(point.place.pixel, point.place.sample, light);
             for (channel, (at, tint)) in source.channels.clone().zip(source.places(i)) {
                 let (open, all) = (part(found.open, tint), part(found.all, tint));
+                let open = if self.is_in_other_colour(found.open, source.tints()) {
+                    f64::NAN
+                } else {
+                    open
+                };
                 if s.exact(at) != 0.0 && all > 0.0 {
                     s.groups.note_lit(i);
                     s.groups.add(i, channel, source.all_channels, open, all);
@@ -237,7 +247,7 @@ impl Renderer<'_> {
             }
             if s.ray_count() >= BATCH || i + 1 == lit.len() {
                 counts[RayKind::ShadowSky] += s.ray_count() as u64;
-                self.trace_rays(s, counts);
+                self.trace_through(s, counts);
                 let found = own.found[traced..].iter_mut().zip(s.highlights());
                 found.for_each(|(found, open)| found.open = open);
                 traced = own.found.len();

@@ -118,7 +118,7 @@ impl Renderer<'_> {
             s.close();
             if s.ray_count() >= BATCH || i + 1 == segments.len() {
                 counts[RayKind::ShadowFog] += s.ray_count() as u64;
-                self.trace_rays(s, counts);
+                self.trace_through(s, counts);
                 let found = segments[traced..=i].iter().zip(s.highlights());
                 for (FogSegment { throughput, place, .. }, seen) in found {
                     pixels.add(place.pixel, place.sample, *throughput * seen);

@@ -4,7 +4,7 @@
 //! directional lights and the sky, mirrors and glass, polished or rough, clear or absorbing, by recursion to a set depth.
 //! Never looks at other frames.
 //!
-//! Not done: light through glass (its shadow is opaque), diffuse interreflection.
+//! Not done: caustics (the shadow of glass is opaque, or light goes straight through), diffuse interreflection.
 
 mod adaptive;
 mod backdrop;
@@ -33,6 +33,7 @@ mod scattered;
 mod selection;
 mod sky_samples;
 mod source;
+mod straight_shadows;
 mod tail;
 mod texture;
 
@@ -323,7 +324,9 @@ impl<'a> Renderer<'a> {
     /// picture and the rays are the same. (Sky rays stay as they were: of a sky that is seen, the scene says
     /// whether it also lights.)
     pub fn with_every_effect(mut self) -> Self {
-        self.plan = EffectPlan { sky_light: self.plan.sky_light, ..EffectPlan::EVERYTHING };
+        // What settings choose stays.
+        let EffectPlan { sky_light, glass_shadows, .. } = self.plan;
+        self.plan = EffectPlan { sky_light, glass_shadows, ..EffectPlan::EVERYTHING };
         self
     }
 

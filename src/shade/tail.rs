@@ -228,6 +228,8 @@ impl Renderer<'_> {
             let Some(channels) = channels else { continue };
             for (k, (at, tint)) in channels.places(i as usize).enumerate() {
                 let (open, all) = (part(irradiance, tint), s.exact(at));
+                let is_other = self.is_in_other_colour(irradiance, channels.tints);
+                let open = if is_other { f64::NAN } else { open };
                 if all != 0.0 {
                     s.groups.note_lit(i as usize);
                     s.groups.add(i as usize, channels.first + k, channels.all, open, all);
@@ -264,7 +266,7 @@ impl Renderer<'_> {
                 s.close();
             }
             if s.ray_count() >= BATCH || i + 1 == lit.len() {
-                self.trace_rays(s, counts);
+                self.trace_through(s, counts);
                 let found = samples.found[first..].iter_mut().zip(s.highlights());
                 found.for_each(|(found, irradiance)| found.irradiance = irradiance);
                 first = samples.found.len();

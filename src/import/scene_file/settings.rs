@@ -10,8 +10,8 @@ use super::time::{Time, TimeOrOff};
 use super::vector::List;
 use crate::error::{Diagnostic, Result};
 use crate::scene::{
-    self, BuildQuality, Filter, FrameRange, HitRules, IntersectorKind, JobOptions, Rect,
-    ReuseSettings, ToneCurve, limits,
+    self, BuildQuality, Filter, FrameRange, GlassShadows, HitRules, IntersectorKind, JobOptions,
+    Rect, ReuseSettings, ToneCurve, limits,
 };
 use samples::Samples;
 use schemars::JsonSchema;
@@ -44,6 +44,9 @@ pub(super) struct Settings {
     fog_samples: Int<0, { limits::MAX_SAMPLES as i64 }>,
     /// In scenes of more than 8 lights, look at every light at every point, not only at those that matter there.
     all_lights: bool,
+    /// What light does that meets glass on its way to a diffuse surface or to fog: "opaque" glass blocks it, "straight" lets it
+    /// go straight on, less what the glass reflects, tints and absorbs.
+    glass_shadows: GlassShadows,
     /// Start shadow rays of smooth meshes on the smooth surface that their facets stand for, so that
     /// shadows end where the shading does.
     smooth_terminator: bool,
@@ -123,6 +126,7 @@ impl Default for Settings {
             sky_samples: Samples::of_light(s.sky_samples, s.least_sky_samples),
             fog_samples: Int::clamped(s.fog_samples.into()),
             all_lights: s.all_lights,
+            glass_shadows: s.glass_shadows,
             smooth_terminator: s.smooth_terminator,
             bounces: Int::clamped(s.bounces.into()),
             cutoff: Share(shortest(s.cutoff)),
@@ -178,6 +182,7 @@ impl Settings {
             least_sky_samples,
             fog_samples: self.fog_samples.u32(),
             all_lights: self.all_lights,
+            glass_shadows: self.glass_shadows,
             smooth_terminator: self.smooth_terminator,
             bounces: self.bounces.u32(),
             cutoff: self.cutoff.0 as f32,

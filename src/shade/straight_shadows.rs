@@ -1,0 +1,56 @@
+//! Light that shadow rays find behind glass: straight through, less what the glass reflects, tints and absorbs.
+//!
+//! Real glass bends light, and gathers it in caustics; this is a stand-in that a scene may choose
+//! ([`GlassShadows::Straight`](crate::scene::GlassShadows)). Diffuse surfaces and fog see light so; glossy ones see what is behind glass by the
+//! rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
+//! glass counts as polished. Where bodies overlap, each takes its share.
+
+use super::{Renderer, medium, optics};
+use crate::intersect::{Ray, SurfaceInteraction};
+use crate::math::Rgb;
+use crate::stats::{RayCounts, RayKind};
+
+/// Surfaces of glass that a shadow ray passes at most.
+const MOST_PASSED: usize = 64;
+
+impl Renderer<'_> {
+    /// Whether glass has given `light` a colour that is no sum of the `tints` which ratios are kept of.
+    pub(super) fn is_in_other_colour(&self, light: Rgb, tints: &[Rgb]) -> bool {
+        if !self.plan.glass_shadows {
+            return false;
+        }
+        let part = |tint: Rgb| tint * (light.dot(tint) / tint.length_squared());
+        let kept: Rgb = tints.iter().map(|tint| part(*tint)).sum();
+        (light - kept).abs().max_element() > 1e-3 * light.max_element()
+    }
+
+    /// The part of light that arrives along a shadow ray that meets something: none if that is no glass.
+    pub(super) fn through_glass(&self, ray: &Ray, counts: &mut RayCounts) -> Rgb {
+        let scene = self.scene;
+        let (mut ray, mut left) = (*ray, Rgb::ONE);
+        for _ in 0..MOST_PASSED {
+            counts[RayKind::ThroughGlass] += 1;
+            let Some(hit) = self.intersector.intersect(&ray, counts) else { return left };
+            let si = SurfaceInteraction::new(scene, &ray, &hit);
+            let material = &scene.materials[si.surface.material as usize];
+            let Some(glass) = &material.glass else { return Rgb::ZERO };
+            let wo = -ray.dir.normalize();
+            let cos = wo.dot(si.ns);
+            if glass.thin {
+                left *= glass.tint * (1.0 - optics::pane_reflectance(cos, glass.ior)) as f32;
+            } else {
+                left *= glass.tint * (1.0 - optics::reflectance(cos.abs(), glass.ior)) as f32;
+                if !si.is_outside(wo) {
+                    let way = scene.recentring.length_to_world(hit.t * ray.dir.length());
+                    left *= medium::transmittance(glass, way);
+                }
+            }
+            if left.max_element() < self.settings.cutoff {
+                return Rgb::ZERO;
+            }
+            let next = si.spawn(ray.dir, self.settings.rules.spawn_offset);
+            ray = Ray { tfar: ray.tfar - hit.t, ..next };
+        }
+        Rgb::ZERO
+    }
+}

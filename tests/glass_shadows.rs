@@ -1,0 +1,142 @@
+//! Light straight through glass against closed forms.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shows what it measured")]
+
+mod common;
+
+use common::{Job, cube, plate, pose, quad, render, render_scene};
+use std::f64::consts::PI;
+use tweenray::math::{Bounds3, DVec3, Rgb};
+use tweenray::scene::{
+    Camera, DirectionalLight, Environment, EnvironmentKind, Fog, Glass, GlassShadows,
+    IntersectorKind, Light, Material, QuadLight, Settings, SkyGradient, World,
+};
+use tweenray::shade::optics;
+use tweenray::stats::RayKind;
+
+const TINT: Rgb = Rgb::new(0.9, 0.5, 0.2);
+
+fn glass(glass: Glass) -> Material {
+    Material { glass: Some(glass), ..Material::glass("glass", 1.5) }
+}
+
+fn pane(tint: Rgb) -> Material {
+    glass(Glass { tint, thin: true, ..Glass::clear(1.5) })
+}
+
+/// A white plate with `above` over it, seen from the side below that.
+fn world(above: Option<(Material, bool)>) -> World {
+    let mut world = plate(Material::diffuse("white", Rgb::ONE), 4.0);
+    if let Some((material, is_body)) = above {
+        let id = world.add_material(material);
+        world.meshes.push(match is_body {
+            true => {
+                let mut slab = cube(DVec3::new(0.0, 2.0, 0.0), 0.5, id);
+                slab.positions.iter_mut().for_each(|p| *p *= DVec3::new(20.0, 1.0, 20.0));
+                slab
+            }
+            false => {
+                let corners = [[-9.0, 9.0], [9.0, 9.0], [9.0, -9.0], [-9.0, -9.0]];
+                quad(corners.map(|[x, z]| DVec3::new(x, 2.0, z)), id)
+            }
+        });
+    }
+    world
+}
+
+fn job(world: World) -> Job {
+    let camera = Camera::new(&pose((2.0, 1.0, 0.3), (0.0, 0.0, 0.0)), 1e-3, 1, 1).unwrap();
+    let glass_shadows = GlassShadows::Straight;
+    Job {
+        world,
+        camera,
+        settings: Settings { width: 1, height: 1, spp: 256, glass_shadows, ..Settings::default() },
+    }
+}
+
+fn sun(cos: f64) -> Light {
+    let to_light = DVec3::new((1.0 - cos * cos).sqrt(), cos, 0.0);
+    Light::Directional(DirectionalLight { to_light, irradiance: Rgb::splat(2.0) })
+}
+
+fn close(found: Rgb, expected: Rgb, tolerance: f32) {
+    let error = ((found - expected) / expected.max(Rgb::splat(1e-6))).abs().max_element();
+    assert!(error < tolerance, "{found} for {expected}");
+}
+
+#[test]
+fn panes_and_bodies_take_fresnel_tint_and_absorption() {
+    let absorption = Rgb::new(0.1, 0.7, 2.0);
+    let body = Glass { tint: TINT, absorption, ..Glass::clear(1.5) };
+    for cos in [1.0, 0.8, 0.3] {
+        let open = Rgb::splat((2.0 * cos / PI) as f32);
+        let through = |material, is_body| {
+            let mut world = world(Some((material, is_body)));
+            world.lights.push(sun(cos));
+            let mut job = job(world);
+            let (film, rays) = render(&job);
+            assert!(rays[RayKind::ThroughGlass] > 0);
+            job.settings.intersector = IntersectorKind::Oracle;
+            let scene = job.world.clone().into_scene(true).unwrap();
+            close(render_scene(&scene, &job).0.rgb[0], film.rgb[0], 1e-5);
+            job.settings.glass_shadows = GlassShadows::Opaque;
+            let (opaque, rays) = render_scene(&scene, &job);
+            assert_eq!((opaque.rgb[0], rays[RayKind::ThroughGlass]), (Rgb::ZERO, 0));
+            film.rgb[0]
+        };
+        let found = through(pane(TINT), false);
+        let expected = open * TINT * (1.0 - optics::pane_reflectance(cos, 1.5)) as f32;
+        println!("cosine {cos}, pane: {found} for {expected}");
+        close(found, expected, 1e-5);
+        let found = through(glass(body), true);
+        let faces = (1.0 - optics::reflectance(cos, 1.5)).powi(2) as f32;
+        let expected = open * TINT * TINT * faces * (absorption * (-1.0 / cos) as f32).exp();
+        println!("cosine {cos}, slab: {found} for {expected}");
+        close(found, expected, 1e-4);
+    }
+}
+
+#[test]
+fn every_kind_of_light_goes_through() {
+    let corners = [[-0.7, 0.7], [0.7, 0.7], [0.7, -0.7], [-0.7, -0.7]];
+    let corners = corners.map(|[x, z]| DVec3::new(x, 4.0, z)).map(|p| p.with_x(-p.x));
+    let lamp = Light::Quad(QuadLight { corners, radiance: Rgb::splat(5.0), two_sided: true });
+    let gradient =
+        SkyGradient { zenith: Rgb::splat(1.5), horizon: Rgb::splat(0.9), ground: Rgb::ZERO };
+    let mut lit = [(); 3].map(|()| world(None));
+    lit[0].lights.push(lamp);
+    lit[1].sky.radiance = Rgb::splat(0.7);
+    lit[2].environment = Some(Environment::new(EnvironmentKind::Gradient(gradient)));
+    for (k, open) in lit.into_iter().enumerate() {
+        let mut behind = open.clone();
+        let above = world(Some((pane(TINT), false)));
+        let id = behind.add_material(pane(TINT));
+        behind.meshes.extend(above.meshes.into_iter().skip(1).map(|mut mesh| {
+            mesh.material = id;
+            mesh
+        }));
+        let [open, behind] = [open, behind].map(|world| render(&job(world)).0.rgb[0]);
+        // Grey light takes the colour of the pane; beside it some gets in below the pane from skies.
+        let share = behind / open;
+        println!("light {k}: {share} of {open}");
+        assert!(share.x < 0.9 && share.x > 0.6, "{k}: {share}");
+        match k {
+            0 => close(share / share.x, TINT / TINT.x, 1e-3),
+            _ => assert!(share.x > share.y && share.y > share.z, "{k}: {share}"),
+        }
+    }
+}
+
+#[test]
+fn fog_is_lit_through_glass() {
+    let lit = |tint: Option<Rgb>| {
+        let mut world = world(tint.map(|tint| (pane(tint), false)));
+        world.materials[0] = Material::diffuse("black", Rgb::ZERO);
+        world.lights.push(sun(1.0));
+        let bounds = Some(Bounds3 { min: DVec3::splat(-3.0), max: DVec3::splat(1.9) });
+        world.fog = Some(Fog { extinction: 0.2, albedo: Rgb::ONE, anisotropy: 0.0, bounds });
+        render(&job(world)).0.rgb[0]
+    };
+    let share = lit(Some(TINT)) / lit(None);
+    close(share, TINT * (1.0 - optics::pane_reflectance(1.0, 1.5)) as f32, 1e-4);
+}
