@@ -303,9 +303,10 @@ fn cut_outs(scene: &Scene, used: &UsedMaterials) -> EffectReason {
 /// Whether reflection grows towards grazing angles.
 fn fresnel(used: &UsedMaterials) -> EffectReason {
     let why = format!(
-        "{} in use, {} with a clear coat",
+        "{} in use, {} with a clear coat, {} in part glass",
         counted(used.fresnel, "principled material"),
-        used.coated
+        used.coated,
+        used.part_glass
     );
     EffectReason { effect: "Fresnel reflection", runs: used.fresnel > 0, why }
 }
@@ -389,6 +390,7 @@ struct UsedMaterials {
     glossy: usize,
     fresnel: usize,
     coated: usize,
+    part_glass: usize,
     glass: usize,
     thin: usize,
     ranked: usize,
@@ -424,6 +426,8 @@ impl UsedMaterials {
             counts.fresnel += usize::from(material.fresnel.is_some());
             let is_coated = material.fresnel.is_some_and(|fresnel| fresnel.clearcoat != 0.0);
             counts.coated += usize::from(is_coated);
+            let is_clear = material.fresnel.is_some_and(|fresnel| fresnel.transmission != 0.0);
+            counts.part_glass += usize::from(is_clear);
             counts.glass += usize::from(material.glass.is_some());
             let glass =
                 |is: fn(&Glass) -> bool| usize::from(material.glass.as_ref().is_some_and(is));

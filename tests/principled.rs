@@ -18,6 +18,7 @@ const PLASTIC: Fresnel = Fresnel {
     metallic_map: None,
     clearcoat: 0.0,
     clearcoat_roughness: 0.0,
+    transmission: 0.0,
 };
 const METAL: Fresnel = Fresnel { metallic: 1.0, ..PLASTIC };
 

@@ -85,9 +85,18 @@ impl World {
 
 /// A thin pane has no inside that a priority or absorption could be of, and only polished glass has a priority.
 fn check_glass(material: &Material) -> Result<()> {
-    let Some(glass) = &material.glass else { return Ok(()) };
+    let share = material.fresnel.map(|fresnel| fresnel.transmission);
+    let Some(glass) = &material.glass else {
+        if share.is_some_and(|share| share != 0.0) {
+            let message = format!("`{}` lets light through, but has no glass", material.name);
+            return Err(Error::Usage(message));
+        }
+        return Ok(());
+    };
     let is_ranked = glass.priority.is_some();
     let what = match glass {
+        _ if share == Some(0.0) => "glass of which layers leave nothing",
+        _ if share.is_some() && is_ranked => "glass with a priority beside other layers",
         Glass { thin: true, absorption, .. } if is_ranked || *absorption != Rgb::ZERO => {
             "thin glass with a priority or absorption, which bodies have"
         }

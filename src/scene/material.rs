@@ -32,7 +32,7 @@ pub struct Material {
     /// How the mirror's reflectance grows towards grazing angles, and what of the surface is metal. The mirror then takes
     /// its share from the diffuse part. `None`: `mirror` at every angle, beside the diffuse part.
     pub fresnel: Option<Fresnel>,
-    /// Glass; then `diffuse` and `mirror` are zero.
+    /// Glass; then `diffuse` and `mirror` are zero, unless `fresnel` says what share of the surface is glass.
     pub glass: Option<Glass>,
     /// Emitted radiance.
     pub emission: Rgb,
@@ -65,6 +65,9 @@ pub struct Fresnel {
     pub clearcoat: f64,
     /// Roughness of the clear coat.
     pub clearcoat_roughness: f64,
+    /// Share of what is no metal that is the material's `glass`, in place of the diffuse part and the mirror over it. The glass
+    /// then has the roughness of the mirror, and image and vertex colours multiply its tint. 0 of materials without glass.
+    pub transmission: f64,
 }
 
 impl Material {
@@ -115,15 +118,20 @@ impl Material {
     /// Whether any of the surface reflects light diffusely. What is NaN or negative goes on, to be counted at its pixel.
     pub fn is_diffuse(&self) -> bool {
         let is_metal = |f: &Fresnel| f.metallic == 1.0 && f.metallic_map.is_none();
-        self.diffuse != Rgb::ZERO && !self.fresnel.as_ref().is_some_and(is_metal)
+        let is_clear = |f: &Fresnel| is_metal(f) || f.transmission == 1.0;
+        self.diffuse != Rgb::ZERO && !self.fresnel.as_ref().is_some_and(is_clear)
     }
 
-    /// Whether any of the surface is a mirror, perfect or rough.
+    /// Whether any of the surface is a mirror, perfect or rough, or glass beside other layers.
     pub fn is_mirror(&self) -> bool {
-        self.mirror != Rgb::ZERO
-            || self
-                .fresnel
-                .is_some_and(|f| f.grazing != 0.0 || f.metallic != 0.0 || f.clearcoat != 0.0)
+        let any = |f: Fresnel| [f.grazing, f.metallic, f.clearcoat, f.transmission] != [0.0; 4];
+        self.mirror != Rgb::ZERO || self.fresnel.is_some_and(any)
+    }
+
+    /// Whether the layers that `fresnel` says are seen from outside the surface, or from inside. The inner side of a body of
+    /// glass has none: light that would meet them has crossed glass, where no shadow ray leads.
+    pub fn shows_layers(&self, outside: bool) -> bool {
+        self.fresnel.is_some() && (outside || self.glass.is_none_or(|glass| glass.thin))
     }
 
     /// Whether any mirror or coat of it, or its glass, is rough.

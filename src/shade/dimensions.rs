@@ -13,10 +13,14 @@ pub(super) const LENS: u32 = 1;
 /// The branch of a path that a camera ray is.
 pub(super) const ROOT: u32 = 1;
 
-/// The branch that the `child`th direction, 0 or 1, of all lobes leads to from the end of `branch`. The tree is at
-/// most 31 deep before branches share dimensions.
+/// The branch that the `child`th direction, 0 to 2, of all lobes leads to from the end of `branch`. The tree is at
+/// most 31 deep before branches share dimensions, or 20 where there are third directions, which have numbers of their own.
 pub(super) fn branch(branch: u32, child: u32) -> u32 {
-    branch.wrapping_mul(2) + child
+    let number = match child {
+        2 => 1 << 20,
+        _ => child,
+    };
+    branch.wrapping_mul(2).wrapping_add(number)
 }
 
 /// The direction that a lobe at the end of a branch is sampled in, of which the first is the `child`th of all: counted from

@@ -373,9 +373,10 @@ impl Vertex<'_, '_> {
             shaped = &tilted;
         }
         let seen = (shaped, wo, state.cone);
-        let layers =
-            material.fresnel.as_ref().map(|fresnel| Layers::at(scene, (material, fresnel), seen));
-        if material.is_diffuse() {
+        let is_layered = material.shows_layers(si.is_outside(wo));
+        let layers = material.fresnel.as_ref().filter(|_| is_layered);
+        let layers = layers.map(|fresnel| Layers::at(scene, (material, fresnel), seen));
+        if material.is_diffuse() && (is_layered || material.fresnel.is_none()) {
             let albedo = match &layers {
                 None => lobe::albedo(scene, material, &si, wo, state.cone),
                 Some(layers) => layers.albedo,

@@ -11,6 +11,7 @@ mod glossy;
 mod layers;
 mod microfacet;
 mod mirror;
+mod part_glass;
 mod reflectance;
 mod rough_glass;
 mod share_table;
@@ -26,6 +27,7 @@ pub(super) use diffuse::albedo;
 use glossy::Glossy;
 pub(super) use layers::Layers;
 use mirror::Mirror;
+use part_glass::SmoothPart;
 use reflectance::Reflectance;
 use rough_glass::RoughGlass;
 
@@ -37,6 +39,7 @@ pub(super) enum Lobe {
     Dielectric(Dielectric),
     Pane(Pane),
     RoughGlass(RoughGlass),
+    SmoothPart(SmoothPart),
 }
 
 /// A direction that a lobe passes radiance on from.
@@ -67,16 +70,28 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     mut take: impl FnMut(Lobe, u32),
 ) {
     let (si, wo, _) = seen;
-    if let Some(Layers { mirror, roughness, coat, albedo: _ }) = layers.filter(|_| MIRROR) {
+    if let Some(Layers { mirror, roughness, coat, glass, albedo: _ }) = layers.filter(|_| MIRROR) {
         let n = facing_normal(si, wo);
-        let over = [Some((*mirror, *roughness)), *coat];
+        let mut over = [Some((*mirror, *roughness)), *coat, None];
+        if let Some(part) = glass.as_ref().filter(|_| GLASS) {
+            let lobes = part.lobes((*mirror, *roughness), si, wo);
+            // A smooth one has both directions.
+            let firsts = [0, u32::from(part.glass.is_rough())];
+            lobes
+                .into_iter()
+                .zip(firsts)
+                .for_each(|(l, at)| l.into_iter().for_each(|l| take(l, at)));
+            over = [None, None, *coat];
+        }
         for (first, (reflectance, roughness)) in (0..).zip(over).filter_map(|(i, l)| Some((i, l?)))
         {
             if reflectance != Reflectance::constant(Rgb::ZERO) {
                 take(reflecting(reflectance, roughness, n, wo), first);
             }
         }
-    } else if MIRROR && material.mirror != Rgb::ZERO {
+        return;
+    }
+    if MIRROR && material.mirror != Rgb::ZERO && material.fresnel.is_none() {
         take(
             match material.roughness {
                 0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
@@ -92,6 +107,8 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
         );
     }
     if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
+        let painted = material.fresnel.and_then(|_| painted_glass(scene, material, seen));
+        let glass = painted.as_ref().unwrap_or(glass);
         match (glass.thin, glass.is_rough()) {
             (true, false) => take(Lobe::Pane(Pane::new(glass)), 0),
             (false, false) => take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))), 0),
@@ -104,16 +121,22 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     }
 }
 
+/// The glass of a material that has other layers too at the point that is `seen`, images looked up.
+fn painted_glass(
+    scene: &Scene,
+    material: &Material,
+    seen: (&SurfaceInteraction, DVec3, RayCone),
+) -> Option<Glass> {
+    let glass = material.glass?;
+    let tint = diffuse::painted(scene, (material, glass.tint), seen);
+    Some(Glass { tint, roughness: glossy::roughness(scene, material, seen), ..glass })
+}
+
 /// What a rough boundary of `glass` reflects, and what it lets through.
 fn rough_glass(glass: &Glass, si: &SurfaceInteraction, wo: DVec3) -> [Lobe; 2] {
     let n = facing_normal(si, wo);
     let boundary = Boundary::new(glass, si.is_outside(wo));
-    let passed = match glass.thin {
-        // Light that goes through leaves as what is reflected does, but on the other side.
-        true => glossy::reflected_shares(glass.roughness, wo.dot(n))[0],
-        false => boundary.passed(glass.roughness, wo.dot(n)),
-    };
-    let back = 1.0 / passed;
+    let back = part_glass::rough_share(glass, boundary, wo.dot(n));
     let through = RoughGlass::new(boundary, glass.tint * back as f32, glass.roughness, n);
     let reflected = Glossy::of_glass(boundary, back, glass.roughness, n);
     [Lobe::Glossy(reflected), Lobe::RoughGlass(through)]
@@ -140,7 +163,7 @@ impl Lobe {
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Glossy(_) | Self::RoughGlass(_) => false,
-            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => true,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) | Self::SmoothPart(_) => true,
         }
     }
 
@@ -154,6 +177,7 @@ impl Lobe {
         match self {
             Self::Pane(_) => true,
             Self::RoughGlass(through) => through.is_pane(),
+            Self::SmoothPart(part) => part.is_pane(),
             Self::Mirror(_) | Self::Glossy(_) | Self::Dielectric(_) => false,
         }
     }
@@ -164,7 +188,9 @@ impl Lobe {
         match self {
             Self::Glossy(glossy) => glossy.f(wo, wi),
             Self::RoughGlass(through) => through.f(wo, wi),
-            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => Rgb::ZERO,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) | Self::SmoothPart(_) => {
+                Rgb::ZERO
+            }
         }
     }
 
@@ -173,7 +199,7 @@ impl Lobe {
         match self {
             Self::Glossy(glossy) => glossy.pdf(wo, wi),
             Self::RoughGlass(through) => through.pdf(wo, wi),
-            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) => 0.0,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::Pane(_) | Self::SmoothPart(_) => 0.0,
         }
     }
 
@@ -193,6 +219,7 @@ impl Lobe {
             Self::RoughGlass(through) => [through.sample(wo, u().map(f64::from)), None],
             Self::Dielectric(dielectric) => dielectric.sample(wo, n),
             Self::Pane(pane) => pane.sample(wo, n),
+            Self::SmoothPart(part) => part.sample(wo, n),
         }
     }
 
@@ -202,7 +229,9 @@ impl Lobe {
         match self {
             Self::Mirror(_) => RayKind::Mirror,
             Self::Glossy(_) => RayKind::Glossy,
-            Self::Dielectric(_) | Self::Pane(_) | Self::RoughGlass(_) => RayKind::Glass,
+            Self::Dielectric(_) | Self::Pane(_) | Self::RoughGlass(_) | Self::SmoothPart(_) => {
+                RayKind::Glass
+            }
         }
     }
 }

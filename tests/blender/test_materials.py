@@ -36,7 +36,10 @@ class Materials(Case):
             self.noted(lines, "p", word)
         table, lines = self.of(lambda: stage.principled("p", Transmission_Weight=1.0, Base_Color=(0.25, 1.0, 1.0), IOR=1.3, Roughness=0.3))
         self.near([table["glass"]["ior"], *table["glass"]["tint"]], [1.3, 0.5, 1.0, 1.0])
-        self.noted(lines, "p", "glass of roughness 0.3")
+        self.near(table["glass"]["roughness"], 0.3)
+        table, _ = self.of(lambda: stage.principled("p", Transmission_Weight=0.25, Base_Color=(0.25, 1.0, 1.0)))
+        p = table["principled"]
+        self.near([p["transmission"], *p["tint"]], [0.25, 0.5, 1.0, 1.0])
         table, lines = self.of(lambda: stage.principled("p", Emission_Color=(1.0, 0.5, 0.25), Emission_Strength=4.0))
         self.near(table["emission"], [4.0, 2.0, 1.0])
         self.assertTrue(table["emits_back"])

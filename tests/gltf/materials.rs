@@ -21,6 +21,7 @@ fn factors_and_their_defaults_are_those_of_the_format() {
         metallic_map: None,
         clearcoat: 0.0,
         clearcoat_roughness: 0.0,
+        transmission: 0.0,
     };
     assert_eq!((white.diffuse, white.roughness, white.fresnel), (Rgb::ONE, 1.0, Some(plain)));
     assert_eq!(white.mirror, Rgb::splat(0.04));
@@ -164,7 +165,8 @@ fn what_is_transparent_all_over_is_left_out() {
 #[test]
 fn transmission_is_a_pane_or_with_a_thickness_a_body_that_absorbs() {
     let glass = |extensions: Value| {
-        let base = json!({"baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0});
+        let base =
+            json!({"baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0, "metallicFactor": 0});
         material(json!({"pbrMetallicRoughness": base, "extensions": extensions}))
     };
     let full = json!({"transmissionFactor": 1});
@@ -181,10 +183,12 @@ fn transmission_is_a_pane_or_with_a_thickness_a_body_that_absorbs() {
     // A half is left after 2, a quarter too: twice as fast.
     let expected = Rgb::new(0.0, 0.5 * 2f32.ln(), 2f32.ln());
     assert!((glass_body.absorption - expected).abs().max_element() < 1e-6);
-    let (opaque, model) =
-        glass(json!({"KHR_materials_transmission": {"transmissionFactor": 0.25}}));
-    assert!(opaque.glass.is_none());
-    assert!(warns(&model.warnings, "of less than a half is ignored"));
+    let quarter = json!({"transmissionFactor": 0.25});
+    let (part, model) = glass(json!({"KHR_materials_transmission": quarter}));
+    assert_eq!(part.glass, Some(Glass { tint, thin: true, ..Glass::clear(1.5) }));
+    assert_eq!(part.fresnel.map(|fresnel| fresnel.transmission), Some(0.25));
+    assert_eq!(part.diffuse, tint);
+    assert!(model.warnings.is_empty() && model.world.into_scene(true).is_ok());
 }
 
 #[test]

@@ -143,9 +143,8 @@ impl Parts<'_, '_> {
             is_invisible = self.laid.base.is_none() && alpha < cutoff;
             material.alpha = self.mask(alpha, cutoff)?;
         }
-        if let Some(glass) = self.glass(base, pbr.as_ref())? {
-            let name = std::mem::take(&mut material.name);
-            material = Material { glass: Some(glass), ..Material::black(name) };
+        if let Some((glass, transmission)) = self.glass(base, pbr.as_ref())? {
+            material = part_glass(material, glass, transmission);
         }
         Ok(Surfaced { material, glow, is_invisible })
     }
@@ -166,7 +165,14 @@ impl Parts<'_, '_> {
         let normal_map = self.normal_map()?;
         let (mirror, grazing) = self.reflectance()?;
         let (clearcoat, clearcoat_roughness) = self.clearcoat()?;
-        let fresnel = Fresnel { grazing, metallic, metallic_map, clearcoat, clearcoat_roughness };
+        let fresnel = Fresnel {
+            grazing,
+            metallic,
+            metallic_map,
+            clearcoat,
+            clearcoat_roughness,
+            transmission: 0.0,
+        };
         let fresnel = Some(fresnel);
         Ok(Material { texture, mirror, roughness, roughness_map, fresnel, normal_map, ..material })
     }
@@ -257,22 +263,24 @@ impl Parts<'_, '_> {
         self.map(self.laid.base, Role::Mask(cutoff.to_bits()))
     }
 
-    /// The glass of KHR_materials_transmission and KHR_materials_volume, where most of the light passes.
-    fn glass(&mut self, tint: Rgb, pbr: Option<&Json<'_>>) -> Result<Option<Glass>> {
+    /// The glass of KHR_materials_transmission and KHR_materials_volume, and the share of what is no metal that it is.
+    fn glass(&mut self, tint: Rgb, pbr: Option<&Json<'_>>) -> Result<Option<(Glass, f64)>> {
         let Some(json) = self.json.extension("KHR_materials_transmission") else { return Ok(None) };
         let transmission = self.share(Some(&json), "transmissionFactor", 0.0)?;
         if transmission == 0.0 {
             return Ok(None);
         }
-        if json.get("transmissionTexture").is_some() || transmission < 0.5 {
-            self.notes.add("KHR_materials_transmission by an image or of less than a half is ignored: the surface is opaque", None);
+        if json.get("transmissionTexture").is_some() {
+            self.notes.add(
+                "KHR_materials_transmission by an image is ignored: the surface is opaque",
+                None,
+            );
             return Ok(None);
         }
-        let images = ["baseColorTexture", "metallicRoughnessTexture"];
-        let has_images = pbr.is_some_and(|pbr| images.iter().any(|image| pbr.get(image).is_some()));
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
-        if transmission < 1.0 || has_images || self.laid.normal.is_some() {
-            self.notes.add("KHR_materials_transmission is read as glass: images and what is not transmitted are left out", None);
+        if self.laid.normal.is_some() {
+            self.notes
+                .add("what has KHR_materials_transmission is shown without its normal map", None);
         }
         let ior = self.ior()?;
         let ior = if ior == 0.0 { 1.5 } else { ior.clamp(0.1, 10.0) };
@@ -280,7 +288,8 @@ impl Parts<'_, '_> {
         let volume =
             volume.filter(|json| json.number("thicknessFactor").is_ok_and(|t| t > Some(0.0)));
         let Some(volume) = volume else {
-            return Ok(Some(Glass { roughness, tint, thin: true, ..Glass::clear(ior) }));
+            let pane = Glass { roughness, tint, thin: true, ..Glass::clear(ior) };
+            return Ok(Some((pane, transmission)));
         };
         let distance = volume.number_within("attenuationDistance", [1e-30, f64::MAX], f64::MAX)?;
         let colour = volume.numbers::<3>("attenuationColor")?.unwrap_or([1.0; 3]);
@@ -288,7 +297,7 @@ impl Parts<'_, '_> {
         let absorption =
             colour.map(|c| (-libm::log(c.clamp(1e-6, 1.0)) / distance).min(1e30) as f32);
         let absorption = Rgb::from_array(absorption);
-        Ok(Some(Glass { roughness, tint, absorption, ..Glass::clear(ior) }))
+        Ok(Some((Glass { roughness, tint, absorption, ..Glass::clear(ior) }, transmission)))
     }
 
     /// A colour from 0 to 1; what lies outside is cut.
@@ -313,4 +322,17 @@ impl Parts<'_, '_> {
         let number = self.images.place(laid.image, role, self.world)?;
         Ok(number.map(|number| laid.map(number)))
     }
+}
+
+/// `material` of which `transmission` is `glass`: where nothing else is, glass alone.
+fn part_glass(material: Material, glass: Glass, transmission: f64) -> Material {
+    let glass = Some(glass);
+    let alone = Material { glass, ..Material::black(material.name.clone()) };
+    let Some(fresnel) = material.fresnel else { return alone };
+    let is_alone = transmission == 1.0 && fresnel.metallic == 0.0 && fresnel.clearcoat == 0.0;
+    if is_alone && !material.has_image() && !material.vertex_colours {
+        return alone;
+    }
+    let fresnel = Some(Fresnel { transmission, ..fresnel });
+    Material { glass, fresnel, normal_map: None, alpha: None, ..material }
 }

@@ -179,6 +179,26 @@ impl Material {
         self.diffuse.or_else(|| paints.then(Reflectance::white))
     }
 
+    fn check_transmission(&self, principled: &At<Principled>, source: &Source) -> Result<()> {
+        let is_glass = principled.transmission.0 != 0.0;
+        let message = match principled.absorption.as_ref() {
+            _ if !is_glass && principled.says_glass() => {
+                "`tint`, `absorption` and `thin` are of the glass: they need a `transmission` above 0"
+            }
+            Some(_) if principled.thin => {
+                "`absorption` is of a body, and a thin pane has no inside"
+            }
+            _ if is_glass && self.alpha.is_some() => {
+                "what has a `transmission` has no cut-outs: its body is closed, and a hole would leave it open"
+            }
+            _ if is_glass && self.normal_map.is_some() => {
+                "what has a `transmission` has no normal map: what it refracts follows the surface that rays meet"
+            }
+            _ => return Ok(()),
+        };
+        Err(source.fault(&principled.span, message).into())
+    }
+
     fn check(&self, source: &Source) -> Result<()> {
         if let Some(principled) = &self.principled {
             let keys = [
@@ -193,9 +213,10 @@ impl Material {
                     "`principled` says how light is reflected: `{key}` does not stand beside it"
                 );
                 let help = "its own keys are `base_colour`, `base_texture`, `metallic`, `roughness`, `ior`, \
-                            `specular`, `clearcoat` and `clearcoat_roughness`";
+                            `specular`, `clearcoat`, `clearcoat_roughness`, `transmission`, `tint`, `absorption` and `thin`";
                 return Err(source.fault(&principled.span, message).help(help).into());
             }
+            self.check_transmission(principled, source)?;
         }
         if let Some(glass) = &self.glass {
             let absorption = glass.absorption.as_ref().map(|a| (&a.span, "absorption"));

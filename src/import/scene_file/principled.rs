@@ -3,9 +3,9 @@
 use super::at::At;
 use super::number::{Ior, Share};
 use super::texture::{ImageTable, MappedShare, NamedTexture};
-use super::vector::{OneOr, Reflectance};
+use super::vector::{Light as Amount, OneOr, Reflectance};
 use crate::math::Rgb;
-use crate::scene::{Fresnel, Material, TextureId};
+use crate::scene::{Fresnel, Glass, Material, TextureId};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -37,6 +37,18 @@ pub(super) struct Principled {
     /// Roughness of the clear coat.
     #[serde(default = "nearly_smooth")]
     clearcoat_roughness: Share,
+    /// Share of what is no metal that is glass of this `ior` and `roughness`, in place of the diffuse part and its reflection.
+    /// Neither `normal_map` nor `alpha` stands beside it.
+    #[serde(default = "none")]
+    pub transmission: Share,
+    /// Share of light that each crossing of the glass lets through: twice of a body, once of a thin pane. `base_texture` and
+    /// vertex colours multiply it. Absent: `base_colour`.
+    tint: Option<Reflectance>,
+    /// Absorption coefficient of the glass, per unit of length, linear RGB or one number for grey. The surface must be closed.
+    pub absorption: Option<At<Amount>>,
+    /// Whether the surface is a whole pane without thickness, such as a window. `absorption` does not stand beside it.
+    #[serde(default)]
+    pub thin: bool,
 }
 
 /// Roughness where none is given.
@@ -61,6 +73,11 @@ fn nearly_smooth() -> Share {
 }
 
 impl Principled {
+    /// Whether a key says what its glass is like.
+    pub fn says_glass(&self) -> bool {
+        self.tint.is_some() || self.absorption.is_some() || self.thin
+    }
+
     /// `material` with this reflection; the images are those of base colour, roughness and metallic.
     pub fn build(
         &self,
@@ -76,7 +93,23 @@ impl Principled {
         let base_colour = self.base_colour.unwrap_or(OneOr([usual; 3]));
         let root = (self.ior.0 - 1.0) / (self.ior.0 + 1.0);
         let normal = root * root * self.specular.0;
+        let glass = (self.transmission.0 != 0.0).then(|| Glass {
+            roughness,
+            tint: self.tint.unwrap_or(base_colour).rgb(),
+            absorption: self.absorption.as_ref().map_or_else(Default::default, |a| a.rgb()),
+            thin: self.thin,
+            ..Glass::clear(self.ior.0)
+        });
+        let is_bare = self.base_texture.is_none() && !material.vertex_colours;
+        let is_alone = self.transmission.0 == 1.0
+            && metallic == 0.0
+            && self.clearcoat.0 == 0.0
+            && roughness_map.is_none();
+        if is_bare && is_alone && material.emission == Rgb::ZERO {
+            return Material { glass, ..material };
+        }
         Material {
+            glass,
             diffuse: base_colour.rgb(),
             texture: self.base_texture.as_ref().zip(base).map(|(table, id)| table.0.map(id)),
             mirror: Rgb::splat(normal as f32),
@@ -88,6 +121,7 @@ impl Principled {
                 metallic_map,
                 clearcoat: self.clearcoat.0,
                 clearcoat_roughness: self.clearcoat_roughness.0,
+                transmission: self.transmission.0,
             }),
             ..material
         }

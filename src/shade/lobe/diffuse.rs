@@ -18,18 +18,16 @@ pub(in crate::shade) fn albedo(
     if !(material.texture.is_some() | material.vertex_colours) {
         return material.diffuse;
     }
-    painted(scene, material, si, wo, cone)
+    painted(scene, (material, material.diffuse), (si, wo, cone))
 }
 
-/// [`albedo`] where it differs from place to place.
-fn painted(
+/// `colour` times what image and vertex colours of `material` say where the point that is `seen` lies.
+pub(super) fn painted(
     scene: &Scene,
-    material: &Material,
-    si: &SurfaceInteraction,
-    wo: DVec3,
-    cone: RayCone,
+    (material, colour): (&Material, Rgb),
+    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
 ) -> Rgb {
-    let mut albedo = material.diffuse;
+    let mut albedo = colour;
     if let Some(map) = &material.texture {
         let footprint = cone.footprint(scene, si, wo);
         albedo *= texture::mapped(scene, map, si.uv, footprint);

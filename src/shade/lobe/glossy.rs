@@ -34,6 +34,8 @@ enum FacetReflectance {
     Mirror(Reflectance),
     /// As a boundary of glass, times a factor.
     Glass(Boundary, f64),
+    /// As a mirror and such a boundary together.
+    Both(Reflectance, Boundary, f64),
 }
 
 impl Glossy {
@@ -41,6 +43,17 @@ impl Glossy {
     pub(super) fn of_glass(boundary: Boundary, factor: f64, roughness: f64, n: DVec3) -> Self {
         let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, n);
         Self { reflectance: FacetReflectance::Glass(boundary, factor), ..mirror }
+    }
+
+    /// What a mirror of this `reflectance` and a boundary of glass, times a factor, reflect together, both of this roughness.
+    pub(super) fn beside_glass(
+        reflectance: Reflectance,
+        (boundary, factor): (Boundary, f64),
+        roughness: f64,
+        n: DVec3,
+    ) -> Self {
+        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, n);
+        Self { reflectance: FacetReflectance::Both(reflectance, boundary, factor), ..mirror }
     }
 
     /// The lobe of microfacets of this `reflectance`, which includes what single reflection loses, at a surface of this
@@ -66,6 +79,9 @@ impl Glossy {
             FacetReflectance::Mirror(reflectance) => reflectance.at(cos),
             FacetReflectance::Glass(boundary, factor) => {
                 Rgb::splat((boundary.reflectance(cos) * factor) as f32)
+            }
+            FacetReflectance::Both(reflectance, boundary, factor) => {
+                reflectance.at(cos) + Rgb::splat((boundary.reflectance(cos) * factor) as f32)
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Layers over a diffuse part, whose reflection grows towards grazing angles, and what each leaves to those below.
 
+use super::part_glass::PartGlass;
 use super::reflectance::Reflectance;
 use super::{diffuse, facing_normal, glossy};
 use crate::intersect::SurfaceInteraction;
@@ -22,6 +23,8 @@ pub(in crate::shade) struct Layers {
     pub roughness: f64,
     /// The clear coat over both.
     pub coat: Option<(Reflectance, f64)>,
+    /// The glass beside diffuse layer and mirror, under the coat.
+    pub glass: Option<PartGlass>,
 }
 
 impl Layers {
@@ -37,7 +40,8 @@ impl Layers {
         let roughness = glossy::roughness(scene, material, seen);
         let metal = fresnel.metallic * texture::share(scene, fresnel.metallic_map.as_ref(), seen);
         let cos = facing_normal(si, wo).dot(wo);
-        let (metal, other) = (metal as f32, (1.0 - metal) as f32);
+        let (metal, no_metal) = (metal as f32, (1.0 - metal) as f32);
+        let other = no_metal * (1.0 - fresnel.transmission as f32);
         let shine = Reflectance::growing(material.mirror, Rgb::splat(fresnel.grazing as f32));
         let shine = shine.given_back(roughness, cos);
         let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(roughness, cos);
@@ -59,6 +63,13 @@ impl Layers {
             mirror: mirror.scaled(Rgb::splat(passed)),
             roughness,
             coat,
+            glass: (fresnel.transmission != 0.0)
+                .then(|| super::painted_glass(scene, material, seen))
+                .flatten()
+                .map(|glass| PartGlass {
+                    glass,
+                    share: no_metal * fresnel.transmission as f32 * passed,
+                }),
         }
     }
 }

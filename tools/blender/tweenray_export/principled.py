@@ -50,10 +50,9 @@ def body(writer, fed):
     metallic = writer.read(fed, "Metallic")
     index = writer.constant(fed, "IOR").grey()
     is_metal = metallic.image is not None or metallic.grey() > 0.0
-    if transmission >= 0.5 and not is_metal:
-        return glass(writer, fed, transmission, index)
-    if transmission > 0.0:
-        writer.note(f"transmission {transmission:.3g}", "opaque")
+    is_coated = writer.constant(fed, "Coat Weight").grey() > 0.0
+    if transmission >= 1.0 and not is_metal and not is_coated:
+        return glass(writer, fed, index)
     made, table = Made({}), {}
     made.table["principled"] = table
     writer.coloured(made, "base_colour", "base_texture", fed, "Base Color", table)
@@ -69,8 +68,20 @@ def body(writer, fed):
             writer.note(f"coat of index {coat_ior:.3g}", "1.5")
         if fed.input("Coat Normal").fed() is not None:
             writer.note("a normal of the coat", "the surface's")
-    writer.normal(made, fed)
+    if transmission > 0.0:
+        part_glass(writer, fed, table, min(transmission, 1.0))
+    else:
+        writer.normal(made, fed)
     return made
+
+
+def part_glass(writer, fed, table, transmission):
+    """The keys of what is glass in part. Of the base colour's image no root is taken."""
+    table["transmission"] = transmission
+    if "base_texture" not in table:
+        table["tint"] = [math.sqrt(c) for c in share(writer.constant(fed, "Base Color").rgb())]
+    if fed.input("Normal").fed() is not None:
+        writer.note("a normal map on glass", "none")
 
 
 def reflection(index, level):
@@ -84,10 +95,8 @@ def reflection(index, level):
     return {"ior": ior((1.0 + root) / (1.0 - root))}
 
 
-def glass(writer, fed, transmission, index):
+def glass(writer, fed, index):
     """Clear glass. A surface lets the root of the base colour through, as in Cycles."""
-    if transmission < 1.0:
-        writer.note(f"transmission {transmission:.3g}", "1")
     roughness = writer.constant(fed, "Roughness").grey()
     if fed.input("Normal").fed() is not None:
         writer.note("a normal map on glass", "none")

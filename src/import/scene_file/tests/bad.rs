@@ -24,6 +24,13 @@ const NAMES: &[Case] = &[
     ("[material.a]\nmirror = 1\nprincipled = ¦{ metallic = 1 }\n", "`mirror`", "`base_colour`"),
     ("[material.a]\nglass = {}\nprincipled = ¦{}\n", "`glass`", ""),
     ("[material.a]\nprincipled = { metallic = ¦2 }\n", "from 0 to 1", ""),
+    ("[material.a]\nprincipled = { transmission = ¦2 }\n", "from 0 to 1", ""),
+    ("[material.a]\nprincipled = ¦{ thin = true }\n", "need a `transmission` above 0", ""),
+    (
+        "[material.a]\nprincipled = ¦{ transmission = 1, thin = true, absorption = 1 }\n",
+        "no inside",
+        "",
+    ),
     ("[material.a]\nprincipled = { base_colour = [1, ¦2, 0] }\n", "from 0 to 1", ""),
     ("[settings]\n¦sspp = 4\n", "unknown key `sspp`", "`spp`"),
     ("[settings.rules]\n¦retri = true\n", "unknown key `retri`", "`retry`"),

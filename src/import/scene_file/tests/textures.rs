@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::math::{DVec2, DVec3, Rgb, Vec2};
-use crate::scene::{TextureMap, WorldMesh, Wrap};
+use crate::scene::{Glass, TextureMap, WorldMesh, Wrap};
 
 /// A job whose one mesh is `mesh`, of a material with a texture.
 fn textured(mesh: &str) -> Loaded {
@@ -322,6 +322,27 @@ fn principled_parameters_are_numbers_or_images() {
 }
 
 #[test]
+fn a_transmission_makes_a_share_glass_and_all_of_it_glass_alone() {
+    let of = |material: &str| {
+        let loaded = data(material).expect("a scene");
+        let made = loaded.world.materials[0].clone();
+        loaded.world.into_scene(true).expect("a valid scene");
+        made
+    };
+    let part =
+        of("principled = { transmission = 0.25, base_colour = [1, 0.5, 0], roughness = 0.3 }\n");
+    let tint = Rgb::new(1.0, 0.5, 0.0);
+    let glass = Glass { roughness: 0.3, tint, ..Glass::clear(1.5) };
+    assert_eq!((part.glass, part.diffuse), (Some(glass), tint));
+    assert_eq!(part.fresnel.map(|fresnel| fresnel.transmission), Some(0.25));
+    let keys = "roughness = 0.3, ior = 1.33, tint = 0.5, thin = true";
+    let all = of(&format!("principled = {{ transmission = 1, {keys} }}\n"));
+    assert_eq!(all, of(&format!("glass = {{ {keys} }}\n")));
+    let coated = of(&format!("principled = {{ transmission = 1, clearcoat = 1, {keys} }}\n"));
+    assert_eq!((coated.fresnel.map(|f| f.clearcoat), coated.glass), (Some(1.0), all.glass));
+}
+
+#[test]
 fn one_file_as_colour_and_as_data_is_two_images() {
     let text = "diffuse = 0.5\ntexture = 'rgba.png'\nmirror = 0.5\nroughness = 'rgba.png'\n\
                 [material.n]\nmirror = 0.5\nroughness = { file = 'rgba.png', scale = 2 }\n";
@@ -377,6 +398,11 @@ fn a_normal_map_has_a_strength_and_is_doubted_if_it_holds_no_normals() {
         ("diffuse = 0.5\nnormal_map = { file = 'blue.png', strength = -1 }\n", "from 0 to 1e30"),
         ("diffuse = 0.5\nnormal_map = 3\n", "a file name or a table"),
         ("glass = {}\nnormal_map = 'blue.png'\n", "glass has no normal map"),
+        (
+            "principled = { transmission = 0.5 }\nnormal_map = 'blue.png'\n",
+            "a `transmission` has no normal map",
+        ),
+        ("principled = { transmission = 1 }\nalpha = 'rgba.png'\n", "has no cut-outs"),
     ] {
         let error = data(text).expect_err("refused").to_string();
         assert!(error.contains(expected), "{text}: {error}");
