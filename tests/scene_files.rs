@@ -51,6 +51,7 @@ fn every_folder_has_a_scene_that_loads_and_has_a_description() {
         "demo",
         "street_at_night",
         "courtyard",
+        "foggy_hall",
         "materials",
     ] {
         assert!(names.iter().any(|n| n == name), "{name}");

@@ -61,9 +61,6 @@ class Fog:
     SLATS = [([x, 2.6, -1.6], [x + 0.25, 2.65, 0.6]) for x in (-1.9, -1.4, -0.9, -0.4, 0.1)]
     BALLS = [([0.9, 0.7, 0.3], 0.7, [0.6, 0.15, 0.1]), ([-1.5, 0.5, 1.0], 0.5, [0.1, 0.3, 0.6])]
 
-    def write_files(self, folder):
-        pass
-
     def mitsuba(self):
         medium = {
             "type": "homogeneous",
