@@ -5,6 +5,8 @@
 //! rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
 //! glass counts as polished. Where bodies overlap, each takes its share.
 
+use super::cone::RayCone;
+use super::lobe::glass_at;
 use super::{Renderer, medium, optics};
 use crate::intersect::{Ray, SurfaceInteraction};
 use crate::math::Rgb;
@@ -33,8 +35,11 @@ impl Renderer<'_> {
             let Some(hit) = self.intersector.intersect(&ray, counts) else { return left };
             let si = SurfaceInteraction::new(scene, &ray, &hit);
             let material = &scene.materials[si.surface.material as usize];
-            let Some(glass) = &material.glass else { return Rgb::ZERO };
             let wo = -ray.dir.normalize();
+            let seen = (&si, wo, RayCone { width: 0.0, spread: 0.0 });
+            let Some(part) = glass_at(scene, material, seen) else { return Rgb::ZERO };
+            let glass = &part.glass;
+            left *= part.share;
             let cos = wo.dot(si.ns);
             if glass.thin {
                 left *= glass.tint * (1.0 - optics::pane_reflectance(cos, glass.ior)) as f32;
