@@ -1,6 +1,6 @@
 //! Skins and morph targets at a time.
 
-use super::build::{File, U8, warns};
+use super::build::{File, U8, Written, warns};
 use serde_json::json;
 use tweenray::import::{LoadOptions, Loaded};
 use tweenray::math::DVec3;
@@ -81,4 +81,29 @@ fn an_animated_node_stands_where_it_is_at_the_time() {
     }]);
     assert_eq!(positions(&at(&file, 0.75))[1], DVec3::X * 2.0);
     assert_eq!(positions(&at(&file, 1.0))[1], DVec3::new(2.0, 4.0, 0.0));
+}
+
+#[test]
+fn a_scene_file_says_at_which_time_a_mesh_stands() {
+    let mut file = File::triangle();
+    let times = file.floats("SCALAR", &[0., 2.]);
+    let moved = file.floats("VEC3", &[0., 0., 0., 8., 0., 0.]);
+    file.json["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": times, "output": moved}],
+    }]);
+    let load = |name: &str, key: &str| {
+        let scene = format!("[[mesh]]\nfile = '{name}'\n{key}\n[sky]\nradiance = 1\n");
+        let written = Written::of("scene.toml", scene.as_bytes());
+        written.beside("part.glb", &file.glb());
+        written.beside("part.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        written.load(&LoadOptions::default())
+    };
+    let still = load("part.glb", "").expect("a scene");
+    let later = load("part.glb", "time = 1.5").expect("a scene");
+    assert_eq!(positions(&later)[0] - positions(&still)[0], DVec3::X * 6.0);
+    assert!(warns(&later.warnings, "at 1.5 s"));
+    let refused = load("part.obj", "time = 1.5").expect_err("no glTF").to_string();
+    assert!(refused.contains("`time` is for glTF files"), "{refused}");
+    assert!(load("part.glb", "time = inf").is_err());
 }

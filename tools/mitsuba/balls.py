@@ -67,7 +67,7 @@ def materials(folder):
         ("clear coat", *plastic(0.5, clearcoat=1.0), False),
         ("textured", 'diffuse = 1\ntexture = "paint.png"', textured, True),
         ("normal map", 'diffuse = 0.7\nnormal_map = "normals.png"', tilted, True),
-        ("cut-outs", 'diffuse = 0.7\nalpha = { file = "holes.png", channel = "r" }', holes, True),
+        ("cut-outs", 'diffuse = 0.7\nalpha = "holes.png"', holes, True),
         ("vertex colours", "diffuse = 1\nvertex_colours = true", coloured, True),
     ]
 
@@ -90,16 +90,19 @@ def ball_mesh(meridians=128, bands=64):
     return p, uv, colours, np.array(triangles)
 
 
-def write_ply(path):
+def write_ply(path, with_colours):
     p, uv, colours, triangles = ball_mesh()
     names = ["x", "y", "z", "nx", "ny", "nz", "u", "v"]
     with open(path, "wb") as out:
         header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(p)}"]
-        header += [f"property float {name}" for name in names] + [f"property uchar {c}" for c in ("red", "green", "blue")]
+        header += [f"property float {name}" for name in names]
+        header += [f"property uchar {c}" for c in ("red", "green", "blue") if with_colours]
         header += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header"]
         out.write(("\n".join(header) + "\n").encode())
-        rows = np.zeros(len(p), [("f", "<f4", 8), ("c", "u1", 3)])
-        rows["f"], rows["c"] = np.hstack([p, p, uv]), np.round(255 * colours)
+        rows = np.zeros(len(p), [("f", "<f4", 8), ("c", "u1", 3 if with_colours else 0)])
+        rows["f"] = np.hstack([p, p, uv])
+        if with_colours:
+            rows["c"] = np.round(255 * colours)
         out.write(rows.tobytes())
         faces = np.zeros(len(triangles), [("n", "u1"), ("v", "<i4", 3)])
         faces["n"], faces["v"] = 3, triangles
@@ -141,7 +144,9 @@ class Ball:
         sensor = {"type": "perspective", "fov": FOV, "fov_axis": "y", "to_world": look, "film": film}
         scene = {"type": "scene", "integrator": {"type": "path", "max_depth": 18, "rr_depth": 100}, "sensor": sensor}
         if self.is_mesh:
-            ball = mi.load_dict({"type": "ply", "filename": os.path.join(self.folder, "ball.ply"), "bsdf": self.bsdf})
+            # Mitsuba has the first row of an image at v = 0.
+            file = {"filename": os.path.join(self.folder, "plain.ply"), "flip_tex_coords": True}
+            ball = mi.load_dict({"type": "ply", "bsdf": self.bsdf, **file})
             if "vertex_colours" in self.text:
                 ball.add_attribute("vertex_color", 3, ball_mesh()[2].astype(np.float32).ravel())
             scene["ball"] = ball
@@ -171,7 +176,8 @@ class Ball:
 
 
 def write(folder):
-    write_ply(os.path.join(folder, "ball.ply"))
+    write_ply(os.path.join(folder, "ball.ply"), True)
+    write_ply(os.path.join(folder, "plain.ply"), False)
     write_images(folder)
 
 

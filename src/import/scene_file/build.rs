@@ -10,7 +10,7 @@ use super::sky::{Shown, Sky};
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::images::{ImageUse, Images};
-use crate::import::{self, Model, emission, untextured};
+use crate::import::{self, Model, ModelOptions, emission, untextured};
 use crate::scene::{self, EnvironmentKind, MaterialId, World, WorldMesh, WorldSphere};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -215,8 +215,9 @@ impl<'a> Builder<'a> {
 
     fn read_model(&mut self, file: &At<String>, mesh: &Mesh, bare: bool) -> Result<World> {
         let path = self.beside(file);
-        let Model { mut world, warnings, files, .. } = import::load_model(&path, mesh.policy())
-            .map_err(|e| match e {
+        let options = self.model_options(&path, mesh)?;
+        let Model { mut world, warnings, files, .. } =
+            import::load_model_with(&path, mesh.policy(), &options).map_err(|e| match e {
                 Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
                 other => self.at_key(file, &other),
             })?;
@@ -228,6 +229,18 @@ impl<'a> Builder<'a> {
             world.masks.clear();
         }
         Ok(world)
+    }
+
+    /// What is wanted of the mesh file `path`.
+    ///
+    /// Errors: a `time` of a file that is not glTF.
+    fn model_options(&self, path: &Path, mesh: &Mesh) -> Result<ModelOptions> {
+        let usual = ModelOptions::default();
+        let Some(time) = &mesh.time else { return Ok(usual) };
+        if !import::gltf::is_named(path) {
+            return Err(self.at_span(&time.span, "`time` is for glTF files, .glb and .gltf"));
+        }
+        Ok(ModelOptions { time: time.value.0, ..usual })
     }
 
     /// A generated mesh, with texture coordinates where it is `textured`.

@@ -2,7 +2,7 @@
 
 use super::at::{At, Span};
 use super::generated::{Cuboid, Quad, Terrain, UvSphere};
-use super::number::{Crease, Positive};
+use super::number::{Crease, Moment, Positive};
 use super::report::Source;
 use super::transform::Step;
 use super::vector::Point;
@@ -45,6 +45,8 @@ pub(super) struct Mesh {
     /// The axis that points up in the mesh file, "x", "y" or "z"; it is turned to y before
     /// `transform`. Absent: "y".
     pub up: Option<At<UpAxis>>,
+    /// Moment at which a glTF file's animated meshes and lights stand, seconds. Absent: 0.
+    pub time: Option<At<Moment>>,
     /// Steps that place the mesh, applied one after the other.
     #[serde(default)]
     pub transform: Vec<At<Step>>,

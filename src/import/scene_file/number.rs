@@ -75,6 +75,11 @@ number!(
     { "type": "number", "minimum": 0, "maximum": 1e30 }
 );
 number!(
+    /// A moment of an animation, seconds.
+    Moment: "a number of seconds from -1e6 to 1e6", |x| x.abs() <= 1e6,
+    { "type": "number", "minimum": -1e6, "maximum": 1e6 }
+);
+number!(
     /// An amount of light in one channel.
     Amount: "a number from 0 to 1e30", |x| limits::AMOUNT.contains(&x),
     { "type": "number", "minimum": 0, "maximum": 1e30 }
