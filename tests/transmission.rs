@@ -7,8 +7,8 @@ mod common;
 use common::{job, mean, pose, render};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    Fresnel, Glass, IntersectorKind, Light, Material, PointLight, Sky, SphereLight, Texture,
-    TextureMap, World,
+    Fresnel, Glass, GlassShadows, IntersectorKind, Light, Material, PointLight, Sky, SphereLight,
+    Texture, TextureMap, World,
 };
 use tweenray::stats::RayKind;
 
@@ -179,4 +179,27 @@ fn an_image_tints_the_glass_of_a_surface() {
     };
     let (image, tint) = (of(true), of(false));
     assert!((image - tint).abs() < 1e-5 && image < 0.4, "{image} {tint}");
+}
+
+/// Straight shadow rays pass the part of a surface that is glass: of light behind a pane that is not metal by 0.8 and glass by
+/// 0.3 of that, 0.24 of what a pane of glass leaves.
+#[test]
+fn straight_shadows_pass_the_part_that_is_glass() {
+    let of = |material| {
+        let mut world = plate(material);
+        world.materials.push(Material::diffuse("floor", Rgb::splat(0.5)));
+        let corners = [(-2.0, -2.0), (-2.0, 2.0), (2.0, 2.0), (2.0, -2.0)];
+        let corners = corners.map(|(x, z)| DVec3::new(x, -1.0, z));
+        world.meshes.push(common::quad(corners, 1));
+        let position = DVec3::new(0.3, 1.0, 0.2);
+        world.lights.push(Light::Point(PointLight { position, intensity: Rgb::ONE }));
+        let mut job = job(world, pose((0.1, -0.2, 0.1), (0.0, -1.0, 0.0)), 16, 12);
+        job.settings.glass_shadows = GlassShadows::Straight;
+        render(&job).0.rgb
+    };
+    let part = with(part_glass(0.3, 0.0, true), |fresnel| fresnel.metallic = 0.2);
+    let whole = Material { glass: part.glass, ..Material::black("glass") };
+    for (part, whole) in of(part).into_iter().zip(of(whole)) {
+        assert!(whole.y > 0.0 && (part.y / whole.y - 0.24).abs() < 1e-4, "{part} of {whole}");
+    }
 }

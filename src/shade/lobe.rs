@@ -27,7 +27,7 @@ pub(super) use diffuse::albedo;
 use glossy::Glossy;
 pub(super) use layers::Layers;
 use mirror::Mirror;
-use part_glass::SmoothPart;
+use part_glass::{PartGlass, SmoothPart};
 use reflectance::Reflectance;
 use rough_glass::RoughGlass;
 
@@ -117,6 +117,24 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
                 take(reflected, 0);
                 take(through, 1);
             }
+        }
+    }
+}
+
+/// The glass of `material` at the point that is `seen`, and the share of the surface there that it is.
+pub(super) fn glass_at(
+    scene: &Scene,
+    material: &Material,
+    seen: (&SurfaceInteraction, DVec3, RayCone),
+) -> Option<PartGlass> {
+    let (si, wo, _) = seen;
+    match &material.fresnel {
+        None => material.glass.map(|glass| PartGlass { glass, share: 1.0 }),
+        Some(fresnel) if material.shows_layers(si.is_outside(wo)) => {
+            Layers::at(scene, (material, fresnel), seen).glass
+        }
+        Some(_) => {
+            painted_glass(scene, material, seen).map(|glass| PartGlass { glass, share: 1.0 })
         }
     }
 }

@@ -6,6 +6,8 @@
 //! glass counts as polished, and images of glass that is a share of a surface are not looked at. Where bodies overlap, each takes
 //! its share.
 
+use super::cone::RayCone;
+use super::lobe::glass_at;
 use super::{Renderer, medium, optics};
 use crate::intersect::{Ray, SurfaceInteraction};
 use crate::math::Rgb;
@@ -34,8 +36,11 @@ impl Renderer<'_> {
             let Some(hit) = self.intersector.intersect(&ray, counts) else { return left };
             let si = SurfaceInteraction::new(scene, &ray, &hit);
             let material = &scene.materials[si.surface.material as usize];
-            let Some(glass) = &material.glass else { return Rgb::ZERO };
             let wo = -ray.dir.normalize();
+            let seen = (&si, wo, RayCone { width: 0.0, spread: 0.0 });
+            let Some(part) = glass_at(scene, material, seen) else { return Rgb::ZERO };
+            let glass = &part.glass;
+            left *= part.share;
             let cos = wo.dot(si.ns);
             if let Some(fresnel) =
                 material.fresnel.filter(|_| material.shows_layers(si.is_outside(wo)))
