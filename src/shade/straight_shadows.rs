@@ -3,8 +3,7 @@
 //! Real glass bends light, and gathers it in caustics; this is a stand-in that a scene may choose
 //! ([`GlassShadows::Straight`](crate::scene::GlassShadows)). Diffuse surfaces and fog see light so; glossy ones see what is behind glass by the
 //! rays of their lobes. What glass reflects depends on the angle on its outer side at both crossings, as in a pane. Rough
-//! glass counts as polished, and images of glass that is a share of a surface are not looked at. Where bodies overlap, each takes
-//! its share.
+//! glass counts as polished. Where bodies overlap, each takes its share.
 
 use super::cone::RayCone;
 use super::lobe::glass_at;
@@ -42,11 +41,6 @@ impl Renderer<'_> {
             let glass = &part.glass;
             left *= part.share;
             let cos = wo.dot(si.ns);
-            if let Some(fresnel) =
-                material.fresnel.filter(|_| material.shows_layers(si.is_outside(wo)))
-            {
-                left *= ((1.0 - fresnel.metallic) * fresnel.transmission) as f32;
-            }
             if glass.thin {
                 left *= glass.tint * (1.0 - optics::pane_reflectance(cos, glass.ior)) as f32;
             } else {
