@@ -80,8 +80,12 @@ const CASES: &[(&str, Expect)] = &[
     ("newmtl a\nbump -clamp maybe a.png\n", Line(2, "`-clamp` is `on` or `off`")),
     ("newmtl a\nillum 7\nNi 1.5\nnorm gone.png\n", Warns(1, "glass has no normal map")),
     ("newmtl a\nmap_Bump bad.mtl\n", Warns(1, "normal map left out")),
-    ("newmtl a\nPr 0.5\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
-    ("newmtl a\nmap_Pr gone.png\n", Warns(1, "`Pr` or `map_Pr` of what is no mirror")),
+    ("newmtl a\nPr 0.5\n", Fine),
+    ("newmtl a\nPm 1\nPr .2\nPc 1\nPcr .03\nPs 0\naniso 0\nanisor 0\n", Fine),
+    ("newmtl a\nPm x\n", Line(2, "`x` is not a number")),
+    ("newmtl a\nPc -1\n", Line(2, "`Pc -1`: from 0 to")),
+    ("newmtl a\nmap_Pr gone.png\n", Warns(1, "roughness map left out")),
+    ("newmtl a\nPm 1\nmap_Pm gone.png\n", Warns(1, "metallic map left out")),
     ("newmtl a\nPr -0.5\n", Line(2, "`Pr -0.5`: from 0 to")),
     ("newmtl a\nillum 3\nKs .5 .5 .5\nPr 1.5\nKd 0 0 0\n", Fine),
     ("newmtl a\nPr nan\n", Line(2, "not a finite number")),
@@ -176,6 +180,35 @@ fn map_pr_is_one_channel_as_it_stands() {
     });
     let expected = [(1.0, Some(48.0 / 255.0)), (1.0, Some(128.0 / 255.0)), (0.25, None)];
     assert_eq!(rough.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn what_has_metal_a_coat_or_a_roughness_alone_is_principled() {
+    let mtl = "newmtl metal\nillum 3\nKs 1 1 1\nKd .9 .8 .3\nPm 1\nPr .2\nNi 1\n\
+               newmtl coated\nKd .5 .5 .5\nPc .5\nPcr .1\nNi 2\n\
+               newmtl matte\nKd .5 .5 .5\nPr 3\nmap_Pm -imfchan r metal.ppm\n\
+               newmtl plain\nKd .5 .5 .5\nPc 0\n";
+    let names = ["metal", "coated", "matte", "plain"];
+    let obj = names.map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
+    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
+    let others = [("bad.mtl", mtl.as_bytes()), ("metal.ppm", image)];
+    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let seen = |material: &Material| {
+        let fresnel = material.fresnel?;
+        let texel = |map: TextureMap| world.textures[map.image as usize].levels()[0].texel(0, 0).x;
+        let coat = (fresnel.clearcoat, fresnel.clearcoat_roughness);
+        let metal = (fresnel.metallic, fresnel.metallic_map.map(texel));
+        Some((material.roughness, (material.mirror.x * 900.0).round(), metal, coat))
+    };
+    let found: Vec<_> = world.materials.iter().map(seen).collect();
+    let expected = [
+        Some((0.2, 36.0, (1.0, None), (0.0, 0.0))),
+        Some((0.5, 100.0, (0.0, None), (0.5, 0.1))),
+        Some((1.0, 36.0, (1.0, Some(16.0 / 255.0)), (0.0, 0.0))),
+        None,
+    ];
+    assert_eq!(found, expected);
 }
 
 #[test]

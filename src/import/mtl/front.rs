@@ -27,6 +27,14 @@ pub(super) struct Source {
     pub roughness: Option<f64>,
     /// `map_Pr`.
     pub roughness_map: Option<MapImage>,
+    /// `Pm`: share that is metal.
+    pub metallic: Option<f64>,
+    /// `map_Pm`.
+    pub metallic_map: Option<MapImage>,
+    /// `Pc`: share under a clear coat.
+    pub clearcoat: Option<f64>,
+    /// `Pcr`: the coat's roughness.
+    pub clearcoat_roughness: Option<f64>,
 }
 
 /// An image of normals or, perhaps, of heights.
@@ -89,9 +97,11 @@ impl Front {
             "d" => self.dissolve(words),
             "Tr" => self.transparency(words),
             "illum" => self.illum(words),
-            "Pr" => self.roughness(words),
+            "Pr" | "Pm" | "Pc" | "Pcr" => self.share(&text, words),
+            // Sheen and anisotropy, which exporters write beside these.
+            "Ps" | "aniso" | "anisor" => number_in(&text, words, f64::MIN, f64::MAX).map(|_| ()),
             "map_Kd" | "map_d" => self.map(&text, MapKind::Image, words, line.number),
-            "map_Pr" => self.map(&text, MapKind::Data, words, line.number),
+            "map_Pr" | "map_Pm" => self.map(&text, MapKind::Data, words, line.number),
             "norm" | "map_Bump" | "map_bump" | "bump" => {
                 self.map(&text, MapKind::Normals, words, line.number)
             }
@@ -139,11 +149,16 @@ impl Front {
         Ok(())
     }
 
-    fn roughness(&mut self, words: Words<'_>) -> std::result::Result<(), String> {
+    /// A share of the extension for physically based materials.
+    fn share(&mut self, keyword: &str, words: Words<'_>) -> std::result::Result<(), String> {
         // Some programs write more than 1 for matte.
-        let roughness = number_in("Pr", words, 0.0, f64::MAX)?.min(1.0);
-        if let Some(source) = self.sources.last_mut() {
-            source.roughness = Some(roughness);
+        let share = Some(number_in(keyword, words, 0.0, f64::MAX)?.min(1.0));
+        let Some(source) = self.sources.last_mut() else { return Ok(()) };
+        match keyword {
+            "Pr" => source.roughness = share,
+            "Pm" => source.metallic = share,
+            "Pc" => source.clearcoat = share,
+            _ => source.clearcoat_roughness = share,
         }
         Ok(())
     }
@@ -159,6 +174,7 @@ impl Front {
         let image = MapImage::read(keyword, kind, words, line, &mut self.notes)?;
         let Some(source) = self.sources.last_mut() else { return Ok(()) };
         match kind {
+            MapKind::Data if keyword == "map_Pm" => source.metallic_map = Some(image),
             MapKind::Data => source.roughness_map = Some(image),
             MapKind::Normals => {
                 let is_normal = keyword == "norm";

@@ -7,17 +7,21 @@
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
 //! | `-s`, `-o`, `-clamp` of images | how the image lies ([`super::image`]) |
 //! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
-//! | `illum` 3 or 5 with `Ks` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
+//! | `illum` 3 or 5 with `Ks` and without `Pm` or `Pc` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
+//! | `Pm`, `map_Pm`, `Pc`; `Pr`, `map_Pr` of what is no mirror | principled: metallic, clear coat (`Pcr` its roughness), roughness (else 0.5), the index of refraction `Ni` (else 1.5) |
 //! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
 
 use super::front::Source;
 use crate::import::model::DEFAULT_ALBEDO;
 use crate::math::{DVec3, Rgb};
-use crate::scene::{Glass, Material};
+use crate::scene::{Fresnel, Glass, Material};
 
 /// Index of refraction of glass whose file has no `Ni`.
 const DEFAULT_IOR: f64 = 1.5;
+
+/// Roughness of physically based materials whose file has none.
+const DEFAULT_ROUGHNESS: f64 = 0.5;
 
 /// The material without its images, and warnings about it.
 pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String>) {
@@ -41,7 +45,8 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
         }
         return (out, notes);
     }
-    if let Some(mirror) = mirror(mtl) {
+    let is_principled = is_principled(source, mtl);
+    if let Some(mirror) = mirror(mtl).filter(|_| !is_principled) {
         out.mirror = mirror;
         out.roughness = source.roughness.unwrap_or(0.0);
     }
@@ -51,6 +56,11 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
         None if dark => Rgb::ZERO,
         None => DEFAULT_ALBEDO,
     };
+    if is_principled {
+        out.diffuse = out.diffuse.min(Rgb::ONE);
+        cover(&mut out, source, mtl);
+        return (out, notes);
+    }
     let most = (out.diffuse + out.mirror).max_element();
     if most > 1.0 {
         out.diffuse /= most;
@@ -73,6 +83,33 @@ pub(super) fn textured(mtl: &tobj::Material) -> Rgb {
 pub(super) fn mirror(mtl: &tobj::Material) -> Option<Rgb> {
     let is_mirror = matches!(mtl.illumination_model, Some(3 | 5));
     mtl.specular.filter(|_| is_mirror).map(rgb).filter(|mirror| *mirror != Rgb::ZERO)
+}
+
+/// Whether it is a material of the extension for physically based materials: a mirror has a roughness without being one.
+fn is_principled(source: &Source, mtl: &tobj::Material) -> bool {
+    let Source { roughness, roughness_map, metallic, metallic_map, clearcoat, .. } = source;
+    let is_rough = roughness.is_some() || roughness_map.is_some();
+    metallic.is_some()
+        || metallic_map.is_some()
+        || clearcoat.is_some_and(|coat| coat > 0.0)
+        || (is_rough && mirror(mtl).is_none())
+}
+
+/// The layers over the base colour.
+fn cover(out: &mut Material, source: &Source, mtl: &tobj::Material) {
+    // Next to no index of refraction is what programs write that mean none.
+    let ior = mtl.optical_density.filter(|ior| *ior > 1.0).unwrap_or(DEFAULT_IOR);
+    let root = (ior - 1.0) / (ior + 1.0);
+    out.mirror = Rgb::splat((root * root) as f32);
+    out.roughness = source.roughness.unwrap_or(DEFAULT_ROUGHNESS);
+    out.fresnel = Some(Fresnel {
+        grazing: 1.0,
+        metallic: source.metallic.unwrap_or(0.0),
+        metallic_map: None,
+        clearcoat: source.clearcoat.unwrap_or(0.0),
+        clearcoat_roughness: source.clearcoat_roughness.unwrap_or(0.0),
+        transmission: 0.0,
+    });
 }
 
 fn is_glass(source: &Source, mtl: &tobj::Material, notes: &mut Vec<String>) -> bool {

@@ -8,7 +8,7 @@ mod meaning;
 
 use super::images::{ImageUse, Images};
 use super::model::Model;
-use super::source::{self, Notes};
+use super::source;
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::Rgb;
 use crate::scene::{Material, MaterialId, NormalMap, TextureMap};
@@ -17,10 +17,6 @@ use image::MapImage;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// The note on a roughness that says nothing of the picture.
-const ROUGHNESS_ALONE: &str =
-    "`Pr` or `map_Pr` of what is no mirror (`illum 3` with `Ks`) is ignored";
 
 /// The materials of the libraries of an OBJ file, by name, before use.
 #[derive(Default)]
@@ -40,19 +36,22 @@ struct Entry {
 struct Taken<'s> {
     texture: Option<&'s MapImage>,
     roughness: Option<&'s MapImage>,
+    metallic: Option<&'s MapImage>,
     normals: Option<&'s BumpImage>,
     mask: Option<&'s MapImage>,
 }
 
 impl Entry {
-    /// The images that count in `material`, as [`meaning::of`] has it: only a mirror is rough, glass has no normal map and no
+    /// The images that count in `material`, as [`meaning::of`] has it: only mirrors and layers are rough, only layers are metal, glass has no normal map and no
     /// cut-outs.
     fn taken(&self, material: &Material) -> Taken<'_> {
-        let front::Source { texture, roughness_map, normal_map, mask, .. } = &self.source;
+        let front::Source { texture, roughness_map, metallic_map, normal_map, mask, .. } =
+            &self.source;
         let is_glass = material.glass.is_some();
         Taken {
             texture: texture.as_ref(),
             roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO),
+            metallic: metallic_map.as_ref().filter(|_| material.fresnel.is_some()),
             normals: normal_map.as_ref().filter(|_| !is_glass),
             mask: mask.as_ref().filter(|_| !is_glass),
         }
@@ -60,11 +59,12 @@ impl Entry {
 
     /// The files of the images that the material takes, with what they serve as.
     fn images(&self) -> impl Iterator<Item = (PathBuf, ImageUse)> {
-        let Taken { texture, roughness, normals, mask } =
+        let Taken { texture, roughness, metallic, normals, mask } =
             self.taken(&meaning::of(&self.source, &self.parsed).0);
         let images = [
             texture.map(|image| (image, ImageUse::Colour)),
             roughness.map(|image| (image, data(image))),
+            metallic.map(|image| (image, data(image))),
             normals.map(|bump| (&bump.image, ImageUse::Normals)),
             mask.map(|image| (image, ImageUse::Mask)),
         ];
@@ -106,7 +106,7 @@ impl Entry {
     }
 }
 
-/// What the image of a roughness serves as.
+/// What the image of a roughness or of metal serves as.
 fn data(image: &MapImage) -> ImageUse {
     ImageUse::Data(image.options.channel)
 }
@@ -141,12 +141,7 @@ impl Libraries {
 
     fn parse(&mut self, file: &Path, bytes: &[u8], model: &mut Model) -> Result<()> {
         model.files.push(file.to_path_buf());
-        let mut notes = Notes::default();
         for (source, parsed) in front::read(file, bytes, &mut model.warnings)? {
-            let has_roughness = source.roughness.is_some() || source.roughness_map.is_some();
-            if has_roughness && meaning::mirror(&parsed).is_none() {
-                notes.add(ROUGHNESS_ALONE, source.line);
-            }
             let name = source.name.clone();
             let entry = Entry { library: file.to_path_buf(), source, parsed };
             if let Some(other) = self.entries.get(&name) {
@@ -161,7 +156,6 @@ impl Libraries {
                 self.entries.insert(name, entry);
             }
         }
-        model.warnings.extend(notes.into_warnings(file));
         Ok(())
     }
 
@@ -196,7 +190,7 @@ impl Libraries {
         };
         let (mut material, notes) = meaning::of(&entry.source, &entry.parsed);
         model.warnings.extend(notes.into_iter().map(place));
-        let Taken { texture, roughness, normals, mask } = entry.taken(&material);
+        let Taken { texture, roughness, metallic, normals, mask } = entry.taken(&material);
         if let Some(image) = texture {
             match entry.lay(image, ImageUse::Colour, images, model) {
                 Ok(map) => {
@@ -217,6 +211,17 @@ impl Libraries {
                 }
                 Err(error) => {
                     model.warnings.push(place(format!("roughness map left out: {error}")));
+                }
+            }
+        }
+        if let (Some(image), Some(fresnel)) = (metallic, &mut material.fresnel) {
+            match entry.lay(image, data(image), images, model) {
+                Ok(map) => {
+                    fresnel.metallic_map = Some(map);
+                    fresnel.metallic = 1.0;
+                }
+                Err(error) => {
+                    model.warnings.push(place(format!("metallic map left out: {error}")));
                 }
             }
         }
