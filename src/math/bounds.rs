@@ -89,8 +89,14 @@ impl Bounds3 {
             if a.is_nan() || b.is_nan() {
                 continue;
             }
-            near = near.max(a.min(b));
-            far = far.min(a.max(b));
+            // No `f64::min`: rustc 1.95 folded it wrongly for a box and a ray that are constants, with an infinite end.
+            let (enters, leaves) = if a < b { (a, b) } else { (b, a) };
+            if enters > near {
+                near = enters;
+            }
+            if leaves < far {
+                far = leaves;
+            }
         }
         (near <= far).then_some((near, far))
     }
