@@ -19,7 +19,7 @@ pub(super) fn split(
     image: &Texture,
     (map, factor): (&TextureMap, Rgb),
 ) -> (WorldMesh, Option<(WorldMesh, Rgb)>) {
-    let Some(uvs) = &mesh.uvs else { return (mesh, None) };
+    let Some(uvs) = mesh.uv_set(map.uv_set) else { return (mesh, None) };
     let colour = |triangle: &[u32; 3]| {
         let corners =
             triangle.map(|i| map.transform.transform_point2(uvs.values[i as usize].as_dvec2()));
@@ -91,6 +91,7 @@ fn part(mesh: &WorldMesh, kept: &[bool]) -> WorldMesh {
     WorldMesh {
         normals: mesh.normals.as_ref().map(|normals| picked(normals, &all)),
         uvs: mesh.uvs.as_ref().map(|uvs| picked(uvs, &all)),
+        more_uvs: mesh.more_uvs.iter().map(|set| Some(picked(set.as_ref()?, &all))).collect(),
         colours,
         always_traced: mesh.always_traced,
         ..WorldMesh::new(mesh.name.clone(), positions, triangles, mesh.material)
