@@ -6,7 +6,7 @@
 use crate::error::counted;
 use crate::math::Rgb;
 use crate::scene::{
-    Fog, Glass, GlassShadows, Light, Material, MeanLights, Scene, Settings, ShotLens,
+    Fog, Glass, GlassShadows, Light, Material, MeanLights, Mesh, Scene, Settings, ShotLens,
 };
 
 /// Which effects run.
@@ -369,10 +369,13 @@ fn is_something(colour: Rgb) -> bool {
     colour != Rgb::ZERO
 }
 
-/// How many meshes have a textured material but no texture coordinates, where any have.
+/// How many meshes have a material with an image but no texture coordinates for it, where any have.
 fn bare(scene: &Scene) -> String {
-    let is_textured = |id: u32| scene.materials[id as usize].has_image();
-    let bare = scene.meshes.iter().filter(|m| m.uvs.is_none() && is_textured(m.surface.material));
+    let is_bare = |mesh: &&Mesh| {
+        let material = &scene.materials[mesh.surface.material as usize];
+        material.images().any(|map| mesh.uv_set(map.uv_set).is_none())
+    };
+    let bare = scene.meshes.iter().filter(is_bare);
     match bare.count() {
         0 => String::new(),
         count => format!(

@@ -19,7 +19,7 @@ use tweenray::film::Film;
 use tweenray::intersect::{
     self, EmbreeIntersector, Hit, Intersector, Oracle, Ray, SurfaceInteraction,
 };
-use tweenray::math::{DVec3, Rgb};
+use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
     AlphaMask, CameraPath, HitRules, IntersectorKind, Light, Material, PointLight, Pose, QuadLight,
     Scene, Settings, Shot, TextureMap, World, WorldMesh, WorldSphere,
@@ -200,6 +200,47 @@ fn the_shadow_of_an_area_light_is_that_of_the_card_without_its_holes() {
     // A sample ray through the very edge of a square may go either way.
     assert!(differ.count() <= masked.rgb.len() / 1000);
     assert!(masked.rgb.iter().any(|c| c.x > 0.01), "something is lit");
+}
+
+/// The same, of which each mesh has its texture coordinates as set 1, by which the masks lie, and none of use as set 0.
+fn by_the_second_set(mut job: Job) -> Job {
+    for mesh in &mut job.world.meshes {
+        let uvs = mesh.uvs.take();
+        mesh.uvs = uvs.clone().map(|mut uvs| {
+            uvs.values.fill(Vec2::splat(0.3));
+            uvs
+        });
+        mesh.more_uvs = vec![uvs];
+    }
+    job.world.materials.iter_mut().flat_map(|m| &mut m.alpha).for_each(|map| map.uv_set = 1);
+    job
+}
+
+#[test]
+fn holes_lie_by_the_set_that_the_mask_names() {
+    let before = job(card_before_a_wall(), pose((0.1, -0.2, 2.0), (0.0, 0.0, -2.0)), 48, 48);
+    let mut mirrored = job(card_before_a_wall(), pose((0.0, 0.0, 0.0), (0.05, 0.1, 3.0)), 48, 48);
+    let mirror = mirrored.world.add_material(Material::mirror("mirror", Rgb::ONE));
+    let corners = [(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)];
+    let corners = corners.map(|(x, y)| DVec3::new(x, y, 3.0));
+    mirrored.world.meshes.push(WorldMesh::quad("mirror", corners, mirror));
+    let light = PointLight { position: DVec3::new(0.0, 4.0, 0.0), intensity: Rgb::splat(16.0) };
+    let shadowed = card_above_a_floor(Light::Point(light));
+    for first in [before, mirrored, shadowed] {
+        let mut second = by_the_second_set(first.clone());
+        let mut none = second.clone();
+        none.world.meshes.iter_mut().for_each(|mesh| mesh.more_uvs.clear());
+        for intersector in [IntersectorKind::Embree, IntersectorKind::Oracle] {
+            let shown = |job: &mut Job| {
+                job.settings.intersector = intersector;
+                common::render(job).0.rgb
+            };
+            let expected = shown(&mut first.clone());
+            assert!(shown(&mut second) == expected, "{intersector:?}");
+            // Not vacuous: without the set there are no holes.
+            assert!(shown(&mut none) != expected, "{intersector:?}");
+        }
+    }
 }
 
 /// A cube of leaf cards around the origin, and a sphere and a closed mesh with leaves cut out.

@@ -226,13 +226,13 @@ fn texture_bytes(scene: &Scene) -> u64 {
 
 fn mesh_bytes(mesh: &Mesh) -> u64 {
     let normals = mesh.normals.as_ref();
-    let uvs = mesh.uvs.as_ref();
+    let uvs = || mesh.uvs.iter().chain(mesh.more_uvs.iter().flatten());
     let corner_lists = normals.and_then(|n| n.corners.as_ref()).map_or(0, Vec::len)
-        + uvs.and_then(|uv| uv.corners.as_ref()).map_or(0, Vec::len);
+        + uvs().filter_map(|uv| uv.corners.as_ref()).map(Vec::len).sum::<usize>();
     let words = 3 * mesh.positions.len()
         + 3 * mesh.triangles.len()
         + 3 * normals.map_or(0, |n| n.values.len())
-        + 2 * uvs.map_or(0, |uv| uv.values.len())
+        + 2 * uvs().map(|uv| uv.values.len()).sum::<usize>()
         + 3 * corner_lists;
     let colours = mesh.colours.as_ref().map_or(0, |colours| colours.bytes().len());
     4 * words as u64 + colours as u64

@@ -9,6 +9,8 @@ use crate::scene::{Material, TextureMap, World, WorldMesh};
 /// A mesh, and what its material shows and it lacks.
 pub(super) struct Untextured {
     mesh: String,
+    /// Whether it has texture coordinates, but not the set that is asked for.
+    has_others: bool,
     material: String,
     lacks: Lacking,
 }
@@ -26,20 +28,20 @@ enum Lacking {
 pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextured> + '_ {
     world.meshes[first..].iter().flat_map(|mesh| {
         let material = &world.materials[mesh.material as usize];
-        let is_bare = mesh.uvs.is_none();
-        let texture = material.texture.filter(|_| is_bare);
+        let is_bare = |map: &TextureMap| mesh.uv_set(map.uv_set).is_none();
+        let texture = material.texture.filter(is_bare);
         let texture = texture.map(|map| world.textures[map.image as usize].name.clone());
-        let mask = material.alpha.filter(|_| is_bare);
+        let mask = material.alpha.filter(is_bare);
         let mask = mask.map(|map| world.masks[map.image as usize].name.clone());
         let share = |what, map: Option<TextureMap>| {
-            let map = map.filter(|_| is_bare)?;
+            let map = map.filter(is_bare)?;
             Some(Lacking::Share(what, world.textures[map.image as usize].name.clone()))
         };
         let roughness = share("roughness", material.roughness_map);
         let metallic = share("metallic", material.fresnel.and_then(|f| f.metallic_map));
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
-        let normals = material.normal_map.filter(|_| is_bare);
+        let normals = material.normal_map.filter(|map| is_bare(&map.image));
         let normals = normals.map(|map| world.textures[map.image.image as usize].name.clone());
         let normals = normals.map(Lacking::Normals);
         let (texture, mask) = (texture.map(Lacking::Texture), mask.map(Lacking::Mask));
@@ -50,27 +52,32 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
 
 impl Untextured {
     fn new(mesh: &WorldMesh, material: &Material, lacks: Lacking) -> Self {
-        Self { mesh: mesh.name.clone(), material: material.name.clone(), lacks }
+        let has_others = mesh.uvs.is_some() || mesh.more_uvs.iter().any(Option::is_some);
+        Self { mesh: mesh.name.clone(), has_others, material: material.name.clone(), lacks }
     }
 
     /// The text of the warning.
     pub fn message(&self) -> String {
-        let Self { mesh, material, lacks } = self;
+        let Self { mesh, has_others, material, lacks } = self;
+        let none = match has_others {
+            true => "lacks a set of texture coordinates",
+            false => "has no texture coordinates",
+        };
         match lacks {
             Lacking::Texture(file) => format!(
-                "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it shows one \
+                "the mesh `{mesh}` {none}: of the material `{material}` it shows one \
                  colour, that of the lower left corner of {file}"
             ),
             Lacking::Mask(file) => format!(
-                "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` cuts \
+                "the mesh `{mesh}` {none}: {file} of the material `{material}` cuts \
                  nothing out of it"
             ),
             Lacking::Share(what, file) => format!(
-                "the mesh `{mesh}` has no texture coordinates: of the material `{material}` it has one `{what}`, \
+                "the mesh `{mesh}` {none}: of the material `{material}` it has one `{what}`, \
                  that of the lower left corner of {file}"
             ),
             Lacking::Normals(file) => format!(
-                "the mesh `{mesh}` has no texture coordinates: {file} of the material `{material}` tilts none of its normals"
+                "the mesh `{mesh}` {none}: {file} of the material `{material}` tilts none of its normals"
             ),
             Lacking::Colours => format!(
                 "the mesh `{mesh}` has no vertex colours: the material `{material}` shows its own colour as it is"

@@ -32,7 +32,7 @@ pub fn sphere_root(scene: &Scene, ray: &Ray, prim: PrimRef) -> Option<f64> {
 
 fn covers_triangle(mask: LaidMask, mesh: &Mesh, ray: &Ray, prim_id: u32) -> bool {
     let prim = prim_id as usize;
-    let Some(uvs) = &mesh.uvs else { return true };
+    let Some(uvs) = mask.uvs(mesh) else { return true };
     let Some(met) = triangle::meet_or_nearest(ray, &mesh.corners(prim)) else { return true };
     let weights = [1.0 - met.u - met.v, met.u, met.v];
     let at = uvs.get(prim, mesh.triangles[prim]);

@@ -1,15 +1,33 @@
-//! How texture coordinates and normals change along a surface.
+//! Texture coordinates of every set, and how they and normals change along a surface.
 
 use super::SurfaceInteraction;
-use crate::math::DVec3;
+use super::interaction::uv_at;
+use crate::math::{DVec3, Vec2};
 use crate::scene::{Mesh, Scene};
 use std::f64::consts::{PI, TAU};
 
-/// Gradients of the texture coordinates u and v along the surface at `si`, per unit of length of scene space. Zero
-/// where there are no coordinates; not finite on triangles without area and at a sphere's poles.
-pub fn uv_gradients(scene: &Scene, si: &SurfaceInteraction) -> [DVec3; 2] {
+/// Texture coordinates of set number `set` at `si`, which holds those of set 0 itself; zero where the mesh lacks the set. An
+/// exact sphere has the same in every set.
+#[inline]
+pub fn uv_of_set(scene: &Scene, si: &SurfaceInteraction, set: u8) -> Vec2 {
+    if set == 0 { si.uv } else { further_uv(scene, si, set) }
+}
+
+/// By the point's place in its triangle: a hit's own weights would take room at every point of every scene.
+#[inline(never)]
+fn further_uv(scene: &Scene, si: &SurfaceInteraction, set: u8) -> Vec2 {
+    let Some(mesh) = scene.meshes.get(si.prim.geom_id as usize) else { return si.uv };
+    let Some(uvs) = mesh.uv_set(set) else { return Vec2::ZERO };
+    let prim = si.prim.prim_id as usize;
+    let weights = corner_weights(mesh.corners(prim), si.p);
+    uv_at(uvs.get(prim, mesh.triangles[prim]), weights)
+}
+
+/// Gradients of the texture coordinates u and v of set number `set` along the surface at `si`, per unit of length of scene
+/// space. Zero where there are no such coordinates; not finite on triangles without area and at a sphere's poles.
+pub fn uv_gradients(scene: &Scene, si: &SurfaceInteraction, set: u8) -> [DVec3; 2] {
     match scene.meshes.get(si.prim.geom_id as usize) {
-        Some(mesh) => on_triangle(mesh, si.prim.prim_id as usize),
+        Some(mesh) => on_triangle(mesh, si.prim.prim_id as usize, set),
         None => on_sphere(scene.spheres[si.prim.prim_id as usize].radius, si.ng),
     }
 }
@@ -42,8 +60,8 @@ pub fn corner_weights(corners: [DVec3; 3], p: DVec3) -> [f64; 3] {
     if whole > 0.0 && whole.is_finite() { parts.map(|part| part / whole) } else { [1.0 / 3.0; 3] }
 }
 
-fn on_triangle(mesh: &Mesh, prim: usize) -> [DVec3; 2] {
-    let Some(uvs) = &mesh.uvs else { return [DVec3::ZERO; 2] };
+fn on_triangle(mesh: &Mesh, prim: usize, set: u8) -> [DVec3; 2] {
+    let Some(uvs) = mesh.uv_set(set) else { return [DVec3::ZERO; 2] };
     let [ta, tb, tc] = uvs.get(prim, mesh.triangles[prim]).map(|t| t.as_dvec2());
     let [a, b, c] = mesh.corners(prim);
     let [along1, along2] = dual(b - a, c - a);
@@ -70,7 +88,7 @@ fn on_sphere(radius: f64, n: DVec3) -> [DVec3; 2] {
 mod tests {
     use super::*;
     use crate::intersect::{Intersector, Oracle, Ray};
-    use crate::math::{Rgb, Vec2, Vec3};
+    use crate::math::{Rgb, Vec3};
     use crate::scene::{Corners, Material, Texture, TextureMap, World, WorldMesh, WorldSphere};
     use crate::stats::RayCounts;
 
@@ -83,14 +101,14 @@ mod tests {
     }
 
     /// Gradients against differences of coordinates of two hits close together.
-    fn check(scene: &Scene, org: DVec3, target: DVec3) {
+    fn check(scene: &Scene, (org, target): (DVec3, DVec3), set: u8) {
         let si = meet(scene, org, target - org);
-        let gradients = uv_gradients(scene, &si);
+        let gradients = uv_gradients(scene, &si, set);
         for step in [DVec3::X, DVec3::Y, DVec3::Z] {
             let step = (step - si.ng * step.dot(si.ng)) * 1e-3;
             let near = meet(scene, org, si.p + step - org);
             let moved = near.p - si.p;
-            let expected = (near.uv - si.uv).as_dvec2();
+            let expected = (uv_of_set(scene, &near, set) - uv_of_set(scene, &si, set)).as_dvec2();
             let found = [gradients[0].dot(moved), gradients[1].dot(moved)];
             let error = (found[0] - expected.x).hypot(found[1] - expected.y);
             assert!(error < 2e-3 * expected.length() + 1e-6, "{found:?} {expected:?}");
@@ -102,16 +120,31 @@ mod tests {
         let mut world = World::default();
         let one = Texture::from_linear("t", [1, 1], vec![Rgb::ONE]);
         world.textures.push(one);
-        let id = world
-            .add_material(Material { texture: Some(TextureMap::of(0)), ..Material::black("m") });
+        let id = world.add_material(Material {
+            texture: Some(TextureMap::of(0)),
+            roughness_map: Some(TextureMap { uv_set: 2, ..TextureMap::of(0) }),
+            ..Material::black("m")
+        });
         world.spheres.push(WorldSphere::new("s", DVec3::new(5.0, 0.0, 0.0), 1.5, id));
         let p = vec![DVec3::ZERO, DVec3::new(2.0, 0.1, 0.3), DVec3::new(0.4, 1.8, -0.2)];
-        let uvs = vec![Vec2::new(0.1, 0.7), Vec2::new(1.3, 0.2), Vec2::new(-0.4, 2.0)];
+        let set = |values: [[f32; 2]; 3]| {
+            Some(Corners { values: values.map(Vec2::from_array).to_vec(), corners: None })
+        };
+        let uvs = set([[0.1, 0.7], [1.3, 0.2], [-0.4, 2.0]]);
+        let more_uvs = vec![None, set([[0.9, -0.2], [0.3, 0.8], [3.0, 0.1]])];
         let mesh = WorldMesh::new("t", p, vec![[0, 1, 2]], id);
-        world.meshes.push(WorldMesh { uvs: Some(Corners { values: uvs, corners: None }), ..mesh });
+        world.meshes.push(WorldMesh { uvs, more_uvs, ..mesh });
         let scene = world.into_scene(false).expect("a scene");
-        check(&scene, DVec3::new(0.5, 0.4, 4.0), DVec3::new(0.6, 0.5, 0.0));
-        check(&scene, DVec3::new(4.0, 3.0, 6.0), DVec3::new(4.6, 0.4, 1.0));
+        for set in [0, 2] {
+            check(&scene, (DVec3::new(0.5, 0.4, 4.0), DVec3::new(0.6, 0.5, 0.0)), set);
+            check(&scene, (DVec3::new(4.0, 3.0, 6.0), DVec3::new(4.6, 0.4, 1.0)), set);
+        }
+        // A set that the mesh lacks.
+        let si = meet(&scene, DVec3::new(0.5, 0.4, 4.0), DVec3::new(0.1, 0.1, -4.0));
+        for set in [1, 3] {
+            assert_eq!(uv_of_set(&scene, &si, set), Vec2::ZERO);
+            assert_eq!(uv_gradients(&scene, &si, set), [DVec3::ZERO; 2]);
+        }
     }
 
     #[test]

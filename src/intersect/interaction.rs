@@ -15,7 +15,7 @@ pub struct SurfaceInteraction {
     pub ng: DVec3,
     /// Unit shading normal, on the same side as `ng`.
     pub ns: DVec3,
-    /// Texture coordinates: the mesh's, or an exact sphere's longitude and latitude; zero without, and
+    /// Texture coordinates of set 0: the mesh's, or an exact sphere's longitude and latitude; zero without, and
     /// on spheres whose material has no image.
     pub uv: Vec2,
     /// Material of the surface.

@@ -17,7 +17,7 @@ mod sphere;
 mod triangle;
 
 pub use crate::ray::{Hit, PrimRef, Ray};
-pub use derivatives::{corner_weights, curvature, uv_gradients};
+pub use derivatives::{corner_weights, curvature, uv_gradients, uv_of_set};
 pub use embree::EmbreeIntersector;
 pub use interaction::{PlaneError, RayEnd, SpawnPoint, SurfaceInteraction, lift_to_smooth};
 pub use oracle::{CourtHit, Oracle};

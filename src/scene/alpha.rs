@@ -3,7 +3,7 @@
 //! A mask holds numbers as the image's file stores them, in 8 bits, and only whether they reach a half
 //! matters. Not done: partial cover. A surface is there, or it is not.
 
-use super::{TextureMap, Wrap};
+use super::{Corners, Mesh, TextureMap, Wrap};
 use crate::math::{Vec2, bulk};
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +55,11 @@ pub struct LaidMask<'s> {
 }
 
 impl LaidMask<'_> {
+    /// The texture coordinates of `mesh` by which the mask lies on it, if the mesh has them.
+    pub fn uvs<'m>(&self, mesh: &'m Mesh) -> Option<&'m Corners<Vec2>> {
+        mesh.uv_set(self.map.uv_set)
+    }
+
     /// Whether the surface is there at its texture coordinates `uv`.
     pub fn is_there(&self, uv: Vec2) -> bool {
         self.mask.is_there(self.map.wrap, self.map.place(uv))

@@ -144,7 +144,7 @@ const WHOLE: Part = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
 
 impl<'m> Emission<'m> {
     fn of(mesh: &'m Mesh, material: &'m Material, textures: &'m [Texture]) -> Self {
-        let image = material.emission_map.as_ref().filter(|_| mesh.uvs.is_some());
+        let image = material.emission_map.as_ref().filter(|map| mesh.uv_set(map.uv_set).is_some());
         let image = image.map(|map| (&textures[map.image as usize], map));
         Self { mesh, colour: material.emission, image }
     }

@@ -111,6 +111,15 @@ impl Material {
     }
 
     /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
+    pub fn images(&self) -> impl Iterator<Item = &TextureMap> {
+        let normals = self.normal_map.as_ref().map(|map| &map.image);
+        let metal = self.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
+        let emission = self.emission_map.as_ref();
+        let maps = [self.texture.as_ref(), self.roughness_map.as_ref(), emission, metal, normals];
+        maps.into_iter().flatten()
+    }
+
+    /// [`images`](Self::images), to be changed.
     pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
         let normals = self.normal_map.as_mut().map(|map| &mut map.image);
         let metal = self.fresnel.as_mut().and_then(|fresnel| fresnel.metallic_map.as_mut());

@@ -66,8 +66,10 @@ pub struct WorldMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Shading normals (unit, or zero where the file's was unusable); `None` shades flat.
     pub normals: Option<Corners<Vec3>>,
-    /// Texture coordinates, origin at the image's lower left.
+    /// Texture coordinates, origin at the image's lower left: set number 0.
     pub uvs: Option<Corners<Vec2>>,
+    /// Further sets of texture coordinates, from number 1 on; `None` is one that the mesh lacks.
+    pub more_uvs: Vec<Option<Corners<Vec2>>>,
     /// A colour for each position, which its material may show.
     pub colours: Option<VertexColours>,
     /// The material of all its triangles.
@@ -85,14 +87,32 @@ impl WorldMesh {
         triangles: Vec<[u32; 3]>,
         material: MaterialId,
     ) -> Self {
-        let (normals, uvs, colours, always_traced) = (None, None, None, false);
-        let name = name.into();
-        Self { name, positions, triangles, normals, uvs, colours, material, always_traced }
+        Self {
+            name: name.into(),
+            positions,
+            triangles,
+            normals: None,
+            uvs: None,
+            more_uvs: Vec::new(),
+            colours: None,
+            material,
+            always_traced: false,
+        }
     }
 
     /// The two triangles between four corners, which run counter-clockwise seen from outside.
     pub fn quad(name: impl Into<String>, corners: [DVec3; 4], material: MaterialId) -> Self {
         Self::new(name, corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]], material)
+    }
+
+    /// The texture coordinates of set number `set`, if the mesh has them.
+    pub fn uv_set(&self, set: u8) -> Option<&Corners<Vec2>> {
+        numbered(&self.uvs, &self.more_uvs, set)
+    }
+
+    /// All sets of texture coordinates that the mesh has.
+    pub fn uv_sets_mut(&mut self) -> impl Iterator<Item = &mut Corners<Vec2>> {
+        self.uvs.iter_mut().chain(self.more_uvs.iter_mut().flatten())
     }
 }
 
@@ -112,8 +132,11 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Shading normals, or `None` to shade flat.
     pub normals: Option<Corners<Vec3>>,
-    /// Texture coordinates.
+    /// Texture coordinates: set number 0.
     pub uvs: Option<Corners<Vec2>>,
+    /// Further sets of texture coordinates, from number 1 on; `None` is one that the mesh lacks, or that its material
+    /// does not use. Apart from the first, so that meshes with one set find it without a search.
+    pub more_uvs: Vec<Option<Corners<Vec2>>>,
     /// A colour for each vertex; `None` where its material shows none.
     pub colours: Option<VertexColours>,
     /// Material.
@@ -128,6 +151,25 @@ impl Mesh {
     /// The f32 corners of triangle `prim`, widened: what every f64 computation starts from.
     pub fn corners(&self, prim: usize) -> [DVec3; 3] {
         self.triangles[prim].map(|i| self.positions[i as usize].as_dvec3())
+    }
+
+    /// The texture coordinates of set number `set`, if the mesh has them.
+    #[inline]
+    pub fn uv_set(&self, set: u8) -> Option<&Corners<Vec2>> {
+        numbered(&self.uvs, &self.more_uvs, set)
+    }
+}
+
+/// Set number `set` of texture coordinates, of which number 0 is `first`, and number 1 the first of `more`.
+#[inline]
+fn numbered<'m>(
+    first: &'m Option<Corners<Vec2>>,
+    more: &'m [Option<Corners<Vec2>>],
+    set: u8,
+) -> Option<&'m Corners<Vec2>> {
+    match set {
+        0 => first.as_ref(),
+        _ => more.get(usize::from(set) - 1)?.as_ref(),
     }
 }
 

@@ -196,9 +196,9 @@ impl Scene {
         Some(LaidMask { mask: &self.masks[map.image as usize], map })
     }
 
-    /// The mask that cuts holes into `mesh`: none without texture coordinates, which say where they lie.
+    /// The mask that cuts holes into `mesh`: none without the texture coordinates that say where they lie.
     pub fn mesh_mask(&self, mesh: &Mesh) -> Option<LaidMask<'_>> {
-        mesh.uvs.as_ref().and_then(|_| self.mask(mesh.surface))
+        self.mask(mesh.surface).filter(|mask| mask.uvs(mesh).is_some())
     }
 
     /// Triangles in all meshes.

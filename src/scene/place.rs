@@ -28,7 +28,7 @@ impl WorldMesh {
         if mirrors {
             reverse(&mut self.triangles);
             self.normals.iter_mut().for_each(reverse_corners);
-            self.uvs.iter_mut().for_each(reverse_corners);
+            self.uv_sets_mut().for_each(reverse_corners);
         }
         Ok(())
     }
@@ -176,6 +176,7 @@ mod tests {
                 corners: Some(vec![[0, 0, 0]]),
             }),
             uvs: Some(Corners { values: vec![], corners: Some(vec![[5, 6, 7]]) }),
+            more_uvs: vec![None, Some(Corners { values: vec![], corners: Some(vec![[1, 2, 3]]) })],
             ..WorldMesh::new("t", corners.into(), vec![[0, 1, 2]], 0)
         }
     }
@@ -201,8 +202,10 @@ mod tests {
                 }
                 assert!((normal.length() - 1.0).abs() < 1e-6);
                 let mirrored = scale.x < 0.0;
-                let uvs = mesh.uvs.and_then(|uv| uv.corners).expect("uv corners");
-                assert_eq!(uvs[0], if mirrored { [5, 7, 6] } else { [5, 6, 7] });
+                let uvs =
+                    |set| mesh.uv_set(set).and_then(|uv| uv.corners.as_ref()).expect("corners")[0];
+                assert_eq!(uvs(0), if mirrored { [5, 7, 6] } else { [5, 6, 7] });
+                assert_eq!(uvs(2), if mirrored { [1, 3, 2] } else { [1, 2, 3] });
             }
         }
     }

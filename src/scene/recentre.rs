@@ -7,7 +7,7 @@ use super::{
     too_small, winding,
 };
 use crate::error::{Error, Result};
-use crate::math::{Bounds3, DVec3, Vec3};
+use crate::math::{Bounds3, DVec3, Vec2, Vec3};
 
 impl World {
     /// Bounds of all geometry and of lights that are seen, world space.
@@ -143,12 +143,19 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
         mut triangles,
         mut normals,
         mut uvs,
+        mut more_uvs,
         colours,
         material,
         always_traced,
     } = mesh;
     let made_of = &materials[material as usize];
     let colours = colours.filter(|_| made_of.vertex_colours);
+    for (set, uvs) in (1..).zip(&mut more_uvs) {
+        let is_used =
+            made_of.images().chain(&made_of.alpha).any(|map| usize::from(map.uv_set) == set);
+        *uvs = uvs.take().filter(|_| is_used);
+    }
+    let mut all_uvs: Vec<_> = uvs.iter_mut().chain(more_uvs.iter_mut().flatten()).collect();
     // A thin pane has no inside.
     if made_of.glass.as_ref().is_some_and(|glass| !glass.thin) {
         // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
@@ -157,18 +164,18 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
         if volume.is_none() {
             let strays = winding::strays(&positions, &triangles);
             let strays = strays.into_iter().flatten().enumerate().filter(|(_, stray)| *stray);
-            strays.for_each(|(i, _)| reverse_one(i, &mut triangles, &mut normals, &mut uvs));
+            strays.for_each(|(i, _)| reverse_one(i, &mut triangles, &mut normals, &mut all_uvs));
             volume = winding::closed_volume(&positions, &triangles);
         }
         if volume.is_some_and(|volume| volume < 0.0) {
-            reverse(&mut triangles, &mut normals, &mut uvs);
+            reverse(&mut triangles, &mut normals, &mut all_uvs);
         }
     }
     let rounded: Vec<Vec3> = positions.iter().map(|p| r.point_to_scene(*p).as_vec3()).collect();
     let lost = too_small::count_collapsed(&positions, &rounded, &triangles);
     let surface = Surface { material, light: None, always_traced };
     let mesh = scene_mesh(name, rounded, triangles, surface);
-    (Mesh { normals, uvs, colours, ..mesh }, lost)
+    (Mesh { normals, uvs, more_uvs, colours, ..mesh }, lost)
 }
 
 fn scene_mesh(
@@ -183,15 +190,15 @@ fn scene_mesh(
     }
     let vertex_count = positions.len();
     positions.push(Vec3::ZERO);
-    let (normals, uvs, colours) = (None, None, None);
     Mesh {
         name,
         positions,
         vertex_count,
         triangles,
-        normals,
-        uvs,
-        colours,
+        normals: None,
+        uvs: None,
+        more_uvs: Vec::new(),
+        colours: None,
         surface,
         lights: None,
         bounds,
@@ -202,25 +209,25 @@ fn reverse_one(
     index: usize,
     triangles: &mut [[u32; 3]],
     normals: &mut Option<Corners<Vec3>>,
-    uvs: &mut Option<Corners<crate::math::Vec2>>,
+    uvs: &mut [&mut Corners<Vec2>],
 ) {
     triangles[index].swap(1, 2);
     let normals = normals.as_mut().and_then(|n| n.corners.as_mut());
-    let uvs = uvs.as_mut().and_then(|uv| uv.corners.as_mut());
+    let uvs = uvs.iter_mut().filter_map(|uv| uv.corners.as_mut());
     normals.into_iter().chain(uvs).for_each(|corners| corners[index].swap(1, 2));
 }
 
 fn reverse(
     triangles: &mut [[u32; 3]],
     normals: &mut Option<Corners<Vec3>>,
-    uvs: &mut Option<Corners<crate::math::Vec2>>,
+    uvs: &mut [&mut Corners<Vec2>],
 ) {
     triangles.iter_mut().for_each(|t| t.swap(1, 2));
     if let Some(n) = normals {
         n.values.iter_mut().for_each(|v| *v = -*v);
         n.corners.iter_mut().flatten().for_each(|t| t.swap(1, 2));
     }
-    if let Some(uv) = uvs {
+    for uv in uvs {
         uv.corners.iter_mut().flatten().for_each(|t| t.swap(1, 2));
     }
 }
@@ -249,5 +256,48 @@ fn add_emitting_surface(
         EmittingShape::Sphere(centre, radius) => {
             spheres.push(Sphere { name, centre, radius, surface });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Fresnel, Glass, Texture, TextureMap};
+
+    #[test]
+    fn glass_that_is_inside_out_is_turned_with_all_that_its_corners_have() {
+        let corners = |first: u32| Corners {
+            values: vec![Vec2::ZERO; 24],
+            corners: Some((0..4).map(|t| [0, 1, 2].map(|k| first + 3 * t + k)).collect()),
+        };
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let inwards = vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+        let mesh = WorldMesh {
+            uvs: Some(corners(0)),
+            more_uvs: vec![Some(corners(6)), Some(corners(12))],
+            ..WorldMesh::new("glass", p.to_vec(), inwards, 0)
+        };
+        let mut world = World::default();
+        world.textures.push(Texture::from_linear("t", [1, 1], vec![crate::math::Rgb::ONE]));
+        let fresnel = Fresnel {
+            grazing: 1.0,
+            metallic: 0.0,
+            metallic_map: None,
+            clearcoat: 0.0,
+            clearcoat_roughness: 0.0,
+            transmission: 1.0,
+        };
+        world.add_material(Material {
+            texture: Some(TextureMap { uv_set: 2, ..TextureMap::of(0) }),
+            fresnel: Some(fresnel),
+            glass: Some(Glass::clear(1.5)),
+            ..Material::black("glass")
+        });
+        world.meshes.push(mesh);
+        let mesh = world.into_scene(true).expect("a scene").meshes.remove(0);
+        assert_eq!(mesh.triangles[0], [0, 2, 1]);
+        let first = |set| mesh.uv_set(set).and_then(|uvs| uvs.corners.as_ref()).map(|c| c[0]);
+        // No image lies by set 1.
+        assert_eq!([first(0), first(1), first(2)], [Some([0, 2, 1]), None, Some([12, 14, 13])]);
     }
 }

@@ -55,6 +55,8 @@ pub struct TextureMap {
     pub image: u32,
     /// What is seen beyond the image's edges at its sides, and above and below.
     pub wrap: [Wrap; 2],
+    /// The set of the mesh's texture coordinates that it lies by, from 0. An exact sphere has the same in every set.
+    pub uv_set: u8,
     /// From the surface's texture coordinates to the image's, of which `(0, 0)` is the lower left corner and
     /// `(1, 1)` the upper right one.
     pub transform: DAffine2,
@@ -74,7 +76,7 @@ pub enum Wrap {
 impl TextureMap {
     /// The image where the texture coordinates put it, repeated.
     pub fn of(image: u32) -> Self {
-        Self { image, wrap: [Wrap::Repeat; 2], transform: DAffine2::IDENTITY }
+        Self { image, wrap: [Wrap::Repeat; 2], uv_set: 0, transform: DAffine2::IDENTITY }
     }
 
     /// The image's coordinates at the surface's texture coordinates `uv`; where the image repeats, less whole

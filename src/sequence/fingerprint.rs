@@ -156,6 +156,7 @@ impl Hash {
             triangles,
             normals,
             uvs,
+            more_uvs,
             colours,
             material: _,
             always_traced: _,
@@ -164,6 +165,10 @@ impl Hash {
         self.array(triangles);
         self.attribute(normals.as_ref());
         self.attribute(uvs.as_ref());
+        for (set, uvs) in (1..).zip(more_uvs) {
+            self.text(&("texture coordinates", set));
+            self.attribute(uvs.as_ref());
+        }
         if let Some(colours) = colours {
             self.text(&("colours", colours.codes().is_some()));
             self.array(colours.bytes());
@@ -209,7 +214,7 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Bounds3, DVec3, Rgb, Vec3};
+    use crate::math::{Bounds3, DVec3, Rgb, Vec2, Vec3};
     use crate::scene::{CameraPath, Light, Material, Pose};
     use crate::scene::{PointLight, TextureMap, VertexColours};
 
@@ -230,6 +235,10 @@ mod tests {
         }
     }
 
+    fn uvs(u: f32) -> Option<Corners<Vec2>> {
+        Some(Corners { values: vec![Vec2::X * u, Vec2::X, Vec2::Y], corners: None })
+    }
+
     fn shot() -> Shot {
         let pose = Pose { eye: DVec3::Z, target: DVec3::ZERO, up: DVec3::Y, roll_degrees: 0.0 };
         let path = CameraPath::Still(pose);
@@ -245,14 +254,19 @@ mod tests {
         renamed.masks[0].name = "frond".into();
         assert_eq!(base, fingerprint(&renamed, &shot()));
 
-        let changes: [fn(&mut World); 11] = [
+        let changes: [fn(&mut World); 16] = [
             |w| w.meshes[0].positions[1].x += 1e-15,
             |w| w.meshes[0].triangles[0] = [0, 2, 1],
             |w| w.meshes[0].normals = None,
+            |w| w.meshes[0].uvs = uvs(0.0),
+            |w| w.meshes[0].more_uvs = vec![uvs(0.0)],
+            |w| w.meshes[0].more_uvs = vec![uvs(1.0)],
+            |w| w.meshes[0].more_uvs = vec![None, uvs(0.0)],
             |w| w.meshes[0].colours = Some(VertexColours::from_encoded(&[[1.0; 3]; 3])),
             |w| w.meshes[0].colours = Some(VertexColours::from_encoded(&[[0.5; 3]; 3])),
             |w| w.materials[0].diffuse.x = 0.5,
             |w| w.materials[0].alpha = Some(TextureMap::of(0)),
+            |w| w.materials[0].alpha = Some(TextureMap { uv_set: 1, ..TextureMap::of(0) }),
             |w| w.masks[0].texels[1] = 254,
             |w| w.sky.lights = false,
             |w| w.meshes[0].always_traced = true,

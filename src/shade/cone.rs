@@ -70,15 +70,21 @@ impl RayCone {
     }
 
     /// What the cone covers of the texture of the surface `si`, seen along `wo` (unit): two conjugate diameters of the
-    /// ellipse, in texture coordinates. Not finite where coordinates have no gradient.
-    pub fn footprint(self, scene: &Scene, si: &SurfaceInteraction, wo: DVec3) -> [DVec2; 2] {
+    /// ellipse, in texture coordinates of set number `set`. Not finite where coordinates have no gradient.
+    pub fn footprint(
+        self,
+        scene: &Scene,
+        si: &SurfaceInteraction,
+        wo: DVec3,
+        set: u8,
+    ) -> [DVec2; 2] {
         let cos = wo.dot(si.ng);
         // Across the plane of incidence the cone is as wide as in the air, along it it is stretched.
         let along =
             (wo - si.ng * cos).try_normalize().unwrap_or_else(|| si.ng.any_orthonormal_vector());
         let across = si.ng.cross(along);
         let width = f64::from(self.width.abs());
-        let [u, v] = uv_gradients(scene, si);
+        let [u, v] = uv_gradients(scene, si, set);
         let in_uv = |d: DVec3| DVec2::new(u.dot(d), v.dot(d));
         [in_uv(along * (width / cos.abs())), in_uv(across * width)]
     }

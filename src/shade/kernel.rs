@@ -359,8 +359,7 @@ impl Vertex<'_, '_> {
         let mut le = material.emitted(si.is_outside(wo));
         if le != Rgb::ZERO {
             if let Some(map) = &material.emission_map {
-                let footprint = state.cone.footprint(scene, &si, wo);
-                le *= texture::mapped(scene, map, si.uv, footprint);
+                le *= texture::shown(scene, map, (&si, wo, state.cone));
             }
             if MIRROR && state.pdf > 0.0 {
                 let ends = (ray.org, si.p);

@@ -8,7 +8,7 @@
 use super::cone::RayCone;
 use super::light::LightSampler;
 use super::texture;
-use crate::intersect::{SurfaceInteraction, uv_gradients};
+use crate::intersect::{SurfaceInteraction, uv_gradients, uv_of_set};
 use crate::math::{DVec3, Rgb};
 use crate::scene::{Material, Scene, Wrap};
 
@@ -24,15 +24,14 @@ pub(super) fn normal(
 ) -> DVec3 {
     let Some(map) = &material.normal_map else { return si.ns };
     // Of the image's coordinates, so that an image that lies turned has its normals turned.
-    let ([u, v], laid) = (uv_gradients(scene, si), map.image.transform.matrix2);
+    let ([u, v], laid) = (uv_gradients(scene, si, map.image.uv_set), map.image.transform.matrix2);
     let gradients = [u * laid.x_axis.x + v * laid.y_axis.x, u * laid.x_axis.y + v * laid.y_axis.y];
     let Some([tangent, bitangent]) = frame(si, gradients) else { return si.ns };
-    let footprint = cone.footprint(scene, si, wo);
-    let shares = texture::mapped(scene, &map.image, si.uv, footprint).as_dvec3();
+    let shares = texture::shown(scene, &map.image, (si, wo, cone)).as_dvec3();
     let mut local = (shares * 2.0 - DVec3::ONE) * DVec3::new(map.strength, map.strength, 1.0);
     if map.image.wrap.contains(&Wrap::Mirror) {
         // Every other copy of the image lies the other way round, and so do its normals.
-        let place = map.image.place(si.uv);
+        let place = map.image.place(uv_of_set(scene, si, map.image.uv_set));
         let side = |at: f32, wrap| {
             if wrap == Wrap::Mirror { side_of_copy(f64::from(at)) } else { 1.0 }
         };

@@ -5,17 +5,27 @@
 //! texels are about as large (Williams, 1983).
 
 use super::cone::RayCone;
-use crate::intersect::SurfaceInteraction;
+use crate::intersect::{SurfaceInteraction, uv_of_set};
 use crate::math::{DVec2, DVec3, Rgb, Vec2};
 use crate::scene::{Scene, Texture, TextureLevel, TextureMap, Wrap};
 
 /// Most pieces of an ellipse. A longer one is taken to be wider.
 const MOST_PIECES: f64 = 16.0;
 
+/// The mean of what `map` shows of the point `si`, seen towards `wo` (unit), over what a ray with this `cone` covers there.
+pub(super) fn shown(
+    scene: &Scene,
+    map: &TextureMap,
+    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+) -> Rgb {
+    let footprint = cone.footprint(scene, si, wo, map.uv_set);
+    mapped(scene, map, uv_of_set(scene, si, map.uv_set), footprint)
+}
+
 /// The mean of what `map` shows over the ellipse around `uv` with the conjugate diameters `footprint`, both in the
-/// surface's texture coordinates.
-pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
-    let TextureMap { image, wrap, transform } = map;
+/// surface's texture coordinates of the map's set.
+fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec2; 2]) -> Rgb {
+    let TextureMap { image, wrap, uv_set: _, transform } = map;
     let uv = map.place(uv);
     let footprint = footprint.map(|axis| transform.transform_vector2(axis));
     filtered(&scene.textures[*image as usize], *wrap, uv, footprint)
@@ -26,11 +36,10 @@ pub(super) fn mapped(scene: &Scene, map: &TextureMap, uv: Vec2, footprint: [DVec
 pub(super) fn share(
     scene: &Scene,
     map: Option<&TextureMap>,
-    (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+    seen: (&SurfaceInteraction, DVec3, RayCone),
 ) -> f64 {
     let Some(map) = map else { return 1.0 };
-    let footprint = cone.footprint(scene, si, wo);
-    let share = f64::from(mapped(scene, map, si.uv, footprint).x);
+    let share = f64::from(shown(scene, map, seen).x);
     // Not `min`, which would hide what is NaN.
     if share > 1.0 { 1.0 } else { share }
 }
@@ -207,7 +216,7 @@ mod tests {
         let scene = scene(Texture::from_linear("ramp", [64, 1], ramp));
         let transform = DAffine2::from_scale(DVec2::splat(100.0));
         for (wrap, expected) in [(Wrap::Repeat, 12.3), (Wrap::Mirror, 12.3)] {
-            let map = TextureMap { image: 0, wrap: [wrap; 2], transform };
+            let map = TextureMap { wrap: [wrap; 2], transform, ..TextureMap::of(0) };
             // 100 · 1.25 = 125 is odd, so what is mirrored runs backwards: at 1.24 it does not.
             let u = (124.0 + (12.3 + 0.5) / 64.0) / 100.0;
             let seen = mapped(&scene, &map, Vec2::new(u as f32, 0.5), POINT).x;

@@ -126,6 +126,34 @@ class Materials(Case):
         self.assertEqual(len(files), 1)
         self.noted(lines, "t", "cut-outs")
 
+    def test_images_lie_by_the_uv_maps_that_they_name(self):
+        def link(tree, node, shader):
+            tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+            other = tree.nodes.new("ShaderNodeTexImage")
+            other.image = node.image
+            place = tree.nodes.new("ShaderNodeUVMap")
+            place.uv_map = "Second"
+            tree.links.new(place.outputs["UV"], other.inputs["Vector"])
+            tree.links.new(other.outputs["Color"], shader.inputs["Roughness"])
+
+        grey = np.full((2, 2, 4), 0.5, dtype=np.float32)
+        stage.fresh()
+        data = stage.plane(material=self.mapped("two", "Non-Color", grey, link))
+        second = data.uv_layers.new(name="Second")
+        turned = [(1.0, 0.0), (1.0, 2.0), (0.0, 2.0), (0.0, 0.0)]
+        for loop, uv in zip(second.uv, turned):
+            loop.vector = uv
+        stage.place("floor", data)
+        found, lines, folder = export("uv-sets")
+        p = found["material"]["two"]["principled"]
+        # Plainly by the active map.
+        self.assertIsInstance(p["base_texture"], str)
+        self.assertEqual((p["roughness"]["uv_set"], lines), (1, []))
+        columns, rows, _ = ply(os.path.join(folder, found["mesh"][0]["file"]))
+        self.assertEqual(columns[6:], ["s", "t", "s1", "t1"])
+        pairs = {tuple(row[6:8]): tuple(row[8:10]) for row in rows.tolist()}
+        self.assertEqual(pairs, dict(zip([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], turned)))
+
     def test_roughness_of_a_coloured_image_is_blenders_grey(self):
         colours = np.ones((2, 2, 4), dtype=np.float32)
         colours[..., :3] = (1.0, 0.0, 0.0)

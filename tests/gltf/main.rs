@@ -11,3 +11,4 @@ mod materials;
 mod moving;
 mod mutations;
 mod samples;
+mod uv_sets;

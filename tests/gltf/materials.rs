@@ -99,21 +99,6 @@ fn images_are_moved_turned_and_scaled_as_the_extension_has_it() {
 }
 
 #[test]
-fn images_of_other_sets_are_left_out_by_name() {
-    let mut file = File::triangle().with_uvs();
-    let texture = file.image(1, &[[9; 4]], json!({}));
-    let file = file.with_material(json!({
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}},
-        "normalTexture": {"index": texture, "texCoord": 1},
-        "occlusionTexture": {"index": texture, "texCoord": 1},
-    }));
-    let model = file.model();
-    let material = &model.world.materials[0];
-    assert!(material.texture.is_some() && material.normal_map.is_none());
-    assert!(warns(&model.warnings, "several sets of texture coordinates"));
-}
-
-#[test]
 fn alpha_is_cut_at_the_cutoff() {
     let masked = |alpha: Value, texels: [u8; 3]| {
         let mut file = File::triangle().with_uvs();
@@ -232,6 +217,27 @@ fn an_image_of_emission_makes_triangles_glow_on_which_it_is_bright() {
     let dim = emissive(0.25);
     assert_eq!(dim.world.meshes.len(), 1);
     assert_eq!(dim.world.materials[dim.world.meshes[0].material as usize].emission, Rgb::ZERO);
+}
+
+#[test]
+fn an_image_of_emission_lies_by_its_own_set() {
+    // Dark by the first set, bright by the second.
+    let mut file = File::triangle();
+    for (set, u) in [(0, 0.3f32), (1, 0.8)] {
+        let uvs = file.floats("VEC2", &[u, 0.1, u, 0.5, u, 0.9]);
+        file.primitive()["attributes"][format!("TEXCOORD_{set}")] = json!(uvs);
+    }
+    let texture = file.image(2, &[[0, 0, 0, 255], [0, 255, 0, 255]], json!({}));
+    let emission = |set: usize| {
+        let model = file.clone().with_material(json!({
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}},
+            "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": texture, "texCoord": set},
+        }));
+        let world = model.model().world;
+        world.materials[world.meshes[0].material as usize].emission
+    };
+    assert_eq!(emission(0), Rgb::ZERO);
+    assert!((emission(1) - Rgb::Y).abs().max_element() < 0.3, "{}", emission(1));
 }
 
 #[test]

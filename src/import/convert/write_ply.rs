@@ -39,7 +39,8 @@ pub struct PlyReport {
 /// doubles. Vertices where several normals or texture coordinates meet are split. Where only
 /// some meshes have normals, the others' are zero, which reads as flat; where only some have colours, the others are
 /// white. Colours are sRGB: bytes, or floats where some would not fit into bytes. Spheres become 80,000
-/// triangles each. Materials, textures, lights and the sky have no place in the format.
+/// triangles each. Materials, textures, lights and the sky have no place in the format, and of several sets of texture
+/// coordinates the first is written: without the materials nothing says what the others are for.
 ///
 /// Errors: `Error::Io`; more than 1,431,655,764 triangles or vertices.
 pub fn write_ply(world: &World, out: &mut dyn Write, file: &Path) -> Result<PlyReport> {

@@ -137,8 +137,12 @@ impl<'a, 'd> Assembly<'a, 'd> {
     /// Adds a primitive at the places of a piece.
     fn add_primitive(&mut self, json: &Json<'_>, piece: &Piece) -> Result<()> {
         let material = json.index("material", self.document.materials.len(), "material")?;
-        let uv_set = material.map_or(Ok(0), |at| self.materials.uv_set(at))?;
-        let read = primitive::read(self.document, json, uv_set, self.notes)?;
+        let mut uv_sets = material.map_or(Ok(vec![]), |at| self.materials.uv_sets(at))?;
+        if uv_sets.is_empty() {
+            // For `convert`, which writes them whatever the material is.
+            uv_sets.push(0);
+        }
+        let read = primitive::read(self.document, json, &uv_sets, self.notes)?;
         let Some(mut primitive) = read else { return Ok(()) };
         let made = self.material(material, primitive.colours.is_some())?;
         if made.is_invisible {

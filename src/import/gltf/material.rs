@@ -28,6 +28,24 @@ struct Laid {
     emissive: Option<LaidImage>,
 }
 
+impl Laid {
+    /// All images, the most important first.
+    fn all(&self) -> impl Iterator<Item = &LaidImage> {
+        [&self.base, &self.normal, &self.metal_rough, &self.emissive].into_iter().flatten()
+    }
+
+    /// The file's sets of texture coordinates that the images lie by, each once: the first is the scene's set 0, and so on.
+    fn uv_sets(&self) -> Vec<usize> {
+        let mut sets = Vec::new();
+        for LaidImage { set, .. } in self.all() {
+            if !sets.contains(set) {
+                sets.push(*set);
+            }
+        }
+        sets
+    }
+}
+
 /// How opaque a surface is.
 enum AlphaMode {
     Opaque,
@@ -53,17 +71,17 @@ impl<'d> MaterialReader<'d> {
         let mut images = BTreeSet::new();
         for at in used {
             let laid = self.laid(&self.document.materials[*at], &mut Notes::default())?;
-            let all = [laid.base, laid.metal_rough, laid.normal, laid.emissive];
-            images.extend(all.into_iter().flatten().map(|laid| laid.image));
+            images.extend(laid.all().map(|laid| laid.image));
         }
         Ok(images)
     }
 
-    /// The set of texture coordinates of a material's meshes: that of its first image. Images of other sets are left out.
-    pub fn uv_set(&self, material: usize) -> Result<usize> {
+    /// The file's sets of texture coordinates that the images of a material lie by, in the scene's order. None without images.
+    ///
+    /// Errors: those of [`TextureTable::laid`].
+    pub fn uv_sets(&self, material: usize) -> Result<Vec<usize>> {
         let laid = self.laid(&self.document.materials[material], &mut Notes::default())?;
-        let first = laid.base.or(laid.normal).or(laid.metal_rough).or(laid.emissive);
-        Ok(first.map_or(0, |laid| laid.set))
+        Ok(laid.uv_sets())
     }
 
     fn laid(&self, json: &Json<'_>, notes: &mut Notes) -> Result<Laid> {
@@ -94,15 +112,9 @@ impl<'d> MaterialReader<'d> {
         notes: &mut Notes,
     ) -> Result<Surfaced> {
         let json = &self.document.materials[at];
-        let mut laid = self.laid(json, notes)?;
-        let set = self.uv_set(at)?;
-        for map in [&mut laid.base, &mut laid.metal_rough, &mut laid.normal, &mut laid.emissive] {
-            if map.as_ref().is_some_and(|map| map.set != set) {
-                notes.add("a material has images on several sets of texture coordinates: those on others than its first image's were left out", None);
-                *map = None;
-            }
-        }
-        let mut parts = Parts { json, laid, images, world, notes };
+        let laid = self.laid(json, notes)?;
+        let uv_sets = laid.uv_sets();
+        let mut parts = Parts { json, laid, uv_sets, images, world, notes };
         let mut surfaced = parts.read(coloured)?;
         surfaced.material.name = name_of(json, "material", at)?;
         Ok(surfaced)
@@ -113,6 +125,7 @@ impl<'d> MaterialReader<'d> {
 struct Parts<'p, 'd> {
     json: &'p Json<'d>,
     laid: Laid,
+    uv_sets: Vec<usize>,
     images: &'p mut ImageStore,
     world: &'p mut World,
     notes: &'p mut Notes,
@@ -317,7 +330,9 @@ impl Parts<'_, '_> {
     fn map(&mut self, laid: Option<LaidImage>, role: Role) -> Result<Option<TextureMap>> {
         let Some(laid) = laid else { return Ok(None) };
         let number = self.images.place(laid.image, role, self.world)?;
-        Ok(number.map(|number| laid.map(number)))
+        // A material has a handful of images, so no more sets than a byte counts.
+        let uv_set = self.uv_sets.iter().position(|set| *set == laid.set).unwrap_or(0) as u8;
+        Ok(number.map(|number| laid.map(number, uv_set)))
     }
 }
 

@@ -34,19 +34,22 @@ pub(super) fn mesh(
     let mut normals = normals.map(|all| unit_normals(all, notes));
     // The image's origin is at its upper left in glTF, at its lower left here.
     let flipped = |uv: &[f32; 2]| Vec2::new(uv[0], 1.0 - uv[1]);
-    let mut uvs: Option<Vec<Vec2>> = uvs.map(|all| all.par_iter().map(flipped).collect());
+    let flipped = |all: Vec<[f32; 2]>| all.par_iter().map(flipped).collect();
+    let mut uvs: Vec<Option<Vec<Vec2>>> = uvs.into_iter().map(|set| set.map(flipped)).collect();
     let mut colours: Option<Vec<Rgb>> =
         colours.map(|all| all.into_par_iter().map(Rgb::from_array).collect());
     if let Some(kept) = tidy::used(positions.len(), &triangles) {
         tidy::retain(&mut positions, &kept);
         normals.iter_mut().for_each(|n| tidy::retain(n, &kept));
-        uvs.iter_mut().for_each(|uv| tidy::retain(uv, &kept));
+        uvs.iter_mut().flatten().for_each(|uv| tidy::retain(uv, &kept));
         colours.iter_mut().for_each(|c| tidy::retain(c, &kept));
         tidy::renumber(&mut triangles, &kept);
     }
+    let mut uvs = uvs.into_iter().map(|set| Some(Corners { values: set?, corners: None }));
     Some(WorldMesh {
         normals: normals.map(|values| Corners { values, corners: None }),
-        uvs: uvs.map(|values| Corners { values, corners: None }),
+        uvs: uvs.next().flatten(),
+        more_uvs: uvs.collect(),
         colours: colours.map(VertexColours::from_linear),
         ..WorldMesh::new(name, positions, triangles, 0)
     })
@@ -129,15 +132,15 @@ fn move_to(
 }
 
 /// Adds the triangles of `other`, which has the same attributes but for colours.
-fn append(mesh: &mut WorldMesh, other: WorldMesh) {
+fn append(mesh: &mut WorldMesh, mut other: WorldMesh) {
     let first = mesh.positions.len() as u32;
-    mesh.positions.extend(other.positions);
-    mesh.triangles.extend(other.triangles.into_iter().map(|t| t.map(|i| i + first)));
-    if let (Some(normals), Some(more)) = (&mut mesh.normals, other.normals) {
-        normals.values.extend(more.values);
+    mesh.positions.append(&mut other.positions);
+    mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
+    if let (Some(normals), Some(more)) = (&mut mesh.normals, &mut other.normals) {
+        normals.values.append(&mut more.values);
     }
-    if let (Some(uvs), Some(more)) = (&mut mesh.uvs, other.uvs) {
-        uvs.values.extend(more.values);
+    for (uvs, more) in mesh.uv_sets_mut().zip(other.uv_sets_mut()) {
+        uvs.values.append(&mut more.values);
     }
 }
 
@@ -145,7 +148,8 @@ fn append(mesh: &mut WorldMesh, other: WorldMesh) {
 pub(super) fn bytes(mesh: &WorldMesh) -> u64 {
     let vertices = mesh.positions.len() as u64;
     let normals = mesh.normals.as_ref().map_or(0, |n| 12 * n.values.len() as u64);
-    let uvs = mesh.uvs.as_ref().map_or(0, |uv| 8 * uv.values.len() as u64);
+    let uvs = mesh.uvs.iter().chain(mesh.more_uvs.iter().flatten());
+    let uvs: u64 = uvs.map(|uv| 8 * uv.values.len() as u64).sum();
     let colours = mesh.colours.as_ref().map_or(0, |c| c.bytes().len() as u64);
     12 * vertices + 12 * mesh.triangles.len() as u64 + normals + uvs + colours
 }

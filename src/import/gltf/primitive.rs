@@ -17,8 +17,8 @@ pub(super) const MOST_PIECES: usize = 4_000_000;
 pub(super) struct Primitive {
     pub positions: Vec<DVec3>,
     pub normals: Option<Vec<[f32; 3]>>,
-    /// Texture coordinates, (0, 0) at the upper left corner.
-    pub uvs: Option<Vec<[f32; 2]>>,
+    /// Sets of texture coordinates, (0, 0) at the upper left corner; `None` is one that the file lacks.
+    pub uvs: Vec<Option<Vec<[f32; 2]>>>,
     /// Linear RGB.
     pub colours: Option<Vec<[f32; 3]>>,
     pub triangles: Vec<[u32; 3]>,
@@ -104,13 +104,13 @@ fn mode(json: &Json<'_>) -> Result<Option<Mode>> {
     }
 }
 
-/// Reads a primitive, with the set `uv_set` of its texture coordinates. `None` of what has no triangles, which is noted.
+/// Reads a primitive, with the sets `uv_sets` of its texture coordinates, in their order. `None` of what has no triangles, which is noted.
 ///
 /// Errors: attributes of different lengths, indices that are out of range, numbers that are not finite.
 pub(super) fn read(
     document: &Document<'_>,
     json: &Json<'_>,
-    uv_set: usize,
+    uv_sets: &[usize],
     notes: &mut Notes,
 ) -> Result<Option<Primitive>> {
     let Some(mode) = mode(json)? else {
@@ -128,13 +128,14 @@ pub(super) fn read(
     // In glTF alpha does nothing to what is opaque.
     let has_alpha = mode_of_alpha.flatten().is_some_and(|mode| mode != "OPAQUE");
     let colours = reader.colours(&attributes, has_alpha, notes)?;
+    let uv_set = |set: &usize| {
+        let uvs = reader.accessor(&attributes, &format!("TEXCOORD_{set}"))?;
+        uvs.map(|uv| uv.finite()).transpose()
+    };
     Ok(Some(Primitive {
         positions: reader.required(&position)?.vectors()?,
         normals: reader.accessor(&attributes, "NORMAL")?.map(|n| n.floats()).transpose()?,
-        uvs: reader
-            .accessor(&attributes, &format!("TEXCOORD_{uv_set}"))?
-            .map(|uv| uv.finite())
-            .transpose()?,
+        uvs: uv_sets.iter().map(uv_set).collect::<Result<_>>()?,
         colours,
         triangles: reader.triangles(json, mode)?,
         joints: reader.joints(&attributes)?,

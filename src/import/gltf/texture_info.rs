@@ -19,16 +19,16 @@ pub(super) struct TextureTable<'d> {
 pub(super) struct LaidImage {
     /// Number of the file's image.
     pub image: usize,
-    /// Set of texture coordinates.
+    /// Set of texture coordinates, by the file's number.
     pub set: usize,
     wrap: [Wrap; 2],
     transform: DAffine2,
 }
 
 impl LaidImage {
-    /// As scene data, with the image's number there.
-    pub fn map(&self, image: u32) -> TextureMap {
-        TextureMap { image, wrap: self.wrap, transform: self.transform }
+    /// As scene data, with the numbers there of the image and of the set of texture coordinates.
+    pub fn map(&self, image: u32, uv_set: u8) -> TextureMap {
+        TextureMap { image, wrap: self.wrap, uv_set, transform: self.transform }
     }
 }
 

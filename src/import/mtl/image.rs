@@ -98,7 +98,7 @@ impl MapOptions {
     pub fn map(&self, image: u32) -> TextureMap {
         let ([x, y], offset) = (self.scale, DVec2::from_array(self.offset));
         let transform = DAffine2::from_cols(DVec2::new(x, 0.0), DVec2::new(0.0, y), offset);
-        TextureMap { image, wrap: [self.wrap; 2], transform }
+        TextureMap { wrap: [self.wrap; 2], transform, ..TextureMap::of(image) }
     }
 }
 

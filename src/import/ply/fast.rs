@@ -61,12 +61,13 @@ fn vertices(
     let chunks = || records.par_chunks_exact(record);
     let normals = columns.normal.map(|n| chunks().map(|b| unit_or_zero(vector(b, n))).collect());
     let uv = |b: &[u8], [u, v]: [usize; 2]| Vec2::new(value(b, u) as f32, value(b, v) as f32);
-    let uvs = columns.uv.map(|at| chunks().map(|bytes| uv(bytes, at)).collect());
+    let set = |at| chunks().map(|bytes| uv(bytes, at)).collect();
+    let (uvs, more_uvs) = (columns.uv.map(set), columns.more_uvs.into_iter().map(set).collect());
     let colours = columns.colour.map(|colour| {
         let share = |bytes: &[u8]| colour.share(colour.at.map(|column| value(bytes, column)));
         chunks().map(share).collect()
     });
-    contents.vertices = Vertices { positions, normals, uvs, colours };
+    contents.vertices = Vertices { positions, normals, uvs, more_uvs, colours };
     Some(size)
 }
 

@@ -139,6 +139,11 @@ impl Body<'_> {
     }
 }
 
+/// An attribute with a value for each vertex.
+fn of_vertices<T>(values: Vec<T>) -> Corners<T> {
+    Corners { values, corners: None }
+}
+
 fn build(
     path: &Path,
     mut vertices: Vertices,
@@ -157,18 +162,19 @@ fn build(
         model.warnings.push(Diagnostic::new(path, "no triangle is left: nothing will be seen"));
         return Ok(None);
     }
-    let Vertices { positions: _, mut normals, mut uvs, mut colours } = vertices;
+    let Vertices { positions: _, mut normals, mut uvs, mut more_uvs, mut colours } = vertices;
     if let Some(kept) = tidy::used(positions.len(), &triangles) {
         tidy::retain(&mut positions, &kept);
         normals.iter_mut().for_each(|n| tidy::retain(n, &kept));
-        uvs.iter_mut().for_each(|uv| tidy::retain(uv, &kept));
+        uvs.iter_mut().chain(&mut more_uvs).for_each(|uv| tidy::retain(uv, &kept));
         colours.iter_mut().for_each(|colours| tidy::retain(colours, &kept));
         tidy::renumber(&mut triangles, &kept);
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     Ok(Some(WorldMesh {
-        normals: normals.map(|values| Corners { values, corners: None }),
-        uvs: uvs.map(|values| Corners { values, corners: None }),
+        normals: normals.map(of_vertices),
+        uvs: uvs.map(of_vertices),
+        more_uvs: more_uvs.into_iter().map(|values| Some(of_vertices(values))).collect(),
         colours: colours.map(|shares| VertexColours::from_encoded(&shares)),
         ..WorldMesh::new(name, positions, triangles, 0)
     }))

@@ -80,6 +80,29 @@ fn every_type_and_order_reads_alike_in_every_format() {
 }
 
 #[test]
+fn sets_of_texture_coordinates_have_numbers() {
+    // The number 3 follows nothing; of an unused vertex no set keeps anything.
+    let header = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property float t1\nproperty float s1\nproperty float s\nproperty float t\n\
+        property float s3\nproperty float t3\nelement face 1\nproperty list uchar int vertex_indices\n";
+    let records = [
+        "9:f4 9:f4 9:f4 9:f4 9:f4 9:f4 9:f4 9:f4 9:f4",
+        "0:f4 0:f4 0:f4 0.5:f4 0.25:f4 0:f4 0:f4 9:f4 9:f4",
+        "1:f4 0:f4 0:f4 1:f4 0.25:f4 1:f4 0:f4 9:f4 9:f4",
+        "0:f4 1:f4 0:f4 0.5:f4 0.75:f4 0:f4 1:f4 9:f4 9:f4",
+        "3:u1 1:i4 2:i4 3:i4",
+    ];
+    for format in FORMATS {
+        let mesh = read_both(&encode(format, header, &records));
+        let values = |set| mesh.uv_set(set).map(|uvs| uvs.values.clone());
+        assert_eq!(values(0), Some(vec![Vec2::ZERO, Vec2::X, Vec2::Y]), "{format}");
+        let second = [(0.25, 0.5), (0.25, 1.0), (0.75, 0.5)].map(|(u, v)| Vec2::new(u, v));
+        assert_eq!(values(1), Some(second.to_vec()), "{format}");
+        assert_eq!((values(2), mesh.more_uvs.len()), (None, 1), "{format}");
+    }
+}
+
+#[test]
 fn strips_alternate_and_restart() {
     let header = "element vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
         element tristrips 2\nproperty list int int vertex_indices\n";

@@ -15,6 +15,8 @@ pub(super) struct Vertices {
     /// Unit, or zero where the file's is unusable.
     pub normals: Option<Vec<Vec3>>,
     pub uvs: Option<Vec<Vec2>>,
+    /// Further sets of texture coordinates, from number 1 on.
+    pub more_uvs: Vec<Vec<Vec2>>,
     /// Shares of the largest sRGB code, as the file has them: any number.
     pub colours: Option<Vec<[f32; 3]>>,
 }
@@ -25,6 +27,8 @@ pub(super) struct Columns {
     pub position: [usize; 3],
     pub normal: Option<[usize; 3]>,
     pub uv: Option<[usize; 2]>,
+    /// Of further sets of texture coordinates, from number 1 on.
+    pub more_uvs: Vec<[usize; 2]>,
     pub colour: Option<ColourColumns>,
 }
 
@@ -36,7 +40,7 @@ pub(super) struct ColourColumns {
     full: [f64; 3],
 }
 
-/// Names that texture coordinates go by.
+/// Names that texture coordinates go by. Those of further sets have the set's number after them: `s1` and `t1`.
 const UV_NAMES: [[&str; 2]; 4] =
     [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
 
@@ -101,11 +105,24 @@ impl Columns {
             let [a, b, c] = names.map(scalar);
             Some([a?, b?, c?])
         };
-        let two = |names: &[&str; 2]| Some([scalar(names[0])?, scalar(names[1])?]);
+        let set = |names: [String; 2]| Some([scalar(&names[0])?, scalar(&names[1])?]);
+        let set = |number: &str| {
+            UV_NAMES.iter().find_map(|names| set(names.map(|name| format!("{name}{number}"))))
+        };
         let position = three(["x", "y", "z"])
             .ok_or_else(|| Fault::new(element.line, "the vertices have no x, y and z"))?;
-        let (normal, uv) = (three(["nx", "ny", "nz"]), UV_NAMES.iter().find_map(two));
-        Ok(Self { position, normal, uv, colour: ColourColumns::of(element, notes) })
+        Ok(Self {
+            position,
+            normal: three(["nx", "ny", "nz"]),
+            uv: set(""),
+            more_uvs: (1..=u8::MAX).map_while(|number| set(&number.to_string())).collect(),
+            colour: ColourColumns::of(element, notes),
+        })
+    }
+
+    /// The columns of all sets of texture coordinates, in their order.
+    fn uv_sets(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.uv.iter().chain(&self.more_uvs).copied()
     }
 }
 
@@ -116,6 +133,7 @@ impl Vertices {
             positions: Vec::with_capacity(count),
             normals: columns.normal.map(|_| Vec::with_capacity(count)),
             uvs: columns.uv.map(|_| Vec::with_capacity(count)),
+            more_uvs: columns.more_uvs.iter().map(|_| Vec::with_capacity(count)).collect(),
             colours: columns.colour.map(|_| Vec::with_capacity(count)),
         }
     }
@@ -127,7 +145,8 @@ impl Vertices {
         if let (Some(normals), Some(at)) = (&mut self.normals, columns.normal) {
             normals.push(unit_or_zero(vector(at)));
         }
-        if let (Some(uvs), Some([u, v])) = (&mut self.uvs, columns.uv) {
+        let sets = self.uvs.iter_mut().chain(&mut self.more_uvs);
+        for (uvs, [u, v]) in sets.zip(columns.uv_sets()) {
             uvs.push(Vec2::new(values[u] as f32, values[v] as f32));
         }
         if let (Some(colours), Some(columns)) = (&mut self.colours, &columns.colour) {
@@ -138,7 +157,8 @@ impl Vertices {
     /// The first vertex with a position, texture coordinate or colour that is not finite.
     pub fn first_not_finite(&self) -> Option<(usize, &'static str)> {
         let position = self.positions.par_iter().position_first(|p| !p.is_finite());
-        let uv = self.uvs.as_ref().and_then(|uvs| uvs.iter().position(|uv| !uv.is_finite()));
+        let sets = self.uvs.iter().chain(&self.more_uvs);
+        let uv = sets.filter_map(|uvs| uvs.iter().position(|uv| !uv.is_finite())).min();
         let is_bad = |c: &[f32; 3]| c.iter().any(|c| !c.is_finite());
         let colour = self.colours.as_ref().and_then(|c| c.par_iter().position_first(is_bad));
         let found = [(position, "position"), (uv, "texture coordinate"), (colour, "colour")];

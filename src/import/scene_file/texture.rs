@@ -35,13 +35,16 @@ macro_rules! image_table {
             /// Added to the texture coordinates; after `scale` and `rotate`.
             #[serde(default = "at_zero")]
             offset: List<Coordinate, 2>,
+            /// The set of the mesh's texture coordinates that the image lies by, from 0: in a ply file 0 is `s` and `t`, 1 `s1` and `t1`.
+            #[serde(default)]
+            uv_set: u8,
             $($(#[$own_doc])* #[serde(default)] pub $own: $type,)*
         }
 
         impl ImageTable for $name {
             fn of_file(file: String) -> Self {
                 let (wrap, scale, rotate, offset) = (Wrapping::Repeat, unscaled(), unturned(), at_zero());
-                Self { file, wrap, scale, rotate, offset, $($own: Default::default(),)* }
+                Self { file, wrap, scale, rotate, offset, uv_set: 0, $($own: Default::default(),)* }
             }
 
             fn file(&self) -> &str {
@@ -49,7 +52,8 @@ macro_rules! image_table {
             }
 
             fn map(&self, image: TextureId) -> TextureMap {
-                map(image, self.wrap, (&self.scale, self.rotate, &self.offset))
+                let map = map(image, self.wrap, (&self.scale, self.rotate, &self.offset));
+                TextureMap { uv_set: self.uv_set, ..map }
             }
         }
     };
@@ -177,7 +181,8 @@ fn map(
     let angle = rotate.0.to_radians();
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     let axes = [DVec2::new(cos, sin) * scale.x, DVec2::new(-sin, cos) * scale.y];
-    TextureMap { image, wrap: [wrap; 2], transform: DAffine2::from_cols(axes[0], axes[1], offset) }
+    let transform = DAffine2::from_cols(axes[0], axes[1], offset);
+    TextureMap { wrap: [wrap; 2], transform, ..TextureMap::of(image) }
 }
 
 /// A table, of which the file's name alone may stand for all.

@@ -29,8 +29,7 @@ pub(super) fn painted(
 ) -> Rgb {
     let mut albedo = colour;
     if let Some(map) = &material.texture {
-        let footprint = cone.footprint(scene, si, wo);
-        albedo *= texture::mapped(scene, map, si.uv, footprint);
+        albedo *= texture::shown(scene, map, (si, wo, cone));
     }
     // No sphere has any.
     let mesh = scene.meshes.get(si.prim.geom_id as usize);

@@ -28,9 +28,9 @@ class Materials:
             self._made[name] = self._make(material, name)
         return self._made[name]
 
-    def uv_map(self, material):
-        """The name of the UV map that its images use, or None for the active one."""
-        return self.made(material).uv_map if material else None
+    def uv_maps(self, material):
+        """The names of the UV maps that its images use, in the order of their numbers; None is the active one."""
+        return (self.made(material).uv_maps if material else None) or [None]
 
     def colour_attribute(self, material):
         """The name of its colour attribute, "" for the active one, None for none."""

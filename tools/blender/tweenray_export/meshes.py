@@ -5,8 +5,7 @@ import os
 
 import numpy as np
 
-# Columns of a vertex: position, normal, texture coordinates, colour.
-HEADS = [("x", "y", "z"), ("nx", "ny", "nz"), ("s", "t"), ("red", "green", "blue")]
+POSITION = ["x", "y", "z"]
 
 
 class Meshes:
@@ -42,7 +41,7 @@ class Meshes:
             material = self._material(mesh, slots, index)
             rows = self._corners(ob, mesh, material)[loops[used == index].reshape(-1)]
             name = f"{ob.data.name if ob.data else ob.name}-{material.name}" if material else ob.name
-            found.append((self._file(name, rows, self._has(mesh, material)), material))
+            found.append((self._file(name, rows, self._heads(mesh, material)), material))
         return found
 
     def _material(self, mesh, slots, index):
@@ -51,11 +50,13 @@ class Meshes:
             name = mesh.materials[index].name
         return self.materials.original(name) if name else None
 
-    def _uv_layer(self, mesh, material):
-        wanted = self.materials.uv_map(material)
+    def _uv_layers(self, mesh, material):
+        """The UV maps that the material names, the active one in place of any that the mesh lacks."""
         layers = mesh.uv_layers
         active = next((layer for layer in layers if layer.active_render), None)
-        return layers.get(wanted, active) if wanted else active
+        if active is None:
+            return []
+        return [layers.get(name, active) if name else active for name in self.materials.uv_maps(material)]
 
     def _colours(self, mesh, material):
         wanted = self.materials.colour_attribute(material)
@@ -64,9 +65,12 @@ class Meshes:
         attributes = mesh.color_attributes
         return attributes.get(wanted) if wanted else attributes.get(attributes.default_color_name or "")
 
-    def _has(self, mesh, material):
-        colours = self._colours(mesh, material) is not None
-        return [True, True, self._uv_layer(mesh, material) is not None, colours]
+    def _heads(self, mesh, material):
+        """Names of what `_corners` gives: position, normal, sets of texture coordinates, colour."""
+        heads = POSITION + ["nx", "ny", "nz"]
+        for number in range(len(self._uv_layers(mesh, material))):
+            heads += [f"{axis}{number or ''}" for axis in "st"]
+        return heads + (["red", "green", "blue"] if self._colours(mesh, material) is not None else [])
 
     def _corners(self, ob, mesh, material):
         """One row of f32 a corner of a face: all that it has, in Blender's axes."""
@@ -74,8 +78,8 @@ class Meshes:
         vertex = whole(mesh.loops, "vertex_index", corners)
         columns = [floats(mesh.vertices, "co", len(mesh.vertices), 3)[vertex]]
         columns.append(floats(mesh.corner_normals, "vector", corners, 3))
-        layer, colours = self._uv_layer(mesh, material), self._colours(mesh, material)
-        if layer is not None:
+        colours = self._colours(mesh, material)
+        for layer in self._uv_layers(mesh, material):
             columns.append(floats(layer.uv, "vector", corners, 2))
         if colours is not None:
             linear = floats(colours.data, "color", len(colours.data), 4)[:, :3]
@@ -87,10 +91,9 @@ class Meshes:
             rows = np.nan_to_num(rows, nan=0.0, posinf=0.0, neginf=0.0)
         return rows + np.float32(0.0)
 
-    def _file(self, name, rows, has):
+    def _file(self, name, rows, heads):
         """The name of the file of triangles whose corners are `rows`, written where no other has its bytes."""
         unique, index = unique_rows(rows)
-        heads = [head for heads, there in zip(HEADS, has) if there for head in heads]
         body = ply(unique, heads, index.reshape(-1, 3))
         digest = hashlib.sha256(body).digest()
         if digest not in self._files:
@@ -106,7 +109,7 @@ class Meshes:
         points = np.array(corners, dtype=np.float32).reshape(-1, 3)
         first = 4 * np.arange(len(corners))[:, None]
         triangles = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]], axis=1).reshape(-1)
-        return self._file(name, points[triangles], [True, False, False, False])
+        return self._file(name, points[triangles], POSITION)
 
 
 def whole(items, name, count):

@@ -8,11 +8,12 @@ SIMPLE = ("BSDF_DIFFUSE", "BSDF_GLOSSY", "BSDF_ANISOTROPIC", "EMISSION", "BSDF_T
 
 
 class Made:
-    """A material of tweenray: its `table`, the UV map and colour attribute that it reads, and whether it is seen at all."""
+    """A material of tweenray: its `table`, the UV maps (in the order of their numbers; None is the active one) and the colour attribute that
+    it reads, and whether it is seen at all."""
 
     def __init__(self, table, is_seen=True):
         self.table, self.is_seen = table, is_seen
-        self.uv_map = self.colours = None
+        self.uv_maps, self.colours = [], None
 
 
 class Writer:
@@ -26,10 +27,7 @@ class Writer:
     def surface(self, place):
         """The material of a surface shader."""
         made = self.shader(place.fed())
-        maps = list(dict.fromkeys(self._maps))
-        made.uv_map = maps[0] if maps else None
-        if len(maps) > 1:
-            self.note("images on several UV maps", f"all on {maps[0]!r}")
+        made.uv_maps = self._maps
         return made
 
     def note(self, what, instead):
@@ -234,8 +232,11 @@ class Writer:
 
     def laid(self, laid, file, as_table=False):
         """The file, or its table where it lies in another way than plainly."""
-        self._maps.append(laid.uv_map)
-        return {"file": file} | laid.table if laid.table or as_table else file
+        if laid.uv_map not in self._maps:
+            self._maps.append(laid.uv_map)
+        number = self._maps.index(laid.uv_map)
+        table = laid.table | ({"uv_set": number} if number else {})
+        return {"file": file} | table if table or as_table else file
 
     def normal(self, made, fed, name="Normal"):
         """A normal map."""

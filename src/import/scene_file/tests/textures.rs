@@ -122,7 +122,7 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("white.ppm"), b"P6 1 1 255\n\xff\xff\xff").expect("written");
     let text = "[material.a]\ntexture = 'white.ppm'\n[material.b]\ntexture = { file = 'white.ppm', \
-                wrap = 'mirror', scale = [2, 3], rotate = 90, offset = [0.5, 0] }\n\
+                wrap = 'mirror', scale = [2, 3], rotate = 90, offset = [0.5, 0], uv_set = 2 }\n\
                 [[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n";
     std::fs::write(at("scene.toml"), text).expect("written");
     let world = load(&at("scene.toml"), &LoadOptions::default()).expect("a scene").world;
@@ -131,7 +131,7 @@ fn a_texture_may_be_scaled_turned_moved_and_wrapped() {
         material.texture.expect("a texture")
     };
     assert_eq!(map("a"), TextureMap::of(0));
-    assert_eq!((map("b").image, map("b").wrap), (0, [Wrap::Mirror; 2]));
+    assert_eq!((map("b").image, map("b").wrap, map("b").uv_set), (0, [Wrap::Mirror; 2], 2));
     // Scaled to (2, 6), turned to (-6, 2), moved.
     let moved = map("b").transform.transform_point2(DVec2::new(1.0, 2.0));
     assert!((moved - DVec2::new(-5.5, 2.0)).length() < 1e-12, "{moved}");
