@@ -169,7 +169,7 @@ impl<'m> Emission<'m> {
     /// The mean radiance of a part of face `at`: of many points in rows, looked up where texels are about as far apart.
     fn mean(&self, at: usize, part: Part) -> Rgb {
         let Some((image, map)) = self.image else { return self.colour };
-        let Some(uvs) = &self.mesh.uvs else { return self.colour };
+        let Some(uvs) = self.mesh.uv_set(map.uv_set) else { return self.colour };
         let [a, b, c] = uvs.get(at, self.mesh.triangles[at]);
         let [a, b, c] = [a, b, c].map(|uv| map.transform.transform_point2(uv.as_dvec2()));
         let corners = part.map(|(u, v)| a + (b - a) * u + (c - a) * v);
