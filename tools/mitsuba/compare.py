@@ -27,8 +27,8 @@ MOST = 0.004
 SAMPLES, PART = 1024, 64
 
 
-def by_mitsuba(scene, samples=SAMPLES):
-    built = mi.load_dict(scene.mitsuba())
+def by_mitsuba(described, samples=SAMPLES):
+    built = mi.load_dict(described)
     parts = range(samples // PART)
     return np.mean([np.array(mi.render(built, spp=PART, seed=part)) for part in parts], axis=0)[..., :3]
 
@@ -36,7 +36,7 @@ def by_mitsuba(scene, samples=SAMPLES):
 def by_tweenray(program, scene, folder):
     with open(os.path.join(folder, "scene.toml"), "w") as out:
         out.write(scene.tweenray())
-    samples = ["--spp", "64", "--shadow-samples", "16", "--sky-samples", "16", "--fog-samples", "8"]
+    samples = ["--spp", str(getattr(scene, "samples", 64)), "--shadow-samples", "16", "--sky-samples", "16", "--fog-samples", "8"]
     command = [program, "render", "scene.toml", "-o", "tweenray.exr", "--overwrite", "--quiet", "--policy", "off", *samples]
     subprocess.run(command, cwd=folder, check=True)
     return np.array(mi.Bitmap(os.path.join(folder, "tweenray.exr")))[..., :3]
@@ -62,7 +62,7 @@ def report(name, mitsuba, tweenray):
 
 def one(program, name, place):
     scene = scenes.ALL[name]
-    pictures = by_mitsuba(scene), by_tweenray(program, scene, place)
+    pictures = by_mitsuba(scene.mitsuba()), by_tweenray(program, scene, place)
     save(place, *pictures)
     return report(name, *pictures)
 
@@ -70,9 +70,15 @@ def one(program, name, place):
 def many(program, name, place):
     balls.write(place)
     rows = []
+    only = os.environ.get("BALLS")
     for ball in balls.all_of(place, name == "balls-environment"):
-        pictures = by_mitsuba(ball), by_tweenray(program, ball, place)
+        if only and not any(ball.name.startswith(word) for word in only.split("|")):
+            continue
+        pictures = by_mitsuba(ball.mitsuba()), by_tweenray(program, ball, place)
         report(ball.name, *pictures)
+        if ball.formula:
+            pictures = by_mitsuba(ball.mitsuba(ball.formula)), pictures[1]
+            report(f"{ball.name}, by formula", *pictures)
         rows.append(pictures)
     together = [np.concatenate(pictures, axis=1) for pictures in zip(*rows)]
     save(place, *together)
