@@ -3,8 +3,14 @@
     python3 tools/mitsuba/compare.py TWEENRAY FOLDER [SCENE ...]      (a Python with the modules mitsuba and numpy)
 
 Compared is linear radiance, clipped to [0, 1]: the root mean square of the difference over all pixels, and over the 95 %
-that agree best. Each scene leaves `mitsuba.exr`, `tweenray.exr` and `pair.png` (Mitsuba above, tweenray below it, ten
-times the difference at the bottom).
+that agree best. Where Mitsuba has another model of a material, a second row compares with tweenray's formula, written anew
+as a BSDF of Mitsuba's (`formulas.py`); that row counts. Each scene leaves `mitsuba.exr`, `tweenray.exr` and `pair.png` (Mitsuba
+above, tweenray below it, ten times the difference at the bottom).
+
+    BALLS='glass|metal 0.9'       only the balls whose names begin so
+    MITSUBA_VARIANT=scalar_rgb    another variant than llvm_ad_rgb, which needs LLVM 15 or newer (DRJIT_LIBLLVM_PATH); the balls'
+                                  formulas take a variant with arrays
+    SAMPLES=16384                 samples of Mitsuba's
 """
 
 import os
@@ -24,7 +30,7 @@ import scenes
 # Most that 95 % of the pixels may differ by.
 MOST = 0.004
 # Samples of Mitsuba's, in parts that fit in memory.
-SAMPLES, PART = 1024, 64
+SAMPLES, PART = int(os.environ.get("SAMPLES", 1024)), 64
 
 
 def by_mitsuba(described, samples=SAMPLES):
