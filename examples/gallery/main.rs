@@ -19,11 +19,11 @@ use tweenray::measure::median;
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs");
 /// Camera samples a pixel of the pictures.
-const PICTURE_SAMPLES: u32 = 144;
+const PICTURE_SAMPLES: u32 = 100;
 /// Camera samples a pixel of the frames whose time is taken.
 const TIMED_SAMPLES: u32 = 8;
 /// Pairs of frames whose times are compared.
-const PAIRS: usize = 9;
+const PAIRS: usize = 7;
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
