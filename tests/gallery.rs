@@ -36,7 +36,8 @@ fn each_effect_changes_its_frame() {
             film.rgb
         });
         let pairs = films[0].iter().zip(&films[1]);
-        let apart = pairs.map(|(a, b)| f64::from((a.min(one()) - b.min(one())).abs().element_sum()));
+        let apart =
+            pairs.map(|(a, b)| f64::from((a.min(one()) - b.min(one())).abs().element_sum()));
         let mean = apart.sum::<f64>() / (3.0 * films[0].len() as f64);
         let is_same = SAME.contains(&effect.name);
         assert_eq!(mean < 0.003, is_same, "{}: {mean} apart", effect.name);
