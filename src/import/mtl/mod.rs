@@ -87,6 +87,25 @@ impl Entry {
         images.place(&self.file(image), what, world, files).map(|id| image.options.map(id))
     }
 
+    /// The same, or a warning that what `name` names is left out.
+    fn lay_or_warn(
+        &self,
+        image: &MapImage,
+        (what, name): (ImageUse, &str),
+        images: &mut Images,
+        model: &mut Model,
+    ) -> Option<TextureMap> {
+        let map = self.lay(image, what, images, model);
+        let warn = |error| model.warnings.push(self.warning(format!("{name} left out: {error}")));
+        map.map_err(warn).ok()
+    }
+
+    /// A warning about the material.
+    fn warning(&self, message: String) -> Diagnostic {
+        let Self { library, source, .. } = self;
+        Diagnostic::new(library, format!("material `{}`: {message}", source.name)).line(source.line)
+    }
+
     /// The normal map of an image; `Err` tells why there is none.
     fn normal_map(
         &self,
@@ -184,55 +203,41 @@ impl Libraries {
                 false => model.default_material(),
             });
         };
-        let place = |message: String| {
-            Diagnostic::new(&entry.library, format!("material `{name}`: {message}"))
-                .line(entry.source.line)
-        };
         let (mut material, notes) = meaning::of(&entry.source, &entry.parsed);
-        model.warnings.extend(notes.into_iter().map(place));
+        model.warnings.extend(notes.into_iter().map(|note| entry.warning(note)));
         let Taken { texture, roughness, metallic, normals, mask } = entry.taken(&material);
         if let Some(image) = texture {
-            match entry.lay(image, ImageUse::Colour, images, model) {
-                Ok(map) => {
-                    material.texture = Some(map);
-                    material.diffuse = meaning::textured(&entry.parsed);
-                    let doubt = images.doubt(&entry.file(image), ImageUse::Colour);
-                    let warn = |doubt| place(format!("`map_Kd` {}: {doubt}", image.name));
-                    model.warnings.extend(doubt.map(warn));
-                }
-                Err(error) => model.warnings.push(place(format!("texture left out: {error}"))),
+            let what = (ImageUse::Colour, "texture");
+            if let Some(map) = entry.lay_or_warn(image, what, images, model) {
+                material.texture = Some(map);
+                material.diffuse = meaning::textured(&entry.parsed);
+                let doubt = images.doubt(&entry.file(image), ImageUse::Colour);
+                let warn = |doubt| entry.warning(format!("`map_Kd` {}: {doubt}", image.name));
+                model.warnings.extend(doubt.map(warn));
             }
         }
         if let Some(image) = roughness {
-            match entry.lay(image, data(image), images, model) {
-                Ok(map) => {
-                    material.roughness_map = Some(map);
-                    material.roughness = 1.0;
-                }
-                Err(error) => {
-                    model.warnings.push(place(format!("roughness map left out: {error}")));
-                }
+            let what = (data(image), "roughness map");
+            if let Some(map) = entry.lay_or_warn(image, what, images, model) {
+                material.roughness_map = Some(map);
+                material.roughness = 1.0;
             }
         }
         if let (Some(image), Some(fresnel)) = (metallic, &mut material.fresnel) {
-            match entry.lay(image, data(image), images, model) {
-                Ok(map) => {
-                    fresnel.metallic_map = Some(map);
-                    fresnel.metallic = 1.0;
-                }
-                Err(error) => {
-                    model.warnings.push(place(format!("metallic map left out: {error}")));
-                }
+            let what = (data(image), "metallic map");
+            if let Some(map) = entry.lay_or_warn(image, what, images, model) {
+                fresnel.metallic_map = Some(map);
+                fresnel.metallic = 1.0;
             }
         }
         if let Some(bump) = normals {
             let normals = entry.normal_map(bump, images, model);
-            let warn = |message| model.warnings.push(place(message));
+            let warn = |message| model.warnings.push(entry.warning(message));
             material.normal_map = normals.map_err(warn).ok();
         }
         if coloured && material.texture.is_some() {
             let message = "the texture is shown, the vertex colours are not";
-            model.warnings.push(place(message.into()));
+            model.warnings.push(entry.warning(message.into()));
         } else if coloured && material.diffuse != Rgb::ZERO {
             material.vertex_colours = true;
             if entry.parsed.diffuse.is_none() {
@@ -240,9 +245,8 @@ impl Libraries {
             }
         }
         if let Some(image) = mask {
-            let mask = entry.lay(image, ImageUse::Mask, images, model);
-            let warn = |error| model.warnings.push(place(format!("cut-outs left out: {error}")));
-            material.alpha = mask.map_err(warn).ok();
+            let what = (ImageUse::Mask, "cut-outs");
+            material.alpha = entry.lay_or_warn(image, what, images, model);
         }
         model.world.materials.push(material);
         Ok(model.world.materials.len() as MaterialId - 1)
