@@ -295,7 +295,7 @@ fn scaling_the_world_by_a_power_of_two_changes_no_byte() {
                     point.position *= s;
                     point.intensity *= (s * s) as f32;
                 }
-                Light::Directional(_) | Light::Sun(_) => {}
+                Light::Directional(_) | Light::Sun(_) | Light::Face(_) => {}
             }
         }
         let glass = w.materials.iter_mut().filter_map(|m| m.glass.as_mut());

@@ -7,7 +7,7 @@ use crate::error::{Diagnostic, Error, Result};
 use crate::import::{self, Loaded};
 use crate::output::FramePattern;
 use crate::scene::limits::MAX_EDGE;
-use crate::scene::{Aovs, Collapsed, Policy, Scene, Settings};
+use crate::scene::{Aovs, Collapsed, MOST_FACE_LIGHTS, Policy, Scene, Settings, Unlit};
 use crate::shade::SampleSpread;
 use std::path::{Path, PathBuf};
 
@@ -44,8 +44,8 @@ fn refuse_folder(path: &Path) -> Result<()> {
     Err(Error::input(path, format!("is a folder, not a scene file\n  help: {help}")))
 }
 
-/// Warnings about meshes of the scene at `file` that lost triangles to rounding.
-pub fn collapsed(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
+/// Warnings about meshes of the scene at `file`: those that lost triangles to rounding, and those whose light lights nothing.
+pub fn lossy_meshes(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
     let warning = |c: &Collapsed| {
         let Collapsed { mesh, lost, of } = c;
         let message = format!(
@@ -55,7 +55,22 @@ pub fn collapsed(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
         Diagnostic::new(file, message)
             .help("leave out what is far away from them, or render them apart")
     };
-    scene.collapsed.iter().map(warning).collect()
+    let unlit = |u: &Unlit| {
+        let Unlit { mesh, share } = u;
+        let message = match share {
+            1.0 => format!("`{mesh}` emits: it is seen, but casts no light"),
+            _ => format!(
+                "`{mesh}` emits: all of it is seen, but {:.0} % of its light lights nothing",
+                100.0 * share
+            ),
+        };
+        let help = format!(
+            "a mesh has at most {MOST_FACE_LIGHTS} faces that light the scene, its brightest ones"
+        );
+        Diagnostic::new(file, message).help(help)
+    };
+    let collapsed = scene.collapsed.iter().map(warning);
+    collapsed.chain(scene.unlit.iter().map(unlit)).collect()
 }
 
 /// Checks the scene file's output pattern; an error has the place in the file.

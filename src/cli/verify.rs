@@ -97,8 +97,8 @@ pub fn run(args: &VerifyArgs) -> Result<Exit> {
     let Loaded { world, shot, settings, warnings, .. } = job::load(&args.scene, &args.settings())?;
     let scene = world.into_scene(settings.rules.recentre)?;
     if !args.quiet {
-        let collapsed = job::collapsed(&scene, &args.scene.scene);
-        warnings.iter().chain(&collapsed).for_each(say::warning);
+        let lossy = job::lossy_meshes(&scene, &args.scene.scene);
+        warnings.iter().chain(&lossy).for_each(say::warning);
     }
     refuse_the_pointless(&scene, &settings)?;
     let threads = args.threads.map_or_else(cluster::default_threads, |n| n as usize);

@@ -1,20 +1,20 @@
-//! Turning emitting surfaces into lights, if a light of that shape exists.
+//! Lights in place of surfaces that emit and do nothing else.
 //!
-//! An analytic sphere becomes a sphere light; the faces of a mesh become quad lights, at most [`MAX_LIGHTS`]. [`World::into_scene`] gives lights their
-//! surface, so the sphere or mesh itself leaves the world. Any other mesh keeps its emission: it
-//! is seen, and casts no light. So does a surface with cut-outs, since lights have no holes.
+//! An analytic sphere becomes a sphere light; the faces of a mesh become quad lights, at most [`MAX_LIGHTS`]. [`World::into_scene`]
+//! gives lights their surface, so the sphere or mesh itself leaves the world. A mesh that reflects too, or emits by an image,
+//! stays, and the scene makes lights of its faces. A surface with cut-outs casts no light, since lights have no holes.
 
-use super::lamps::{MAX_LIGHTS, cover};
+use super::lamps::cover;
 use crate::scene::{Light, Material, QuadLight, SphereLight, World};
 
 /// A note about an emitting surface, for a warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Note {
-    /// The mesh of this name is visible but lights nothing.
+    /// The sphere of this name is visible but lights nothing, since it emits by an image.
     CastsNoLight(String),
     /// The surface of this name is visible but lights nothing, since it has cut-outs.
     HasHoles(String),
-    /// The surface of this name became a light, which reflects nothing.
+    /// The sphere of this name became a light, which reflects nothing.
     ReflectsNothing(String),
 }
 
@@ -22,7 +22,11 @@ impl Note {
     /// The text of the warning.
     pub fn message(&self) -> String {
         match self {
-            Self::CastsNoLight(name) => format!("`{name}` emits: it is seen, but casts no light"),
+            Self::CastsNoLight(name) => {
+                format!(
+                    "`{name}` is a sphere that emits by an image: it is seen, but casts no light"
+                )
+            }
             Self::HasHoles(name) => {
                 format!("`{name}` emits and has cut-outs: it is seen, but casts no light")
             }
@@ -35,9 +39,7 @@ impl Note {
     /// The help line of the warning.
     pub fn help(&self) -> String {
         match self {
-            Self::CastsNoLight(_) => format!(
-                "a sphere, or a mesh of at most {MAX_LIGHTS} triangles or flat quads, lights the scene when it emits"
-            ),
+            Self::CastsNoLight(_) => "take a mesh, as `uv_sphere`".into(),
             Self::HasHoles(_) => "a light has no holes: take `alpha` from its material".into(),
             Self::ReflectsNothing(_) => "give it a material with `emission` alone".into(),
         }
@@ -51,9 +53,8 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
     let materials = &world.materials;
     for mesh in world.meshes.split_off(first_mesh) {
         let material = &materials[mesh.material as usize];
-        match shines(material).then(|| cover(&mesh)).flatten() {
+        match is_mere_light(material).then(|| cover(&mesh)).flatten() {
             Some(quads) => {
-                notes.extend(material.reflects().then(|| Note::ReflectsNothing(mesh.name.clone())));
                 let light = |corners| {
                     let (radiance, two_sided) = (material.emission, material.emits_back);
                     Light::Quad(QuadLight { corners, radiance, two_sided })
@@ -61,35 +62,36 @@ pub(super) fn adopt(world: &mut World, first_mesh: usize, first_sphere: usize) -
                 world.lights.extend(quads.into_iter().map(light));
             }
             None => {
-                notes.extend(emits(material).then(|| dark(material, mesh.name.clone())));
+                let has_holes = material.emits() && material.alpha.is_some();
+                notes.extend(has_holes.then(|| Note::HasHoles(mesh.name.clone())));
                 world.meshes.push(mesh);
             }
         }
     }
     for sphere in world.spheres.split_off(first_sphere) {
         let material = &materials[sphere.material as usize];
-        if shines(material) {
+        if material.emits() && is_even(material) {
             notes.extend(material.reflects().then_some(Note::ReflectsNothing(sphere.name)));
             let (centre, radius, radiance) = (sphere.centre, sphere.radius, material.emission);
             world.lights.push(Light::Sphere(SphereLight { centre, radius, radiance }));
         } else {
-            notes.extend(emits(material).then(|| dark(material, sphere.name.clone())));
+            notes.extend(material.emits().then(|| dark(material, sphere.name.clone())));
             world.spheres.push(sphere);
         }
     }
     notes
 }
 
-fn emits(material: &Material) -> bool {
-    material.emission.max_element() > 0.0
+fn is_even(material: &Material) -> bool {
+    material.alpha.is_none() && material.emission_map.is_none()
 }
 
-/// Whether a surface may become a light.
-fn shines(material: &Material) -> bool {
-    emits(material) && material.alpha.is_none()
+/// Whether lights may replace a mesh, which loses nothing else by it.
+pub(super) fn is_mere_light(material: &Material) -> bool {
+    material.emits() && is_even(material) && material.glass.is_none() && !material.reflects()
 }
 
-/// The note about an emitting surface that becomes none.
+/// The note about an emitting sphere that becomes none.
 fn dark(material: &Material, name: String) -> Note {
     if material.alpha.is_some() { Note::HasHoles(name) } else { Note::CastsNoLight(name) }
 }
@@ -97,6 +99,7 @@ fn dark(material: &Material, name: String) -> Note {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::lamps::MAX_LIGHTS;
     use crate::math::{DVec3, Rgb};
     use crate::scene::{WorldMesh, WorldSphere};
 
@@ -144,9 +147,9 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_of_too_many_faces_stays_with_a_note() {
+    fn a_mesh_of_too_many_faces_stays() {
         let mut world = world(lamp(vec![[0, 1, 2]; MAX_LIGHTS + 1], 0.0));
-        assert_eq!(adopt(&mut world, 0, 0), [Note::CastsNoLight("lamp".into())]);
+        assert_eq!(adopt(&mut world, 0, 0), []);
         assert_eq!((world.meshes.len(), world.lights.len()), (1, 0));
     }
 

@@ -10,8 +10,6 @@ pub(super) const MAX_LIGHTS: usize = 4096;
 /// Narrower faces, in widths of their mesh, are left out: together they send next to nothing, and f32 may not hold them beside
 /// the rest of the scene.
 const LEAST_WIDTH: f64 = 1e-4;
-/// A quad's corners may leave its plane by this share of its size: file coordinates have six digits or so.
-const FLAT: f64 = 1e-5;
 
 /// Flat convex quads that cover the faces of a mesh, counter-clockwise as these are; `None` if there would be more than
 /// [`MAX_LIGHTS`]. Neighbouring triangles that follow one another become one quad where possible; any other
@@ -27,7 +25,8 @@ pub(super) fn cover(mesh: &WorldMesh) -> Option<Vec<[DVec3; 4]>> {
     let mut quads = Vec::new();
     let mut rest = &mesh.triangles[..];
     while let [first, after @ ..] = rest {
-        if let Some(quad) = after.first().and_then(|second| joined(corners(first), corners(second)))
+        if let Some(quad) =
+            after.first().and_then(|second| QuadLight::joined(corners(first), corners(second)))
         {
             quads.push(quad);
             rest = &after[1..];
@@ -57,7 +56,7 @@ pub(super) fn of_mesh(mesh: &WorldMesh, radiance: Rgb) -> Option<Vec<Light>> {
 /// Errors: as [`polygon::triangulate`].
 pub(super) fn of_face(corners: &[DVec3], radiance: Rgb) -> Result<Vec<Light>, String> {
     if let [a, b, c, d] = *corners {
-        if is_flat_and_convex(&[a, b, c, d]) {
+        if QuadLight::is_flat_and_convex(&[a, b, c, d]) {
             return Ok(vec![light([a, b, c, d], radiance)]);
         }
     }
@@ -76,25 +75,6 @@ fn of_triangle([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 4]> {
     ((b - a).cross(c - a) != DVec3::ZERO).then_some([a, b, c, c])
 }
 
-/// The flat convex quad of two triangles of one orientation that share a side.
-pub(super) fn joined(p: [DVec3; 3], q: [DVec3; 3]) -> Option<[DVec3; 4]> {
-    let mut sides = (0..9).map(|k| (k / 3, k % 3));
-    let (i, j) = sides.find(|(i, j)| p[*i] == q[(j + 1) % 3] && p[(i + 1) % 3] == q[*j])?;
-    let quad = [p[i], q[(j + 2) % 3], p[(i + 1) % 3], p[(i + 2) % 3]];
-    is_flat_and_convex(&quad).then_some(quad)
-}
-
-fn is_flat_and_convex(corners: &[DVec3; 4]) -> bool {
-    let [a, b, c, d] = *corners;
-    let normal = (c - a).cross(d - b).normalize_or_zero();
-    let size = (c - a).length().max((d - b).length());
-    let turns_left = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - q).dot(normal) > 0.0;
-    (b - a).dot(normal).abs() <= FLAT * size
-        && [(a, b, c), (b, c, d), (c, d, a), (d, a, b)]
-            .into_iter()
-            .all(|(p, q, r)| turns_left(p, q, r))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,7 +83,7 @@ mod tests {
         let area = |light: &Light| match light {
             Light::Quad(quad) => {
                 let [.., c, d] = quad.corners;
-                assert!(c == d || is_flat_and_convex(&quad.corners));
+                assert!(c == d || QuadLight::is_flat_and_convex(&quad.corners));
                 0.5 * quad.area_vector()
             }
             other => panic!("{other:?}"),

@@ -24,6 +24,8 @@ pub struct Model {
     pub files: Vec<PathBuf>,
     /// The file's own camera, of formats that have one.
     pub camera: Option<FileCamera>,
+    /// Whether it holds surfaces that emit and are meant as lamps: those of OBJ files are.
+    pub has_lamps: bool,
     /// Meshes that the file places more than once.
     pub repeats: Repeats,
 }

@@ -50,7 +50,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
         time: options.time.unwrap_or(0.0),
         fps: options.fps,
     };
-    let Model { mut world, mut warnings, files, mut camera, repeats } =
+    let Model { mut world, mut warnings, files, mut camera, has_lamps, repeats } =
         super::load_model_with(path, policy, &of_file)?;
     let transform = DAffine3::from_scale(DVec3::splat(options.scale)) * to_y_up(options.up);
     world.apply_transform(&transform)?;
@@ -58,7 +58,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
         camera.shot.apply_transform(&transform);
     }
     // What glows is no reason to leave out the lamp.
-    let own_lights = !world.lights.is_empty();
+    let own_lights = has_lamps || !world.lights.is_empty();
     for note in emission::adopt(&mut world, 0, 0) {
         warnings.push(Diagnostic::new(path, note.message()).help(note.help()));
     }

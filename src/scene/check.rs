@@ -20,6 +20,7 @@ impl World {
         self.materials.iter().try_for_each(|material| {
             let of = |map: &TextureMap, what| image_of(map, &self.textures, what, &material.name);
             material.texture.as_ref().map(|map| of(map, "texture")).transpose()?;
+            material.emission_map.as_ref().map(|map| of(map, "emission map")).transpose()?;
             material.roughness_map.as_ref().map(|map| of(map, "roughness map")).transpose()?;
             let metal = material.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
             metal.map(|map| of(map, "metallic map")).transpose()?;

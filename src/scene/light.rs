@@ -6,6 +6,7 @@
 mod bound;
 mod directional;
 mod disk;
+mod face;
 mod far_field;
 mod point;
 mod quad;
@@ -16,6 +17,7 @@ mod sun;
 
 pub use directional::DirectionalLight;
 pub use disk::DiskLight;
+pub use face::FaceLight;
 pub use far_field::FarField;
 pub use point::PointLight;
 pub use quad::QuadLight;
@@ -79,6 +81,8 @@ kinds! {
     Spot(SpotLight) = "spot",
     /// A disk at infinity.
     Sun(SunLight) = "sun",
+    /// A face of a mesh, or a part of one; a scene makes them of the meshes of its world.
+    Face(FaceLight) = "face",
 }
 
 /// The interface of a kind of light to the scene.

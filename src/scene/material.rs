@@ -36,6 +36,8 @@ pub struct Material {
     pub glass: Option<Glass>,
     /// Emitted radiance.
     pub emission: Rgb,
+    /// Image that multiplies `emission`.
+    pub emission_map: Option<TextureMap>,
     /// Whether the back emits too.
     pub emits_back: bool,
 }
@@ -86,6 +88,7 @@ impl Material {
             fresnel: None,
             glass: None,
             emission: Rgb::ZERO,
+            emission_map: None,
             emits_back: false,
         }
     }
@@ -103,7 +106,7 @@ impl Material {
     /// Whether its scattering is looked up in an image anywhere; cut-outs do not count.
     pub fn has_image(&self) -> bool {
         let is_metal_mapped = self.fresnel.is_some_and(|fresnel| fresnel.metallic_map.is_some());
-        let maps = [self.texture, self.roughness_map];
+        let maps = [self.texture, self.roughness_map, self.emission_map];
         is_metal_mapped || self.normal_map.is_some() || maps.iter().any(Option::is_some)
     }
 
@@ -111,7 +114,8 @@ impl Material {
     pub fn images(&self) -> impl Iterator<Item = &TextureMap> {
         let normals = self.normal_map.as_ref().map(|map| &map.image);
         let metal = self.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
-        let maps = [self.texture.as_ref(), self.roughness_map.as_ref(), metal, normals];
+        let emission = self.emission_map.as_ref();
+        let maps = [self.texture.as_ref(), self.roughness_map.as_ref(), emission, metal, normals];
         maps.into_iter().flatten()
     }
 
@@ -119,7 +123,8 @@ impl Material {
     pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
         let normals = self.normal_map.as_mut().map(|map| &mut map.image);
         let metal = self.fresnel.as_mut().and_then(|fresnel| fresnel.metallic_map.as_mut());
-        let maps = [self.texture.as_mut(), self.roughness_map.as_mut(), metal, normals];
+        let emission = self.emission_map.as_mut();
+        let maps = [self.texture.as_mut(), self.roughness_map.as_mut(), emission, metal, normals];
         maps.into_iter().flatten()
     }
 
@@ -158,7 +163,12 @@ impl Material {
         most > 0.0 || self.fresnel.is_some_and(any)
     }
 
-    /// Emitted radiance towards the outside or inside.
+    /// Whether the surface emits; what is no number counts, so that it is noticed.
+    pub fn emits(&self) -> bool {
+        !self.emission.cmple(Rgb::ZERO).all()
+    }
+
+    /// Emitted radiance towards the outside or inside, but for its image.
     pub fn emitted(&self, outside: bool) -> Rgb {
         if outside || self.emits_back { self.emission } else { Rgb::ZERO }
     }

@@ -1,6 +1,6 @@
 //! Meshes and spheres, before (`World…`) and after recentring.
 
-use super::{MaterialId, VertexColours};
+use super::{FaceLights, MaterialId, VertexColours};
 use crate::math::{Bounds3, DVec3, Vec2, Vec3, bulk};
 use bytemuck::Pod;
 use serde::{Deserialize, Serialize};
@@ -141,6 +141,8 @@ pub struct Mesh {
     pub colours: Option<VertexColours>,
     /// Material.
     pub surface: Surface,
+    /// The lights that its faces are; `None` of most meshes, and of those that are the surface of one light.
+    pub lights: Option<FaceLights>,
     /// Bounds of the f32 positions that triangles use.
     pub bounds: Bounds3,
 }

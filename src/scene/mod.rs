@@ -12,7 +12,9 @@ mod alpha;
 mod aovs;
 mod camera;
 mod check;
+mod emitting_mesh;
 mod environment;
+mod face_lights;
 mod fog;
 mod job;
 mod lens;
@@ -44,12 +46,13 @@ pub use environment::{
     Daylight, Environment, EnvironmentKind, EnvironmentRadiance, IrradianceTable, RadianceTable,
     SceneEnvironment, SkyGradient, SunSky, brightness, image_place,
 };
+pub use face_lights::{FaceLights, MOST_FACE_LIGHTS, Unlit};
 pub use fog::Fog;
 pub use job::JobOptions;
 pub use lens::{Focus, Lens, LensKey, ShotLens, ThinLens, ThinLensPath};
 pub use light::{
-    DirectionalLight, DiskLight, FarField, Light, PointLight, QuadLight, Sky, SphereLight,
-    SpotLight, SunLight,
+    DirectionalLight, DiskLight, FaceLight, FarField, Light, PointLight, QuadLight, Sky,
+    SphereLight, SpotLight, SunLight,
 };
 pub(crate) use light_cells::FEW_LIGHTS;
 pub use light_cells::{CellLight, CellLights, LightCells, MeanLights, Tail};
@@ -143,6 +146,8 @@ pub struct Scene {
     pub bounds: Bounds3,
     /// Meshes that lost triangles to rounding. Tracing does not use it; it is reported.
     pub collapsed: Vec<Collapsed>,
+    /// Meshes that emit light which lights nothing. Reported, as `collapsed` is.
+    pub unlit: Vec<Unlit>,
     /// Which lights matter where; `None` of a scene with few lights, all of which are looked at everywhere.
     pub light_cells: Option<LightCells>,
 }
@@ -151,6 +156,18 @@ impl Scene {
     /// The `geom_id` under which the analytic spheres are traced.
     pub fn sphere_geom_id(&self) -> u32 {
         self.meshes.len() as u32
+    }
+
+    /// The area light whose surface was met at the weights `u` and `v` of the second and third corner of triangle `prim_id` of
+    /// mesh `geom_id`, or on sphere number `prim_id`.
+    pub fn light_at(&self, (geom_id, prim_id): (u32, u32), (u, v): (f64, f64)) -> Option<u32> {
+        match self.meshes.get(geom_id as usize) {
+            Some(mesh) => match &mesh.lights {
+                Some(lights) => lights.light(prim_id, u, v),
+                None => mesh.surface.light,
+            },
+            None => self.spheres[prim_id as usize].surface.light,
+        }
     }
 
     /// Whether any light must be traced in every frame.

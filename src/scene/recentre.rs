@@ -2,7 +2,9 @@
 
 use super::{
     Collapsed, Corners, Light, LightCells, Material, Mesh, Recentring, Scene, SceneEnvironment,
-    Sphere, Surface, World, WorldMesh, WorldSphere, environment,
+    Sphere, Surface, World, WorldMesh, WorldSphere,
+    emitting_mesh::face_lights,
+    environment,
     light::{EmittingShape, EmittingSurface},
     too_small, winding,
 };
@@ -56,7 +58,7 @@ impl World {
             .into_iter()
             .map(|light| light.into_scene(&recentring))
             .collect();
-        let lights = environment::with_sun(lights, self.environment.as_ref(), self.sky.lights);
+        let mut lights = environment::with_sun(lights, self.environment.as_ref(), self.sky.lights);
         let to_scene_box = |b: &Bounds3| Bounds3 {
             min: recentring.point_to_scene(b.min),
             max: recentring.point_to_scene(b.max),
@@ -75,6 +77,17 @@ impl World {
                 collapsed.push(lost);
             }
             meshes.push(mesh);
+        }
+        let mut unlit = Vec::new();
+        for mesh in &mut meshes {
+            let material = &self.materials[mesh.surface.material as usize];
+            let first = lights.len() as u32;
+            let (own, rest) = face_lights(mesh, material, &self.textures, first);
+            unlit.extend(rest);
+            if let Some((own, more)) = own {
+                mesh.lights = Some(own);
+                lights.extend(more);
+            }
         }
         let mut spheres: Vec<Sphere> =
             self.spheres.into_iter().map(|s| to_scene_sphere(s, &recentring)).collect();
@@ -106,6 +119,7 @@ impl World {
             traced_regions,
             bounds: scene_bounds,
             collapsed,
+            unlit,
             light_cells: None,
         };
         scene.light_cells = LightCells::of(&scene);
@@ -188,6 +202,7 @@ fn scene_mesh(
         more_uvs: Vec::new(),
         colours: None,
         surface,
+        lights: None,
         bounds,
     }
 }

@@ -1,6 +1,6 @@
 //! Images that materials show or take numbers from, with their mip levels.
 
-use crate::math::{DAffine2, DVec3, Rgb, Vec2, Vec3, bulk, srgb_decode};
+use crate::math::{DAffine2, DVec2, DVec3, Rgb, Vec2, Vec3, bulk, srgb_decode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -82,12 +82,16 @@ impl TextureMap {
     /// The image's coordinates at the surface's texture coordinates `uv`; where the image repeats, less whole
     /// repetitions, lest f32 rounds the rest away.
     pub fn place(&self, uv: Vec2) -> Vec2 {
+        self.wrapped(self.transform.transform_point2(uv.as_dvec2()))
+    }
+
+    /// The image's coordinates `uv`; where the image repeats, less whole repetitions.
+    pub(super) fn wrapped(&self, uv: DVec2) -> Vec2 {
         let near = |x: f64, wrap: Wrap| match wrap {
             Wrap::Repeat if x.abs() > 1.0 => x - x.floor(),
             Wrap::Mirror if x.abs() > 1.0 => x - 2.0 * (0.5 * x).floor(),
             Wrap::Repeat | Wrap::Mirror | Wrap::Clamp => x,
         };
-        let uv = self.transform.transform_point2(uv.as_dvec2());
         Vec2::new(near(uv.x, self.wrap[0]) as f32, near(uv.y, self.wrap[1]) as f32)
     }
 }
@@ -308,6 +312,15 @@ impl TextureLevel {
                 [upper + left, upper + right, lower + left, lower + right].map(|at| self.datum(at))
             }
         }
+    }
+
+    /// What the level shows at the image's coordinates `uv`, between the middles of four texels.
+    #[inline(always)] // Up to 32 times in a lookup.
+    pub fn bilinear(&self, wrap: [Wrap; 2], uv: Vec2) -> Rgb {
+        let (x0, x1, fx) = wrap[0].two_texels(uv.x, self.width);
+        let (y0, y1, fy) = wrap[1].two_texels(1.0 - uv.y, self.height);
+        let [a, b, c, d] = self.four([x0, x1], [y0, y1]);
+        a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
     }
 
     /// Texel number `at` of data, as a grey. (Apart from [`four`](Self::four), whose code is there in each place that looks

@@ -64,7 +64,8 @@ impl<'a> Backdrop<'a> {
                 | Light::Quad(_)
                 | Light::Sphere(_)
                 | Light::Disk(_)
-                | Light::Spot(_) => None,
+                | Light::Spot(_)
+                | Light::Face(_) => None,
             })
             .collect();
         if !scene.sky.lights {

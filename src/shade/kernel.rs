@@ -15,7 +15,7 @@ use super::lobe::{self, Layers, Lobe, Scattered};
 use super::medium_stack::{self, Body, MediumStack};
 use super::pixels::BlockPixels;
 use super::point::{SamplePlace, ShadingPoint};
-use super::{FrameInput, Left, Renderer, dimensions, medium, normal_map, optics};
+use super::{FrameInput, Left, Renderer, dimensions, medium, normal_map, optics, texture};
 use crate::film::GPixel;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
@@ -358,10 +358,14 @@ impl Vertex<'_, '_> {
         let wo = -ray.dir.normalize();
         let mut le = material.emitted(si.is_outside(wo));
         if le != Rgb::ZERO {
+            if let Some(map) = &material.emission_map {
+                le *= texture::shown(scene, map, (&si, wo, state.cone));
+            }
             if MIRROR && state.pdf > 0.0 {
                 let ends = (ray.org, si.p);
                 let lobe = (f64::from(state.pdf), state.cell);
-                le *= self.renderer.share_of_lobe(self.input, si.surface.light, ends, lobe);
+                let light = scene.light_at((hit.prim.geom_id, hit.prim.prim_id), (hit.u, hit.v));
+                le *= self.renderer.share_of_lobe(self.input, light, ends, lobe);
             }
             self.add(state, state.throughput * le);
         }

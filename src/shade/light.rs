@@ -75,6 +75,7 @@ impl LightSampler {
                 (light.irradiance, Shape::Directional(Directional::new(light)))
             }
             Light::Quad(light) => (light.radiance, Shape::Quad(Quad::new(light))),
+            Light::Face(light) => (light.part.radiance, Shape::Quad(Quad::of_face(light))),
             Light::Sphere(light) => (light.radiance, Shape::Sphere(Sphere::new(light))),
             Light::Disk(light) => (light.radiance, Shape::Disk(Disk::new(light))),
             Light::Spot(light) => (light.intensity, Shape::Spot(Spot::new(light))),

@@ -54,7 +54,7 @@ pub(super) fn filtered(texture: &Texture, wrap: [Wrap; 2], uv: Vec2, footprint: 
     // Else texels are larger than what the ray covers, or coordinates have no gradient that could say how large it is.
     let is_minified = ellipse.major > 1.0 && ellipse.major < f64::MAX;
     if !is_minified {
-        return bilinear(&levels[0], wrap, uv);
+        return levels[0].bilinear(wrap, uv);
     }
     let minor = ellipse.minor.max(ellipse.major / MOST_PIECES).max(1.0);
     let pieces = (ellipse.major / minor).ceil();
@@ -98,23 +98,14 @@ fn trilinear(levels: &[TextureLevel], wrap: [Wrap; 2], uv: Vec2, level: f64) -> 
     let last = levels.len() - 1;
     let whole = level as usize;
     if whole >= last {
-        return bilinear(&levels[last], wrap, uv);
+        return levels[last].bilinear(wrap, uv);
     }
-    let fine = bilinear(&levels[whole], wrap, uv);
+    let fine = levels[whole].bilinear(wrap, uv);
     let fraction = (level - whole as f64) as f32;
     match fraction {
         0.0 => fine,
-        _ => fine.lerp(bilinear(&levels[whole + 1], wrap, uv), fraction),
+        _ => fine.lerp(levels[whole + 1].bilinear(wrap, uv), fraction),
     }
-}
-
-/// Bilinear lookup in one level.
-#[inline(always)]
-fn bilinear(level: &TextureLevel, wrap: [Wrap; 2], uv: Vec2) -> Rgb {
-    let (x0, x1, fx) = wrap[0].two_texels(uv.x, level.width);
-    let (y0, y1, fy) = wrap[1].two_texels(1.0 - uv.y, level.height);
-    let [a, b, c, d] = level.four([x0, x1], [y0, y1]);
-    a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
 }
 
 #[cfg(test)]

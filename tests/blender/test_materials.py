@@ -92,6 +92,17 @@ class Materials(Case):
         copy = bpy.data.images.load(os.path.join(self.folder, texture["file"]))
         self.near(np.array(copy.pixels[:]).reshape(2, 2, 4), pixels, 1.0 / 255.0)
 
+    def test_emission_from_an_image(self):
+        def link(tree, node, shader):
+            tree.links.new(node.outputs["Color"], shader.inputs["Emission Color"])
+            shader.inputs["Emission Strength"].default_value = 3.0
+
+        pixels = np.ones((2, 2, 4), dtype=np.float32)
+        table, lines = self.of(lambda: self.mapped("t", "sRGB", pixels, link))
+        self.near(table["emission"], [3.0] * 3)
+        self.assertTrue(os.path.exists(os.path.join(self.folder, table["emission_texture"])))
+        self.assertEqual((table["emits_back"], lines), (True, []))
+
     def test_roughness_normals_and_cut_outs_from_images(self):
         grey = np.ones((4, 4, 4), dtype=np.float32) * 0.5
         grey[..., 3] = np.arange(4) / 3.0

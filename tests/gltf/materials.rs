@@ -184,13 +184,15 @@ fn emission_is_radiance_and_lights_the_scene() {
     }));
     assert_eq!((lamp.emission, lamp.emits_back), (Rgb::new(4.0, 2.0, 0.0), true));
     let file = File::triangle().with_material(json!({"emissiveFactor": [1, 1, 1]}));
-    let lights = file.loaded().world.lights;
-    // The other one is the studio's.
-    assert_eq!(lights.iter().filter(|light| matches!(light, Light::Quad(_))).count(), 2);
+    let lights = file.loaded().world.into_scene(true).unwrap().lights;
+    let count = |is: fn(&&Light) -> bool| lights.iter().filter(is).count();
+    // The quad is the studio's; what emits reflects, too.
+    assert_eq!(count(|light| matches!(light, Light::Face(_))), 1);
+    assert_eq!(count(|light| matches!(light, Light::Quad(_))), 1);
 }
 
 #[test]
-fn an_image_of_emission_makes_triangles_glow_on_which_it_is_bright() {
+fn an_image_of_emission_lights_where_it_is_bright() {
     // The left half of the image is black, the right one green.
     let mut file = File::new();
     let positions = [0., 0., 0., 1., 0., 0., 1., 1., 0., 2., 0., 0., 3., 0., 0., 3., 1., 0.];
@@ -208,15 +210,19 @@ fn an_image_of_emission_makes_triangles_glow_on_which_it_is_bright() {
         file.clone().with_material(lit).model()
     };
     let model = emissive(1.0);
-    let [bright, dark] = &model.world.meshes[..] else { panic!("{:?}", model.world.meshes) };
-    let emission =
-        |mesh: &tweenray::scene::WorldMesh| model.world.materials[mesh.material as usize].emission;
-    assert_eq!((emission(bright), emission(dark)), (Rgb::Y, Rgb::ZERO));
-    assert_eq!((bright.positions[0].x, dark.positions[0].x), (2.0, 0.0));
-    assert!(warns(&model.warnings, "emission by an image"));
-    let dim = emissive(0.25);
-    assert_eq!(dim.world.meshes.len(), 1);
-    assert_eq!(dim.world.materials[dim.world.meshes[0].material as usize].emission, Rgb::ZERO);
+    let [mesh] = &model.world.meshes[..] else { panic!("{:?}", model.world.meshes) };
+    let material = &model.world.materials[mesh.material as usize];
+    assert!(material.emission == Rgb::ONE && material.emission_map.is_some());
+    assert_eq!(model.warnings, []);
+    for factor in [1.0, 0.25] {
+        let lights = emissive(factor).world.into_scene(true).unwrap().lights;
+        let [Light::Face(face)] = &lights[..] else { panic!("{lights:?}") };
+        assert!((face.part.radiance - Rgb::Y * factor as f32).length() < 1e-6);
+        let nearest = face.triangle.iter().map(|corner| corner.x).fold(f64::MAX, f64::min);
+        let furthest = face.triangle.iter().map(|corner| corner.x).fold(f64::MIN, f64::max);
+        // The second triangle is the last third of the model.
+        assert!(nearest > 0.0 && furthest > nearest, "{face:?}");
+    }
 }
 
 #[test]
@@ -233,11 +239,13 @@ fn an_image_of_emission_lies_by_its_own_set() {
             "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}},
             "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": texture, "texCoord": set},
         }));
-        let world = model.model().world;
-        world.materials[world.meshes[0].material as usize].emission
+        let lights = model.model().world.into_scene(true).unwrap().lights;
+        lights[0].emission()
     };
-    assert_eq!(emission(0), Rgb::ZERO);
-    assert!((emission(1) - Rgb::Y).abs().max_element() < 0.3, "{}", emission(1));
+    // A tenth of a texel beside the middle of the dark one, and of the bright one.
+    let (dark, bright) = (emission(0), emission(1));
+    assert!((dark - Rgb::Y * 0.1).length() < 1e-5, "{dark}");
+    assert!((bright - Rgb::Y * 0.9).length() < 1e-5, "{bright}");
 }
 
 #[test]

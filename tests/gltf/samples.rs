@@ -3,7 +3,7 @@
 use super::build::model;
 use std::path::{Path, PathBuf};
 use tweenray::import::{LoadOptions, load};
-use tweenray::scene::CameraPath;
+use tweenray::scene::{CameraPath, Light};
 
 /// The folder of the files; without it a test says that it skips.
 fn folder() -> Option<PathBuf> {
@@ -60,5 +60,8 @@ fn an_animated_lens_of_blender_is_read() {
     assert_eq!(frames.len(), 48);
     let [first, last] = [&frames[0], &frames[47]].map(|frame| frame.vfov_degrees);
     assert!((first - last).abs() > 1.0, "{first} {last}");
-    assert_eq!(loaded.world.lights.len(), 4);
+    // One mesh emits, and reflects too.
+    assert_eq!(loaded.world.lights.len(), 3);
+    let lights = loaded.world.into_scene(true).expect("a scene").lights;
+    assert!(lights.iter().any(|light| matches!(light, Light::Face(_))));
 }

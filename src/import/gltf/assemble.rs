@@ -9,12 +9,12 @@ use super::material::{MaterialReader, Surfaced};
 use super::node::{Nodes, name_of};
 use super::primitive::{self, MOST_PIECES, MOST_PLACED, Size};
 use super::uri::shortened;
-use super::{glow, instances, light, place};
+use super::{instances, light, place};
 use crate::error::Result;
 use crate::import::model::Model;
 use crate::import::source::Notes;
 use crate::math::DAffine3;
-use crate::scene::{Material, MaterialId, WorldMesh};
+use crate::scene::{MaterialId, WorldMesh};
 use std::collections::{BTreeSet, HashMap};
 
 /// What a scene is put together from.
@@ -45,7 +45,6 @@ struct Piece {
 #[derive(Clone, Copy)]
 struct Made {
     id: MaterialId,
-    glow: Option<crate::scene::TextureMap>,
     is_invisible: bool,
 }
 
@@ -162,7 +161,7 @@ impl<'a, 'd> Assembly<'a, 'd> {
         let still = [DAffine3::IDENTITY];
         let places = if skin.is_some() { &still[..] } else { &piece.places };
         if let Some(mesh) = place::at_all(mesh, places, json, self.notes)? {
-            self.add(WorldMesh { material: made.id, ..mesh }, made);
+            self.model.world.meshes.push(WorldMesh { material: made.id, ..mesh });
         }
         Ok(())
     }
@@ -188,44 +187,6 @@ impl<'a, 'd> Assembly<'a, 'd> {
         Ok(Some(self.joints.entry(at).or_insert(joints).clone()))
     }
 
-    /// Adds a mesh; of one that emits by an image the parts where that is bright, and the rest, apart.
-    fn add(&mut self, mesh: WorldMesh, made: Made) {
-        let Some(map) = made.glow else {
-            self.model.world.meshes.push(mesh);
-            return;
-        };
-        self.notes.add(
-            "emission by an image: triangles on which it is brighter than half of white emit its mean there, others nothing",
-            None,
-        );
-        let image = &self.model.world.textures[map.image as usize];
-        let material = &self.model.world.materials[made.id as usize];
-        let emission = material.emission;
-        let (dark, bright) = glow::split(mesh, image, (&map, emission));
-        if let Some((bright, emission)) = bright {
-            let glowing = Material { emission, ..material.clone() };
-            self.model.world.materials.push(glowing);
-            let material = self.model.world.materials.len() as MaterialId - 1;
-            self.model.world.meshes.push(WorldMesh { material, ..bright });
-        }
-        if !dark.triangles.is_empty() {
-            let material = self.dark(made.id);
-            self.model.world.meshes.push(WorldMesh { material, ..dark });
-        }
-    }
-
-    /// The material `id` without its emission.
-    fn dark(&mut self, id: MaterialId) -> MaterialId {
-        let material = self.model.world.materials[id as usize].clone();
-        let dark = Material { emission: crate::math::Rgb::ZERO, ..material };
-        let materials = &mut self.model.world.materials;
-        let known = materials.iter().position(|other| *other == dark);
-        known.unwrap_or_else(|| {
-            materials.push(dark);
-            materials.len() - 1
-        }) as MaterialId
-    }
-
     fn material(&mut self, at: Option<usize>, coloured: bool) -> Result<Made> {
         if let Some(made) = self.made.get(&(at, coloured)) {
             return Ok(*made);
@@ -235,13 +196,11 @@ impl<'a, 'd> Assembly<'a, 'd> {
                 let world = &mut self.model.world;
                 let read =
                     self.materials.read(number, coloured, &mut self.images, world, self.notes)?;
-                let Surfaced { material, glow, is_invisible } = read;
-                Made { id: world.add_material(material), glow, is_invisible }
+                let Surfaced { material, is_invisible } = read;
+                Made { id: world.add_material(material), is_invisible }
             }
-            None if coloured => {
-                Made { id: self.model.coloured_material(), glow: None, is_invisible: false }
-            }
-            None => Made { id: self.model.default_material(), glow: None, is_invisible: false },
+            None if coloured => Made { id: self.model.coloured_material(), is_invisible: false },
+            None => Made { id: self.model.default_material(), is_invisible: false },
         };
         self.made.insert((at, coloured), made);
         Ok(made)

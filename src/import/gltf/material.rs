@@ -15,8 +15,6 @@ use std::collections::BTreeSet;
 /// A material, with what no single [`Material`] says.
 pub(super) struct Surfaced {
     pub material: Material,
-    /// An image that multiplies the emission; its number is among the world's textures.
-    pub glow: Option<TextureMap>,
     /// Nothing of the surface is there.
     pub is_invisible: bool,
 }
@@ -148,8 +146,7 @@ impl Parts<'_, '_> {
             Some(_) => self.unlit(material)?,
             None => self.principled(material, pbr.as_ref())?,
         };
-        let (emission, glow) = self.emission()?;
-        material.emission = emission;
+        (material.emission, material.emission_map) = self.emission()?;
         material.emits_back = self.json.truth("doubleSided")?.unwrap_or(false);
         let mut is_invisible = false;
         if let AlphaMode::Mask(cutoff) = self.alpha_mode()? {
@@ -159,7 +156,7 @@ impl Parts<'_, '_> {
         if let Some((glass, transmission)) = self.glass(base, pbr.as_ref())? {
             material = part_glass(material, glass, transmission);
         }
-        Ok(Surfaced { material, glow, is_invisible })
+        Ok(Surfaced { material, is_invisible })
     }
 
     /// A surface that is shown as bright as its colour is, whatever the light: matte, the nearest that there is.

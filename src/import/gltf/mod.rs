@@ -17,7 +17,6 @@ mod component;
 mod container;
 mod deform;
 mod document;
-mod glow;
 mod image;
 mod instances;
 mod json;

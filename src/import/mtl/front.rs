@@ -29,6 +29,8 @@ pub(super) struct Source {
     pub roughness_map: Option<MapImage>,
     /// `Pm`: share that is metal.
     pub metallic: Option<f64>,
+    /// `map_Ke`.
+    pub emission_map: Option<MapImage>,
     /// `map_Pm`.
     pub metallic_map: Option<MapImage>,
     /// `Pc`: share under a clear coat.
@@ -100,13 +102,13 @@ impl Front {
             "Pr" | "Pm" | "Pc" | "Pcr" => self.share(&text, words),
             // Sheen and anisotropy, which exporters write beside these.
             "Ps" | "aniso" | "anisor" => number_in(&text, words, f64::MIN, f64::MAX).map(|_| ()),
-            "map_Kd" | "map_d" => self.map(&text, MapKind::Image, words, line.number),
+            "map_Kd" | "map_Ke" | "map_d" => self.map(&text, MapKind::Image, words, line.number),
             "map_Pr" | "map_Pm" => self.map(&text, MapKind::Data, words, line.number),
             "norm" | "map_Bump" | "map_bump" | "bump" => {
                 self.map(&text, MapKind::Normals, words, line.number)
             }
-            "map_Ka" | "map_Ks" | "map_Ke" | "map_Ns" | "disp" | "decal" | "refl" | "map_Tr"
-            | "map_refl" | "map_Kn" => {
+            "map_Ka" | "map_Ks" | "map_Ns" | "disp" | "decal" | "refl" | "map_Tr" | "map_refl"
+            | "map_Kn" => {
                 self.notes.add(&format!("textures by `{text}` are ignored"), line.number);
                 Ok(())
             }
@@ -183,6 +185,7 @@ impl Front {
                     source.normal_map = Some(BumpImage { image, is_normal, line });
                 }
             }
+            MapKind::Image if keyword == "map_Ke" => source.emission_map = Some(image),
             MapKind::Image if keyword == "map_d" => source.mask = Some(image),
             MapKind::Image => source.texture = Some(image),
         }

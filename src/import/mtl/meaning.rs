@@ -6,7 +6,7 @@
 //! | `norm`; `map_Bump` and `bump` whose image looks like normals | normal map, `-bm` its strength; nothing on glass |
 //! | `map_d` | cut-outs: below a half the surface is not there; nothing on glass |
 //! | `-s`, `-o`, `-clamp` of images | how the image lies ([`super::image`]) |
-//! | `Ke` | emission, both sides; of few flat faces, area lights in their place |
+//! | `Ke`, `map_Ke` | emission, both sides, and its image |
 //! | `illum` 3 or 5 with `Ks` and without `Pm` or `Pc` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
 //! | `Pm`, `map_Pm`, `Pc`; `Pr`, `map_Pr` of what is no mirror | principled: metallic, clear coat (`Pcr` its roughness), roughness (else 0.5), the index of refraction `Ni` (else 1.5) |
 //! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
@@ -27,7 +27,9 @@ const DEFAULT_ROUGHNESS: f64 = 0.5;
 pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String>) {
     let mut notes = Vec::new();
     let mut out = Material::black(&source.name);
-    out.emission = mtl.emissive.map_or(Rgb::ZERO, rgb);
+    // Programs that write an image beside black mean the image.
+    let plain = if source.emission_map.is_some() { Rgb::ONE } else { Rgb::ZERO };
+    out.emission = emission(mtl).unwrap_or(plain);
     out.emits_back = true;
     if is_glass(source, mtl, &mut notes) {
         let tint = source.filter.map_or(Rgb::ONE, rgb);
@@ -77,6 +79,11 @@ pub(super) fn textured(mtl: &tobj::Material) -> Rgb {
         Some(diffuse) if diffuse != Rgb::ZERO => diffuse.min(Rgb::ONE),
         _ => Rgb::ONE,
     }
+}
+
+/// `Ke`, unless that is black.
+pub(super) fn emission(mtl: &tobj::Material) -> Option<Rgb> {
+    mtl.emissive.map(rgb).filter(|emission| *emission != Rgb::ZERO)
 }
 
 /// The reflectance of the mirror that it is, if any.

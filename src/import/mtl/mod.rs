@@ -37,6 +37,7 @@ struct Taken<'s> {
     texture: Option<&'s MapImage>,
     roughness: Option<&'s MapImage>,
     metallic: Option<&'s MapImage>,
+    emission: Option<&'s MapImage>,
     normals: Option<&'s BumpImage>,
     mask: Option<&'s MapImage>,
 }
@@ -45,13 +46,14 @@ impl Entry {
     /// The images that count in `material`, as [`meaning::of`] has it: only mirrors and layers are rough, only layers are metal, glass has no normal map and no
     /// cut-outs.
     fn taken(&self, material: &Material) -> Taken<'_> {
-        let front::Source { texture, roughness_map, metallic_map, normal_map, mask, .. } =
-            &self.source;
+        let front::Source { texture, roughness_map, metallic_map, normal_map, .. } = &self.source;
+        let front::Source { emission_map, mask, .. } = &self.source;
         let is_glass = material.glass.is_some();
         Taken {
             texture: texture.as_ref(),
             roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO),
             metallic: metallic_map.as_ref().filter(|_| material.fresnel.is_some()),
+            emission: emission_map.as_ref(),
             normals: normal_map.as_ref().filter(|_| !is_glass),
             mask: mask.as_ref().filter(|_| !is_glass),
         }
@@ -59,12 +61,13 @@ impl Entry {
 
     /// The files of the images that the material takes, with what they serve as.
     fn images(&self) -> impl Iterator<Item = (PathBuf, ImageUse)> {
-        let Taken { texture, roughness, metallic, normals, mask } =
+        let Taken { texture, roughness, metallic, emission, normals, mask } =
             self.taken(&meaning::of(&self.source, &self.parsed).0);
         let images = [
             texture.map(|image| (image, ImageUse::Colour)),
             roughness.map(|image| (image, data(image))),
             metallic.map(|image| (image, data(image))),
+            emission.map(|image| (image, ImageUse::Colour)),
             normals.map(|bump| (&bump.image, ImageUse::Normals)),
             mask.map(|image| (image, ImageUse::Mask)),
         ];
@@ -205,7 +208,8 @@ impl Libraries {
         };
         let (mut material, notes) = meaning::of(&entry.source, &entry.parsed);
         model.warnings.extend(notes.into_iter().map(|note| entry.warning(note)));
-        let Taken { texture, roughness, metallic, normals, mask } = entry.taken(&material);
+        let Taken { texture, roughness, metallic, emission, normals, mask } =
+            entry.taken(&material);
         if let Some(image) = texture {
             let what = (ImageUse::Colour, "texture");
             if let Some(map) = entry.lay_or_warn(image, what, images, model) {
@@ -228,6 +232,13 @@ impl Libraries {
             if let Some(map) = entry.lay_or_warn(image, what, images, model) {
                 fresnel.metallic_map = Some(map);
                 fresnel.metallic = 1.0;
+            }
+        }
+        if let Some(image) = emission {
+            let what = (ImageUse::Colour, "emission map");
+            material.emission_map = entry.lay_or_warn(image, what, images, model);
+            if material.emission_map.is_none() {
+                material.emission = meaning::emission(&entry.parsed).unwrap_or(Rgb::ZERO);
             }
         }
         if let Some(bump) = normals {

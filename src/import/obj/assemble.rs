@@ -5,7 +5,7 @@ use super::parse::{Part, UNCOLOURED};
 use crate::error::{Diagnostic, Result};
 use crate::import::model::Model;
 use crate::import::source::Fault;
-use crate::import::{lamps, mtl, polygon, tidy};
+use crate::import::{emission, lamps, mtl, polygon, tidy};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 use crate::scene::{Corners, VertexColours, WorldMesh};
 use rayon::prelude::*;
@@ -89,8 +89,8 @@ pub(super) fn assemble(
 /// Adds a mesh, or lights in its place where it emits and is simple enough.
 fn add(path: &Path, mesh: WorldMesh, model: &mut Model) {
     let material = &model.world.materials[mesh.material as usize];
-    let emission = material.emission;
-    if emission == Rgb::ZERO {
+    let radiance = material.emission;
+    if radiance == Rgb::ZERO {
         model.world.meshes.push(mesh);
     } else if material.alpha.is_some() {
         let message = format!(
@@ -99,18 +99,13 @@ fn add(path: &Path, mesh: WorldMesh, model: &mut Model) {
         );
         model.warnings.push(Diagnostic::new(path, message));
         model.world.meshes.push(mesh);
-    } else if let Some(lights) = lamps::of_mesh(&mesh, emission) {
-        model.world.lights.extend(lights);
     } else {
-        let message = format!(
-            "`{}` emits from {} triangles: they glow but light nothing, since that would take \
-             more than {} area lights",
-            mesh.name,
-            mesh.triangles.len(),
-            lamps::MAX_LIGHTS
-        );
-        model.warnings.push(Diagnostic::new(path, message));
-        model.world.meshes.push(mesh);
+        model.has_lamps = true;
+        let lights = emission::is_mere_light(material).then(|| lamps::of_mesh(&mesh, radiance));
+        match lights.flatten() {
+            Some(lights) => model.world.lights.extend(lights),
+            None => model.world.meshes.push(mesh),
+        }
     }
 }
 

@@ -360,7 +360,7 @@ impl<'a> Builder<'a> {
 
     fn warn_of_darkness(&mut self) {
         let World { lights, sky, environment, materials, .. } = &self.world;
-        let glows = materials.iter().any(|m| m.emission.max_element() > 0.0);
+        let glows = materials.iter().any(|m| m.emits());
         let bright = environment.is_some()
             || sky.radiance.max_element() > 0.0
             || sky.ambient.max_element() > 0.0;

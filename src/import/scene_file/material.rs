@@ -8,6 +8,7 @@ use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, 
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::import::images::ImageUse;
+use crate::math::Rgb;
 use crate::scene;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -43,9 +44,12 @@ pub(super) struct Material {
     pub principled: Option<At<Principled>>,
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
-    /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0. Spheres, and
-    /// meshes of up to 4096 triangles or flat quads, then light the scene; larger ones and those with `alpha` only glow.
+    /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0, or 1 where there is an `emission_texture`.
+    /// Spheres and meshes then light the scene, of a mesh the 4096 brightest faces; those with `alpha` only glow.
     pub emission: Option<Amount>,
+    /// Image file, relative to the scene file, that multiplies `emission`, or a table of the file and how it lies on the
+    /// surface. A sphere with it only glows.
+    pub emission_texture: Option<At<NamedTexture>>,
     /// Whether the back of a face emits too.
     #[serde(default)]
     pub emits_back: bool,
@@ -84,6 +88,7 @@ pub(super) struct ImagesOf<T> {
     alpha: Option<T>,
     roughness: Option<T>,
     metallic: Option<T>,
+    emission: Option<T>,
 }
 
 impl<T> ImagesOf<T> {
@@ -95,13 +100,14 @@ impl<T> ImagesOf<T> {
             alpha: self.alpha.map(&mut of).transpose()?,
             roughness: self.roughness.map(&mut of).transpose()?,
             metallic: self.metallic.map(&mut of).transpose()?,
+            emission: self.emission.map(&mut of).transpose()?,
         })
     }
 
     /// All that there are.
     pub fn all(self) -> impl Iterator<Item = T> {
-        let Self { texture, normals, alpha, roughness, metallic } = self;
-        [texture, normals, alpha, roughness, metallic].into_iter().flatten()
+        let Self { texture, normals, alpha, roughness, metallic, emission } = self;
+        [texture, normals, alpha, roughness, metallic, emission].into_iter().flatten()
     }
 }
 
@@ -122,12 +128,14 @@ impl Material {
         let roughness = roughness.and_then(|key| key.data_file(ChannelName::Green));
         let metallic = principled.and_then(|p| p.metallic.as_ref());
         let metallic = metallic.and_then(|key| key.data_file(ChannelName::Blue));
+        let emission = self.emission_texture.as_ref();
         ImagesOf {
             texture: texture.map(|key| (key.image_file(), ImageUse::Colour)),
             normals: normal_map.map(|key| (key.image_file(), ImageUse::Normals)),
             alpha: self.alpha.as_ref().map(|key| (key.image_file(), ImageUse::Mask)),
             roughness: roughness.map(|(file, channel)| (file, ImageUse::Data(channel))),
             metallic: metallic.map(|(file, channel)| (file, ImageUse::Data(channel))),
+            emission: emission.map(|key| (key.image_file(), ImageUse::Colour)),
         }
     }
 
@@ -147,7 +155,7 @@ impl Material {
             priority: g.priority.as_ref().map(|p| p.u32() as u8),
             thin: g.thin,
         });
-        let ImagesOf { texture, normals, alpha, roughness, metallic } = images;
+        let ImagesOf { texture, normals, alpha, roughness, metallic, emission } = images;
         let own_roughness = self.roughness.as_deref().map(|key| key.parts(*roughness));
         let (roughness_share, roughness_map) = own_roughness.unwrap_or_default();
         let built = scene::Material {
@@ -165,7 +173,16 @@ impl Material {
             roughness_map,
             fresnel: None,
             glass,
-            emission: self.emission.unwrap_or_default().rgb(),
+            emission: match (self.emission, emission) {
+                (Some(factor), _) => factor.rgb(),
+                (None, Some(_)) => Rgb::ONE,
+                (None, None) => Rgb::ZERO,
+            },
+            emission_map: self
+                .emission_texture
+                .as_ref()
+                .zip(*emission)
+                .map(|(map, id)| map.0.map(id)),
             emits_back: self.emits_back,
         };
         Ok(match self.principled.as_deref() {

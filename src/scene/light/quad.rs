@@ -6,6 +6,9 @@ use crate::math::{Bounds3, DAffine3, DVec3, Rgb};
 use crate::scene::Recentring;
 use serde::{Deserialize, Serialize};
 
+/// A quad's corners may leave its plane by this share of its size: file coordinates have six digits or so.
+const FLAT: f64 = 1e-5;
+
 /// A flat convex quad that emits from the side its corners run counter-clockwise on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct QuadLight {
@@ -26,6 +29,26 @@ impl QuadLight {
     /// Unit normal of the emitting side.
     pub fn normal(&self) -> DVec3 {
         self.area_vector().normalize()
+    }
+
+    /// The corners of the flat convex quad of two triangles of one orientation that share a side.
+    pub fn joined(p: [DVec3; 3], q: [DVec3; 3]) -> Option<[DVec3; 4]> {
+        let mut sides = (0..9).map(|k| (k / 3, k % 3));
+        let (i, j) = sides.find(|(i, j)| p[*i] == q[(j + 1) % 3] && p[(i + 1) % 3] == q[*j])?;
+        let quad = [p[i], q[(j + 2) % 3], p[(i + 1) % 3], p[(i + 2) % 3]];
+        Self::is_flat_and_convex(&quad).then_some(quad)
+    }
+
+    /// Whether these corners, in order, are those of a flat convex quad.
+    pub fn is_flat_and_convex(corners: &[DVec3; 4]) -> bool {
+        let [a, b, c, d] = *corners;
+        let normal = (c - a).cross(d - b).normalize_or_zero();
+        let size = (c - a).length().max((d - b).length());
+        let turns_left = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - q).dot(normal) > 0.0;
+        (b - a).dot(normal).abs() <= FLAT * size
+            && [(a, b, c), (b, c, d), (c, d, a), (d, a, b)]
+                .into_iter()
+                .all(|(p, q, r)| turns_left(p, q, r))
     }
 
     /// The triangles that it consists of, by their corners' places.

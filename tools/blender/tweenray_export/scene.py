@@ -153,8 +153,6 @@ class Export:
                 continue
             name = material.name if material else DEFAULT
             self.used.add(name)
-            if made.table.get("emission") and set(made.table) - {"emission", "emits_back", "normal_map"}:
-                self.report.add(name, "emission of what also reflects", "meshes of up to 4096 faces become lights, which reflect nothing")
             self.placed.append((ob.name, file, name, axes.matrix(matrix)))
 
     def note_visibility(self, ob):

@@ -144,14 +144,15 @@ class Writer:
 
     def sum(self, one, two, a, b):
         """The exact sum of diffuse surface, mirror and emission, or None where there is none."""
-        keys = {"diffuse", "texture", "mirror", "roughness", "emission", "emits_back", "normal_map", "vertex_colours"}
+        keys = {"diffuse", "texture", "mirror", "roughness", "emission", "emission_texture", "emits_back", "normal_map", "vertex_colours"}
         if not (one.is_seen and two.is_seen) or set(one.table) - keys or set(two.table) - keys:
             return None
         textured = [{"texture", "vertex_colours"} & set(m.table) for m in (one, two)]
         both_diffuse = all("diffuse" in m.table for m in (one, two)) and any(textured)
         both_mirror = all("mirror" in m.table for m in (one, two))
         maps = [m.table.get("normal_map") for m in (one, two) if {"diffuse", "mirror"} & set(m.table)]
-        if both_diffuse or len({repr(m) for m in maps}) > 1:
+        both_emit = all("emission" in m.table for m in (one, two)) and any("emission_texture" in m.table for m in (one, two))
+        if both_diffuse or both_emit or len({repr(m) for m in maps}) > 1:
             return None
         if both_mirror and one.table.get("roughness") != two.table.get("roughness"):
             return None
@@ -261,9 +262,17 @@ class Writer:
         factor = self.constant(fed, strength).grey()
         if factor == 0.0:
             return
-        rgb = [max(c * factor, 0.0) for c in self.constant(fed, colour).rgb()]
+        value = self.read(fed, colour)
+        file = None
+        if value.image is not None and value.image.channel is None and value.colours is None:
+            file = self.images.colour(value.image.image)
+        if file is None:
+            value = self.constant(fed, colour)
+        rgb = [max(c * factor, 0.0) for c in value.rgb()]
         if max(rgb) > 0.0:
             made.table |= {"emission": rgb, "emits_back": True}
+            if file is not None:
+                made.table["emission_texture"] = self.laid(value.image, file)
 
     def cut(self, made, value):
         """Cut-outs by an image's alpha, or its grey."""

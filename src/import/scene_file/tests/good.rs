@@ -279,7 +279,7 @@ fn files_are_read_beside_the_scene_file_once_named_and_listed() {
 }
 
 #[test]
-fn emitting_surfaces_become_lights_or_give_a_warning() {
+fn emitting_surfaces_become_lights() {
     let loaded = good(
         "[material.glow]\nemission = 4\n\
          [[mesh]]\nquad = { centre = [0, 3, 0], normal = '-y', size = [1, 1] }\nmaterial = 'glow'\n\
@@ -292,9 +292,37 @@ fn emitting_surfaces_become_lights_or_give_a_warning() {
     assert!(matches!(&lights[0], SceneLight::Quad(q) if q.normal() == DVec3::NEG_Y));
     assert!(matches!(&lights[7], SceneLight::Sphere(_)));
     assert_eq!((loaded.world.meshes.len(), loaded.world.spheres.len()), (1, 0));
-    let [warning] = &loaded.warnings[..] else { panic!("one warning") };
-    assert_eq!(warning.line, Some(13));
-    assert!(warning.message.contains("casts no light"));
+    assert_eq!(loaded.warnings, []);
+    // The last has too many faces to be replaced by lights.
+    let scene = loaded.world.into_scene(true).expect("a scene");
+    let [unlit] = &scene.unlit[..] else { panic!("{:?}", scene.unlit) };
+    assert!(unlit.share > 0.0, "{unlit:?}");
+}
+
+#[test]
+fn an_image_of_emission_multiplies_it() {
+    let emission = |text: &str| {
+        let loaded = data_of(text).expect("a scene");
+        let material = &loaded.world.materials[0];
+        (material.emission, material.emission_map.is_some())
+    };
+    assert_eq!(emission("emission_texture = 'rgba.png'"), (Rgb::ONE, true));
+    assert_eq!(
+        emission("diffuse = 0.5\nemission = 3\nemission_texture = 'rgba.png'"),
+        (Rgb::splat(3.0), true)
+    );
+}
+
+/// A scene of a quad of the material `text`, beside the image `rgba.png`.
+fn data_of(text: &str) -> crate::error::Result<Loaded> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pixel = image::RgbaImage::from_pixel(1, 1, image::Rgba([10, 128, 30, 255]));
+    pixel.save(folder.path().join("rgba.png")).expect("written");
+    let quad =
+        "[[mesh]]\nquad = { centre = [0, 3, 0], normal = '-y', size = [1, 1] }\nmaterial = 'm'\n";
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, format!("{quad}[material.m]\n{text}\n")).expect("written");
+    load(&path, &LoadOptions::default())
 }
 
 #[test]

@@ -1,0 +1,255 @@
+//! Makes lights of the faces of meshes that emit and are seen as they are: what reflects light too, or emits by an image.
+//!
+//! A face is one light, of the mean of what it emits. Where an image makes that differ within a face, the face is cut into rows
+//! of smaller triangles, those first whose parts differ most. So light is right from far away, and near by up to what differs
+//! within one part.
+
+use super::face_lights::{FaceLights, MOST_FACE_LIGHTS, Unlit};
+use super::light::{FaceLight, Light, QuadLight};
+use super::{Material, Mesh, Texture, TextureMap};
+use crate::math::{DVec2, DVec3, Rgb};
+use rayon::prelude::*;
+use std::collections::BinaryHeap;
+
+/// Most lights that faces are cut into for the sake of an image.
+const MOST_PARTS: usize = 512;
+/// Parts are small enough where what differs within them is this share of all.
+const SMALL: f64 = 0.01;
+/// Faces that together send this share of a mesh's light cast none: black that is nearly so would be thousands of lights.
+const LEAST: f64 = 1e-3;
+/// A mesh whose lights would send a smaller share of its light than this casts none.
+const ENOUGH: f64 = 0.5;
+
+/// Lights of `mesh`, scene space, of `material`, the first of which will be number `first` of the scene's. `None` where it
+/// has none, and what of its light it then does not send.
+pub(super) fn face_lights(
+    mesh: &Mesh,
+    material: &Material,
+    textures: &[Texture],
+    first: u32,
+) -> (Option<(FaceLights, Vec<Light>)>, Option<Unlit>) {
+    if !material.emits() || material.alpha.is_some() {
+        return (None, None);
+    }
+    let emission = Emission::of(mesh, material, textures);
+    let means = emission.of_faces();
+    let powers: Vec<f64> = (0..means.len()).map(|at| emission.power(at, means[at])).collect();
+    let (chosen, share) = brightest(&powers, emission.image.is_some());
+    let lost = (share < 1.0 - 10.0 * LEAST).then_some(1.0 - share);
+    let unlit = |share| Unlit { mesh: mesh.name.clone(), share };
+    if chosen.is_empty() || share < ENOUGH {
+        return (None, (!chosen.is_empty()).then(|| unlit(1.0)));
+    }
+    let rows = emission.rows(&chosen, powers.iter().sum());
+    let mut all = FaceLights::none(means.len());
+    let mut lights = Vec::new();
+    let mut chosen = chosen.iter().zip(rows).peekable();
+    while let Some((&at, rows)) = chosen.next() {
+        all.cut(at, rows);
+        let triangle = mesh.corners(at);
+        let light = |corners, radiance| {
+            let part = QuadLight { corners, radiance, two_sided: material.emits_back };
+            Light::Face(FaceLight { part, triangle })
+        };
+        // Two triangles of one radiance are one quad where they can be.
+        let quad = chosen.peek().filter(|_| material.emission_map.is_none());
+        let quad = quad.and_then(|(next, _)| {
+            Some((**next, QuadLight::joined(triangle, mesh.corners(**next))?))
+        });
+        if let Some((next, corners)) = quad {
+            all.cut(next, rows);
+            all.push(Some(first + lights.len() as u32));
+            lights.push(light(corners, means[at]));
+            chosen.next();
+            continue;
+        }
+        for part in parts(rows) {
+            let radiance = if rows == 1 { means[at] } else { emission.mean(at, part) };
+            let is_light = !radiance.cmple(Rgb::ZERO).all();
+            all.push(is_light.then_some(first + lights.len() as u32));
+            if is_light {
+                let [a, b, c] = part.map(|(u, v)| {
+                    let [a, b, c] = triangle;
+                    a + (b - a) * u + (c - a) * v
+                });
+                lights.push(light([a, b, c, c], radiance));
+            }
+        }
+    }
+    (Some((all, lights)), lost.map(unlit))
+}
+
+/// The faces that are lights, in their order, and the share of all power that they have; `by_image` differs what they emit.
+fn brightest(powers: &[f64], by_image: bool) -> (Vec<usize>, f64) {
+    let total: f64 = powers.iter().sum();
+    let mut order: Vec<usize> = (0..powers.len()).filter(|at| powers[*at] > 0.0).collect();
+    order.sort_by(|a, b| powers[*b].total_cmp(&powers[*a]).then(a.cmp(b)));
+    let enough = if by_image { (1.0 - LEAST) * total } else { f64::INFINITY };
+    let mut sum = 0.0;
+    let mut count = 0;
+    while count < order.len().min(MOST_FACE_LIGHTS) && sum < enough {
+        sum += powers[order[count]];
+        count += 1;
+    }
+    order.truncate(count);
+    order.sort_unstable();
+    (order, if total > 0.0 { sum / total } else { 0.0 })
+}
+
+/// What the faces of a mesh emit.
+struct Emission<'m> {
+    mesh: &'m Mesh,
+    colour: Rgb,
+    /// The image that multiplies it, and the coordinates of that.
+    image: Option<(&'m Texture, &'m TextureMap)>,
+}
+
+/// Weights of the second and third corner of a triangle, at the corners of a part of it.
+type Part = [(f64, f64); 3];
+
+const WHOLE: Part = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
+
+impl<'m> Emission<'m> {
+    fn of(mesh: &'m Mesh, material: &'m Material, textures: &'m [Texture]) -> Self {
+        let image = material.emission_map.as_ref().filter(|map| mesh.uv_set(map.uv_set).is_some());
+        let image = image.map(|map| (&textures[map.image as usize], map));
+        Self { mesh, colour: material.emission, image }
+    }
+
+    /// The mean radiance of each face; 0 of those without an area.
+    fn of_faces(&self) -> Vec<Rgb> {
+        let mean = |at| if self.area(at) > 0.0 { self.mean(at, WHOLE) } else { Rgb::ZERO };
+        (0..self.mesh.triangles.len()).into_par_iter().map(mean).collect()
+    }
+
+    fn area(&self, at: usize) -> f64 {
+        let [a, b, c] = self.mesh.corners(at);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Area times the sum of the colours of `radiance`, of face `at`.
+    fn power(&self, at: usize, radiance: Rgb) -> f64 {
+        let power = self.area(at) * f64::from(radiance.max(Rgb::ZERO).element_sum());
+        // A light of no number stays one, so that it is noticed.
+        if radiance.is_finite() { power } else { self.area(at) }
+    }
+
+    /// The mean radiance of a part of face `at`: of many points in rows, looked up where texels are about as far apart.
+    fn mean(&self, at: usize, part: Part) -> Rgb {
+        let Some((image, map)) = self.image else { return self.colour };
+        let Some(uvs) = self.mesh.uv_set(map.uv_set) else { return self.colour };
+        let [a, b, c] = uvs.get(at, self.mesh.triangles[at]);
+        let [a, b, c] = [a, b, c].map(|uv| map.transform.transform_point2(uv.as_dvec2()));
+        let corners = part.map(|(u, v)| a + (b - a) * u + (c - a) * v);
+        self.colour * mean_between(image, map, corners)
+    }
+
+    /// Into how many rows each of the `chosen` faces is cut, of which all send `total`.
+    fn rows(&self, chosen: &[usize], total: f64) -> Vec<u32> {
+        let mut rows = vec![1; chosen.len()];
+        if self.image.is_none() || chosen.len() >= MOST_PARTS {
+            return rows;
+        }
+        let differs = |k: usize, rows| Differs { by: self.differs(chosen[k], rows), at: k };
+        let mut heap: BinaryHeap<Differs> =
+            (0..chosen.len()).into_par_iter().map(|k| differs(k, 1)).collect::<Vec<_>>().into();
+        let mut left: f64 = heap.iter().map(|face| face.by).sum();
+        let mut count = chosen.len();
+        while let Some(Differs { by, at }) = heap.pop() {
+            let more = 3 * (rows[at] * rows[at]) as usize;
+            if left <= SMALL * total || by == 0.0 {
+                break;
+            }
+            if count + more > MOST_PARTS {
+                continue;
+            }
+            count += more;
+            rows[at] *= 2;
+            let smaller = differs(at, rows[at]);
+            left += smaller.by - by;
+            heap.push(smaller);
+        }
+        rows
+    }
+
+    /// By how much of its power the quarters of the parts of face `at`, in `rows` rows, differ from the parts.
+    fn differs(&self, at: usize, rows: u32) -> f64 {
+        let area = self.area(at) / f64::from(4 * rows * rows);
+        let of = |part: Part| -> f64 {
+            let whole = self.mean(at, part);
+            let quarters = parts(2).map(|quarter| within(part, quarter));
+            let apart =
+                quarters.map(|quarter| (self.mean(at, quarter) - whole).abs().element_sum());
+            apart.map(|apart| f64::from(apart) * area).sum()
+        };
+        let by: f64 = parts(rows).map(of).sum();
+        if by.is_finite() { by } else { 0.0 }
+    }
+}
+
+/// What differs within the parts of a face.
+struct Differs {
+    by: f64,
+    at: usize,
+}
+
+impl Ord for Differs {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.by.total_cmp(&other.by).then(other.at.cmp(&self.at))
+    }
+}
+
+impl PartialOrd for Differs {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Differs {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Differs {}
+
+/// The parts of a triangle in `rows` rows, row by row from the side between the first and the third corner; each as the triangle
+/// winds.
+fn parts(rows: u32) -> impl Iterator<Item = Part> {
+    let at = move |i: u32, j: u32| (f64::from(i) / f64::from(rows), f64::from(j) / f64::from(rows));
+    (0..rows).flat_map(move |i| {
+        (0..2 * (rows - i) - 1).map(move |k| {
+            let j = k / 2;
+            match k % 2 {
+                0 => [at(i, j), at(i + 1, j), at(i, j + 1)],
+                _ => [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)],
+            }
+        })
+    })
+}
+
+/// The part `inner` of the part `outer`.
+fn within(outer: Part, inner: Part) -> Part {
+    let [a, b, c] = outer.map(|(u, v)| DVec2::new(u, v));
+    inner.map(|(u, v)| (a + (b - a) * u + (c - a) * v).into())
+}
+
+/// The mean of what `image` shows between three `corners`, in its coordinates.
+fn mean_between(image: &Texture, map: &TextureMap, corners: [DVec2; 3]) -> Rgb {
+    const TEXELS: f64 = 256.0;
+    let levels = image.levels();
+    let size = DVec2::new(f64::from(levels[0].width), f64::from(levels[0].height));
+    let [a, b, c] = corners;
+    let texels = 0.5 * ((b - a) * size).perp_dot((c - a) * size).abs();
+    // A level down has a quarter of them.
+    let down = (0..levels.len() - 1).find(|level| texels / 4f64.powi(*level as i32) <= TEXELS);
+    let down = down.unwrap_or(levels.len() - 1);
+    let covered = texels / 4f64.powi(down as i32);
+    let rows = (2.0 * covered).sqrt().ceil().clamp(2.0, 2.0 * TEXELS.sqrt()) as u32;
+    let points = parts(rows).map(|part| {
+        let (u, v) = part.iter().fold((0.0, 0.0), |sum, w| (sum.0 + w.0 / 3.0, sum.1 + w.1 / 3.0));
+        let uv = map.wrapped(a + (b - a) * u + (c - a) * v);
+        levels[down].bilinear(map.wrap, uv).as_dvec3()
+    });
+    (points.sum::<DVec3>() / f64::from(rows * rows)).as_vec3()
+}
