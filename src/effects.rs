@@ -6,7 +6,7 @@
 use crate::error::counted;
 use crate::math::Rgb;
 use crate::scene::{
-    Fog, Glass, GlassShadows, Light, Material, MeanLights, Mesh, Scene, Settings, ShotLens,
+    Fog, Fresnel, Glass, GlassShadows, Light, Material, MeanLights, Mesh, Scene, Settings, ShotLens,
 };
 
 /// Which effects run.
@@ -326,7 +326,9 @@ fn normal_maps(used: &UsedMaterials) -> EffectReason {
 }
 
 fn has_roughness_map(material: &Material) -> bool {
-    material.is_mirror() && material.roughness != 0.0 && material.roughness_map.is_some()
+    let of_coat = |f: Fresnel| f.clearcoat_roughness_map.is_some() && f.clearcoat_roughness != 0.0;
+    let of_mirror = material.roughness != 0.0 && material.roughness_map.is_some();
+    material.is_mirror() && (of_mirror || material.fresnel.is_some_and(of_coat))
 }
 
 /// Whether surfaces show colours of vertices, and how many.

@@ -7,19 +7,12 @@ mod common;
 use common::{job, mean, pose, render};
 use tweenray::math::{DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    Corners, Fresnel, IntersectorKind, Light, Material, PointLight, Sky, SphereLight, Texture,
-    TextureMap, World, WorldSphere,
+    Corners, Fresnel, Glass, IntersectorKind, Light, Material, PointLight, Sky, SphereLight,
+    Texture, TextureMap, World, WorldSphere, Wrap,
 };
 use tweenray::stats::RayKind;
 
-const PLASTIC: Fresnel = Fresnel {
-    grazing: 1.0,
-    metallic: 0.0,
-    metallic_map: None,
-    clearcoat: 0.0,
-    clearcoat_roughness: 0.0,
-    transmission: 0.0,
-};
+const PLASTIC: Fresnel = Fresnel::PLASTIC;
 const METAL: Fresnel = Fresnel { metallic: 1.0, ..PLASTIC };
 
 fn principled(base: Rgb, roughness: f64, fresnel: Fresnel) -> Material {
@@ -199,12 +192,17 @@ fn light_samples_and_lobe_samples_agree() {
     }
 }
 
+/// The image that the plates below have, clamped, so that its halves do not meet at the sides too.
+fn halves() -> TextureMap {
+    TextureMap { wrap: [Wrap::Clamp; 2], ..TextureMap::of(0) }
+}
+
 /// An image makes the left half of a plate metal and the right one plastic, seen straight down.
 #[test]
 fn a_metallic_map_tells_metal_from_plastic() {
     let texels = vec![255, 0];
     let base = Rgb::new(0.8, 0.4, 0.2);
-    let fresnel = Fresnel { metallic_map: Some(TextureMap::of(0)), ..METAL };
+    let fresnel = Fresnel { metallic_map: Some(halves()), ..METAL };
     let mut world = plate(principled(base, 0.0, fresnel));
     world.textures.push(Texture::from_data8("halves", [2, 1], texels));
     let uvs = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)];
@@ -212,9 +210,10 @@ fn a_metallic_map_tells_metal_from_plastic() {
     world.meshes[0].uvs = Some(Corners { values, corners: None });
     // What is seen in a mirror, and what lights the diffuse part.
     world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
-    let mut job = job(world, pose((0.0, 3.0, 0.01), (0.0, 0.0, 0.0)), 32, 24);
+    let mut job = job(world, pose((0.0, 9.0, 0.01), (0.0, 0.0, 0.0)), 32, 24);
     job.settings.sky_samples = 4;
     let (film, _) = render(&job);
+    let mut counts = [0; 2];
     for (x, y, rgb) in common::pixels(&film) {
         let p = common::on_plane_y(&job, x, y, 0.0);
         let grown = (1.0 - (job.camera.eye - p).normalize().y).powi(5) as f32;
@@ -222,12 +221,68 @@ fn a_metallic_map_tells_metal_from_plastic() {
         let of_plastic = by_angle(Rgb::splat(0.04));
         // Texels have their middles at the quarters.
         let expected = match p.x {
+            x if x.abs() > 3.9 => continue,
             x if x < -2.1 => by_angle(base),
             x if x > 2.1 => of_plastic + base * (Rgb::ONE - of_plastic),
             _ => continue,
         };
         let off = (rgb - expected).abs().max_element();
         assert!(off < 2e-3, "{x},{y}: {rgb} for {expected}");
+        counts[usize::from(p.x > 0.0)] += 1;
+    }
+    assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
+}
+
+/// An image of the right half's 0 and the left half's 1 is as good as two materials.
+#[test]
+fn images_multiply_every_share() {
+    let coat = Fresnel { clearcoat: 0.9, clearcoat_roughness: 0.4, ..PLASTIC };
+    let part = Fresnel { transmission: 0.7, ..PLASTIC };
+    let maps: [(Fresnel, Fresnel, fn(&mut Fresnel) -> &mut Option<TextureMap>); 4] = [
+        (PLASTIC, Fresnel { grazing: 0.0, ..PLASTIC }, |f| &mut f.specular_map),
+        (coat, Fresnel { clearcoat: 0.0, ..coat }, |f| &mut f.clearcoat_map),
+        (coat, Fresnel { clearcoat_roughness: 0.0, ..coat }, |f| &mut f.clearcoat_roughness_map),
+        (part, Fresnel { transmission: 0.0, ..part }, |f| &mut f.transmission_map),
+    ];
+    for (at, (all, none, map)) in maps.into_iter().enumerate() {
+        let film = |fresnel: Fresnel| {
+            let mut material = principled(Rgb::new(0.8, 0.4, 0.2), 0.0, fresnel);
+            if fresnel.grazing == 0.0 {
+                material.mirror = Rgb::ZERO;
+            }
+            let tint = Rgb::new(0.1, 0.9, 0.4);
+            let glass = Glass { thin: true, tint, ..Glass::clear(1.5) };
+            material.glass = (fresnel.transmission != 0.0).then_some(glass);
+            let mut world = plate(material);
+            world.textures.push(Texture::from_data8("halves", [2, 1], vec![255, 0]));
+            let uvs = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)];
+            let values = uvs.map(|(u, v)| Vec2::new(u, v)).to_vec();
+            world.meshes[0].uvs = Some(Corners { values, corners: None });
+            world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+            let light =
+                PointLight { position: DVec3::new(0.5, 2.0, 0.2), intensity: Rgb::splat(3.0) };
+            world.lights.push(Light::Point(light));
+            let job = job(world, pose((0.0, 9.0, 0.01), (0.0, 0.0, 0.0)), 32, 24);
+            let at = |(x, y, _)| common::on_plane_y(&job, x, y, 0.0).x;
+            let (film, _) = render(&job);
+            let places: Vec<f64> = common::pixels(&film).map(at).collect();
+            (film.rgb, places)
+        };
+        let mut mapped = all;
+        *map(&mut mapped) = Some(halves());
+        let ((mapped, places), (all, _), (none, _)) = (film(mapped), film(all), film(none));
+        let mut counts = [0; 2];
+        for (i, x) in places.into_iter().enumerate() {
+            if !(2.1..3.9).contains(&x.abs()) {
+                continue;
+            }
+            let (expected, other) = if x < 0.0 { (all[i], none[i]) } else { (none[i], all[i]) };
+            let off = (mapped[i] - expected).abs().max_element();
+            assert!(off < 1e-5, "map {at} at {x}: {} for {expected}", mapped[i]);
+            counts[usize::from(x > 0.0)] +=
+                usize::from((expected - other).abs().max_element() > 1e-3);
+        }
+        assert!(counts.iter().all(|count| *count > 20), "map {at}: {counts:?}");
     }
 }
 

@@ -13,14 +13,7 @@ use tweenray::scene::{
 use tweenray::stats::RayKind;
 
 const KINDS: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
-const PLASTIC: Fresnel = Fresnel {
-    grazing: 1.0,
-    metallic: 0.0,
-    metallic_map: None,
-    clearcoat: 0.0,
-    clearcoat_roughness: 0.0,
-    transmission: 0.0,
-};
+const PLASTIC: Fresnel = Fresnel::PLASTIC;
 
 /// White, and clear where it is glass.
 fn part_glass(transmission: f64, roughness: f64, thin: bool) -> Material {

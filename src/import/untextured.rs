@@ -38,15 +38,21 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
             Some(Lacking::Share(what, world.textures[map.image as usize].name.clone()))
         };
         let roughness = share("roughness", material.roughness_map);
-        let metallic = share("metallic", material.fresnel.and_then(|f| f.metallic_map));
+        let emission = share("emission", material.emission_map);
+        let shares = material.fresnel.iter().flat_map(|fresnel| fresnel.maps());
+        let shares: Vec<Lacking> = shares.filter_map(|(what, map)| share(what, *map)).collect();
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
         let normals = material.normal_map.filter(|map| is_bare(&map.image));
         let normals = normals.map(|map| world.textures[map.image.image as usize].name.clone());
         let normals = normals.map(Lacking::Normals);
         let (texture, mask) = (texture.map(Lacking::Texture), mask.map(Lacking::Mask));
-        let lacking = [texture, mask, roughness, metallic, normals, colours];
-        lacking.into_iter().flatten().map(|lacks| Untextured::new(mesh, material, lacks))
+        let lacking = [texture, mask, emission, roughness, normals, colours];
+        lacking
+            .into_iter()
+            .flatten()
+            .chain(shares)
+            .map(|lacks| Untextured::new(mesh, material, lacks))
     })
 }
 

@@ -1,6 +1,6 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{AlphaMask, Fog, Glass, Material, TextureMap, World, WorldMesh};
+use super::{AlphaMask, Fog, Fresnel, Glass, Material, TextureMap, World, WorldMesh};
 use crate::error::{Error, Result};
 use crate::math::Rgb;
 
@@ -18,12 +18,14 @@ impl World {
             return Err(Error::Usage(message));
         }
         self.materials.iter().try_for_each(|material| {
-            let of = |map: &TextureMap, what| image_of(map, &self.textures, what, &material.name);
+            let of =
+                |map: &TextureMap, what: &str| image_of(map, &self.textures, what, &material.name);
             material.texture.as_ref().map(|map| of(map, "texture")).transpose()?;
             material.emission_map.as_ref().map(|map| of(map, "emission map")).transpose()?;
             material.roughness_map.as_ref().map(|map| of(map, "roughness map")).transpose()?;
-            let metal = material.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
-            metal.map(|map| of(map, "metallic map")).transpose()?;
+            for (share, map) in material.fresnel.iter().flat_map(Fresnel::maps) {
+                map.as_ref().map(|map| of(map, &format!("{share} map"))).transpose()?;
+            }
             self.check_normal_map(material)?;
             check_glass(material)?;
             self.check_mask(material)

@@ -63,13 +63,58 @@ pub struct Fresnel {
     pub metallic: f64,
     /// Image that multiplies `metallic`, of data from 0 to 1.
     pub metallic_map: Option<TextureMap>,
+    /// Image that multiplies what is reflected of what is no metal, `mirror` and `grazing`; of data from 0 to 1, as those below.
+    pub specular_map: Option<TextureMap>,
     /// Share of the surface that lies under a clear coat.
     pub clearcoat: f64,
+    /// Image that multiplies `clearcoat`.
+    pub clearcoat_map: Option<TextureMap>,
     /// Roughness of the clear coat.
     pub clearcoat_roughness: f64,
+    /// Image that multiplies `clearcoat_roughness`.
+    pub clearcoat_roughness_map: Option<TextureMap>,
     /// Share of what is no metal that is the material's `glass`, in place of the diffuse part and the mirror over it. The glass
     /// then has the roughness of the mirror, and image and vertex colours multiply its tint. 0 of materials without glass.
     pub transmission: f64,
+    /// Image that multiplies `transmission`.
+    pub transmission_map: Option<TextureMap>,
+}
+
+impl Fresnel {
+    /// Plastic: all light at grazing angles, over the diffuse part.
+    pub const PLASTIC: Self = Self {
+        grazing: 1.0,
+        metallic: 0.0,
+        metallic_map: None,
+        specular_map: None,
+        clearcoat: 0.0,
+        clearcoat_map: None,
+        clearcoat_roughness: 0.0,
+        clearcoat_roughness_map: None,
+        transmission: 0.0,
+        transmission_map: None,
+    };
+
+    /// Its images, each after the name of what it multiplies.
+    pub fn maps(&self) -> [(&'static str, &Option<TextureMap>); 5] {
+        [
+            ("metallic", &self.metallic_map),
+            ("specular", &self.specular_map),
+            ("clearcoat", &self.clearcoat_map),
+            ("clearcoat_roughness", &self.clearcoat_roughness_map),
+            ("transmission", &self.transmission_map),
+        ]
+    }
+
+    fn maps_mut(&mut self) -> [&mut Option<TextureMap>; 5] {
+        [
+            &mut self.metallic_map,
+            &mut self.specular_map,
+            &mut self.clearcoat_map,
+            &mut self.clearcoat_roughness_map,
+            &mut self.transmission_map,
+        ]
+    }
 }
 
 impl Material {
@@ -105,33 +150,31 @@ impl Material {
 
     /// Whether its scattering is looked up in an image anywhere; cut-outs do not count.
     pub fn has_image(&self) -> bool {
-        let is_metal_mapped = self.fresnel.is_some_and(|fresnel| fresnel.metallic_map.is_some());
-        let maps = [self.texture, self.roughness_map, self.emission_map];
-        is_metal_mapped || self.normal_map.is_some() || maps.iter().any(Option::is_some)
+        self.images().next().is_some()
     }
 
     /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
     pub fn images(&self) -> impl Iterator<Item = &TextureMap> {
         let normals = self.normal_map.as_ref().map(|map| &map.image);
-        let metal = self.fresnel.as_ref().and_then(|fresnel| fresnel.metallic_map.as_ref());
-        let emission = self.emission_map.as_ref();
-        let maps = [self.texture.as_ref(), self.roughness_map.as_ref(), emission, metal, normals];
-        maps.into_iter().flatten()
+        let shares =
+            self.fresnel.iter().flat_map(|fresnel| fresnel.maps()).map(|(_, map)| map.as_ref());
+        let maps = [&self.texture, &self.roughness_map, &self.emission_map].map(Option::as_ref);
+        maps.into_iter().chain([normals]).chain(shares).flatten()
     }
 
     /// [`images`](Self::images), to be changed.
     pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
         let normals = self.normal_map.as_mut().map(|map| &mut map.image);
-        let metal = self.fresnel.as_mut().and_then(|fresnel| fresnel.metallic_map.as_mut());
-        let emission = self.emission_map.as_mut();
-        let maps = [self.texture.as_mut(), self.roughness_map.as_mut(), emission, metal, normals];
-        maps.into_iter().flatten()
+        let shares = self.fresnel.iter_mut().flat_map(Fresnel::maps_mut).map(Option::as_mut);
+        let maps = [&mut self.texture, &mut self.roughness_map, &mut self.emission_map];
+        maps.map(Option::as_mut).into_iter().chain([normals]).chain(shares).flatten()
     }
 
     /// Whether any of the surface reflects light diffusely. What is NaN or negative goes on, to be counted at its pixel.
     pub fn is_diffuse(&self) -> bool {
         let is_metal = |f: &Fresnel| f.metallic == 1.0 && f.metallic_map.is_none();
-        let is_clear = |f: &Fresnel| is_metal(f) || f.transmission == 1.0;
+        let is_clear =
+            |f: &Fresnel| is_metal(f) || f.transmission == 1.0 && f.transmission_map.is_none();
         self.diffuse != Rgb::ZERO && !self.fresnel.as_ref().is_some_and(is_clear)
     }
 

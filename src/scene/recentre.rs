@@ -281,14 +281,7 @@ mod tests {
         };
         let mut world = World::default();
         world.textures.push(Texture::from_linear("t", [1, 1], vec![crate::math::Rgb::ONE]));
-        let fresnel = Fresnel {
-            grazing: 1.0,
-            metallic: 0.0,
-            metallic_map: None,
-            clearcoat: 0.0,
-            clearcoat_roughness: 0.0,
-            transmission: 1.0,
-        };
+        let fresnel = Fresnel { transmission: 1.0, ..Fresnel::PLASTIC };
         world.add_material(Material {
             texture: Some(TextureMap { uv_set: 2, ..TextureMap::of(0) }),
             fresnel: Some(fresnel),

@@ -7,9 +7,11 @@
 //! through of them is part of their ratio. What fog scatters (`in_scattering.rs`) depends on the view and is traced in every frame.
 
 mod distance;
+mod light_tree;
 pub(super) mod phase;
 
 pub(super) use distance::Distances;
+pub(super) use light_tree::{FarLight, LightTree};
 
 use super::Renderer;
 use super::light::{LightSample, LightView, SampleSink, ShadowTarget};
@@ -98,8 +100,7 @@ pub(super) struct FogSamples {
     pub distances: Vec<[f32; 2]>,
     pub places: Vec<[f32; 2]>,
     pub choices: Vec<[f32; 2]>,
-    /// For each light the distances, and a sum of what those up to it may scatter.
-    pub lights: Vec<(Distances, f64)>,
+    pub candidates: Vec<light_tree::Candidate>,
 }
 
 impl FogSegment {

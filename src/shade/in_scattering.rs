@@ -2,17 +2,17 @@
 //!
 //! Along each stretch of a path in fog, points are drawn for each light (`fog/distance.rs`), and a sample of the light from
 //! there. In a scene whose lights are selected, samples choose lights by what each would scatter if nothing were in the
-//! way and fog took nothing.
+//! way and fog took nothing (`fog/light_tree.rs`).
 
 use super::direct::{BATCH, ShadowScratch};
-use super::fog::{Distances, FogSamples, FogSegment, phase};
+use super::fog::{Distances, FarLight, FogSamples, FogSegment, LightTree, phase};
 use super::light::{LightSample, SampleSink, ShadowTarget};
 use super::pixels::BlockPixels;
 use super::source::LightSource;
 use super::{FrameInput, Renderer};
 use crate::intersect::SpawnPoint;
 use crate::math::{DVec3, Rgb};
-use crate::scene::{FEW_LIGHTS, FarField, Fog, Scene};
+use crate::scene::{FEW_LIGHTS, Fog, Scene};
 use crate::stats::{RayCounts, RayKind};
 
 /// The fog of a frame.
@@ -20,41 +20,18 @@ pub(super) struct FogInput<'a> {
     fog: &'a Fog,
     /// The frame's lights as they are seen from afar, without the sky.
     lights: Vec<FarLight>,
-}
-
-struct FarLight {
-    field: FarField,
-    /// Mean of the emission's colours, each without its sign.
-    mean: f64,
+    tree: LightTree,
 }
 
 impl<'a> FogInput<'a> {
     pub fn of(fog: &'a Fog, scene: &Scene, sources: &[LightSource]) -> Self {
-        let far = |source: &LightSource| FarLight {
-            field: scene.lights[source.number as usize].far_field(),
-            mean: f64::from(source.sampler.emission.abs().element_sum()) / 3.0,
+        let far = |source: &LightSource| {
+            let mean = f64::from(source.sampler.emission.abs().element_sum()) / 3.0;
+            FarLight::new(scene.lights[source.number as usize].far_field(), mean)
         };
-        let lights = sources.iter().filter(|source| !source.is_sky()).map(far).collect();
-        Self { fog, lights }
-    }
-}
-
-impl FarLight {
-    fn distances(&self, fog: &FogInput, segment: &FogSegment) -> Distances {
-        let distances = Distances::new(fog.fog.extinction, segment.length);
-        match self.field.place() {
-            Some((centre, reach)) => distances.near(segment.dir, centre - segment.start, reach),
-            None => distances,
-        }
-    }
-
-    /// What would be scattered along `distances` if nothing were in the way and fog took nothing from light on its way.
-    fn scattered(&self, distances: &Distances) -> f64 {
-        let along = match self.field.place() {
-            Some(_) => distances.angle_over_distance(),
-            None => distances.mean_free_length(),
-        };
-        self.mean * self.field.intensity() * along
+        let sources = sources.iter().filter(|source| !source.is_sky());
+        let lights: Vec<FarLight> = sources.map(far).collect();
+        Self { fog, tree: LightTree::new(&lights), lights }
     }
 }
 
@@ -140,10 +117,10 @@ impl Renderer<'_> {
         s: &mut ShadowScratch,
     ) {
         let n = self.settings.fog_samples;
-        let arrives = |far: &FarLight| fog.fog.bounds.is_some() || far.field.place().is_some();
+        let arrives = |far: &FarLight| fog.fog.bounds.is_some() || far.is_near();
         let lights = input.lights.iter().zip(&fog.lights);
         for (source, far) in lights.filter(|(_, far)| arrives(far)) {
-            let distances = far.distances(fog, segment);
+            let distances = far.distances(fog.fog.extinction, segment);
             self.fill_pairs(segment, source.number, n, pixels, own);
             for (u, place) in own.distances.iter().zip(&own.places) {
                 let sample = (u.map(f64::from), *place, f64::from(n));
@@ -161,16 +138,7 @@ impl Renderer<'_> {
         own: &mut FogSamples,
         s: &mut ShadowScratch,
     ) {
-        own.lights.clear();
-        let mut sum = 0.0;
-        for far in &fog.lights {
-            let distances = far.distances(fog, segment);
-            sum += far.scattered(&distances);
-            own.lights.push((distances, sum));
-        }
-        if sum.is_nan() || sum <= 0.0 {
-            return;
-        }
+        fog.tree.look(fog.fog.extinction, segment, &mut own.candidates);
         let n = self.settings.fog_samples * FEW_LIGHTS as u32;
         self.fill_pairs(segment, 0, n, pixels, own);
         own.choices.resize(n as usize, [0.0; 2]);
@@ -178,15 +146,12 @@ impl Renderer<'_> {
         let number = self.fog_dimension(1);
         self.fill(&segment.place, number, first, pixels, &mut own.choices);
         for ((u, place), choice) in own.distances.iter().zip(&own.places).zip(&own.choices) {
-            let at = own.lights.partition_point(|(_, to)| *to <= f64::from(choice[0]) * sum);
-            let at = at.min(own.lights.len() - 1);
-            let before = at.checked_sub(1).map_or(0.0, |before| own.lights[before].1);
-            let (distances, to) = &own.lights[at];
-            let count = f64::from(n) * (to - before) / sum;
-            if count > 0.0 {
-                let sample = (u.map(f64::from), *place, count);
-                self.scatter((fog, &input.lights[at]), segment, distances, sample, s);
-            }
+            let Some((at, share)) = fog.tree.choose(&own.candidates, choice.map(f64::from)) else {
+                continue;
+            };
+            let distances = fog.lights[at].distances(fog.fog.extinction, segment);
+            let sample = (u.map(f64::from), *place, f64::from(n) * share);
+            self.scatter((fog, &input.lights[at]), segment, &distances, sample, s);
         }
     }
 

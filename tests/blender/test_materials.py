@@ -117,10 +117,14 @@ class Materials(Case):
             channels = tree.nodes.new("ShaderNodeSeparateColor")
             tree.links.new(node.outputs["Color"], channels.inputs[0])
             tree.links.new(channels.outputs["Blue"], shader.inputs["Metallic"])
+            tree.links.new(channels.outputs["Red"], shader.inputs["Coat Weight"])
+            tree.links.new(channels.outputs["Green"], shader.inputs["Coat Roughness"])
 
         table, lines = self.of(lambda: self.mapped("t", "Non-Color", grey, link))
         self.assertEqual(table["principled"]["roughness"]["channel"], "g")
         self.assertEqual(table["principled"]["metallic"]["channel"], "b")
+        coat = [table["principled"][key]["channel"] for key in ("clearcoat", "clearcoat_roughness")]
+        self.assertEqual(coat, ["r", "g"])
         self.assertEqual(table["normal_map"]["strength"], 0.5)
         files = {table["alpha"], table["normal_map"]["file"], table["principled"]["roughness"]["file"]}
         self.assertEqual(len(files), 1)

@@ -15,14 +15,7 @@ fn material(value: Value) -> (Material, Model) {
 #[test]
 fn factors_and_their_defaults_are_those_of_the_format() {
     let (white, model) = material(json!({}));
-    let plain = Fresnel {
-        grazing: 1.0,
-        metallic: 1.0,
-        metallic_map: None,
-        clearcoat: 0.0,
-        clearcoat_roughness: 0.0,
-        transmission: 0.0,
-    };
+    let plain = Fresnel { metallic: 1.0, ..Fresnel::PLASTIC };
     assert_eq!((white.diffuse, white.roughness, white.fresnel), (Rgb::ONE, 1.0, Some(plain)));
     assert_eq!(white.mirror, Rgb::splat(0.04));
     assert!(!white.emits_back && white.emission == Rgb::ZERO && model.warnings.is_empty());
@@ -71,6 +64,49 @@ fn images_serve_as_colour_roughness_metal_and_normals() {
     assert_eq!(metal.wrap, [Wrap::Clamp, Wrap::Mirror]);
     assert!(warns(&model.warnings, "the filter NEAREST of a texture is read as LINEAR"));
     assert_eq!(model.world.textures.len(), 4);
+}
+
+#[test]
+fn images_of_coat_transmission_and_specular_are_taken_by_their_channels() {
+    let mut file = File::triangle().with_uvs();
+    let texture = file.image(1, &[[51, 102, 153, 204]], json!({}));
+    let info = json!({"index": texture});
+    let with = |coat: f64| {
+        json!({
+            "KHR_materials_clearcoat": {
+                "clearcoatFactor": coat, "clearcoatTexture": info,
+                "clearcoatRoughnessFactor": 0.5, "clearcoatRoughnessTexture": info,
+            },
+            "KHR_materials_transmission": {"transmissionFactor": 0.5, "transmissionTexture": info},
+            "KHR_materials_specular": {"specularTexture": info},
+        })
+    };
+    let file = file.with_material(json!({"extensions": with(0.75)}));
+    let model = file.model();
+    let material = &model.world.materials[0];
+    let fresnel = material.fresnel.expect("layers");
+    let texel = |map: &Option<TextureMap>| {
+        let image = map.map(|map| &model.world.textures[map.image as usize]);
+        image.map(|image| image.levels()[0].texel(0, 0).x)
+    };
+    let shares = fresnel.maps().map(|(name, map)| (name, texel(map)));
+    let expected = [
+        ("metallic", None),
+        ("specular", Some(0.8)),
+        ("clearcoat", Some(0.2)),
+        ("clearcoat_roughness", Some(0.4)),
+        ("transmission", Some(0.2)),
+    ];
+    assert_eq!(shares, expected);
+    assert_eq!((fresnel.clearcoat, fresnel.clearcoat_roughness), (0.75, 0.5));
+    assert_eq!((fresnel.transmission, material.glass.is_some()), (0.5, true));
+    assert!(model.warnings.is_empty() && model.world.into_scene(true).is_ok());
+    // An image times nothing is not read.
+    let mut plain = File::triangle().with_uvs();
+    plain.image(1, &[[51, 102, 153, 204]], json!({}));
+    let none = plain.with_material(json!({"extensions": with(0.0)})).model();
+    let fresnel = none.world.materials[0].fresnel.expect("layers");
+    assert_eq!((fresnel.clearcoat_map, fresnel.clearcoat_roughness_map), (None, None));
 }
 
 /// Where the coordinates of the file, with v downwards, lead in an image with v downwards.

@@ -3,8 +3,14 @@
     python3 tools/mitsuba/compare.py TWEENRAY FOLDER [SCENE ...]      (a Python with the modules mitsuba and numpy)
 
 Compared is linear radiance, clipped to [0, 1]: the root mean square of the difference over all pixels, and over the 95 %
-that agree best. Each scene leaves `mitsuba.exr`, `tweenray.exr` and `pair.png` (Mitsuba above, tweenray below it, ten
-times the difference at the bottom).
+that agree best. Where Mitsuba has another model of a material, a second row compares with tweenray's formula, written anew
+as a BSDF of Mitsuba's (`formulas.py`); that row counts. Each scene leaves `mitsuba.exr`, `tweenray.exr` and `pair.png` (Mitsuba
+above, tweenray below it, ten times the difference at the bottom).
+
+    BALLS='glass|metal 0.9'       only the balls whose names begin so
+    MITSUBA_VARIANT=scalar_rgb    another variant than llvm_ad_rgb, which needs LLVM 15 or newer (DRJIT_LIBLLVM_PATH); the balls'
+                                  formulas take a variant with arrays
+    SAMPLES=16384                 samples of Mitsuba's
 """
 
 import os
@@ -24,11 +30,11 @@ import scenes
 # Most that 95 % of the pixels may differ by.
 MOST = 0.004
 # Samples of Mitsuba's, in parts that fit in memory.
-SAMPLES, PART = 1024, 64
+SAMPLES, PART = int(os.environ.get("SAMPLES", 1024)), 64
 
 
-def by_mitsuba(scene, samples=SAMPLES):
-    built = mi.load_dict(scene.mitsuba())
+def by_mitsuba(described, samples=SAMPLES):
+    built = mi.load_dict(described)
     parts = range(samples // PART)
     return np.mean([np.array(mi.render(built, spp=PART, seed=part)) for part in parts], axis=0)[..., :3]
 
@@ -36,7 +42,7 @@ def by_mitsuba(scene, samples=SAMPLES):
 def by_tweenray(program, scene, folder):
     with open(os.path.join(folder, "scene.toml"), "w") as out:
         out.write(scene.tweenray())
-    samples = ["--spp", "64", "--shadow-samples", "16", "--sky-samples", "16", "--fog-samples", "8"]
+    samples = ["--spp", str(getattr(scene, "samples", 64)), "--shadow-samples", "16", "--sky-samples", "16", "--fog-samples", "8"]
     command = [program, "render", "scene.toml", "-o", "tweenray.exr", "--overwrite", "--quiet", "--policy", "off", *samples]
     subprocess.run(command, cwd=folder, check=True)
     return np.array(mi.Bitmap(os.path.join(folder, "tweenray.exr")))[..., :3]
@@ -62,7 +68,7 @@ def report(name, mitsuba, tweenray):
 
 def one(program, name, place):
     scene = scenes.ALL[name]
-    pictures = by_mitsuba(scene), by_tweenray(program, scene, place)
+    pictures = by_mitsuba(scene.mitsuba()), by_tweenray(program, scene, place)
     save(place, *pictures)
     return report(name, *pictures)
 
@@ -70,9 +76,15 @@ def one(program, name, place):
 def many(program, name, place):
     balls.write(place)
     rows = []
+    only = os.environ.get("BALLS")
     for ball in balls.all_of(place, name == "balls-environment"):
-        pictures = by_mitsuba(ball), by_tweenray(program, ball, place)
+        if only and not any(ball.name.startswith(word) for word in only.split("|")):
+            continue
+        pictures = by_mitsuba(ball.mitsuba()), by_tweenray(program, ball, place)
         report(ball.name, *pictures)
+        if ball.formula:
+            pictures = by_mitsuba(ball.mitsuba(ball.formula)), pictures[1]
+            report(f"{ball.name}, by formula", *pictures)
         rows.append(pictures)
     together = [np.concatenate(pictures, axis=1) for pictures in zip(*rows)]
     save(place, *together)

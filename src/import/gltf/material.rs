@@ -26,12 +26,28 @@ struct Laid {
     metal_rough: Option<LaidImage>,
     normal: Option<LaidImage>,
     emissive: Option<LaidImage>,
+    transmission: Option<LaidImage>,
+    coat: Option<LaidImage>,
+    coat_roughness: Option<LaidImage>,
+    specular: Option<LaidImage>,
 }
 
 impl Laid {
     /// All images, the most important first.
     fn all(&self) -> impl Iterator<Item = &LaidImage> {
-        [&self.base, &self.normal, &self.metal_rough, &self.emissive].into_iter().flatten()
+        let Self {
+            base,
+            metal_rough,
+            normal,
+            emissive,
+            transmission,
+            coat,
+            coat_roughness,
+            specular,
+        } = self;
+        [base, normal, metal_rough, emissive, transmission, coat, coat_roughness, specular]
+            .into_iter()
+            .flatten()
     }
 
     /// The file's sets of texture coordinates that the images lie by, each once: the first is the scene's set 0, and so on.
@@ -96,8 +112,34 @@ impl<'d> MaterialReader<'d> {
         // An image times nothing is nothing.
         let glows = json.numbers::<3>("emissiveFactor")?.is_some_and(|factor| factor != [0.0; 3]);
         let emissive = if glows { of(Some(json), "emissiveTexture")? } else { None };
+        let mut of_extension = |name, factor, usual: f64, key| {
+            let Some(json) = json.extension(name) else { return Ok(None) };
+            let counts = json.number(factor)?.unwrap_or(usual) > 0.0;
+            if counts { of(Some(&json), key) } else { Ok(None) }
+        };
+        let transmission = of_extension(
+            "KHR_materials_transmission",
+            "transmissionFactor",
+            0.0,
+            "transmissionTexture",
+        )?;
+        let mut of_coat =
+            |key| of_extension("KHR_materials_clearcoat", "clearcoatFactor", 0.0, key);
+        let coat = of_coat("clearcoatTexture")?;
+        let coat_roughness = of_coat("clearcoatRoughnessTexture")?;
+        let specular =
+            of_extension("KHR_materials_specular", "specularFactor", 1.0, "specularTexture")?;
         // The ambient occlusion of an image is left out: rays find it.
-        Ok(Laid { base, metal_rough, normal, emissive })
+        Ok(Laid {
+            base,
+            metal_rough,
+            normal,
+            emissive,
+            transmission,
+            coat,
+            coat_roughness,
+            specular,
+        })
     }
 
     /// Material number `at`, for meshes that are `coloured` by their vertices or not. Images enter `world`.
@@ -175,13 +217,22 @@ impl Parts<'_, '_> {
         let normal_map = self.normal_map()?;
         let (mirror, grazing) = self.reflectance()?;
         let (clearcoat, clearcoat_roughness) = self.clearcoat()?;
+        let red = Role::Share(ImageChannel::Red);
+        let clearcoat_map = self.map(self.laid.coat, red)?;
+        let transmission_map = self.map(self.laid.transmission, red)?;
+        let green = Role::Share(ImageChannel::Green);
+        let clearcoat_roughness_map = self.map(self.laid.coat_roughness, green)?;
         let fresnel = Fresnel {
             grazing,
+            specular_map: self.map(self.laid.specular, Role::Share(ImageChannel::Alpha))?,
             metallic,
             metallic_map,
             clearcoat,
+            clearcoat_map,
             clearcoat_roughness,
+            clearcoat_roughness_map,
             transmission: 0.0,
+            transmission_map,
         };
         let fresnel = Some(fresnel);
         Ok(Material { texture, mirror, roughness, roughness_map, fresnel, normal_map, ..material })
@@ -206,9 +257,11 @@ impl Parts<'_, '_> {
         let Some(json) = self.json.extension("KHR_materials_specular") else {
             return Ok((Rgb::splat((root * root) as f32), 1.0));
         };
-        if json.get("specularTexture").or(json.get("specularColorTexture")).is_some() {
-            self.notes
-                .add("images of KHR_materials_specular are ignored: their factors count", None);
+        if json.get("specularColorTexture").is_some() {
+            self.notes.add(
+                "specularColorTexture of KHR_materials_specular is ignored: its factor counts",
+                None,
+            );
         }
         let specular = self.share(Some(&json), "specularFactor", 1.0)?;
         let tint = json.numbers::<3>("specularColorFactor")?.unwrap_or([1.0; 3]);
@@ -227,10 +280,11 @@ impl Parts<'_, '_> {
         let Some(json) = self.json.extension("KHR_materials_clearcoat") else {
             return Ok((0.0, 0.0));
         };
-        let images = ["clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"];
-        if images.iter().any(|key| json.get(key).is_some()) {
-            self.notes
-                .add("images of KHR_materials_clearcoat are ignored: its factors count", None);
+        if json.get("clearcoatNormalTexture").is_some() {
+            self.notes.add(
+                "clearcoatNormalTexture of KHR_materials_clearcoat is ignored: coats are as smooth as their meshes",
+                None,
+            );
         }
         let coat = self.share(Some(&json), "clearcoatFactor", 0.0)?;
         Ok((coat, self.share(Some(&json), "clearcoatRoughnessFactor", 0.0)?))
@@ -278,13 +332,6 @@ impl Parts<'_, '_> {
         let Some(json) = self.json.extension("KHR_materials_transmission") else { return Ok(None) };
         let transmission = self.share(Some(&json), "transmissionFactor", 0.0)?;
         if transmission == 0.0 {
-            return Ok(None);
-        }
-        if json.get("transmissionTexture").is_some() {
-            self.notes.add(
-                "KHR_materials_transmission by an image is ignored: the surface is opaque",
-                None,
-            );
             return Ok(None);
         }
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;

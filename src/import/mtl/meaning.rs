@@ -110,12 +110,10 @@ fn cover(out: &mut Material, source: &Source, mtl: &tobj::Material) {
     out.mirror = Rgb::splat((root * root) as f32);
     out.roughness = source.roughness.unwrap_or(DEFAULT_ROUGHNESS);
     out.fresnel = Some(Fresnel {
-        grazing: 1.0,
         metallic: source.metallic.unwrap_or(0.0),
-        metallic_map: None,
         clearcoat: source.clearcoat.unwrap_or(0.0),
         clearcoat_roughness: source.clearcoat_roughness.unwrap_or(0.0),
-        transmission: 0.0,
+        ..Fresnel::PLASTIC
     });
 }
 

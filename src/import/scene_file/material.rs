@@ -2,7 +2,7 @@
 
 use super::at::At;
 use super::number::{Int, Ior, Share};
-use super::principled::Principled;
+use super::principled::{Principled, SharesOf};
 use super::report::Source;
 use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
 use super::vector::{Light as Amount, Reflectance};
@@ -86,28 +86,28 @@ pub(super) struct ImagesOf<T> {
     texture: Option<T>,
     normals: Option<T>,
     alpha: Option<T>,
-    roughness: Option<T>,
-    metallic: Option<T>,
     emission: Option<T>,
+    shares: SharesOf<T>,
 }
 
 impl<T> ImagesOf<T> {
     /// What `of` makes of each, in order; the first error, if any.
     pub fn try_map<U>(self, mut of: impl FnMut(T) -> Result<U>) -> Result<ImagesOf<U>> {
+        let shares = self.shares.map(|share| share.map(&mut of).transpose());
+        let [a, b, c, d, e, f] = shares;
         Ok(ImagesOf {
+            shares: [a?, b?, c?, d?, e?, f?],
             texture: self.texture.map(&mut of).transpose()?,
             normals: self.normals.map(&mut of).transpose()?,
             alpha: self.alpha.map(&mut of).transpose()?,
-            roughness: self.roughness.map(&mut of).transpose()?,
-            metallic: self.metallic.map(&mut of).transpose()?,
             emission: self.emission.map(&mut of).transpose()?,
         })
     }
 
     /// All that there are.
     pub fn all(self) -> impl Iterator<Item = T> {
-        let Self { texture, normals, alpha, roughness, metallic, emission } = self;
-        [texture, normals, alpha, roughness, metallic, emission].into_iter().flatten()
+        let Self { texture, normals, alpha, emission, shares } = self;
+        [texture, normals, alpha, emission].into_iter().chain(shares).flatten()
     }
 }
 
@@ -124,18 +124,19 @@ impl Material {
     pub fn images(&self) -> ImagesOf<(At<String>, ImageUse)> {
         let (principled, normal_map) = (self.principled.as_deref(), self.normal_map.as_ref());
         let texture = principled.map_or(self.texture.as_ref(), |p| p.base_texture.as_ref());
-        let roughness = principled.map_or(self.roughness.as_ref(), |p| p.roughness.as_ref());
-        let roughness = roughness.and_then(|key| key.data_file(ChannelName::Green));
-        let metallic = principled.and_then(|p| p.metallic.as_ref());
-        let metallic = metallic.and_then(|key| key.data_file(ChannelName::Blue));
+        let roughness = self.roughness.as_ref().map(|key| (key, ChannelName::Green));
+        let plain = [roughness, None, None, None, None, None];
+        let shares = principled.map_or(plain, Principled::shares).map(|share| {
+            let (file, channel) = share.and_then(|(key, usual)| key.data_file(usual))?;
+            Some((file, ImageUse::Data(channel)))
+        });
         let emission = self.emission_texture.as_ref();
         ImagesOf {
             texture: texture.map(|key| (key.image_file(), ImageUse::Colour)),
             normals: normal_map.map(|key| (key.image_file(), ImageUse::Normals)),
             alpha: self.alpha.as_ref().map(|key| (key.image_file(), ImageUse::Mask)),
-            roughness: roughness.map(|(file, channel)| (file, ImageUse::Data(channel))),
-            metallic: metallic.map(|(file, channel)| (file, ImageUse::Data(channel))),
             emission: emission.map(|key| (key.image_file(), ImageUse::Colour)),
+            shares,
         }
     }
 
@@ -155,8 +156,8 @@ impl Material {
             priority: g.priority.as_ref().map(|p| p.u32() as u8),
             thin: g.thin,
         });
-        let ImagesOf { texture, normals, alpha, roughness, metallic, emission } = images;
-        let own_roughness = self.roughness.as_deref().map(|key| key.parts(*roughness));
+        let ImagesOf { texture, normals, alpha, emission, shares } = images;
+        let own_roughness = self.roughness.as_deref().map(|key| key.parts(shares[0]));
         let (roughness_share, roughness_map) = own_roughness.unwrap_or_default();
         let built = scene::Material {
             name: name.to_owned(),
@@ -187,7 +188,7 @@ impl Material {
         };
         Ok(match self.principled.as_deref() {
             None => built,
-            Some(principled) => principled.build(built, [*texture, *roughness, *metallic]),
+            Some(principled) => principled.build(built, *texture, *shares),
         })
     }
 
@@ -197,7 +198,7 @@ impl Material {
     }
 
     fn check_transmission(&self, principled: &At<Principled>, source: &Source) -> Result<()> {
-        let is_glass = principled.transmission.0 != 0.0;
+        let is_glass = principled.has_glass();
         let message = match principled.absorption.as_ref() {
             _ if !is_glass && principled.says_glass() => {
                 "`tint`, `absorption` and `thin` are of the glass: they need a `transmission` above 0"

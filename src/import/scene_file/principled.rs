@@ -2,7 +2,7 @@
 
 use super::at::At;
 use super::number::{Ior, Share};
-use super::texture::{ImageTable, MappedShare, NamedTexture};
+use super::texture::{ChannelName, ImageTable, MappedShare, NamedTexture};
 use super::vector::{Light as Amount, OneOr, Reflectance};
 use crate::math::Rgb;
 use crate::scene::{Fresnel, Glass, Material, TextureId};
@@ -28,19 +28,16 @@ pub(super) struct Principled {
     /// Index of refraction of what is no metal: it reflects ((ior - 1) / (ior + 1))² at normal incidence.
     #[serde(default = "plastic")]
     ior: Ior,
-    /// Factor on the reflection of what is no metal: 0 is none, so that it is diffuse alone.
-    #[serde(default = "all")]
-    specular: Share,
-    /// Share that lies under a clear coat, as of car paint.
-    #[serde(default = "none")]
-    clearcoat: Share,
-    /// Roughness of the clear coat.
-    #[serde(default = "nearly_smooth")]
-    clearcoat_roughness: Share,
+    /// Factor on the reflection of what is no metal: 0 is none, so that it is diffuse alone. Or an image file of it, whose red
+    /// counts as it stands; or a table. Absent: 1.
+    pub specular: Option<At<MappedShare>>,
+    /// Share that lies under a clear coat, as of car paint. Or an image file of it, whose red counts as it stands; or a table. Absent: 0.
+    pub clearcoat: Option<At<MappedShare>>,
+    /// Roughness of the clear coat. Or an image file of it, whose green counts as it stands; or a table. Absent: 0.03.
+    pub clearcoat_roughness: Option<At<MappedShare>>,
     /// Share of what is no metal that is glass of this `ior` and `roughness`, in place of the diffuse part and its reflection.
-    /// Neither `normal_map` nor `alpha` stands beside it.
-    #[serde(default = "none")]
-    pub transmission: Share,
+    /// Or an image file of it, whose red counts as it stands; or a table. Neither `normal_map` nor `alpha` stands beside it. Absent: 0.
+    pub transmission: Option<At<MappedShare>>,
     /// Share of light that each crossing of the glass lets through: twice of a body, once of a thin pane. `base_texture` and
     /// vertex colours multiply it. Absent: `base_colour`.
     tint: Option<Reflectance>,
@@ -51,8 +48,9 @@ pub(super) struct Principled {
     pub thin: bool,
 }
 
-/// Roughness where none is given.
+/// Roughness where none is given, of the reflection and of the clear coat.
 const USUAL_ROUGHNESS: f64 = 0.5;
+const USUAL_COAT_ROUGHNESS: f64 = 0.03;
 /// Grey of a surface without a colour.
 const USUAL_GREY: Share = Share(0.8);
 
@@ -60,17 +58,9 @@ fn plastic() -> Ior {
     Ior(1.5)
 }
 
-fn all() -> Share {
-    Share(1.0)
-}
-
-fn none() -> Share {
-    Share(0.0)
-}
-
-fn nearly_smooth() -> Share {
-    Share(0.03)
-}
+/// Something of each key that may be an image: `roughness`, `metallic`, `specular`, `clearcoat`, `clearcoat_roughness` and
+/// `transmission`.
+pub(super) type SharesOf<T> = [Option<T>; 6];
 
 impl Principled {
     /// Whether a key says what its glass is like.
@@ -78,22 +68,51 @@ impl Principled {
         self.tint.is_some() || self.absorption.is_some() || self.thin
     }
 
-    /// `material` with this reflection; the images are those of base colour, roughness and metallic.
+    /// The keys that may be images, in the order of [`SharesOf`], and the channel of each that counts where none is named.
+    pub fn shares(&self) -> SharesOf<(&At<MappedShare>, ChannelName)> {
+        let usual = [
+            (&self.roughness, ChannelName::Green),
+            (&self.metallic, ChannelName::Blue),
+            (&self.specular, ChannelName::Red),
+            (&self.clearcoat, ChannelName::Red),
+            (&self.clearcoat_roughness, ChannelName::Green),
+            (&self.transmission, ChannelName::Red),
+        ];
+        usual.map(|(key, channel)| key.as_ref().map(|key| (key, channel)))
+    }
+
+    /// Whether any of the surface may be glass.
+    pub fn has_glass(&self) -> bool {
+        self.transmission.as_deref().is_some_and(|key| key.factor() != 0.0)
+    }
+
+    /// `material` with this reflection; the images are those of the base colour and of [`shares`](Self::shares).
     pub fn build(
         &self,
         material: Material,
-        [base, roughness, metallic]: [Option<TextureId>; 3],
+        base: Option<TextureId>,
+        images: SharesOf<TextureId>,
     ) -> Material {
-        let own_roughness = self.roughness.as_deref().map(|key| key.parts(roughness));
-        let (roughness, roughness_map) = own_roughness.unwrap_or((USUAL_ROUGHNESS, None));
-        let own_metallic = self.metallic.as_deref().map(|key| key.parts(metallic));
-        let (metallic, metallic_map) = own_metallic.unwrap_or_default();
+        let keys = [
+            (&self.roughness, USUAL_ROUGHNESS),
+            (&self.metallic, 0.0),
+            (&self.specular, 1.0),
+            (&self.clearcoat, 0.0),
+            (&self.clearcoat_roughness, USUAL_COAT_ROUGHNESS),
+            (&self.transmission, 0.0),
+        ];
+        let parts = std::array::from_fn(|at| {
+            let (key, usual) = &keys[at];
+            key.as_deref().map_or((*usual, None), |key| key.parts(images[at]))
+        });
+        let [roughness, metallic, specular, clearcoat, clearcoat_roughness, transmission] = parts;
+        let (roughness, roughness_map) = roughness;
         let paints = self.base_texture.is_some() || material.vertex_colours;
         let usual = if paints { Share(1.0) } else { USUAL_GREY };
         let base_colour = self.base_colour.unwrap_or(OneOr([usual; 3]));
         let root = (self.ior.0 - 1.0) / (self.ior.0 + 1.0);
-        let normal = root * root * self.specular.0;
-        let glass = (self.transmission.0 != 0.0).then(|| Glass {
+        let normal = root * root * specular.0;
+        let glass = (transmission.0 != 0.0).then(|| Glass {
             roughness,
             tint: self.tint.unwrap_or(base_colour).rgb(),
             absorption: self.absorption.as_ref().map_or_else(Default::default, |a| a.rgb()),
@@ -101,9 +120,9 @@ impl Principled {
             ..Glass::clear(self.ior.0)
         });
         let is_bare = self.base_texture.is_none() && !material.vertex_colours;
-        let is_alone = self.transmission.0 == 1.0
-            && metallic == 0.0
-            && self.clearcoat.0 == 0.0
+        let is_alone = transmission == (1.0, None)
+            && metallic.0 == 0.0
+            && clearcoat.0 == 0.0
             && roughness_map.is_none();
         if is_bare && is_alone && material.emission == Rgb::ZERO {
             return Material { glass, ..material };
@@ -116,12 +135,16 @@ impl Principled {
             roughness,
             roughness_map,
             fresnel: Some(Fresnel {
-                grazing: self.specular.0,
-                metallic,
-                metallic_map,
-                clearcoat: self.clearcoat.0,
-                clearcoat_roughness: self.clearcoat_roughness.0,
-                transmission: self.transmission.0,
+                grazing: specular.0,
+                specular_map: specular.1,
+                metallic: metallic.0,
+                metallic_map: metallic.1,
+                clearcoat: clearcoat.0,
+                clearcoat_map: clearcoat.1,
+                clearcoat_roughness: clearcoat_roughness.0,
+                clearcoat_roughness_map: clearcoat_roughness.1,
+                transmission: transmission.0,
+                transmission_map: transmission.1,
             }),
             ..material
         }

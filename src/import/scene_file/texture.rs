@@ -235,11 +235,19 @@ pub(super) enum MappedShare {
 }
 
 impl MappedShare {
+    /// What multiplies the image, or the number that is the same everywhere.
+    pub fn factor(&self) -> f64 {
+        match self {
+            Self::Same(share) => share.0,
+            Self::Image(Named(table)) => table.factor.0.0,
+        }
+    }
+
     /// The number that is the same everywhere, and the image that multiplies it; `image` is its number in the world.
     pub fn parts(&self, image: Option<TextureId>) -> (f64, Option<TextureMap>) {
         match self {
-            Self::Same(share) => (share.0, None),
-            Self::Image(Named(table)) => (table.factor.0.0, image.map(|id| table.map(id))),
+            Self::Same(_) => (self.factor(), None),
+            Self::Image(Named(table)) => (self.factor(), image.map(|id| table.map(id))),
         }
     }
 }

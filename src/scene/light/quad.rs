@@ -111,9 +111,9 @@ impl LightData for QuadLight {
     }
 
     fn most_irradiance(&self, cell: &Bounds3) -> f64 {
+        let normal = self.normal();
         // A corner may lie a rounding error off the plane of the others.
-        let height =
-            |corner: &DVec3| bound::most_height(*corner, self.normal(), self.two_sided, cell);
+        let height = |corner: &DVec3| bound::most_height(*corner, normal, self.two_sided, cell);
         let height = self.corners.iter().map(height).fold(0.0, f64::max);
         bound::of_flat(self.area(), &self.bounds(), height, cell)
     }

@@ -5,7 +5,7 @@ use super::reflectance::Reflectance;
 use super::{diffuse, facing_normal, glossy};
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb};
-use crate::scene::{Fresnel, Material, Scene};
+use crate::scene::{Fresnel, Material, Scene, TextureMap};
 use crate::shade::cone::RayCone;
 use crate::shade::texture;
 
@@ -38,17 +38,21 @@ impl Layers {
         let seen = (si, wo, cone);
         let base = diffuse::albedo(scene, material, si, wo, cone);
         let roughness = glossy::roughness(scene, material, seen);
-        let metal = fresnel.metallic * texture::share(scene, fresnel.metallic_map.as_ref(), seen);
+        let share = |map: &Option<TextureMap>| texture::share(scene, map.as_ref(), seen);
+        let metal = fresnel.metallic * share(&fresnel.metallic_map);
+        let specular = share(&fresnel.specular_map) as f32;
+        let transmission = fresnel.transmission * share(&fresnel.transmission_map);
+        let clearcoat = fresnel.clearcoat * share(&fresnel.clearcoat_map);
         let cos = facing_normal(si, wo).dot(wo);
         let (metal, no_metal) = (metal as f32, (1.0 - metal) as f32);
-        let other = no_metal * (1.0 - fresnel.transmission as f32);
-        let shine = Reflectance::growing(material.mirror, Rgb::splat(fresnel.grazing as f32));
+        let other = no_metal * (1.0 - transmission as f32);
+        let grazing = Rgb::splat(fresnel.grazing as f32);
+        let shine = Reflectance::growing(material.mirror * specular, grazing * specular);
         let shine = shine.given_back(roughness, cos);
         let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(roughness, cos);
-        let coat = (fresnel.clearcoat != 0.0).then(|| {
-            let [normal, all] =
-                [COAT, 1.0].map(|share| Rgb::splat((fresnel.clearcoat * share) as f32));
-            let roughness = fresnel.clearcoat_roughness;
+        let coat = (clearcoat != 0.0).then(|| {
+            let [normal, all] = [COAT, 1.0].map(|share| Rgb::splat((clearcoat * share) as f32));
+            let roughness = fresnel.clearcoat_roughness * share(&fresnel.clearcoat_roughness_map);
             (Reflectance::growing(normal, all).given_back(roughness, cos), roughness)
         });
         let passed = coat.map_or(1.0, |(coat, roughness)| 1.0 - coat.single(roughness, cos).x);
@@ -63,13 +67,10 @@ impl Layers {
             mirror: mirror.scaled(Rgb::splat(passed)),
             roughness,
             coat,
-            glass: (fresnel.transmission != 0.0)
+            glass: (transmission != 0.0)
                 .then(|| super::painted_glass(scene, material, seen))
                 .flatten()
-                .map(|glass| PartGlass {
-                    glass,
-                    share: no_metal * fresnel.transmission as f32 * passed,
-                }),
+                .map(|glass| PartGlass { glass, share: no_metal * transmission as f32 * passed }),
         }
     }
 }

@@ -46,12 +46,12 @@ def glows(writer, fed):
 
 def body(writer, fed):
     """Glass, or all that reflects."""
-    transmission = writer.constant(fed, "Transmission Weight").grey()
-    metallic = writer.read(fed, "Metallic")
+    transmission = writer.read(fed, "Transmission Weight")
     index = writer.constant(fed, "IOR").grey()
-    is_metal = metallic.image is not None or metallic.grey() > 0.0
-    is_coated = writer.constant(fed, "Coat Weight").grey() > 0.0
-    if transmission >= 1.0 and not is_metal and not is_coated:
+    is_metal = is_there(writer.read(fed, "Metallic"))
+    is_coated = is_there(writer.read(fed, "Coat Weight"))
+    is_clear = transmission.image is None and transmission.grey() >= 1.0
+    if is_clear and not is_metal and not is_coated:
         return glass(writer, fed, index)
     made, table = Made({}), {}
     made.table["principled"] = table
@@ -59,25 +59,29 @@ def body(writer, fed):
     writer.number(table, "metallic", fed, "Metallic")
     writer.number(table, "roughness", fed, "Roughness")
     table |= reflection(index, writer.constant(fed, "Specular IOR Level").grey())
-    coat = min(max(writer.constant(fed, "Coat Weight").grey(), 0.0), 1.0)
-    if coat > 0.0:
-        roughness = min(max(writer.constant(fed, "Coat Roughness").grey(), 0.0), 1.0)
-        table |= {"clearcoat": coat, "clearcoat_roughness": roughness}
+    if is_coated:
+        writer.number(table, "clearcoat", fed, "Coat Weight")
+        writer.number(table, "clearcoat_roughness", fed, "Coat Roughness")
         coat_ior = writer.constant(fed, "Coat IOR").grey()
         if abs(coat_ior - 1.5) > 1e-3:
             writer.note(f"coat of index {coat_ior:.3g}", "1.5")
         if fed.input("Coat Normal").fed() is not None:
             writer.note("a normal of the coat", "the surface's")
-    if transmission > 0.0:
-        part_glass(writer, fed, table, min(transmission, 1.0))
+    if is_there(transmission):
+        part_glass(writer, fed, table)
     else:
         writer.normal(made, fed)
     return made
 
 
-def part_glass(writer, fed, table, transmission):
+def is_there(share):
+    """Whether a share is above 0 anywhere."""
+    return share.image is not None or share.grey() > 0.0
+
+
+def part_glass(writer, fed, table):
     """The keys of what is glass in part. Of the base colour's image no root is taken."""
-    table["transmission"] = transmission
+    writer.number(table, "transmission", fed, "Transmission Weight")
     if "base_texture" not in table:
         table["tint"] = [math.sqrt(c) for c in share(writer.constant(fed, "Base Color").rgb())]
     if fed.input("Normal").fed() is not None:

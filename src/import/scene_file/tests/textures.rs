@@ -319,6 +319,12 @@ fn principled_parameters_are_numbers_or_images() {
     assert_eq!((roughness, metal), (Some(128.0 / 255.0), Some(30.0 / 255.0)));
     assert!(base.is_some_and(|red| (red - 0.003).abs() < 1e-4), "sRGB code 10: {base:?}");
     assert_eq!((fresnel.clearcoat, fresnel.clearcoat_roughness), (1.0, 0.2));
+    let (_, fresnel, _) =
+        of("specular = { file = 'rgba.png', channel = 'a' }, clearcoat = 'rgba.png', \
+         clearcoat_roughness = { file = 'rgba.png', factor = 0.5 }, transmission = 'rgba.png'");
+    assert_eq!((fresnel.grazing, fresnel.clearcoat, fresnel.clearcoat_roughness), (1.0, 1.0, 0.5));
+    assert_eq!(fresnel.transmission, 1.0);
+    assert_eq!(fresnel.maps().map(|(_, map)| map.is_some()), [false, true, true, true, true]);
 }
 
 #[test]
