@@ -192,6 +192,9 @@ fn light_samples_and_lobe_samples_agree() {
     }
 }
 
+/// An image of a share.
+type MapOf = fn(&mut Fresnel) -> &mut Option<TextureMap>;
+
 /// The image that the plates below have, clamped, so that its halves do not meet at the sides too.
 fn halves() -> TextureMap {
     TextureMap { wrap: [Wrap::Clamp; 2], ..TextureMap::of(0) }
@@ -238,7 +241,7 @@ fn a_metallic_map_tells_metal_from_plastic() {
 fn images_multiply_every_share() {
     let coat = Fresnel { clearcoat: 0.9, clearcoat_roughness: 0.4, ..PLASTIC };
     let part = Fresnel { transmission: 0.7, ..PLASTIC };
-    let maps: [(Fresnel, Fresnel, fn(&mut Fresnel) -> &mut Option<TextureMap>); 4] = [
+    let maps: [(Fresnel, Fresnel, MapOf); 4] = [
         (PLASTIC, Fresnel { grazing: 0.0, ..PLASTIC }, |f| &mut f.specular_map),
         (coat, Fresnel { clearcoat: 0.0, ..coat }, |f| &mut f.clearcoat_map),
         (coat, Fresnel { clearcoat_roughness: 0.0, ..coat }, |f| &mut f.clearcoat_roughness_map),

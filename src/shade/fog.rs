@@ -100,7 +100,7 @@ pub(super) struct FogSamples {
     pub distances: Vec<[f32; 2]>,
     pub places: Vec<[f32; 2]>,
     pub choices: Vec<[f32; 2]>,
-    pub candidates: Vec<light_tree::Candidate>,
+    pub balls: Vec<light_tree::SeenBall>,
 }
 
 impl FogSegment {

@@ -138,7 +138,7 @@ impl Renderer<'_> {
         own: &mut FogSamples,
         s: &mut ShadowScratch,
     ) {
-        fog.tree.look(fog.fog.extinction, segment, &mut own.candidates);
+        fog.tree.look(fog.fog.extinction, segment, &mut own.balls);
         let n = self.settings.fog_samples * FEW_LIGHTS as u32;
         self.fill_pairs(segment, 0, n, pixels, own);
         own.choices.resize(n as usize, [0.0; 2]);
@@ -146,7 +146,7 @@ impl Renderer<'_> {
         let number = self.fog_dimension(1);
         self.fill(&segment.place, number, first, pixels, &mut own.choices);
         for ((u, place), choice) in own.distances.iter().zip(&own.places).zip(&own.choices) {
-            let Some((at, share)) = fog.tree.choose(&own.candidates, choice.map(f64::from)) else {
+            let Some((at, share)) = fog.tree.choose(&own.balls, choice.map(f64::from)) else {
                 continue;
             };
             let distances = fog.lights[at].distances(fog.fog.extinction, segment);

@@ -64,7 +64,7 @@ struct Ball {
 }
 
 /// A ball that was looked at, with the sum of what it and those before it may scatter.
-pub type Candidate = (usize, f64);
+pub type SeenBall = (usize, f64);
 
 impl LightTree {
     /// Of `lights`.
@@ -128,7 +128,7 @@ impl LightTree {
 
     /// The balls to choose among along `segment`, by what they would scatter if nothing were in the way and fog took nothing from
     /// light on its way.
-    pub fn look(&self, extinction: f64, segment: &FogSegment, found: &mut Vec<Candidate>) {
+    pub fn look(&self, extinction: f64, segment: &FogSegment, found: &mut Vec<SeenBall>) {
         found.clear();
         let (mut at, mut sum) = (0, 0.0);
         while let Some(ball) = self.balls.get(at) {
@@ -156,7 +156,7 @@ impl LightTree {
     }
 
     /// The light that two numbers in 0..1 choose among `found`, and its probability; `None` where none scatters.
-    pub fn choose(&self, found: &[Candidate], u: [f64; 2]) -> Option<(usize, f64)> {
+    pub fn choose(&self, found: &[SeenBall], u: [f64; 2]) -> Option<(usize, f64)> {
         let all = found.last()?.1;
         if all.is_nan() || all <= 0.0 {
             return None;
