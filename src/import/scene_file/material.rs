@@ -93,14 +93,16 @@ pub(super) struct ImagesOf<T> {
 impl<T> ImagesOf<T> {
     /// What `of` makes of each, in order; the first error, if any.
     pub fn try_map<U>(self, mut of: impl FnMut(T) -> Result<U>) -> Result<ImagesOf<U>> {
-        let shares = self.shares.map(|share| share.map(&mut of).transpose());
-        let [a, b, c, d, e, f] = shares;
+        let mut of = |image: Option<T>| image.map(&mut of).transpose();
         Ok(ImagesOf {
-            shares: [a?, b?, c?, d?, e?, f?],
-            texture: self.texture.map(&mut of).transpose()?,
-            normals: self.normals.map(&mut of).transpose()?,
-            alpha: self.alpha.map(&mut of).transpose()?,
-            emission: self.emission.map(&mut of).transpose()?,
+            texture: of(self.texture)?,
+            normals: of(self.normals)?,
+            alpha: of(self.alpha)?,
+            emission: of(self.emission)?,
+            shares: {
+                let [a, b, c, d, e, f] = self.shares.map(of);
+                [a?, b?, c?, d?, e?, f?]
+            },
         })
     }
 
