@@ -103,7 +103,7 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
     /// Floor and lamp that were added to a bare mesh.
     pub stage: Option<AddedStage>,
-    /// Meshes that a bare file places more than once.
+    /// Meshes that files place more than once, and files that a scene places more than once.
     pub repeats: Repeats,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::Diagnostic;
 use crate::math::{Rgb, Vec3};
-use crate::scene::{Material, MaterialId, Shot, World};
+use crate::scene::{Material, MaterialId, Shot, World, WorldMesh};
 use std::path::PathBuf;
 
 /// Name of the material of faces that have none.
@@ -46,6 +46,16 @@ pub struct Repeats {
     pub copies: usize,
     /// Bytes of these copies, ready to be traced.
     pub bytes: u64,
+}
+
+/// Bytes of a mesh once it is ready to be traced.
+pub(super) fn traced_bytes(mesh: &WorldMesh) -> u64 {
+    let vertices = mesh.positions.len() as u64;
+    let normals = mesh.normals.as_ref().map_or(0, |n| 12 * n.values.len() as u64);
+    let uvs = mesh.uvs.iter().chain(mesh.more_uvs.iter().flatten());
+    let uvs: u64 = uvs.map(|uv| 8 * uv.values.len() as u64).sum();
+    let colours = mesh.colours.as_ref().map_or(0, |c| c.bytes().len() as u64);
+    12 * vertices + 12 * mesh.triangles.len() as u64 + normals + uvs + colours
 }
 
 /// What of a mesh file is wanted that holds more than one camera or moment.

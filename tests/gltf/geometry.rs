@@ -294,3 +294,14 @@ fn a_scene_file_takes_a_gltf_file_as_a_mesh() {
     let world = written.load(&LoadOptions::default()).expect("a scene").world;
     assert_eq!(world.meshes[0].positions[0], DVec3::Y * 3.0);
 }
+
+#[test]
+fn a_file_that_a_scene_places_again_is_a_copy() {
+    use super::build::Written;
+    let part = "[[mesh]]\nfile = 'part.glb'\n";
+    let scene = format!("{}[sky]\nradiance = 1\n", part.repeat(3));
+    let written = Written::of("scene.toml", scene.as_bytes());
+    written.beside("part.glb", &File::triangle().glb());
+    let repeats = written.load(&LoadOptions::default()).expect("a scene").repeats;
+    assert_eq!((repeats.copies, repeats.bytes), (2, 96));
+}

@@ -11,7 +11,7 @@ use super::primitive::{self, MOST_PIECES, MOST_PLACED, Size};
 use super::uri::shortened;
 use super::{instances, light, place};
 use crate::error::Result;
-use crate::import::model::Model;
+use crate::import::model::{Model, traced_bytes};
 use crate::import::source::Notes;
 use crate::math::DAffine3;
 use crate::scene::{MaterialId, WorldMesh};
@@ -128,7 +128,7 @@ impl<'a, 'd> Assembly<'a, 'd> {
         }
         // Copies that instances would not need: of a mesh that bends none.
         if !bends {
-            let bytes = self.model.world.meshes[before..].iter().map(place::bytes).sum();
+            let bytes = self.model.world.meshes[before..].iter().map(traced_bytes).sum();
             self.count_copies(seen.entry(mesh).or_insert(0), piece.places.len(), bytes);
         }
         Ok(())

@@ -143,13 +143,3 @@ fn append(mesh: &mut WorldMesh, mut other: WorldMesh) {
         uvs.values.append(&mut more.values);
     }
 }
-
-/// Bytes of a mesh once it is ready to be traced.
-pub(super) fn bytes(mesh: &WorldMesh) -> u64 {
-    let vertices = mesh.positions.len() as u64;
-    let normals = mesh.normals.as_ref().map_or(0, |n| 12 * n.values.len() as u64);
-    let uvs = mesh.uvs.iter().chain(mesh.more_uvs.iter().flatten());
-    let uvs: u64 = uvs.map(|uv| 8 * uv.values.len() as u64).sum();
-    let colours = mesh.colours.as_ref().map_or(0, |c| c.bytes().len() as u64);
-    12 * vertices + 12 * mesh.triangles.len() as u64 + normals + uvs + colours
-}

@@ -10,7 +10,8 @@ use super::sky::{Shown, Sky};
 use super::{SceneFile, mapping, shapes};
 use crate::error::{Diagnostic, Error, Result};
 use crate::import::images::{ImageUse, Images};
-use crate::import::{self, Model, ModelOptions, emission, untextured};
+use crate::import::model::traced_bytes;
+use crate::import::{self, Model, ModelOptions, Repeats, emission, untextured};
 use crate::scene::{self, EnvironmentKind, MaterialId, World, WorldMesh, WorldSphere};
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -31,6 +32,9 @@ pub(super) struct Builder<'a> {
     materials: BTreeMap<&'a str, Named>,
     default_material: Option<MaterialId>,
     generated: u64,
+    /// Mesh files that were placed, with the bits of their time.
+    placed: HashSet<(PathBuf, u64)>,
+    pub repeats: Repeats,
 }
 
 struct Named {
@@ -53,6 +57,8 @@ impl<'a> Builder<'a> {
             materials: BTreeMap::new(),
             default_material: None,
             generated: 0,
+            placed: HashSet::new(),
+            repeats: Repeats::default(),
         };
         this.read_images(file)?;
         for (name, material) in &file.material {
@@ -216,13 +222,21 @@ impl<'a> Builder<'a> {
     fn read_model(&mut self, file: &At<String>, mesh: &Mesh, bare: bool) -> Result<World> {
         let path = self.beside(file);
         let options = self.model_options(&path, mesh)?;
-        let Model { mut world, warnings, files, .. } =
+        let Model { mut world, warnings, files, repeats, .. } =
             import::load_model_with(&path, mesh.policy(), &options).map_err(|e| match e {
                 Error::Input(inside) if inside.line.is_some() => Error::Input(inside),
                 other => self.at_key(file, &other),
             })?;
         files.iter().for_each(|f| self.note_file(f));
         self.warnings.extend(warnings);
+        let is_new = self.placed.insert((path, options.time.to_bits()));
+        let all = || Repeats {
+            copies: world.meshes.len(),
+            bytes: world.meshes.iter().map(traced_bytes).sum(),
+        };
+        let Repeats { copies, bytes } = if is_new { repeats } else { all() };
+        self.repeats.copies += copies;
+        self.repeats.bytes += bytes;
         if bare {
             world.materials.clear();
             world.textures.clear();

@@ -99,7 +99,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     if let Some((width, height)) = options.size {
         (settings.width, settings.height) = (width, height);
     }
-    let Builder { world, warnings, mut files, .. } = Builder::build(&source, &file)?;
+    let Builder { world, warnings, mut files, repeats, .. } = Builder::build(&source, &file)?;
     let aspect = f64::from(settings.width.max(1)) / f64::from(settings.height.max(1));
     let shot = match &file.camera {
         Some(camera) => camera.build(&source, &world, aspect)?,
@@ -108,5 +108,12 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
     files.extend(file.camera.iter().flat_map(|camera| camera.pose_files(&source)));
     let options = file.settings.job(&source, shot.frames)?;
     let output_place = file.settings.output_place(&source);
-    Ok(Loaded { options, output_place, warnings, files, ..Loaded::new(world, shot, settings) })
+    Ok(Loaded {
+        options,
+        output_place,
+        warnings,
+        files,
+        repeats,
+        ..Loaded::new(world, shot, settings)
+    })
 }

@@ -3,9 +3,10 @@
 use super::{Cell, CellLight, FEW_LIGHTS, LightCells, MOST_MAIN, MeanLights, Node, root};
 use crate::math::{Bounds3, DVec3, Rgb};
 use crate::scene::{Light, Scene};
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Most cells.
 const MOST_CELLS: usize = 1 << 14;
@@ -37,7 +38,7 @@ struct Open {
     node: usize,
     lights: Vec<BoundedLight>,
     /// Numbers of the main lights, those of the region that the box lies in.
-    main: Rc<[u32]>,
+    main: Arc<[u32]>,
     /// What all lights send to the middle, at most.
     typical: f64,
 }
@@ -93,7 +94,7 @@ impl LightCells {
         let mut has_main = false;
         while let Some((_, Reverse(at))) = queue.pop() {
             if !has_main && open.len() >= regions {
-                open.iter_mut().for_each(|open| open.choose_main(lights));
+                open.par_iter_mut().for_each(|open| open.choose_main(lights));
                 has_main = true;
             }
             let next: usize = open[at].lights.len();
@@ -109,7 +110,7 @@ impl LightCells {
             }
         }
         if !has_main {
-            open.iter_mut().for_each(|open| open.choose_main(lights));
+            open.par_iter_mut().for_each(|open| open.choose_main(lights));
         }
         open
     }
@@ -209,7 +210,7 @@ impl Open {
             let weight = if weight.is_finite() { weight } else { 1.0 };
             own.push(BoundedLight { light: *number, bound, weight });
         }
-        Self { bounds, node, lights: own, main: Rc::new([]), typical }
+        Self { bounds, node, lights: own, main: Arc::new([]), typical }
     }
 
     /// Chooses the main lights of all boxes within this one: those that somewhere in it send at least [`SHARE`] of what
