@@ -269,3 +269,20 @@ fn dim_faces_light_nothing_and_what_is_lost_is_said() {
     let (lights, unlit) = count(lit_floor(|_, _| 1.0, 1.0, 80));
     assert!(lights == 0 && unlit[0].share == 1.0, "{lights} {unlit:?}");
 }
+
+/// Rays see the image's lower left corner, and the floor is lit by that.
+#[test]
+fn a_panel_without_texture_coordinates_lights_as_it_is_seen() {
+    let light = |picture: Picture, has_uvs: bool| {
+        let mut world = lit_floor(picture, 0.6, 1);
+        world.meshes[1].uvs = world.meshes[1].uvs.take().filter(|_| has_uvs);
+        let mut job = job(world, pose((0.0, 2.0, 3.0), (0.0, 0.0, 0.0)), 32, 24);
+        job.settings.shadow_samples = 4;
+        mean(&render(&job).0)
+    };
+    let of_corner = light(|_, _| 3.0, true);
+    assert!(of_corner > 0.05, "{of_corner}");
+    let bare = light(|x, y| if x < 0.2 && y < 0.2 { 3.0 } else { 0.0 }, false);
+    assert!((bare / of_corner - 1.0).abs() < 1e-3, "{bare} {of_corner}");
+    assert_eq!(light(|x, y| if x < 0.2 && y < 0.2 { 0.0 } else { 3.0 }, false), 0.0);
+}

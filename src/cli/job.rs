@@ -65,7 +65,8 @@ pub fn lossy_meshes(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
             ),
         };
         let help = format!(
-            "a mesh has at most {MOST_FACE_LIGHTS} faces that light the scene, its brightest ones"
+            "the {MOST_FACE_LIGHTS} brightest faces of a mesh light the scene, where these send half of its light: make what \
+             emits of fewer faces, or of several meshes"
         );
         Diagnostic::new(file, message).help(help)
     };

@@ -1,6 +1,6 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{AlphaMask, Fog, Fresnel, Glass, Material, TextureMap, World, WorldMesh};
+use super::{AlphaMask, Fog, Fresnel, Glass, Light, Material, TextureMap, World, WorldMesh};
 use crate::error::{Error, Result};
 use crate::math::Rgb;
 
@@ -76,6 +76,11 @@ impl World {
         let what = |what: &str| {
             Err(Error::Usage(format!("the place or size of {what} is not a finite number")))
         };
+        if let Some(index) = self.lights.iter().position(|l| matches!(l, Light::Face(_))) {
+            let message =
+                format!("light {} is a face of no mesh: faces light by their material", index + 1);
+            return Err(Error::Usage(message));
+        }
         if let Some(index) = self.lights.iter().position(|l| !l.is_finite()) {
             return what(&format!("light {}", index + 1));
         }
@@ -100,6 +105,7 @@ fn check_glass(material: &Material) -> Result<()> {
     let what = match glass {
         _ if share == Some(0.0) => "glass of which layers leave nothing",
         _ if share.is_some() && is_ranked => "glass with a priority beside other layers",
+        _ if is_ranked && material.emits() => "glass with a priority that emits",
         Glass { thin: true, absorption, .. } if is_ranked || *absorption != Rgb::ZERO => {
             "thin glass with a priority or absorption, which bodies have"
         }

@@ -7,7 +7,7 @@
 use super::face_lights::{FaceLights, MOST_FACE_LIGHTS, Unlit};
 use super::light::{FaceLight, Light, QuadLight};
 use super::{Material, Mesh, Texture, TextureMap};
-use crate::math::{DVec2, DVec3, Rgb};
+use crate::math::{DVec2, DVec3, Rgb, Vec2};
 use rayon::prelude::*;
 use std::collections::BinaryHeap;
 
@@ -52,7 +52,7 @@ pub(super) fn face_lights(
             Light::Face(FaceLight { part, triangle })
         };
         // Two triangles of one radiance are one quad where they can be.
-        let quad = chosen.peek().filter(|_| material.emission_map.is_none());
+        let quad = chosen.peek().filter(|_| emission.image.is_none());
         let quad = quad.and_then(|(next, _)| {
             Some((**next, QuadLight::joined(triangle, mesh.corners(**next))?))
         });
@@ -111,9 +111,16 @@ const WHOLE: Part = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)];
 
 impl<'m> Emission<'m> {
     fn of(mesh: &'m Mesh, material: &'m Material, textures: &'m [Texture]) -> Self {
-        let image = material.emission_map.as_ref().filter(|map| mesh.uv_set(map.uv_set).is_some());
+        let image = material.emission_map.as_ref();
         let image = image.map(|map| (&textures[map.image as usize], map));
-        Self { mesh, colour: material.emission, image }
+        match image {
+            // Rays see the lower left corner.
+            Some((image, map)) if mesh.uv_set(map.uv_set).is_none() => {
+                let seen = image.levels()[0].bilinear(map.wrap, map.place(Vec2::ZERO));
+                Self { mesh, colour: material.emission * seen, image: None }
+            }
+            _ => Self { mesh, colour: material.emission, image },
+        }
     }
 
     /// The mean radiance of each face; 0 of those without an area.
@@ -252,4 +259,38 @@ fn mean_between(image: &Texture, map: &TextureMap, corners: [DVec2; 3]) -> Rgb {
         levels[down].bilinear(map.wrap, uv).as_dvec3()
     });
     (points.sum::<DVec3>() / f64::from(rows * rows)).as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_fill_a_triangle_and_are_found_by_their_weights() {
+        for rows in [1, 2, 4, 8, 16] {
+            let mut lights = FaceLights::none(1);
+            lights.cut(0, rows);
+            (0..rows * rows).for_each(|number| lights.push(Some(number)));
+            let mut area = 0.0;
+            for (number, part) in parts(rows).enumerate() {
+                let [a, b, c] = part.map(DVec2::from);
+                let own = 0.5 * (b - a).perp_dot(c - a);
+                assert!(own > 0.0, "part {number} of {rows} rows winds the other way");
+                area += own;
+                // Its middle, and points next to its corners.
+                for weights in [[1.0, 1.0, 1.0], [9.0, 0.5, 0.5], [0.5, 9.0, 0.5], [0.5, 0.5, 9.0]]
+                {
+                    let [i, j, k] = weights;
+                    let p = (a * i + b * j + c * k) / (i + j + k);
+                    assert_eq!(lights.light(0, p.x, p.y), Some(number as u32), "{rows} rows");
+                }
+            }
+            assert!((area - 0.5).abs() < 1e-12);
+            for (u, v) in
+                [(1.0, 1e-9), (1e-9, 1.0), (0.5, 0.5 + 1e-9), (-1e-9, 2.0), (f64::NAN, 0.3)]
+            {
+                assert!(lights.light(0, u, v).is_some(), "{u}, {v} of {rows} rows");
+            }
+        }
+    }
 }

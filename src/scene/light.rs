@@ -43,6 +43,11 @@ macro_rules! kinds {
             /// Names of all kinds.
             pub const KINDS: &[&str] = &[$($name),*];
 
+            /// Names of the kinds that scene files write: all but faces, the last, which are of meshes that emit.
+            pub fn written_kinds() -> impl Iterator<Item = &'static str> {
+                Self::KINDS.iter().copied().filter(|kind| *kind != "face")
+            }
+
             /// The kind, as scene files and messages call it.
             pub fn name(&self) -> &'static str {
                 match self {

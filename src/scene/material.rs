@@ -148,7 +148,7 @@ impl Material {
         Self { mirror: reflectance, ..Self::black(name) }
     }
 
-    /// Whether its scattering is looked up in an image anywhere; cut-outs do not count.
+    /// Whether anything but its cut-outs is looked up in an image.
     pub fn has_image(&self) -> bool {
         self.images().next().is_some()
     }

@@ -1,8 +1,8 @@
 //! What fog scatters towards the camera: light that is scattered once.
 //!
 //! Along each stretch of a path in fog, points are drawn for each light (`fog/distance.rs`), and a sample of the light from
-//! there. In a scene whose lights are selected, samples choose lights by what each would scatter if nothing were in the
-//! way and fog took nothing (`fog/light_tree.rs`).
+//! there. In a scene whose lights are selected, samples choose groups of lights by what each would scatter if nothing
+//! were in the way and fog took nothing, and lights within them by power (`fog/light_tree.rs`).
 
 use super::direct::{BATCH, ShadowScratch};
 use super::fog::{Distances, FarLight, FogSamples, FogSegment, LightTree, phase};

@@ -267,8 +267,7 @@ mod tests {
         let size = libm::exp(-3.0 + 2.5 * next());
         let radiance = Rgb::new(2.0, 1.0, 0.5) * libm::exp(3.0 * next()) as f32;
         let two_sided = next() > 0.0;
-        // All but faces, which are quads of a mesh.
-        let kinds = Light::KINDS.len() - 1;
+        let kinds = Light::written_kinds().count();
         match (0.5 * kinds as f64 * (next() + 1.0)) as usize {
             0 => Light::Point(PointLight { position: p, intensity: radiance * 0.01 }),
             1 => {

@@ -209,6 +209,11 @@ fn transmission_is_a_pane_or_with_a_thickness_a_body_that_absorbs() {
     assert_eq!(part.glass, Some(Glass { tint, thin: true, ..Glass::clear(1.5) }));
     assert_eq!(part.fresnel.map(|fresnel| fresnel.transmission), Some(0.25));
     assert_eq!(part.diffuse, tint);
+    let (neon, _) = material(json!({
+        "emissiveFactor": [1, 0, 0], "pbrMetallicRoughness": {"metallicFactor": 0},
+        "extensions": {"KHR_materials_transmission": full},
+    }));
+    assert_eq!((neon.emission, neon.glass.is_some()), (Rgb::X, true));
     assert!(model.warnings.is_empty() && model.world.into_scene(true).is_ok());
 }
 

@@ -386,7 +386,9 @@ impl Parts<'_, '_> {
 /// `material` of which `transmission` is `glass`: where nothing else is, glass alone.
 fn part_glass(material: Material, glass: Glass, transmission: f64) -> Material {
     let glass = Some(glass);
-    let alone = Material { glass, ..Material::black(material.name.clone()) };
+    let Material { emission, emission_map, emits_back, .. } = material;
+    let name = material.name.clone();
+    let alone = Material { glass, emission, emission_map, emits_back, ..Material::black(name) };
     let Some(fresnel) = material.fresnel else { return alone };
     let is_alone = transmission == 1.0 && fresnel.metallic == 0.0 && fresnel.clearcoat == 0.0;
     if is_alone && !material.has_image() && !material.vertex_colours {

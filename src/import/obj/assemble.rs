@@ -7,7 +7,7 @@ use crate::import::model::Model;
 use crate::import::source::Fault;
 use crate::import::{emission, lamps, mtl, polygon, tidy};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
-use crate::scene::{Corners, VertexColours, WorldMesh};
+use crate::scene::{Corners, MOST_FACE_LIGHTS, VertexColours, WorldMesh};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -100,9 +100,13 @@ fn add(path: &Path, mesh: WorldMesh, model: &mut Model) {
         model.warnings.push(Diagnostic::new(path, message));
         model.world.meshes.push(mesh);
     } else {
-        model.has_lamps = true;
         let lights = emission::is_mere_light(material).then(|| lamps::of_mesh(&mesh, radiance));
-        match lights.flatten() {
+        let lights = lights.flatten();
+        // Faces of what also reflects are lights; whether those of an image are, its texels say.
+        let has_lit_faces =
+            material.emission_map.is_none() && mesh.triangles.len() <= MOST_FACE_LIGHTS;
+        model.has_lamps |= lights.is_some() || has_lit_faces;
+        match lights {
             Some(lights) => model.world.lights.extend(lights),
             None => model.world.meshes.push(mesh),
         }

@@ -45,7 +45,8 @@ pub(super) struct Material {
     /// Glass, clear or absorbing.
     pub glass: Option<At<Glass>>,
     /// Emitted radiance, W/(m² sr), linear RGB or one number for grey. Absent: 0, or 1 where there is an `emission_texture`.
-    /// Spheres and meshes then light the scene, of a mesh the 4096 brightest faces; those with `alpha` only glow.
+    /// Spheres and meshes then light the scene, of a mesh the 4096 brightest faces, where these send half of its light; those with
+    /// `alpha` only glow.
     pub emission: Option<Amount>,
     /// Image file, relative to the scene file, that multiplies `emission`, or a table of the file and how it lies on the
     /// surface. A sphere with it only glows.
@@ -261,9 +262,9 @@ impl Material {
             }
             let paints = self.texture.is_some() || self.vertex_colours;
             let others = self.diffuse.is_some() || paints || self.mirror.is_some();
-            if others || self.emission.is_some() {
-                let message = "glass stands alone: a material that has it has neither `diffuse`, \
-                               `texture`, `vertex_colours`, `mirror` nor `emission`";
+            if others || self.emission.is_some() || self.emission_texture.is_some() {
+                let message = "glass stands alone: a material that has it has neither `diffuse`, `texture`, \
+                               `vertex_colours`, `mirror`, `emission` nor `emission_texture`";
                 return Err(source.fault(&glass.span, message).into());
             }
         }

@@ -10,9 +10,8 @@ const MAX_BYTES: u64 = 16 << 20;
 
 /// The kinds of what comes in kinds.
 fn kinds() -> String {
-    // Faces are of meshes that emit.
-    let written = Light::KINDS.iter().filter(|kind| **kind != "face");
-    let lights = written.map(|kind| format!("`{kind}`")).collect::<Vec<_>>().join(", ");
+    let lights =
+        Light::written_kinds().map(|kind| format!("`{kind}`")).collect::<Vec<_>>().join(", ");
     format!(
         "a light has one of {lights}; a step of `transform` one of `translate`, `rotate`, `scale` and \
          `matrix`"

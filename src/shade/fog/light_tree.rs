@@ -7,7 +7,6 @@
 use super::{Distances, FogSegment};
 use crate::math::{Bounds3, DVec3};
 use crate::scene::FarField;
-use std::ops::Range;
 
 /// A ball is opened where its centre is nearer than this times its radius.
 const CLOSE: f64 = 2.0;
@@ -44,21 +43,18 @@ fn distances(place: Option<(DVec3, f64)>, extinction: f64, segment: &FogSegment)
     }
 }
 
-/// Lights, in balls.
+/// Lights, in balls: each before the two halves of its lights.
 pub struct LightTree {
-    /// Each before those within it.
     balls: Vec<Ball>,
-    /// Numbers of lights, those of a ball next to one another.
-    order: Vec<u32>,
-    /// Sums of the powers up to each of these.
-    sums: Vec<f64>,
 }
 
 struct Ball {
     /// Centre and radius; `None` of one light without a place.
     place: Option<(DVec3, f64)>,
-    /// Its lights in `order`.
-    lights: Range<usize>,
+    /// Sum of its lights'.
+    power: f64,
+    /// The light, of a ball of one.
+    light: Option<u32>,
     /// The first ball that is not within it.
     next: usize,
 }
@@ -71,59 +67,52 @@ impl LightTree {
     pub fn new(lights: &[FarLight]) -> Self {
         let (mut near, far): (Vec<u32>, Vec<u32>) =
             (0..lights.len() as u32).partition(|at| lights[*at as usize].is_near());
-        let mut tree = Self { balls: Vec::new(), order: Vec::new(), sums: Vec::new() };
+        let mut tree = Self { balls: Vec::new() };
         for at in far {
-            tree.push(lights, &[at], None);
+            tree.push(lights, &[at]);
         }
-        tree.divide(lights, &mut near);
-        let mut sum = 0.0;
-        tree.sums.extend(tree.order.iter().map(|at| {
-            sum += lights[*at as usize].power;
-            sum
-        }));
+        if !near.is_empty() {
+            tree.divide(lights, &mut near);
+        }
         tree
     }
 
     /// Adds a ball of these lights, as the last; returns its number.
-    fn push(&mut self, lights: &[FarLight], own: &[u32], bounds: Option<Bounds3>) -> usize {
-        let place = bounds.map(|bounds| {
-            let centre = bounds.centre();
-            let reach = |at: &u32| {
-                let place = lights[*at as usize].field.place();
-                place.map_or(0.0, |(own, reach)| own.distance(centre) + reach)
-            };
-            (centre, own.iter().map(reach).fold(0.0, f64::max))
+    fn push(&mut self, lights: &[FarLight], own: &[u32]) -> usize {
+        let places = own.iter().filter_map(|at| lights[*at as usize].field.place());
+        let mut bounds = Bounds3::EMPTY;
+        places.clone().for_each(|(centre, _)| bounds.include(centre));
+        let centre = bounds.centre();
+        let place = places.map(|(own, reach)| own.distance(centre) + reach).reduce(f64::max);
+        let power = own.iter().map(|at| lights[*at as usize].power).sum();
+        let light = own.first().copied().filter(|_| own.len() == 1);
+        let at = self.balls.len();
+        self.balls.push(Ball {
+            place: place.map(|reach| (centre, reach)),
+            power,
+            light,
+            next: at + 1,
         });
-        let first = self.order.len();
-        if own.len() == 1 {
-            self.order.extend(own);
-        }
-        let next = self.balls.len() + 1;
-        self.balls.push(Ball { place, lights: first..first + own.len(), next });
-        next - 1
+        at
     }
 
     /// Adds the balls of lights that have places.
     fn divide(&mut self, lights: &[FarLight], own: &mut [u32]) {
+        let ball = self.push(lights, own);
+        if own.len() == 1 {
+            return;
+        }
         let centre = |at: &u32| lights[*at as usize].field.place().map_or(DVec3::ZERO, |(c, _)| c);
         let mut bounds = Bounds3::EMPTY;
         own.iter().for_each(|at| bounds.include(centre(at)));
-        match own.len() {
-            0 => {}
-            1 => _ = self.push(lights, own, Some(bounds)),
-            count => {
-                let ball = self.push(lights, own, Some(bounds));
-                let extent = bounds.extent();
-                let axis =
-                    (0..3).fold(0, |most, at| if extent[at] > extent[most] { at } else { most });
-                let along = |at: &u32| centre(at)[axis];
-                own.sort_unstable_by(|a, b| along(a).total_cmp(&along(b)).then(a.cmp(b)));
-                let (lower, upper) = own.split_at_mut(count / 2);
-                self.divide(lights, lower);
-                self.divide(lights, upper);
-                self.balls[ball].next = self.balls.len();
-            }
-        }
+        let extent = bounds.extent();
+        let axis = (0..3).fold(0, |most, at| if extent[at] > extent[most] { at } else { most });
+        let along = |at: &u32| centre(at)[axis];
+        own.sort_unstable_by(|a, b| along(a).total_cmp(&along(b)).then(a.cmp(b)));
+        let (lower, upper) = own.split_at_mut(own.len() / 2);
+        self.divide(lights, lower);
+        self.divide(lights, upper);
+        self.balls[ball].next = self.balls.len();
     }
 
     /// The balls to choose among along `segment`, by what they would scatter if nothing were in the way and fog took nothing from
@@ -132,7 +121,7 @@ impl LightTree {
         found.clear();
         let (mut at, mut sum) = (0, 0.0);
         while let Some(ball) = self.balls.get(at) {
-            if ball.lights.len() > 1 && ball.place.is_some_and(|place| is_close(place, segment)) {
+            if ball.light.is_none() && ball.place.is_some_and(|place| is_close(place, segment)) {
                 at += 1;
                 continue;
             }
@@ -141,18 +130,10 @@ impl LightTree {
                 Some(_) => distances.angle_over_distance(),
                 None => distances.mean_free_length(),
             };
-            sum += self.power(&ball.lights) * along;
+            sum += ball.power * along;
             found.push((at, sum));
             at = ball.next;
         }
-    }
-
-    fn before(&self, at: usize) -> f64 {
-        at.checked_sub(1).map_or(0.0, |before| self.sums[before])
-    }
-
-    fn power(&self, lights: &Range<usize>) -> f64 {
-        self.before(lights.end) - self.before(lights.start)
     }
 
     /// The light that two numbers in 0..1 choose among `found`, and its probability; `None` where none scatters.
@@ -164,14 +145,18 @@ impl LightTree {
         let at = found.partition_point(|(_, to)| *to <= u[0] * all).min(found.len() - 1);
         let (ball, to) = found[at];
         let from = at.checked_sub(1).map_or(0.0, |before| found[before].1);
-        let lights = self.balls[ball].lights.clone();
-        let (start, power) = (self.before(lights.start), self.power(&lights));
-        let own = &self.sums[lights.clone()];
-        let at = lights.start + own.partition_point(|sum| sum - start <= u[1] * power);
-        let at = at.min(lights.end - 1);
-        let share = (self.sums[at] - self.before(at)) / power;
-        let probability = share * (to - from) / all;
-        (probability > 0.0).then(|| (self.order[at] as usize, probability))
+        let (mut at, mut u, mut probability) = (ball, u[1], (to - from) / all);
+        loop {
+            if let Some(light) = self.balls[at].light {
+                return (probability > 0.0).then_some((light as usize, probability));
+            }
+            let halves = [at + 1, self.balls[at + 1].next];
+            let powers = halves.map(|half| self.balls[half].power);
+            let [lower, upper] = powers.map(|power| power / (powers[0] + powers[1]));
+            let (half, share, rest) =
+                if u < lower { (halves[0], lower, u) } else { (halves[1], upper, u - lower) };
+            (at, u, probability) = (half, rest / share, probability * share);
+        }
     }
 }
 

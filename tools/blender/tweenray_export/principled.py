@@ -67,9 +67,7 @@ def body(writer, fed):
             writer.note(f"coat of index {coat_ior:.3g}", "1.5")
         if fed.input("Coat Normal").fed() is not None:
             writer.note("a normal of the coat", "the surface's")
-    if is_there(transmission):
-        part_glass(writer, fed, table)
-    else:
+    if not (is_there(transmission) and part_glass(writer, fed, table)):
         writer.normal(made, fed)
     return made
 
@@ -80,12 +78,17 @@ def is_there(share):
 
 
 def part_glass(writer, fed, table):
-    """The keys of what is glass in part. Of the base colour's image no root is taken."""
+    """The keys of what is glass in part; whether anything is. Of the base colour's image no root is taken."""
     writer.number(table, "transmission", fed, "Transmission Weight")
+    written = table["transmission"]
+    if (written.get("factor", 1.0) if isinstance(written, dict) else written) <= 0.0:
+        del table["transmission"]
+        return False
     if "base_texture" not in table:
         table["tint"] = [math.sqrt(c) for c in share(writer.constant(fed, "Base Color").rgb())]
     if fed.input("Normal").fed() is not None:
         writer.note("a normal map on glass", "none")
+    return True
 
 
 def reflection(index, level):

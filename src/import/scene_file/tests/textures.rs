@@ -349,6 +349,12 @@ fn a_transmission_makes_a_share_glass_and_all_of_it_glass_alone() {
 }
 
 #[test]
+fn glass_emits_by_no_image() {
+    let refused = data("emission_texture = 'rgba.png'\nglass = {}\n").expect_err("glass alone");
+    assert!(refused.to_string().contains("glass stands alone"), "{refused}");
+}
+
+#[test]
 fn one_file_as_colour_and_as_data_is_two_images() {
     let text = "diffuse = 0.5\ntexture = 'rgba.png'\nmirror = 0.5\nroughness = 'rgba.png'\n\
                 [material.n]\nmirror = 0.5\nroughness = { file = 'rgba.png', scale = 2 }\n";
