@@ -77,8 +77,8 @@ impl LightTree {
         tree
     }
 
-    /// Adds a ball of these lights, as the last; returns its number.
-    fn push(&mut self, lights: &[FarLight], own: &[u32]) -> usize {
+    /// Adds a ball of these lights, as the last; returns its number, and the bounds of their centres.
+    fn push(&mut self, lights: &[FarLight], own: &[u32]) -> (usize, Bounds3) {
         let places = own.iter().filter_map(|at| lights[*at as usize].field.place());
         let mut bounds = Bounds3::EMPTY;
         places.clone().for_each(|(centre, _)| bounds.include(centre));
@@ -93,18 +93,16 @@ impl LightTree {
             light,
             next: at + 1,
         });
-        at
+        (at, bounds)
     }
 
     /// Adds the balls of lights that have places.
     fn divide(&mut self, lights: &[FarLight], own: &mut [u32]) {
-        let ball = self.push(lights, own);
+        let (ball, bounds) = self.push(lights, own);
         if own.len() == 1 {
             return;
         }
         let centre = |at: &u32| lights[*at as usize].field.place().map_or(DVec3::ZERO, |(c, _)| c);
-        let mut bounds = Bounds3::EMPTY;
-        own.iter().for_each(|at| bounds.include(centre(at)));
         let extent = bounds.extent();
         let axis = (0..3).fold(0, |most, at| if extent[at] > extent[most] { at } else { most });
         let along = |at: &u32| centre(at)[axis];
