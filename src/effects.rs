@@ -440,7 +440,7 @@ impl UsedMaterials {
             counts.ranked += glass(|glass| glass.priority.is_some());
             counts.absorbing += glass(|glass| is_something(glass.absorption));
             counts.textured += usize::from(material.has_image());
-            counts.normal_maps += usize::from(material.normal_map.is_some());
+            counts.normal_maps += usize::from(material.normal_maps().next().is_some());
             counts.roughness_maps += usize::from(has_roughness_map(material));
             counts.vertex_colours += usize::from(material.vertex_colours);
             counts.cut_out += usize::from(material.alpha.is_some());

@@ -9,8 +9,8 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use tweenray::film::Film;
 use tweenray::math::{DAffine2, DVec2, DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    Corners, DirectionalLight, IntersectorKind, Light, Material, NormalMap, PointLight, QuadLight,
-    Sky, SphereLight, Texture, TextureMap, World, WorldMesh, WorldSphere, Wrap,
+    Corners, DirectionalLight, Fresnel, IntersectorKind, Light, Material, NormalMap, PointLight,
+    QuadLight, Sky, SphereLight, Texture, TextureMap, World, WorldMesh, WorldSphere, Wrap,
 };
 
 const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
@@ -266,5 +266,46 @@ fn spheres_have_the_frame_of_longitude_and_latitude() {
         // In the middle of the image: u along x, v along y.
         let expected = 0.5 * FRAC_1_PI * to_light.dot(n);
         assert!((f64::from(middle) / expected - 1.0).abs() < 0.03, "{kind:?}: {middle} {expected}");
+    }
+}
+
+/// A clear coat follows its own image of normals, and no other: with it a coat over black is the mirror of plastic with
+/// that image, without it the coat of a smooth mesh.
+#[test]
+fn a_coat_has_normals_of_its_own() {
+    let bare = Fresnel { grazing: 0.0, ..Fresnel::PLASTIC };
+    let coat = |roughness| Fresnel { clearcoat: 1.0, clearcoat_roughness: roughness, ..bare };
+    let map = |image| Some(NormalMap { image: TextureMap::of(image), strength: 1.0 });
+    for (kind, roughness) in BOTH.into_iter().zip([0.0, 0.3]) {
+        let film = |fresnel: Fresnel, [base, of_coat]: [Option<NormalMap>; 2]| {
+            let mirror = Rgb::splat(if fresnel.grazing == 0.0 { 0.0 } else { 0.04 });
+            let black = Material { mirror, roughness, ..Material::black("black") };
+            let fresnel = Fresnel { clearcoat_normal_map: of_coat, ..fresnel };
+            let mut world = plate(Material { fresnel: Some(fresnel), ..black }, bumps());
+            world.materials[0].normal_map = base;
+            let lamp = Material { emission: Rgb::splat(20.0), ..Material::black("lamp") };
+            world.materials.push(lamp);
+            world.spheres.push(WorldSphere::new("lamp", DVec3::new(0.5, 3.0, -1.0), 0.8, 1));
+            world.sky = Sky { radiance: Rgb::new(0.2, 0.3, 0.5), ..Sky::default() };
+            let mut job = looking(world, kind);
+            job.settings.spp = if roughness == 0.0 { 1 } else { 1024 };
+            render(&job).0
+        };
+        let mean = |film: &Film| film.rgb.iter().sum::<Rgb>() / film.rgb.len() as f32;
+        let off = |a: &Film, b: &Film| {
+            let pixels = a.rgb.iter().zip(&b.rgb);
+            match roughness {
+                0.0 => pixels.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max),
+                _ => ((mean(a) - mean(b)) / mean(b)).abs().max_element(),
+            }
+        };
+        let smooth = film(coat(roughness), [None; 2]);
+        let own = film(coat(roughness), [None, map(0)]);
+        let of_plastic = film(Fresnel::PLASTIC, [map(0), None]);
+        assert!(off(&own, &of_plastic) < 0.01, "{kind:?}: {}", off(&own, &of_plastic));
+        assert!(off(&own, &smooth) > 0.05, "{kind:?}: {}", off(&own, &smooth));
+        assert_eq!(film(coat(roughness), [map(0), None]).rgb, smooth.rgb);
+        let both = film(coat(roughness), [map(0); 2]);
+        assert_eq!(both.rgb, own.rgb);
     }
 }

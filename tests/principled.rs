@@ -241,18 +241,19 @@ fn a_metallic_map_tells_metal_from_plastic() {
 fn images_multiply_every_share() {
     let coat = Fresnel { clearcoat: 0.9, clearcoat_roughness: 0.4, ..PLASTIC };
     let part = Fresnel { transmission: 0.7, ..PLASTIC };
-    let maps: [(Fresnel, Fresnel, MapOf); 4] = [
-        (PLASTIC, Fresnel { grazing: 0.0, ..PLASTIC }, |f| &mut f.specular_map),
-        (coat, Fresnel { clearcoat: 0.0, ..coat }, |f| &mut f.clearcoat_map),
-        (coat, Fresnel { clearcoat_roughness: 0.0, ..coat }, |f| &mut f.clearcoat_roughness_map),
-        (part, Fresnel { transmission: 0.0, ..part }, |f| &mut f.transmission_map),
+    let (shiny, dull) = (Rgb::splat(0.04), Rgb::ZERO);
+    let smooth = Fresnel { clearcoat_roughness: 0.0, ..coat };
+    let maps: [(Fresnel, (Fresnel, Rgb), MapOf); 5] = [
+        (PLASTIC, (Fresnel { grazing: 0.0, ..PLASTIC }, dull), |f| &mut f.specular_map),
+        (PLASTIC, (PLASTIC, dull), |f| &mut f.specular_colour_map),
+        (coat, (Fresnel { clearcoat: 0.0, ..coat }, shiny), |f| &mut f.clearcoat_map),
+        (coat, (smooth, shiny), |f| &mut f.clearcoat_roughness_map),
+        (part, (Fresnel { transmission: 0.0, ..part }, shiny), |f| &mut f.transmission_map),
     ];
-    for (at, (all, none, map)) in maps.into_iter().enumerate() {
-        let film = |fresnel: Fresnel| {
-            let mut material = principled(Rgb::new(0.8, 0.4, 0.2), 0.0, fresnel);
-            if fresnel.grazing == 0.0 {
-                material.mirror = Rgb::ZERO;
-            }
+    for (at, (all, (none, bare), map)) in maps.into_iter().enumerate() {
+        let film = |fresnel: Fresnel, mirror| {
+            let base = principled(Rgb::new(0.8, 0.4, 0.2), 0.0, fresnel);
+            let mut material = Material { mirror, ..base };
             let tint = Rgb::new(0.1, 0.9, 0.4);
             let glass = Glass { thin: true, tint, ..Glass::clear(1.5) };
             material.glass = (fresnel.transmission != 0.0).then_some(glass);
@@ -273,7 +274,8 @@ fn images_multiply_every_share() {
         };
         let mut mapped = all;
         *map(&mut mapped) = Some(halves());
-        let ((mapped, places), (all, _), (none, _)) = (film(mapped), film(all), film(none));
+        let ((mapped, places), (all, _)) = (film(mapped, shiny), film(all, shiny));
+        let (none, _) = film(none, bare);
         let mut counts = [0; 2];
         for (i, x) in places.into_iter().enumerate() {
             if !(2.1..3.9).contains(&x.abs()) {

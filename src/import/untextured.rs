@@ -43,14 +43,15 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
         let shares: Vec<Lacking> = shares.filter_map(|(what, map)| share(what, *map)).collect();
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
-        let normals = material.normal_map.filter(|map| is_bare(&map.image));
-        let normals = normals.map(|map| world.textures[map.image.image as usize].name.clone());
-        let normals = normals.map(Lacking::Normals);
+        let normals = material.normal_maps().filter(|map| is_bare(&map.image));
+        let normals = normals.map(|map| &world.textures[map.image.image as usize].name);
+        let normals: Vec<Lacking> = normals.cloned().map(Lacking::Normals).collect();
         let (texture, mask) = (texture.map(Lacking::Texture), mask.map(Lacking::Mask));
-        let lacking = [texture, mask, emission, roughness, normals, colours];
+        let lacking = [texture, mask, emission, roughness, colours];
         lacking
             .into_iter()
             .flatten()
+            .chain(normals)
             .chain(shares)
             .map(|lacks| Untextured::new(mesh, material, lacks))
     })

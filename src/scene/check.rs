@@ -1,6 +1,8 @@
 //! Errors in a world that is built in code, which would break tracing: refused by name.
 
-use super::{AlphaMask, Fog, Fresnel, Glass, Light, Material, TextureMap, World, WorldMesh};
+use super::{
+    AlphaMask, Fog, Fresnel, Glass, Light, Material, NormalMap, TextureMap, World, WorldMesh,
+};
 use crate::error::{Error, Result};
 use crate::math::Rgb;
 
@@ -26,7 +28,7 @@ impl World {
             for (share, map) in material.fresnel.iter().flat_map(Fresnel::maps) {
                 map.as_ref().map(|map| of(map, &format!("{share} map"))).transpose()?;
             }
-            self.check_normal_map(material)?;
+            material.normal_maps().try_for_each(|map| self.check_normal_map(material, map))?;
             check_glass(material)?;
             self.check_mask(material)
         })?;
@@ -37,8 +39,7 @@ impl World {
         self.check_finite()
     }
 
-    fn check_normal_map(&self, material: &Material) -> Result<()> {
-        let Some(map) = &material.normal_map else { return Ok(()) };
+    fn check_normal_map(&self, material: &Material, map: &NormalMap) -> Result<()> {
         let name = &material.name;
         image_of(&map.image, &self.textures, "normal map", name)?;
         if !(map.strength >= 0.0 && map.strength.is_finite()) {

@@ -17,7 +17,7 @@ pub struct Material {
     pub diffuse: Rgb,
     /// Image that multiplies `diffuse`.
     pub texture: Option<TextureMap>,
-    /// Image of normals of a finer surface. None on glass.
+    /// Image of normals of a finer surface, but for its clear coat. None on glass.
     pub normal_map: Option<NormalMap>,
     /// Whether the vertex colours of a mesh multiply `diffuse`; what has none counts as white.
     pub vertex_colours: bool,
@@ -65,6 +65,8 @@ pub struct Fresnel {
     pub metallic_map: Option<TextureMap>,
     /// Image that multiplies what is reflected of what is no metal, `mirror` and `grazing`; of data from 0 to 1, as those below.
     pub specular_map: Option<TextureMap>,
+    /// Image of colours that multiplies what is reflected of what is no metal at normal incidence, `mirror`.
+    pub specular_colour_map: Option<TextureMap>,
     /// Share of the surface that lies under a clear coat.
     pub clearcoat: f64,
     /// Image that multiplies `clearcoat`.
@@ -73,6 +75,8 @@ pub struct Fresnel {
     pub clearcoat_roughness: f64,
     /// Image that multiplies `clearcoat_roughness`.
     pub clearcoat_roughness_map: Option<TextureMap>,
+    /// Image of normals of the clear coat, which without it is as smooth as the mesh. None on glass.
+    pub clearcoat_normal_map: Option<NormalMap>,
     /// Share of what is no metal that is the material's `glass`, in place of the diffuse part and the mirror over it. The glass
     /// then has the roughness of the mirror, and image and vertex colours multiply its tint. 0 of materials without glass.
     pub transmission: f64,
@@ -87,33 +91,40 @@ impl Fresnel {
         metallic: 0.0,
         metallic_map: None,
         specular_map: None,
+        specular_colour_map: None,
         clearcoat: 0.0,
         clearcoat_map: None,
         clearcoat_roughness: 0.0,
         clearcoat_roughness_map: None,
+        clearcoat_normal_map: None,
         transmission: 0.0,
         transmission_map: None,
     };
 
-    /// Its images, each after the name of what it multiplies.
-    pub fn maps(&self) -> [(&'static str, &Option<TextureMap>); 5] {
+    /// Its images but for normals, each after the name of what it multiplies.
+    pub fn maps(&self) -> [(&'static str, &Option<TextureMap>); 6] {
         [
             ("metallic", &self.metallic_map),
             ("specular", &self.specular_map),
+            ("specular_colour", &self.specular_colour_map),
             ("clearcoat", &self.clearcoat_map),
             ("clearcoat_roughness", &self.clearcoat_roughness_map),
             ("transmission", &self.transmission_map),
         ]
     }
 
-    fn maps_mut(&mut self) -> [&mut Option<TextureMap>; 5] {
-        [
+    /// All its images, to be changed.
+    fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
+        let maps = [
             &mut self.metallic_map,
             &mut self.specular_map,
+            &mut self.specular_colour_map,
             &mut self.clearcoat_map,
             &mut self.clearcoat_roughness_map,
             &mut self.transmission_map,
-        ]
+        ];
+        let normals = self.clearcoat_normal_map.as_mut().map(|map| &mut map.image);
+        maps.into_iter().flatten().chain(normals)
     }
 }
 
@@ -155,19 +166,25 @@ impl Material {
 
     /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
     pub fn images(&self) -> impl Iterator<Item = &TextureMap> {
-        let normals = self.normal_map.as_ref().map(|map| &map.image);
+        let normals = self.normal_maps().map(|map| &map.image);
         let shares =
             self.fresnel.iter().flat_map(|fresnel| fresnel.maps()).map(|(_, map)| map.as_ref());
         let maps = [&self.texture, &self.roughness_map, &self.emission_map].map(Option::as_ref);
-        maps.into_iter().chain([normals]).chain(shares).flatten()
+        maps.into_iter().chain(shares).flatten().chain(normals)
+    }
+
+    /// Its images of normals: of the surface, and of its clear coat.
+    pub fn normal_maps(&self) -> impl Iterator<Item = &NormalMap> {
+        let coat = self.fresnel.as_ref().and_then(|fresnel| fresnel.clearcoat_normal_map.as_ref());
+        self.normal_map.iter().chain(coat)
     }
 
     /// [`images`](Self::images), to be changed.
     pub fn images_mut(&mut self) -> impl Iterator<Item = &mut TextureMap> {
         let normals = self.normal_map.as_mut().map(|map| &mut map.image);
-        let shares = self.fresnel.iter_mut().flat_map(Fresnel::maps_mut).map(Option::as_mut);
+        let layers = self.fresnel.iter_mut().flat_map(Fresnel::images_mut);
         let maps = [&mut self.texture, &mut self.roughness_map, &mut self.emission_map];
-        maps.map(Option::as_mut).into_iter().chain([normals]).chain(shares).flatten()
+        maps.into_iter().flatten().chain(normals).chain(layers)
     }
 
     /// Whether any of the surface reflects light diffusely. What is NaN or negative goes on, to be counted at its pixel.

@@ -19,7 +19,7 @@ use super::{FrameInput, Left, Renderer, dimensions, medium, normal_map, optics, 
 use crate::film::GPixel;
 use crate::intersect::{Hit, Ray, SurfaceInteraction};
 use crate::math::{DVec3, Rgb};
-use crate::scene::MaterialId;
+use crate::scene::{MaterialId, NormalMap};
 use crate::stats::{RayCounts, RayKind};
 
 /// Boundaries of ranked glass that a ray passes without another medium behind them.
@@ -369,17 +369,19 @@ impl Vertex<'_, '_> {
             }
             self.add(state, state.throughput * le);
         }
-        let tilted;
-        let mut shaped = &si;
-        if material.normal_map.is_some() {
-            let ns = normal_map::normal(scene, material, &si, wo, state.cone);
-            tilted = SurfaceInteraction { ns, ..si };
-            shaped = &tilted;
-        }
+        let mapped = |map: &NormalMap| {
+            let ns = normal_map::normal(scene, map, &si, wo, state.cone);
+            SurfaceInteraction { ns, ..si }
+        };
+        let tilted = material.normal_map.as_ref().map(mapped);
+        let shaped = tilted.as_ref().unwrap_or(&si);
         let seen = (shaped, wo, state.cone);
         let is_layered = material.shows_layers(si.is_outside(wo));
-        let layers = material.fresnel.as_ref().filter(|_| is_layered);
-        let layers = layers.map(|fresnel| Layers::at(scene, (material, fresnel), seen));
+        let fresnel = material.fresnel.as_ref().filter(|_| is_layered);
+        let tilted_coat =
+            fresnel.and_then(|fresnel| fresnel.clearcoat_normal_map.as_ref()).map(mapped);
+        let coat = tilted_coat.as_ref().unwrap_or(&si);
+        let layers = fresnel.map(|fresnel| Layers::at(scene, (material, fresnel), seen, coat));
         if material.is_diffuse() && (is_layered || material.fresnel.is_none()) {
             let albedo = match &layers {
                 None => lobe::albedo(scene, material, &si, wo, state.cone),
@@ -392,9 +394,8 @@ impl Vertex<'_, '_> {
         if !may_bounce {
             return;
         }
-        let si = shaped;
         let what = (material, layers.as_ref());
-        lobe::for_each_directional::<MIRROR, GLASS>(scene, what, seen, |lobe, first| {
+        lobe::for_each_directional::<MIRROR, GLASS>(scene, what, seen, |lobe, first, si| {
             let start = (si, inside);
             let behind = match lobe.is_pane() {
                 true => state.medium,
@@ -518,7 +519,10 @@ fn record(
             let si = SurfaceInteraction::new(scene, ray, &hit);
             let material = &scene.materials[si.surface.material as usize];
             let wo = -ray.dir.normalize();
-            let ns = normal_map::normal(scene, material, &si, wo, state.cone);
+            let ns = material
+                .normal_map
+                .as_ref()
+                .map_or(si.ns, |map| normal_map::normal(scene, map, &si, wo, state.cone));
             let normal = if si.is_outside(ray.dir) { -ns } else { ns };
             let along = (si.p - input.camera.eye).dot(input.camera.forward);
             let spheres = hit.prim.geom_id == scene.sphere_geom_id();

@@ -59,7 +59,7 @@ pub(super) struct Scattered {
 }
 
 /// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving) by a ray with this cone, that
-/// depends on the direction, and the number of its first direction among those of all. `layers` are the material's there, if
+/// depends on the direction, the number of its first direction among those of all, and the point with the lobe's shading normal. `layers` are the material's there, if
 /// its reflectance grows towards grazing angles. Lobes that the kernel leaves out, since no material of the scene has them,
 /// cost nothing.
 #[inline(always)]
@@ -67,12 +67,12 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
     scene: &Scene,
     (material, layers): (&Material, Option<&Layers>),
     seen: (&SurfaceInteraction, DVec3, RayCone),
-    mut take: impl FnMut(Lobe, u32),
+    mut take: impl FnMut(Lobe, u32, &SurfaceInteraction),
 ) {
     let (si, wo, _) = seen;
     if let Some(Layers { mirror, roughness, coat, glass, albedo: _ }) = layers.filter(|_| MIRROR) {
-        let n = facing_normal(si, wo);
-        let mut over = [Some((*mirror, *roughness)), *coat, None];
+        let coat = coat.as_ref().map(|coat| (coat.reflectance, coat.roughness, coat.si));
+        let mut over = [Some((*mirror, *roughness, si)), coat, None];
         if let Some(part) = glass.as_ref().filter(|_| GLASS) {
             let lobes = part.lobes((*mirror, *roughness), si, wo);
             // A smooth one has both directions.
@@ -80,13 +80,13 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
             lobes
                 .into_iter()
                 .zip(firsts)
-                .for_each(|(l, at)| l.into_iter().for_each(|l| take(l, at)));
-            over = [None, None, *coat];
+                .for_each(|(l, at)| l.into_iter().for_each(|l| take(l, at, si)));
+            over = [None, None, coat];
         }
-        for (first, (reflectance, roughness)) in (0..).zip(over).filter_map(|(i, l)| Some((i, l?)))
-        {
+        for (first, layer) in (0..).zip(over) {
+            let Some((reflectance, roughness, si)) = layer else { continue };
             if reflectance != Reflectance::constant(Rgb::ZERO) {
-                take(reflecting(reflectance, roughness, n, wo), first);
+                take(reflecting(reflectance, roughness, facing_normal(si, wo), wo), first, si);
             }
         }
         return;
@@ -104,18 +104,21 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
                 }
             },
             0,
+            si,
         );
     }
     if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
         let painted = material.fresnel.and_then(|_| painted_glass(scene, material, seen));
         let glass = painted.as_ref().unwrap_or(glass);
         match (glass.thin, glass.is_rough()) {
-            (true, false) => take(Lobe::Pane(Pane::new(glass)), 0),
-            (false, false) => take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))), 0),
+            (true, false) => take(Lobe::Pane(Pane::new(glass)), 0, si),
+            (false, false) => {
+                take(Lobe::Dielectric(Dielectric::new(glass, si.is_outside(wo))), 0, si)
+            }
             (_, true) => {
                 let [reflected, through] = rough_glass(glass, si, wo);
-                take(reflected, 0);
-                take(through, 1);
+                take(reflected, 0, si);
+                take(through, 1, si);
             }
         }
     }
@@ -131,7 +134,7 @@ pub(super) fn glass_at(
     match &material.fresnel {
         None => material.glass.map(|glass| PartGlass { glass, share: 1.0 }),
         Some(fresnel) if material.shows_layers(si.is_outside(wo)) => {
-            Layers::at(scene, (material, fresnel), seen).glass
+            Layers::at(scene, (material, fresnel), seen, si).glass
         }
         Some(_) => {
             painted_glass(scene, material, seen).map(|glass| PartGlass { glass, share: 1.0 })

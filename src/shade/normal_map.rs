@@ -10,19 +10,18 @@ use super::light::LightSampler;
 use super::texture;
 use crate::intersect::{SurfaceInteraction, uv_gradients, uv_of_set};
 use crate::math::{DVec3, Rgb};
-use crate::scene::{Material, Scene, Wrap};
+use crate::scene::{NormalMap, Scene, Wrap};
 
-/// The mapped unit normal at `si`, on the side of `ng`, as seen towards `wo` (unit) by a ray with this `cone`; the shading normal where the
-/// material has no normal map, or the surface no coordinates for it.
+/// The unit normal that `map` says at `si`, on the side of `ng`, as seen towards `wo` (unit) by a ray with this `cone`; the shading
+/// normal where the surface has no coordinates for it.
 #[inline(never)]
 pub(super) fn normal(
     scene: &Scene,
-    material: &Material,
+    map: &NormalMap,
     si: &SurfaceInteraction,
     wo: DVec3,
     cone: RayCone,
 ) -> DVec3 {
-    let Some(map) = &material.normal_map else { return si.ns };
     // Of the image's coordinates, so that an image that lies turned has its normals turned.
     let ([u, v], laid) = (uv_gradients(scene, si, map.image.uv_set), map.image.transform.matrix2);
     let gradients = [u * laid.x_axis.x + v * laid.y_axis.x, u * laid.x_axis.y + v * laid.y_axis.y];

@@ -92,6 +92,15 @@ class Materials(Case):
         copy = bpy.data.images.load(os.path.join(self.folder, texture["file"]))
         self.near(np.array(copy.pixels[:]).reshape(2, 2, 4), pixels, 1.0 / 255.0)
 
+    def test_the_tint_of_reflection_is_a_colour_or_an_image(self):
+        table, lines = self.of(lambda: stage.principled("p", Specular_Tint=(1.0, 0.5, 0.25)))
+        self.near(table["principled"]["specular_colour"], [1.0, 0.5, 0.25])
+        self.assertEqual(lines, [])
+        link = lambda tree, node, shader: tree.links.new(node.outputs["Color"], shader.inputs["Specular Tint"])
+        table, lines = self.of(lambda: self.mapped("t", "sRGB", np.ones((2, 2, 4), dtype=np.float32), link))
+        self.assertTrue(os.path.exists(os.path.join(self.folder, table["principled"]["specular_texture"])))
+        self.assertEqual(lines, [])
+
     def test_emission_from_an_image(self):
         def link(tree, node, shader):
             tree.links.new(node.outputs["Color"], shader.inputs["Emission Color"])
@@ -119,6 +128,7 @@ class Materials(Case):
             tree.links.new(channels.outputs["Blue"], shader.inputs["Metallic"])
             tree.links.new(channels.outputs["Red"], shader.inputs["Coat Weight"])
             tree.links.new(channels.outputs["Green"], shader.inputs["Coat Roughness"])
+            tree.links.new(normal.outputs["Normal"], shader.inputs["Coat Normal"])
 
         table, lines = self.of(lambda: self.mapped("t", "Non-Color", grey, link))
         self.assertEqual(table["principled"]["roughness"]["channel"], "g")
@@ -126,6 +136,7 @@ class Materials(Case):
         coat = [table["principled"][key]["channel"] for key in ("clearcoat", "clearcoat_roughness")]
         self.assertEqual(coat, ["r", "g"])
         self.assertEqual(table["normal_map"]["strength"], 0.5)
+        self.assertEqual(table["principled"]["clearcoat_normal_map"], table["normal_map"])
         files = {table["alpha"], table["normal_map"]["file"], table["principled"]["roughness"]["file"]}
         self.assertEqual(len(files), 1)
         self.noted(lines, "t", "cut-outs")

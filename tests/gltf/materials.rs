@@ -3,7 +3,7 @@
 use super::build::{File, warns};
 use serde_json::{Value, json};
 use tweenray::import::Model;
-use tweenray::math::{DAffine2, DVec2, Rgb};
+use tweenray::math::{DAffine2, DVec2, Rgb, srgb_decode};
 use tweenray::scene::{Fresnel, Glass, Light, Material, TextureMap, Wrap};
 
 fn material(value: Value) -> (Material, Model) {
@@ -78,7 +78,7 @@ fn images_of_coat_transmission_and_specular_are_taken_by_their_channels() {
                 "clearcoatRoughnessFactor": 0.5, "clearcoatRoughnessTexture": info,
             },
             "KHR_materials_transmission": {"transmissionFactor": 0.5, "transmissionTexture": info},
-            "KHR_materials_specular": {"specularTexture": info},
+            "KHR_materials_specular": {"specularTexture": info, "specularColorTexture": info},
         })
     };
     let file = file.with_material(json!({"extensions": with(0.75)}));
@@ -93,6 +93,8 @@ fn images_of_coat_transmission_and_specular_are_taken_by_their_channels() {
     let expected = [
         ("metallic", None),
         ("specular", Some(0.8)),
+        // An sRGB code.
+        ("specular_colour", Some(srgb_decode(0.2) as f32)),
         ("clearcoat", Some(0.2)),
         ("clearcoat_roughness", Some(0.4)),
         ("transmission", Some(0.2)),
@@ -107,6 +109,28 @@ fn images_of_coat_transmission_and_specular_are_taken_by_their_channels() {
     let none = plain.with_material(json!({"extensions": with(0.0)})).model();
     let fresnel = none.world.materials[0].fresnel.expect("layers");
     assert_eq!((fresnel.clearcoat_map, fresnel.clearcoat_roughness_map), (None, None));
+}
+
+#[test]
+fn a_coat_has_normals_of_its_own() {
+    let mut file = File::triangle().with_uvs();
+    let texture = file.image(1, &[[51, 102, 153, 204]], json!({}));
+    let coat = |factor: f64| {
+        let normals = json!({"index": texture, "scale": 0.5});
+        json!({"extensions": {"KHR_materials_clearcoat": {
+            "clearcoatFactor": factor, "clearcoatNormalTexture": normals,
+        }}})
+    };
+    let model = file.with_material(coat(1.0)).model();
+    let material = &model.world.materials[0];
+    let normals = material.fresnel.and_then(|f| f.clearcoat_normal_map).expect("normals");
+    let texel = model.world.textures[normals.image.image as usize].levels()[0].texel(0, 0);
+    assert_eq!((texel.x, normals.strength, material.normal_map), (0.2, 0.5, None));
+    assert!(model.warnings.is_empty() && model.world.into_scene(true).is_ok());
+    let mut plain = File::triangle().with_uvs();
+    plain.image(1, &[[51, 102, 153, 204]], json!({}));
+    let none = plain.with_material(coat(0.0)).model();
+    assert_eq!(none.world.materials[0].fresnel.and_then(|f| f.clearcoat_normal_map), None);
 }
 
 /// Where the coordinates of the file, with v downwards, lead in an image with v downwards.

@@ -36,7 +36,7 @@ fn everything() -> File {
             "metallicRoughnessTexture": {"index": texture}, "baseColorFactor": [1, 1, 1, 0.9]},
          "normalTexture": {"index": texture}, "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": texture},
          "alphaMode": "MASK", "alphaCutoff": 0.3},
-        {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": {"index": texture}}, "KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatTexture": {"index": texture}, "clearcoatRoughnessTexture": {"index": texture}}, "KHR_materials_specular": {"specularTexture": {"index": texture}}, "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1},
+        {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": {"index": texture}}, "KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatTexture": {"index": texture}, "clearcoatRoughnessTexture": {"index": texture}, "clearcoatNormalTexture": {"index": texture, "scale": 0.5}}, "KHR_materials_specular": {"specularTexture": {"index": texture}, "specularColorTexture": {"index": texture}}, "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1},
             "KHR_materials_ior": {"ior": 1.4}}, "pbrMetallicRoughness": {"roughnessFactor": 0}},
     ]);
     file.json["nodes"] = json!([

@@ -29,7 +29,9 @@ struct Laid {
     transmission: Option<LaidImage>,
     coat: Option<LaidImage>,
     coat_roughness: Option<LaidImage>,
+    coat_normal: Option<LaidImage>,
     specular: Option<LaidImage>,
+    specular_colour: Option<LaidImage>,
 }
 
 impl Laid {
@@ -43,11 +45,13 @@ impl Laid {
             transmission,
             coat,
             coat_roughness,
+            coat_normal,
             specular,
+            specular_colour,
         } = self;
-        [base, normal, metal_rough, emissive, transmission, coat, coat_roughness, specular]
-            .into_iter()
-            .flatten()
+        let of_coat = [coat, coat_roughness, coat_normal];
+        let of_base = [base, normal, metal_rough, emissive, transmission];
+        of_base.into_iter().chain(of_coat).chain([specular, specular_colour]).flatten()
     }
 
     /// The file's sets of texture coordinates that the images lie by, each once: the first is the scene's set 0, and so on.
@@ -127,8 +131,11 @@ impl<'d> MaterialReader<'d> {
             |key| of_extension("KHR_materials_clearcoat", "clearcoatFactor", 0.0, key);
         let coat = of_coat("clearcoatTexture")?;
         let coat_roughness = of_coat("clearcoatRoughnessTexture")?;
-        let specular =
-            of_extension("KHR_materials_specular", "specularFactor", 1.0, "specularTexture")?;
+        let coat_normal = of_coat("clearcoatNormalTexture")?;
+        let mut of_specular =
+            |key| of_extension("KHR_materials_specular", "specularFactor", 1.0, key);
+        let specular = of_specular("specularTexture")?;
+        let specular_colour = of_specular("specularColorTexture")?;
         // The ambient occlusion of an image is left out: rays find it.
         Ok(Laid {
             base,
@@ -138,7 +145,9 @@ impl<'d> MaterialReader<'d> {
             transmission,
             coat,
             coat_roughness,
+            coat_normal,
             specular,
+            specular_colour,
         })
     }
 
@@ -214,7 +223,10 @@ impl Parts<'_, '_> {
         let metallic_map = self.map(self.laid.metal_rough, Role::Share(ImageChannel::Blue))?;
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
         let metallic = self.share(pbr, "metallicFactor", 1.0)?;
-        let normal_map = self.normal_map()?;
+        let normal_map = self.normal_map(self.laid.normal, Some(self.json), "normalTexture")?;
+        let coat = self.json.extension("KHR_materials_clearcoat");
+        let clearcoat_normal_map =
+            self.normal_map(self.laid.coat_normal, coat.as_ref(), "clearcoatNormalTexture")?;
         let (mirror, grazing) = self.reflectance()?;
         let (clearcoat, clearcoat_roughness) = self.clearcoat()?;
         let red = Role::Share(ImageChannel::Red);
@@ -225,12 +237,14 @@ impl Parts<'_, '_> {
         let fresnel = Fresnel {
             grazing,
             specular_map: self.map(self.laid.specular, Role::Share(ImageChannel::Alpha))?,
+            specular_colour_map: self.map(self.laid.specular_colour, Role::Colour)?,
             metallic,
             metallic_map,
             clearcoat,
             clearcoat_map,
             clearcoat_roughness,
             clearcoat_roughness_map,
+            clearcoat_normal_map,
             transmission: 0.0,
             transmission_map,
         };
@@ -238,10 +252,16 @@ impl Parts<'_, '_> {
         Ok(Material { texture, mirror, roughness, roughness_map, fresnel, normal_map, ..material })
     }
 
-    fn normal_map(&mut self) -> Result<Option<NormalMap>> {
-        let Some(image) = self.map(self.laid.normal, Role::Normals)? else { return Ok(None) };
-        let info = self.json.required("normalTexture")?;
-        let strength = info.number("scale")?.unwrap_or(1.0);
+    /// The image of normals that `key` of `json` says, as it is `laid`.
+    fn normal_map(
+        &mut self,
+        laid: Option<LaidImage>,
+        json: Option<&Json<'_>>,
+        key: &str,
+    ) -> Result<Option<NormalMap>> {
+        let Some(image) = self.map(laid, Role::Normals)? else { return Ok(None) };
+        let scale = json.and_then(|json| json.get(key)).map(|info| info.number("scale"));
+        let strength = scale.transpose()?.flatten().unwrap_or(1.0);
         if strength < 0.0 {
             self.notes.add("a normal map's negative scale is read as a positive one", None);
         }
@@ -257,12 +277,6 @@ impl Parts<'_, '_> {
         let Some(json) = self.json.extension("KHR_materials_specular") else {
             return Ok((Rgb::splat((root * root) as f32), 1.0));
         };
-        if json.get("specularColorTexture").is_some() {
-            self.notes.add(
-                "specularColorTexture of KHR_materials_specular is ignored: its factor counts",
-                None,
-            );
-        }
         let specular = self.share(Some(&json), "specularFactor", 1.0)?;
         let tint = json.numbers::<3>("specularColorFactor")?.unwrap_or([1.0; 3]);
         let normal = tint.map(|tint| ((root * root * tint.max(0.0)).min(1.0) * specular) as f32);
@@ -280,12 +294,6 @@ impl Parts<'_, '_> {
         let Some(json) = self.json.extension("KHR_materials_clearcoat") else {
             return Ok((0.0, 0.0));
         };
-        if json.get("clearcoatNormalTexture").is_some() {
-            self.notes.add(
-                "clearcoatNormalTexture of KHR_materials_clearcoat is ignored: coats are as smooth as their meshes",
-                None,
-            );
-        }
         let coat = self.share(Some(&json), "clearcoatFactor", 0.0)?;
         Ok((coat, self.share(Some(&json), "clearcoatRoughnessFactor", 0.0)?))
     }
@@ -335,9 +343,9 @@ impl Parts<'_, '_> {
             return Ok(None);
         }
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
-        if self.laid.normal.is_some() {
+        if self.laid.normal.is_some() || self.laid.coat_normal.is_some() {
             self.notes
-                .add("what has KHR_materials_transmission is shown without its normal map", None);
+                .add("what has KHR_materials_transmission is shown without its normal maps", None);
         }
         let ior = self.ior()?;
         let ior = if ior == 0.0 { 1.5 } else { ior.clamp(0.1, 10.0) };
@@ -394,6 +402,6 @@ fn part_glass(material: Material, glass: Glass, transmission: f64) -> Material {
     if is_alone && !material.has_image() && !material.vertex_colours {
         return alone;
     }
-    let fresnel = Some(Fresnel { transmission, ..fresnel });
+    let fresnel = Some(Fresnel { transmission, clearcoat_normal_map: None, ..fresnel });
     Material { glass, fresnel, normal_map: None, alpha: None, ..material }
 }

@@ -1,8 +1,9 @@
 //! `[material.NAME]`.
 
 use super::at::At;
+use super::material_images::ImagesOf;
 use super::number::{Int, Ior, Share};
-use super::principled::{Principled, SharesOf};
+use super::principled::Principled;
 use super::report::Source;
 use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
 use super::vector::{Light as Amount, Reflectance};
@@ -82,38 +83,6 @@ pub(super) struct Glass {
     thin: bool,
 }
 
-/// Something of each image of a material.
-pub(super) struct ImagesOf<T> {
-    texture: Option<T>,
-    normals: Option<T>,
-    alpha: Option<T>,
-    emission: Option<T>,
-    shares: SharesOf<T>,
-}
-
-impl<T> ImagesOf<T> {
-    /// What `of` makes of each, in order; the first error, if any.
-    pub fn try_map<U>(self, mut of: impl FnMut(T) -> Result<U>) -> Result<ImagesOf<U>> {
-        let mut of = |image: Option<T>| image.map(&mut of).transpose();
-        Ok(ImagesOf {
-            texture: of(self.texture)?,
-            normals: of(self.normals)?,
-            alpha: of(self.alpha)?,
-            emission: of(self.emission)?,
-            shares: {
-                let [a, b, c, d, e, f] = self.shares.map(of);
-                [a?, b?, c?, d?, e?, f?]
-            },
-        })
-    }
-
-    /// All that there are.
-    pub fn all(self) -> impl Iterator<Item = T> {
-        let Self { texture, normals, alpha, emission, shares } = self;
-        [texture, normals, alpha, emission].into_iter().chain(shares).flatten()
-    }
-}
-
 fn polished() -> Share {
     Share(0.0)
 }
@@ -125,7 +94,7 @@ fn window_glass() -> Ior {
 impl Material {
     /// The files of its images, with what they serve as.
     pub fn images(&self) -> ImagesOf<(At<String>, ImageUse)> {
-        let (principled, normal_map) = (self.principled.as_deref(), self.normal_map.as_ref());
+        let principled = self.principled.as_deref();
         let texture = principled.map_or(self.texture.as_ref(), |p| p.base_texture.as_ref());
         let roughness = self.roughness.as_ref().map(|key| (key, ChannelName::Green));
         let plain = [roughness, None, None, None, None, None];
@@ -133,12 +102,20 @@ impl Material {
             let (file, channel) = share.and_then(|(key, usual)| key.data_file(usual))?;
             Some((file, ImageUse::Data(channel)))
         });
-        let emission = self.emission_texture.as_ref();
+        let of = |key: Option<&At<NamedTexture>>, what| key.map(|key| (key.image_file(), what));
+        let normals = |key: Option<&At<Named<NormalTexture>>>| {
+            key.map(|key| (key.image_file(), ImageUse::Normals))
+        };
         ImagesOf {
-            texture: texture.map(|key| (key.image_file(), ImageUse::Colour)),
-            normals: normal_map.map(|key| (key.image_file(), ImageUse::Normals)),
-            alpha: self.alpha.as_ref().map(|key| (key.image_file(), ImageUse::Mask)),
-            emission: emission.map(|key| (key.image_file(), ImageUse::Colour)),
+            texture: of(texture, ImageUse::Colour),
+            specular_texture: of(
+                principled.and_then(|p| p.specular_texture.as_ref()),
+                ImageUse::Colour,
+            ),
+            normals: normals(self.normal_map.as_ref()),
+            coat_normals: normals(principled.and_then(|p| p.clearcoat_normal_map.as_ref())),
+            alpha: of(self.alpha.as_ref(), ImageUse::Mask),
+            emission: of(self.emission_texture.as_ref(), ImageUse::Colour),
             shares,
         }
     }
@@ -159,17 +136,18 @@ impl Material {
             priority: g.priority.as_ref().map(|p| p.u32() as u8),
             thin: g.thin,
         });
-        let ImagesOf { texture, normals, alpha, emission, shares } = images;
+        let ImagesOf { texture, normals, alpha, emission, shares, .. } = images;
         let own_roughness = self.roughness.as_deref().map(|key| key.parts(shares[0]));
         let (roughness_share, roughness_map) = own_roughness.unwrap_or_default();
         let built = scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
             texture: self.texture.as_ref().zip(*texture).map(|(texture, id)| texture.0.map(id)),
-            normal_map: self.normal_map.as_ref().zip(*normals).map(|(table, id)| {
-                let (image, strength) = (table.0.map(id), table.0.strength.0.0);
-                scene::NormalMap { image, strength }
-            }),
+            normal_map: self
+                .normal_map
+                .as_ref()
+                .zip(*normals)
+                .map(|(table, id)| table.0.normals(id)),
             vertex_colours: self.vertex_colours,
             alpha: self.alpha.as_ref().zip(*alpha).map(|(alpha, id)| alpha.0.map(id)),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
@@ -191,7 +169,7 @@ impl Material {
         };
         Ok(match self.principled.as_deref() {
             None => built,
-            Some(principled) => principled.build(built, *texture, *shares),
+            Some(principled) => principled.build(built, images),
         })
     }
 
@@ -212,7 +190,9 @@ impl Material {
             _ if is_glass && self.alpha.is_some() => {
                 "what has a `transmission` has no cut-outs: its body is closed, and a hole would leave it open"
             }
-            _ if is_glass && self.normal_map.is_some() => {
+            _ if is_glass
+                && (self.normal_map.is_some() || principled.clearcoat_normal_map.is_some()) =>
+            {
                 "what has a `transmission` has no normal map: what it refracts follows the surface that rays meet"
             }
             _ => return Ok(()),
@@ -234,7 +214,8 @@ impl Material {
                     "`principled` says how light is reflected: `{key}` does not stand beside it"
                 );
                 let help = "its own keys are `base_colour`, `base_texture`, `metallic`, `roughness`, `ior`, \
-                            `specular`, `clearcoat`, `clearcoat_roughness`, `transmission`, `tint`, `absorption` and `thin`";
+                            `specular`, `specular_colour`, `specular_texture`, `clearcoat`, `clearcoat_roughness`, \
+                            `clearcoat_normal_map`, `transmission`, `tint`, `absorption` and `thin`";
                 return Err(source.fault(&principled.span, message).help(help).into());
             }
             self.check_transmission(principled, source)?;

@@ -13,6 +13,7 @@ mod generated;
 mod light;
 mod mapping;
 mod material;
+mod material_images;
 mod mesh;
 mod number;
 mod piece;

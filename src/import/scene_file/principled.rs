@@ -1,8 +1,9 @@
 //! `principled`: the parameters that glTF and Blender have for most materials.
 
 use super::at::At;
+use super::material_images::{ImagesOf, SharesOf};
 use super::number::{Ior, Share};
-use super::texture::{ChannelName, ImageTable, MappedShare, NamedTexture};
+use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
 use super::vector::{Light as Amount, OneOr, Reflectance};
 use crate::math::Rgb;
 use crate::scene::{Fresnel, Glass, Material, TextureId};
@@ -31,12 +32,20 @@ pub(super) struct Principled {
     /// Factor on the reflection of what is no metal: 0 is none, so that it is diffuse alone. Or an image file of it, whose red
     /// counts as it stands; or a table. Absent: 1.
     pub specular: Option<At<MappedShare>>,
+    /// Factor on the reflection of what is no metal at normal incidence, linear RGB or one number for grey. Absent: 1.
+    specular_colour: Option<Reflectance>,
+    /// Image file, relative to the scene file, that multiplies `specular_colour`; or a table of the file and how it lies on
+    /// the surface.
+    pub specular_texture: Option<At<NamedTexture>>,
     /// Share that lies under a clear coat, as of car paint. Or an image file of it, whose red counts as it stands; or a table. Absent: 0.
     pub clearcoat: Option<At<MappedShare>>,
     /// Roughness of the clear coat. Or an image file of it, whose green counts as it stands; or a table. Absent: 0.03.
     pub clearcoat_roughness: Option<At<MappedShare>>,
+    /// Image file, relative to the scene file, of normals of the clear coat, as of `normal_map`, or a table. Absent: the coat is as
+    /// smooth as the mesh, whatever `normal_map` says of what lies under it.
+    pub clearcoat_normal_map: Option<At<Named<NormalTexture>>>,
     /// Share of what is no metal that is glass of this `ior` and `roughness`, in place of the diffuse part and its reflection.
-    /// Or an image file of it, whose red counts as it stands; or a table. Neither `normal_map` nor `alpha` stands beside it. Absent: 0.
+    /// Or an image file of it, whose red counts as it stands; or a table. No normal map and no `alpha` stands beside it. Absent: 0.
     pub transmission: Option<At<MappedShare>>,
     /// Share of light that each crossing of the glass lets through: twice of a body, once of a thin pane. `base_texture` and
     /// vertex colours multiply it. Absent: `base_colour`.
@@ -57,10 +66,6 @@ const USUAL_GREY: Share = Share(0.8);
 fn plastic() -> Ior {
     Ior(1.5)
 }
-
-/// Something of each key that may be an image: `roughness`, `metallic`, `specular`, `clearcoat`, `clearcoat_roughness` and
-/// `transmission`.
-pub(super) type SharesOf<T> = [Option<T>; 6];
 
 impl Principled {
     /// Whether a key says what its glass is like.
@@ -86,13 +91,9 @@ impl Principled {
         self.transmission.as_deref().is_some_and(|key| key.factor() != 0.0)
     }
 
-    /// `material` with this reflection; the images are those of the base colour and of [`shares`](Self::shares).
-    pub fn build(
-        &self,
-        material: Material,
-        base: Option<TextureId>,
-        images: SharesOf<TextureId>,
-    ) -> Material {
+    /// `material` with this reflection.
+    pub fn build(&self, material: Material, images: &ImagesOf<TextureId>) -> Material {
+        let ImagesOf { texture, specular_texture, coat_normals, shares: images, .. } = images;
         let keys = [
             (&self.roughness, USUAL_ROUGHNESS),
             (&self.metallic, 0.0),
@@ -111,7 +112,8 @@ impl Principled {
         let usual = if paints { Share(1.0) } else { USUAL_GREY };
         let base_colour = self.base_colour.unwrap_or(OneOr([usual; 3]));
         let root = (self.ior.0 - 1.0) / (self.ior.0 + 1.0);
-        let normal = root * root * specular.0;
+        let colour = self.specular_colour.map_or(Rgb::ONE, |colour| colour.rgb());
+        let normal = colour * ((root * root * specular.0) as f32);
         let glass = (transmission.0 != 0.0).then(|| Glass {
             roughness,
             tint: self.tint.unwrap_or(base_colour).rgb(),
@@ -130,19 +132,29 @@ impl Principled {
         Material {
             glass,
             diffuse: base_colour.rgb(),
-            texture: self.base_texture.as_ref().zip(base).map(|(table, id)| table.0.map(id)),
-            mirror: Rgb::splat(normal as f32),
+            texture: self.base_texture.as_ref().zip(*texture).map(|(table, id)| table.0.map(id)),
+            mirror: normal,
             roughness,
             roughness_map,
             fresnel: Some(Fresnel {
                 grazing: specular.0,
                 specular_map: specular.1,
+                specular_colour_map: self
+                    .specular_texture
+                    .as_ref()
+                    .zip(*specular_texture)
+                    .map(|(table, id)| table.0.map(id)),
                 metallic: metallic.0,
                 metallic_map: metallic.1,
                 clearcoat: clearcoat.0,
                 clearcoat_map: clearcoat.1,
                 clearcoat_roughness: clearcoat_roughness.0,
                 clearcoat_roughness_map: clearcoat_roughness.1,
+                clearcoat_normal_map: self
+                    .clearcoat_normal_map
+                    .as_ref()
+                    .zip(*coat_normals)
+                    .map(|(table, id)| table.0.normals(id)),
                 transmission: transmission.0,
                 transmission_map: transmission.1,
             }),

@@ -6,7 +6,7 @@ use super::schema::inline_schema;
 use super::vector::{List, OneOr};
 use crate::import::texture::ImageChannel;
 use crate::math::{DAffine2, DVec2};
-use crate::scene::{TextureId, TextureMap, Wrap};
+use crate::scene::{NormalMap, TextureId, TextureMap, Wrap};
 use schemars::{JsonSchema, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, Error, IntoDeserializer, MapAccess, Visitor};
@@ -80,6 +80,13 @@ image_table!(
         strength: Strength,
     }
 );
+
+impl NormalTexture {
+    /// As scene data, with the decoded image's index.
+    pub fn normals(&self, image: TextureId) -> NormalMap {
+        NormalMap { image: self.map(image), strength: self.strength.0.0 }
+    }
+}
 
 /// Factor on a normal map.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]

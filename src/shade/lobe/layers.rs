@@ -15,25 +15,35 @@ const COAT: f64 = 0.04;
 /// The layers of a surface at one of its points as one viewer sees them, images looked up. Of each light what a layer
 /// reflects is taken from those below, by the share that it reflects towards the viewer: in a furnace all add up to
 /// one, but light that comes in flat is not weakened more than other light is.
-pub(in crate::shade) struct Layers {
+pub(in crate::shade) struct Layers<'s> {
     /// The share of irradiance that the diffuse layer sends out.
     pub albedo: Rgb,
     /// The mirror over it.
     pub mirror: Reflectance,
     pub roughness: f64,
     /// The clear coat over both.
-    pub coat: Option<(Reflectance, f64)>,
+    pub coat: Option<Coat<'s>>,
     /// The glass beside diffuse layer and mirror, under the coat.
     pub glass: Option<PartGlass>,
 }
 
-impl Layers {
+/// A clear coat at one point of a surface, as one viewer sees it.
+#[derive(Clone, Copy)]
+pub(in crate::shade) struct Coat<'s> {
+    pub reflectance: Reflectance,
+    pub roughness: f64,
+    /// The point, with the coat's own shading normal.
+    pub si: &'s SurfaceInteraction,
+}
+
+impl<'s> Layers<'s> {
     /// The layers of `material`, whose reflectance grows as `fresnel` says, at the point `si`, seen along `wo` (unit,
-    /// leaving) by a ray with this `cone`.
+    /// leaving) by a ray with this `cone`. `coated` is the point with the shading normal of the clear coat.
     pub fn at(
         scene: &Scene,
         (material, fresnel): (&Material, &Fresnel),
         (si, wo, cone): (&SurfaceInteraction, DVec3, RayCone),
+        coated: &'s SurfaceInteraction,
     ) -> Self {
         let seen = (si, wo, cone);
         let base = diffuse::albedo(scene, material, si, wo, cone);
@@ -47,15 +57,21 @@ impl Layers {
         let (metal, no_metal) = (metal as f32, (1.0 - metal) as f32);
         let other = no_metal * (1.0 - transmission as f32);
         let grazing = Rgb::splat(fresnel.grazing as f32);
-        let shine = Reflectance::growing(material.mirror * specular, grazing * specular);
+        let normal = fresnel
+            .specular_colour_map
+            .map_or(material.mirror, |map| material.mirror * texture::shown(scene, &map, seen));
+        let shine = Reflectance::growing(normal * specular, grazing * specular);
         let shine = shine.given_back(roughness, cos);
         let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(roughness, cos);
         let coat = (clearcoat != 0.0).then(|| {
             let [normal, all] = [COAT, 1.0].map(|share| Rgb::splat((clearcoat * share) as f32));
             let roughness = fresnel.clearcoat_roughness * share(&fresnel.clearcoat_roughness_map);
-            (Reflectance::growing(normal, all).given_back(roughness, cos), roughness)
+            let cos = facing_normal(coated, wo).dot(wo);
+            let reflectance = Reflectance::growing(normal, all).given_back(roughness, cos);
+            let passed = 1.0 - reflectance.single(roughness, cos).x;
+            (Coat { reflectance, roughness, si: coated }, passed)
         });
-        let passed = coat.map_or(1.0, |(coat, roughness)| 1.0 - coat.single(roughness, cos).x);
+        let (coat, passed) = coat.map_or((None, 1.0), |(coat, passed)| (Some(coat), passed));
         let mirror = Reflectance {
             normal: shine.normal * other + of_metal.normal * metal,
             rise: shine.rise * other + of_metal.rise * metal,

@@ -20,12 +20,8 @@ def write(writer, fed):
         value = writer.read(fed, name)
         if not value.is_constant() or value.grey() != 0.0:
             writer.note(what, instead)
-    for name in ("Specular Tint", "Coat Tint"):
-        value = writer.read(fed, name)
-        weight = writer.read(fed, "Coat Weight")
-        counts = name == "Specular Tint" or not weight.is_constant() or weight.grey() > 0.0
-        if counts and (not value.is_constant() or any(abs(c - 1.0) > 1e-6 for c in value.rgb())):
-            writer.note(name.lower(), "white")
+    if is_there(writer.read(fed, "Coat Weight")) and not is_white(writer.read(fed, "Coat Tint")):
+        writer.note("coat tint", "white")
     alpha = writer.read(fed, "Alpha")
     if alpha.is_constant() and alpha.grey() <= 0.0:
         return Made({}, is_seen=False)
@@ -59,22 +55,34 @@ def body(writer, fed):
     writer.number(table, "metallic", fed, "Metallic")
     writer.number(table, "roughness", fed, "Roughness")
     table |= reflection(index, writer.constant(fed, "Specular IOR Level").grey())
+    tint = writer.read(fed, "Specular Tint")
+    if tint.colours is not None:
+        table["specular_colour"] = share(writer.constant(fed, "Specular Tint").rgb())
+    elif not is_white(tint):
+        writer.coloured(made, "specular_colour", "specular_texture", fed, "Specular Tint", table)
     if is_coated:
         writer.number(table, "clearcoat", fed, "Coat Weight")
         writer.number(table, "clearcoat_roughness", fed, "Coat Roughness")
         coat_ior = writer.constant(fed, "Coat IOR").grey()
         if abs(coat_ior - 1.5) > 1e-3:
             writer.note(f"coat of index {coat_ior:.3g}", "1.5")
-        if fed.input("Coat Normal").fed() is not None:
-            writer.note("a normal of the coat", "the surface's")
+        if not is_there(transmission):
+            writer.normal(table, "clearcoat_normal_map", fed, "Coat Normal")
+        elif fed.input("Coat Normal").fed() is not None:
+            writer.note("a normal of the coat on glass", "the surface's")
     if not (is_there(transmission) and part_glass(writer, fed, table)):
-        writer.normal(made, fed)
+        writer.normal(made.table, "normal_map", fed)
     return made
 
 
 def is_there(share):
     """Whether a share is above 0 anywhere."""
     return share.image is not None or share.grey() > 0.0
+
+
+def is_white(value):
+    """Whether a colour is white everywhere."""
+    return value.is_constant() and all(abs(c - 1.0) <= 1e-6 for c in value.rgb())
 
 
 def part_glass(writer, fed, table):

@@ -61,7 +61,7 @@ class Writer:
             self.note("rough diffuse (Oren-Nayar)", "Lambert")
         made = Made({})
         self.coloured(made, "diffuse", "texture", fed, "Color")
-        self.normal(made, fed)
+        self.normal(made.table, "normal_map", fed)
         return made
 
     def _bsdf_glossy(self, fed):
@@ -76,7 +76,7 @@ class Writer:
             made.table["principled"] = principled = {"metallic": 1.0}
             self.coloured(made, "base_colour", "base_texture", fed, "Color", principled)
             self.number(principled, "roughness", fed, "Roughness")
-        self.normal(made, fed)
+        self.normal(made.table, "normal_map", fed)
         return made
 
     _bsdf_anisotropic = _bsdf_glossy
@@ -139,7 +139,7 @@ class Writer:
         if factor.kind == "FRESNEL":
             principled["ior"] = ior(self.constant(factor, "IOR").grey())
         self.note("diffuse and glossy mixed by angle", "a principled material")
-        self.normal(made, parts[0])
+        self.normal(made.table, "normal_map", parts[0])
         return made
 
     def sum(self, one, two, a, b):
@@ -238,8 +238,8 @@ class Writer:
         table = laid.table | ({"uv_set": number} if number else {})
         return {"file": file} | table if table or as_table else file
 
-    def normal(self, made, fed, name="Normal"):
-        """A normal map."""
+    def normal(self, table, key, fed, name="Normal"):
+        """A normal map, as `key` of the table."""
         place = fed.input(name)
         node = place.fed() if place is not None else None
         if node is None:
@@ -251,11 +251,11 @@ class Writer:
         file = self.images.data(colour.image.image)
         if file is None:
             return
-        table = self.laid(colour.image, file, True)
+        laid = self.laid(colour.image, file, True)
         strength = self.constant(node, "Strength").grey()
         if strength != 1.0:
-            table["strength"] = max(strength, 0.0)
-        made.table["normal_map"] = table
+            laid["strength"] = max(strength, 0.0)
+        table[key] = laid
 
     def emit(self, made, fed, colour, strength):
         """Emission, of both sides as in Blender."""

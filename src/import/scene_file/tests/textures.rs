@@ -324,7 +324,17 @@ fn principled_parameters_are_numbers_or_images() {
          clearcoat_roughness = { file = 'rgba.png', factor = 0.5 }, transmission = 'rgba.png'");
     assert_eq!((fresnel.grazing, fresnel.clearcoat, fresnel.clearcoat_roughness), (1.0, 1.0, 0.5));
     assert_eq!(fresnel.transmission, 1.0);
-    assert_eq!(fresnel.maps().map(|(_, map)| map.is_some()), [false, true, true, true, true]);
+    assert_eq!(
+        fresnel.maps().map(|(_, map)| map.is_some()),
+        [false, true, false, true, true, true]
+    );
+    let (shiny, fresnel, _) = of("specular_colour = [1, 0.5, 0], specular_texture = 'rgba.png', \
+         clearcoat = 1, clearcoat_normal_map = { file = 'rgba.png', strength = 0.5 }");
+    assert_eq!(shiny.mirror, Rgb::new(0.04, 0.02, 0.0));
+    let colours = fresnel.specular_colour_map.map(|map| map.image);
+    let normals = fresnel.clearcoat_normal_map.expect("normals");
+    assert!(shiny.normal_map.is_none() && normals.strength == 0.5);
+    assert!(colours.is_some_and(|image| image != normals.image.image));
 }
 
 #[test]
