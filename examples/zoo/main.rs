@@ -43,18 +43,16 @@ fn run(options: &Options) -> Result<bool, Failure> {
     println!("{}", telling::HEAD);
     for index in options.indices()? {
         let specimen = Specimen::new(options.seed, index, options.frames);
-        let specimen = match options.lens {
-            true => specimen.with_lens(options.seed),
-            false => specimen,
-        };
-        let specimen = match options.gloss {
-            true => specimen.with_gloss(options.seed),
-            false => specimen,
-        };
-        let specimen = match options.sky {
-            true => specimen.with_sky(options.seed),
-            false => specimen,
-        };
+        let changes: [(bool, fn(Specimen, u64) -> Specimen); 5] = [
+            (options.lens, Specimen::with_lens),
+            (options.gloss, Specimen::with_gloss),
+            (options.sky, Specimen::with_sky),
+            (options.matter, Specimen::with_matter),
+            (options.fog, Specimen::with_fog),
+        ];
+        let wanted = changes.into_iter().filter(|(is_wanted, _)| *is_wanted);
+        let specimen =
+            wanted.fold(specimen, |specimen, (_, change)| change(specimen, options.seed));
         let settings = options.settings.unwrap_or(specimen.settings);
         let place = folder.join(format!("{index:04}"));
         let verdict = judge(&program, &specimen, settings, &options.plan(), &place)?;

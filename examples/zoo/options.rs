@@ -44,6 +44,12 @@ pub struct Options {
     /// Gives every scene a random environment for a sky: an image, a gradient, or sun and sky
     #[arg(long)]
     pub sky: bool,
+    /// Makes most of what is painted of other matter (images, normal maps, cut-outs, panes, emission), and glass rough
+    #[arg(long)]
+    pub matter: bool,
+    /// Fills every scene with random fog
+    #[arg(long)]
+    pub fog: bool,
     /// Only the scene of this index
     #[arg(long)]
     only: Option<u64>,

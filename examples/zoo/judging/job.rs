@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+/// Fog samples of a light on each ray: the program's own number.
+const FOG_SAMPLES: usize = 4;
+
 /// The program to judge.
 pub struct Program {
     path: PathBuf,
@@ -20,7 +23,7 @@ pub struct Render {
     policy: &'static str,
     /// First and last; all where there is none.
     frames: Option<[usize; 2]>,
-    /// On shadow and sky samples.
+    /// On shadow, sky and fog samples.
     factor: usize,
     /// As many camera samples in every pixel, instead of those of the settings.
     camera: Option<usize>,
@@ -131,6 +134,7 @@ impl Program {
     ) -> Result<Spent, Failure> {
         let frames = folder.join(&render.name);
         let light = (settings.light * render.factor).to_string();
+        let fog = (FOG_SAMPLES * render.factor).to_string();
         let camera = render.camera.map_or(settings, |spp| settings.uniform(spp)).camera_samples();
         let stats = folder.join(format!("{}.json", render.name));
         let mut command = Command::new(&self.path);
@@ -140,6 +144,7 @@ impl Program {
             .args(["--size", &format!("{}x{}", size[0], size[1])])
             .args(["--spp", &camera])
             .args(["--shadow-samples", &light, "--sky-samples", &light])
+            .args(["--fog-samples", &fog])
             .args(["--policy", render.policy, "--no-video", "--overwrite", "-q", "--stats"])
             .arg(&stats)
             .arg("-o")

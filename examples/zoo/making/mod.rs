@@ -5,6 +5,7 @@
 
 mod builder;
 mod cameras;
+mod changes;
 mod dice;
 mod families;
 mod hdr;

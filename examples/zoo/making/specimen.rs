@@ -4,7 +4,6 @@ use super::builder::{Builder, triple};
 use super::cameras::{Move, Pose};
 use super::dice::Dice;
 use super::families::{FAMILIES, Family};
-use super::hdr;
 use super::props;
 use glam::DVec3;
 use std::fmt::Write;
@@ -38,7 +37,8 @@ pub struct Specimen {
     /// The seed of its zoo and its number there: what it is a function of.
     pub index: u64,
     /// The family's name, `forest`, with a `+` where things of other kinds were added
-    /// a `~` where a lens blurs, a `^` where mirrors are rough, and a `*` where the sky is an environment.
+    /// a `~` where a lens blurs, a `^` where mirrors are rough, a `*` where the sky is an environment, a `#` where paint is of
+    /// other matter, and a `%` in fog.
     pub name: String,
     /// Which of [`FAMILIES`].
     pub family: usize,
@@ -49,10 +49,10 @@ pub struct Specimen {
     /// One for each frame.
     pub poses: Vec<Pose>,
     /// `lens` of the scene file; empty for a pinhole.
-    lens: String,
+    pub(super) lens: String,
     /// What it is rendered with unless the command line says otherwise.
     pub settings: Settings,
-    builder: Builder,
+    pub(super) builder: Builder,
 }
 
 impl Specimen {
@@ -78,94 +78,6 @@ impl Specimen {
         let poses = kind.poses(&mut dice, &stage, frames);
         let name = format!("{name}{}", if is_mixed { "+" } else { "" });
         Self { index, name, family, kind, fov, poses, lens: String::new(), settings, builder }
-    }
-
-    /// With a random thin lens: from hardly any blur to a strong one, focused on the target, before or behind it.
-    pub fn with_lens(mut self, seed: u64) -> Self {
-        let mut dice = Dice::new(!seed, self.index);
-        let distance = self.poses.first().map_or(1.0, |pose| pose.eye.distance(pose.target));
-        let radius = distance * dice.scale(0.002, 0.04);
-        let focus = match dice.chance(0.5) {
-            true => "\"target\"".to_string(),
-            false => format!("{:?}", distance * dice.scale(0.4, 2.0)),
-        };
-        let blades = dice.pick(&["", ", blades = 5", ", blades = 8"]);
-        self.lens = format!("lens = {{ radius = {radius:?}, focus = {focus}{blades} }}\n");
-        self.name.push('~');
-        self
-    }
-
-    /// With rough mirrors for perfect ones, and about half of what is painted of plastic, some of it under a clear coat or
-    /// partly metal.
-    pub fn with_gloss(mut self, seed: u64) -> Self {
-        let mut dice = Dice::new(seed.rotate_left(32), self.index);
-        let mut text = String::new();
-        let mut lines = self.builder.text.lines().peekable();
-        while let Some(line) = lines.next() {
-            let is_mirror = |line: &str| line.starts_with("mirror = ");
-            let has_none = lines.peek().is_none_or(|next| !is_mirror(next));
-            let paint = line.strip_prefix("diffuse = ").filter(|_| has_none && dice.chance(0.5));
-            if let Some(colour) = paint {
-                let roughness = dice.scale(0.05, 0.8);
-                let more = dice.pick(&["", ", clearcoat = 1", ", metallic = 0.5"]);
-                let _ = writeln!(
-                    text,
-                    "principled = {{ base_colour = {colour}, roughness = {roughness:?}{more} }}"
-                );
-                continue;
-            }
-            let _ = writeln!(text, "{line}");
-            if is_mirror(line) {
-                let _ = writeln!(text, "roughness = {:?}", dice.scale(0.05, 0.8));
-            }
-        }
-        self.builder.text = text;
-        self.name.push('^');
-        self
-    }
-
-    /// With a random environment in place of the sky.
-    pub fn with_sky(mut self, seed: u64) -> Self {
-        let mut dice = Dice::new(seed.rotate_left(16), self.index);
-        let mut colour =
-            |most: f64| DVec3::from_array([(); 3].map(|()| dice.scale(0.1, 1.0))) * most;
-        let colours = [colour(1.5), colour(1.0), colour(0.4), colour(20.0)];
-        let to_sun =
-            DVec3::new(dice.within(-1.0, 1.0), dice.within(0.1, 1.0), dice.within(-1.0, 1.0));
-        let (turbidity, turn) = (dice.within(2.0, 8.0), dice.within(0.0, 360.0));
-        let (strength, width) = (dice.scale(0.1, 0.4), dice.scale(0.005, 0.6));
-        let keys = match dice.count(0, 2) {
-            0 => {
-                let [zenith, horizon, ground, _] = colours.map(triple);
-                format!(
-                    "gradient = {{ zenith = {zenith}, horizon = {horizon}, ground = {ground} }}"
-                )
-            }
-            1 => {
-                let sun = triple(to_sun);
-                format!(
-                    "sun_sky = {{ to_sun = {sun}, turbidity = {turbidity:.3} }}\nstrength = {strength:.4}\n\
-                     rotate = {turn:.2}"
-                )
-            }
-            _ => {
-                let image = hdr::sky(colours, to_sun.normalize(), width);
-                self.builder.files.push(("sky.hdr".into(), image));
-                format!("image = \"sky.hdr\"\nrotate = {turn:.2}")
-            }
-        };
-        // The old sky's table ends where the next one begins.
-        let mut text = String::new();
-        let mut is_sky = false;
-        for line in self.builder.text.lines() {
-            is_sky = if line.starts_with('[') { line == "[sky]" } else { is_sky };
-            if !is_sky {
-                let _ = writeln!(text, "{line}");
-            }
-        }
-        self.builder.text = format!("{text}[sky]\n{keys}\n");
-        self.name.push('*');
-        self
     }
 
     /// Writes the scene file `name` and what it needs into `folder`: a move through `poses`, of
