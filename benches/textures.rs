@@ -1,11 +1,18 @@
 //! What the filter of textures gains and costs: shimmer of a pan over a checkerboard to the horizon at one camera
-//! sample, and the time of a frame with textures beside the same frame without.
+//! sample, the time of a frame with textures beside the same frame without, and the memory of many images beside what
+//! `inspect` predicts.
 #![allow(clippy::print_stdout, reason = "a bench prints its figures")]
 
 #[path = "../tests/common/checkerboard.rs"]
 mod checkerboard;
 mod support;
 
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use support::Candidate;
 use tweenray::film::Film;
@@ -149,6 +156,63 @@ fn cost() {
     support::table(&["", "without, ms", "with, ms", "ratio; wanted: 1.15"], &rows);
 }
 
+/// Images of the scene that is weighed, and texels along an edge of each.
+const IMAGES: u8 = 64;
+const EDGE: u32 = 4096;
+
+/// Writes an image of many colours.
+fn write_image(path: &Path, seed: u8) {
+    let file = BufWriter::new(File::create(path).expect("a file"));
+    let mut encoder = png::Encoder::new(file, EDGE, EDGE);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    let row: Vec<u8> = (0..3 * EDGE).map(|x| (x as u8).wrapping_mul(seed | 1)).collect();
+    let mut image = encoder.write_header().expect("an image");
+    image.write_image_data(&row.repeat(EDGE as usize)).expect("an image");
+}
+
+/// The memory of a scene of bit-mapped materials: what `inspect` predicts, and the most that rendering a frame takes.
+fn memory() {
+    let folder = tempfile::tempdir().expect("a folder to work in");
+    let mut text =
+        "[camera]\nfov = 40\n[[camera.keys]]\nat = 0\neye = [0, 20, 30]\ntarget = [0, 0, 0]\n\
+                    [sky]\nradiance = 0.5\n"
+            .to_owned();
+    for i in 0..IMAGES {
+        write_image(&folder.path().join(format!("{i}.png")), i);
+        let (x, z) = (2 * i32::from(i % 8) - 8, 2 * i32::from(i / 8) - 8);
+        text += &format!(
+            "[material.m{i}]\ntexture = \"{i}.png\"\n[[mesh]]\nmaterial = \"m{i}\"\n\
+             quad = {{ centre = [{x}, 0, {z}], normal = \"y\", size = 1.8 }}\n"
+        );
+    }
+    let (scene, stats) = (folder.path().join("scene.toml"), folder.path().join("stats.json"));
+    std::fs::write(&scene, text).expect("a file");
+    let run = |command: &str, more: &[&OsStr]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_tweenray"));
+        program.arg(command).arg(&scene).args(["--size", "640x360"]).args(more);
+        let out = program.output().expect("the program");
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        out.stdout
+    };
+    let inspected = run("inspect", &["--json".as_ref()]);
+    let inspected: Value = serde_json::from_slice(&inspected).expect("JSON");
+    let parts = inspected["memory"].as_object().expect("parts").values();
+    let predicted: f64 = parts.filter_map(Value::as_f64).sum();
+    let frame = folder.path().join("frame.png");
+    let [first, quiet, told] = ["--frames=1", "-q", "--stats"].map(OsStr::new);
+    run("render", &[first, quiet, told, stats.as_ref(), "-o".as_ref(), frame.as_ref()]);
+    let told: Value = serde_json::from_slice(&std::fs::read(stats).expect("a file")).expect("JSON");
+    let taken = told["peak_memory_bytes"].as_f64().expect("peak memory");
+    println!("\n{IMAGES} materials, each with an image of {EDGE} x {EDGE} texels");
+    let row = vec![
+        format!("{:.3}", predicted / 1e9),
+        format!("{:.3}", taken / 1e9),
+        format!("{:.3}", taken / predicted),
+    ];
+    support::table(&["predicted, GB", "taken at most, GB", "ratio; wanted: 0.9 to 1.1"], &[row]);
+}
+
 /// Words pick the parts.
 fn main() {
     support::title("textures");
@@ -159,5 +223,8 @@ fn main() {
     }
     if is_picked("cost") {
         cost();
+    }
+    if is_picked("memory") {
+        memory();
     }
 }

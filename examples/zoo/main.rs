@@ -17,6 +17,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use telling::{Sheet, Told, summary, table};
 
+/// What is changed of a scene, by the zoo's seed.
+type Change = fn(Specimen, u64) -> Specimen;
+
 fn main() -> ExitCode {
     let options = Options::parse();
     match run(&options) {
@@ -43,7 +46,7 @@ fn run(options: &Options) -> Result<bool, Failure> {
     println!("{}", telling::HEAD);
     for index in options.indices()? {
         let specimen = Specimen::new(options.seed, index, options.frames);
-        let changes: [(bool, fn(Specimen, u64) -> Specimen); 5] = [
+        let changes: [(bool, Change); 5] = [
             (options.lens, Specimen::with_lens),
             (options.gloss, Specimen::with_gloss),
             (options.sky, Specimen::with_sky),
