@@ -183,7 +183,7 @@ fn memory() {
         let (x, z) = (2 * i32::from(i % 8) - 8, 2 * i32::from(i / 8) - 8);
         text += &format!(
             "[material.m{i}]\ntexture = \"{i}.png\"\n[[mesh]]\nmaterial = \"m{i}\"\n\
-             quad = {{ centre = [{x}, 0, {z}], normal = \"y\", size = 1.8 }}\n"
+             quad = {{ centre = [{x}, 0, {z}], normal = \"y\", size = [1.8, 1.8] }}\n"
         );
     }
     let (scene, stats) = (folder.path().join("scene.toml"), folder.path().join("stats.json"));
