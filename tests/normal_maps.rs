@@ -9,8 +9,9 @@ use std::f64::consts::{FRAC_1_PI, PI};
 use tweenray::film::Film;
 use tweenray::math::{DAffine2, DVec2, DVec3, Rgb, Vec2};
 use tweenray::scene::{
-    Corners, DirectionalLight, Fresnel, IntersectorKind, Light, Material, NormalMap, PointLight,
-    QuadLight, Sky, SphereLight, Texture, TextureMap, World, WorldMesh, WorldSphere, Wrap,
+    Corners, DirectionalLight, Environment, EnvironmentKind, Fresnel, IntersectorKind, Light,
+    Material, NormalMap, PointLight, QuadLight, Sky, SkyGradient, SphereLight, Texture, TextureMap,
+    World, WorldMesh, WorldSphere, Wrap,
 };
 
 const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
@@ -275,8 +276,8 @@ fn spheres_have_the_frame_of_longitude_and_latitude() {
 fn a_coat_has_normals_of_its_own() {
     let bare = Fresnel { grazing: 0.0, ..Fresnel::PLASTIC };
     let coat = |roughness| Fresnel { clearcoat: 1.0, clearcoat_roughness: roughness, ..bare };
-    let map = |image| Some(NormalMap { image: TextureMap::of(image), strength: 1.0 });
-    for (kind, roughness) in BOTH.into_iter().zip([0.0, 0.3]) {
+    let map = || Some(NormalMap { image: TextureMap::of(0), strength: 1.0 });
+    for (kind, roughness) in BOTH.into_iter().flat_map(|kind| [(kind, 0.0), (kind, 0.3)]) {
         let film = |fresnel: Fresnel, [base, of_coat]: [Option<NormalMap>; 2]| {
             let mirror = Rgb::splat(if fresnel.grazing == 0.0 { 0.0 } else { 0.04 });
             let black = Material { mirror, roughness, ..Material::black("black") };
@@ -284,8 +285,8 @@ fn a_coat_has_normals_of_its_own() {
             let mut world = plate(Material { fresnel: Some(fresnel), ..black }, bumps());
             world.materials[0].normal_map = base;
             let lamp = Material { emission: Rgb::splat(20.0), ..Material::black("lamp") };
-            world.materials.push(lamp);
-            world.spheres.push(WorldSphere::new("lamp", DVec3::new(0.5, 3.0, -1.0), 0.8, 1));
+            let lamp = world.add_material(lamp);
+            world.spheres.push(WorldSphere::new("lamp", DVec3::new(0.5, 3.0, -1.0), 0.8, lamp));
             world.sky = Sky { radiance: Rgb::new(0.2, 0.3, 0.5), ..Sky::default() };
             let mut job = looking(world, kind);
             job.settings.spp = if roughness == 0.0 { 1 } else { 1024 };
@@ -300,12 +301,84 @@ fn a_coat_has_normals_of_its_own() {
             }
         };
         let smooth = film(coat(roughness), [None; 2]);
-        let own = film(coat(roughness), [None, map(0)]);
-        let of_plastic = film(Fresnel::PLASTIC, [map(0), None]);
+        let own = film(coat(roughness), [None, map()]);
+        let of_plastic = film(Fresnel::PLASTIC, [map(), None]);
         assert!(off(&own, &of_plastic) < 0.01, "{kind:?}: {}", off(&own, &of_plastic));
         assert!(off(&own, &smooth) > 0.05, "{kind:?}: {}", off(&own, &smooth));
-        assert_eq!(film(coat(roughness), [map(0), None]).rgb, smooth.rgb);
-        let both = film(coat(roughness), [map(0); 2]);
-        assert_eq!(both.rgb, own.rgb);
+        assert_eq!(film(coat(roughness), [map(), None]).rgb, smooth.rgb);
+    }
+}
+
+/// What lies under a coat follows its own normals, and receives what the coat lets through by the coat's.
+#[test]
+fn base_and_coat_follow_different_normals() {
+    let coat_normal = DVec3::new(0.0, 0.35, 1.0).normalize();
+    let film = |base: Rgb, clearcoat: f64, kind| {
+        let fresnel = Fresnel {
+            clearcoat,
+            clearcoat_normal_map: Some(NormalMap { image: TextureMap::of(1), strength: 1.0 }),
+            metallic: 1.0,
+            ..Fresnel::PLASTIC
+        };
+        let metal = Material { fresnel: Some(fresnel), ..Material::diffuse("metal", base) };
+        let mut world = plate(metal, even(DVec3::new(0.3, 0.0, 1.0).normalize()));
+        world.textures.push(even(coat_normal));
+        let [zenith, horizon, ground] = [0.1, 1.5, 0.3].map(Rgb::splat);
+        let gradient = SkyGradient { zenith, horizon, ground };
+        world.environment = Some(Environment::new(EnvironmentKind::Gradient(gradient)));
+        let mut job = looking(world, kind);
+        // The edges of black metal reflect less than a thousandth.
+        job.settings.cutoff = 0.0;
+        (render(&job).0, job)
+    };
+    for kind in BOTH {
+        // Metal reflects all light at grazing angles, and black one nothing else.
+        let (both, job) = film(Rgb::ONE, 1.0, kind);
+        let (metal, _) = film(Rgb::ONE, 0.0, kind);
+        let schlick = |cos: f64| 0.04 + 0.96 * (1.0 - cos).powi(5);
+        let black = |cos: f64| (1.0 - cos).powi(5);
+        let (of_black, _) = film(Rgb::ZERO, 1.0, kind);
+        let (edges, _) = film(Rgb::ZERO, 0.0, kind);
+        for (i, (x, y, both)) in common::pixels(&both).enumerate() {
+            let wo = (job.camera.eye - common::on_plane_y(&job, x, y, 0.0)).normalize();
+            let passed = 1.0 - schlick(wo.dot(in_world(coat_normal)));
+            // What the coat itself reflects is what black metal under it shows, less the metal's edges.
+            let coat = of_black.rgb[i].as_dvec3() - edges.rgb[i].as_dvec3() * passed;
+            let expected = metal.rgb[i].as_dvec3() * passed + coat;
+            let off = (both.as_dvec3() - expected).abs().max_element();
+            assert!(off < 2e-4, "{kind:?} {x} {y}: {both} for {expected}");
+            let edge = black(wo.dot(in_world(DVec3::new(0.3, 0.0, 1.0).normalize())));
+            let all = f64::from(edges.rgb[i].x / metal.rgb[i].x);
+            assert!((all - edge).abs() < 1e-3, "{kind:?} {x} {y}: {all} {edge}");
+        }
+        assert!(off_by_most(&both, &metal) > 0.02, "the coat is seen");
+    }
+}
+
+fn off_by_most(a: &Film, b: &Film) -> f32 {
+    let pixels = a.rgb.iter().zip(&b.rgb);
+    pixels.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max)
+}
+
+/// In a furnace no coat shows its normals over white, polished or rough.
+#[test]
+fn a_furnace_shows_no_gain_under_bumpy_coats() {
+    for (clearcoat_roughness, spp) in [(0.0, 4), (0.4, 64)] {
+        let normals = NormalMap { image: TextureMap::of(0), strength: 1.0 };
+        let fresnel = Fresnel {
+            clearcoat: 1.0,
+            clearcoat_roughness,
+            clearcoat_normal_map: Some(normals),
+            ..Fresnel::PLASTIC
+        };
+        let white = Material { fresnel: Some(fresnel), ..Material::diffuse("white", Rgb::ONE) };
+        let mut world = plate(white, bumps());
+        world.materials[0].normal_map = None;
+        world.sky = Sky { radiance: Rgb::ONE, lights: true, ..Sky::default() };
+        let mut job = looking(world, IntersectorKind::Embree);
+        job.settings.spp = spp;
+        let film = render(&job).0;
+        let mean = common::mean(&film);
+        assert!(film.bad.total() == 0 && mean < 1.002 && mean > 0.97, "{mean}");
     }
 }

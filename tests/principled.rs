@@ -291,6 +291,30 @@ fn images_multiply_every_share() {
     }
 }
 
+/// An image of one colour is as good as a reflectance of that colour, and no image makes a surface reflect more than all.
+#[test]
+fn an_image_colours_the_reflection() {
+    let film = |mirror: Rgb, image: Option<Rgb>| {
+        let specular_colour_map = image.map(|_| TextureMap::of(0));
+        let fresnel = Fresnel { specular_colour_map, ..PLASTIC };
+        let mut world = plate(Material { mirror, ..principled(Rgb::ZERO, 0.0, fresnel) });
+        let colour = image.unwrap_or(Rgb::ONE);
+        world.textures.push(Texture::from_linear("colour", [1, 1], vec![colour]));
+        let values = vec![Vec2::ZERO; 4];
+        world.meshes[0].uvs = Some(Corners { values, corners: None });
+        world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+        render(&job(world, pose((0.0, 3.0, 2.0), (0.0, 0.0, 0.0)), 16, 12)).0
+    };
+    let colour = Rgb::new(1.0, 0.5, 0.25);
+    let (image, plain) =
+        (film(Rgb::splat(0.2), Some(colour)), film(Rgb::splat(0.2) * colour, None));
+    assert_eq!(image.rgb, plain.rgb);
+    let [r, g, b] = image.rgb[0].to_array();
+    assert!(r > 1.5 * g && g > 1.3 * b, "{r} {g} {b}");
+    let bright = film(Rgb::splat(0.2), Some(Rgb::splat(40.0)));
+    assert!(bright.rgb.iter().all(|c| c.max_element() <= 1.0001));
+}
+
 /// The diffuse part of plastic is looked up in other frames, its reflection traced; the kernel that leaves no effect out
 /// makes the same picture.
 #[test]

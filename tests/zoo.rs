@@ -9,18 +9,17 @@ mod judging;
 mod making;
 
 use judging::{Plan, Program, Tile, judge};
-use making::{FAMILIES, Settings, Specimen};
+use making::{Change, FAMILIES, Settings, Specimen};
 
 const SEED: u64 = 1;
 
-/// What is changed of a scene.
-type Change = fn(Specimen, u64) -> Specimen;
-
 const LENS: Option<Change> = Some(Specimen::with_lens);
 const GLOSS: Option<Change> = Some(Specimen::with_gloss);
+const MATTER: Option<Change> = Some(Specimen::with_matter);
+const FOG: Option<Change> = Some(Specimen::with_fog);
 
 /// Families, each with the camera samples of its pixels.
-const SCENES: [(&str, usize, Option<Change>); 11] = [
+const SCENES: [(&str, usize, Option<Change>); 13] = [
     ("forest", 1, None),
     ("grating", 4, None),
     ("contact", 4, None),
@@ -32,6 +31,8 @@ const SCENES: [(&str, usize, Option<Change>); 11] = [
     ("mirrors", 4, LENS),
     ("contact", 4, GLOSS),
     ("mirrors", 1, GLOSS),
+    ("contact", 1, MATTER),
+    ("cornell", 4, FOG),
 ];
 
 #[test]

@@ -11,14 +11,11 @@ mod telling;
 
 use clap::Parser;
 use judging::{Failure, Program, judge};
-use making::{FAMILIES, Specimen};
+use making::{Change, FAMILIES, Specimen};
 use options::Options;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use telling::{Sheet, Told, summary, table};
-
-/// What is changed of a scene, by the zoo's seed.
-type Change = fn(Specimen, u64) -> Specimen;
 
 fn main() -> ExitCode {
     let options = Options::parse();

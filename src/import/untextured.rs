@@ -20,7 +20,7 @@ enum Lacking {
     Texture(String),
     Mask(String),
     Share(&'static str, String),
-    Normals(String),
+    Normals(&'static str, String),
     Colours,
 }
 
@@ -43,9 +43,10 @@ pub(super) fn find(world: &World, first: usize) -> impl Iterator<Item = Untextur
         let shares: Vec<Lacking> = shares.filter_map(|(what, map)| share(what, *map)).collect();
         let colours =
             (material.vertex_colours && mesh.colours.is_none()).then_some(Lacking::Colours);
-        let normals = material.normal_maps().filter(|map| is_bare(&map.image));
-        let normals = normals.map(|map| &world.textures[map.image.image as usize].name);
-        let normals: Vec<Lacking> = normals.cloned().map(Lacking::Normals).collect();
+        let normals = material.normal_maps().filter(|(_, map)| is_bare(&map.image));
+        let file = |map: &TextureMap| world.textures[map.image as usize].name.clone();
+        let normals = normals.map(|(what, map)| Lacking::Normals(what, file(&map.image)));
+        let normals: Vec<Lacking> = normals.collect();
         let (texture, mask) = (texture.map(Lacking::Texture), mask.map(Lacking::Mask));
         let lacking = [texture, mask, emission, roughness, colours];
         lacking
@@ -83,7 +84,7 @@ impl Untextured {
                 "the mesh `{mesh}` {none}: of the material `{material}` it has one `{what}`, \
                  that of the lower left corner of {file}"
             ),
-            Lacking::Normals(file) => format!(
+            Lacking::Normals(_, file) => format!(
                 "the mesh `{mesh}` {none}: {file} of the material `{material}` tilts none of its normals"
             ),
             Lacking::Colours => format!(
@@ -103,9 +104,11 @@ impl Untextured {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
                  material without `alpha`"
             }
-            Lacking::Normals(_) => {
-                "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
-                 material without a `normal_map`"
+            Lacking::Normals(what, _) => {
+                return format!(
+                    "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \
+                     material without a `{what}`"
+                );
             }
             Lacking::Share(what, _) => {
                 return format!(

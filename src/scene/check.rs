@@ -39,15 +39,15 @@ impl World {
         self.check_finite()
     }
 
-    fn check_normal_map(&self, material: &Material, map: &NormalMap) -> Result<()> {
+    fn check_normal_map(&self, material: &Material, (what, map): (&str, &NormalMap)) -> Result<()> {
         let name = &material.name;
-        image_of(&map.image, &self.textures, "normal map", name)?;
+        image_of(&map.image, &self.textures, what, name)?;
         if !(map.strength >= 0.0 && map.strength.is_finite()) {
-            let message = format!("the normal map of `{name}` has the strength {}", map.strength);
+            let message = format!("the `{what}` of `{name}` has the strength {}", map.strength);
             return Err(Error::Usage(message));
         }
         if material.glass.is_some() {
-            let message = format!("`{name}` is glass with a normal map, which glass has none of");
+            let message = format!("`{name}` is glass with a `{what}`, which glass has none of");
             return Err(Error::Usage(message));
         }
         Ok(())

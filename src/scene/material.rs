@@ -63,24 +63,24 @@ pub struct Fresnel {
     pub metallic: f64,
     /// Image that multiplies `metallic`, of data from 0 to 1.
     pub metallic_map: Option<TextureMap>,
-    /// Image that multiplies what is reflected of what is no metal, `mirror` and `grazing`; of data from 0 to 1, as those below.
+    /// Image that multiplies what is reflected of what is no metal, `mirror` and `grazing`; of data from 0 to 1.
     pub specular_map: Option<TextureMap>,
     /// Image of colours that multiplies what is reflected of what is no metal at normal incidence, `mirror`.
     pub specular_colour_map: Option<TextureMap>,
     /// Share of the surface that lies under a clear coat.
     pub clearcoat: f64,
-    /// Image that multiplies `clearcoat`.
+    /// Image that multiplies `clearcoat`, of data from 0 to 1.
     pub clearcoat_map: Option<TextureMap>,
     /// Roughness of the clear coat.
     pub clearcoat_roughness: f64,
-    /// Image that multiplies `clearcoat_roughness`.
+    /// Image that multiplies `clearcoat_roughness`, of data from 0 to 1.
     pub clearcoat_roughness_map: Option<TextureMap>,
     /// Image of normals of the clear coat, which without it is as smooth as the mesh. None on glass.
     pub clearcoat_normal_map: Option<NormalMap>,
     /// Share of what is no metal that is the material's `glass`, in place of the diffuse part and the mirror over it. The glass
     /// then has the roughness of the mirror, and image and vertex colours multiply its tint. 0 of materials without glass.
     pub transmission: f64,
-    /// Image that multiplies `transmission`.
+    /// Image that multiplies `transmission`, of data from 0 to 1.
     pub transmission_map: Option<TextureMap>,
 }
 
@@ -166,17 +166,19 @@ impl Material {
 
     /// The images of [`has_image`](Self::has_image), each an index into `Scene::textures`.
     pub fn images(&self) -> impl Iterator<Item = &TextureMap> {
-        let normals = self.normal_maps().map(|map| &map.image);
+        let normals = self.normal_maps().map(|(_, map)| &map.image);
         let shares =
             self.fresnel.iter().flat_map(|fresnel| fresnel.maps()).map(|(_, map)| map.as_ref());
         let maps = [&self.texture, &self.roughness_map, &self.emission_map].map(Option::as_ref);
         maps.into_iter().chain(shares).flatten().chain(normals)
     }
 
-    /// Its images of normals: of the surface, and of its clear coat.
-    pub fn normal_maps(&self) -> impl Iterator<Item = &NormalMap> {
-        let coat = self.fresnel.as_ref().and_then(|fresnel| fresnel.clearcoat_normal_map.as_ref());
-        self.normal_map.iter().chain(coat)
+    /// Its images of normals, of the surface and of its clear coat, each after its name.
+    pub fn normal_maps(&self) -> impl Iterator<Item = (&'static str, &NormalMap)> {
+        let coat = self.fresnel.as_ref().map(|fresnel| &fresnel.clearcoat_normal_map);
+        let maps =
+            [("normal_map", Some(&self.normal_map)), ("clearcoat_normal_map", coat)].into_iter();
+        maps.filter_map(|(name, map)| Some((name, map?.as_ref()?)))
     }
 
     /// [`images`](Self::images), to be changed.

@@ -59,7 +59,8 @@ pub(super) struct Scattered {
 }
 
 /// Calls `take` with each lobe of `material` at the point `si`, seen along `wo` (unit, leaving) by a ray with this cone, that
-/// depends on the direction, the number of its first direction among those of all, and the point with the lobe's shading normal. `layers` are the material's there, if
+/// depends on the direction; with the number of its first direction among those of all; and with the point, which has the
+/// shading normal of the lobe. `layers` are the material's there, if
 /// its reflectance grows towards grazing angles. Lobes that the kernel leaves out, since no material of the scene has them,
 /// cost nothing.
 #[inline(always)]

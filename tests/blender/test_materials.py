@@ -96,6 +96,9 @@ class Materials(Case):
         table, lines = self.of(lambda: stage.principled("p", Specular_Tint=(1.0, 0.5, 0.25)))
         self.near(table["principled"]["specular_colour"], [1.0, 0.5, 0.25])
         self.assertEqual(lines, [])
+        for inputs, what in (({"Metallic": 0.5}, "metal"), ({"Transmission_Weight": 0.5}, "glass"), ({"Transmission_Weight": 1.0}, "glass")):
+            _, lines = self.of(lambda: stage.principled("p", Specular_Tint=(1.0, 0.5, 0.25), **inputs))
+            self.noted(lines, "p", f"specular tint of {what}")
         link = lambda tree, node, shader: tree.links.new(node.outputs["Color"], shader.inputs["Specular Tint"])
         table, lines = self.of(lambda: self.mapped("t", "sRGB", np.ones((2, 2, 4), dtype=np.float32), link))
         self.assertTrue(os.path.exists(os.path.join(self.folder, table["principled"]["specular_texture"])))

@@ -127,6 +127,15 @@ fn a_coat_has_normals_of_its_own() {
     let texel = model.world.textures[normals.image.image as usize].levels()[0].texel(0, 0);
     assert_eq!((texel.x, normals.strength, material.normal_map), (0.2, 0.5, None));
     assert!(model.warnings.is_empty() && model.world.into_scene(true).is_ok());
+    // Glass has no normals of an image, and none is read for it.
+    let mut clear = File::triangle().with_uvs();
+    clear.image(1, &[[51, 102, 153, 204]], json!({}));
+    let mut glass = coat(1.0);
+    glass["extensions"]["KHR_materials_transmission"] = json!({"transmissionFactor": 0.5});
+    let glass = clear.with_material(glass).model();
+    let fresnel = glass.world.materials[0].fresnel.expect("layers");
+    assert_eq!((fresnel.clearcoat_normal_map, glass.world.textures.len()), (None, 0));
+    assert!(warns(&glass.warnings, "shown without its normal maps"));
     let mut plain = File::triangle().with_uvs();
     plain.image(1, &[[51, 102, 153, 204]], json!({}));
     let none = plain.with_material(coat(0.0)).model();

@@ -8,9 +8,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// Fog samples of a light on each ray: the program's own number.
-const FOG_SAMPLES: usize = 4;
-
 /// The program to judge.
 pub struct Program {
     path: PathBuf,
@@ -134,7 +131,8 @@ impl Program {
     ) -> Result<Spent, Failure> {
         let frames = folder.join(&render.name);
         let light = (settings.light * render.factor).to_string();
-        let fog = (FOG_SAMPLES * render.factor).to_string();
+        let fog =
+            (tweenray::scene::Settings::default().fog_samples as usize * render.factor).to_string();
         let camera = render.camera.map_or(settings, |spp| settings.uniform(spp)).camera_samples();
         let stats = folder.join(format!("{}.json", render.name));
         let mut command = Command::new(&self.path);

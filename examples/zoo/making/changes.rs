@@ -7,6 +7,9 @@ use super::specimen::Specimen;
 use glam::DVec3;
 use std::fmt::Write;
 
+/// What is changed of a scene, by the zoo's seed.
+pub type Change = fn(Specimen, u64) -> Specimen;
+
 /// Side of an image of matter, texels.
 const SIDE: usize = 64;
 
@@ -160,9 +163,11 @@ fn matter(dice: &mut Dice, colour: &str) -> String {
         }
         3..=4 => {
             let image = lies(dice);
+            let coat = ", clearcoat = 1, clearcoat_normal_map = \"bumps.ppm\"";
+            let more = dice.pick(&["", coat, ", specular_texture = \"stains.ppm\""]);
             format!(
                 "principled = {{ base_colour = {colour}, roughness = {{ file = \"stains.ppm\", factor = {roughness:.3}, \
-                 {image} }}, metallic = {{ file = \"stains.ppm\", {image} }} }}"
+                 {image} }}, metallic = {{ file = \"stains.ppm\", {image} }}{more} }}"
             )
         }
         5..=6 => {

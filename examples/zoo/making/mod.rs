@@ -15,5 +15,6 @@ mod props;
 mod specimen;
 
 pub use cameras::Pose;
+pub use changes::Change;
 pub use families::FAMILIES;
 pub use specimen::{Settings, Specimen};

@@ -112,7 +112,12 @@ impl<'d> MaterialReader<'d> {
         };
         let base = of(pbr.as_ref(), "baseColorTexture")?;
         let metal_rough = of(pbr.as_ref(), "metallicRoughnessTexture")?;
-        let normal = of(Some(json), "normalTexture")?;
+        let transmits = match json.extension("KHR_materials_transmission") {
+            Some(glass) => glass.number("transmissionFactor")?.unwrap_or(0.0) > 0.0,
+            None => false,
+        };
+        // Glass has no normals of an image.
+        let normal = if transmits { None } else { of(Some(json), "normalTexture")? };
         // An image times nothing is nothing.
         let glows = json.numbers::<3>("emissiveFactor")?.is_some_and(|factor| factor != [0.0; 3]);
         let emissive = if glows { of(Some(json), "emissiveTexture")? } else { None };
@@ -131,11 +136,15 @@ impl<'d> MaterialReader<'d> {
             |key| of_extension("KHR_materials_clearcoat", "clearcoatFactor", 0.0, key);
         let coat = of_coat("clearcoatTexture")?;
         let coat_roughness = of_coat("clearcoatRoughnessTexture")?;
-        let coat_normal = of_coat("clearcoatNormalTexture")?;
+        let coat_normal = if transmits { None } else { of_coat("clearcoatNormalTexture")? };
         let mut of_specular =
             |key| of_extension("KHR_materials_specular", "specularFactor", 1.0, key);
         let specular = of_specular("specularTexture")?;
-        let specular_colour = of_specular("specularColorTexture")?;
+        let specular_json = json.extension("KHR_materials_specular");
+        let tint =
+            specular_json.map(|json| json.numbers::<3>("specularColorFactor")).transpose()?;
+        let is_tinted = tint.flatten().is_none_or(|tint| tint != [0.0; 3]);
+        let specular_colour = if is_tinted { of_specular("specularColorTexture")? } else { None };
         // The ambient occlusion of an image is left out: rays find it.
         Ok(Laid {
             base,
@@ -223,12 +232,9 @@ impl Parts<'_, '_> {
         let metallic_map = self.map(self.laid.metal_rough, Role::Share(ImageChannel::Blue))?;
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
         let metallic = self.share(pbr, "metallicFactor", 1.0)?;
-        let normal_map = self.normal_map(self.laid.normal, Some(self.json), "normalTexture")?;
-        let coat = self.json.extension("KHR_materials_clearcoat");
-        let clearcoat_normal_map =
-            self.normal_map(self.laid.coat_normal, coat.as_ref(), "clearcoatNormalTexture")?;
+        let normal_map = self.normal_map(self.laid.normal, self.json, "normalTexture")?;
         let (mirror, grazing) = self.reflectance()?;
-        let (clearcoat, clearcoat_roughness) = self.clearcoat()?;
+        let (clearcoat, clearcoat_roughness, clearcoat_normal_map) = self.clearcoat()?;
         let red = Role::Share(ImageChannel::Red);
         let clearcoat_map = self.map(self.laid.coat, red)?;
         let transmission_map = self.map(self.laid.transmission, red)?;
@@ -252,15 +258,15 @@ impl Parts<'_, '_> {
         Ok(Material { texture, mirror, roughness, roughness_map, fresnel, normal_map, ..material })
     }
 
-    /// The image of normals that `key` of `json` says, as it is `laid`.
+    /// The image of normals that `json` has under `key`; `laid` says how it lies on the surface.
     fn normal_map(
         &mut self,
         laid: Option<LaidImage>,
-        json: Option<&Json<'_>>,
+        json: &Json<'_>,
         key: &str,
     ) -> Result<Option<NormalMap>> {
         let Some(image) = self.map(laid, Role::Normals)? else { return Ok(None) };
-        let scale = json.and_then(|json| json.get(key)).map(|info| info.number("scale"));
+        let scale = json.get(key).map(|info| info.number("scale"));
         let strength = scale.transpose()?.flatten().unwrap_or(1.0);
         if strength < 0.0 {
             self.notes.add("a normal map's negative scale is read as a positive one", None);
@@ -290,12 +296,15 @@ impl Parts<'_, '_> {
         }
     }
 
-    fn clearcoat(&mut self) -> Result<(f64, f64)> {
+    /// The share of the surface under a coat, its roughness and its normals.
+    fn clearcoat(&mut self) -> Result<(f64, f64, Option<NormalMap>)> {
         let Some(json) = self.json.extension("KHR_materials_clearcoat") else {
-            return Ok((0.0, 0.0));
+            return Ok((0.0, 0.0, None));
         };
         let coat = self.share(Some(&json), "clearcoatFactor", 0.0)?;
-        Ok((coat, self.share(Some(&json), "clearcoatRoughnessFactor", 0.0)?))
+        let roughness = self.share(Some(&json), "clearcoatRoughnessFactor", 0.0)?;
+        let laid = self.laid.coat_normal;
+        Ok((coat, roughness, self.normal_map(laid, &json, "clearcoatNormalTexture")?))
     }
 
     /// Emitted radiance, and the image that multiplies it. A unit of emission is a unit of radiance: white.
@@ -343,7 +352,9 @@ impl Parts<'_, '_> {
             return Ok(None);
         }
         let roughness = self.share(pbr, "roughnessFactor", 1.0)?;
-        if self.laid.normal.is_some() || self.laid.coat_normal.is_some() {
+        let coat = self.json.extension("KHR_materials_clearcoat");
+        let of_coat = coat.and_then(|coat| coat.get("clearcoatNormalTexture"));
+        if self.json.get("normalTexture").or(of_coat).is_some() {
             self.notes
                 .add("what has KHR_materials_transmission is shown without its normal maps", None);
         }
@@ -402,6 +413,6 @@ fn part_glass(material: Material, glass: Glass, transmission: f64) -> Material {
     if is_alone && !material.has_image() && !material.vertex_colours {
         return alone;
     }
-    let fresnel = Some(Fresnel { transmission, clearcoat_normal_map: None, ..fresnel });
-    Material { glass, fresnel, normal_map: None, alpha: None, ..material }
+    let fresnel = Some(Fresnel { transmission, ..fresnel });
+    Material { glass, fresnel, alpha: None, ..material }
 }

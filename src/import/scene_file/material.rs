@@ -5,7 +5,7 @@ use super::material_images::ImagesOf;
 use super::number::{Int, Ior, Share};
 use super::principled::Principled;
 use super::report::Source;
-use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
+use super::texture::{self, ChannelName, MappedShare, Named, NamedTexture, NormalTexture};
 use super::vector::{Light as Amount, Reflectance};
 use crate::error::Result;
 use crate::import::images::ImageUse;
@@ -142,14 +142,10 @@ impl Material {
         let built = scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
-            texture: self.texture.as_ref().zip(*texture).map(|(texture, id)| texture.0.map(id)),
-            normal_map: self
-                .normal_map
-                .as_ref()
-                .zip(*normals)
-                .map(|(table, id)| table.0.normals(id)),
+            texture: texture::laid(&self.texture, *texture),
+            normal_map: texture::normals(&self.normal_map, *normals),
             vertex_colours: self.vertex_colours,
-            alpha: self.alpha.as_ref().zip(*alpha).map(|(alpha, id)| alpha.0.map(id)),
+            alpha: texture::laid(&self.alpha, *alpha),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
             roughness: roughness_share,
             roughness_map,
@@ -160,11 +156,7 @@ impl Material {
                 (None, Some(_)) => Rgb::ONE,
                 (None, None) => Rgb::ZERO,
             },
-            emission_map: self
-                .emission_texture
-                .as_ref()
-                .zip(*emission)
-                .map(|(map, id)| map.0.map(id)),
+            emission_map: texture::laid(&self.emission_texture, *emission),
             emits_back: self.emits_back,
         };
         Ok(match self.principled.as_deref() {
@@ -219,6 +211,13 @@ impl Material {
                 return Err(source.fault(&principled.span, message).help(help).into());
             }
             self.check_transmission(principled, source)?;
+            if let Some(map) =
+                principled.clearcoat_normal_map.as_ref().filter(|_| !principled.has_coat())
+            {
+                let message =
+                    "`clearcoat_normal_map` is of the clear coat: it needs a `clearcoat` above 0";
+                return Err(source.fault(&map.span, message).into());
+            }
         }
         if let Some(glass) = &self.glass {
             let absorption = glass.absorption.as_ref().map(|a| (&a.span, "absorption"));

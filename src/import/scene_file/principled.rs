@@ -3,7 +3,7 @@
 use super::at::At;
 use super::material_images::{ImagesOf, SharesOf};
 use super::number::{Ior, Share};
-use super::texture::{ChannelName, ImageTable, MappedShare, Named, NamedTexture, NormalTexture};
+use super::texture::{self, ChannelName, MappedShare, Named, NamedTexture, NormalTexture};
 use super::vector::{Light as Amount, OneOr, Reflectance};
 use crate::math::Rgb;
 use crate::scene::{Fresnel, Glass, Material, TextureId};
@@ -86,6 +86,11 @@ impl Principled {
         usual.map(|(key, channel)| key.as_ref().map(|key| (key, channel)))
     }
 
+    /// Whether any of the surface may lie under a clear coat.
+    pub fn has_coat(&self) -> bool {
+        self.clearcoat.as_deref().is_some_and(|key| key.factor() != 0.0)
+    }
+
     /// Whether any of the surface may be glass.
     pub fn has_glass(&self) -> bool {
         self.transmission.as_deref().is_some_and(|key| key.factor() != 0.0)
@@ -93,7 +98,7 @@ impl Principled {
 
     /// `material` with this reflection.
     pub fn build(&self, material: Material, images: &ImagesOf<TextureId>) -> Material {
-        let ImagesOf { texture, specular_texture, coat_normals, shares: images, .. } = images;
+        let ImagesOf { texture: base, specular_texture, coat_normals, shares: images, .. } = images;
         let keys = [
             (&self.roughness, USUAL_ROUGHNESS),
             (&self.metallic, 0.0),
@@ -132,29 +137,21 @@ impl Principled {
         Material {
             glass,
             diffuse: base_colour.rgb(),
-            texture: self.base_texture.as_ref().zip(*texture).map(|(table, id)| table.0.map(id)),
+            texture: texture::laid(&self.base_texture, *base),
             mirror: normal,
             roughness,
             roughness_map,
             fresnel: Some(Fresnel {
                 grazing: specular.0,
                 specular_map: specular.1,
-                specular_colour_map: self
-                    .specular_texture
-                    .as_ref()
-                    .zip(*specular_texture)
-                    .map(|(table, id)| table.0.map(id)),
+                specular_colour_map: texture::laid(&self.specular_texture, *specular_texture),
                 metallic: metallic.0,
                 metallic_map: metallic.1,
                 clearcoat: clearcoat.0,
                 clearcoat_map: clearcoat.1,
                 clearcoat_roughness: clearcoat_roughness.0,
                 clearcoat_roughness_map: clearcoat_roughness.1,
-                clearcoat_normal_map: self
-                    .clearcoat_normal_map
-                    .as_ref()
-                    .zip(*coat_normals)
-                    .map(|(table, id)| table.0.normals(id)),
+                clearcoat_normal_map: texture::normals(&self.clearcoat_normal_map, *coat_normals),
                 transmission: transmission.0,
                 transmission_map: transmission.1,
             }),

@@ -81,13 +81,6 @@ image_table!(
     }
 );
 
-impl NormalTexture {
-    /// As scene data, with the decoded image's index.
-    pub fn normals(&self, image: TextureId) -> NormalMap {
-        NormalMap { image: self.map(image), strength: self.strength.0.0 }
-    }
-}
-
 /// Factor on a normal map.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
@@ -197,6 +190,20 @@ fn map(
 pub(super) struct Named<T>(pub T);
 
 pub(super) type NamedTexture = Named<Texture>;
+
+/// The image that `key` says, as scene data, with the decoded image's index.
+pub(super) fn laid(key: &Option<At<NamedTexture>>, image: Option<TextureId>) -> Option<TextureMap> {
+    Some(key.as_ref()?.0.map(image?))
+}
+
+/// The normals that `key` says, as scene data, with the decoded image's index.
+pub(super) fn normals(
+    key: &Option<At<Named<NormalTexture>>>,
+    image: Option<TextureId>,
+) -> Option<NormalMap> {
+    let table = &key.as_ref()?.0;
+    Some(NormalMap { image: table.map(image?), strength: table.strength.0.0 })
+}
 
 impl<T: ImageTable> At<Named<T>> {
     /// The image's file at the place of the whole value.

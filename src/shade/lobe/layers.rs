@@ -36,6 +36,14 @@ pub(in crate::shade) struct Coat<'s> {
     pub si: &'s SurfaceInteraction,
 }
 
+impl Coat<'_> {
+    /// The share of light that it lets through, for a viewer along the unit vector `wo`.
+    fn passed(&self, wo: DVec3) -> f32 {
+        let cos = facing_normal(self.si, wo).dot(wo);
+        1.0 - self.reflectance.single(self.roughness, cos).x
+    }
+}
+
 impl<'s> Layers<'s> {
     /// The layers of `material`, whose reflectance grows as `fresnel` says, at the point `si`, seen along `wo` (unit,
     /// leaving) by a ray with this `cone`. `coated` is the point with the shading normal of the clear coat.
@@ -57,9 +65,11 @@ impl<'s> Layers<'s> {
         let (metal, no_metal) = (metal as f32, (1.0 - metal) as f32);
         let other = no_metal * (1.0 - transmission as f32);
         let grazing = Rgb::splat(fresnel.grazing as f32);
-        let normal = fresnel
-            .specular_colour_map
-            .map_or(material.mirror, |map| material.mirror * texture::shown(scene, &map, seen));
+        let normal = fresnel.specular_colour_map.map_or(material.mirror, |map| {
+            // An image may hold any colour, and nothing reflects more than all. Not `min`, which would hide what is NaN.
+            let reflected = material.mirror * texture::shown(scene, &map, seen);
+            Rgb::select(reflected.cmpgt(Rgb::ONE), Rgb::ONE, reflected)
+        });
         let shine = Reflectance::growing(normal * specular, grazing * specular);
         let shine = shine.given_back(roughness, cos);
         let of_metal = Reflectance::growing(base, Rgb::ONE).given_back(roughness, cos);
@@ -68,10 +78,9 @@ impl<'s> Layers<'s> {
             let roughness = fresnel.clearcoat_roughness * share(&fresnel.clearcoat_roughness_map);
             let cos = facing_normal(coated, wo).dot(wo);
             let reflectance = Reflectance::growing(normal, all).given_back(roughness, cos);
-            let passed = 1.0 - reflectance.single(roughness, cos).x;
-            (Coat { reflectance, roughness, si: coated }, passed)
+            Coat { reflectance, roughness, si: coated }
         });
-        let (coat, passed) = coat.map_or((None, 1.0), |(coat, passed)| (Some(coat), passed));
+        let passed = coat.map_or(1.0, |coat| coat.passed(wo));
         let mirror = Reflectance {
             normal: shine.normal * other + of_metal.normal * metal,
             rise: shine.rise * other + of_metal.rise * metal,

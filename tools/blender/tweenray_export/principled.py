@@ -55,24 +55,35 @@ def body(writer, fed):
     writer.number(table, "metallic", fed, "Metallic")
     writer.number(table, "roughness", fed, "Roughness")
     table |= reflection(index, writer.constant(fed, "Specular IOR Level").grey())
-    tint = writer.read(fed, "Specular Tint")
-    if tint.colours is not None:
-        table["specular_colour"] = share(writer.constant(fed, "Specular Tint").rgb())
-    elif not is_white(tint):
-        writer.coloured(made, "specular_colour", "specular_texture", fed, "Specular Tint", table)
+    tinted(writer, made, fed, table)
     if is_coated:
         writer.number(table, "clearcoat", fed, "Coat Weight")
         writer.number(table, "clearcoat_roughness", fed, "Coat Roughness")
         coat_ior = writer.constant(fed, "Coat IOR").grey()
         if abs(coat_ior - 1.5) > 1e-3:
             writer.note(f"coat of index {coat_ior:.3g}", "1.5")
-        if not is_there(transmission):
-            writer.normal(table, "clearcoat_normal_map", fed, "Coat Normal")
-        elif fed.input("Coat Normal").fed() is not None:
+    if is_there(transmission) and part_glass(writer, fed, table):
+        if is_coated and fed.input("Coat Normal").fed() is not None:
             writer.note("a normal of the coat on glass", "the surface's")
-    if not (is_there(transmission) and part_glass(writer, fed, table)):
-        writer.normal(made.table, "normal_map", fed)
+        return made
+    writer.normal(made.table, "normal_map", fed)
+    if is_coated:
+        writer.normal(table, "clearcoat_normal_map", fed, "Coat Normal")
     return made
+
+
+def tinted(writer, made, fed, table):
+    """The colour of the reflection of what is no metal. Cycles tints the edges of metal and the reflection of glass by it, too."""
+    tint = writer.read(fed, "Specular Tint")
+    if is_white(tint):
+        return
+    for name, what in (("Metallic", "metal"), ("Transmission Weight", "glass")):
+        if is_there(writer.read(fed, name)):
+            writer.note(f"specular tint of {what}", "white")
+    if tint.colours is not None:
+        table["specular_colour"] = share(writer.constant(fed, "Specular Tint").rgb())
+    else:
+        writer.coloured(made, "specular_colour", "specular_texture", fed, "Specular Tint", table)
 
 
 def is_there(share):
@@ -112,6 +123,8 @@ def reflection(index, level):
 
 def glass(writer, fed, index):
     """Clear glass. A surface lets the root of the base colour through, as in Cycles."""
+    if not is_white(writer.read(fed, "Specular Tint")):
+        writer.note("specular tint of glass", "white")
     roughness = writer.constant(fed, "Roughness").grey()
     if fed.input("Normal").fed() is not None:
         writer.note("a normal map on glass", "none")

@@ -421,6 +421,11 @@ fn a_normal_map_has_a_strength_and_is_doubted_if_it_holds_no_normals() {
         ("diffuse = 0.5\nnormal_map = 3\n", "a file name or a table"),
         ("glass = {}\nnormal_map = 'blue.png'\n", "glass has no normal map"),
         (
+            "principled = { transmission = 0.5, clearcoat = 1, clearcoat_normal_map = 'blue.png' }\n",
+            "what has a `transmission` has no normal map",
+        ),
+        ("principled = { clearcoat_normal_map = 'blue.png' }\n", "it needs a `clearcoat` above 0"),
+        (
             "principled = { transmission = 0.5 }\nnormal_map = 'blue.png'\n",
             "a `transmission` has no normal map",
         ),
