@@ -4,7 +4,7 @@
 //! The difference of both, over its standard error, is a sample of the normal distribution (a z-test) unless there is a bias
 //! that more samples take away. What no number of samples takes away is seen by the closed forms of other tests.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
 
@@ -30,10 +30,10 @@ const FEW_OF_SKY: u32 = 16;
 const FACTOR: u32 = 8;
 /// Pixels of a render.
 const SIZE: (u32, u32) = (8, 6);
-/// |z| that one of 238 tests passes by chance once in 66 times; seeds are the same in each run.
+/// |z| that one of 227 tests passes by chance once in 70 times; seeds are the same in each run.
 const MOST: f64 = 4.0;
 /// Standard error of a difference, as a share of the light, beyond which a test would see too little.
-const MOST_ERROR: f64 = 0.02;
+const MOST_ERROR: f64 = 0.05;
 
 type MakeLight = fn(&mut World);
 
@@ -157,7 +157,7 @@ fn materials() -> Vec<(&'static str, Material)> {
         ("bumpy diffuse", bumpy(Material::diffuse("", Rgb::splat(0.6)))),
         ("mirror", mirror(0.0)),
         ("rough mirror", mirror(0.3)),
-        ("nearly smooth mirror", mirror(0.08)),
+        ("nearly smooth mirror", mirror(0.15)),
         ("bumpy rough mirror", bumpy(mirror(0.4))),
         ("plastic", layered(0.3, Fresnel::PLASTIC)),
         ("metal", layered(0.5, metal)),
