@@ -67,7 +67,7 @@ def body(writer, fed):
             writer.note("a normal of the coat on glass", "the surface's")
         return made
     writer.normal(made.table, "normal_map", fed)
-    if is_coated:
+    if is_coated and counts(table["clearcoat"]):
         writer.normal(table, "clearcoat_normal_map", fed, "Coat Normal")
     return made
 
@@ -91,6 +91,11 @@ def is_there(share):
     return share.image is not None or share.grey() > 0.0
 
 
+def counts(written):
+    """Whether a share as it is written, a number or an image's table, is above 0: a file that is missing is written as 0."""
+    return (written.get("factor", 1.0) if isinstance(written, dict) else written) > 0.0
+
+
 def is_white(value):
     """Whether a colour is white everywhere."""
     return value.is_constant() and all(abs(c - 1.0) <= 1e-6 for c in value.rgb())
@@ -99,8 +104,7 @@ def is_white(value):
 def part_glass(writer, fed, table):
     """The keys of what is glass in part; whether anything is. Of the base colour's image no root is taken."""
     writer.number(table, "transmission", fed, "Transmission Weight")
-    written = table["transmission"]
-    if (written.get("factor", 1.0) if isinstance(written, dict) else written) <= 0.0:
+    if not counts(table["transmission"]):
         del table["transmission"]
         return False
     if "base_texture" not in table:
