@@ -11,6 +11,8 @@ mod accuracy;
 mod cost;
 #[path = "inbetween/lights.rs"]
 mod lights;
+#[path = "inbetween/matter.rs"]
+mod matter;
 #[path = "../tests/common/moves.rs"]
 mod moves;
 #[path = "inbetween/pan.rs"]
@@ -44,7 +46,7 @@ impl Choice {
 
 type Section = (&'static str, fn(&Choice));
 
-const SECTIONS: [Section; 9] = [
+const SECTIONS: [Section; 10] = [
     ("quality", accuracy::quality),
     ("policies", accuracy::policies),
     ("flicker", accuracy::flicker),
@@ -54,6 +56,7 @@ const SECTIONS: [Section; 9] = [
     ("pan", pan::speed),
     ("effects", pan::effects),
     ("lights", lights::report),
+    ("matter", matter::report),
 ];
 
 fn main() {

@@ -156,7 +156,7 @@ fn check_vertices(mesh: &WorldMesh) -> Result<()> {
 mod tests {
     use super::*;
     use crate::math::{DVec3, Rgb};
-    use crate::scene::{VertexColours, WorldSphere};
+    use crate::scene::{Texture, VertexColours, WorldSphere};
 
     #[test]
     fn indices_out_of_range_are_refused_by_name() {
@@ -213,5 +213,33 @@ mod tests {
         assert!(refusal(of(pane), vec![]).contains("`pane` is thin glass"));
         let frosted = Glass { roughness: 0.3, ..ranked };
         assert!(refusal(of(frosted), vec![]).contains("`pane` is rough glass"));
+    }
+
+    #[test]
+    fn normal_maps_of_wrong_strength_or_on_glass_are_refused_by_name() {
+        let refusal = |strength: f64, glass: Option<Glass>| {
+            let map = Some(NormalMap { image: TextureMap::of(0), strength });
+            let transmission = if glass.is_some() { 0.5 } else { 0.0 };
+            let layers = Fresnel { clearcoat: 1.0, transmission, ..Fresnel::PLASTIC };
+            let black = Material::black("hull");
+            let base = Material { normal_map: map, glass, fresnel: Some(layers), ..black.clone() };
+            let coated = Some(Fresnel { clearcoat_normal_map: map, ..layers });
+            let coat = Material { glass, fresnel: coated, ..black };
+            [base, coat].map(|material| {
+                let image = Texture::from_vectors8("n", [1, 1], vec![[128, 128, 255]]);
+                let (materials, textures) = (vec![material], vec![image]);
+                let world = World { materials, textures, ..World::default() };
+                world.into_scene(true).map_or_else(|e| e.to_string(), |_| String::new())
+            })
+        };
+        assert_eq!(refusal(1.0, None), ["", ""]);
+        for strength in [-1.0, f64::NAN, f64::INFINITY] {
+            let [base, coat] = refusal(strength, None);
+            assert!(base.contains("the `normal_map` of `hull` has the strength"), "{base}");
+            assert!(coat.contains("the `clearcoat_normal_map` of `hull` has"), "{coat}");
+        }
+        let [base, coat] = refusal(1.0, Some(Glass::clear(1.5)));
+        assert!(base.contains("`hull` is glass with a `normal_map`"), "{base}");
+        assert!(coat.contains("`hull` is glass with a `clearcoat_normal_map`"), "{coat}");
     }
 }

@@ -144,6 +144,23 @@ class Materials(Case):
         self.assertEqual(len(files), 1)
         self.noted(lines, "t", "cut-outs")
 
+    def test_a_coat_whose_image_is_missing_has_no_normals(self):
+        """Scene files refuse normals of a coat that is not there."""
+        def link(tree, node, shader):
+            lost = tree.nodes.new("ShaderNodeTexImage")
+            lost.image = bpy.data.images.new("lost", 2, 2)
+            lost.image.source, lost.image.filepath = "FILE", "//no-such-file.png"
+            tree.links.new(lost.outputs["Color"], shader.inputs["Coat Weight"])
+            normal = tree.nodes.new("ShaderNodeNormalMap")
+            tree.links.new(node.outputs["Color"], normal.inputs["Color"])
+            tree.links.new(normal.outputs["Normal"], shader.inputs["Coat Normal"])
+
+        pixels = np.full((2, 2, 4), 0.5, dtype=np.float32)
+        table, lines = self.of(lambda: self.mapped("t", "Non-Color", pixels, link))
+        self.assertEqual(table["principled"].get("clearcoat", 0.0), 0.0)
+        self.assertNotIn("clearcoat_normal_map", table["principled"])
+        self.noted(lines, "lost", "no pixels")
+
     def test_images_lie_by_the_uv_maps_that_they_name(self):
         def link(tree, node, shader):
             tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
