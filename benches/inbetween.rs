@@ -1,7 +1,7 @@
 //! Figures of inferred frames, as ratios: how accurate and how fast they are beside traced ones.
 //!
 //! Words pick sections: `cargo bench --bench inbetween -- cost flicker`. `--threads N` (2),
-//! `--size WxH`, `--scene NAME`, and `--spp N` (1) for `quality`, change what is run; `--all` judges every
+//! `--size WxH`, `--scene NAME`, and `--spp N` (1) for `quality` and `matter`, change what is run; `--all` judges every
 //! frame in place of some, at the full size. What is compared takes turns, frame by frame.
 #![allow(clippy::print_stdout, reason = "a bench prints its figures")]
 

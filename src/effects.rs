@@ -336,7 +336,7 @@ fn vertex_colours(scene: &Scene, used: &UsedMaterials) -> EffectReason {
     let meshes = scene.meshes.iter().filter(|mesh| mesh.colours.is_some()).count();
     let materials = counted(used.vertex_colours, "material");
     let why = match used.vertex_colours {
-        0 => format!("{materials} that shows them in use"),
+        0 => "no material in use shows them".into(),
         _ => format!("{materials} in use, {meshes} of {} meshes have them", scene.meshes.len()),
     };
     EffectReason { effect: "vertex colours", runs: meshes > 0, why }

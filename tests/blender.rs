@@ -78,9 +78,14 @@ fn exported_scenes_have_the_right_numbers_and_are_read_and_rendered() {
 fn the_script_names_what_is_wrong() {
     let Some(python) = python() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/blender/export_tweenray.py");
-    for (arguments, wanted) in
-        [(vec![], "blender -b"), (vec!["absent.blend", "out"], "absent.blend")]
-    {
+    let help = Command::new(&python).arg(&script).arg("--help").output().expect("it starts");
+    assert!(help.status.success() && String::from_utf8_lossy(&help.stdout).contains("blender -b"));
+    for (arguments, wanted) in [
+        (vec![], "blender -b"),
+        (vec!["absent.blend", "out"], "absent.blend"),
+        (vec!["shot.blend", "--output"], "blender -b"),
+        (vec!["out"], "no scene is open"),
+    ] {
         let output =
             Command::new(&python).arg(&script).args(&arguments).output().expect("it starts");
         assert_eq!(output.status.code(), Some(2));

@@ -1,10 +1,11 @@
 """The camera in the scene file, against what Blender projects."""
 
 import math
+import os
 
 import bpy
 
-from common import Case, export, seen_at
+from common import FOLDER, Case, export, seen_at
 
 import stage
 
@@ -59,9 +60,11 @@ class Cameras(Case):
 
     def test_cameras_without_perspective_and_none_are_refused_by_name(self):
         scene = stage.fresh()
+        stage.place("floor", stage.plane())
         scene.camera.data.type = "ORTHO"
         with self.assertRaisesRegex(ValueError, "Camera: the camera's type is ORTHO"):
             export("ortho")
+        self.assertFalse(os.path.exists(os.path.join(FOLDER, "ortho", "meshes")))
         scene.camera = None
         with self.assertRaisesRegex(ValueError, "no camera"):
             export("none")

@@ -37,6 +37,7 @@ fn containers_that_lie_are_refused() {
         glb[at..at + bytes.len()].copy_from_slice(bytes);
         refusal("test.glb", &glb)
     };
+    assert_eq!(refusal("test.glb", &[]), "the file is empty");
     let length = glb.len();
     assert_eq!(refusal("test.glb", b"glTF\x02"), "a .glb of 5 bytes: its header alone has 12");
     assert_eq!(with(4, &[1]), "a .glb of version 1; version 2 can be read");

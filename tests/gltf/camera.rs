@@ -206,6 +206,31 @@ fn cameras_are_chosen_by_node_name_or_number() {
 }
 
 #[test]
+fn a_camera_that_nobody_chose_is_named_where_there_are_others() {
+    let loaded = filmed().loaded();
+    let told = "the camera is `a`; --camera takes another of the 2, they are 0: `b` on node `plan`, 1: `a` on node `rig`";
+    assert!(warns(&loaded.warnings, told), "{:?}", loaded.warnings);
+    let chosen = LoadOptions { camera: Some("rig".into()), ..LoadOptions::default() };
+    assert!(!warns(&filmed().loaded_with(&chosen).warnings, "--camera takes"));
+    let mut alone = filmed();
+    alone.json["nodes"].as_array_mut().expect("nodes").remove(1);
+    assert!(!warns(&alone.loaded().warnings, "--camera takes"));
+}
+
+#[test]
+fn cameras_and_scenes_that_are_not_shown_are_named() {
+    let mut file = filmed();
+    file.json["scenes"] =
+        json!([{"nodes": [1, 2], "name": "plans"}, {"nodes": [0], "name": "shot"}]);
+    file.json["scene"] = json!(1);
+    let loaded = file.loaded();
+    let two = "the file has 2 scenes: its default one is shown, `shot`";
+    assert!(warns(&loaded.warnings, two), "{:?}", loaded.warnings);
+    assert!(warns(&loaded.warnings, "the camera `a` is on no node of the scene that is shown"));
+    assert!(matches!(loaded.shot.path, CameraPath::Orbit { .. }));
+}
+
+#[test]
 fn without_a_perspective_the_camera_orbits() {
     let mut file = filmed();
     file.json["cameras"][0] = file.json["cameras"][1].clone();

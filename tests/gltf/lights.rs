@@ -1,6 +1,6 @@
 //! KHR_lights_punctual.
 
-use super::build::File;
+use super::build::{File, warns};
 use serde_json::json;
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::Light;
@@ -48,4 +48,23 @@ fn a_file_with_lights_gets_no_lamp_and_one_with_a_glow_does() {
     assert!(loaded.stage.is_some());
     let lights = loaded.world.into_scene(true).unwrap().lights;
     assert_eq!(lights.iter().filter(|light| matches!(light, Light::Face(_))).count(), 1);
+}
+
+#[test]
+fn lights_that_leave_all_dark_are_named() {
+    let told = |kind: &str, intensity: f64, material: serde_json::Value| {
+        let mut file = File::triangle().with_material(material);
+        let light = json!({"type": kind, "intensity": intensity, "spot": {}});
+        file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+        let of_node = json!({"KHR_lights_punctual": {"light": 0}});
+        file.add("nodes", json!({"translation": [0, 0, 4], "extensions": of_node}));
+        warns(&file.model().warnings, "the lights of the file are dim")
+    };
+    let grey = || json!({});
+    for (kind, dim, bright) in
+        [("point", 5.0, 5000.0), ("spot", 5.0, 5000.0), ("directional", 1.0, 1000.0)]
+    {
+        assert!(told(kind, dim, grey()) && !told(kind, bright, grey()), "{kind}");
+        assert!(!told(kind, dim, json!({"emissiveFactor": [1, 1, 1]})), "{kind}");
+    }
 }

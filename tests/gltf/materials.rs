@@ -208,6 +208,18 @@ fn alpha_is_cut_at_the_cutoff() {
 }
 
 #[test]
+fn a_sheet_that_is_half_there_all_over_is_opaque_with_a_warning() {
+    let sheet = |alpha: f64| {
+        let base = json!({"baseColorFactor": [1, 1, 1, alpha]});
+        material(json!({"pbrMetallicRoughness": base, "alphaMode": "BLEND"}))
+    };
+    let (half, model) = sheet(0.7);
+    assert!(half.alpha.is_none() && model.world.meshes.len() == 1);
+    assert!(warns(&model.warnings, "alphaMode BLEND is read as cut-outs"));
+    assert!(sheet(1.0).1.warnings.is_empty());
+}
+
+#[test]
 fn what_is_transparent_all_over_is_left_out() {
     let clear =
         json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.3]}, "alphaMode": "BLEND"});

@@ -20,8 +20,12 @@ def main(words):
 
     files = [word for word in words if word.endswith(".blend")]
     folders = [word for word in words if not word.endswith(".blend")]
-    if len(files) > 1 or len(folders) != 1:
-        print(__doc__, file=sys.stderr)
+    if len(files) > 1 or len(folders) != 1 or folders[0].startswith("-"):
+        asked = words in (["--help"], ["-h"])
+        print(__doc__, file=sys.stdout if asked else sys.stderr)
+        return 0 if asked else 2
+    if not files and not bpy.data.filepath:
+        print("export_tweenray: no scene is open: name a .blend", file=sys.stderr)
         return 2
     try:
         for file in files:

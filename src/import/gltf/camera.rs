@@ -105,6 +105,7 @@ fn choose<'p, 'd>(
             let name = &other.camera_name;
             notes.add(&format!("the camera `{name}` is orthographic, which cannot be rendered: the model is shown on a turntable"), None);
         }
+        note_others(document, all, first, notes)?;
         return Ok(first);
     };
     let by = |name: for<'c> fn(&'c Placed<'d>) -> &'c str| {
@@ -116,16 +117,47 @@ fn choose<'p, 'd>(
         return Ok(found);
     }
     let message = format!("the scene has no camera `{}`", shortened(wanted));
+    let help = match all.len() {
+        0 => "it has none: leave out --camera, and the camera orbits the model".into(),
+        more if more > MOST_NAMES => format!("its first cameras are {}", names(all)),
+        _ => format!("its cameras are {}", names(all)),
+    };
+    Err(Diagnostic::new(document.file, message).help(help).into())
+}
+
+/// The first cameras, each as `--camera` takes it.
+fn names(all: &[Placed<'_>]) -> String {
     let name = |(at, camera): (usize, &Placed<'_>)| {
         format!("{at}: `{}` on node `{}`", camera.camera_name, camera.node_name)
     };
     let names: Vec<String> = all.iter().enumerate().take(MOST_NAMES).map(name).collect();
-    let help = match all.len() {
-        0 => "it has none: leave out --camera, and the camera orbits the model".into(),
-        more if more > MOST_NAMES => format!("its first cameras are {}", names.join(", ")),
-        _ => format!("its cameras are {}", names.join(", ")),
-    };
-    Err(Diagnostic::new(document.file, message).help(help).into())
+    names.join(", ")
+}
+
+/// Names the cameras that are not `used`, where nobody has chosen one.
+fn note_others(
+    document: &Document<'_>,
+    all: &[Placed<'_>],
+    used: Option<&Placed<'_>>,
+    notes: &mut Notes,
+) -> Result<()> {
+    let first = if all.len() > MOST_NAMES { "the first of them are" } else { "they are" };
+    match used {
+        Some(used) if all.len() > 1 => {
+            let (own, count, names) = (&used.camera_name, all.len(), names(all));
+            let what = format!(
+                "the camera is `{own}`; --camera takes another of the {count}, {first} {names}"
+            );
+            notes.add(&what, None);
+        }
+        None if all.is_empty() && !document.cameras.is_empty() => {
+            let name = name_of(&document.cameras[0], "camera", 0)?;
+            let what = format!("the camera `{name}` is on no node of the scene that is shown");
+            notes.add(&what, None);
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
 /// What moves a camera.

@@ -28,6 +28,9 @@ pub(super) struct Container<'a> {
 /// Errors: a `.glb` of another version than 2, lengths that lie, a first chunk that is no JSON, more JSON than
 /// [`MAX_JSON`].
 pub(super) fn open<'a>(file: &Path, bytes: &'a [u8]) -> Result<Container<'a>> {
+    if bytes.is_empty() {
+        return Err(Diagnostic::new(file, "the file is empty").into());
+    }
     let container = if bytes.starts_with(MAGIC) {
         glb(file, bytes)?
     } else {

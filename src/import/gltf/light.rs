@@ -2,10 +2,12 @@
 
 use super::document::Document;
 use super::json::Json;
-use crate::error::Result;
+use crate::error::{Diagnostic, Result};
+use crate::import::framing;
 use crate::math::{DAffine3, DVec3, Rgb};
-use crate::scene::{DirectionalLight, Light, PointLight, SpotLight};
+use crate::scene::{DirectionalLight, Light, PointLight, SpotLight, World, WorldMesh};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::path::Path;
 
 /// Lumens of a watt: candela and lux of the file over this are W/sr and W/m² here. It is the luminous efficacy of green
 /// light, by which the candela is defined and by which Blender converts when it writes glTF.
@@ -51,6 +53,42 @@ pub(super) fn read(
         }
         _ => return Err(kind.fault("a light is `point`, `spot` or `directional`").into()),
     }))
+}
+
+/// Irradiance of a white surface that is seen as 25 of 255.
+const DIM: f64 = 0.03;
+
+/// Warns of lights that leave all dark at an exposure of 1, in a scene where nothing else shines. Many programs write their
+/// own numbers for candela and lux.
+pub(super) fn note_dim(world: &World, path: &Path) -> Option<Diagnostic> {
+    let emits = |mesh: &WorldMesh| world.materials[mesh.material as usize].emits();
+    if world.lights.is_empty() || world.meshes.is_empty() || world.meshes.iter().any(emits) {
+        return None;
+    }
+    let bounds = framing::bounds(world);
+    let middle = bounds.centre();
+    let nearest = 0.25 * (bounds.max - bounds.min).length();
+    let from = |place: DVec3, intensity: Rgb| {
+        let distance = place.distance(middle).max(nearest);
+        f64::from(intensity.max_element()) / (distance * distance)
+    };
+    let irradiance = |light: &Light| match light {
+        Light::Point(light) => from(light.position, light.intensity),
+        Light::Spot(light) => from(light.position, light.intensity),
+        Light::Directional(light) => f64::from(light.irradiance.max_element()),
+        _ => 0.0,
+    };
+    let all: f64 = world.lights.iter().map(irradiance).sum();
+    if all >= DIM || !all.is_finite() {
+        return None;
+    }
+    let message = format!(
+        "the lights of the file are dim: {all:.2e} W/m² in the middle of the scene, where 3 show white as white"
+    );
+    let help = format!(
+        "--exposure {LUMENS_PER_WATT} shows candela and lux of the file as if they were W/sr and W/m²"
+    );
+    Some(Diagnostic::new(path, message).help(help))
 }
 
 /// Cosines of the angles up to which a spot is full and beyond which there is no light.

@@ -209,7 +209,7 @@ impl Parts<'_, '_> {
         (material.emission, material.emission_map) = self.emission()?;
         material.emits_back = self.json.truth("doubleSided")?.unwrap_or(false);
         let mut is_invisible = false;
-        if let AlphaMode::Mask(cutoff) = self.alpha_mode()? {
+        if let AlphaMode::Mask(cutoff) = self.alpha_mode(alpha)? {
             is_invisible = self.laid.base.is_none() && alpha < cutoff;
             material.alpha = self.mask(alpha, cutoff)?;
         }
@@ -318,14 +318,15 @@ impl Parts<'_, '_> {
         Ok((Rgb::from_array(emission), self.map(self.laid.emissive, Role::Colour)?))
     }
 
-    fn alpha_mode(&mut self) -> Result<AlphaMode> {
+    /// How the surface's alpha is read, `factor` times that of its image.
+    fn alpha_mode(&mut self, factor: f64) -> Result<AlphaMode> {
         Ok(match self.json.text("alphaMode")? {
             Some("MASK") => {
                 AlphaMode::Mask(self.json.number_within("alphaCutoff", [0.0, f64::MAX], 0.5)?)
             }
             Some("BLEND") => {
                 let image = self.laid.base.is_some_and(|base| self.images.has_alpha(base.image));
-                if image {
+                if image || factor < 1.0 {
                     self.notes.add("alphaMode BLEND is read as cut-outs: a surface is there where its alpha is a half or more", None);
                 }
                 AlphaMode::Mask(0.5)

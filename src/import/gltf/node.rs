@@ -5,6 +5,7 @@ use super::document::Document;
 use super::json::Json;
 use super::uri::shortened;
 use crate::error::Result;
+use crate::import::source::Notes;
 use crate::math::{DAffine3, DMat3, DQuat, DVec3};
 
 /// The nodes of a file, and those that the scene shows.
@@ -99,6 +100,18 @@ impl Nodes {
         }
         worlds.into_iter().map(Option::unwrap_or_default).collect()
     }
+}
+
+/// Names the scene that is shown, where the file has others.
+pub(super) fn note_scenes(document: &Document<'_>, notes: &mut Notes) -> Result<()> {
+    let scenes = document.top.list("scenes")?;
+    let shown = document.top.index("scene", scenes.len(), "scene")?.unwrap_or(0);
+    if let (Some(scene), true) = (scenes.get(shown), scenes.len() > 1) {
+        let (name, count) = (name_of(scene, "scene", shown)?, scenes.len());
+        let what = format!("the file has {count} scenes: its default one is shown, `{name}`");
+        notes.add(&what, None);
+    }
+    Ok(())
 }
 
 /// The roots of the scene that the file shows; `None` without scenes.

@@ -93,12 +93,13 @@ class Export:
         frames = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
         for frame in frames:
             engine.frame_set(frame, 0.0)
+            # First, since a camera that cannot be exported shall leave no files.
+            self.camera(depsgraph)
             if frame == frames[0]:
                 self.geometry(depsgraph)
                 before = places(depsgraph)
             if frame in (frames[len(frames) // 2], frames[-1]) and frame != frames[0]:
                 self.note_moves(before, places(depsgraph), frames[0])
-            self.camera(depsgraph)
 
     def camera(self, depsgraph):
         ob = depsgraph.scene.camera

@@ -1,6 +1,6 @@
 //! A camera as computer vision has it, and the text of files of such cameras.
 
-use crate::error::{Error, Result};
+use crate::error::{Diagnostic, Error, Result};
 use crate::math::{DMat3, DVec3};
 use crate::scene::Projection;
 use std::path::Path;
@@ -89,7 +89,8 @@ pub(super) fn rotation(m: DMat3) -> std::result::Result<DMat3, &'static str> {
 pub(super) fn read(path: &Path) -> Result<String> {
     let about = std::fs::metadata(path).map_err(|e| Error::io("read", path, e))?;
     if !about.is_file() {
-        return Err(Error::input(path, "this is not a regular file"));
+        let help = "name a file: transforms.json, or COLMAP's images.txt";
+        return Err(Diagnostic::new(path, "this is not a regular file").help(help).into());
     }
     if about.len() > MAX_BYTES {
         let message = format!("a file of poses has at most {} MB", MAX_BYTES >> 20);
@@ -98,6 +99,9 @@ pub(super) fn read(path: &Path) -> Result<String> {
     let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
     String::from_utf8(bytes).map_err(|e| {
         let offset = e.utf8_error().valid_up_to();
-        Error::input(path, format!("the file is not UTF-8 text from byte {offset} on"))
+        let message = format!("the file is not UTF-8 text from byte {offset} on");
+        let help =
+            "binary models of COLMAP become text by `colmap model_converter --output_type TXT`";
+        Diagnostic::new(path, message).help(help).into()
     })
 }
