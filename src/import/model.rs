@@ -20,6 +20,8 @@ pub struct Model {
     pub world: World,
     /// Warnings about dropped faces, ignored material keys and the like.
     pub warnings: Vec<Diagnostic>,
+    /// Warnings about its camera and its lights, which hold where nothing else is in the scene.
+    pub warnings_alone: Vec<Diagnostic>,
     /// Every file read.
     pub files: Vec<PathBuf>,
     /// The file's own camera, of formats that have one.

@@ -50,8 +50,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
         time: options.time.unwrap_or(0.0),
         fps: options.fps,
     };
-    let Model { mut world, mut warnings, files, mut camera, has_lamps, repeats } =
+    let Model { mut world, mut warnings, warnings_alone, files, mut camera, has_lamps, repeats } =
         super::load_model_with(path, policy, &of_file)?;
+    warnings.extend(warnings_alone);
     let transform = DAffine3::from_scale(DVec3::splat(options.scale)) * to_y_up(options.up);
     world.apply_transform(&transform)?;
     if let Some(camera) = &mut camera {

@@ -212,6 +212,8 @@ fn a_camera_that_nobody_chose_is_named_where_there_are_others() {
     assert!(warns(&loaded.warnings, told), "{:?}", loaded.warnings);
     let chosen = LoadOptions { camera: Some("rig".into()), ..LoadOptions::default() };
     assert!(!warns(&filmed().loaded_with(&chosen).warnings, "--camera takes"));
+    // A scene file has a camera of its own.
+    assert!(filmed().model().warnings.is_empty());
     let mut alone = filmed();
     alone.json["nodes"].as_array_mut().expect("nodes").remove(1);
     assert!(!warns(&alone.loaded().warnings, "--camera takes"));

@@ -56,12 +56,14 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &ModelOptions) -> Result<
     let nodes = Nodes::read(&document)?;
     node::note_scenes(&document, &mut notes)?;
     let animations = Animations::read(&document, &mut notes)?;
-    let camera = camera::read(&document, &nodes, &animations, options, &mut notes)?;
+    let mut of_camera = Notes::default();
+    let camera = camera::read(&document, &nodes, &animations, options, &mut of_camera)?;
     camera::note_moving(&document, &nodes, &animations, options.time, &mut notes)?;
     let model = Model { files, camera, ..Model::default() };
     let mut model =
         Assembly::of(&document, &nodes, (&animations, options.time), model, &mut notes)?.build()?;
-    model.warnings.extend(light::note_dim(&model.world, path));
+    model.warnings_alone = of_camera.into_warnings(path);
+    model.warnings_alone.extend(light::note_dim(&model.world, path));
     let is_empty = model.world.meshes.is_empty();
     if is_empty {
         model
