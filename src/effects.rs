@@ -311,10 +311,9 @@ fn fresnel(used: &UsedMaterials) -> EffectReason {
     EffectReason { effect: "Fresnel reflection", runs: used.fresnel > 0, why }
 }
 
-/// Whether the roughness of mirrors is looked up in images.
+/// Whether the roughness of mirrors or glass is looked up in images.
 fn roughness_maps(used: &UsedMaterials, settings: &Settings) -> EffectReason {
-    let why =
-        format!("{} in use", counted(used.roughness_maps, "roughness-mapped mirror material"));
+    let why = format!("{} in use", counted(used.roughness_maps, "roughness-mapped material"));
     let runs = used.roughness_maps > 0 && settings.bounces > 0;
     EffectReason { effect: "roughness maps", runs, why }
 }
@@ -327,8 +326,10 @@ fn normal_maps(used: &UsedMaterials) -> EffectReason {
 
 fn has_roughness_map(material: &Material) -> bool {
     let of_coat = |f: Fresnel| f.clearcoat_roughness_map.is_some() && f.clearcoat_roughness != 0.0;
-    let of_mirror = material.roughness != 0.0 && material.roughness_map.is_some();
-    material.is_mirror() && (of_mirror || material.fresnel.is_some_and(of_coat))
+    let of_layers = material.is_mirror() && material.roughness != 0.0;
+    let of_glass = material.glass.as_ref().is_some_and(Glass::is_rough);
+    let is_mapped = material.roughness_map.is_some() && (of_layers || of_glass);
+    is_mapped || material.is_mirror() && material.fresnel.is_some_and(of_coat)
 }
 
 /// Whether surfaces show colours of vertices, and how many.

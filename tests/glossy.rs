@@ -5,10 +5,10 @@
 mod common;
 
 use common::{job, mean, pose, render};
-use tweenray::math::{DMat3, DVec3, Rgb, Vec2};
+use tweenray::math::{DMat3, DVec3, Rgb};
 use tweenray::scene::{
     Corners, DiskLight, Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky,
-    SphereLight, SpotLight, SunLight, Texture, TextureMap, World, WorldMesh, WorldSphere,
+    SphereLight, SpotLight, SunLight, Texture, TextureMap, World, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -243,13 +243,8 @@ fn a_spot_with_a_radius_is_a_sphere_within_its_cone() {
 /// A plate whose roughness lies in an image of `texels`, once over it.
 fn mapped_plate(image: Texture) -> World {
     let map = Some(TextureMap::of(0));
-    let mut world = plate(Material { roughness_map: map, ..rough(Rgb::splat(0.9), 1.0) });
-    let uv = |p: &DVec3| Vec2::new((p.x / 8.0 + 0.5) as f32, (0.5 - p.z / 8.0) as f32);
-    let values = world.meshes[0].positions.iter().map(uv).collect();
-    let mesh = world.meshes.remove(0);
-    world.meshes.push(WorldMesh { uvs: Some(Corners { values, corners: None }), ..mesh });
-    world.textures.push(image);
-    world
+    let material = Material { roughness_map: map, ..rough(Rgb::splat(0.9), 1.0) };
+    common::imaged_plate(material, 4.0, image)
 }
 
 /// An image that is the same all over gives the picture of the number, at 8 and at 16 bits; one with two halves gives each half's

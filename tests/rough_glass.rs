@@ -7,7 +7,8 @@ mod common;
 use common::{job, mean, pose, render};
 use tweenray::math::{DVec3, Rgb};
 use tweenray::scene::{
-    Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky, World, WorldSphere,
+    Glass, IntersectorKind, Light, Material, PointLight, QuadLight, Sky, Texture, TextureMap,
+    World, WorldSphere,
 };
 use tweenray::stats::RayKind;
 
@@ -153,4 +154,59 @@ fn what_bends_no_light_is_not_rough() {
     };
     let ((matte, counts), (clear, _)) = (seen(0.7, 1.0), seen(0.0, 1.0));
     assert_eq!((matte.rgb, counts[RayKind::Glossy]), (clear.rgb, 0));
+}
+
+/// A plate of glass whose roughness lies in an image of `texels`, 16 in a row.
+fn mapped_plate(texels: Vec<u8>, thin: bool) -> World {
+    let image = Texture::from_data8("t", [16, (texels.len() / 16) as u32], texels);
+    let map = Some(TextureMap::of(0));
+    common::imaged_plate(Material { roughness_map: map, ..glass(1.0, thin) }, 9.0, image)
+}
+
+/// An image that is the same all over gives the picture of the number, from both sides; one of other roughness does not.
+#[test]
+fn an_image_of_roughness_is_the_roughness_that_it_holds() {
+    for (kind, thin, height) in KINDS
+        .into_iter()
+        .flat_map(|kind| [(kind, true, 2.0), (kind, false, 2.0), (kind, false, -2.0)])
+    {
+        let seen = |mut world: World| {
+            for height in [-1.5, 1.5] {
+                let position = DVec3::new(0.3, height, -0.2);
+                world
+                    .lights
+                    .push(Light::Point(PointLight { position, intensity: Rgb::splat(3.0) }));
+            }
+            world.sky = Sky { radiance: Rgb::splat(0.1), ..Sky::default() };
+            let mut job = job(world, pose((-0.4, height, 0.5), (0.0, 0.0, 0.0)), 24, 18);
+            (job.settings.intersector, job.settings.spp) = (kind, 4);
+            render(&job).0.rgb
+        };
+        let number = seen(plate(glass(f64::from(f32::from(102_u8) / 255.0), thin)));
+        let told = format!("{kind:?} thin {thin} from {height}");
+        let off = |found: Vec<Rgb>| {
+            let each = found.iter().zip(&number).map(|(a, b)| (a.y / b.y - 1.0).abs());
+            each.fold(0.0, f32::max)
+        };
+        // Interpolation between equal texels rounds.
+        let same = off(seen(mapped_plate(vec![102; 64], thin)));
+        assert!(same < 1e-3, "{told}: {same}");
+        let other = off(seen(mapped_plate(vec![160; 64], thin)));
+        assert!(other > 0.1, "{told}: {other}");
+    }
+}
+
+/// From polished to ground side by side, a furnace shows nothing.
+#[test]
+fn an_image_of_roughness_in_a_furnace_is_one() {
+    for (thin, height) in [(true, 1.0), (false, 1.0), (false, -1.0)] {
+        let mut world = mapped_plate((0..=255).collect(), thin);
+        world.sky = Sky { radiance: Rgb::ONE, ..Sky::default() };
+        let mut job = job(world, pose((0.0, height, 3.0), (0.0, 0.0, 0.0)), 32, 24);
+        job.settings.spp = 256;
+        let film = render(&job).0;
+        let mean = mean(&film);
+        assert!((mean - 1.0).abs() < 0.002, "thin {thin} from {height}: {mean}");
+        assert_eq!(film.bad.total(), 0);
+    }
 }

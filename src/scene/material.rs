@@ -27,7 +27,7 @@ pub struct Material {
     pub mirror: Rgb,
     /// Roughness of the mirror in `[0, 1]`; 0 is perfect.
     pub roughness: f64,
-    /// Image that multiplies `roughness`, of data from 0 to 1.
+    /// Image that multiplies `roughness` and that of the glass, of data from 0 to 1.
     pub roughness_map: Option<TextureMap>,
     /// How the mirror's reflectance grows towards grazing angles, and what of the surface is metal. The mirror then takes
     /// its share from the diffuse part. `None`: `mirror` at every angle, beside the diffuse part.

@@ -98,7 +98,8 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
                 0.0 => Lobe::Mirror(Mirror::new(material.mirror)),
                 _ => {
                     let n = facing_normal(si, wo);
-                    let roughness = glossy::roughness(scene, material, seen);
+                    let factor = material.roughness;
+                    let roughness = glossy::roughness(scene, (material, factor), seen);
                     let reflectance = Reflectance::constant(material.mirror);
                     let reflectance = reflectance.given_back(roughness, wo.dot(n));
                     Lobe::Glossy(Glossy::new(reflectance, roughness, n))
@@ -108,9 +109,7 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
             si,
         );
     }
-    if let Some(glass) = material.glass.as_ref().filter(|_| GLASS) {
-        let painted = material.fresnel.and_then(|_| painted_glass(scene, material, seen));
-        let glass = painted.as_ref().unwrap_or(glass);
+    if GLASS && let Some(glass) = &painted_glass(scene, material, seen) {
         match (glass.thin, glass.is_rough()) {
             (true, false) => take(Lobe::Pane(Pane::new(glass)), 0, si),
             (false, false) => {
@@ -133,25 +132,25 @@ pub(super) fn glass_at(
 ) -> Option<PartGlass> {
     let (si, wo, _) = seen;
     match &material.fresnel {
-        None => material.glass.map(|glass| PartGlass { glass, share: 1.0 }),
         Some(fresnel) if material.shows_layers(si.is_outside(wo)) => {
             Layers::at(scene, (material, fresnel), seen, si).glass
         }
-        Some(_) => {
-            painted_glass(scene, material, seen).map(|glass| PartGlass { glass, share: 1.0 })
-        }
+        _ => painted_glass(scene, material, seen).map(|glass| PartGlass { glass, share: 1.0 }),
     }
 }
 
-/// The glass of a material that has other layers too at the point that is `seen`, images looked up.
+/// The glass of a material at the point that is `seen`, images looked up; the colours of other layers count where it has such.
 fn painted_glass(
     scene: &Scene,
     material: &Material,
     seen: (&SurfaceInteraction, DVec3, RayCone),
 ) -> Option<Glass> {
     let glass = material.glass?;
-    let tint = diffuse::painted(scene, (material, glass.tint), seen);
-    Some(Glass { tint, roughness: glossy::roughness(scene, material, seen), ..glass })
+    let tint = material
+        .fresnel
+        .map_or(glass.tint, |_| diffuse::painted(scene, (material, glass.tint), seen));
+    let roughness = glossy::roughness(scene, (material, glass.roughness), seen);
+    Some(Glass { tint, roughness, ..glass })
 }
 
 /// What a rough boundary of `glass` reflects, and what it lets through.

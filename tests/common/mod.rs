@@ -5,8 +5,10 @@
 use std::sync::atomic::AtomicBool;
 use tweenray::film::Film;
 use tweenray::intersect;
-use tweenray::math::{DVec3, Rgb};
-use tweenray::scene::{Camera, Material, Pose, Scene, Settings, World, WorldMesh, WorldSphere};
+use tweenray::math::{DVec3, Rgb, Vec2};
+use tweenray::scene::{
+    Camera, Corners, Material, Pose, Scene, Settings, Texture, World, WorldMesh, WorldSphere,
+};
 use tweenray::shade::Renderer;
 use tweenray::stats::RayCounts;
 
@@ -78,6 +80,17 @@ pub fn plate(material: Material, half: f64) -> World {
     world.materials.push(material);
     let corners = [(-half, -half), (-half, half), (half, half), (half, -half)];
     world.meshes.push(quad(corners.map(|(x, z)| DVec3::new(x, 0.0, z)), 0));
+    world
+}
+
+/// A [`plate`] of half edge `half`, with `image` laid once over it, the one that maps of the material name.
+pub fn imaged_plate(material: Material, half: f64, image: Texture) -> World {
+    let mut world = plate(material, half);
+    let over = 2.0 * half;
+    let uv = |p: &DVec3| Vec2::new((p.x / over + 0.5) as f32, (0.5 - p.z / over) as f32);
+    let values = world.meshes[0].positions.iter().map(uv).collect();
+    world.meshes[0].uvs = Some(Corners { values, corners: None });
+    world.textures.push(image);
     world
 }
 

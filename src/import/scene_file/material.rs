@@ -2,7 +2,7 @@
 
 use super::at::At;
 use super::material_images::ImagesOf;
-use super::number::{Int, Ior, Share};
+use super::number::{Int, Ior};
 use super::principled::Principled;
 use super::report::Source;
 use super::texture::{self, ChannelName, MappedShare, Named, NamedTexture, NormalTexture};
@@ -64,9 +64,10 @@ pub(super) struct Glass {
     /// Index of refraction of the inside relative to the outside.
     #[serde(default = "window_glass")]
     ior: Ior,
-    /// Roughness: 0 is polished, 0.3 frosted, 1 as ground as glass gets. Rough glass has no `priority`.
-    #[serde(default = "polished")]
-    roughness: Share,
+    /// Roughness: 0 is polished, 0.3 frosted, 1 as ground as glass gets. Or an image file of it, relative to the scene file,
+    /// whose green counts as it stands; or a table of the file, the channel and how it lies on the surface. Absent: 0. Rough
+    /// glass has no `priority`.
+    roughness: Option<At<MappedShare>>,
     /// Share of light that each crossing of the surface lets through: twice of a body, once of a thin pane.
     #[serde(default = "Reflectance::white")]
     tint: Reflectance,
@@ -83,10 +84,6 @@ pub(super) struct Glass {
     thin: bool,
 }
 
-fn polished() -> Share {
-    Share(0.0)
-}
-
 fn window_glass() -> Ior {
     Ior(1.5)
 }
@@ -96,7 +93,7 @@ impl Material {
     pub fn images(&self) -> ImagesOf<(At<String>, ImageUse)> {
         let principled = self.principled.as_deref();
         let texture = principled.map_or(self.texture.as_ref(), |p| p.base_texture.as_ref());
-        let roughness = self.roughness.as_ref().map(|key| (key, ChannelName::Green));
+        let roughness = self.own_roughness().map(|key| (key, ChannelName::Green));
         let plain = [roughness, None, None, None, None, None];
         let shares = principled.map_or(plain, Principled::shares).map(|share| {
             let (file, channel) = share.and_then(|(key, usual)| key.data_file(usual))?;
@@ -128,17 +125,17 @@ impl Material {
         images: &ImagesOf<u32>,
     ) -> Result<scene::Material> {
         self.check(source)?;
+        let ImagesOf { texture, normals, alpha, emission, shares, .. } = images;
+        let own_roughness = self.own_roughness().map(|key| key.parts(shares[0]));
+        let (roughness, roughness_map) = own_roughness.unwrap_or_default();
         let glass = self.glass.as_ref().map(|g| scene::Glass {
-            roughness: g.roughness.0,
+            roughness,
             ior: g.ior.0,
             tint: g.tint.rgb(),
             absorption: g.absorption.as_ref().map_or_else(Default::default, |a| a.rgb()),
             priority: g.priority.as_ref().map(|p| p.u32() as u8),
             thin: g.thin,
         });
-        let ImagesOf { texture, normals, alpha, emission, shares, .. } = images;
-        let own_roughness = self.roughness.as_deref().map(|key| key.parts(shares[0]));
-        let (roughness_share, roughness_map) = own_roughness.unwrap_or_default();
         let built = scene::Material {
             name: name.to_owned(),
             diffuse: self.albedo().map_or_else(Default::default, |d| d.rgb()),
@@ -147,7 +144,7 @@ impl Material {
             vertex_colours: self.vertex_colours,
             alpha: texture::laid(&self.alpha, *alpha),
             mirror: self.mirror.as_ref().map_or_else(Default::default, |m| m.rgb()),
-            roughness: roughness_share,
+            roughness: if self.glass.is_some() { 0.0 } else { roughness },
             roughness_map,
             fresnel: None,
             glass,
@@ -163,6 +160,11 @@ impl Material {
             None => built,
             Some(principled) => principled.build(built, images),
         })
+    }
+
+    /// The roughness of its mirror or its glass, of which it has one at most.
+    fn own_roughness(&self) -> Option<&At<MappedShare>> {
+        self.glass.as_ref().map_or(self.roughness.as_ref(), |glass| glass.roughness.as_ref())
     }
 
     fn albedo(&self) -> Option<Reflectance> {
@@ -226,7 +228,8 @@ impl Material {
                 let message = format!("`{key}` is of a body, and a thin pane has no inside");
                 return Err(source.fault(span, message).into());
             }
-            if let Some(priority) = glass.priority.as_ref().filter(|_| glass.roughness.0 != 0.0) {
+            let is_rough = glass.roughness.as_deref().is_some_and(|key| key.factor() != 0.0);
+            if let Some(priority) = glass.priority.as_ref().filter(|_| is_rough) {
                 let message = "glass with a `priority` is polished: it has no `roughness`";
                 return Err(source.fault(&priority.span, message).into());
             }
@@ -250,7 +253,8 @@ impl Material {
         }
         if let (Some(roughness), None) = (&self.roughness, &self.mirror) {
             let message = "`roughness` is the mirror's: it needs `mirror`";
-            return Err(source.fault(&roughness.span, message).into());
+            let help = "glass has its own: `glass = { roughness = 0.3 }`";
+            return Err(source.fault(&roughness.span, message).help(help).into());
         }
         if let (Some(diffuse), Some(mirror)) = (self.albedo(), &self.mirror) {
             let sums = [0, 1, 2].map(|c| diffuse.0[c].0 + mirror.0[c].0);

@@ -118,11 +118,14 @@ impl Glossy {
 /// ray's cone included.
 pub(super) fn roughness(
     scene: &Scene,
-    material: &Material,
+    (material, factor): (&Material, f64),
     seen: (&SurfaceInteraction, DVec3, RayCone),
 ) -> f64 {
-    let Some(map) = &material.roughness_map else { return material.roughness };
-    at_least(material.roughness * texture::share(scene, Some(map), seen))
+    match &material.roughness_map {
+        // What is polished is another lobe, which no image turns into a rough one.
+        Some(map) if factor != 0.0 => at_least(factor * texture::share(scene, Some(map), seen)),
+        _ => factor,
+    }
 }
 
 impl Reflectance {

@@ -55,7 +55,7 @@ impl<'s> Layers<'s> {
     ) -> Self {
         let seen = (si, wo, cone);
         let base = diffuse::albedo(scene, material, si, wo, cone);
-        let roughness = glossy::roughness(scene, material, seen);
+        let roughness = glossy::roughness(scene, (material, material.roughness), seen);
         let share = |map: &Option<TextureMap>| texture::share(scene, map.as_ref(), seen);
         let metal = fresnel.metallic * share(&fresnel.metallic_map);
         let specular = share(&fresnel.specular_map) as f32;

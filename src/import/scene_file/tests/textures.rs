@@ -271,12 +271,18 @@ fn data(text: &str) -> Result<Loaded> {
 #[test]
 fn a_roughness_is_a_number_or_a_channel_of_an_image_as_it_stands() {
     let of = |roughness: &str| {
-        let loaded = data(&format!("mirror = 0.5\nroughness = {roughness}\n")).expect("a scene");
-        let material = &loaded.world.materials[0];
-        let map = material.roughness_map;
-        let texel =
-            map.map(|map| loaded.world.textures[map.image as usize].levels()[0].texel(0, 0).x);
-        (material.roughness, texel)
+        let mirror = format!("mirror = 0.5\nroughness = {roughness}\n");
+        let glass = format!("glass = {{ roughness = {roughness} }}\n");
+        let [mirror, glass] = [mirror, glass].map(|keys| {
+            let loaded = data(&keys).expect("a scene");
+            let material = &loaded.world.materials[0];
+            let map = material.roughness_map;
+            let texel =
+                map.map(|map| loaded.world.textures[map.image as usize].levels()[0].texel(0, 0).x);
+            (material.glass.map_or(material.roughness, |glass| glass.roughness), texel)
+        });
+        assert_eq!(mirror, glass);
+        mirror
     };
     assert_eq!(of("0.25"), (0.25, None));
     assert_eq!(of("1"), (1.0, None));
