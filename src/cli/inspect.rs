@@ -82,6 +82,8 @@ struct Lights {
 struct CameraView {
     eye: [f64; 3],
     looks_along: [f64; 3],
+    /// Vertical field of view, degrees.
+    vfov_degrees: f64,
     /// Focus distance of the lens; absent for a pinhole.
     #[serde(skip_serializing_if = "Option::is_none")]
     focus: Option<f64>,
@@ -193,7 +195,8 @@ impl CameraView {
     fn at(shot: &Shot, frame: u32, settings: &Settings) -> Result<Self> {
         let camera = shot.camera(frame, settings.width, settings.height)?;
         let (eye, looks_along) = (camera.eye.to_array(), camera.forward.to_array());
-        Ok(Self { eye, looks_along, focus: camera.lens.focus() })
+        let vfov_degrees = 2.0 * camera.half_up.length().atan().to_degrees();
+        Ok(Self { eye, looks_along, vfov_degrees, focus: camera.lens.focus() })
     }
 }
 
@@ -273,7 +276,10 @@ impl Inspection {
             let (eye, along) = (point(view.eye), point(view.looks_along));
             let focus =
                 view.focus.map_or(String::new(), |at| format!(", focused at {}", short(at)));
-            lines.push(format!("camera     {name}: at {eye}, looks along {along}{focus}"));
+            let vfov = short(view.vfov_degrees);
+            lines.push(format!(
+                "camera     {name}: at {eye}, looks along {along}, {vfov} degrees high{focus}"
+            ));
         }
         lines.push(format!("tracer     {}", self.tracer));
         let m = &self.memory;

@@ -88,8 +88,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
 
 /// Lights a scene that has a camera and nothing that shines, and says so.
 fn light_up(world: &mut World, path: &Path) -> Option<Diagnostic> {
-    let emission = |mesh: &WorldMesh| world.materials[mesh.material as usize].emission;
-    let glows = world.meshes.iter().any(|mesh| emission(mesh).max_element() > 0.0);
+    let glows = world.meshes.iter().any(|mesh| world.materials[mesh.material as usize].emits());
     if glows || !world.lights.is_empty() {
         return None;
     }

@@ -84,6 +84,28 @@ fn an_animated_node_stands_where_it_is_at_the_time() {
 }
 
 #[test]
+fn a_time_beyond_the_animations_or_without_any_is_said() {
+    let mut file = File::triangle();
+    let still = file.loaded_with(&LoadOptions { time: Some(2.0), ..LoadOptions::default() });
+    assert!(warns(&still.warnings, "2 s (--time) changes nothing"));
+    let times = file.floats("SCALAR", &[0.5, 3.]);
+    let moved = file.floats("VEC3", &[0., 0., 0., 0., 4., 0.]);
+    file.json["animations"] = json!([{
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": times, "output": moved}],
+    }]);
+    for (time, is_beyond) in [(0.0, false), (0.25, true), (0.5, false), (3.0, false), (4.0, true)] {
+        let found = at(&file, time).warnings;
+        assert!(!warns(&found, "changes nothing"));
+        assert_eq!(
+            warns(&found, "the file's animations last from 0.5 to 3 s"),
+            is_beyond,
+            "{time}"
+        );
+    }
+}
+
+#[test]
 fn a_scene_file_says_at_which_time_a_mesh_stands() {
     let mut file = File::triangle();
     let times = file.floats("SCALAR", &[0., 2.]);

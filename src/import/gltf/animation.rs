@@ -99,6 +99,12 @@ impl Animations {
         self.0.get(&property).map(Arc::as_ref)
     }
 
+    /// The time of the first and the last key of all curves, seconds; `None` without any.
+    pub fn span(&self) -> Option<[f64; 2]> {
+        let spans = self.0.values().map(|curve| curve.span());
+        spans.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
+    }
+
     /// Whether the place of a node is animated.
     pub fn moves(&self, node: usize) -> bool {
         let moving = [Property::Translation(node), Property::Rotation(node), Property::Scale(node)];

@@ -305,7 +305,18 @@ pub(super) fn note_moving(
     }
     if moving > 0 {
         let nodes = counted(moving, "node");
-        notes.add(&format!("the scene is static: meshes and lights of {nodes} are animated, and stay as they are at {time} s (--time)"), None);
+        let within = match animations.span() {
+            Some([first, last]) if !(first..=last).contains(&time) && time != 0.0 => {
+                format!("; the file's animations last from {first} to {last} s")
+            }
+            _ => String::new(),
+        };
+        notes.add(&format!("the scene is static: meshes and lights of {nodes} are animated, and stay as they are at {time} s (--time){within}"), None);
+    } else if time != 0.0 {
+        notes.add(
+            &format!("{time} s (--time) changes nothing: no mesh and no light is animated"),
+            None,
+        );
     }
     Ok(())
 }

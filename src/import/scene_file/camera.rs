@@ -34,8 +34,8 @@ use serde::Deserialize;
 ]}))]
 pub(super) struct Camera {
     /// Vertical field of view, degrees.
-    #[serde(default = "default_fov")]
-    fov: FieldOfView,
+    #[schemars(extend("default" = 40.0))]
+    fov: Option<FieldOfView>,
     /// Frames of the whole move. Absent: 1 for `still`, else 48.
     frames: Option<Int<1, 1_000_000>>,
     /// How the frames are spread along the path: evenly ("linear"), or with a slow start ("in"),
@@ -142,9 +142,8 @@ pub(super) struct BSpline {
     target: Point,
 }
 
-fn default_fov() -> FieldOfView {
-    FieldOfView(40.0)
-}
+/// Field of view of a camera that says none.
+const USUAL_FOV: FieldOfView = FieldOfView(40.0);
 
 fn linear() -> Easing {
     Easing::Linear
@@ -173,7 +172,7 @@ fn full_turn() -> Degrees {
 impl Default for Camera {
     fn default() -> Self {
         Self {
-            fov: default_fov(),
+            fov: None,
             frames: None,
             easing: linear(),
             up: y_up(),
@@ -188,5 +187,12 @@ impl Default for Camera {
             bspline: None,
             poses: None,
         }
+    }
+}
+
+impl Camera {
+    /// Vertical field of view.
+    fn vfov(&self) -> FieldOfView {
+        self.fov.unwrap_or(USUAL_FOV)
     }
 }

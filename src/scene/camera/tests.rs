@@ -126,9 +126,11 @@ proptest! {
         prop_assert!((direction.length() - 1.0).abs() < 1e-15);
         let p = eye + direction * distance;
         let (px, py, depth) = c.project(p).expect("in front");
-        // Rounding of p against the size of a pixel at its distance.
+        // Rounding of p against the size of a pixel at its distance, and against its depth, which is small at the edges of a wide picture.
         let pixel = 2.0 * c.half_up.length() / f64::from(h) * depth;
-        let bound = 1e-13 * (1.0 + (eye.length() + distance) / pixel) + 1e-12 * f64::from(w + h);
+        let reach = eye.length() + distance;
+        let edges = f64::from(w + h);
+        let bound = 1e-13 * (1.0 + reach / pixel) + edges * (1e-12 + 4e-15 * reach / depth);
         prop_assert!((px - x).abs() < bound && (py - y).abs() < bound, "{px} {py} for {x} {y}");
         prop_assert!((depth - distance * direction.dot(c.forward)).abs() < 1e-12 * (10.0 + distance));
     }

@@ -130,13 +130,13 @@ impl Camera {
             let lens = key.lens.as_ref();
             let span = lens.map_or(&key.span, |lens| &lens.span);
             let given = lens.map_or(own, |lens| lens.given().or(own));
-            self.lens_key((at, key.fov.unwrap_or(self.fov)), &given, source, span)
+            self.lens_key((at, key.fov.unwrap_or(self.vfov())), &given, source, span)
         };
         let keys = match path {
             CameraPath::Keys(poses) if self.keys.is_some() => {
                 keys.iter().zip(poses).map(|(key, pose)| at_key(key, pose.at)).collect()
             }
-            _ => self.lens_key((0.0, self.fov), &own, source, first).map(|key| vec![key]),
+            _ => self.lens_key((0.0, self.vfov()), &own, source, first).map(|key| vec![key]),
         }?;
         let own = self.lens.as_ref();
         let blades = own.and_then(|lens| lens.blades).map_or(0, Int::u32);

@@ -46,7 +46,7 @@ impl Camera {
             path,
             projections,
             easing: self.easing,
-            vfov_degrees: self.fov.0,
+            vfov_degrees: self.vfov().0,
             lens,
         };
         shot.validate().map_err(|error| match error {
@@ -95,7 +95,7 @@ impl Camera {
             return Ok(spline.path(&common));
         }
         let around = self.orbit.as_ref().map_or(&Orbit::WHOLE, |o| &o.value);
-        let lens = Lens { vfov_degrees: self.fov.0, aspect: aspect * self.pixel_aspect.0 };
+        let lens = Lens { vfov_degrees: self.vfov().0, aspect: aspect * self.pixel_aspect.0 };
         Ok(around.path(&common, world, &lens))
     }
 }
@@ -104,7 +104,7 @@ impl Camera {
     /// The projections along `path`; none where it is the centred one of square pixels throughout.
     fn projections(&self, path: &CameraPath) -> Vec<ProjectionKey> {
         let own = Projection {
-            vfov_degrees: self.fov.0,
+            vfov_degrees: self.vfov().0,
             shift: self.shift.0.map(|shift| shift.0),
             pixel_aspect: self.pixel_aspect.0,
         };
@@ -119,7 +119,7 @@ impl Camera {
             }
             _ => vec![ProjectionKey { at: 0.0, projection: own }],
         };
-        let centred = Projection::centred(self.fov.0);
+        let centred = Projection::centred(self.vfov().0);
         if keys.iter().all(|key| key.projection == centred) { Vec::new() } else { keys }
     }
 }

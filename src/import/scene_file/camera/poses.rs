@@ -83,13 +83,13 @@ impl Camera {
         Ok(path_of(&posed, poses.0.up))
     }
 
-    /// Refuses what `poses` makes useless, where it is not at its default.
+    /// Refuses what `poses` makes useless: `fov` and `frames` at all, the others where they are not at their defaults.
     fn refuse_idle_keys(&self, poses: &At<Poses>, source: &Source) -> Result<()> {
         let usual = Self::default();
         let lens = self.lens.as_ref();
         let idle = [
             ("frames", self.frames.is_some()),
-            ("fov", self.fov != usual.fov),
+            ("fov", self.fov.is_some()),
             ("up", self.up.unit() != usual.up.unit()),
             ("roll", self.roll.0 != 0.0),
             ("shift", self.shift != usual.shift),

@@ -249,6 +249,7 @@ fn keys_that_do_nothing_beside_poses_are_refused() {
     for (key, wanted) in [
         ("frames = 3", "`frames` has no effect"),
         ("fov = 30", "`fov` has no effect"),
+        ("fov = 40", "`fov` has no effect"),
         ("easing = 'in'", "`easing` has no effect"),
         ("shift = [1, 0]", "`shift` has no effect"),
         ("lens = { radius = 1 }", "a `radius` and a `focus`"),
