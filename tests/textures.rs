@@ -11,6 +11,7 @@ use common::{Job, job, pose, render};
 use tweenray::film::Film;
 use tweenray::import;
 use tweenray::math::{DVec3, Rgb, srgb_decode};
+use tweenray::output::exr::{self, ExrChannel, ExrSamples};
 use tweenray::scene::{Glass, IntersectorKind, Material, World, WorldSphere};
 
 const BOTH: [IntersectorKind; 2] = [IntersectorKind::Embree, IntersectorKind::Oracle];
@@ -194,5 +195,31 @@ fn images_of_all_formats_are_read() {
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         let refused = import::load_texture(&path).unwrap_err().to_string();
         assert!(refused.contains(name), "{refused}");
+    }
+}
+
+/// An OpenEXR file of one channel, whatever its name, is a grey image, as colour and as data; one that ends early is refused.
+#[test]
+fn an_exr_file_of_one_channel_is_grey() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grey.exr");
+    let samples = ExrSamples::F32(vec![0.25, 0.5, 0.75, 1.0, 0.0, 0.125]);
+    let bytes = exr::encode(3, 2, &[ExrChannel { name: "V".into(), samples }], "").unwrap();
+    std::fs::write(&path, &bytes).unwrap();
+    let texture = import::load_texture(&path).unwrap();
+    let level = &texture.levels()[0];
+    assert_eq!((level.width, level.height), (3, 2));
+    assert_eq!((level.texel(0, 0), level.texel(2, 1)), (Rgb::splat(0.25), Rgb::splat(0.125)));
+    let scene = "sky.radiance = 1\n[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n[material.m]\n\
+                 mirror = 0.5\nroughness = 'grey.exr'\n";
+    let file = folder.path().join("scene.toml");
+    std::fs::write(&file, scene).unwrap();
+    let world = import::load(&file, &import::LoadOptions::default()).unwrap().world;
+    let rough = world.textures[0].levels()[0].texel(1, 0).x;
+    assert!((rough - 0.5).abs() < 1e-5, "{rough}");
+    for end in [bytes.len() / 2, bytes.len() - 1, 12] {
+        std::fs::write(&path, &bytes[..end]).unwrap();
+        let refused = import::load_texture(&path).unwrap_err().to_string();
+        assert!(refused.contains("grey.exr"), "{refused}");
     }
 }

@@ -132,7 +132,7 @@ fn inspect(args: &InspectArgs) -> Result<Inspection> {
     let scene = world.into_scene(settings.rules.recentre)?;
     let intersector = intersect::build(&scene, &settings, cluster::default_threads())?;
     let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    let lossy = job::lossy_meshes(&scene, &args.scene.scene);
+    let lossy = job::mesh_warnings(&scene, &args.scene.scene);
     warnings.extend(lossy.iter().map(ToString::to_string));
     warnings.extend(findings(&scene, &settings, &shot, &*intersector)?);
     let meshes = own_meshes(&scene, stage);

@@ -44,8 +44,9 @@ fn refuse_folder(path: &Path) -> Result<()> {
     Err(Error::input(path, format!("is a folder, not a scene file\n  help: {help}")))
 }
 
-/// Warnings about meshes of the scene at `file`: those that lost triangles to rounding, and those whose light lights nothing.
-pub fn lossy_meshes(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
+/// Warnings about meshes of the scene at `file`: those that lost triangles to rounding, bodies of glass that are open, and those
+/// whose light lights nothing.
+pub fn mesh_warnings(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
     let warning = |c: &Collapsed| {
         let Collapsed { mesh, lost, of } = c;
         let message = format!(
@@ -71,7 +72,21 @@ pub fn lossy_meshes(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
         Diagnostic::new(file, message).help(help)
     };
     let collapsed = scene.collapsed.iter().map(warning);
-    collapsed.chain(scene.unlit.iter().map(unlit)).collect()
+    let others = collapsed.chain(scene.unlit.iter().map(unlit));
+    others.chain(open_glass(&scene.open_glass, file)).collect()
+}
+
+/// The warning about bodies of glass that are open, which have these `names`; `None` without any.
+fn open_glass(names: &[String], file: &Path) -> Option<Diagnostic> {
+    let (first, more) = names.split_first()?;
+    let message = match more.len() {
+        0 => format!("`{first}` is a body of glass, and its mesh is open"),
+        1 => format!("`{first}` and another mesh are bodies of glass and open"),
+        more => format!("`{first}` and {more} other meshes are bodies of glass and open"),
+    };
+    let message = message + ": light that enters does not find the way out";
+    let help = "close the mesh, or make it a pane: `thin = true`";
+    Some(Diagnostic::new(file, message).help(help))
 }
 
 /// Checks the scene file's output pattern; an error has the place in the file.

@@ -97,7 +97,7 @@ pub fn run(args: &VerifyArgs) -> Result<Exit> {
     let Loaded { world, shot, settings, warnings, .. } = job::load(&args.scene, &args.settings())?;
     let scene = world.into_scene(settings.rules.recentre)?;
     if !args.quiet {
-        let lossy = job::lossy_meshes(&scene, &args.scene.scene);
+        let lossy = job::mesh_warnings(&scene, &args.scene.scene);
         warnings.iter().chain(&lossy).for_each(say::warning);
     }
     refuse_the_pointless(&scene, &settings)?;

@@ -13,8 +13,10 @@ use std::sync::Arc;
 /// What an image serves as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum ImageUse {
-    /// Reflectances.
+    /// Reflectances, which are at most 1.
     Colour,
+    /// What a surface or the sky emits.
+    Light,
     /// A number from 0 to 1 in one channel.
     Data(ImageChannel),
     /// Normals in tangent space: red, green and blue.
@@ -33,6 +35,8 @@ struct Image {
     state: State,
     /// Whether it looks like a normal map; `None` of a mask, of data and of what is not to be had.
     looks_like_normals: Option<bool>,
+    /// Whether colours above 1 were cut.
+    is_cut: bool,
 }
 
 /// Where an image is.
@@ -114,7 +118,11 @@ impl Images {
 
     /// Why the image may be meant for another use, if it may.
     pub fn doubt(&mut self, path: &Path, what: ImageUse) -> Option<&'static str> {
+        let is_cut = self.image(path, what)?.is_cut;
         match (what, self.looks_like_normals(path, what)?) {
+            (ImageUse::Colour, false) if is_cut => Some(
+                "colours above 1 are cut to 1: no surface reflects more light than it receives",
+            ),
             (ImageUse::Normals, false) => Some(
                 "this does not look like a normal map: few of its texels are unit vectors in tangent space",
             ),
@@ -158,7 +166,8 @@ fn decode((path, uses): (PathBuf, BTreeSet<ImageUse>)) -> Vec<((PathBuf, ImageUs
             }
             _ => None,
         };
-        ((path.clone(), what), Image { state, looks_like_normals })
+        let is_cut = what == ImageUse::Colour && decoded.as_ref().is_ok_and(texture::is_above_one);
+        ((path.clone(), what), Image { state, looks_like_normals, is_cut })
     };
     uses.into_par_iter().map(of).collect()
 }
@@ -167,7 +176,8 @@ impl ImageUse {
     /// What the world holds of `image` in this use.
     fn texels(self, path: &Path, image: &DynamicImage) -> Result<Texels> {
         match self {
-            Self::Colour => texture::colours(path, image).map(Texels::Texture),
+            Self::Colour => texture::reflectances(path, image).map(Texels::Texture),
+            Self::Light => texture::colours(path, image).map(Texels::Texture),
             Self::Data(channel) => texture::data(path, image, channel).map(Texels::Texture),
             Self::Normals => texture::normals(path, image).map(Texels::Texture),
             Self::Mask => alpha::mask_of(path, image).map(Texels::Mask),

@@ -3,11 +3,14 @@
 //! Colours of integer formats are sRGB, those of floats (Radiance HDR, OpenEXR) are linear as they stand; their alpha is
 //! dropped. Data are one channel of an image, as it stands.
 
+mod grey_exr;
+
 use crate::error::{Diagnostic, Error, Result};
 use crate::math::{Rgb, srgb_decode};
 use crate::scene::Texture;
 use crate::stats::Fault;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -39,6 +42,21 @@ pub fn load_texture(path: &Path) -> Result<Texture> {
 ///
 /// Errors: a pixel that is no light.
 pub(super) fn colours(path: &Path, image: &DynamicImage) -> Result<Texture> {
+    colours_up_to(path, image, f32::INFINITY)
+}
+
+/// [`colours`] of which none is above 1, as no surface reflects more than it receives.
+pub(super) fn reflectances(path: &Path, image: &DynamicImage) -> Result<Texture> {
+    colours_up_to(path, image, 1.0)
+}
+
+/// Whether [`reflectances`] cuts a colour of the image.
+pub(super) fn is_above_one(image: &DynamicImage) -> bool {
+    let is_integer = image.as_flat_samples_u8().is_some() || image.as_flat_samples_u16().is_some();
+    !is_integer && floats(image).iter().flatten().any(|c| *c > 1.0)
+}
+
+fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<Texture> {
     let (name, size) = (path.display().to_string(), [image.width(), image.height()]);
     if let Some(codes) = image.as_flat_samples_u8() {
         return Ok(Texture::from_srgb(name, size, rgb(codes.samples, image).collect()));
@@ -52,6 +70,10 @@ pub(super) fn colours(path: &Path, image: &DynamicImage) -> Result<Texture> {
         }
         None => floats(image).into_iter().map(Rgb::from_array).collect(),
     };
+    // Not `min`, which would hide what is NaN.
+    let cut = |c: f32| if c > most { most } else { c };
+    let texels: Vec<Rgb> =
+        texels.into_iter().map(|c| Rgb::from_array(c.to_array().map(cut))).collect();
     let is_light = texels.iter().all(|c| Fault::of(c.to_array()).is_none());
     is_light.then(|| Texture::from_linear(name, size, texels)).ok_or_else(|| bad_pixel(path))
 }
@@ -118,17 +140,43 @@ pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     limits.max_image_height = Some(1 << 16);
     // Some decoders ask for memory before they look at the limits: the size comes first.
     pixels(path, bytes)?;
+    if let Some(grey) = grey_exr::decode(path, bytes)? {
+        return Ok(grey);
+    }
     let mut decoder = reader(path, bytes)?;
+    if decoder.format() == Some(ImageFormat::Jpeg) && !is_whole_jpeg(bytes) {
+        return Err(Error::input(path, "not a readable image: the file ends within the picture"));
+    }
     decoder.limits(limits);
     decoder.decode().map_err(|error| unreadable(path, &error))
+}
+
+/// Whether a JPEG file goes on to the marker that ends its picture; decoders show grey for what is missing.
+fn is_whole_jpeg(bytes: &[u8]) -> bool {
+    const END: u8 = 0xd9;
+    // Behind the marker of the start.
+    let mut at = 2;
+    loop {
+        let Some(rest) = bytes.get(at..) else { return false };
+        // Within the picture's data 0 follows on what is no marker, and restarts are markers without a segment.
+        let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7);
+        let Some(place) = rest.windows(2).position(is_marker) else { return false };
+        if rest[place + 1] == END {
+            return true;
+        }
+        let Some(length) = rest.get(place + 2..place + 4) else { return false };
+        at += place + 2 + usize::from(u16::from_be_bytes([length[0], length[1]]));
+    }
 }
 
 /// How many pixels the image has whose file holds `bytes`, by its header.
 ///
 /// Errors: what is no image, no pixels, or more than [`MAX_IMAGE_BYTES`].
 pub(super) fn pixels(path: &Path, bytes: &[u8]) -> Result<u64> {
-    let dimensions = reader(path, bytes)?.into_dimensions();
-    let (width, height) = dimensions.map_err(|error| unreadable(path, &error))?;
+    let (width, height) = match grey_exr::size(bytes) {
+        Some(size) => size,
+        None => reader(path, bytes)?.into_dimensions().map_err(|error| unreadable(path, &error))?,
+    };
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels * 3 > MAX_IMAGE_BYTES {
         return Err(Diagnostic::new(path, format!("an image of {width} x {height} pixels"))
@@ -138,7 +186,12 @@ pub(super) fn pixels(path: &Path, bytes: &[u8]) -> Result<u64> {
     Ok(pixels)
 }
 
-fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>> {
+fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<Cow<'a, [u8]>>>> {
+    // The older of two first lines of the same format, which some programs still write.
+    let bytes = match bytes.strip_prefix(b"#?RGBE\n") {
+        Some(rest) => Cow::Owned([b"#?RADIANCE\n", rest].concat()),
+        None => Cow::Borrowed(bytes),
+    };
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| Error::io("read", path, e))?;
@@ -242,6 +295,50 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn reflectances_of_floats_are_cut_at_one() {
+        let path = Path::new("t");
+        let image: DynamicImage =
+            image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, 1.0, 3.0])).into();
+        let texel = |texture: Texture| texture.levels()[0].texel(0, 0);
+        assert_eq!(texel(colours(path, &image).expect("light")), Rgb::new(0.5, 1.0, 3.0));
+        assert_eq!(texel(reflectances(path, &image).expect("colours")), Rgb::new(0.5, 1.0, 1.0));
+        assert!(is_above_one(&image));
+        let white: DynamicImage = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([1.0; 3])).into();
+        assert!(!is_above_one(&white) && !is_above_one(&white.to_rgb8().into()));
+        let unknown: DynamicImage =
+            image::Rgb32FImage::from_pixel(1, 1, image::Rgb([f32::NAN; 3])).into();
+        assert!(reflectances(path, &unknown).is_err());
+    }
+
+    #[test]
+    fn a_jpeg_that_ends_early_is_refused() {
+        let path = Path::new("t.jpg");
+        let noise = |x: u32, y: u32| image::Rgb([(x * 37 + y * 91) as u8, (x * y) as u8, y as u8]);
+        let image = image::RgbImage::from_fn(64, 48, noise);
+        let mut bytes = Vec::new();
+        image.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Jpeg).expect("written");
+        assert!(decode_bytes(path, &bytes).is_ok());
+        // What some cameras write behind the picture does not matter.
+        let longer = [&bytes[..], &[0xff, 0xda, 0, 1, 2]].concat();
+        assert!(decode_bytes(path, &longer).is_ok());
+        for end in [bytes.len() - 1, bytes.len() - 2, bytes.len() * 2 / 3, 200, 3, 2] {
+            assert!(decode_bytes(path, &bytes[..end]).is_err(), "{end} bytes");
+        }
+    }
+
+    #[test]
+    fn radiance_files_have_either_of_two_first_lines() {
+        let path = Path::new("t.hdr");
+        let picture = b"FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x40\x20\x81";
+        let pixel = |first: &[u8]| {
+            let image = decode_bytes(path, &[first, picture].concat()).expect("an image");
+            image.to_rgb32f().get_pixel(0, 0).0
+        };
+        assert_eq!(pixel(b"#?RGBE\n"), pixel(b"#?RADIANCE\n"));
+        assert_eq!(pixel(b"#?RGBE\n"), [1.0, 0.5, 0.25]);
     }
 
     #[test]

@@ -95,6 +95,9 @@ impl Untextured {
 
     /// The help line.
     pub fn help(&self) -> String {
+        if self.has_others && !matches!(self.lacks, Lacking::Colours) {
+            return "say by `uv_set` which of its sets the image lies by: 0 is the first".into();
+        }
         let help = match &self.lacks {
             Lacking::Texture(_) => {
                 "write the mesh with texture coordinates (`vt` in obj, `s` and `t` in ply), or give it a \

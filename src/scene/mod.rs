@@ -146,6 +146,8 @@ pub struct Scene {
     pub bounds: Bounds3,
     /// Meshes that lost triangles to rounding. Tracing does not use it; it is reported.
     pub collapsed: Vec<Collapsed>,
+    /// Names of meshes that bound bodies of glass and are open. Reported, as `collapsed` is.
+    pub open_glass: Vec<String>,
     /// Meshes that emit light which lights nothing. Reported, as `collapsed` is.
     pub unlit: Vec<Unlit>,
     /// Which lights matter where; `None` of a scene with few lights, all of which are looked at everywhere.

@@ -66,9 +66,11 @@ impl World {
         let traced_regions = self.traced_regions.iter().map(to_scene_box).collect();
 
         let mut meshes = Vec::with_capacity(self.meshes.len());
-        let mut collapsed = Vec::new();
+        let (mut collapsed, mut open_glass) = (Vec::new(), Vec::new());
         for mesh in std::mem::take(&mut self.meshes) {
-            let (mesh, lost) = to_scene_mesh(mesh, &self.materials, &recentring);
+            let (mesh, Reported { lost, is_open_glass }) =
+                to_scene_mesh(mesh, &self.materials, &recentring);
+            open_glass.extend(is_open_glass.then(|| mesh.name.clone()));
             let lost = Collapsed { mesh: mesh.name.clone(), lost, of: mesh.triangles.len() };
             if recentre {
                 too_small::refuse_collapsed(&lost)?;
@@ -119,6 +121,7 @@ impl World {
             traced_regions,
             bounds: scene_bounds,
             collapsed,
+            open_glass,
             unlit,
             light_cells: None,
         };
@@ -137,8 +140,16 @@ fn to_scene_sphere(s: WorldSphere, r: &Recentring) -> Sphere {
     }
 }
 
-/// The mesh in scene space, and how many of its triangles rounding took.
-fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Mesh, usize) {
+/// What of a mesh in scene space is reported.
+struct Reported {
+    /// How many of its triangles rounding took.
+    lost: usize,
+    /// Whether it bounds a body of glass and is open, so that light that enters it never leaves.
+    is_open_glass: bool,
+}
+
+/// The mesh in scene space.
+fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Mesh, Reported) {
     let WorldMesh {
         name,
         positions,
@@ -158,6 +169,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
         *uvs = uvs.take().filter(|_| is_used);
     }
     let mut all_uvs: Vec<_> = uvs.iter_mut().chain(more_uvs.iter_mut().flatten()).collect();
+    let mut is_open_glass = false;
     // A thin pane has no inside.
     if made_of.glass.as_ref().is_some_and(|glass| !glass.thin) {
         // Glass tells inside from outside by the winding; a file with reversed faces, some or all,
@@ -169,6 +181,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
             strays.for_each(|(i, _)| reverse_one(i, &mut triangles, &mut normals, &mut all_uvs));
             volume = winding::closed_volume(&positions, &triangles);
         }
+        is_open_glass = volume.is_none() && !triangles.is_empty();
         if volume.is_some_and(|volume| volume < 0.0) {
             reverse(&mut triangles, &mut normals, &mut all_uvs);
         }
@@ -177,7 +190,7 @@ fn to_scene_mesh(mesh: WorldMesh, materials: &[Material], r: &Recentring) -> (Me
     let lost = too_small::count_collapsed(&positions, &rounded, &triangles);
     let surface = Surface { material, light: None, always_traced };
     let mesh = scene_mesh(name, rounded, triangles, surface);
-    (Mesh { normals, uvs, more_uvs, colours, ..mesh }, lost)
+    (Mesh { normals, uvs, more_uvs, colours, ..mesh }, Reported { lost, is_open_glass })
 }
 
 fn scene_mesh(

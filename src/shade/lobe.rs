@@ -102,7 +102,7 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
                     let roughness = glossy::roughness(scene, (material, factor), seen);
                     let reflectance = Reflectance::constant(material.mirror);
                     let reflectance = reflectance.given_back(roughness, wo.dot(n));
-                    Lobe::Glossy(Glossy::new(reflectance, roughness, n))
+                    Lobe::Glossy(Glossy::new(reflectance, roughness, (n, wo.dot(n))))
                 }
             },
             0,
@@ -159,7 +159,7 @@ fn rough_glass(glass: &Glass, si: &SurfaceInteraction, wo: DVec3) -> [Lobe; 2] {
     let boundary = Boundary::new(glass, si.is_outside(wo));
     let back = part_glass::rough_share(glass, boundary, wo.dot(n));
     let through = RoughGlass::new(boundary, glass.tint * back as f32, glass.roughness, n);
-    let reflected = Glossy::of_glass(boundary, back, glass.roughness, n);
+    let reflected = Glossy::of_glass(boundary, back, glass.roughness, (n, wo.dot(n)));
     [Lobe::Glossy(reflected), Lobe::RoughGlass(through)]
 }
 
@@ -167,7 +167,7 @@ fn rough_glass(glass: &Glass, si: &SurfaceInteraction, wo: DVec3) -> [Lobe; 2] {
 fn reflecting(reflectance: Reflectance, roughness: f64, n: DVec3, wo: DVec3) -> Lobe {
     match roughness {
         0.0 => Lobe::Mirror(Mirror::new(reflectance.at(wo.dot(n)))),
-        _ => Lobe::Glossy(Glossy::new(reflectance, roughness, n)),
+        _ => Lobe::Glossy(Glossy::new(reflectance, roughness, (n, wo.dot(n)))),
     }
 }
 

@@ -183,6 +183,22 @@ fn map_pr_is_one_channel_as_it_stands() {
 }
 
 #[test]
+fn glass_has_the_roughness_of_pr_or_map_pr() {
+    let mtl = "newmtl a\nillum 7\nNi 1.5\nPr 0.25\nnewmtl b\nillum 7\nNi 1.5\nPr 0.25\nmap_Pr rough.ppm\n\
+               newmtl c\nillum 7\nNi 1.5\n";
+    let obj = ["a", "b", "c"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
+    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
+    let others = [("bad.mtl", mtl.as_bytes()), ("rough.ppm", image)];
+    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let rough = world.materials.iter().map(|material| {
+        let glass = material.glass.expect("glass");
+        (glass.roughness, material.roughness_map.is_some())
+    });
+    assert_eq!(rough.collect::<Vec<_>>(), [(0.25, false), (1.0, true), (0.0, false)]);
+}
+
+#[test]
 fn what_has_metal_a_coat_or_a_roughness_alone_is_principled() {
     let mtl = "newmtl metal\nillum 3\nKs 1 1 1\nKd .9 .8 .3\nPm 1\nPr .2\nNi 1\n\
                newmtl coated\nKd .5 .5 .5\nPc .5\nPcr .1\nNi 2\n\

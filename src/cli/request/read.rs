@@ -44,7 +44,7 @@ impl Request {
         };
         let path = &scene.scene;
         let scene = world.into_scene(settings.rules.recentre)?;
-        warnings.extend(job::lossy_meshes(&scene, path));
+        warnings.extend(job::mesh_warnings(&scene, path));
         Ok(Self {
             scene,
             shot,

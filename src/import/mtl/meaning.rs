@@ -9,7 +9,7 @@
 //! | `Ke`, `map_Ke` | emission, both sides, and its image |
 //! | `illum` 3 or 5 with `Ks` and without `Pm` or `Pc` | mirror of reflectance `Ks` beside the diffuse part; perfect, or of the roughness `Pr` or `map_Pr` |
 //! | `Pm`, `map_Pm`, `Pc`; `Pr`, `map_Pr` of what is no mirror | principled: metallic, clear coat (`Pcr` its roughness), roughness (else 0.5), the index of refraction `Ni` (else 1.5) |
-//! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | clear glass: `Ni` (else 1.5), `Tf` |
+//! | `illum` 6 or 7; 4 or 9 unless `d` is 1 or `map_d` alone; `d` < 1 with `Ni` | glass: `Ni` (else 1.5), `Tf`, `Pr` or `map_Pr` (else polished) |
 //! | `Ks` otherwise, `Ns`, `Ka` | nothing: no glossy highlights |
 
 use super::front::Source;
@@ -37,7 +37,8 @@ pub(super) fn of(source: &Source, mtl: &tobj::Material) -> (Material, Vec<String
             notes.push(format!("glass without `Ni`: the index of refraction is {DEFAULT_IOR}"));
             DEFAULT_IOR
         });
-        out.glass = Some(Glass { tint, ..Glass::clear(ior) });
+        let roughness = source.roughness.unwrap_or(0.0);
+        out.glass = Some(Glass { tint, roughness, ..Glass::clear(ior) });
         if let Some(bump) = &source.normal_map {
             let line = bump.line;
             notes.push(format!("glass has no normal map: that of line {line} is ignored"));

@@ -43,7 +43,7 @@ struct Taken<'s> {
 }
 
 impl Entry {
-    /// The images that count in `material`, as [`meaning::of`] has it: only mirrors and layers are rough, only layers are metal, glass has no normal map and no
+    /// The images that count in `material`, as [`meaning::of`] has it: only mirrors, layers and glass are rough, only layers are metal, glass has no normal map and no
     /// cut-outs.
     fn taken(&self, material: &Material) -> Taken<'_> {
         let front::Source { texture, roughness_map, metallic_map, normal_map, .. } = &self.source;
@@ -51,7 +51,7 @@ impl Entry {
         let is_glass = material.glass.is_some();
         Taken {
             texture: texture.as_ref(),
-            roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO),
+            roughness: roughness_map.as_ref().filter(|_| material.mirror != Rgb::ZERO || is_glass),
             metallic: metallic_map.as_ref().filter(|_| material.fresnel.is_some()),
             emission: emission_map.as_ref(),
             normals: normal_map.as_ref().filter(|_| !is_glass),
@@ -67,7 +67,7 @@ impl Entry {
             texture.map(|image| (image, ImageUse::Colour)),
             roughness.map(|image| (image, data(image))),
             metallic.map(|image| (image, data(image))),
-            emission.map(|image| (image, ImageUse::Colour)),
+            emission.map(|image| (image, ImageUse::Light)),
             normals.map(|bump| (&bump.image, ImageUse::Normals)),
             mask.map(|image| (image, ImageUse::Mask)),
         ];
@@ -224,7 +224,10 @@ impl Libraries {
             let what = (data(image), "roughness map");
             if let Some(map) = entry.lay_or_warn(image, what, images, model) {
                 material.roughness_map = Some(map);
-                material.roughness = 1.0;
+                match &mut material.glass {
+                    Some(glass) => glass.roughness = 1.0,
+                    None => material.roughness = 1.0,
+                }
             }
         }
         if let (Some(image), Some(fresnel)) = (metallic, &mut material.fresnel) {
@@ -235,7 +238,7 @@ impl Libraries {
             }
         }
         if let Some(image) = emission {
-            let what = (ImageUse::Colour, "emission map");
+            let what = (ImageUse::Light, "emission map");
             material.emission_map = entry.lay_or_warn(image, what, images, model);
             if material.emission_map.is_none() {
                 material.emission = meaning::emission(&entry.parsed).unwrap_or(Rgb::ZERO);

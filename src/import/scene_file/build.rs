@@ -131,7 +131,7 @@ impl<'a> Builder<'a> {
         let shown = sky.shown(self.source, &sky.span)?;
         let kind = match &shown {
             Shown::Radiance => return Ok(()),
-            Shown::Image(file) => EnvironmentKind::Image(self.image(file, ImageUse::Colour)?),
+            Shown::Image(file) => EnvironmentKind::Image(self.image(file, ImageUse::Light)?),
             Shown::Gradient(gradient) => gradient.build(self.source)?,
             Shown::SunSky(day) => day.build(self.source)?,
         };

@@ -112,7 +112,7 @@ impl Material {
             normals: normals(self.normal_map.as_ref()),
             coat_normals: normals(principled.and_then(|p| p.clearcoat_normal_map.as_ref())),
             alpha: of(self.alpha.as_ref(), ImageUse::Mask),
-            emission: of(self.emission_texture.as_ref(), ImageUse::Colour),
+            emission: of(self.emission_texture.as_ref(), ImageUse::Light),
             shares,
         }
     }
@@ -265,7 +265,13 @@ impl Material {
                     sums[channel],
                     ["red", "green", "blue"][channel]
                 );
-                return Err(source.fault(&mirror.span, message).into());
+                let fault = source.fault(&mirror.span, message);
+                return Err(match self.diffuse {
+                    Some(_) => fault.into(),
+                    None => fault
+                        .help("beside a texture or vertex colours `diffuse` is 1 unless it is given: it multiplies them")
+                        .into(),
+                });
             }
         }
         Ok(())

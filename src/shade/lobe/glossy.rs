@@ -7,7 +7,7 @@ use super::reflectance::{Reflectance, schlick};
 use super::share_table::{self, ShareTable};
 use crate::intersect::SurfaceInteraction;
 use crate::math::{DVec3, Rgb, orthonormal_basis};
-use crate::sampling::to_world;
+use crate::sampling::{mix, to_world};
 use crate::scene::{Material, Scene};
 use crate::shade::cone::RayCone;
 use crate::shade::{optics, texture};
@@ -26,6 +26,25 @@ pub(in crate::shade) struct Glossy {
     alpha: f64,
     /// Unit normal on the viewer's side.
     n: DVec3,
+    /// The share of light that microfacets which reflect all send towards the viewer, light that meets a second one dropped.
+    passed: f64,
+}
+
+/// Microfacets that are tried for one direction: of a million directions less than one takes more.
+const MOST_TRIES: u32 = 32;
+
+/// Random numbers in the unit interval after a pair of them, a function of that pair.
+struct Further(u64);
+
+impl Further {
+    fn of([u, v]: [f64; 2]) -> Self {
+        Self(u.to_bits() ^ mix(v.to_bits()))
+    }
+
+    fn next(&mut self) -> f64 {
+        self.0 = mix(self.0);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
 }
 
 /// What a microfacet reflects by angle.
@@ -39,29 +58,36 @@ enum FacetReflectance {
 }
 
 impl Glossy {
-    /// What a boundary of glass of this roughness reflects, times `factor`, at the unit normal `n` on the viewer's side.
-    pub(super) fn of_glass(boundary: Boundary, factor: f64, roughness: f64, n: DVec3) -> Self {
-        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, n);
+    /// What a boundary of glass of this roughness reflects, times `factor`; `seen` as in [`new`](Self::new).
+    pub(super) fn of_glass(
+        boundary: Boundary,
+        factor: f64,
+        roughness: f64,
+        seen: (DVec3, f64),
+    ) -> Self {
+        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, seen);
         Self { reflectance: FacetReflectance::Glass(boundary, factor), ..mirror }
     }
 
-    /// What a mirror of this `reflectance` and a boundary of glass, times a factor, reflect together, both of this roughness.
+    /// What a mirror of this `reflectance` and a boundary of glass, times a factor, reflect together, both of this roughness;
+    /// `seen` as in [`new`](Self::new).
     pub(super) fn beside_glass(
         reflectance: Reflectance,
         (boundary, factor): (Boundary, f64),
         roughness: f64,
-        n: DVec3,
+        seen: (DVec3, f64),
     ) -> Self {
-        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, n);
+        let mirror = Self::new(Reflectance::constant(Rgb::ZERO), roughness, seen);
         Self { reflectance: FacetReflectance::Both(reflectance, boundary, factor), ..mirror }
     }
 
     /// The lobe of microfacets of this `reflectance`, which includes what single reflection loses, at a surface of this
-    /// `roughness` with the unit normal `n` on the viewer's side.
-    pub fn new(reflectance: Reflectance, roughness: f64, n: DVec3) -> Self {
+    /// `roughness` with the unit normal `n` on the viewer's side, seen at the cosine `cos` to it.
+    pub fn new(reflectance: Reflectance, roughness: f64, (n, cos): (DVec3, f64)) -> Self {
         let roughness = at_least(roughness);
         let reflectance = FacetReflectance::Mirror(reflectance);
-        Self { reflectance, alpha: roughness * roughness, n }
+        let [passed, _] = reflected_shares(roughness, cos);
+        Self { reflectance, alpha: roughness * roughness, n, passed }
     }
 
     /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving), per steradian.
@@ -88,21 +114,33 @@ impl Glossy {
 
     /// The density of [`sample`](Self::sample) at `wi`, per steradian.
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
-        let Some([cos_o, _, cos_m]) = self.cosines(wo, wi) else { return 0.0 };
-        density(self.alpha, cos_m) * unmasked(self.alpha, cos_o) / (4.0 * cos_o)
+        let Some([cos_o, cos_i, cos_m]) = self.cosines(wo, wi) else { return 0.0 };
+        let g2 = shadowed(self.alpha, cos_o, cos_i) * unmasked(self.alpha, cos_o);
+        density(self.alpha, cos_m) * g2 / (4.0 * cos_o * self.passed)
     }
 
     /// A direction for `u` in the unit square, by the microfacets that are seen along `wo` (Dupuy and Benyoub,
-    /// 2023); `None` where light would come from below the surface.
+    /// 2023) and whose light others do not hide: one that is hidden counts for another. So all directions have the same
+    /// weight, and those of a path that is reflected again and again never multiply to more than what the surfaces reflect.
     pub fn sample(&self, wo: DVec3, u: [f64; 2]) -> Option<Scattered> {
         let (s, t) = orthonormal_basis(self.n);
         let local = DVec3::new(wo.dot(s), wo.dot(t), wo.dot(self.n));
-        let m = visible_normal(self.alpha, local, u);
-        let wi = optics::reflect(wo, to_world(m, (s, t), self.n)).normalize();
-        let [cos_o, cos_i, _] = self.cosines(wo, wi)?;
-        let share = shadowed(self.alpha, cos_o, cos_i) as f32;
-        let pdf = self.pdf(wo, wi);
-        Some(Scattered { wi, share, tint: self.tint(wo, wi), transmitted: None, pdf })
+        let mut further = Further::of(u);
+        let mut u = u;
+        for _ in 0..MOST_TRIES {
+            let m = visible_normal(self.alpha, local, u);
+            let wi = optics::reflect(wo, to_world(m, (s, t), self.n)).normalize();
+            let leaves = |[cos_o, cos_i, _]: [f64; 3]| shadowed(self.alpha, cos_o, cos_i);
+            let hidden = further.next();
+            // NaN goes on, to be counted at its pixel.
+            if self.cosines(wo, wi).map(leaves).is_none_or(|share| hidden > share) {
+                u = [further.next(), further.next()];
+                continue;
+            }
+            let (share, pdf) = (self.passed as f32, self.pdf(wo, wi));
+            return Some(Scattered { wi, share, tint: self.tint(wo, wi), transmitted: None, pdf });
+        }
+        None
     }
 
     /// Cosines between the normal and `wo`, `wi` and the microfacet between them; `None` where one of the
@@ -181,8 +219,8 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    fn lobe(roughness: f64) -> Glossy {
-        Glossy::new(Reflectance::constant(Rgb::ONE), roughness, DVec3::Z)
+    fn lobe(roughness: f64, wo: DVec3) -> Glossy {
+        Glossy::new(Reflectance::constant(Rgb::ONE), roughness, (DVec3::Z, wo.z))
     }
 
     #[test]
@@ -214,10 +252,12 @@ mod tests {
     /// What a lobe of white microfacets and one of Schlick's reflect, by samples.
     fn integral(roughness: f64, wo: DVec3, n: usize) -> [f64; 2] {
         let at = |i: usize| (i as f64 + 0.5) / n as f64;
-        let samples = (0..n * n).filter_map(|i| lobe(roughness).sample(wo, [at(i / n), at(i % n)]));
-        let sums = samples.fold([0.0; 2], |[all, grown], sample| {
-            let share = f64::from(sample.share);
-            [all + share, grown + share * schlick(0.5 * (wo + sample.wi).length())]
+        let alpha = roughness * roughness;
+        let facets = (0..n * n).map(|i| visible_normal(alpha, wo, [at(i / n), at(i % n)]));
+        let sums = facets.fold([0.0; 2], |[all, grown], m| {
+            let cos_i = optics::reflect(wo, m).z;
+            let share = if cos_i > 0.0 { shadowed(alpha, wo.z, cos_i) } else { 0.0 };
+            [all + share, grown + share * schlick(wo.dot(m))]
         });
         sums.map(|sum| sum / (n * n) as f64)
     }
@@ -227,7 +267,8 @@ mod tests {
         // A sharper peak would take a finer grid.
         for roughness in [0.3, 0.6, 1.0] {
             for cos in [0.05, 0.4, 0.9] {
-                let (lobe, wo) = (lobe(roughness), direction(cos, 0.7));
+                let wo = direction(cos, 0.7);
+                let lobe = lobe(roughness, wo);
                 // The density over the upper half, by a fine grid, and the share of samples that fall there.
                 let n = 2000;
                 let (mut density, mut light) = (0.0, 0.0);
@@ -246,7 +287,8 @@ mod tests {
                 let all = (m * m) as f64;
                 let above = samples.len() as f64 / all;
                 let share = samples.iter().map(|s| f64::from(s.share)).sum::<f64>() / all;
-                assert!((density - above).abs() < 0.01, "{roughness} {cos}: {density} {above}");
+                assert_eq!(above, 1.0);
+                assert!((density - 1.0).abs() < 0.01, "{roughness} {cos}: {density}");
                 assert!((light - share).abs() < 0.01, "{roughness} {cos}: {light} {share}");
                 for s in samples.iter().step_by(97) {
                     let f = f64::from(lobe.f(wo, s.wi).x) * s.wi.z / s.pdf;

@@ -32,14 +32,14 @@ impl PartGlass {
         if self.glass.is_rough() {
             let back = rough_share(&self.glass, boundary, cos);
             let share = f64::from(self.share) * back;
-            let reflected = Glossy::beside_glass(mirror, (boundary, share), roughness, n);
+            let reflected = Glossy::beside_glass(mirror, (boundary, share), roughness, (n, cos));
             let through = RoughGlass::new(boundary, self.glass.tint * share as f32, roughness, n);
             return [Some(Lobe::Glossy(reflected)), Some(Lobe::RoughGlass(through))];
         }
         // Glass that bends no light is smooth, whatever the mirror is.
         let (rough, smooth) = match roughness {
             0.0 => (None, mirror.at(cos)),
-            _ => (Some(Lobe::Glossy(Glossy::new(mirror, roughness, n))), Rgb::ZERO),
+            _ => (Some(Lobe::Glossy(Glossy::new(mirror, roughness, (n, cos)))), Rgb::ZERO),
         };
         let Self { glass: Glass { tint, .. }, share } = *self;
         let part = SmoothPart { boundary, mirror: smooth, share, tint };

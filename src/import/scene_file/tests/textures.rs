@@ -299,6 +299,26 @@ fn a_roughness_is_a_number_or_a_channel_of_an_image_as_it_stands() {
 }
 
 #[test]
+fn colours_above_one_are_cut_where_they_are_reflected_and_not_where_they_are_emitted() {
+    let load = |keys: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        let bright = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([3.0_f32, 0.5, 0.5]));
+        bright.save(at("bright.exr")).expect("written");
+        let text = format!(
+            "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n[material.m]\n{keys}\n"
+        );
+        std::fs::write(at("scene.toml"), format!("sky.radiance = 1\n{text}")).expect("written");
+        let loaded = load(&at("scene.toml"), &LoadOptions::default()).expect("a scene");
+        let told = loaded.warnings.iter().any(|w| w.message.contains("colours above 1 are cut"));
+        (loaded.world.textures[0].levels()[0].texel(0, 0).x, told)
+    };
+    assert_eq!(load("texture = 'bright.exr'"), (1.0, true));
+    assert_eq!(load("principled = { base_texture = 'bright.exr' }"), (1.0, true));
+    assert_eq!(load("emission_texture = 'bright.exr'"), (3.0, false));
+}
+
+#[test]
 fn principled_parameters_are_numbers_or_images() {
     let of = |keys: &str| {
         let loaded = data(&format!("principled = {{ {keys} }}\n")).expect("a scene");
