@@ -308,4 +308,23 @@ mod tests {
         // No image lies by set 1.
         assert_eq!([first(0), first(1), first(2)], [Some([0, 2, 1]), None, Some([12, 14, 13])]);
     }
+
+    #[test]
+    fn bodies_of_glass_that_are_open_are_reported() {
+        let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let closed = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let mut world = World::default();
+        for thin in [false, true] {
+            let glass = Some(Glass { thin, ..Glass::clear(1.5) });
+            world.add_material(Material { glass, ..Material::black("glass") });
+        }
+        world.add_material(Material::diffuse("paint", crate::math::Rgb::ONE));
+        for (name, faces, material) in
+            [("whole", 4, 0), ("open", 3, 0), ("pane", 3, 1), ("painted", 3, 2)]
+        {
+            let faces = closed[..faces].to_vec();
+            world.meshes.push(WorldMesh::new(name, p.to_vec(), faces, material));
+        }
+        assert_eq!(world.into_scene(true).expect("a scene").open_glass, ["open"]);
+    }
 }
