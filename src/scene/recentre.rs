@@ -312,7 +312,7 @@ mod tests {
     #[test]
     fn bodies_of_glass_that_are_open_are_reported() {
         let p = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let closed = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let closed = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let mut world = World::default();
         for thin in [false, true] {
             let glass = Some(Glass { thin, ..Glass::clear(1.5) });
