@@ -80,12 +80,14 @@ pub fn mesh_warnings(scene: &Scene, file: &Path) -> Vec<Diagnostic> {
 fn open_glass(names: &[String], file: &Path) -> Option<Diagnostic> {
     let (first, more) = names.split_first()?;
     let message = match more.len() {
-        0 => format!("`{first}` is a body of glass, and its mesh is open"),
-        1 => format!("`{first}` and another mesh are bodies of glass and open"),
-        more => format!("`{first}` and {more} other meshes are bodies of glass and open"),
+        0 => format!("`{first}` is a body of glass, and its mesh alone does not close it"),
+        1 => format!("`{first}` and another mesh are bodies of glass, and alone do not close them"),
+        more => format!(
+            "`{first}` and {more} other meshes are bodies of glass, and alone do not close them"
+        ),
     };
-    let message = message + ": light that enters does not find the way out";
-    let help = "close the mesh, or make it a pane: `thin = true`";
+    let message = message + ": light that enters leaves only where another mesh closes it";
+    let help = "close it, or make it a pane: `thin = true`";
     Some(Diagnostic::new(file, message).help(help))
 }
 

@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub(super) enum ImageUse {
     /// Reflectances, which are at most 1.
     Colour,
-    /// What a surface or the sky emits.
+    /// Colours of any size: what a surface or the sky emits, and factors.
     Light,
     /// A number from 0 to 1 in one channel.
     Data(ImageChannel),

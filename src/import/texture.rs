@@ -16,6 +16,8 @@ use std::path::Path;
 
 /// The largest image that is decoded, bytes of its own pixel format.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
+/// Its longest edge, pixels.
+const MAX_IMAGE_EDGE: u32 = 1 << 16;
 
 /// A channel of an image. In a grey image red, green and blue are the grey.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -70,12 +72,11 @@ fn colours_up_to(path: &Path, image: &DynamicImage, most: f32) -> Result<Texture
         }
         None => floats(image).into_iter().map(Rgb::from_array).collect(),
     };
-    // Not `min`, which would hide what is NaN.
-    let cut = |c: f32| if c > most { most } else { c };
-    let texels: Vec<Rgb> =
-        texels.into_iter().map(|c| Rgb::from_array(c.to_array().map(cut))).collect();
-    let is_light = texels.iter().all(|c| Fault::of(c.to_array()).is_none());
-    is_light.then(|| Texture::from_linear(name, size, texels)).ok_or_else(|| bad_pixel(path))
+    if !texels.iter().all(|c| Fault::of(c.to_array()).is_none()) {
+        return Err(bad_pixel(path));
+    }
+    let texels = texels.into_iter().map(|c| c.min(Rgb::splat(most))).collect();
+    Ok(Texture::from_linear(name, size, texels))
 }
 
 /// The normals of a decoded image: red, green and blue as they stand.
@@ -136,8 +137,8 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
 pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_IMAGE_BYTES);
-    limits.max_image_width = Some(1 << 16);
-    limits.max_image_height = Some(1 << 16);
+    limits.max_image_width = Some(MAX_IMAGE_EDGE);
+    limits.max_image_height = Some(MAX_IMAGE_EDGE);
     // Some decoders ask for memory before they look at the limits: the size comes first.
     pixels(path, bytes)?;
     if let Some(grey) = grey_exr::decode(path, bytes)? {
@@ -145,7 +146,7 @@ pub(super) fn decode_bytes(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     }
     let mut decoder = reader(path, bytes)?;
     if decoder.format() == Some(ImageFormat::Jpeg) && !is_whole_jpeg(bytes) {
-        return Err(Error::input(path, "not a readable image: the file ends within the picture"));
+        return Err(Error::input(path, "the picture has no end marker: the file was cut short"));
     }
     decoder.limits(limits);
     decoder.decode().map_err(|error| unreadable(path, &error))
@@ -158,8 +159,9 @@ fn is_whole_jpeg(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {
         let Some(rest) = bytes.get(at..) else { return false };
-        // Within the picture's data 0 follows on what is no marker, and restarts are markers without a segment.
-        let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7);
+        // Within the picture's data 0 follows on what is no marker; 1 and the restarts are markers without a segment.
+        let is_marker =
+            |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 1 | 0xff | 0xd0..=0xd7);
         let Some(place) = rest.windows(2).position(is_marker) else { return false };
         if rest[place + 1] == END {
             return true;
@@ -179,11 +181,16 @@ pub(super) fn pixels(path: &Path, bytes: &[u8]) -> Result<u64> {
     };
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels * 3 > MAX_IMAGE_BYTES {
-        return Err(Diagnostic::new(path, format!("an image of {width} x {height} pixels"))
-            .help(format!("at most {} bytes can be decoded", MAX_IMAGE_BYTES))
-            .into());
+        return Err(too_large(path, (width, height)));
     }
     Ok(pixels)
+}
+
+/// The error of an image of no pixels or too many.
+fn too_large(path: &Path, (width, height): (u32, u32)) -> Error {
+    Diagnostic::new(path, format!("an image of {width} x {height} pixels"))
+        .help(format!("at most {MAX_IMAGE_BYTES} bytes can be decoded"))
+        .into()
 }
 
 fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<Cow<'a, [u8]>>>> {
@@ -308,9 +315,10 @@ mod tests {
         assert!(is_above_one(&image));
         let white: DynamicImage = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([1.0; 3])).into();
         assert!(!is_above_one(&white) && !is_above_one(&white.to_rgb8().into()));
-        let unknown: DynamicImage =
-            image::Rgb32FImage::from_pixel(1, 1, image::Rgb([f32::NAN; 3])).into();
-        assert!(reflectances(path, &unknown).is_err());
+        for bad in [f32::NAN, f32::INFINITY, -0.5] {
+            let bad = image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.5, bad, 0.5])).into();
+            assert!(reflectances(path, &bad).is_err() && colours(path, &bad).is_err());
+        }
     }
 
     #[test]

@@ -146,10 +146,11 @@ fn painted_glass(
     seen: (&SurfaceInteraction, DVec3, RayCone),
 ) -> Option<Glass> {
     let glass = material.glass?;
+    let factor = material.fresnel.map_or(glass.roughness, |_| material.roughness);
     let tint = material
         .fresnel
         .map_or(glass.tint, |_| diffuse::painted(scene, (material, glass.tint), seen));
-    let roughness = glossy::roughness(scene, (material, glass.roughness), seen);
+    let roughness = glossy::roughness(scene, (material, factor), seen);
     Some(Glass { tint, roughness, ..glass })
 }
 

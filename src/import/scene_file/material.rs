@@ -107,7 +107,7 @@ impl Material {
             texture: of(texture, ImageUse::Colour),
             specular_texture: of(
                 principled.and_then(|p| p.specular_texture.as_ref()),
-                ImageUse::Colour,
+                ImageUse::Light,
             ),
             normals: normals(self.normal_map.as_ref()),
             coat_normals: normals(principled.and_then(|p| p.clearcoat_normal_map.as_ref())),

@@ -30,8 +30,8 @@ pub(in crate::shade) struct Glossy {
     passed: f64,
 }
 
-/// Microfacets that are tried for one direction: of a million directions less than one takes more.
-const MOST_TRIES: u32 = 32;
+/// Microfacets that are tried for one direction: of a million directions less than one takes more, at any roughness.
+const MOST_TRIES: u32 = 40;
 
 /// Random numbers in the unit interval after a pair of them, a function of that pair.
 struct Further(u64);
@@ -121,7 +121,7 @@ impl Glossy {
 
     /// A direction for `u` in the unit square, by the microfacets that are seen along `wo` (Dupuy and Benyoub,
     /// 2023) and whose light others do not hide: one that is hidden counts for another. So all directions have the same
-    /// weight, and those of a path that is reflected again and again never multiply to more than what the surfaces reflect.
+    /// weight, and those of a path that is reflected again and again do not multiply to more than what the mirrors reflect.
     pub fn sample(&self, wo: DVec3, u: [f64; 2]) -> Option<Scattered> {
         let (s, t) = orthonormal_basis(self.n);
         let local = DVec3::new(wo.dot(s), wo.dot(t), wo.dot(self.n));
@@ -271,13 +271,17 @@ mod tests {
                 let lobe = lobe(roughness, wo);
                 // The density over the upper half, by a fine grid, and the share of samples that fall there.
                 let n = 2000;
-                let (mut density, mut light) = (0.0, 0.0);
+                let (mut density, mut light, mut mean) = (0.0, 0.0, [0.0; 2]);
+                let features = |wi: DVec3| [wi.z, schlick(0.5 * (wo + wi).length())];
                 for i in 0..n * n / 4 {
                     let (row, column) = (i / (n / 2), i % (n / 2));
                     let cos_i = (row as f64 + 0.5) / (n / 2) as f64;
                     let wi = direction(cos_i, (column as f64 + 0.5) / (n / 2) as f64 * TAU);
                     let solid_angle = TAU / (n * n / 4) as f64;
                     density += lobe.pdf(wo, wi) * solid_angle;
+                    for (mean, feature) in mean.iter_mut().zip(features(wi)) {
+                        *mean += feature * lobe.pdf(wo, wi) * solid_angle;
+                    }
                     light += f64::from(lobe.f(wo, wi).x) * cos_i * solid_angle;
                 }
                 let m = 64;
@@ -288,6 +292,12 @@ mod tests {
                 let above = samples.len() as f64 / all;
                 let share = samples.iter().map(|s| f64::from(s.share)).sum::<f64>() / all;
                 assert_eq!(above, 1.0);
+                // Directions are drawn by the density, hidden ones left out.
+                for (k, mean) in mean.into_iter().enumerate() {
+                    let drawn = samples.iter().map(|s| features(s.wi)[k]).sum::<f64>() / all;
+                    let told = format!("{roughness} {cos}: {drawn} of {mean}");
+                    assert!((drawn - mean).abs() < 0.01 * mean.max(0.3), "feature {k}, {told}");
+                }
                 assert!((density - 1.0).abs() < 0.01, "{roughness} {cos}: {density}");
                 assert!((light - share).abs() < 0.01, "{roughness} {cos}: {light} {share}");
                 for s in samples.iter().step_by(97) {
