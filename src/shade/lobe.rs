@@ -109,7 +109,8 @@ pub(super) fn for_each_directional<const MIRROR: bool, const GLASS: bool>(
             si,
         );
     }
-    if GLASS && let Some(glass) = &painted_glass(scene, material, seen) {
+    let glass = if GLASS { painted_glass(scene, material, seen) } else { None };
+    if let Some(glass) = &glass {
         match (glass.thin, glass.is_rough()) {
             (true, false) => take(Lobe::Pane(Pane::new(glass)), 0, si),
             (false, false) => {
