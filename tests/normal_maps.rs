@@ -289,7 +289,7 @@ fn a_coat_has_normals_of_its_own() {
             world.spheres.push(WorldSphere::new("lamp", DVec3::new(0.5, 3.0, -1.0), 0.8, lamp));
             world.sky = Sky { radiance: Rgb::new(0.2, 0.3, 0.5), ..Sky::default() };
             let mut job = looking(world, kind);
-            job.settings.spp = if roughness == 0.0 { 1 } else { 1024 };
+            job.settings.spp = if roughness == 0.0 { 1 } else { 4096 };
             render(&job).0
         };
         let mean = |film: &Film| film.rgb.iter().sum::<Rgb>() / film.rgb.len() as f32;
