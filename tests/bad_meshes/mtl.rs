@@ -3,7 +3,7 @@
 use super::{Expect, Expect::*, check, load_bytes};
 use tweenray::error::Diagnostic;
 use tweenray::math::DVec2;
-use tweenray::scene::{Material, TextureMap, Wrap};
+use tweenray::scene::{Material, TextureMap, World, Wrap};
 
 const OBJ: &[u8] = b"mtllib bad.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -164,16 +164,21 @@ fn textures_are_linear_and_shared() {
     assert_eq!(model.files.len(), 3);
 }
 
+/// A face of each of the materials `names` of a library `mtl`, which lies beside the `image` of one pixel: red 16, green 128, blue 48.
+fn faces_of(mtl: &str, names: &[&str], image: &str) -> World {
+    let faces: String = names.iter().map(|name| format!("usemtl {name}\nf 1 2 3\n")).collect();
+    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}");
+    let pixel: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
+    let others = [("bad.mtl", mtl.as_bytes()), (image, pixel)];
+    load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world
+}
+
 #[test]
 fn map_pr_is_one_channel_as_it_stands() {
     let mtl = "newmtl a\nillum 3\nKd 0 0 0\nKs 1 1 1\nPr 0.25\nmap_Pr -imfchan b rough.ppm\n\
                newmtl b\nillum 3\nKd 0 0 0\nKs 1 1 1\nmap_Pr rough.ppm\nnewmtl c\nillum 5\nKd 0 0 0\n\
                Ks 1 1 1\nPr 0.25\n";
-    let obj = ["a", "b", "c"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
-    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
-    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
-    let others = [("bad.mtl", mtl.as_bytes()), ("rough.ppm", image)];
-    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let world = faces_of(mtl, &["a", "b", "c"], "rough.ppm");
     let rough = world.materials.iter().map(|material| {
         let texel = |map: TextureMap| world.textures[map.image as usize].levels()[0].texel(0, 0).x;
         (material.roughness, material.roughness_map.map(texel))
@@ -186,11 +191,7 @@ fn map_pr_is_one_channel_as_it_stands() {
 fn glass_has_the_roughness_of_pr_or_map_pr() {
     let mtl = "newmtl a\nillum 7\nNi 1.5\nPr 0.25\nnewmtl b\nillum 7\nNi 1.5\nPr 0.25\nmap_Pr rough.ppm\n\
                newmtl c\nillum 7\nNi 1.5\n";
-    let obj = ["a", "b", "c"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
-    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
-    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
-    let others = [("bad.mtl", mtl.as_bytes()), ("rough.ppm", image)];
-    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let world = faces_of(mtl, &["a", "b", "c"], "rough.ppm");
     let rough = world.materials.iter().map(|material| {
         let glass = material.glass.expect("glass");
         (glass.roughness, material.roughness_map.is_some())
@@ -204,12 +205,7 @@ fn what_has_metal_a_coat_or_a_roughness_alone_is_principled() {
                newmtl coated\nKd .5 .5 .5\nPc .5\nPcr .1\nNi 2\n\
                newmtl matte\nKd .5 .5 .5\nPr 3\nmap_Pm -imfchan r metal.ppm\n\
                newmtl plain\nKd .5 .5 .5\nPc 0\n";
-    let names = ["metal", "coated", "matte", "plain"];
-    let obj = names.map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
-    let obj = format!("mtllib bad.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{obj}");
-    let image: &[u8] = b"P6 1 1 255\n\x10\x80\x30";
-    let others = [("bad.mtl", mtl.as_bytes()), ("metal.ppm", image)];
-    let world = load_bytes("obj", obj.as_bytes(), &others).expect("a good file").world;
+    let world = faces_of(mtl, &["metal", "coated", "matte", "plain"], "metal.ppm");
     let seen = |material: &Material| {
         let fresnel = material.fresnel?;
         let texel = |map: TextureMap| world.textures[map.image as usize].levels()[0].texel(0, 0).x;
