@@ -2,7 +2,7 @@
 
 use super::Scattered;
 use super::boundary::Boundary;
-use super::microfacet::{at_least, density, lambda, shadowed, unmasked, visible_normal};
+use super::microfacet::{at_least, density, lambda, shadowed, visible_normal};
 use super::reflectance::{Reflectance, schlick};
 use super::share_table::{self, ShareTable};
 use crate::intersect::SurfaceInteraction;
@@ -93,9 +93,14 @@ impl Glossy {
     /// The share of irradiance from `wi` that becomes radiance towards `wo` (both unit, leaving), per steradian.
     pub fn f(&self, wo: DVec3, wi: DVec3) -> Rgb {
         let Some(cosines) = self.cosines(wo, wi) else { return Rgb::ZERO };
-        let [cos_o, cos_i, cos_m] = cosines;
+        self.tint(wo, wi) * (self.reflected(cosines) / cosines[1]) as f32
+    }
+
+    /// The share of light that perfect microfacets reflect to the viewer per steradian of its directions; the cosines are those
+    /// of [`cosines`](Self::cosines).
+    fn reflected(&self, [cos_o, cos_i, cos_m]: [f64; 3]) -> f64 {
         let g2 = 1.0 / (1.0 + lambda(self.alpha, cos_o) + lambda(self.alpha, cos_i));
-        self.tint(wo, wi) * (density(self.alpha, cos_m) * g2 / (4.0 * cos_o * cos_i)) as f32
+        density(self.alpha, cos_m) * g2 / (4.0 * cos_o)
     }
 
     /// The share of light from `wi` that the microfacet between it and `wo` reflects, with what single reflection loses.
@@ -114,9 +119,7 @@ impl Glossy {
 
     /// The density of [`sample`](Self::sample) at `wi`, per steradian.
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
-        let Some([cos_o, cos_i, cos_m]) = self.cosines(wo, wi) else { return 0.0 };
-        let g2 = shadowed(self.alpha, cos_o, cos_i) * unmasked(self.alpha, cos_o);
-        density(self.alpha, cos_m) * g2 / (4.0 * cos_o * self.passed)
+        self.cosines(wo, wi).map_or(0.0, |cosines| self.reflected(cosines) / self.passed)
     }
 
     /// A direction for `u` in the unit square, by the microfacets that are seen along `wo` (Dupuy and Benyoub,
