@@ -66,7 +66,7 @@ pub use settings::{
     BuildQuality, Filter, FrameRange, GlassShadows, HitRules, IntersectorKind, Recheck, Rect,
     Settings, ToneCurve,
 };
-pub use texture::{Texture, TextureId, TextureLevel, TextureMap, Wrap};
+pub use texture::{PointRow, Texture, TextureId, TextureLevel, TextureMap, Wrap};
 pub use time::{SaveInterval, parse_time, parse_time_limit};
 pub use too_small::Collapsed;
 pub use vertex_colours::VertexColours;

@@ -97,31 +97,39 @@ impl TextureMap {
 }
 
 impl Wrap {
-    /// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first; the row
-    /// goes from 0 to 1. What is no number, or too large to have a fraction, counts as 0.
-    #[inline(always)] // Up to 64 times in a lookup.
-    pub fn two_texels(self, u: f32, n: u32) -> (usize, usize, f32) {
-        let last = n as usize - 1;
-        let clamped = |u: f32| {
-            let x = (u * n as f32 - 0.5).clamp(0.0, last as f32);
-            let first = x as usize;
-            (first, (first + 1).min(last), x - first as f32)
-        };
+    /// The coordinate from 0 to 1 where the image itself shows what is seen at `u`. What is no number, or too large to have a
+    /// fraction, counts as 0.
+    #[inline(always)] // Up to 32 times in a lookup.
+    fn inside(self, u: f32) -> f32 {
         match self {
-            Self::Repeat => {
-                let x = repeat(u) * n as f32 - 0.5;
-                let whole = floor(x);
-                // Before the first texel lies the last.
-                let first = if whole < 0.0 { last } else { (whole as usize).min(last) };
-                let second = if first < last { first + 1 } else { 0 };
-                (first, second, x - whole)
-            }
-            Self::Clamp => clamped(if u.is_nan() { 0.0 } else { u.clamp(0.0, 1.0) }),
+            Self::Repeat => repeat(u),
+            Self::Clamp if u.is_nan() => 0.0,
+            Self::Clamp => u.clamp(0.0, 1.0),
             Self::Mirror => {
                 let there_and_back = 2.0 * repeat(0.5 * u);
-                clamped(there_and_back.min(2.0 - there_and_back))
+                there_and_back.min(2.0 - there_and_back)
             }
         }
+    }
+
+    /// The two of `n` texels in a row between whose middles the coordinate `u` lies, and how far from the first; the row
+    /// goes from 0 to 1.
+    pub fn two_texels(self, u: f32, n: u32) -> (usize, usize, f32) {
+        self.two_inside(self.inside(u), n)
+    }
+
+    /// The same of what [`inside`](Self::inside) gave.
+    #[inline(always)] // Up to 64 times in a lookup.
+    fn two_inside(self, inside: f32, n: u32) -> (usize, usize, f32) {
+        let last = n as i32 - 1;
+        // From half a texel before the first one's middle to half a texel behind the last one's.
+        let place = inside * n as f32 + 0.5;
+        let second = place as i32;
+        let apart = place - second as f32;
+        let (before, behind) = if self == Self::Repeat { (last, 0) } else { (0, last) };
+        let first = if second > 0 { second - 1 } else { before };
+        let second = if second > last { behind } else { second };
+        (first as usize, second as usize, apart)
     }
 }
 
@@ -233,6 +241,37 @@ impl Texture {
         &self.levels
     }
 
+    /// The mean of what is seen at some points in level number `level` and, by `fraction`, in the next one.
+    pub fn mean(&self, wrap: [Wrap; 2], at: PointRow, (level, fraction): (usize, f32)) -> Rgb {
+        let fine = &self.levels[level];
+        let coarse = self.levels.get(level + 1).unwrap_or(fine);
+        let levels = [fine, coarse];
+        // Told apart once, lest each texel asks what it is.
+        match (&fine.texels, &coarse.texels) {
+            (Texels::Srgb(a), Texels::Srgb(b)) => {
+                let table: &[f32; 256] = &LINEAR;
+                let linear = |code: [u8; 3]| Rgb::from_array(code.map(|c| table[usize::from(c)]));
+                at.mean(levels, ([a, b], linear), wrap, fraction)
+            }
+            (Texels::Linear(a), Texels::Linear(b)) => {
+                at.mean(levels, ([a, b], |value| value), wrap, fraction)
+            }
+            (Texels::Data8(a), Texels::Data8(b)) => {
+                at.mean(levels, ([a, b], grey8), wrap, fraction)
+            }
+            (Texels::Data16(a), Texels::Data16(b)) => {
+                at.mean(levels, ([a, b], grey16), wrap, fraction)
+            }
+            (Texels::Vectors8(a), Texels::Vectors8(b)) => {
+                at.mean(levels, ([a, b], vector8), wrap, fraction)
+            }
+            (Texels::Vectors16(a), Texels::Vectors16(b)) => {
+                at.mean(levels, ([a, b], vector16), wrap, fraction)
+            }
+            _ => unreachable!("levels of one image are of one kind"),
+        }
+    }
+
     /// Bytes of all texels.
     pub fn bytes(&self) -> u64 {
         self.levels.iter().map(|level| level.bytes().len() as u64).sum()
@@ -276,64 +315,55 @@ impl TextureLevel {
     /// # Panics
     /// Outside of the level.
     pub fn texel(&self, column: usize, row: usize) -> Rgb {
-        self.four([column; 2], [row; 2])[0]
+        self.linear(row * self.width as usize + column)
     }
 
     /// The texels in two columns and two rows, row by row, linear RGB or greys of data.
     ///
     /// # Panics
     /// Outside of the level.
-    #[inline(always)] // Up to 32 times in a lookup.
-    pub fn four(&self, columns: [usize; 2], rows: [usize; 2]) -> [Rgb; 4] {
-        let width = self.width as usize;
-        let ([left, right], [upper, lower]) = (columns, rows);
-        let (upper, lower) = (upper * width, lower * width);
-        match &self.texels {
-            Texels::Srgb(codes) => {
-                let table: &[f32; 256] = &LINEAR;
-                let texel = |at: usize| {
-                    let [r, g, b] = codes[at];
-                    Rgb::new(table[r as usize], table[g as usize], table[b as usize])
-                };
-                [
-                    texel(upper + left),
-                    texel(upper + right),
-                    texel(lower + left),
-                    texel(lower + right),
-                ]
-            }
-            Texels::Linear(values) => [
-                values[upper + left],
-                values[upper + right],
-                values[lower + left],
-                values[lower + right],
-            ],
-            Texels::Data8(_) | Texels::Data16(_) | Texels::Vectors8(_) | Texels::Vectors16(_) => {
-                [upper + left, upper + right, lower + left, lower + right].map(|at| self.datum(at))
-            }
-        }
+    pub fn four(&self, [left, right]: [usize; 2], rows: [usize; 2]) -> [Rgb; 4] {
+        let [upper, lower] = rows.map(|row| row * self.width as usize);
+        [upper + left, upper + right, lower + left, lower + right].map(|at| self.linear(at))
     }
 
     /// What the level shows at the image's coordinates `uv`, between the middles of four texels.
-    #[inline(always)] // Up to 32 times in a lookup.
     pub fn bilinear(&self, wrap: [Wrap; 2], uv: Vec2) -> Rgb {
-        let (x0, x1, fx) = wrap[0].two_texels(uv.x, self.width);
-        let (y0, y1, fy) = wrap[1].two_texels(1.0 - uv.y, self.height);
-        let [a, b, c, d] = self.four([x0, x1], [y0, y1]);
-        a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
+        let [columns, rows] = self.two_by_two(wrap, inside(wrap, uv));
+        let four = self.four([columns.0, columns.1], [rows.0, rows.1]);
+        mixed(four, columns.2, rows.2)
     }
 
-    /// Texel number `at` of data, as a grey. (Apart from [`four`](Self::four), whose code is there in each place that looks
-    /// something up.)
-    #[inline(never)]
-    fn datum(&self, at: usize) -> Rgb {
+    /// The columns and the rows of the four texels around what [`inside`] gives, and how far it is from the first of each.
+    #[inline(always)] // Up to 32 times in a lookup.
+    fn two_by_two(&self, wrap: [Wrap; 2], inside: Vec2) -> [(usize, usize, f32); 2] {
+        [wrap[0].two_inside(inside.x, self.width), wrap[1].two_inside(inside.y, self.height)]
+    }
+
+    /// As [`bilinear`](Self::bilinear), of `texels` of this level, which `linear` decodes.
+    #[inline(always)] // Up to 32 times in a lookup.
+    fn bilinear_of<T: Copy>(
+        &self,
+        (texels, linear): (&[T], impl Fn(T) -> Rgb),
+        wrap: [Wrap; 2],
+        inside: Vec2,
+    ) -> Rgb {
+        let [(left, right, x), (upper, lower, y)] = self.two_by_two(wrap, inside);
+        let width = self.width as usize;
+        let (upper, lower) = (upper * width, lower * width);
+        let four = [upper + left, upper + right, lower + left, lower + right];
+        mixed(four.map(|at| linear(texels[at])), x, y)
+    }
+
+    /// Texel number `at`, linear RGB or a grey of data.
+    fn linear(&self, at: usize) -> Rgb {
         match &self.texels {
-            Texels::Srgb(codes) => Rgb::from_array(codes[at].map(|c| LINEAR[c as usize])),
+            Texels::Srgb(codes) => Rgb::from_array(codes[at].map(|c| LINEAR[usize::from(c)])),
             Texels::Linear(values) => values[at],
-            Texels::Data8(values) => Rgb::splat(f32::from(values[at]) / 255.0),
-            Texels::Data16(values) => Rgb::splat(f32::from(values[at]) / 65_535.0),
-            Texels::Vectors8(values) => Rgb::from_array(values[at].map(f32::from)) / 255.0,
-            Texels::Vectors16(values) => Rgb::from_array(values[at].map(f32::from)) / 65_535.0,
+            Texels::Data8(values) => grey8(values[at]),
+            Texels::Data16(values) => grey16(values[at]),
+            Texels::Vectors8(values) => vector8(values[at]),
+            Texels::Vectors16(values) => vector16(values[at]),
         }
     }
 
@@ -383,6 +413,64 @@ impl TextureLevel {
         };
         Some(Self::new(size.map(|n| n as u32), texels))
     }
+}
+
+/// Points of an image side by side.
+#[derive(Debug, Clone, Copy)]
+pub struct PointRow {
+    /// The image's coordinates of the first.
+    pub first: Vec2,
+    /// From each to the next.
+    pub step: Vec2,
+    /// How many.
+    pub count: u32,
+}
+
+impl PointRow {
+    /// See [`Texture::mean`]; `texels` of both levels, which `linear` decodes.
+    fn mean<T: Copy>(
+        self,
+        [fine, coarse]: [&TextureLevel; 2],
+        (texels, linear): ([&[T]; 2], impl Fn(T) -> Rgb + Copy),
+        wrap: [Wrap; 2],
+        fraction: f32,
+    ) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        for point in 0..self.count {
+            let at = inside(wrap, self.first + self.step * point as f32);
+            let seen = fine.bilinear_of((texels[0], linear), wrap, at);
+            sum += seen.lerp(coarse.bilinear_of((texels[1], linear), wrap, at), fraction);
+        }
+        sum / self.count as f32
+    }
+}
+
+/// Where the image itself shows what is seen at its coordinates `uv`: along its rows, and down its columns from the top.
+#[inline(always)] // Up to 16 times in a lookup.
+fn inside(wrap: [Wrap; 2], uv: Vec2) -> Vec2 {
+    Vec2::new(wrap[0].inside(uv.x), wrap[1].inside(1.0 - uv.y))
+}
+
+/// Between four texels, row by row: `x` from the left ones and `y` from the upper ones.
+#[inline(always)] // Up to 32 times in a lookup.
+fn mixed([a, b, c, d]: [Rgb; 4], x: f32, y: f32) -> Rgb {
+    a.lerp(b, x).lerp(c.lerp(d, x), y)
+}
+
+fn grey8(share: u8) -> Rgb {
+    Rgb::splat(f32::from(share) / 255.0)
+}
+
+fn grey16(share: u16) -> Rgb {
+    Rgb::splat(f32::from(share) / 65_535.0)
+}
+
+fn vector8(shares: [u8; 3]) -> Rgb {
+    Rgb::from_array(shares.map(f32::from)) / 255.0
+}
+
+fn vector16(shares: [u16; 3]) -> Rgb {
+    Rgb::from_array(shares.map(f32::from)) / 65_535.0
 }
 
 /// Which texels of a row each texel of a row half as long covers.

@@ -7,7 +7,7 @@
 use super::cone::RayCone;
 use crate::intersect::{SurfaceInteraction, uv_of_set};
 use crate::math::{DVec2, DVec3, Rgb, Vec2};
-use crate::scene::{Scene, Texture, TextureLevel, TextureMap, Wrap};
+use crate::scene::{PointRow, Scene, Texture, TextureMap, Wrap};
 
 /// Most pieces of an ellipse. A longer one is taken to be wider.
 const MOST_PIECES: f64 = 16.0;
@@ -57,16 +57,19 @@ pub(super) fn filtered(texture: &Texture, wrap: [Wrap; 2], uv: Vec2, footprint: 
         return levels[0].bilinear(wrap, uv);
     }
     let minor = ellipse.minor.max(ellipse.major / MOST_PIECES).max(1.0);
-    let pieces = (ellipse.major / minor).ceil();
+    let longer = ellipse.major / minor;
+    // Rounded up. (Not `ceil`, which is a call where the processor's instruction for it cannot be counted on.)
+    let pieces = longer as u32 + u32::from(longer.fract() > 0.0);
     // From the middle of the first piece to that of the last.
     let reach = ellipse.axis / size * (ellipse.major - minor);
-    let level = libm::log2(minor);
-    let mut sum = Rgb::ZERO;
-    for piece in 0..pieces as u32 {
-        let along = f64::from(piece) / (pieces - 1.0).max(1.0) - 0.5;
-        sum += trilinear(levels, wrap, uv + (reach * along).as_vec2(), level);
+    let step = reach / f64::from(pieces - 1).max(1.0);
+    let row = PointRow { first: uv - (0.5 * reach).as_vec2(), step: step.as_vec2(), count: pieces };
+    // The level with the largest texels that are no larger than a piece, and how much larger the piece is.
+    let level = (minor as u32).ilog2() as usize;
+    if level + 1 >= levels.len() {
+        return texture.mean(wrap, row, (levels.len() - 1, 0.0));
     }
-    sum / pieces as f32
+    texture.mean(wrap, row, (level, (minor / f64::from(1u32 << level) - 1.0) as f32))
 }
 
 /// Principal diameters of an ellipse, texels.
@@ -90,21 +93,6 @@ impl Ellipse {
         let axis =
             if half >= 0.0 { DVec2::new(half + apart, xy) } else { DVec2::new(xy, apart - half) };
         Self { major, minor, axis: axis.try_normalize().unwrap_or(DVec2::X) }
-    }
-}
-
-/// Lookup between two of `levels`; `level` is at least 0.
-fn trilinear(levels: &[TextureLevel], wrap: [Wrap; 2], uv: Vec2, level: f64) -> Rgb {
-    let last = levels.len() - 1;
-    let whole = level as usize;
-    if whole >= last {
-        return levels[last].bilinear(wrap, uv);
-    }
-    let fine = levels[whole].bilinear(wrap, uv);
-    let fraction = (level - whole as f64) as f32;
-    match fraction {
-        0.0 => fine,
-        _ => fine.lerp(levels[whole + 1].bilinear(wrap, uv), fraction),
     }
 }
 
