@@ -73,9 +73,63 @@ fn json_that_is_damaged_is_refused_with_line_and_column() {
     assert_eq!(deep, format!("the JSON of the file is damaged: recursion limit exceeded{help}"));
     let list = refusal("test.glb", &glb_of(b"[1]", b""));
     assert_eq!(list, "the JSON is no object: this is not a glTF file");
-    assert_eq!(refusal("test.glb", &glb_of(b"{}", b"")), "`asset` is missing");
-    let old = refusal("test.glb", &glb_of(b"{\"asset\":{\"version\":\"1.0\"}}", b""));
-    assert_eq!(old, "asset: glTF of version `1.0`; version 2 can be read");
+}
+
+#[test]
+fn files_of_another_version_are_refused_with_what_to_do() {
+    let of = |json: &str| refusal("test.glb", &glb_of(json.as_bytes(), b""));
+    let help = "\n  help: export or convert it to glTF 2.0";
+    let unknown = format!("`asset` is missing: this is no glTF 2.0{help}");
+    assert_eq!(of("{}"), unknown);
+    assert_eq!(of(r#"{"asset":{}}"#), format!("asset: `version` is missing{help}"));
+    for (asset, version) in [
+        (r#"{"version":"1.0"}"#, "1.0"),
+        (r#"{"version":"x"}"#, "x"),
+        (r#"{"version":"2.0","minVersion":"2.1"}"#, "2.1"),
+    ] {
+        let expected = format!("asset: glTF of version `{version}`; version 2.0 can be read{help}");
+        assert_eq!(of(&format!(r#"{{"asset":{asset}}}"#)), expected);
+    }
+    for asset in [json!({"version": "2.1"}), json!({"version": "2.1", "minVersion": "2.0"})] {
+        let mut file = File::triangle();
+        file.json["asset"] = asset;
+        file.model();
+    }
+}
+
+#[test]
+fn what_is_there_only_in_a_packed_form_is_refused_with_what_to_do() {
+    let refused = |file: &File, start: &str, help: &str| {
+        let refused = refusal("test.glb", &file.glb());
+        assert!(refused.starts_with(start) && refused.contains(help), "{refused}");
+    };
+    let mut file = File::triangle();
+    file.json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+    let draco =
+        json!({"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}});
+    file.json["meshes"][0]["primitives"][0]["extensions"] = draco;
+    let start = "meshes[0].primitives[0]: `KHR_draco_mesh_compression` is not read";
+    refused(&file, start, "untick Compression");
+    let mut json = File::triangle().json;
+    let meshopt = json!({"EXT_meshopt_compression": {"fallback": true}});
+    json["buffers"] = json!([{"byteLength": 36, "extensions": meshopt}]);
+    let meshopt = refusal("test.gltf", json.to_string().as_bytes());
+    let start = "buffers[0]: `EXT_meshopt_compression` is not read";
+    assert!(meshopt.starts_with(start) && meshopt.contains("without -c"), "{meshopt}");
+    for (bytes, format, help) in [
+        (&b"\xabKTX 20\xbb\r\n\x1a\n...."[..], "KTX", "not KTX2"),
+        (b"RIFF\x04\0\0\0WEBPVP8 ", "WebP", "untick WebP"),
+        (b"\0\0\0\x1cftypavif", "AVIF", "not AVIF"),
+        (b"DDS |\0\0\0", "DDS", "not DDS"),
+    ] {
+        let mut file = File::triangle().with_uvs();
+        let view = file.view(bytes);
+        file.json["images"] = json!([{"bufferView": view}]);
+        file.json["textures"] = json!([{"source": 0}]);
+        let info = json!({"baseColorTexture": {"index": 0}});
+        let file = file.with_material(json!({"pbrMetallicRoughness": info}));
+        refused(&file, &format!("images[0]: the image is {format}, which is not read"), help);
+    }
 }
 
 #[test]
@@ -349,8 +403,7 @@ fn buffers_and_images_that_are_not_there_are_refused() {
     let mut file = File::triangle().with_uvs();
     let view = file.view(b"no image");
     file.json["images"] = json!([{"bufferView": view}, {}]);
-    file.json["textures"] =
-        json!([{"source": 0}, {"source": 1}, {"extensions": {"EXT_texture_webp": {"source": 0}}}]);
+    file.json["textures"] = json!([{"source": 0}, {"source": 1}, {"extensions": {"EXT_texture_webp": {"source": 0}}}, {}]);
     let of = |texture: usize| {
         let info = json!({"baseColorTexture": {"index": texture}});
         refusal(
@@ -360,7 +413,8 @@ fn buffers_and_images_that_are_not_there_are_refused() {
     };
     assert!(of(0).starts_with("images[0]: not a readable image"), "{}", of(0));
     assert_eq!(of(1), "images[1]: the image has neither `uri` nor `bufferView`");
-    assert!(of(2).starts_with("textures[2]: the texture has no `source`"), "{}", of(2));
+    assert!(of(2).starts_with("textures[2]: `EXT_texture_webp` is not read"), "{}", of(2));
+    assert!(of(3).starts_with("textures[3]: the texture has no `source`"), "{}", of(3));
 }
 
 #[test]

@@ -51,22 +51,39 @@ fn a_file_with_lights_gets_no_lamp_and_one_with_a_glow_does() {
 }
 
 #[test]
-fn lights_that_leave_all_dark_are_named() {
-    let told = |kind: &str, intensity: f64, material: serde_json::Value| {
+fn lights_that_would_leave_all_dark_are_as_bright_as_their_numbers() {
+    let read = |kind: &str, intensity: f64, material: serde_json::Value| {
         let mut file = File::triangle().with_material(material);
         let light = json!({"type": kind, "intensity": intensity, "spot": {}});
         file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
         let of_node = json!({"KHR_lights_punctual": {"light": 0}});
         file.add("nodes", json!({"translation": [0, 0, 4], "extensions": of_node}));
-        let is_dim = |warnings: &[_]| warns(warnings, "the lights of the file are dim");
-        assert!(!is_dim(&file.model().warnings), "beside others they need not be all");
-        is_dim(&file.loaded().warnings)
+        let loaded = file.loaded();
+        let amount = match &loaded.world.lights[0] {
+            Light::Point(light) => light.intensity.x,
+            Light::Spot(light) => light.intensity.x,
+            Light::Directional(light) => light.irradiance.x,
+            other => panic!("{other:?}"),
+        };
+        (f64::from(amount), warns(&loaded.warnings, "the lights of the file are dim"))
     };
-    let grey = || json!({});
+    let is = |(amount, told): (f64, bool), expected: f64, is_dim| {
+        assert!((amount / expected - 1.0).abs() < 1e-6 && told == is_dim, "{amount} {expected}");
+    };
     for (kind, dim, bright) in
         [("point", 5.0, 5000.0), ("spot", 5.0, 5000.0), ("directional", 1.0, 1000.0)]
     {
-        assert!(told(kind, dim, grey()) && !told(kind, bright, grey()), "{kind}");
-        assert!(!told(kind, dim, json!({"emissiveFactor": [1, 1, 1]})), "{kind}");
+        is(read(kind, dim, json!({})), dim, true);
+        is(read(kind, dim, json!({"emissiveFactor": [0.02, 0, 0]})), dim, true);
+        is(read(kind, bright, json!({})), bright / 683.0, false);
     }
+}
+
+#[test]
+fn a_range_that_is_ignored_is_said() {
+    let mut file = File::triangle();
+    let light = json!({"type": "point", "range": 3});
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+    file.add("nodes", json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    assert!(warns(&file.model().warnings, "the range of lights is ignored"));
 }

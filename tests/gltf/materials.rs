@@ -345,13 +345,34 @@ fn unlit_surfaces_are_matte_by_name() {
 
 #[test]
 fn extensions_that_are_not_read_are_named_once_each() {
-    let mut file = File::triangle();
-    file.json["extensionsUsed"] =
-        json!(["KHR_materials_sheen", "KHR_materials_ior", "KHR_xmp_json_ld"]);
-    let warnings = file.model().warnings;
-    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    let materials = |extensions: serde_json::Value| {
+        let mut file = File::triangle().with_material(json!({"extensions": extensions}));
+        // What the list says and no object has is no loss.
+        file.json["extensionsUsed"] = json!(["KHR_materials_iridescence", "KHR_materials_ior"]);
+        file.json["extras"] = json!({"extensions": {"ACME_notes": {}}});
+        file.json["nodes"][0]["extensions"] = json!({"KHR_interactivity": {}, "KHR_xmp": {}});
+        let warnings = file.model().warnings;
+        warnings.into_iter().map(|warning| warning.message).collect::<Vec<_>>()
+    };
+    assert_eq!(materials(json!({"KHR_materials_ior": {}, "EXT_texture_webp": {}})), [""; 0]);
     assert_eq!(
-        warning.message,
-        "the extension `KHR_materials_sheen` is not read: the picture may differ"
+        materials(json!({"KHR_materials_sheen": {}, "ACME_cloud": {}})),
+        [
+            "the extension `ACME_cloud` is not read: the picture may differ",
+            "the extension `KHR_materials_sheen` is not read: the picture may differ"
+        ]
     );
+    let [gloss] = &materials(json!({"KHR_materials_pbrSpecularGlossiness": {}}))[..] else {
+        panic!("one")
+    };
+    assert!(gloss.contains("convert the file to metallic-roughness"), "{gloss}");
+}
+
+#[test]
+fn variants_of_materials_are_named() {
+    let mut file = File::triangle();
+    let names = json!([{"name": "red"}, {"name": "blue"}]);
+    file.json["extensions"] = json!({"KHR_materials_variants": {"variants": names}});
+    file.json["extensionsRequired"] = json!(["KHR_materials_variants", "KHR_audio_emitter"]);
+    assert!(warns(&file.model().warnings, "materials have variants (red, blue)"));
 }

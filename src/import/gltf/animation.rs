@@ -130,7 +130,8 @@ fn property(
         return Ok(pointed_at(document, pointer.required("pointer")?.as_text()?, notes));
     }
     let Some(node) = target.index("node", document.nodes.len(), "node")? else {
-        // Its target is for an extension to say, so this channel is not ours.
+        // The format leaves such a channel to extensions.
+        notes.add("an animation that names no node is ignored", None);
         return Ok(None);
     };
     Ok(of_node(path, node).or_else(|| {

@@ -85,7 +85,9 @@ impl<'a, 'd> Assembly<'a, 'd> {
         let mut seen = HashMap::new();
         for number in &self.nodes.shown {
             let node = &self.document.nodes[*number];
-            if let Some(light) = light::read(self.document, node, &self.worlds[*number])? {
+            if let Some(light) =
+                light::read(self.document, node, &self.worlds[*number], self.notes)?
+            {
                 self.model.world.lights.push(light);
             }
             let meshes = self.document.meshes.len();
@@ -146,7 +148,7 @@ impl<'a, 'd> Assembly<'a, 'd> {
         let Some(mut primitive) = read else { return Ok(()) };
         let made = self.material(material, primitive.colours.is_some())?;
         if made.is_invisible {
-            self.notes.add("a surface whose alpha is below its cutoff was left out", None);
+            self.notes.add("a surface whose alpha is below its cutoff, or less than a half of BLEND, was left out", None);
             return Ok(());
         }
         let mut shape = Shape::of(&mut primitive);

@@ -1,60 +1,15 @@
 //! The file as a whole: its JSON, its buffers, and the extensions that it asks for.
 
 use super::container::Container;
+use super::extensions;
 use super::json::Json;
 use super::uri::{self, Resource};
 use crate::error::{Diagnostic, Error, Result};
-use crate::import::source::{self, Notes};
+use crate::import::source;
 use serde_json::Value;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Extensions that are read.
-const READ: [&str; 17] = [
-    "EXT_mesh_gpu_instancing",
-    "KHR_animation_pointer",
-    "KHR_lights_punctual",
-    "KHR_materials_clearcoat",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_node_visibility",
-    "KHR_texture_transform",
-    // What these two say is not about the picture.
-    "KHR_xmp",
-    "KHR_xmp_json_ld",
-    // Choices, of which the file's own first one is shown.
-    "KHR_materials_variants",
-    // Where it is not required, the texture has another image too.
-    "EXT_texture_webp",
-];
-
-/// Extensions without which a file can usually be written, and what to do about them.
-const AVOIDABLE: [(&str, &str); 6] = [
-    (
-        "KHR_draco_mesh_compression",
-        "export it again without Draco: untick Compression in the exporter",
-    ),
-    (
-        "EXT_meshopt_compression",
-        "export it again without meshopt compression (gltfpack: without -c)",
-    ),
-    (
-        "KHR_meshopt_compression",
-        "export it again without meshopt compression (gltfpack: without -c)",
-    ),
-    (
-        "KHR_texture_basisu",
-        "export it again with png or jpeg images, not KTX2 (gltfpack: without -tc)",
-    ),
-    ("EXT_texture_webp", "export it again with png or jpeg images: untick WebP in the exporter"),
-    ("EXT_texture_avif", "export it again with png or jpeg images, not AVIF"),
-];
 
 /// A parsed file with its buffers.
 pub(super) struct Document<'a> {
@@ -116,7 +71,7 @@ impl<'a> Document<'a> {
             return Err(top.fault("the JSON is no object: this is not a glTF file").into());
         }
         check_version(&top)?;
-        check_required(&top)?;
+        extensions::check_required(&top)?;
         let mut document = Self {
             file,
             accessors: top.list("accessors")?,
@@ -173,52 +128,29 @@ impl<'a> Document<'a> {
         };
         Ok(Some((bytes, view.whole("byteStride")?)))
     }
-
-    /// Notes extensions that the file uses and that are not read.
-    pub fn note_extensions(&self, notes: &mut Notes) -> Result<()> {
-        for json in self.top.list("extensionsUsed")? {
-            let name = json.as_text()?;
-            if !READ.contains(&name) {
-                let name = uri::shortened(name);
-                notes.add(
-                    &format!("the extension `{name}` is not read: the picture may differ"),
-                    None,
-                );
-            }
-        }
-        Ok(())
-    }
 }
+
+/// Most minor version of glTF 2 that is read.
+const MINOR: u32 = 0;
 
 fn check_version(top: &Json<'_>) -> Result<()> {
-    let asset = top.required("asset")?;
-    let least = asset.text("minVersion")?.or(asset.text("version")?).unwrap_or_default();
-    match least.split('.').next() {
-        Some("2") => Ok(()),
-        _ => {
-            let message =
-                format!("glTF of version `{}`; version 2 can be read", uri::shortened(least));
-            Err(asset.fault(message).into())
-        }
+    let help = "export or convert it to glTF 2.0";
+    let Some(asset) = top.get("asset") else {
+        return Err(top.fault("`asset` is missing: this is no glTF 2.0").help(help).into());
+    };
+    let (version, least) = (asset.text("version")?, asset.text("minVersion")?);
+    let Some(version) = least.or(version) else {
+        return Err(asset.fault("`version` is missing").help(help).into());
+    };
+    let mut parts = version.split('.').map(|part| part.parse::<u32>().ok());
+    let (major, minor) = (parts.next().flatten(), parts.next().flatten());
+    // What is of a later 2.x can be read as 2.0 unless it says that it needs more.
+    if major == Some(2) && (least.is_none() || minor <= Some(MINOR)) {
+        return Ok(());
     }
-}
-
-/// Refuses extensions that the file requires and that are not read.
-fn check_required(top: &Json<'_>) -> Result<()> {
-    for json in top.list("extensionsRequired")? {
-        let name = json.as_text()?;
-        let avoidable = AVOIDABLE.iter().find(|(avoidable, _)| *avoidable == name);
-        if avoidable.is_none() && READ.contains(&name) {
-            continue;
-        }
-        let message = format!(
-            "the file requires the extension `{}`, which is not read",
-            uri::shortened(name)
-        );
-        let help = avoidable.map_or("export it again without this extension", |(_, help)| help);
-        return Err(json.fault(message).help(help).into());
-    }
-    Ok(())
+    let message =
+        format!("glTF of version `{}`; version 2.{MINOR} can be read", uri::shortened(version));
+    Err(asset.fault(message).help(help).into())
 }
 
 impl Buffer<'_> {
@@ -257,7 +189,7 @@ fn read_buffer<'a>(
     };
     if bytes.is_none() && bin.is_none() {
         let message = "the buffer has no `uri`, and the file no binary chunk";
-        return Err(json.fault(message).into());
+        return Err(extensions::packed(json).unwrap_or_else(|| json.fault(message)).into());
     }
     if has < length {
         return Err(json.fault(format!("the buffer says {length} bytes and has {has}")).into());

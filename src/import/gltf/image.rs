@@ -1,6 +1,7 @@
 //! Images of materials: embedded or beside the file, decoded once each, on all threads.
 
 use super::document::{Document, read_beside};
+use super::extensions;
 use super::json::Json;
 use super::uri::{self, Resource};
 use crate::error::Result;
@@ -48,6 +49,9 @@ impl ImageStore {
         for at in wanted {
             let json = &images[*at];
             let (name, bytes) = read(document, json, files)?;
+            if let Some(fault) = extensions::packed_image(json, &bytes) {
+                return Err(fault.into());
+            }
             pixels += texture::pixels(&name, &bytes)?;
             if pixels > MOST_PIXELS {
                 let message = format!(

@@ -2,6 +2,7 @@
 
 use crate::error::{Diagnostic, Result};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// A value of the file, and where it stands.
@@ -50,6 +51,12 @@ impl<'a> Json<'a> {
     /// The extension `name` of this object.
     pub fn extension(&self, name: &str) -> Option<Self> {
         self.get("extensions")?.get(name)
+    }
+
+    /// Adds the names of all extensions that this value and what it holds have to `names`; what programs keep for themselves
+    /// does not count.
+    pub fn collect_extensions(&self, names: &mut BTreeSet<&'a str>) {
+        collect_extensions(self.value, names);
     }
 
     /// The elements of the array `key`; none where there is no such key.
@@ -177,5 +184,21 @@ impl<'a> Json<'a> {
         // An array of the wrong length is an array too.
         let other = if wanted.contains(found) { "another" } else { found };
         Err(self.fault(format!("expected {wanted}, found {other}")).into())
+    }
+}
+
+/// No deeper than a parsed file nests.
+fn collect_extensions<'a>(value: &'a Value, names: &mut BTreeSet<&'a str>) {
+    match value {
+        Value::Array(values) => values.iter().for_each(|value| collect_extensions(value, names)),
+        Value::Object(members) => {
+            for (key, value) in members.iter().filter(|(key, _)| *key != "extras") {
+                if let ("extensions", Value::Object(extensions)) = (key.as_str(), value) {
+                    names.extend(extensions.keys().map(String::as_str));
+                }
+                collect_extensions(value, names);
+            }
+        }
+        _ => {}
     }
 }

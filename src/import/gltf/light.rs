@@ -4,8 +4,9 @@ use super::document::Document;
 use super::json::Json;
 use crate::error::{Diagnostic, Result};
 use crate::import::framing;
+use crate::import::source::Notes;
 use crate::math::{DAffine3, DVec3, Rgb};
-use crate::scene::{DirectionalLight, Light, PointLight, SpotLight, World, WorldMesh};
+use crate::scene::{DirectionalLight, Light, PointLight, SpotLight, World};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::path::Path;
 
@@ -20,6 +21,7 @@ pub(super) fn read(
     document: &Document<'_>,
     node: &Json<'_>,
     world: &DAffine3,
+    notes: &mut Notes,
 ) -> Result<Option<Light>> {
     let Some(of_node) = node.extension("KHR_lights_punctual") else { return Ok(None) };
     let lights = &document.lights;
@@ -29,6 +31,12 @@ pub(super) fn read(
     let emitted = Rgb::from_array(colour.map(|c| (c.clamp(0.0, 1e30) * amount).min(1e30) as f32));
     if emitted == Rgb::ZERO {
         return Ok(None);
+    }
+    if json.get("range").is_some() {
+        notes.add(
+            "the range of lights is ignored: light falls with the square of the distance",
+            None,
+        );
     }
     let position = world.translation;
     // Lights shine along -z; scales are no matter.
@@ -58,11 +66,10 @@ pub(super) fn read(
 /// Irradiance of a white surface that is seen as 25 of 255.
 const DIM: f64 = 0.03;
 
-/// Warns of lights that leave all dark at an exposure of 1, in a scene where nothing else shines. Many programs write their
-/// own numbers for candela and lux.
-pub(super) fn note_dim(world: &World, path: &Path) -> Option<Diagnostic> {
-    let emits = |mesh: &WorldMesh| world.materials[mesh.material as usize].emits();
-    if world.lights.is_empty() || world.meshes.is_empty() || world.meshes.iter().any(emits) {
+/// Takes the numbers of lights that would leave all dark as W/sr and W/m², and says so: many programs write their own
+/// for candela and lux.
+pub(super) fn brighten(world: &mut World, path: &Path) -> Option<Diagnostic> {
+    if world.lights.is_empty() || world.meshes.is_empty() {
         return None;
     }
     let bounds = framing::bounds(world);
@@ -82,13 +89,20 @@ pub(super) fn note_dim(world: &World, path: &Path) -> Option<Diagnostic> {
     if all >= DIM || !all.is_finite() {
         return None;
     }
+    for light in &mut world.lights {
+        match light {
+            Light::Point(PointLight { intensity: amount, .. })
+            | Light::Spot(SpotLight { intensity: amount, .. })
+            | Light::Directional(DirectionalLight { irradiance: amount, .. }) => {
+                *amount *= LUMENS_PER_WATT as f32;
+            }
+            _ => {}
+        }
+    }
     let message = format!(
-        "the lights of the file are dim: {all:.2e} W/m² in the middle of the scene, where 3 show white as white"
+        "the lights of the file are dim as candela and lux ({all:.2e} W/m² in the middle of the scene, where 3 show white as white): their numbers are taken as W/sr and W/m², as many viewers do"
     );
-    let help = format!(
-        "--exposure {LUMENS_PER_WATT} shows candela and lux of the file as if they were W/sr and W/m²"
-    );
-    Some(Diagnostic::new(path, message).help(help))
+    Some(Diagnostic::new(path, message).help("--exposure 0.001464 shows them as dim as they are"))
 }
 
 /// Cosines of the angles up to which a spot is full and beyond which there is no light.

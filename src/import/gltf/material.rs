@@ -210,7 +210,8 @@ impl Parts<'_, '_> {
         material.emits_back = self.json.truth("doubleSided")?.unwrap_or(false);
         let mut is_invisible = false;
         if let AlphaMode::Mask(cutoff) = self.alpha_mode(alpha)? {
-            is_invisible = self.laid.base.is_none() && alpha < cutoff;
+            // An image only takes from it.
+            is_invisible = alpha < cutoff;
             material.alpha = self.mask(alpha, cutoff)?;
         }
         if let Some((glass, transmission)) = self.glass(base, pbr.as_ref())? {

@@ -17,6 +17,7 @@ mod component;
 mod container;
 mod deform;
 mod document;
+mod extensions;
 mod image;
 mod instances;
 mod json;
@@ -52,7 +53,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &ModelOptions) -> Result<
     let mut files = vec![path.to_path_buf()];
     let document = Document::open(path, &value, container.bin, &mut files)?;
     let mut notes = Notes::default();
-    document.note_extensions(&mut notes)?;
+    extensions::note_unread(&document.top, &mut notes)?;
     let nodes = Nodes::read(&document)?;
     node::note_scenes(&document, &mut notes)?;
     let animations = Animations::read(&document, &mut notes)?;
@@ -63,7 +64,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], options: &ModelOptions) -> Result<
     let mut model =
         Assembly::of(&document, &nodes, (&animations, options.time), model, &mut notes)?.build()?;
     model.warnings_alone = of_camera.into_warnings(path);
-    model.warnings_alone.extend(light::note_dim(&model.world, path));
+    model.warnings.extend(light::brighten(&mut model.world, path));
     let is_empty = model.world.meshes.is_empty();
     if is_empty {
         model

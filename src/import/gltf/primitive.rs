@@ -2,6 +2,7 @@
 
 use super::accessor::Accessor;
 use super::document::Document;
+use super::extensions;
 use super::json::Json;
 use crate::error::Result;
 use crate::import::source::Notes;
@@ -81,6 +82,12 @@ pub(super) fn size(document: &Document<'_>, json: &Json<'_>) -> Result<Size> {
     let empty = Size { pieces: 1, ..Size::default() };
     let Some(mode) = mode(json)? else { return Ok(empty) };
     let Some(position) = json.required("attributes")?.get("POSITION") else { return Ok(empty) };
+    let accessor = &document.accessors[position.as_index(document.accessors.len(), "accessor")?];
+    let is_there = accessor.get("bufferView").or(accessor.get("sparse")).is_some();
+    // Without bytes all vertices would be zero.
+    if let Some(fault) = extensions::packed(json).filter(|_| !is_there) {
+        return Err(fault.into());
+    }
     let vertices = Accessor::open(document, &position)?.count;
     let indices = match json.get("indices") {
         Some(indices) => Accessor::open(document, &indices)?.count,

@@ -1,6 +1,7 @@
 //! How an image lies on a surface: sampler, set of coordinates, KHR_texture_transform.
 
 use super::document::Document;
+use super::extensions;
 use super::json::Json;
 use crate::error::Result;
 use crate::import::source::Notes;
@@ -53,7 +54,8 @@ impl<'d> TextureTable<'d> {
             let message =
                 "the texture has no `source`: its image is of a format that only an extension has";
             let help = "export the file again with png or jpeg images";
-            return Err(texture.fault(message).help(help).into());
+            let unnamed = || texture.fault(message).help(help);
+            return Err(extensions::packed(texture).unwrap_or_else(unnamed).into());
         };
         let sampler = texture.index("sampler", self.samplers.len(), "sampler")?;
         let wrap = match sampler {
