@@ -67,6 +67,8 @@ fn json_that_is_damaged_is_refused_with_line_and_column() {
     let Err(Error::Input(d)) = written.model() else { panic!("refused") };
     assert_eq!((d.line, d.column), (Some(2), Some(13)));
     assert_eq!(d.message, "the JSON of the file is damaged: key must be a string");
+    let marked = [b"\xef\xbb\xbf".as_slice(), File::new().json.to_string().as_bytes()].concat();
+    assert!(Written::of("test.gltf", &marked).model().is_ok(), "a byte order mark");
     let help = "\n  help: export the file again, or check it with a glTF validator";
     let nested = "[".repeat(100_000);
     let deep = refusal("test.glb", &glb_of(nested.as_bytes(), b""));

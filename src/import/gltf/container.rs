@@ -34,7 +34,8 @@ pub(super) fn open<'a>(file: &Path, bytes: &'a [u8]) -> Result<Container<'a>> {
     let container = if bytes.starts_with(MAGIC) {
         glb(file, bytes)?
     } else {
-        Container { json: bytes, bin: None }
+        // Some editors write a byte order mark.
+        Container { json: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), bin: None }
     };
     let length = container.json.len();
     if length > MAX_JSON {

@@ -97,7 +97,9 @@ pub(super) fn read(path: &Path) -> Result<String> {
         return Err(Error::input(path, message));
     }
     let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
-    String::from_utf8(bytes).map_err(|e| {
+    // Some editors write a byte order mark.
+    let start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    String::from_utf8(bytes[start..].to_vec()).map_err(|e| {
         let offset = e.utf8_error().valid_up_to();
         let message = format!("the file is not UTF-8 text from byte {offset} on");
         let help =

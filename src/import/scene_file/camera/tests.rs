@@ -188,6 +188,18 @@ fn pose_files_that_are_wrong_are_refused_with_their_place() {
 }
 
 #[test]
+fn distortion_of_0_and_cameras_that_no_image_has_do_not_matter() {
+    let cameras = "1 SIMPLE_RADIAL 800 400 700 400 200 0\n2 OPENCV_FISHEYE 800 400 700 700 400 200 1 2 3 4\n3 x\n";
+    let shot = |cameras: &str| {
+        let images = "1 1 0 0 0 0 0 5 1 a.png\n\n";
+        good(TXT, &[("images.txt", images), ("cameras.txt", cameras)]).shot
+    };
+    let plain = "\u{feff}1 PINHOLE 800 400 700 700 400 200\n";
+    let [radial, plain] = [cameras, plain].map(|cameras| shot(cameras).camera(1, 800, 400));
+    assert_eq!(radial.expect("a camera"), plain.expect("a camera"));
+}
+
+#[test]
 fn colmap_files_that_are_wrong_are_refused_with_their_line() {
     let cameras = "1 PINHOLE 800 400 700 700 400 200\n";
     let image = "1 1 0 0 0 0 0 5 1 a.png\n\n";
@@ -197,9 +209,10 @@ fn colmap_files_that_are_wrong_are_refused_with_their_line() {
         (cameras, "1 0 0 0 0 0 0 5 1 a\n", "images.txt", Some(1), "quaternion"),
         (cameras, "1 1 0 0 0 0 nan 5 1 a\n", "images.txt", Some(1), "TY is NaN"),
         (cameras, "1 1 0 0 0 0 0 5 2 a\n", "images.txt", Some(1), "the camera 2 is not in"),
+        (cameras, "1 1 0 0 0 0 0 5 1 a\n2 1 0 0 0 0 0 5 1 b\n", "images.txt", Some(2), "no points"),
         (cameras, "# none\n", "images.txt", None, "0 poses"),
         (
-            "1 OPENCV 800 400 700 700 400 200 0 0 0 0\n",
+            "1 OPENCV 800 400 700 700 400 200 0 0 1e-3 0\n",
             image,
             "cameras.txt",
             Some(1),
